@@ -15,7 +15,7 @@ add_library(o80_private_headers INTERFACE)
 target_link_libraries(o80_private_headers INTERFACE o80_headers)
 target_include_directories(o80_private_headers INTERFACE ${PROJECT_SOURCE_DIR}/src)
 
-file(GLOB o80_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*/*.cpp)
+file(GLOB_RECURSE o80_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/*.cpp)
 list(FILTER o80_sources EXCLUDE REGEX "/src/programs/")
 # the hash of all sources is a source of its own, compiled alone because it changes with each of them
 file(GLOB_RECURSE hashed_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/include/o80/*.hpp

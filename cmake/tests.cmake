@@ -1,18 +1,20 @@
-# One test program for each folder of tests/cpp, and for the folder tests/cpp of each robot and
-# simulator, which is named after the robot. A test finds the built programs and robots beside itself
+# One test program for each folder of tests/cpp, the rooms in it included, and for the folder
+# tests/cpp of each robot and simulator, which is named after the robot. A test finds the built programs and robots beside itself
 # (tests/cpp/places.hpp), laid out as when installed.
 include(cmake/googletest.cmake)
 include(GoogleTest)
 
 file(GLOB test_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/cpp/*/*.cpp
+     ${PROJECT_SOURCE_DIR}/tests/cpp/*/*/*.cpp
      ${PROJECT_SOURCE_DIR}/robots/*/tests/cpp/*.cpp ${PROJECT_SOURCE_DIR}/simulators/*/tests/cpp/*.cpp
      ${PROJECT_SOURCE_DIR}/devices/tests/cpp/*.cpp
 )
 set(test_folders)
 foreach(source IN LISTS test_sources)
   cmake_path(GET source PARENT_PATH folder)
-  cmake_path(GET folder FILENAME name)
-  if(name STREQUAL "cpp") # of a robot
+  cmake_path(RELATIVE_PATH folder BASE_DIRECTORY ${PROJECT_SOURCE_DIR}/tests/cpp OUTPUT_VARIABLE name)
+  string(REGEX REPLACE "/.*" "" name ${name})
+  if(name STREQUAL "..") # of a robot
     cmake_path(SET robot NORMALIZE ${folder}/../..)
     cmake_path(GET robot PARENT_PATH robot)
     cmake_path(GET robot FILENAME name)
@@ -35,7 +37,7 @@ else()
 endif()
 
 # the layers that do the work of an iteration once more, with that work counted
-file(GLOB counted_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/control/*.cpp
+file(GLOB_RECURSE counted_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/control/*.cpp
      ${PROJECT_SOURCE_DIR}/src/runtime/*.cpp
 )
 add_library(o80_bounded OBJECT EXCLUDE_FROM_ALL ${counted_sources})
@@ -44,7 +46,7 @@ target_compile_options(o80_bounded PRIVATE -ffp-contract=off -O1)
 target_link_libraries(o80_bounded PRIVATE o80_private_headers o80_warnings)
 
 # the memory layer once more, with labelled points at which a process can be killed
-file(GLOB memory_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/memory/*.cpp)
+file(GLOB_RECURSE memory_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/src/memory/*.cpp)
 add_library(o80_killed OBJECT EXCLUDE_FROM_ALL ${memory_sources})
 target_compile_definitions(o80_killed PUBLIC O80_CRASH_POINTS)
 target_compile_options(o80_killed PRIVATE ${test_options})

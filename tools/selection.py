@@ -110,8 +110,10 @@ def _add_path(chosen: Selection, path: Path, word: str) -> None:
         if path == folder:
             chosen.cpp[name] = set()
             return
-        if path.parent == folder and path.suffix == ".cpp":
-            suites = re.findall(r"^TEST(?:_F|_P)?\((\w+),", path.read_text(), re.MULTILINE)
+        if folder in path.parents and (path.is_dir() or path.suffix == ".cpp"):
+            sources = path.rglob("*.cpp") if path.is_dir() else [path]
+            text = "".join(source.read_text() for source in sources)
+            suites = re.findall(r"^TEST(?:_F|_P)?\((\w+),", text, re.MULTILINE)
             if name not in chosen.cpp or chosen.cpp[name]:
                 chosen.cpp.setdefault(name, set()).update(suites)
             return

@@ -3,7 +3,7 @@
 #include <cstring>
 
 #include "empty_robot.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 #include "sample.hpp"
 
 namespace o80::bench {

@@ -10,7 +10,7 @@
 
 #include "control/record.hpp"
 #include "empty_robot.hpp"
-#include "memory/segment_name.hpp"
+#include "memory/segment/segment_name.hpp"
 #include "sample.hpp"
 
 namespace o80::bench {

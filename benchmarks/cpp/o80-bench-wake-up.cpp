@@ -3,7 +3,7 @@
 #include <sys/mman.h>
 
 #include "empty_robot.hpp"
-#include "memory/futex.hpp"
+#include "memory/os/futex.hpp"
 #include "ping_pong.hpp"
 #include "sample.hpp"
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <thread>
 
-#include "memory/spinner.hpp"
+#include "memory/os/spinner.hpp"
 #include "sample.hpp"
 
 namespace o80::bench {

@@ -21,7 +21,7 @@
 #include "arguments.hpp"
 #include "bindings.hpp"
 #include "loop_options.hpp"
-#include "memory/fork.hpp"
+#include "memory/os/fork.hpp"
 #include "o80/runtime/observation.hpp"
 #include "pickling.hpp"
 #include "schema_builder.hpp"

@@ -1,6 +1,6 @@
 // Exclusive control as a context manager.
 
-#include "runtime/control_block.hpp"
+#include "runtime/frontend/control_block.hpp"
 
 #include <nanobind/nanobind.h>
 
@@ -13,7 +13,7 @@
 #include "errors.hpp"
 #include "frontend.hpp"
 #include "pickling.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;

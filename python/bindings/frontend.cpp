@@ -12,7 +12,7 @@
 #include "arguments.hpp"
 #include "bindings.hpp"
 #include "describe/table.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 #include "states.hpp"
 #include "verb.hpp"
 #include "waiting.hpp"

@@ -11,7 +11,7 @@
 #include "buffer.hpp"
 #include "frontend.hpp"
 #include "pickling.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 #include "verb.hpp"
 #include "waiting.hpp"
 

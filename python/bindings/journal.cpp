@@ -14,8 +14,8 @@
 #include "bindings.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
-#include "runtime/raw_journal.hpp"
-#include "runtime/recorded_journal.hpp"
+#include "runtime/frontend/raw_journal.hpp"
+#include "runtime/journal/recorded_journal.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;

@@ -1,4 +1,4 @@
-#include "runtime/loop_state.hpp"
+#include "runtime/frontend/loop_state.hpp"
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>

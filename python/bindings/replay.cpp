@@ -19,7 +19,7 @@
 #include "o80/runtime/observation.hpp"
 #include "open_replay.hpp"
 #include "robot/library.hpp"
-#include "runtime/driverless_replay.hpp"
+#include "runtime/replay/driverless_replay.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;

@@ -3,8 +3,8 @@
 #include <nanobind/stl/vector.h>
 
 #include "bindings.hpp"
-#include "memory/process_start.hpp"
-#include "memory/segment_name.hpp"
+#include "memory/os/process_start.hpp"
+#include "memory/segment/segment_name.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "waiting.hpp"
 

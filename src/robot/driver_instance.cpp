@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cstdio>
 
-#include "memory/fork.hpp"
+#include "memory/os/fork.hpp"
 #include "o80/base/version.hpp"
 
 namespace o80 {

@@ -8,10 +8,10 @@
 
 #include "control/batch_builder.hpp"
 #include "control/limits.hpp"
-#include "memory/futex.hpp"
-#include "memory/signal.hpp"
+#include "memory/os/futex.hpp"
+#include "memory/segment/signal.hpp"
 #include "robot/descriptor_limit.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 
 namespace o80 {
 

@@ -10,7 +10,7 @@
 #include <thread>
 #include <vector>
 
-#include "memory/fork.hpp"
+#include "memory/os/fork.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/keep_waiting.hpp"
 #include "o80/control/command.hpp"

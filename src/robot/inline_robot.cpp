@@ -7,8 +7,8 @@
 #include <cstring>
 #include <utility>
 
-#include "memory/futex.hpp"
-#include "memory/signal.hpp"
+#include "memory/os/futex.hpp"
+#include "memory/segment/signal.hpp"
 #include "o80/base/error.hpp"
 
 namespace o80 {

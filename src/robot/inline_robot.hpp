@@ -10,8 +10,8 @@
 
 #include "o80/runtime/frontend.hpp"
 #include "robot/loop.hpp"
-#include "runtime/direct_burst.hpp"
-#include "runtime/inline_runner.hpp"
+#include "runtime/backend/direct_burst.hpp"
+#include "runtime/backend/inline_runner.hpp"
 
 namespace o80 {
 

@@ -4,8 +4,8 @@
 #include <bit>
 
 #include "base/short_text.hpp"
-#include "memory/signal.hpp"
-#include "memory/verb_word.hpp"
+#include "memory/segment/signal.hpp"
+#include "memory/segment/verb_word.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
 #include "o80/robot/plant_requests.hpp"

@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "memory/fork.hpp"
-#include "memory/verb_word.hpp"
+#include "memory/os/fork.hpp"
+#include "memory/segment/verb_word.hpp"
 #include "o80/runtime/backend.hpp"
 #include "robot/driver_instance.hpp"
 #include "robot/pacer.hpp"
@@ -89,7 +89,7 @@ class Loop final : public RequestServer {
   bool begin();
   bool cannot_begin();
   /// Calls a function of the driver. Observers see which one has not returned
-  /// (memory/verb_word.hpp).
+  /// (memory/segment/verb_word.hpp).
   template <class Call>
   auto calls(Verb verb, Call&& call) noexcept {
     backend_.enter(verb);

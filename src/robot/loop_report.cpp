@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "base/printable.hpp"
-#include "memory/futex.hpp"
+#include "memory/os/futex.hpp"
 #include "o80/base/time.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "robot/service_manager.hpp"

@@ -6,9 +6,9 @@
 #include <string>
 #include <thread>
 
-#include "memory/halt_word.hpp"
+#include "memory/segment/halt_word.hpp"
 #include "o80/describe/layout.hpp"
-#include "runtime/loop_state.hpp"
+#include "runtime/frontend/loop_state.hpp"
 
 namespace o80 {
 

@@ -8,7 +8,7 @@
 #include <cerrno>
 #include <cstring>
 
-#include "memory/liveness.hpp"
+#include "memory/segment/liveness.hpp"
 
 namespace o80 {
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "o80/base/error.hpp"
-#include "runtime/recorded_entry_check.hpp"
+#include "runtime/journal/recorded_entry_check.hpp"
 
 namespace o80 {
 

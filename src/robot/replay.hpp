@@ -9,7 +9,7 @@
 #include "o80/runtime/journal.hpp"
 #include "robot/driver_instance.hpp"
 #include "robot/loop.hpp"
-#include "runtime/recorded_decisions.hpp"
+#include "runtime/journal/recorded_decisions.hpp"
 
 namespace o80 {
 

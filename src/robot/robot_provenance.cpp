@@ -15,7 +15,7 @@
 #include <utility>
 
 #include "base/sha256.hpp"
-#include "memory/fork.hpp"
+#include "memory/os/fork.hpp"
 
 namespace o80 {
 

@@ -18,7 +18,7 @@
 
 #include "base/printable.hpp"
 #include "describe/number_name.hpp"
-#include "memory/owned_segment.hpp"
+#include "memory/segment/owned_segment.hpp"
 #include "o80/base/error.hpp"
 #include "o80/robot/real_time.hpp"
 #include "robot/loop.hpp"

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <utility>
 
-#include "memory/futex.hpp"
-#include "memory/signal.hpp"
+#include "memory/os/futex.hpp"
+#include "memory/segment/signal.hpp"
 
 namespace o80 {
 

@@ -6,8 +6,8 @@
 #include <thread>
 #include <vector>
 
-#include "memory/fork.hpp"
-#include "memory/spinner.hpp"
+#include "memory/os/fork.hpp"
+#include "memory/os/spinner.hpp"
 
 namespace o80 {
 

@@ -27,7 +27,7 @@ def test_a_package_stands_for_its_tests_in_both_languages(word: str) -> None:
 
 
 def test_a_file_of_the_core_stands_for_its_suites() -> None:
-    chosen = select(["tests/cpp/memory/lane_test.cpp"])
+    chosen = select(["tests/cpp/memory/ring/lane_test.cpp"])
     assert "LaneTest" in chosen.cpp["memory"]
     assert re.match(chosen.cpp_pattern(), "memory.LaneTest.SendsABatch")
     assert not re.match(chosen.cpp_pattern(), "memory.KillTest.Dies")
@@ -35,8 +35,8 @@ def test_a_file_of_the_core_stands_for_its_suites() -> None:
 
 def test_a_folder_beside_one_of_its_files_stays_whole() -> None:
     for words in (
-        ["memory", "tests/cpp/memory/lane_test.cpp"],
-        ["tests/cpp/memory/lane_test.cpp", "memory"],
+        ["memory", "tests/cpp/memory/ring/lane_test.cpp"],
+        ["tests/cpp/memory/ring/lane_test.cpp", "memory"],
     ):
         assert select(words).cpp == {"memory": set()}
 

@@ -28,7 +28,9 @@ GAP = "o80.gap"
 """Name of the metadata record of rows that were overwritten before they were read."""
 
 
-_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")  # as src/memory/segment_name.cpp allows
+_NAME = re.compile(
+    r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"
+)  # as src/memory/segment/segment_name.cpp allows
 
 
 @dataclass(frozen=True)

@@ -14,8 +14,8 @@
 
 #include "benchmarks/cpp/flooded_backend.hpp"
 #include "bounded/counted_work.hpp"
-#include "memory/attached_segment.hpp"
 #include "memory/private_directory.hpp"
+#include "memory/segment/attached_segment.hpp"
 
 namespace o80::test {
 namespace {

@@ -27,7 +27,7 @@
 #include <utility>
 #include <vector>
 
-#include "memory/futex.hpp"
+#include "memory/os/futex.hpp"
 
 namespace o80::test {
 namespace {

@@ -18,7 +18,7 @@
 #include <thread>
 #include <vector>
 
-#include "memory/futex.hpp"
+#include "memory/os/futex.hpp"
 
 namespace o80::test {
 namespace {

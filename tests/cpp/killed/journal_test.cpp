@@ -1,6 +1,6 @@
 // A writer of the journal that is killed at every labelled point: readers see whole entries only.
 
-#include "memory/journal.hpp"
+#include "memory/ring/journal.hpp"
 
 #include <gmock/gmock.h>
 #include <sys/wait.h>

@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "base/crash_point.hpp"
-#include "memory/segment_draft.hpp"
-#include "memory/segment_name.hpp"
+#include "memory/segment/segment_draft.hpp"
+#include "memory/segment/segment_name.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
 

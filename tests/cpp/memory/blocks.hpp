@@ -7,8 +7,8 @@
 #include <span>
 #include <vector>
 
-#include "memory/atomic_words.hpp"
-#include "memory/lane.hpp"
+#include "memory/os/atomic_words.hpp"
+#include "memory/ring/lane.hpp"
 
 namespace o80 {
 

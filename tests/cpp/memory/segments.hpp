@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "memory/private_directory.hpp"
-#include "memory/segment.hpp"
+#include "memory/segment/segment.hpp"
 
 namespace o80 {
 

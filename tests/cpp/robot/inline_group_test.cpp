@@ -10,7 +10,7 @@
 #include "memory/child_process.hpp"
 #include "o80/memory/segment_list.hpp"
 #include "robot/drifter.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 
 namespace o80::test {
 namespace {

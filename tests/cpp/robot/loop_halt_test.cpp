@@ -16,7 +16,7 @@
 #include <stdexcept>
 #include <thread>
 
-#include "memory/verb_word.hpp"
+#include "memory/segment/verb_word.hpp"
 #include "readings_played.hpp"
 #include "robot/loop.hpp"
 #include "robot/puppet.hpp"

@@ -13,7 +13,7 @@
 
 #include "o80/robot/make_table.hpp"
 #include "robot/puppet.hpp"
-#include "runtime/driverless_replay.hpp"
+#include "runtime/replay/driverless_replay.hpp"
 
 namespace o80::test {
 namespace {

@@ -9,7 +9,7 @@
 #include <random>
 
 #include "control/batch_builder.hpp"
-#include "memory/lane.hpp"
+#include "memory/ring/lane.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

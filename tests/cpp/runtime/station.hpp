@@ -15,7 +15,7 @@
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "o80/runtime/robot_types.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 
 namespace o80::test {
 

@@ -13,8 +13,8 @@
 #include <string_view>
 
 #include "base/crash_point.hpp"
-#include "memory/segment_layout.hpp"
-#include "memory/segment_name.hpp"
+#include "memory/segment/segment_layout.hpp"
+#include "memory/segment/segment_name.hpp"
 
 namespace torture {
 

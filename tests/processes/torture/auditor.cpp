@@ -3,7 +3,7 @@
 #include <map>
 
 #include "describe/table.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 #include "torture/actor.hpp"
 #include "torture/journal_audit.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <bit>
 
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 
 namespace torture {
 

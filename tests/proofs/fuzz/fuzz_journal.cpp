@@ -11,12 +11,12 @@
 
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
-#include "memory/journal.hpp"
+#include "memory/ring/journal.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/journal.hpp"
-#include "runtime/decision_journal.hpp"
-#include "runtime/journal_records.hpp"
-#include "runtime/recorded_journal.hpp"
+#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_records.hpp"
+#include "runtime/journal/recorded_journal.hpp"
 
 namespace o80::fuzz {
 namespace {

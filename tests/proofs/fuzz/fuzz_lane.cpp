@@ -15,13 +15,13 @@
 #include "control/batch_builder.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
-#include "memory/atomic_words.hpp"
-#include "memory/lane.hpp"
-#include "memory/liveness.hpp"
+#include "memory/os/atomic_words.hpp"
+#include "memory/ring/lane.hpp"
+#include "memory/segment/liveness.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/frontend.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 
 namespace o80::fuzz {
 namespace {

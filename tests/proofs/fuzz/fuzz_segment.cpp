@@ -18,15 +18,15 @@
 #include "describe/table.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
-#include "memory/segment.hpp"
-#include "memory/segment_file.hpp"
-#include "memory/segment_name.hpp"
+#include "memory/segment/segment.hpp"
+#include "memory/segment/segment_file.hpp"
+#include "memory/segment/segment_name.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "o80/runtime/journal.hpp"
 #include "o80/runtime/typed_frontend.hpp"
-#include "runtime/link.hpp"
+#include "runtime/frontend/link.hpp"
 
 namespace o80::fuzz {
 namespace {

@@ -108,14 +108,14 @@ class Relacy:
     """Compiles models together with the sources of the product, or with a mutant of them."""
 
     SOURCES = (
-        "src/memory/halt_word.cpp",
-        "src/memory/history.cpp",
-        "src/memory/journal.cpp",
-        "src/memory/lane_receiver.cpp",
-        "src/memory/lane_sender.cpp",
-        "src/memory/segment_file.cpp",
-        "src/memory/segment_layout.cpp",
-        "src/memory/signal.cpp",
+        "src/memory/segment/halt_word.cpp",
+        "src/memory/ring/history.cpp",
+        "src/memory/ring/journal.cpp",
+        "src/memory/ring/lane_receiver.cpp",
+        "src/memory/ring/lane_sender.cpp",
+        "src/memory/segment/segment_file.cpp",
+        "src/memory/segment/segment_layout.cpp",
+        "src/memory/segment/signal.cpp",
     )
     FLAGS = ("-std=c++20", "-O1", "-w", "-fno-sized-deallocation")
 

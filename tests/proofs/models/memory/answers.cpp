@@ -1,13 +1,13 @@
 // The answers of a lane: nobody sleeps on while what it waits for is there, though no slice ever
 // passes.
 //
-// mutant flag_not_looked_at_again: src/memory/lane_receiver.cpp
+// mutant flag_not_looked_at_again: src/memory/ring/lane_receiver.cpp
 //   - sleepers || waiting.load(std::memory_order_seq_cst) != 0;
 //   + sleepers;
-// mutant flag_not_raised: src/memory/lane_sender.cpp
+// mutant flag_not_raised: src/memory/ring/lane_sender.cpp
 //   - page_->waiting.store(1, std::memory_order_seq_cst);
 //   +
-// mutant sleeps_on_a_later_value: src/memory/lane_sender.cpp
+// mutant sleeps_on_a_later_value: src/memory/ring/lane_sender.cpp
 //   - futex_wait(wake, now, at_most);
 //   + futex_wait(wake, wake.load(std::memory_order_seq_cst), at_most);
 

@@ -1,15 +1,15 @@
 // The bell: a backend that found nothing to do does not sleep while something was committed.
 //
-// mutant looks_before_it_rings: src/memory/signal.cpp
+// mutant looks_before_it_rings: src/memory/segment/signal.cpp
 //   - bell.rung.fetch_add(1, std::memory_order_seq_cst);
 //   + const bool sleeps = view.wakes().sleeping.load(std::memory_order_seq_cst) != 0;
 //   + bell.rung.fetch_add(1, std::memory_order_seq_cst);
 //   - if (view.wakes().sleeping.load(std::memory_order_seq_cst) != 0)
 //   + if (sleeps)
-// mutant looks_relaxed: src/memory/signal.cpp
+// mutant looks_relaxed: src/memory/segment/signal.cpp
 //   - if (view.wakes().sleeping.load(std::memory_order_seq_cst) != 0)
 //   + if (view.wakes().sleeping.load(std::memory_order_relaxed) != 0)
-// mutant sleeps_in_secret: src/memory/signal.cpp
+// mutant sleeps_in_secret: src/memory/segment/signal.cpp
 //   - sleeping.store(1, std::memory_order_seq_cst);
 //   +
 

@@ -1,7 +1,7 @@
 // The burst hand-shake: request, grant, rows, answer, wake-up. Nobody sleeps on while its answer is
 // there, and who has its answer reads its row.
 //
-// mutant burst_relaxed: src/memory/lane_receiver.cpp
+// mutant burst_relaxed: src/memory/ring/lane_receiver.cpp
 //   - slot.id.store(id, std::memory_order_release);    // sync burst
 //   + slot.id.store(id, std::memory_order_relaxed);
 

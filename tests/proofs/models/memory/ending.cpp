@@ -1,15 +1,15 @@
 // The end of a backend: whoever waits, for a row or with a lane, is told at once, though no slice
 // ever passes; what was there before the end is not lost to it.
 //
-// mutant end_of_rows_slept_through: src/memory/signal.cpp
+// mutant end_of_rows_slept_through: src/memory/segment/signal.cpp
 //   - // the end is stored before `row_wake` changes: has_ended() is reliable after the load above
 //   - if (segment.has_ended()) return std::nullopt;
 //   +
-// mutant end_of_lanes_slept_through: src/memory/lane_sender.cpp
+// mutant end_of_lanes_slept_through: src/memory/ring/lane_sender.cpp
 //   - // the end is stored before `lane_wake` changes: has_ended() is reliable after the load above
 //   - if (segment_->has_ended()) return;
 //   +
-// mutant ended_after_the_wake: src/memory/segment_file.cpp
+// mutant ended_after_the_wake: src/memory/segment/segment_file.cpp
 //   - counters.state.store(static_cast<std::uint32_t>(state), std::memory_order_seq_cst);
 //   +
 //   - futex_wake(wakes.row_wake, kEverybody);
@@ -17,7 +17,7 @@
 //   + counters.state.store(static_cast<std::uint32_t>(state), std::memory_order_seq_cst);
 
 #include "kernel.hpp"
-#include "memory/segment_file.hpp"
+#include "memory/segment/segment_file.hpp"
 #include "o80/base/error.hpp"
 
 namespace {

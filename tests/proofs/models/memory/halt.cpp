@@ -1,7 +1,7 @@
 // The halt: each one that is asked for is latched, also by a backend that stands still; a resume
 // clears none that it has not seen; what is shown is of one halt.
 //
-// mutant asked_without_the_bell: src/memory/halt_word.cpp
+// mutant asked_without_the_bell: src/memory/segment/halt_word.cpp
 //   - O80_CRASH_POINT("halt.after_count");
 //   - ring_bell(view);
 //   - write_halt(
@@ -9,25 +9,25 @@
 //   - // again: the backend may have read the slot before this reason and sleep since
 //   - ring_bell(view);
 //   +
-// mutant counted_not_added: src/memory/halt_word.cpp
+// mutant counted_not_added: src/memory/segment/halt_word.cpp
 //   - bell.halts.fetch_add(1, std::memory_order_seq_cst) + 1;
 //   + bell.halts.load(std::memory_order_seq_cst) + 1;
 //   + bell.halts.store(number, std::memory_order_seq_cst);
-// mutant clears_what_it_has_not_seen: src/memory/halt_word.cpp
+// mutant clears_what_it_has_not_seen: src/memory/segment/halt_word.cpp
 //   - if (view_.bell().halts.load(std::memory_order_seq_cst) != seen_) return false;
 //   + seen_ = view_.bell().halts.load(std::memory_order_seq_cst);
-// mutant reason_relaxed: src/memory/halt_word.cpp
+// mutant reason_relaxed: src/memory/segment/halt_word.cpp
 //   - slot.number.store(number, std::memory_order_release);
 //   + slot.number.store(number, std::memory_order_relaxed);
-// mutant reason_changed_in_public: src/memory/halt_word.cpp
+// mutant reason_changed_in_public: src/memory/segment/halt_word.cpp
 //   - slot.number.store(0, std::memory_order_relaxed);
 //   +
-// mutant reason_not_asked_again: src/memory/halt_word.cpp
+// mutant reason_not_asked_again: src/memory/segment/halt_word.cpp
 //   - if (slot.number.load(std::memory_order_relaxed) != number) return false;
 //   +
 
 #include "kernel.hpp"
-#include "memory/halt_word.hpp"
+#include "memory/segment/halt_word.hpp"
 
 namespace {
 

@@ -1,21 +1,21 @@
 // The history ring: a reader never accepts a torn row, or a row that is not the one it asked for.
 //
-// mutant without_release_fence: src/memory/history.cpp
+// mutant without_release_fence: src/memory/ring/history.cpp
 //   - std::atomic_thread_fence(std::memory_order_release);
 //   +
-// mutant without_acquire_fence: src/memory/history.cpp
+// mutant without_acquire_fence: src/memory/ring/history.cpp
 //   - std::atomic_thread_fence(std::memory_order_acquire);
 //   +
-// mutant never_begun: src/memory/history.cpp
+// mutant never_begun: src/memory/ring/history.cpp
 //   - counters_->begun.store(k, std::memory_order_relaxed);
 //   +
-// mutant published_relaxed: src/memory/history.cpp
+// mutant published_relaxed: src/memory/ring/history.cpp
 //   - counters_->published.store(k, std::memory_order_seq_cst);
 //   + counters_->published.store(k, std::memory_order_relaxed);
-// mutant read_relaxed: src/memory/history.cpp
+// mutant read_relaxed: src/memory/ring/history.cpp
 //   - counters_->published.load(std::memory_order_acquire);
 //   + counters_->published.load(std::memory_order_relaxed);
-// mutant one_row_too_many: src/memory/history.cpp
+// mutant one_row_too_many: src/memory/ring/history.cpp
 //   - static_cast<Iteration>(slots_) + 1;
 //   + static_cast<Iteration>(slots_);
 

@@ -1,32 +1,32 @@
 // The journal: a reader never accepts a torn entry, gets every entry once and in order, and counts
 // exactly those that were overwritten before it came.
 //
-// mutant without_release_fence: src/memory/journal.cpp
+// mutant without_release_fence: src/memory/ring/journal.cpp
 //   - std::atomic_thread_fence(std::memory_order_release);
 //   +
-// mutant without_acquire_fence: src/memory/journal.cpp
+// mutant without_acquire_fence: src/memory/ring/journal.cpp
 //   - std::atomic_thread_fence(std::memory_order_acquire);
 //   +
-// mutant never_begun: src/memory/journal.cpp
+// mutant never_begun: src/memory/ring/journal.cpp
 //   - counters_->begun.store(position_ + length, std::memory_order_relaxed);
 //   +
-// mutant begun_without_its_head: src/memory/journal.cpp
+// mutant begun_without_its_head: src/memory/ring/journal.cpp
 //   - counters_->begun.store(position_ + length, std::memory_order_relaxed);
 //   + counters_->begun.store(position_ + length - sizeof(JournalHead), std::memory_order_relaxed);
-// mutant published_relaxed: src/memory/journal.cpp
+// mutant published_relaxed: src/memory/ring/journal.cpp
 //   - counters_->published.store(position_, std::memory_order_release);
 //   + counters_->published.store(position_, std::memory_order_relaxed);
-// mutant read_relaxed: src/memory/journal.cpp
+// mutant read_relaxed: src/memory/ring/journal.cpp
 //   - counters_->published.load(std::memory_order_acquire)
 //   + counters_->published.load(std::memory_order_relaxed)
-// mutant overwritten_accepted: src/memory/journal.cpp
+// mutant overwritten_accepted: src/memory/ring/journal.cpp
 //   - if (position_ < first_intact()) return Got::overtaken;
 //   +
-// mutant gap_not_counted: src/memory/journal.cpp
+// mutant gap_not_counted: src/memory/ring/journal.cpp
 //   - item.missed = item.head.number - std::min(expected_, item.head.number);
 //   + item.missed = 0;
 
-#include "memory/journal.hpp"
+#include "memory/ring/journal.hpp"
 
 #include "kernel.hpp"
 

@@ -2,7 +2,7 @@
 
 #include "kernel.hpp"
 
-#include "memory/futex.hpp"
+#include "memory/os/futex.hpp"
 #include "o80/base/error.hpp"
 
 // Relacy counts allocations: all of the program, its libraries included, go the same way

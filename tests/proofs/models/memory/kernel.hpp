@@ -5,10 +5,10 @@
 /// Time stands still: no slice ever passes, so nothing heals a lost wake-up, and Relacy reports a
 /// state in which everybody sleeps.
 
-#include "memory/history.hpp"
-#include "memory/lane.hpp"
-#include "memory/segment_layout.hpp"
-#include "memory/signal.hpp"
+#include "memory/ring/history.hpp"
+#include "memory/ring/lane.hpp"
+#include "memory/segment/segment_layout.hpp"
+#include "memory/segment/signal.hpp"
 
 namespace model {
 

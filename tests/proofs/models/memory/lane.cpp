@@ -1,22 +1,22 @@
 // Lanes: batches come whole, in the order of their tickets and of what caused them, never before
 // their commit, and blocks are never overwritten before they were given back.
 //
-// mutant committed_relaxed: src/memory/lane_sender.cpp
+// mutant committed_relaxed: src/memory/ring/lane_sender.cpp
 //   - page_->committed.store(sent_, std::memory_order_release);
 //   + page_->committed.store(sent_, std::memory_order_relaxed);
-// mutant freed_relaxed: src/memory/lane_receiver.cpp
+// mutant freed_relaxed: src/memory/ring/lane_receiver.cpp
 //   - feedback_->freed.store(freed_, std::memory_order_release);
 //   + feedback_->freed.store(freed_, std::memory_order_relaxed);
-// mutant freed_read_relaxed: src/memory/lane_sender.cpp
+// mutant freed_read_relaxed: src/memory/ring/lane_sender.cpp
 //   - feedback_->freed.load(std::memory_order_acquire);
 //   + feedback_->freed.load(std::memory_order_relaxed);
-// mutant commit_before_the_copy: src/memory/lane_sender.cpp
+// mutant commit_before_the_copy: src/memory/ring/lane_sender.cpp
 //   - O80_CRASH_POINT("lane.before_copy");
 //   + page_->committed.store(sent_ + count, std::memory_order_release);
-// mutant tickets_not_looked_at_first: src/memory/lane_receiver.cpp
+// mutant tickets_not_looked_at_first: src/memory/ring/lane_receiver.cpp
 //   - below_ = drawn;
 //   + below_ = ~std::uint64_t{0};
-// mutant ticket_drawn_relaxed: src/memory/lane_sender.cpp
+// mutant ticket_drawn_relaxed: src/memory/ring/lane_sender.cpp
 //   - view_.bell().tickets.fetch_add(1, std::memory_order_seq_cst);
 //   + view_.bell().tickets.fetch_add(1, std::memory_order_relaxed);
 

@@ -1,27 +1,27 @@
 // Waiting for rows: nobody sleeps on while the row it wants is there, though no slice ever passes.
 // One is woken, the first awake wakes the rest.
 //
-// mutant waiter_looks_relaxed: src/memory/signal.cpp
+// mutant waiter_looks_relaxed: src/memory/segment/signal.cpp
 //   - if (view.counters().published.load(std::memory_order_seq_cst) >= k) {
 //   + if (view.counters().published.load(std::memory_order_relaxed) >= k) {
-// mutant published_with_release: src/memory/history.cpp
+// mutant published_with_release: src/memory/ring/history.cpp
 //   - counters_->published.store(k, std::memory_order_seq_cst);
 //   + counters_->published.store(k, std::memory_order_release);
-// mutant writer_looks_relaxed: src/memory/signal.cpp
+// mutant writer_looks_relaxed: src/memory/segment/signal.cpp
 //   - bell.wanted.load(std::memory_order_seq_cst) > k
 //   + bell.wanted.load(std::memory_order_relaxed) > k
-// mutant never_asked: src/memory/signal.cpp
+// mutant never_asked: src/memory/segment/signal.cpp
 //   - while (k < lowest &&
 //   + while (k < 0 &&
-// mutant nobody_tells_the_rest: src/memory/signal.cpp
+// mutant nobody_tells_the_rest: src/memory/segment/signal.cpp
 //   - futex_wake(wake, kEverybody);
 //   +
-// mutant reset_after_the_wake: src/memory/signal.cpp
+// mutant reset_after_the_wake: src/memory/segment/signal.cpp
 //   - bell.wanted.store(kNoWish, std::memory_order_seq_cst);  // sync wanted
 //   +
 //   - O80_CRASH_POINT("rows.after_wake");
 //   + if (sleepers.rows) view.bell().wanted.store(kNoWish, std::memory_order_seq_cst);
-// mutant sleeps_on_a_later_value: src/memory/signal.cpp
+// mutant sleeps_on_a_later_value: src/memory/segment/signal.cpp
 //   - futex_wait(view_.wakes().row_wake, *seen, at_most)
 //   + futex_wait(view_.wakes().row_wake,
 //   +            view_.wakes().row_wake.load(std::memory_order_seq_cst), at_most)

@@ -1,28 +1,28 @@
 // Statuses and results of bursts: an answer is of the id that was asked for, or none, though the
 // places are used again and again.
 //
-// mutant old_word_stays: src/memory/lane_receiver.cpp
+// mutant old_word_stays: src/memory/ring/lane_receiver.cpp
 //   - slot.word.store(StatusWord::announcing(id), std::memory_order_relaxed);
 //   +
-// mutant nothing_announced: src/memory/lane_receiver.cpp
+// mutant nothing_announced: src/memory/ring/lane_receiver.cpp
 //   - slot.word.store(StatusWord::announcing(id), std::memory_order_relaxed);
 //   + slot.word.store(~std::uint64_t{0} >> 16, std::memory_order_relaxed);
-// mutant id_relaxed: src/memory/lane_receiver.cpp
+// mutant id_relaxed: src/memory/ring/lane_receiver.cpp
 //   - slot.id.store(id, std::memory_order_release);  // sync status_id
 //   + slot.id.store(id, std::memory_order_relaxed);
-// mutant word_relaxed: src/memory/lane_receiver.cpp
+// mutant word_relaxed: src/memory/ring/lane_receiver.cpp
 //   - slot.word.store(word, std::memory_order_release);
 //   + slot.word.store(word, std::memory_order_relaxed);
-// mutant word_looked_at_once: src/memory/lane_sender.cpp
+// mutant word_looked_at_once: src/memory/ring/lane_sender.cpp
 //   - slot.word.load(std::memory_order_relaxed) == word) {
 //   + true) {
-// mutant burst_not_taken_back: src/memory/lane_receiver.cpp
+// mutant burst_not_taken_back: src/memory/ring/lane_receiver.cpp
 //   - slot.id.store(0, std::memory_order_relaxed); O80_CRASH_POINT("burst.before_row");
 //   +
-// mutant burst_row_relaxed: src/memory/lane_receiver.cpp
+// mutant burst_row_relaxed: src/memory/ring/lane_receiver.cpp
 //   - slot.row.store(row, std::memory_order_release);
 //   + slot.row.store(row, std::memory_order_relaxed);
-// mutant burst_looked_at_once: src/memory/lane_sender.cpp
+// mutant burst_looked_at_once: src/memory/ring/lane_sender.cpp
 //   - row = slot.row.load(std::memory_order_acquire);                   // sync burst_row
 //   - return slot.id.load(std::memory_order_relaxed) == id;
 //   + row = slot.row.load(std::memory_order_acquire);

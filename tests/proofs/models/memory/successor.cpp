@@ -1,16 +1,16 @@
 // A lane whose owners die anywhere in taking it and sending: their successor's positions go on,
 // each batch is taken once, and the backend can tell who sent it.
 //
-// mutant successor_begins_anew: src/memory/lane_sender.cpp
+// mutant successor_begins_anew: src/memory/ring/lane_sender.cpp
 //   - sent_ = page_->committed.load(std::memory_order_relaxed);
 //   + sent_ = 0;
-// mutant successor_leaves_no_mark: src/memory/lane_sender.cpp
+// mutant successor_leaves_no_mark: src/memory/ring/lane_sender.cpp
 //   - page_->successor_begin.store(sent_, std::memory_order_relaxed);
 //   +
-// mutant successor_counts_relaxed: src/memory/lane_sender.cpp
+// mutant successor_counts_relaxed: src/memory/ring/lane_sender.cpp
 //   - page_->incarnation.store(incarnation_, std::memory_order_release);
 //   + page_->incarnation.store(incarnation_, std::memory_order_relaxed);
-// mutant commit_before_the_copy: src/memory/lane_sender.cpp
+// mutant commit_before_the_copy: src/memory/ring/lane_sender.cpp
 //   - O80_CRASH_POINT("lane.before_copy");
 //   + page_->committed.store(sent_ + count, std::memory_order_release);
 

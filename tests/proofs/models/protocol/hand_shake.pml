@@ -1,9 +1,9 @@
 // The burst hand-shake with deaths: a frontend asks, the backend grants, runs, answers; either may
 // be killed anywhere.
 //
-// Transcribed from src/runtime/backend.cpp (step, publish), backend_burst.cpp (end_burst),
+// Transcribed from src/runtime/backend/backend.cpp (step, publish), backend_burst.cpp (end_burst),
 // backend_lives.cpp (look_at_lives, on_owner_death), batch.cpp (Burst::wait_done) and
-// src/memory/lane_sender.cpp (wait_until, sleep), signal.cpp (BellWaiter, ring_bell),
+// src/memory/ring/lane_sender.cpp (wait_until, sleep), signal.cpp (BellWaiter, ring_bell),
 // lane_receiver.cpp (flush). Sleeps are cut into slices, which end at any time, but do end.
 //
 // safety: two bursts never mix; an answer is of the frontend's own burst and comes after its rows

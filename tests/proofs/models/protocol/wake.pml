@@ -1,7 +1,7 @@
 // Waking those who wait for a row: who is woken first wakes the rest, and may be killed before it
 // does. A slice, a sleep that ends by itself, heals that.
 //
-// Transcribed from src/memory/signal.cpp (RowWaiter::sleep, RowSignal). Memory is in order here:
+// Transcribed from src/memory/segment/signal.cpp (RowWaiter::sleep, RowSignal). Memory is in order here:
 // what the machine may reorder is checked by memory/rows.cpp, which cannot kill.
 //
 // safety: nobody reads a row that is not there; no slice is needed unless somebody was killed

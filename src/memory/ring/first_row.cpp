@@ -1,0 +1,95 @@
+#include "memory/ring/first_row.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "memory/os/futex.hpp"
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+namespace {
+
+constexpr std::int64_t kGlance = 1'000'000;  // between looks at what cannot be slept on [ns]
+
+bool is_there(const RowOf& wanted) noexcept {
+  const Counters& counters = wanted.segment->view().counters();
+  return counters.published.load(std::memory_order_acquire) >= wanted.row;  // sync published
+}
+
+void nap(std::int64_t at_most) noexcept {
+  if (at_most <= 0) return;
+  const timespec pause{.tv_sec = 0, .tv_nsec = static_cast<long>(std::min(at_most, kGlance))};
+  nanosleep(&pause, nullptr);
+}
+
+/// One sleep, which any of the rows ends.
+class Sleep {
+ public:
+  explicit Sleep(std::span<const RowOf> rows) : rows_(rows) {
+    words_.reserve(rows.size());
+    views_.reserve(rows.size());
+  }
+
+  void sleep(std::int64_t at_most) {
+    words_.clear();
+    views_.clear();
+    bool all = true;
+    for (const RowOf& wanted : rows_) {
+      if (wanted.segment->access() != Access::read_write || words_.size() == kMostFutexWords) {
+        all = false;
+        continue;
+      }
+      const auto seen = register_for_row(*wanted.segment, wanted.row);
+      if (!seen) return;
+      views_.push_back(&wanted.segment->view());
+      words_.push_back({.word = &views_.back()->wakes().row_wake, .expected = *seen});
+    }
+    if (!all) at_most = std::min(at_most, kGlance);
+    if (words_.empty() || !futex_wait_any(words_, at_most)) nap(at_most);
+    // several may have been woken through this one
+    for (std::size_t i = 0; i < words_.size(); ++i) pass_on_wake(*views_[i], words_[i].expected);
+  }
+
+ private:
+  std::span<const RowOf> rows_;
+  std::vector<FutexWord> words_;
+  std::vector<const SegmentView*> views_;
+};
+
+}  // namespace
+
+Waited wait_for_first_row(std::span<const RowOf> rows, const Deadline& deadline,
+                          const KeepWaiting& keep_waiting) {
+  static Spinner spinner;
+  for (const RowOf& wanted : rows) wanted.segment->check_process();
+  const auto ready = [&] { return std::ranges::any_of(rows, is_there); };
+  if (spinner.spin(ready)) return Waited::ready;
+
+  const auto has_ended = [](const RowOf& wanted) { return wanted.segment->has_ended(); };
+  // rows may have come before the end
+  const auto throw_if_gone = [&] {
+    const auto gone =
+        std::ranges::find_if(rows, [](const RowOf& wanted) { return wanted.segment->gone(); });
+    if (gone != rows.end() && !ready()) gone->segment->throw_if_gone();
+  };
+  Sleep sleep(rows);
+  std::int64_t look_at = monotonic_now() + kSlice;
+  while (!deadline.over()) {
+    sleep.sleep(deadline.left(std::max<std::int64_t>(0, look_at - monotonic_now())));
+    if (ready()) return Waited::ready;
+    if (monotonic_now() < look_at && std::ranges::none_of(rows, has_ended)) continue;
+    look_at = monotonic_now() + kSlice;
+    if (keep_waiting && !keep_waiting())
+      throw Cancelled("the wait for the first of several rows was cancelled");
+    throw_if_gone();
+    if (ready()) return Waited::ready;
+  }
+  // a wait too short to look around learns of an end all the same
+  throw_if_gone();
+  return ready() ? Waited::ready : Waited::timed_out;
+}
+
+}  // namespace o80

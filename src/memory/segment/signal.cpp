@@ -1,0 +1,159 @@
+#include "memory/segment/signal.hpp"
+
+#include <time.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "base/crash_point.hpp"
+#include "memory/os/futex.hpp"
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+namespace {
+constexpr Iteration kNoWish = std::numeric_limits<Iteration>::max();
+}
+
+RowWaiter::RowWaiter(const AttachedSegment& segment, std::int64_t poll) noexcept
+    : segment_(&segment), view_(segment.view()), poll_(std::max<std::int64_t>(poll, 1000)) {}
+
+Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline,
+                               const KeepWaiting& keep_waiting) {
+  segment_->check_process();
+  const std::atomic<std::int64_t>& published = view_.counters().published;
+  const auto ready = [&] {
+    return published.load(std::memory_order_acquire) >= k;  // sync published
+  };
+  if (spinner_.spin(ready)) return Waited::ready;
+  std::int64_t look_at = monotonic_now() + kSlice;
+  std::int64_t nap = kSlice;  // time until look_at [ns]
+  while (!deadline.over()) {
+    if (segment_->access() == Access::read_write)
+      sleep(k, deadline.left(nap));
+    else
+      poll(k, deadline.left(nap));
+    if (ready()) return Waited::ready;
+    nap = look_at - monotonic_now();
+    if (nap > 0 && !segment_->has_ended()) continue;
+    look_at = monotonic_now() + kSlice;
+    nap = kSlice;
+    if (keep_waiting && !keep_waiting())
+      throw Cancelled("the wait for a row of segment '" + segment_->name() + "' was cancelled");
+    // first the end, then the row: the row may have been published before the end
+    const bool gone = segment_->gone();
+    if (ready()) return Waited::ready;
+    if (gone) segment_->throw_if_gone();
+  }
+  // a wait shorter than one slice checks for the end of the backend too
+  const bool gone = segment_->gone();
+  if (ready()) return Waited::ready;
+  if (gone) segment_->throw_if_gone();
+  return Waited::timed_out;
+}
+
+std::optional<std::uint32_t> register_for_row(const AttachedSegment& segment,
+                                              Iteration k) noexcept {
+  const SegmentView& view = segment.view();
+  Bell& bell = view.bell();
+
+  // lower the word, look again
+  O80_CRASH_POINT("rows.before_register");
+  const std::uint32_t seen =
+      view.wakes().row_wake.load(std::memory_order_seq_cst);  // sync row_wake
+  // the end is stored before `row_wake` changes: has_ended() is reliable after the load above
+  if (segment.has_ended()) return std::nullopt;
+  Iteration lowest = bell.wanted.load(std::memory_order_seq_cst);  // sync wanted
+  while (k < lowest &&
+         !bell.wanted.compare_exchange_weak(lowest, k, std::memory_order_seq_cst)) {  // sync wanted
+  }
+  O80_CRASH_POINT("rows.before_sleep");
+  if (view.counters().published.load(std::memory_order_seq_cst) >= k) {  // sync published
+    return std::nullopt;
+  }
+  return seen;
+}
+
+void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept {
+  std::atomic<std::uint32_t>& wake = view.wakes().row_wake;
+  Bell& bell = view.bell();
+  const std::uint32_t now = wake.load(std::memory_order_seq_cst);  // sync row_wake
+  if (now == seen || bell.passed_on.exchange(now, std::memory_order_relaxed) == now) return;
+  O80_CRASH_POINT("rows.before_pass_on");
+  futex_wake(wake, kEverybody);
+}
+
+void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
+  const std::optional<std::uint32_t> seen = register_for_row(*segment_, k);
+  if (!seen || !futex_wait(view_.wakes().row_wake, *seen, at_most)) return;
+  pass_on_wake(view_, *seen);
+}
+
+void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {
+  // not on the futex: a read-only reader would consume the one wake-up and cannot pass it on
+  const Counters& counters = view_.counters();
+  const std::int64_t end = monotonic_now() + at_most;
+  for (std::int64_t left = at_most; left > 0; left = end - monotonic_now()) {
+    const std::int64_t nap = std::min(left, poll_);
+    const timespec pause{.tv_sec = 0, .tv_nsec = static_cast<long>(nap)};
+    nanosleep(&pause, nullptr);
+    if (counters.published.load(std::memory_order_acquire) >= k) return;  // sync published
+    if (segment_->has_ended()) return;
+  }
+}
+
+bool RowSignal::announce(Iteration k) noexcept {
+  Bell& bell = view_.bell();
+  if (bell.wanted.load(std::memory_order_seq_cst) > k) return false;  // sync wanted
+  O80_CRASH_POINT("rows.before_reset");
+  bell.wanted.store(kNoWish, std::memory_order_seq_cst);  // sync wanted
+  O80_CRASH_POINT("rows.before_wake");
+  // after the reset: a reader that lowered `wanted` before has the old `row_wake` and does not
+  // sleep
+  view_.wakes().row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
+  return true;
+}
+
+void wake_sleepers(const SegmentView& view, Sleepers sleepers) noexcept {
+  if (!sleepers.lanes && !sleepers.rows) return;
+  Wakes& wakes = view.wakes();
+  if (sleepers.lanes && sleepers.rows) {
+    futex_wake_both(wakes.row_wake, 1, wakes.lane_wake);
+  } else if (sleepers.lanes) {
+    futex_wake(wakes.lane_wake, kEverybody);
+  } else {
+    futex_wake(wakes.row_wake, 1);
+  }
+  O80_CRASH_POINT("rows.after_wake");
+}
+
+std::uint32_t BellWaiter::value() const noexcept {
+  return view_.bell().rung.load(std::memory_order_acquire);  // sync bell
+}
+
+bool BellWaiter::wait(std::uint32_t seen, std::int64_t at_most) noexcept {
+  const auto rang = [&] { return value() != seen; };
+  if (spinner_.spin(rang)) return true;
+  std::atomic<std::uint32_t>& sleeping = view_.wakes().sleeping;
+  sleeping.store(1, std::memory_order_seq_cst);  // sync sleeping
+  O80_CRASH_POINT("bell.before_sleep");
+  const Bell& bell = view_.bell();
+  if (bell.rung.load(std::memory_order_seq_cst) == seen)  // sync bell
+    futex_wait(bell.rung, seen, std::min(at_most, kSlice));
+  O80_CRASH_POINT("bell.after_sleep");
+  sleeping.store(0, std::memory_order_relaxed);
+  return rang();
+}
+
+void BellWaiter::interrupt() noexcept { ring_bell(view_); }
+
+void ring_bell(const SegmentView& view) noexcept {
+  Bell& bell = view.bell();
+  O80_CRASH_POINT("bell.before_ring");
+  bell.rung.fetch_add(1, std::memory_order_seq_cst);  // sync bell
+  O80_CRASH_POINT("bell.after_ring");
+  if (view.wakes().sleeping.load(std::memory_order_seq_cst) != 0)  // sync sleeping
+    futex_wake(bell.rung, 1);
+}
+
+}  // namespace o80

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "o80/describe/schema.hpp"
+#include "o80/runtime/batch.hpp"
+#include "runtime/frontend/sent_commands.hpp"
+
+namespace o80 {
+
+/// True for the end of a command that reached its target, or of a request that was served.
+constexpr bool is_success(Status status) noexcept { return status == Status::completed; }
+
+/// Names of the actuators of a command; empty for a request.
+std::vector<std::string> names_of(const Schema& schema, std::span<const SentCommand> command);
+
+/// What happened to one record: "'elbow' was purged in iteration 7 (its frontend died)".
+std::string end_text(const Schema& schema, std::span<const SentCommand> command,
+                     const Handle& handle);
+
+/// Why a command takes longer than asked: "2 iterations later than asked, because of its jerk
+/// limit". `packed` as in Limited::packed().
+std::string late_text(std::uint8_t packed, std::int64_t late);
+
+/// The text of NotCompleted, from those of `records` records that did not complete.
+std::string not_completed_text(const std::string& segment, const std::vector<std::string>& ends,
+                               std::size_t records);
+
+}  // namespace o80

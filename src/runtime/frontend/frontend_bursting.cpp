@@ -1,0 +1,212 @@
+// How a frontend requests iterations, of one backend or of several. See ARCHITECTURE.md, Bursting.
+
+#include <algorithm>
+#include <limits>
+#include <set>
+
+#include "o80/runtime/frontend.hpp"
+#include "runtime/frontend/link.hpp"
+#include "runtime/frontend/sent.hpp"
+
+namespace o80 {
+
+namespace {
+
+/// Cancels the rest of a burst if its caller leaves without the last row.
+class CancelUnlessDone {
+ public:
+  CancelUnlessDone(LaneSender* lane, CommandId id) : lane_(lane), id_(id) {}
+  CancelUnlessDone(const CancelUnlessDone&) = delete;
+  CancelUnlessDone& operator=(const CancelUnlessDone&) = delete;
+  ~CancelUnlessDone() {
+    if (lane_ != nullptr) lane_->cancel_burst(id_);
+  }
+  void done() noexcept { lane_ = nullptr; }
+
+ private:
+  LaneSender* lane_;
+  CommandId id_;
+};
+
+}  // namespace
+
+UntypedObservation UntypedFrontend::pulse_and_wait(Timeout timeout, const PulseOptions& options,
+                                                   const KeepWaiting& keep_waiting,
+                                                   const WaitOptions& wait) {
+  return wait_for_end(pulse_to_end(options), timeout, keep_waiting, wait);
+}
+
+UntypedObservation UntypedFrontend::wait_for_end(const Batch& batch, Timeout timeout,
+                                                 const KeepWaiting& keep_waiting,
+                                                 const WaitOptions& options) const {
+  UntypedObservation observation(link_->description);
+  const Iteration last = wait_until_ended(batch, timeout, keep_waiting);
+  if (batch.id() == 0) link_->segment.throw_if_gone();  // its newest row would look like an answer
+  if (batch.id() != 0 && options.check) batch.throw_unless_completed();
+  if (last < 0 && batch.rejected_by() == Reason::stopped) throw_rejected(*link_, "batch", batch);
+  if (last < 0 || !link_->history.read(last, observation.bytes())) latest(observation.bytes());
+  return observation;
+}
+
+Iteration UntypedFrontend::wait_until_ended(const Batch& batch, Timeout timeout,
+                                            const KeepWaiting& keep_waiting) const {
+  if (batch.id() == 0 || !bursting()) {
+    batch.wait(timeout, keep_waiting, {.check = false});
+    return batch.last_iteration();
+  }
+  CancelUnlessDone rest(batch.lane_.get(), batch.id());
+  const Iteration last = Burst(link_, batch).wait_done(timeout, keep_waiting);
+  rest.done();
+  link_->check_usable();
+  return last;
+}
+
+void UntypedFrontend::refuse_burst(std::int64_t iterations) const {
+  link_->check_usable();
+  if (!bursting()) {
+    throw NotBursting("'" + segment() +
+                      (is_played(link_->segment)
+                           ? "' is played by time: play the recording with --bursts"
+                           : "' runs in real time and cannot be burst: start it with bursting"));
+  }
+  if (iterations < 1) {
+    throw InvalidArgument("the iterations of a burst of '" + segment() +
+                          "' must be at least 1, got " + std::to_string(iterations));
+  }
+}
+
+Sent UntypedFrontend::send_burst(BatchBuilder& builder, std::int64_t iterations,
+                                 const PulseOptions& options, Asked asked) {
+  refuse_burst(iterations);
+  BatchRecord record = batch_of(options);
+  record.burst = iterations;
+  return send(builder, record, asked);
+}
+
+Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
+  return {link_, Batch(link_, send_burst(link_->builder, iterations, options, Asked::yes))};
+}
+
+UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
+                                          const KeepWaiting& keep_waiting,
+                                          const PulseOptions& options) {
+  return burst(link_->builder, iterations, timeout, keep_waiting, options);
+}
+
+UntypedObservation UntypedFrontend::burst(BatchBuilder& builder, std::int64_t iterations,
+                                          Timeout timeout, const KeepWaiting& keep_waiting,
+                                          const PulseOptions& options) {
+  // start_burst(iterations).wait(timeout, keep_waiting) without the allocations of a Burst
+  const Sent sent = send_burst(builder, iterations, options, Asked::no);
+  CancelUnlessDone rest(sent.lane.get(), sent.id);
+  UntypedObservation observation(link_->description);  // made while the backend works
+  const Iteration row =
+      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);
+  rest.done();
+  link_->check_usable();  // a close of this frontend ends its burst too
+  if (row < 0) return Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why
+  read_last_row(*link_, row, observation);
+  return observation;
+}
+
+Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout,
+                                      const KeepWaiting& keep_waiting,
+                                      const PulseOptions& options) {
+  const std::size_t count = rows.size() / layout().size;
+  if (count > link_->history.rows()) {
+    throw InvalidArgument("the " + std::to_string(count) + " rows of a burst of '" + segment() +
+                          "' do not fit into its history of " +
+                          std::to_string(link_->history.rows()));
+  }
+  const Sent sent =
+      send_burst(link_->builder, static_cast<std::int64_t>(count), options, Asked::no);
+  CancelUnlessDone rest(sent.lane.get(), sent.id);
+  const Iteration last =
+      wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);
+  rest.done();
+  link_->check_usable();
+  if (last < 0) Burst(link_, Batch(link_, sent)).wait(timeout, keep_waiting);  // says why
+  const Iteration first = last + 1 - static_cast<Iteration>(count);
+  if (link_->history.read_range(first, count, rows.data()).count != count) {
+    throw RowOverwritten("rows " + std::to_string(first) + " to " + std::to_string(last) + " of '" +
+                         segment() + "', those of this burst, are no longer there");
+  }
+  return last;
+}
+
+// ------------------------------------------------------------------------------ groups
+
+/// Throws what start_burst would throw, or if the backend has gone, as far as it can be known now.
+void UntypedFrontend::refuse_unless_ready(std::int64_t iterations) {
+  refuse_burst(iterations);
+  const auto lock = link_->lock_to_send();
+  if (link_->runner) link_->runner->refuse_nested();
+  link_->segment.throw_if_gone();
+  BatchRecord wanted;
+  wanted.burst = iterations;
+  refuse_if_too_much(link_->builder);
+  refuse_if_full(link_->builder, wanted, *link_->lane());
+}
+
+std::vector<Burst> start_bursts(std::span<const BurstMember> group) {
+  std::set<const Link*> seen;
+  for (const auto& [frontend, iterations] : group) {
+    frontend->refuse_unless_ready(iterations);
+    if (!seen.insert(frontend->link_.get()).second) {
+      throw InvalidArgument("the frontend of '" + frontend->segment() +
+                            "' is in the group twice: give each frontend once");
+    }
+  }
+  std::vector<Burst> bursts;
+  bursts.reserve(group.size());
+  try {
+    for (const auto& [frontend, iterations] : group) {
+      bursts.push_back(frontend->start_burst(iterations));
+    }
+  } catch (...) {
+    // another thread has used the free blocks, or a backend has just gone
+    std::ranges::for_each(bursts, &Burst::cancel);
+    throw;
+  }
+  return bursts;
+}
+
+std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout timeout,
+                                         const KeepWaiting& keep_waiting) {
+  const Deadline deadline(timeout);
+  const auto left = [&] {
+    return timeout ? Timeout(std::chrono::nanoseconds(
+                         deadline.left(std::numeric_limits<std::int64_t>::max())))
+                   : Timeout();
+  };
+  // a later member may fail during the wait for an earlier one
+  const auto look_at_all = [&] { std::ranges::for_each(bursts, &Burst::throw_if_failed); };
+  const KeepWaiting watch = [&] {
+    look_at_all();
+    return !keep_waiting || keep_waiting();
+  };
+  std::vector<UntypedObservation> observations;
+  observations.reserve(bursts.size());
+  try {
+    for (const Burst& burst : bursts) {
+      try {
+        observations.push_back(burst.wait(left(), watch));
+      } catch (const TimeoutError&) {
+        look_at_all();  // prefer a failure over the timeout
+        throw;
+      }
+    }
+  } catch (...) {
+    std::ranges::for_each(bursts, &Burst::cancel);
+    throw;
+  }
+  return observations;
+}
+
+std::vector<UntypedObservation> burst(std::span<const BurstMember> group, Timeout timeout,
+                                      const KeepWaiting& keep_waiting) {
+  const std::vector<Burst> bursts = start_bursts(group);
+  return wait_for(bursts, timeout, keep_waiting);
+}
+
+}  // namespace o80

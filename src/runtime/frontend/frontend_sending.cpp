@@ -1,0 +1,483 @@
+// How a frontend adds records to a batch and sends it.
+// See ARCHITECTURE.md, The life of a command.
+
+#include <algorithm>
+#include <limits>
+
+#include "o80/runtime/frontend.hpp"
+#include "runtime/backend/schedule.hpp"
+#include "runtime/frontend/link.hpp"
+#include "runtime/frontend/sent.hpp"
+
+namespace o80 {
+
+namespace {
+
+RecordHead head_of(std::uint32_t actuator, const CommandOptions& options, Profile otherwise) {
+  RecordHead head;
+  head.actuator = static_cast<std::uint16_t>(actuator);
+  head.mode = options.mode;
+  head.profile = options.profile.value_or(otherwise);
+  head.start = options.start;
+  head.pace = options.pace.pace;
+  if (options.pace.pace == Pace::speed) {
+    head.speed = options.pace.per_second;
+  } else {
+    head.amount = options.pace.amount;
+  }
+  return head;
+}
+
+void check_pace(const PaceSpec& pace, std::uint32_t rows) {
+  const auto refuse = [](const std::string& why) { throw InvalidArgument("the pace " + why); };
+  switch (pace.pace) {
+    case Pace::speed:
+    case Pace::fastest:
+      return;
+    case Pace::direct:
+      if (pace.amount < 0) refuse("has a negative time between set-points");
+      if (pace.amount > kLongestDuration) refuse("has too long a time between set-points");
+      return;
+    case Pace::duration:
+      if (pace.amount < 0) refuse("is a negative duration");
+      if (pace.amount > kLongestDuration) refuse("is a duration too long to be counted");
+      return;
+    case Pace::iterations:
+      if (pace.amount < 1) refuse("of iterations must be at least 1");
+      if (pace.amount > kMostIterations) refuse("is too many iterations");
+      return;
+    case Pace::until:
+      if (rows > 1) refuse("'until' suits one target; give a trajectory iterations or times");
+      if (pace.amount < 0) refuse("'until' is a negative iteration");
+      if (pace.amount > kMostIterations) refuse("'until' lies too far");
+  }
+}
+
+/// Refuses options that contradict each other.
+void check_options(const CommandOptions& options) {
+  if (options.profile && options.pace.pace == Pace::fastest) {
+    throw InvalidArgument(
+        "a command that goes as fast as its limits allow has no profile: leave out profile");
+  }
+  if (options.profile == Profile::as_sent &&
+      (options.pace.pace != Pace::direct || options.pace.amount != 0)) {
+    throw InvalidArgument(
+        "the profile as_sent is for set-points without a pace and without every: leave these out, "
+        "or "
+        "profile");
+  }
+}
+
+void check_times(std::span<const std::int64_t> times, std::uint32_t rows) {
+  if (times.size() != rows) {
+    throw InvalidArgument("a trajectory of " + std::to_string(rows) +
+                          " rows needs as many times, " + std::to_string(times.size()) +
+                          " were given");
+  }
+  for (std::size_t i = 0; i < times.size(); ++i) {
+    const std::int64_t before = i == 0 ? 0 : times[i - 1];
+    if (times[i] < before || times[i] > kLongestDuration) {
+      throw InvalidArgument("the times of a trajectory must grow from 0: row " + std::to_string(i) +
+                            " ends at " + std::to_string(times[i]) + " ns, the one before at " +
+                            std::to_string(before) + " ns");
+    }
+  }
+}
+
+}  // namespace
+
+// ------------------------------------------------------------------------------ adding
+
+RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
+                                            std::span<const std::byte> state,
+                                            const CommandOptions& options,
+                                            std::span<const std::uint64_t> mask) const {
+  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
+  link_->command_check.targets(index, state, mask);
+  check_options(options);
+  const PaceSpec& pace = options.pace;
+  check_pace(pace, 1);
+  if (pace.pace == Pace::speed) link_->command_check.speed(index, pace.per_second, mask);
+  if (pace.pace == Pace::fastest) link_->command_check.fastest(index, mask);
+  if (pace.pace == Pace::direct) link_->command_check.direct(index, state, mask);
+  return head_of(index, options, link_->command_check.usual_profile(index));
+}
+
+std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<const std::byte> state,
+                                           const CommandOptions& options,
+                                           std::span<const std::uint64_t> mask) {
+  const RecordHead head = checked_command(actuator, state, options, mask);
+  const auto lock = link_->lock_to_add();
+  return link_->builder.command(head, mask, {}, 1, state);
+}
+
+std::size_t UntypedFrontend::size_of_state(std::uint32_t actuator) const {
+  return schema().types[schema().actuators[actuator].type].size;
+}
+
+void UntypedFrontend::refuse_twice(std::span<const std::uint32_t> actuators) const {
+  if (actuators.empty()) throw InvalidArgument("a command needs at least one actuator");
+  for (std::size_t i = 0; i < actuators.size(); ++i) {
+    if (std::ranges::count(actuators.subspan(0, i), actuators[i]) == 0) continue;
+    throw InvalidArgument("actuator '" + schema().actuators[actuators[i]].name.str() +
+                          "' is named twice: one command gives it one target");
+  }
+}
+
+std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actuators,
+                                            std::span<const std::byte> states,
+                                            const CommandOptions& options,
+                                            std::span<const std::uint64_t> masks) {
+  const auto lock = link_->lock_to_add();
+  return add_commands_to(link_->builder, actuators, states, options, masks);
+}
+
+std::uint32_t UntypedFrontend::add_commands_to(BatchBuilder& builder,
+                                               std::span<const std::uint32_t> actuators,
+                                               std::span<const std::byte> states,
+                                               const CommandOptions& options,
+                                               std::span<const std::uint64_t> masks) const {
+  std::size_t bytes = 0;
+  std::size_t words = 0;
+  for (const std::uint32_t actuator : actuators) {
+    bytes += size_of_state(link_->command_check.actuator(std::int64_t{actuator}));
+    words += link_->command_check.words_of_mask(actuator);
+  }
+  refuse_twice(actuators);
+  const auto refuse_size = [&](const char* what, std::size_t given, std::size_t wanted,
+                               const char* unit) {
+    if (given == wanted) return;
+    throw InvalidArgument(std::string("the ") + what + " of " + std::to_string(actuators.size()) +
+                          " actuators take " + std::to_string(wanted) + ' ' + unit + ", " +
+                          std::to_string(given) + " were given");
+  };
+  refuse_size("states", states.size(), bytes, "bytes");
+  if (!masks.empty()) refuse_size("masks", masks.size(), words, "words");
+
+  link_->members.clear();
+  Profile profile = Profile::linear;
+  for (const std::uint32_t actuator : actuators) {
+    const auto state = states.first(size_of_state(actuator));
+    const auto mask = masks.first(masks.empty() ? 0 : link_->command_check.words_of_mask(actuator));
+    link_->members.push_back({checked_command(actuator, state, options, mask), mask, state});
+    if (link_->members.back().head.profile == Profile::minimum_jerk)
+      profile = Profile::minimum_jerk;
+    states = states.subspan(state.size());
+    masks = masks.subspan(mask.size());
+  }
+  // all members use one profile: minimum_jerk if one of them needs it
+  for (BatchBuilder::Member& member : link_->members) member.head.profile = profile;
+  if (link_->members.size() == 1) {
+    const BatchBuilder::Member& only = link_->members.front();
+    return builder.command(only.head, only.mask, {}, 1, only.states);
+  }
+  return builder.group(link_->members);
+}
+
+/// Checks a trajectory; returns its options with the pace that follows from its times.
+CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
+                                                   std::span<const std::byte> states,
+                                                   const CommandOptions& options,
+                                                   std::span<const std::int64_t> times,
+                                                   std::span<const std::uint64_t> mask) const {
+  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
+  if (rows == 0) throw InvalidArgument("the trajectory has no row");
+  check_options(options);
+  link_->command_check.targets(index, states, mask);
+  CommandOptions paced = options;
+  // a trajectory always has a pace
+  if (paced.pace.pace == Pace::direct) paced.pace = iterations(1);
+  if (!times.empty()) {
+    check_times(times, rows);
+    paced.pace = duration(std::chrono::nanoseconds(times.back()));
+  } else if (paced.pace.pace == Pace::duration && rows > 1) {
+    throw InvalidArgument("a trajectory at a duration needs the times of its rows");
+  }
+  check_pace(paced.pace, rows);
+  if (paced.pace.pace == Pace::speed)
+    link_->command_check.speed(index, paced.pace.per_second, mask);
+  if (paced.pace.pace == Pace::fastest) link_->command_check.fastest(index, mask);
+  return paced;
+}
+
+std::uint32_t UntypedFrontend::add_trajectory(std::uint32_t actuator, std::uint32_t rows,
+                                              std::span<const std::byte> states,
+                                              const CommandOptions& options,
+                                              std::span<const std::int64_t> times) {
+  return add_trajectories({&actuator, 1}, rows, states, options, times);
+}
+
+/// Bytes of the rows of one of several actuators, of the `left` ones; for the last one, all of
+/// these: the check of its targets says what is wrong with them.
+std::size_t UntypedFrontend::size_of_rows(std::uint32_t actuator, std::uint32_t rows,
+                                          std::size_t left,
+                                          std::span<const std::uint32_t> actuators) const {
+  if (actuator == actuators.back()) return left;
+  const Schema& schema = link_->description->schema;
+  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
+  return std::min(left, std::size_t{rows} * schema.types[schema.actuators[index].type].size);
+}
+
+std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> actuators,
+                                                std::uint32_t rows,
+                                                std::span<const std::byte> states,
+                                                const CommandOptions& options,
+                                                std::span<const std::int64_t> times,
+                                                std::span<const std::uint64_t> mask) {
+  for (const std::uint32_t actuator : actuators) {
+    link_->command_check.actuator(std::int64_t{actuator});
+  }
+  refuse_twice(actuators);
+  CommandOptions paced = options;
+  std::size_t at = 0;
+  for (const std::uint32_t actuator : actuators) {
+    const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
+    paced = checked_trajectory(actuator, rows, states.subspan(at, size), options, times, mask);
+    at += size;
+  }
+  const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
+  const auto lock = link_->lock_to_add();
+  if (actuators.size() == 1) {
+    return link_->builder.command(head_of(actuators[0], paced, Profile::linear), mask, ends, rows,
+                                  states);
+  }
+  link_->members.clear();
+  at = 0;
+  for (const std::uint32_t actuator : actuators) {
+    const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
+    link_->members.push_back(
+        {head_of(actuator, paced, Profile::linear), mask, states.subspan(at, size)});
+    at += size;
+  }
+  return link_->builder.group(link_->members, ends, rows);
+}
+
+void UntypedFrontend::add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
+                                     std::span<const std::byte> states, Mode mode) {
+  refuse_twice(actuators);
+  const auto each = [&](auto&& visit) {
+    std::size_t at = 0;
+    for (const std::uint32_t actuator : actuators) {
+      const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
+      visit(link_->command_check.actuator(std::int64_t{actuator}), states.subspan(at, size));
+      at += size;
+    }
+  };
+  each([&](std::uint32_t actuator, std::span<const std::byte> targets) {
+    link_->command_check.targets(actuator, targets);
+  });
+  const auto lock = link_->lock_to_add();
+  each([&](std::uint32_t actuator, std::span<const std::byte> targets) {
+    RecordHead head;
+    head.actuator = static_cast<std::uint16_t>(actuator);
+    head.mode = mode;
+    head.profile = link_->command_check.usual_profile(actuator);
+    link_->builder.command(head, {}, {}, rows, targets);
+  });
+}
+
+std::uint32_t UntypedFrontend::add_purge(std::uint32_t actuator) {
+  if (actuator != kEveryActuator) link_->command_check.actuator(std::int64_t{actuator});
+  const auto lock = link_->lock_to_add();
+  return link_->builder.purge(static_cast<std::uint16_t>(actuator));
+}
+
+std::uint32_t UntypedFrontend::add_purge_own() {
+  const auto lock = link_->lock_to_add();
+  return link_->builder.purge_own(kEveryActuator);
+}
+
+std::uint32_t UntypedFrontend::add_mark(std::string_view text) {
+  const auto lock = link_->lock_to_add();
+  return link_->builder.mark(text);
+}
+
+std::uint32_t UntypedFrontend::add_request(std::uint32_t request,
+                                           std::span<const std::byte> payload) {
+  link_->command_check.request(request, payload);
+  const auto lock = link_->lock_to_add();
+  return link_->builder.request(static_cast<std::uint16_t>(request), payload);
+}
+
+std::uint32_t UntypedFrontend::add_take_control() {
+  const auto lock = link_->lock_to_add();
+  return link_->builder.take_control();
+}
+
+std::uint32_t UntypedFrontend::add_release_control() {
+  const auto lock = link_->lock_to_add();
+  return link_->builder.release_control();
+}
+
+std::size_t UntypedFrontend::added() const {
+  link_->segment.check_process();
+  const std::scoped_lock lock(link_->sending);
+  return link_->builder.records();
+}
+
+void UntypedFrontend::forget_added() {
+  link_->segment.check_process();
+  const std::scoped_lock lock(link_->sending);
+  link_->builder.clear();
+}
+
+// ------------------------------------------------------------------------------ sending
+
+namespace {
+
+/// True if a batch may stay in the lane for long.
+bool does_stay(const BatchBuilder& builder, const BatchRecord& wanted) {
+  return builder.has_commands() || wanted.at != kNow;
+}
+
+/// True if a batch was taken or rejected.
+bool has_begun(const LaneSender& lane, CommandId batch) {
+  return lane.status(batch).known != LaneSender::Known::not_yet;
+}
+
+}  // namespace
+
+BatchRecord UntypedFrontend::batch_of(const PulseOptions& options) {
+  if (options.at != kNow && options.at < 0) {
+    throw InvalidArgument("at must be an iteration from 0 on, got " + std::to_string(options.at));
+  }
+  BatchRecord record;
+  record.at = options.at;
+  record.late_now = options.late == PulseOptions::Late::now ? 1 : 0;
+  return record;
+}
+
+/// Refuses a batch with too many requests or orders, which would make the iteration that takes it
+/// too long.
+void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
+  const auto refuse = [&](std::uint32_t count, std::uint32_t most, const char* what) {
+    if (count <= most) return;
+    throw InvalidArgument("a batch may have " + std::to_string(most) + " " + what +
+                          ", this one has " + std::to_string(count) +
+                          ": send them in several pulses. Nothing was sent, all stays added "
+                          "(forget_added() drops it)");
+  };
+  refuse(builder.requests(), kMostRequests, "requests");
+  refuse(builder.control_orders(), kMostControlOrders, "orders to take or release control");
+
+  const std::uint64_t journal = link_->segment.view().shape.journal_bytes;
+  const std::uint64_t bytes = builder.blocks() * kBlockBytes;
+  if (journal == 0 || bytes <= journal / 2) return;
+  throw InvalidArgument(
+      "this batch takes " + std::to_string(bytes) + " bytes, and the journal of '" + segment() +
+      "' allows " + std::to_string(journal / 2) +
+      " (half of its size). Send the commands in several pulses, or start the "
+      "robot with a larger journal (--journal). Nothing was sent, all stays added "
+      "(forget_added() drops it)");
+}
+
+/// Refuses a batch for a later iteration if too many of them wait already.
+void UntypedFrontend::refuse_if_too_many_wait(Iteration at, const LaneSender& lane) {
+  if (at == kNow) return;
+  std::erase_if(link_->scheduled, [&](const Link::Scheduled& sent) {
+    return sent.at <= link_->history.published() || has_begun(lane, sent.id);
+  });
+  const auto refuse = [&](std::size_t there, std::uint32_t most, const std::string& of) {
+    if (there < most) return;
+    throw LaneFull("at most " + std::to_string(most) + " batches of a frontend may wait for " + of +
+                   ", and so many wait in '" + segment() +
+                   "'. Nothing was sent, all stays added: put several commands into one batch, or "
+                   "pulse again later");
+  };
+  const auto same = std::ranges::count(link_->scheduled, at, &Link::Scheduled::at);
+  refuse(static_cast<std::size_t>(same), kMostScheduledAt, "iteration " + std::to_string(at));
+  refuse(link_->scheduled.size(), kMostScheduled, "later iterations");
+}
+
+/// Refuses a batch that does not fit into the lane. Checked before ids are drawn: ids that are
+/// never sent would overwrite the statuses of other batches.
+void UntypedFrontend::refuse_if_full(const BatchBuilder& builder, const BatchRecord& wanted,
+                                     const LaneSender& lane) const {
+  const std::uint64_t needed = builder.blocks();
+  // commands leave some blocks free for a burst, a purge or a request
+  const bool stays = does_stay(builder, wanted);
+  const std::uint32_t most = lane.blocks() - (stays ? kept_free(lane.blocks()) : 0);
+  const std::uint32_t sent = lane.blocks() - lane.free_blocks();
+  const std::uint32_t free = most - std::min(sent, most);
+  if (needed > free) throw lane_full(segment(), needed, free, most);
+}
+
+/// Draws ids whose status slots are free.
+CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stays) {
+  const auto has_ended = [&](CommandId id) {
+    const LaneSender::StatusAnswer answer = lane.status(id);
+    return answer.known == LaneSender::Known::forgotten ||
+           (answer.known == LaneSender::Known::yes &&
+            is_end(static_cast<Status>(answer.word.status)));
+  };
+  const std::optional<CommandId> first = stays ? link_->ids.draw(lane.next_id(), n, has_ended)
+                                               : link_->ids.draw_kept(lane.next_id(), n, has_ended);
+  if (!first) {
+    throw LaneFull("the batches in the lane of '" + segment() +
+                   "' that have not ended leave no status slots for " + std::to_string(n - 2) +
+                   " more records. Nothing was sent, all stays added: wait for a batch, purge, or "
+                   "start the backend with larger lanes (lane_blocks)");
+  }
+  lane.draw_ids(*first + n);
+  return *first;
+}
+
+/// Seals a batch, sends it, and lets an inline robot take it.
+Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted, Asked asked) {
+  Sent sent;
+  std::shared_ptr<InlineRunner> runner;
+  {
+    const auto lock = link_->lock_to_send();
+    runner = link_->runner;
+    if (runner) runner->refuse_nested();
+    if (builder.records() > 0) refuse_if_played(link_->segment);
+    sent.lane = link_->lane();
+    LaneSender* const lane = sent.lane.get();
+    link_->segment.throw_if_known_gone();
+    refuse_if_too_much(builder);
+    refuse_if_too_many_wait(wanted.at, *lane);
+    refuse_if_full(builder, wanted, *lane);
+    BatchRecord record = wanted;
+    const std::uint32_t records = builder.records();
+    sent.events_before_send = lane->events();
+    record.id = draw_ids(*lane, std::uint64_t{records} + 2, does_stay(builder, wanted));
+    const std::span<const Block> blocks = builder.seal(record);
+    link_->sent_commands.note(blocks, asked == Asked::yes ? &sent.commands : nullptr);
+    lane->send(std::as_bytes(blocks), offsetof(BatchRecord, ticket));
+    builder.clear();
+    if (records > 0) link_->ids.sent(record.id, std::uint64_t{records} + 2);
+    if (record.at != kNow) link_->scheduled.push_back({record.at, record.id});
+    sent.id = record.id;
+    sent.records = records;
+  }
+  if (runner) runner->run();
+  return sent;
+}
+
+Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
+  BatchRecord record = batch_of(options);
+  record.flags = flags;
+  {
+    const auto lock = link_->lock_to_send();
+    if (link_->builder.empty()) return {};
+  }
+  return {link_, send(link_->builder, record)};
+}
+
+Batch UntypedFrontend::pulse(BatchBuilder& batch) {
+  link_->check_usable();
+  return batch.empty() ? Batch() : Batch(link_, send(batch, {}));
+}
+
+Batch UntypedFrontend::pulse_to_end(const PulseOptions& options) {
+  return pulse(options, bursting() ? kBurstUntilEnded : std::uint16_t{0});
+}
+
+Batch UntypedFrontend::pulse_to_end(BatchBuilder& batch) {
+  link_->check_usable();
+  BatchRecord record;
+  if (bursting()) record.flags = kBurstUntilEnded;
+  return batch.empty() ? Batch() : Batch(link_, send(batch, record));
+}
+
+}  // namespace o80

@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "memory/ring/lane_sender.hpp"
+#include "o80/runtime/batch.hpp"
+#include "runtime/frontend/link.hpp"
+#include "runtime/frontend/sent_commands.hpp"
+
+namespace o80 {
+
+/// Result of send().
+struct Sent {
+  std::shared_ptr<LaneSender> lane;
+  CommandId id = 0;
+  std::uint32_t records = 0;
+  std::uint32_t events_before_send = 0;  // event count of the lane before the batch was sent
+  std::vector<SentCommand> commands;     // empty for a burst whose batch nobody gets
+};
+
+/// Waits until burst `id` is done; returns its last row, or -1 if its batch was rejected.
+/// `events_before_send`: the event count before it was sent, if it has just been sent. Throws
+/// TimeoutError, BackendGone, Cancelled, and BackendHalted if a halt cut the burst.
+Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
+                         const KeepWaiting& keep_waiting,
+                         std::optional<std::uint32_t> events_before_send = {});
+/// Throws Error, BackendHalted or BackendGone, with the reason why a batch was rejected.
+[[noreturn]] void throw_rejected(Link& link, const char* what, const Batch& batch);
+/// Copies the row that wait_for_burst returned. Throws RowOverwritten.
+void read_last_row(const Link& link, Iteration row, UntypedObservation& observation);
+
+}  // namespace o80

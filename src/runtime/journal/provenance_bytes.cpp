@@ -1,0 +1,136 @@
+#include "runtime/journal/provenance_bytes.hpp"
+
+#include <cstdint>
+#include <cstring>
+#include <string>
+
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+namespace {
+
+constexpr std::uint64_t kProvenanceMagic = 0x6E65'766F'7250'3038;  // "80Proven"
+constexpr std::uint32_t kMostOfAKind = 4096;                       // options or files
+
+/// Visits all parts in the order in which they stand in the bytes.
+template <class ProvenanceLike, class Visit>
+void each_part(ProvenanceLike& provenance, Visit&& visit) {
+  visit(provenance.wall_clock_offset);
+  visit(provenance.robot);
+  visit(provenance.library);
+  visit(provenance.library_sha256);
+  visit(provenance.built_with);
+  visit(provenance.options);
+  visit(provenance.run_options);
+  visit(provenance.files);
+  visit(provenance.version);
+  visit(provenance.source_hash);
+  visit(provenance.motion_rules);
+}
+
+class Writer {
+ public:
+  void operator()(std::uint64_t number) { append(&number, sizeof number); }
+  void operator()(std::int64_t number) { append(&number, sizeof number); }
+  void operator()(const std::string& text) {
+    count(text.size());
+    append(text.data(), text.size());
+  }
+  void operator()(const std::pair<std::string, std::string>& option) {
+    (*this)(option.first);
+    (*this)(option.second);
+  }
+  void operator()(const Provenance::File& file) {
+    (*this)(file.option);
+    (*this)(file.path);
+    (*this)(file.sha256);
+  }
+  template <class Each>
+  void operator()(const std::vector<Each>& all) {
+    count(all.size());
+    for (const Each& each : all) (*this)(each);
+  }
+  std::vector<std::byte> bytes;
+
+ private:
+  void count(std::size_t number) {
+    const auto stored = static_cast<std::uint32_t>(number);
+    append(&stored, sizeof stored);
+  }
+  void append(const void* from, std::size_t size) {
+    const auto* first = static_cast<const std::byte*>(from);
+    bytes.insert(bytes.end(), first, first + size);
+  }
+};
+
+class Reader {
+ public:
+  explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
+  void operator()(std::uint64_t& number) { take(&number, sizeof number); }
+  void operator()(std::int64_t& number) { take(&number, sizeof number); }
+  void operator()(std::string& text) {
+    std::uint32_t size = 0;
+    take(&size, sizeof size);
+    if (size > bytes_.size()) fail();
+    text.assign(reinterpret_cast<const char*>(bytes_.data()), size);
+    bytes_ = bytes_.subspan(size);
+  }
+  void operator()(std::pair<std::string, std::string>& option) {
+    (*this)(option.first);
+    (*this)(option.second);
+  }
+  void operator()(Provenance::File& file) {
+    (*this)(file.option);
+    (*this)(file.path);
+    (*this)(file.sha256);
+  }
+  template <class Each>
+  void operator()(std::vector<Each>& all) {
+    std::uint32_t count = 0;
+    take(&count, sizeof count);
+    if (count > kMostOfAKind) fail();
+    for (std::uint32_t i = 0; i < count; ++i) (*this)(all.emplace_back());
+  }
+  bool is_at_end() const { return bytes_.empty(); }
+
+  [[noreturn]] static void fail() {
+    throw SegmentError("the record of how the robot was started is damaged");
+  }
+
+ private:
+  void take(void* to, std::size_t size) {
+    if (size > bytes_.size()) fail();
+    std::memcpy(to, bytes_.data(), size);
+    bytes_ = bytes_.subspan(size);
+  }
+  std::span<const std::byte> bytes_;
+};
+
+}  // namespace
+
+std::vector<std::byte> to_bytes(const Provenance& provenance) {
+  for (const std::size_t count :
+       {provenance.options.size(), provenance.run_options.size(), provenance.files.size()}) {
+    if (count > kMostOfAKind)
+      throw InvalidArgument("a robot can have at most " + std::to_string(kMostOfAKind) +
+                            " options, got " + std::to_string(count));
+  }
+  Writer write;
+  write(kProvenanceMagic);
+  each_part(provenance, write);
+  return write.bytes;
+}
+
+Provenance provenance_from_bytes(std::span<const std::byte> bytes) {
+  Reader read(bytes);
+  std::uint64_t magic = 0;
+  read(magic);
+  if (magic != kProvenanceMagic) Reader::fail();
+  Provenance provenance;
+  each_part(provenance, read);
+  if (!read.is_at_end()) Reader::fail();
+  return provenance;
+}
+
+}  // namespace o80

@@ -1,0 +1,45 @@
+#include "runtime/journal/recorded_entry_check.hpp"
+
+#include <cstring>
+#include <string>
+
+#include "control/record.hpp"
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+namespace {
+
+[[noreturn]] void refuse_entry(const JournalEntry& entry, const std::string& why) {
+  throw InvalidArgument("entry " + std::to_string(entry.number) + " of the journal " + why);
+}
+
+/// Throws if these are not the blocks of a whole batch.
+void check_blocks(const JournalEntry& entry) {
+  BatchRecord batch;
+  if (entry.blocks.size() < kBlockBytes) refuse_entry(entry, "lacks the blocks of its batch");
+  std::memcpy(&batch, entry.blocks.data(), sizeof batch);
+  const bool is_whole = batch.kind == RecordKind::batch &&
+                        std::uint64_t{batch.blocks} * kBlockBytes == entry.blocks.size();
+  if (!is_whole) refuse_entry(entry, "holds a damaged batch");
+}
+
+}  // namespace
+
+void check_recorded(const JournalEntry& entry, const Schema& schema, std::uint32_t lanes) {
+  const bool is_batch = entry.kind == JournalKind::taken || entry.kind == JournalKind::rejected;
+  const bool is_of_lane = is_batch || entry.kind == JournalKind::died ||
+                          entry.kind == JournalKind::silent ||
+                          entry.kind == JournalKind::fresh_start;
+  if (is_of_lane && entry.lane >= lanes) {
+    refuse_entry(entry, "is of lane " + std::to_string(entry.lane) + ", but the robot has " +
+                            std::to_string(lanes) +
+                            " lanes: give the option lanes of the recorded run");
+  }
+  if (is_batch) check_blocks(entry);
+  if (entry.kind == JournalKind::interrupted && entry.actuator >= schema.actuators.size()) {
+    refuse_entry(entry, "interrupts an actuator that the robot does not have");
+  }
+}
+
+}  // namespace o80

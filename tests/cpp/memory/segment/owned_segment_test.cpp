@@ -1,0 +1,198 @@
+#include "memory/segment/owned_segment.hpp"
+
+#include <gmock/gmock.h>
+#include <sys/stat.h>
+
+#include <fstream>
+#include <thread>
+
+#include "memory/segment/segment_name.hpp"
+#include "memory/segments.hpp"
+#include "o80/base/error.hpp"
+
+namespace o80 {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using OwnedSegmentTest = SegmentTest;
+
+struct stat status_of(const std::string& path) {
+  struct stat status{};
+  EXPECT_EQ(stat(path.c_str(), &status), 0) << path;
+  return status;
+}
+
+TEST_F(OwnedSegmentTest, IsTwoFilesThatGoWithTheirOwner) {
+  {
+    const OwnedSegment segment = OwnedSegment::create(small_spec());
+    EXPECT_EQ(directory_.files(), 2U);
+    EXPECT_TRUE(std::filesystem::exists(directory_.file_of("arm")));
+    EXPECT_TRUE(std::filesystem::exists(commands_path("arm", segment.epoch())));
+  }
+  EXPECT_EQ(directory_.files(), 0U);
+}
+
+TEST_F(OwnedSegmentTest, LetsThoseObserveWhoMayReadAndThoseCommandWhoMayWrite) {
+  struct Case {
+    mode_t permission, segment, commands;
+  };
+  const mode_t before = umask(0077);
+  for (const Case& modes : {Case{0600, 0600, 0600}, Case{0640, 0640, 0600}, Case{0644, 0644, 0600},
+                            Case{0660, 0640, 0660}, Case{0664, 0644, 0660}, Case{0666, 0644, 0666},
+                            Case{0620, 0640, 0660}, Case{0, 0600, 0600}}) {
+    SegmentSpec spec = small_spec();
+    spec.permission = modes.permission;
+    const OwnedSegment segment = OwnedSegment::create(spec);
+    EXPECT_EQ(status_of(directory_.file_of("arm")).st_mode & 0777, modes.segment);
+    EXPECT_EQ(status_of(commands_path("arm", segment.epoch())).st_mode & 0777, modes.commands);
+  }
+  umask(before);
+}
+
+TEST_F(OwnedSegmentTest, HasItsMemoryReserved) {
+  const OwnedSegment segment = OwnedSegment::create(small_spec());
+
+  for (const std::string& path :
+       {directory_.file_of("arm"), commands_path("arm", segment.epoch())}) {
+    const struct stat status = status_of(path);
+    EXPECT_GE(status.st_blocks * 512, status.st_size);
+  }
+}
+
+TEST_F(OwnedSegmentTest, RefusesASecondLivingBackendNamingTheOwnerAndTheCure) {
+  const OwnedSegment segment = OwnedSegment::create(small_spec());
+  const auto wanted =
+      AllOf(HasSubstr("segment 'arm' already has a backend (pid " + std::to_string(getpid())),
+            HasSubstr(", started "), HasSubstr(" by "), HasSubstr("o80 stop arm"),
+            HasSubstr("--segment"));
+
+  EXPECT_THAT(message_of<SegmentTaken>([] { OwnedSegment::create(small_spec()); }), wanted);
+  EXPECT_THAT(message_of<SegmentTaken>([] { OwnedSegment::refuse_if_taken("arm"); }), wanted);
+  EXPECT_EQ(directory_.files(), 2U);
+}
+
+TEST_F(OwnedSegmentTest, DoesNotRefuseANameThatNobodyHas) {
+  EXPECT_NO_THROW(OwnedSegment::refuse_if_taken("arm"));
+}
+
+TEST_F(OwnedSegmentTest, KeepsItsFileWhenItFailedAndLetsItBeTakenOver) {
+  {
+    OwnedSegment segment = running_segment();
+    segment.end(BackendState::failed, "no hardware");
+  }
+  EXPECT_EQ(directory_.files(), 2U);
+
+  const OwnedSegment next = OwnedSegment::create(small_spec());
+  EXPECT_EQ(directory_.files(), 2U);
+  EXPECT_EQ(next.state(), BackendState::starting);
+}
+
+TEST_F(OwnedSegmentTest, TakesOverWhateverFileNobodyHolds) {
+  std::ofstream(directory_.file_of("arm")) << "left by something else";
+
+  const OwnedSegment segment = running_segment();
+
+  EXPECT_EQ(attach().epoch(), segment.epoch());
+}
+
+TEST_F(OwnedSegmentTest, TellsThoseAttachedToItsPredecessorThatItIsSuperseded) {
+  running_segment().end(BackendState::failed);
+  AttachedSegment old = AttachedSegment::attach("arm", Access::read_only, soon(),
+                                                {.dead = AttachOptions::Dead::accept});
+  const OwnedSegment next = running_segment();
+
+  EXPECT_EQ(old.life(), Life::superseded);
+  EXPECT_THROW(old.throw_if_gone(), BackendSuperseded);
+  EXPECT_NE(old.epoch(), next.epoch());
+}
+
+TEST_F(OwnedSegmentTest, IsWonByExactlyOneOfManyStarters) {
+  for (int round = 0; round < 20; ++round) {
+    // every other round there is a dead one to take over
+    if (round % 2 == 1) running_segment().end(BackendState::failed);
+    std::atomic<int> won{0}, refused{0}, decided{0};
+    std::vector<std::thread> starters;
+    starters.reserve(4);
+    for (int i = 0; i < 4; ++i)
+      starters.emplace_back([&] {
+        try {
+          const OwnedSegment segment = OwnedSegment::create(small_spec());
+          ++won;
+          ++decided;
+          while (decided < 4) std::this_thread::yield();
+        } catch (const SegmentTaken&) {
+          ++refused;
+          ++decided;
+        }
+      });
+    for (std::thread& starter : starters) starter.join();
+
+    EXPECT_EQ(won, 1);
+    EXPECT_EQ(refused, 3);
+    EXPECT_EQ(directory_.files(), 0U);
+  }
+}
+
+TEST_F(OwnedSegmentTest, SweepsAwayTheDraftsOfDeadStarters) {
+  std::ofstream(directory_.file_of("arm.new-0123456789abcdef")) << "half a segment";
+
+  const OwnedSegment segment = OwnedSegment::create(small_spec());
+
+  EXPECT_EQ(directory_.files(), 2U);
+}
+
+TEST_F(OwnedSegmentTest, SaysWhenSharedMemoryIsTooSmallAndLeavesNothing) {
+  SegmentSpec spec = small_spec();
+  spec.rows = 1ULL << 38;
+
+  EXPECT_THAT(message_of<SegmentError>([&] { OwnedSegment::create(spec); }),
+              AllOf(HasSubstr("has no room"), HasSubstr("shorter history")));
+  EXPECT_EQ(directory_.files(), 0U);
+}
+
+TEST_F(OwnedSegmentTest, SaysWhenItsDirectoryIsMissing) {
+  setenv("O80_DIRECTORY", (directory_.path() + "/nowhere").c_str(), 1);
+
+  EXPECT_THAT(message_of<SegmentError>([] { OwnedSegment::create(small_spec()); }),
+              HasSubstr("nowhere"));
+}
+
+TEST_F(OwnedSegmentTest, RefusesNamesThatAreNoFileNames) {
+  for (const char* name :
+       {"", ".arm", "a/b", "arm.new-1", "arm.commanders-1", "arm arm", "\xc3\xa4"}) {
+    SegmentSpec spec = small_spec(name);
+    EXPECT_THROW(OwnedSegment::create(spec), InvalidArgument) << name;
+  }
+  EXPECT_THROW(OwnedSegment::create(small_spec(std::string(65, 'a'))), InvalidArgument);
+  EXPECT_NO_THROW(OwnedSegment::create(small_spec(std::string(64, 'a'))));
+}
+
+TEST_F(OwnedSegmentTest, RefusesRowsThatAreNoWords) {
+  SegmentSpec spec = small_spec();
+  spec.row_bytes = 12;
+  EXPECT_THROW(OwnedSegment::create(spec), InvalidArgument);
+}
+
+TEST_F(OwnedSegmentTest, CanBeMoved) {
+  OwnedSegment first = running_segment(small_spec("first"));
+  OwnedSegment second = std::move(first);
+  second = running_segment(small_spec("second"));
+
+  EXPECT_FALSE(std::filesystem::exists(directory_.file_of("first")));
+  EXPECT_TRUE(std::filesystem::exists(directory_.file_of("second")));
+  EXPECT_EQ(second.state(), BackendState::running);
+}
+
+TEST_F(OwnedSegmentTest, DoesNotTakeAwayTheFileOfASuccessor) {
+  OwnedSegment segment = running_segment();
+  std::filesystem::remove(directory_.file_of("arm"));  // somebody cleaned by hand
+  const OwnedSegment next = OwnedSegment::create(small_spec());
+
+  segment.remove();
+
+  EXPECT_TRUE(std::filesystem::exists(directory_.file_of("arm")));
+}
+
+}  // namespace
+}  // namespace o80

@@ -1,0 +1,163 @@
+#include "memory/segment/signal.hpp"
+
+#include <gmock/gmock.h>
+
+#include <atomic>
+#include <thread>
+
+#include "memory/ring/history.hpp"
+#include "memory/segments.hpp"
+#include "o80/base/error.hpp"
+
+namespace o80 {
+namespace {
+
+constexpr Iteration kNobody = std::numeric_limits<Iteration>::max();
+
+class SignalTest : public SegmentTest {
+ protected:
+  void publish(Iteration from, Iteration to) {
+    const std::vector<std::byte> row(64);
+    for (Iteration k = from; k <= to; ++k) {
+      writer_.publish(k, row.data());
+      wake_sleepers(segment_.view(), {.rows = signal_.announce(k)});
+    }
+  }
+  Iteration wanted() const { return segment_.view().bell().wanted.load(); }
+  void wait_until_wanted(Iteration k) const {
+    while (wanted() > k) std::this_thread::yield();
+  }
+
+  OwnedSegment segment_ = running_segment();
+  HistoryWriter writer_{segment_.view()};
+  RowSignal signal_{segment_.view()};
+  AttachedSegment attached_ = attach();
+};
+
+TEST_F(SignalTest, DoesNotWaitForARowThatIsThere) {
+  publish(0, 3);
+  RowWaiter waiter(attached_);
+  EXPECT_EQ(waiter.wait_for_row(3, Deadline(Timeout(0))), Waited::ready);
+  EXPECT_EQ(waiter.wait_for_row(4, Deadline(Timeout(0))), Waited::timed_out);
+}
+
+TEST_F(SignalTest, WakesASleeperByItsRowAndByNoEarlierOne) {
+  std::thread sleeper([&] {
+    RowWaiter waiter(attached_);
+    EXPECT_EQ(waiter.wait_for_row(5, patient()), Waited::ready);
+  });
+  wait_until_wanted(5);
+  publish(0, 4);
+  EXPECT_EQ(wanted(), 5);
+  publish(5, 5);
+  sleeper.join();
+  EXPECT_EQ(wanted(), kNobody);
+}
+
+TEST_F(SignalTest, WakesEveryoneOfManyWaitersForDifferentRows) {
+  constexpr int kSleepers = 32;
+  constexpr Iteration kLast = 200;
+  std::atomic<int> done{0};
+  std::vector<std::thread> sleepers;
+  sleepers.reserve(kSleepers);
+  for (int i = 0; i < kSleepers; ++i)
+    sleepers.emplace_back([&, i] {
+      RowWaiter waiter(attached_);
+      for (Iteration k = i % 7; k <= kLast; k += 1 + i % 5)
+        ASSERT_EQ(waiter.wait_for_row(k, patient()), Waited::ready);
+      ++done;
+    });
+  for (Iteration k = 0; k <= kLast; ++k) {
+    publish(k, k);
+    std::this_thread::yield();
+  }
+  for (std::thread& sleeper : sleepers) sleeper.join();
+  EXPECT_EQ(done, kSleepers);
+}
+
+TEST_F(SignalTest, LetsReadersWithoutWritePermissionPoll) {
+  const AttachedSegment reader = attach("arm", Access::read_only);
+  std::atomic<bool> asked{false};
+  std::thread sleeper([&] {
+    RowWaiter waiter(reader);
+    EXPECT_EQ(waiter.wait_for_row(0, patient(),
+                                  [&] {
+                                    asked = true;
+                                    return true;
+                                  }),
+              Waited::ready);
+  });
+  while (!asked) std::this_thread::yield();
+  EXPECT_EQ(wanted(), kNobody);
+  publish(0, 0);
+  sleeper.join();
+}
+
+TEST_F(SignalTest, RaisesTheFaultForThoseWhoWait) {
+  std::thread sleeper([&] {
+    RowWaiter waiter(attached_);
+    EXPECT_THROW(waiter.wait_for_row(5, patient()), BackendFailed);
+  });
+  wait_until_wanted(5);
+  segment_.end(BackendState::failed, "no power");
+  sleeper.join();
+}
+
+TEST_F(SignalTest, GivesRowsThatCameBeforeTheEnd) {
+  publish(0, 5);
+  segment_.end(BackendState::stopped);
+  RowWaiter waiter(attached_);
+  EXPECT_EQ(waiter.wait_for_row(5, patient()), Waited::ready);
+  EXPECT_THROW(waiter.wait_for_row(6, patient()), BackendStopped);
+}
+
+TEST_F(SignalTest, RaisesTheEndHoweverShortTheWait) {
+  publish(0, 0);
+  RowWaiter waiter(attached_);
+  EXPECT_EQ(waiter.wait_for_row(1, Deadline(Timeout(0))), Waited::timed_out);
+
+  segment_.end(BackendState::stopped);
+
+  EXPECT_EQ(waiter.wait_for_row(0, Deadline(Timeout(0))), Waited::ready);
+  EXPECT_THROW(waiter.wait_for_row(1, Deadline(Timeout(0))), BackendStopped);
+}
+
+TEST_F(SignalTest, EndsAWaitWhenTheCallerSaysSo) {
+  RowWaiter waiter(attached_);
+  EXPECT_THROW(waiter.wait_for_row(0, patient(), [] { return false; }), Cancelled);
+}
+
+TEST_F(SignalTest, HealsAWakeUpThatWasLost) {
+  std::thread sleeper([&] {
+    RowWaiter waiter(attached_);
+    EXPECT_EQ(waiter.wait_for_row(0, patient()), Waited::ready);
+  });
+  wait_until_wanted(0);
+  const std::vector<std::byte> row(64);
+  writer_.publish(0, row.data());  // and nobody is woken
+  sleeper.join();
+}
+
+TEST_F(SignalTest, TellsTheBackendThatTheBellRang) {
+  BellWaiter bell(segment_.view());
+  const std::uint32_t seen = bell.value();
+  EXPECT_FALSE(bell.wait(seen, 1000));
+  ring_bell(attached_.view());
+  EXPECT_TRUE(bell.wait(seen));
+}
+
+TEST_F(SignalTest, WakesABackendThatSleepsAtTheBell) {
+  std::thread backend([&] {
+    BellWaiter bell(segment_.view());
+    const std::uint32_t seen = bell.value();
+    while (!bell.wait(seen)) {
+    }
+  });
+  while (segment_.view().wakes().sleeping.load() == 0) std::this_thread::yield();
+  BellWaiter(segment_.view()).interrupt();
+  backend.join();
+  EXPECT_EQ(segment_.view().wakes().sleeping.load(), 0U);
+}
+
+}  // namespace
+}  // namespace o80

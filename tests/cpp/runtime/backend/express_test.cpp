@@ -1,0 +1,340 @@
+// Purges and control orders wait for nobody, commands older than a purge do not outlive it, and
+// what would keep an iteration too long is refused before it is sent.
+
+#include <gtest/gtest.h>
+
+#include <unistd.h>
+
+#include <fstream>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "memory/segment/queue_word.hpp"
+#include "runtime/backend/schedule.hpp"
+#include "runtime/frontend/link.hpp"
+#include "runtime/frontend/loop_state.hpp"
+#include "runtime/liar.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+class ExpressTest : public StationTest {
+ protected:
+  /// So many frontends, each with as much in its lane as fits.
+  std::vector<std::unique_ptr<UntypedFrontend>> flood(std::size_t count) {
+    std::vector<std::unique_ptr<UntypedFrontend>> frontends;
+    for (std::size_t i = 0; i < count; ++i) {
+      frontends.push_back(std::make_unique<UntypedFrontend>("pair"));
+      for (int command = 0; command < 16'300; ++command) {
+        add(*frontends.back(), 0, 1.0, {.pace = iterations(1'000'000)});
+      }
+      floods.push_back(frontends.back()->pulse());
+    }
+    return frontends;
+  }
+
+  Station station;
+  std::vector<Batch> floods;
+};
+
+TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOtherLanes) {
+  station.start();
+  UntypedFrontend one("pair");
+  const Batch moving = send(one, 0, 9.0, {.pace = iterations(1000)});
+  station.run(3);
+  const auto others = flood(7);
+  station.run(2);
+  // a little of its own stands before it, which waits for the others' turn
+  const Batch queued = send(one, 0, 5.0, {.pace = iterations(10)});
+  const Batch mixed = send(one, 1, 5.0, {.pace = iterations(10)});
+  one.add_purge(0);
+  const Batch purge = one.pulse();
+  const Iteration now = station.last() + 1;
+  station.run(1);
+  EXPECT_EQ(purge.first_iteration(), now);
+  EXPECT_EQ(purge.handle(0).status, Status::completed);
+  EXPECT_EQ(moving.handle(0).status, Status::purged);
+  EXPECT_EQ(moving.handle(0).iteration, now);
+  EXPECT_EQ(queued.first_iteration(), -1) << "commands keep their turn";
+
+  // when their turn comes
+  for (int i = 0; i < 1000 && !(mixed.ended() && queued.ended()); ++i) station.run(1);
+  EXPECT_EQ(queued.handle(0).status, Status::purged);
+  EXPECT_EQ(mixed.handle(0).status, Status::completed) << "of another actuator";
+  for (const Batch& flood : floods) {
+    EXPECT_EQ(flood.handle(0).status, Status::purged) << "older than the purge, taken later";
+  }
+  EXPECT_EQ(desired(one.latest()), desired(one.wait_for(now, kAtOnce))) << "nothing has moved it";
+}
+
+TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
+  station.start();
+  UntypedFrontend one("pair");
+  send(one, 1, 1.0);
+  station.run(1);
+  EXPECT_EQ(queue_holder(one.link()->segment.view()), std::nullopt);
+  const auto others = flood(1);
+  const Iteration begun = station.last() + 1;
+  station.run(1);
+  const Batch waiting = send(one, 1, 2.0);
+  station.run(kLongQueue);
+
+  const std::optional<QueueHolder> holder = queue_holder(one.link()->segment.view());
+  ASSERT_TRUE(holder.has_value());
+  EXPECT_EQ(holder->lane, others[0]->link()->lane()->lane());
+  EXPECT_EQ(holder->since, begun);
+  std::string program;
+  std::ifstream("/proc/self/comm") >> program;
+  const std::string told = "most of the queue is of the frontend of pid " +
+                           std::to_string(getpid()) + " (" + program +
+                           "); batches have been waiting since iteration " + std::to_string(begun);
+  EXPECT_THAT([&] { waiting.wait(std::chrono::nanoseconds(0)); },
+              ::testing::ThrowsMessage<TimeoutError>(HasSubstr("not taken yet: " + told)));
+  EXPECT_EQ(loop_state(one).queue, told);
+  const UntypedFrontend reader("pair", {.access = Access::read_only});
+  EXPECT_EQ(loop_state(reader).trouble(), told);
+
+  for (int i = 0; i < 1000 && !waiting.ended(); ++i) station.run(1);
+  station.run(1);
+  EXPECT_EQ(loop_state(one).queue, "");
+}
+
+TEST_F(ExpressTest, TheHolderOfTheQueueIsTheLaneThatDoesMostOfTheWork) {
+  station.start();
+  const UntypedFrontend reader("pair", {.access = Access::read_only});
+  const SegmentView& view = reader.link()->segment.view();
+  QueueWord word(station.backend.segment().view());
+  word.waits(1);
+  EXPECT_EQ(queue_holder(view), std::nullopt) << "nobody has done any work";
+  for (Iteration i = 2; i < 1'000'000; ++i) {
+    word.spent(3, 1024);
+    word.waits(i);
+  }
+  ASSERT_EQ(queue_holder(view), (QueueHolder{.lane = 3, .since = 2}));
+  int taken_over = 0;
+  while (queue_holder(view)->lane == 3) {
+    word.spent(5, 1024);
+    word.waits(1'000'000);
+    ASSERT_LT(++taken_over, 20) << "after a thousand seconds of the other";
+  }
+  EXPECT_EQ(queue_holder(view), (QueueHolder{.lane = 5, .since = 2})) << "batches have waited on";
+}
+
+TEST_F(ExpressTest, ControlIsTakenAtOnceToo) {
+  station.start();
+  UntypedFrontend one("pair");
+  send(one, 1, 1.0);
+  station.run(1);
+  const auto others = flood(7);
+  station.run(1);
+  one.add_take_control();
+  const Batch control = one.pulse();
+  const Iteration now = station.last() + 1;
+  station.run(1);
+  EXPECT_EQ(control.first_iteration(), now);
+  const Batch mine = send(one, 1, 2.0);
+  for (int i = 0; i < 400 && !mine.ended(); ++i) station.run(1);
+  EXPECT_EQ(mine.handle(0).status, Status::completed);
+  EXPECT_EQ(floods.back().handle(0).reason, Reason::exclusive);
+}
+
+TEST_F(ExpressTest, ControlIsNotLetGoOfBeforeWhatWasSentUnderIt) {
+  station.start();
+  UntypedFrontend one("pair");
+  one.add_take_control();
+  one.pulse();
+  station.run(1);
+  const auto others = flood(7);
+  station.run(1);
+  const Batch mine = send(one, 1, 2.0);
+  one.add_release_control();
+  const Batch release = one.pulse();
+  for (int i = 0; i < 1000 && !release.ended(); ++i) station.run(1);
+  EXPECT_EQ(mine.handle(0).status, Status::completed);
+  EXPECT_GE(release.first_iteration(), mine.first_iteration());
+}
+
+TEST_F(ExpressTest, AResumeWaitsForWhatWasSentBeforeIt) {
+  station.start();
+  UntypedFrontend one("pair");
+  const std::uint64_t number = one.halt("stop");
+  station.run(1);
+  const auto others = flood(7);
+  station.run(1);
+  BatchBuilder resume;
+  resume.resume(number);
+  const Batch resumed = one.pulse(resume);
+  for (int i = 0; i < 1000 && !resumed.ended(); ++i) station.run(1);
+  EXPECT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
+  for (const Batch& flood : floods) {
+    EXPECT_EQ(flood.handle(0).reason, Reason::halted) << "sent while the robot was halted";
+  }
+}
+
+TEST_F(ExpressTest, APurgeEndsWhatWaitsForALaterIterationIfItWasSentBefore) {
+  station.start();
+  UntypedFrontend one("pair");
+  UntypedFrontend two("pair");
+  add(one, 0, 1.0);
+  add(one, 1, 1.0);
+  const Batch before = one.pulse({.at = 5});
+  two.add_purge(0);
+  two.pulse();
+  add(one, 0, 2.0);
+  const Batch after = one.pulse({.at = 6});
+  station.run(8);
+  EXPECT_EQ(before.handle(0).status, Status::purged);
+  EXPECT_EQ(before.handle(0).iteration, 5) << "when it would have acted";
+  EXPECT_EQ(before.handle(1).status, Status::completed);
+  EXPECT_EQ(after.handle(0).status, Status::completed);
+}
+
+TEST_F(ExpressTest, WhoMayCommandIsDecidedWhenABatchActs) {
+  station.start();
+  UntypedFrontend one("pair");
+  UntypedFrontend two("pair");
+  one.add_take_control();
+  one.pulse();
+  station.run(1);
+  add(two, 0, 1.0);
+  const Batch later = two.pulse({.at = 6});
+  add(two, 1, 1.0);
+  const Batch sooner = two.pulse({.at = 3});
+  station.run(3);
+  EXPECT_EQ(sooner.handle(0).reason, Reason::exclusive);
+  EXPECT_EQ(sooner.handle(0).iteration, 3);
+  one.add_release_control();
+  one.pulse();
+  station.run(4);
+  EXPECT_EQ(later.handle(0).status, Status::completed);
+}
+
+// ------------------------------------------------------------------------------ refused in pulse
+
+TEST_F(ExpressTest, MoreRequestsOrOrdersThanABatchMayHaveAreRefused) {
+  station.start();
+  UntypedFrontend one("pair");
+  for (std::uint32_t i = 0; i < kMostRequests + 1; ++i) add_request<Snapshot>(one);
+  EXPECT_THAT(message_of<InvalidArgument>([&] { one.pulse(); }),
+              AllOf(HasSubstr("may have 8 requests, this one has 9"), HasSubstr("several pulses")));
+  EXPECT_EQ(one.added(), kMostRequests + 1) << "nothing was sent";
+  one.forget_added();
+  for (std::uint32_t i = 0; i < kMostControlOrders + 1; ++i) one.add_take_control();
+  EXPECT_THAT(message_of<InvalidArgument>([&] { one.pulse(); }), HasSubstr("control"));
+}
+
+TEST_F(ExpressTest, MoreBatchesThanMayWaitForLaterIterationsAreRefused) {
+  station.start();
+  UntypedFrontend one("pair");
+  const auto pulse_at = [&](Iteration at) {
+    add(one, 0, 1.0);
+    return one.pulse({.at = at});
+  };
+  std::vector<Batch> batches;
+  for (std::uint32_t i = 0; i < kMostScheduledAt; ++i) batches.push_back(pulse_at(900));
+  EXPECT_THAT(message_of<LaneFull>([&] { pulse_at(900); }),
+              AllOf(HasSubstr("16 batches"), HasSubstr("iteration 900"), HasSubstr("one batch")));
+  one.forget_added();
+  for (std::uint32_t i = kMostScheduledAt; i < kMostScheduled; ++i) {
+    batches.push_back(pulse_at(901 + i / 2));
+  }
+  EXPECT_THAT(message_of<LaneFull>([&] { pulse_at(2000); }), HasSubstr("256 batches"));
+  // what was sent is still added, and goes when there is room
+  station.run(901);
+  EXPECT_EQ(one.pulse({.at = 2000}).size(), 1U);
+  station.run(1200);
+  for (const Batch& batch : batches) EXPECT_EQ(batch.handle(0).status, Status::completed);
+}
+
+TEST_F(ExpressTest, ABackendRejectsWhatASenderPutsIntoItsScheduleBeyondThat) {
+  station.start();
+  Liar liar;
+  std::vector<CommandId> ids;
+  for (std::uint32_t i = 0; i < kMostScheduledAt + 1; ++i) {
+    BatchBuilder batch;
+    batch.purge(0);
+    const CommandId id = liar.sender().next_id();
+    liar.sender().draw_ids(id + 3);
+    liar.send(batch, {.id = id, .at = 50});
+    ids.push_back(id);
+  }
+  station.run(60);
+  const auto word = [&](CommandId id) { return liar.sender().status(id).word; };
+  EXPECT_EQ(static_cast<Status>(word(ids.front()).status), Status::active);
+  EXPECT_EQ(static_cast<Status>(word(ids.back()).status), Status::rejected);
+  EXPECT_EQ(static_cast<Reason>(word(ids.back()).reason), Reason::full);
+}
+
+TEST_F(ExpressTest, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayBe) {
+  station.start();
+  UntypedFrontend one("pair");
+  const auto flood_at = [&](UntypedFrontend& frontend, PulseOptions::Late late) {
+    std::vector<Batch> batches;
+    for (std::uint32_t i = 0; i < kMostScheduledAt; ++i) {
+      for (std::uint32_t request = 0; request < 4; ++request) add_request<Snapshot>(frontend);
+      batches.push_back(frontend.pulse({.at = 20, .late = late}));
+    }
+    return batches;
+  };
+  // eight requests an iteration: two of these batches
+  const std::vector<Batch> strict = flood_at(one, PulseOptions::Late::reject);
+  station.run(30);
+  EXPECT_EQ(strict[1].first_iteration(), 20);
+  EXPECT_EQ(strict[1].handle(0).status, Status::completed);
+  EXPECT_EQ(strict[2].handle(0).reason, Reason::late);
+}
+
+TEST_F(ExpressTest, WhatMayBeLateActsInOrderInTheIterationsThatFollow) {
+  station.start();
+  UntypedFrontend one("pair");
+  std::vector<Batch> batches;
+  for (std::uint32_t i = 0; i < 6; ++i) {
+    for (std::uint32_t request = 0; request < 4; ++request) add_request<Snapshot>(one);
+    batches.push_back(one.pulse({.at = 20, .late = PulseOptions::Late::now}));
+  }
+  station.run(30);
+  for (std::size_t i = 0; i < batches.size(); ++i) {
+    EXPECT_EQ(batches[i].first_iteration(), 20 + static_cast<Iteration>(i / 2));
+    EXPECT_EQ(batches[i].handle(0).status, Status::completed);
+  }
+}
+
+// ------------------------------------------------------------------------------ ids
+
+TEST_F(ExpressTest, APurgeAlwaysHasIdsHoweverNarrowTheGapsBetweenThoseInUse) {
+  Station bursting({.segment = "bursting", .bursting = true, .lane_blocks = 1024});
+  bursting.start();
+  UntypedFrontend one("bursting");
+  // long commands and bursts in turn leave gaps of ids two wide
+  std::vector<Batch> running;
+  try {
+    while (true) {
+      running.push_back(send(one, 0, 1.0, {.pace = iterations(1'000'000)}));
+      one.start_burst(1);
+      bursting.drive();
+    }
+  } catch (const LaneFull&) {
+    one.forget_added();
+  }
+  ASSERT_GT(running.size(), 300U);
+  for (int i = 0; i < 3000; ++i) {
+    add_request<Snapshot>(one);
+    const Batch request = one.pulse();
+    bursting.drive();
+    ASSERT_EQ(request.handle(0).status, Status::completed) << i;
+  }
+  one.add_purge();
+  const Batch purge = one.pulse();
+  bursting.drive();
+  EXPECT_EQ(purge.handle(0).status, Status::completed);
+  EXPECT_EQ(running.front().handle(0).status, Status::purged);
+  EXPECT_EQ(running.back().handle(0).status, Status::purged);
+}
+
+}  // namespace
+}  // namespace o80::test

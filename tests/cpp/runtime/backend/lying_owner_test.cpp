@@ -1,0 +1,141 @@
+// An owner of a lane that lies about itself and its predecessors: the next owners have an ordinary
+// lane.
+
+#include <gmock/gmock.h>
+
+#include <memory>
+#include <thread>
+
+#include "memory/child_process.hpp"
+#include "memory/ring/lane.hpp"
+#include "runtime/liar.hpp"
+#include "runtime/shared_scene.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::HasSubstr;
+
+/// What an owner of a lane may have written about itself and its predecessors.
+struct SelfDescription {
+  std::uint64_t incarnation, closed, dead_incarnation, successor_begin, owner_begin;
+
+  void write(LaneSenderPage& page) const {
+    page.closed = closed;
+    page.dead_incarnation = dead_incarnation;
+    page.successor_begin = successor_begin;
+    page.owner_begin = owner_begin;
+    page.incarnation = incarnation;
+  }
+};
+
+constexpr std::uint64_t kFar = (std::uint64_t{1} << 62) - 2;
+constexpr std::uint64_t kFurther = ~std::uint64_t{0} - 1;
+constexpr SelfDescription kLies[] = {
+    {kFar + 1, 0, 0, 0, 0},
+    {kFar, kFar, 0, 0, 0},
+    {kFurther, kFar, kFar, kFar, kFar},
+    {1, kFar, kFar, kFar, kFar},
+    {1, 2, 2, 1000, 1000},
+    {2, 2, 1, kFar, 0},
+    {0, 0, 0, 0, 0},
+    {0, kFurther, 3, 9, 9},
+    {100, 101, 100, 5, 5},
+    {1 << 20, 1 << 20, 7, kFar, 0},
+    {(1 << 20) + 1, 0, 0, 0, 0},
+};
+
+/// A liar in lane 0, an honest frontend in lane 1.
+class LyingOwnerTest : public StationTest {
+ protected:
+  LyingOwnerTest() { station_.start(); }
+
+  void honest_frontend_comes() {
+    other_ = std::make_unique<UntypedFrontend>("pair");
+    send(*other_, 0, 0.0);
+    ASSERT_EQ(other_->link()->lane()->lane(), 1U);
+    station_.run(1);
+  }
+  /// The next owners of lane 0: each is served, keeps its control, is known to have closed or died.
+  void expect_an_ordinary_lane() {
+    UntypedFrontend next("pair");
+    next.add_take_control();
+    const Batch taken = pulse_as_soon_as_there_is_room(next, station_);
+    ASSERT_EQ(next.link()->lane()->lane(), 0U);
+    station_.run_until([&] { return taken.ended(); });
+    EXPECT_EQ(taken.handle(0).status, Status::completed);
+    for (int i = 0; i < 3; ++i) {
+      const Batch refused = send(*other_, 0, 1.0);
+      station_.run(1);
+      EXPECT_THAT(refused.rejection(), HasSubstr("exclusive control"));
+    }
+    next.add_release_control();
+    add(next, 1, 1.0, {.pace = iterations(1'000'000)});
+    next.pulse();
+    station_.run(2);
+    next.close();
+
+    // its command goes on, since it closed, when the lane has its next owner; that one dies
+    ChildProcess owner([](const ChildProcess::Ready& ready) {
+      UntypedFrontend frontend("pair");
+      send(frontend, 0, 0.5, {.pace = iterations(1'000'000)});
+      ready();
+      pause_for_ever();
+    });
+    ASSERT_TRUE(owner.wait_until_ready());
+    station_.run(2);
+    EXPECT_EQ(*station_.backend.active() & 3, 3U) << "of the closed owner, and of the living one";
+    owner.kill_now();
+    station_.run_until([&] { return (*station_.backend.active() & 1) == 0; });
+    other_.reset();
+  }
+
+  Station station_{{.segment = "pair", .lanes = 2, .lane_blocks = 64, .stale = Stale::purge}};
+  std::unique_ptr<UntypedFrontend> other_;
+};
+
+TEST_F(LyingOwnerTest, ThatClosesLeavesAnOrdinaryLane) {
+  for (const bool seen : {false, true})
+    for (const SelfDescription& lie : kLies) {
+      SCOPED_TRACE(::testing::Message() << lie.incarnation << (seen ? ", seen" : ""));
+      {
+        Liar liar;
+        honest_frontend_comes();
+        lie.write(liar.page());
+        if (seen) station_.run(2);
+        liar.leave();
+        lie.write(liar.page());
+      }
+      expect_an_ordinary_lane();
+      if (HasFatalFailure()) return;
+    }
+}
+
+TEST_F(LyingOwnerTest, ThatDiesLeavesAnOrdinaryLane) {
+  for (const bool seen : {false, true})
+    for (const SelfDescription& lie : kLies) {
+      SCOPED_TRACE(::testing::Message() << lie.incarnation << (seen ? ", seen" : ""));
+      {
+        const SharedScene scene;
+        ChildProcess liar([&](const ChildProcess::Ready& ready) {
+          Liar own;
+          ready();
+          while (!scene->over) std::this_thread::yield();
+          lie.write(own.page());
+          ++scene->scribbles;
+          pause_for_ever();
+        });
+        ASSERT_TRUE(liar.wait_until_ready());
+        honest_frontend_comes();
+        scene->over = true;
+        while (scene->scribbles == 0) std::this_thread::yield();
+        if (seen) station_.run(2);
+      }
+      expect_an_ordinary_lane();
+      if (HasFatalFailure()) return;
+    }
+}
+
+}  // namespace
+}  // namespace o80::test

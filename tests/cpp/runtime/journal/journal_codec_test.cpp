@@ -1,0 +1,452 @@
+// The format of journals in files: what was encoded is decoded, what is unknown is skipped, what is
+// damaged is refused. tests/data/recordings has files of each version.
+
+#include "runtime/journal/journal_codec.hpp"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <cstring>
+#include <map>
+#include <random>
+#include <string>
+#include <utility>
+
+#include "o80/base/error.hpp"
+#include "runtime/journal/recorded_journal.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::ThrowsMessage;
+
+template <class Struct>
+void append(std::vector<std::byte>& to, const Struct& value) {
+  const auto bytes = std::as_bytes(std::span(&value, 1));
+  to.insert(to.end(), bytes.begin(), bytes.end());
+}
+
+/// Entries as backends write them, drawn from a seed.
+class Draw {
+ public:
+  explicit Draw(std::uint32_t seed) : random_(seed) {}
+  std::uint64_t number() { return random_(); }
+  std::uint64_t below(std::uint64_t most) { return random_() % most; }
+  template <std::size_t size>
+  void fill(std::array<char, size>& text) {
+    text = {};
+    for (std::size_t i = below(size); i > 0; --i) text[i - 1] = static_cast<char>(1 + below(255));
+  }
+
+  /// A record of any kind that a frontend may send, also with values that no o80 knows.
+  void add_record(std::vector<std::byte>& blocks) {
+    RecordHead head;
+    head.kind = static_cast<RecordKind>(2 + below(9));
+    head.mode = static_cast<Mode>(below(3));
+    head.pace = static_cast<Pace>(below(8));
+    head.profile = static_cast<Profile>(below(4));
+    head.start = static_cast<Start>(below(3));
+    head.masked = static_cast<std::uint8_t>(below(2));
+    head.actuator = static_cast<std::uint16_t>(number());
+    head.id = number();
+    head.rows = static_cast<std::uint32_t>(number());
+    head.amount = static_cast<std::int64_t>(number());
+    head.payload_bytes = static_cast<std::uint32_t>(below(4) == 0 ? below(2000) : below(40));
+    append(blocks, head);
+    for (std::uint32_t i = 0; i < head.payload_bytes; ++i)
+      blocks.push_back(static_cast<std::byte>(number()));
+    blocks.resize((blocks.size() + kBlockBytes - 1) / kBlockBytes * kBlockBytes);
+  }
+  std::vector<std::byte> batch(CommandId id) {
+    std::vector<std::byte> blocks(kBlockBytes);
+    const std::uint64_t records = below(6);
+    for (std::uint64_t i = 0; i < records; ++i) add_record(blocks);
+    BatchRecord batch;
+    batch.late_now = static_cast<std::uint8_t>(below(2));
+    batch.flags = static_cast<std::uint16_t>(below(4));
+    batch.records = static_cast<std::uint32_t>(records);
+    batch.id = id;
+    batch.ticket = number();
+    batch.at = static_cast<Iteration>(number());
+    batch.burst = static_cast<std::int64_t>(below(100));
+    batch.blocks = static_cast<std::uint32_t>(blocks.size() / kBlockBytes);
+    std::memcpy(blocks.data(), &batch, sizeof batch);
+    return blocks;
+  }
+
+  /// An entry that is not of blocks.
+  JournalItem plain(JournalKind kind) {
+    JournalItem item;
+    item.head = {.kind = kind, .lane = static_cast<std::uint8_t>(number())};
+    item.head.what = static_cast<std::uint32_t>(number());
+    item.head.iteration = static_cast<Iteration>(number());
+    item.head.id = number();
+    const auto signed_number = [&] { return static_cast<std::int64_t>(number()); };
+    switch (kind) {
+      case JournalKind::owner: {
+        std::array<char, sizeof(JournalOwner)> name;
+        fill(name);
+        append(item.payload, name);
+        break;
+      }
+      case JournalKind::taken:
+      case JournalKind::scheduled:
+      case JournalKind::rejected:
+        append(item.payload, JournalBatch{number(), number(), signed_number()});
+        break;
+      case JournalKind::halt:
+      case JournalKind::halt_reason: {
+        JournalHalt halt{.cause = below(256)};
+        fill(halt.who);
+        fill(halt.text);
+        append(item.payload, halt);
+        break;
+      }
+      case JournalKind::resume:
+      case JournalKind::burst_ended:
+        append(item.payload, JournalSender{number()});
+        break;
+      case JournalKind::burst:
+        append(item.payload, JournalBurst{signed_number(), number()});
+        break;
+      case JournalKind::ended: {
+        JournalText text;
+        fill(text);
+        append(item.payload, text);
+        break;
+      }
+      case JournalKind::statuses:
+        item.head.what = static_cast<std::uint32_t>(1 + below(kMostStatuses));
+        for (std::uint64_t i = 1 + below(5); i > 0; --i)
+          append(item.payload, JournalStatusRun{number(), below(9), number()});
+        break;
+      case JournalKind::snapshot:
+        for (std::uint64_t i = below(9); i > 0; --i) append(item.payload, number());
+        break;
+      default:
+        break;
+    }
+    return item;
+  }
+
+  /// All kinds of entries in any order, with batches of two lanes whose blocks come in pieces.
+  std::vector<JournalItem> journal(std::size_t count) {
+    std::vector<JournalItem> items;
+    std::array<std::vector<std::byte>, 2> left;
+    std::array<std::uint32_t, 2> read{};
+    std::array<CommandId, 2> ids{};
+    while (items.size() < count) {
+      const auto kind = static_cast<JournalKind>(below(kJournalKinds));
+      if (kind != JournalKind::records) {
+        items.push_back(plain(kind));
+        continue;
+      }
+      const std::size_t lane = below(2);
+      if (left[lane].empty()) {
+        ids[lane] = number();
+        left[lane] = batch(ids[lane]);
+        read[lane] = 0;
+      }
+      JournalItem item;
+      item.head = {.kind = kind, .lane = static_cast<std::uint8_t>(lane), .what = read[lane]};
+      item.head.id = ids[lane];
+      const std::size_t blocks = 1 + below(left[lane].size() / kBlockBytes);
+      const auto end = left[lane].begin() + static_cast<std::ptrdiff_t>(blocks * kBlockBytes);
+      item.payload.assign(left[lane].begin(), end);
+      left[lane].erase(left[lane].begin(), end);
+      read[lane] += static_cast<std::uint32_t>(blocks);
+      items.push_back(item);
+    }
+    std::uint64_t next = 0;
+    for (JournalItem& item : items) {
+      item.head.words = static_cast<std::uint16_t>((sizeof item.head + item.payload.size()) / 8);
+      item.head.number = next;
+      next += item.head.numbers();
+    }
+    return items;
+  }
+
+ private:
+  std::mt19937_64 random_;
+};
+
+std::vector<std::byte> encoded(const std::vector<JournalItem>& items) {
+  JournalFileEncoder encoder;
+  std::vector<std::byte> bytes;
+  for (const JournalItem& item : items) encoder.encode(item.head, item.payload, bytes);
+  return bytes;
+}
+
+std::vector<JournalItem> decoded(std::span<const std::byte> bytes,
+                                 std::int64_t version = kJournalCodec) {
+  std::vector<JournalItem> items;
+  JournalFileDecoder().decode(version, bytes, [&](JournalItem& item) { items.push_back(item); });
+  return items;
+}
+
+std::vector<std::byte> memory_of(const std::vector<JournalItem>& items) {
+  std::vector<std::byte> bytes;
+  for (const JournalItem& item : items) {
+    append(bytes, item.head);
+    bytes.insert(bytes.end(), item.payload.begin(), item.payload.end());
+  }
+  return bytes;
+}
+
+TEST(JournalCodecTest, DecodesWhateverWasEncoded) {
+  for (std::uint32_t seed = 0; seed < 200; ++seed) {
+    const std::vector<JournalItem> items = Draw(seed).journal(100);
+    const std::vector<JournalItem> found = decoded(encoded(items));
+    ASSERT_EQ(found.size(), items.size()) << seed;
+    for (std::size_t i = 0; i < items.size(); ++i)
+      ASSERT_EQ(memory_of({found[i]}), memory_of({items[i]}))
+          << seed << ": entry " << i << ", " << to_text(items[i].head.kind);
+  }
+}
+
+/// Kinds and payloads of the records of whole batches.
+std::vector<std::pair<RecordKind, std::string>> records_in(const std::vector<JournalItem>& items) {
+  std::map<std::uint64_t, std::vector<std::byte>> batches;
+  for (const JournalItem& item : items) {
+    std::vector<std::byte>& batch = batches[item.head.id];
+    if (item.head.kind == JournalKind::records)
+      batch.insert(batch.end(), item.payload.begin(), item.payload.end());
+  }
+  std::vector<std::pair<RecordKind, std::string>> records;
+  for (const auto& [id, blocks] : batches) {
+    for (std::size_t at = kBlockBytes; at < blocks.size();) {
+      RecordHead head;
+      std::memcpy(&head, &blocks[at], sizeof head);
+      if (at + sizeof head + head.payload_bytes > blocks.size()) break;  // the rest was not read
+      const auto* text = reinterpret_cast<const char*>(&blocks[at]) + sizeof head;
+      records.emplace_back(head.kind, std::string(text, head.payload_bytes));
+      at += blocks_of(head.payload_bytes) * kBlockBytes;
+    }
+  }
+  return records;
+}
+
+TEST(JournalCodecTest, FindsTheTextsOfMarksHoweverTheirBlocksAreRead) {
+  std::size_t marks = 0;
+  for (std::uint32_t seed = 0; seed < 200; ++seed) {
+    const std::vector<JournalItem> items = Draw(seed).journal(100);
+    std::vector<std::string> sent;
+    for (const auto& [kind, text] : records_in(items))
+      if (kind == RecordKind::mark && !text.empty() && text.size() <= kMostMarkBytes)
+        sent.push_back(text);
+    JournalFileEncoder encoder;
+    std::vector<std::byte> bytes;
+    std::vector<std::string> found;
+    for (const JournalItem& item : items) {
+      encoder.encode(item.head, item.payload, bytes);
+      for (JournalFileEncoder::Mark& mark : encoder.take_marks()) {
+        EXPECT_EQ(mark.iteration, item.head.iteration);
+        found.push_back(std::move(mark.text));
+      }
+    }
+    ASSERT_THAT(found, ::testing::UnorderedElementsAreArray(sent)) << seed;
+    marks += found.size();
+  }
+  EXPECT_GT(marks, 50U);
+}
+
+TEST(JournalCodecTest, DamagedAndCutBytesAreDecodedOrRefused) {
+  int refused = 0;
+  for (std::uint32_t seed = 0; seed < 2000; ++seed) {
+    Draw draw(seed);
+    const std::int64_t version = seed % 2;
+    const std::vector<JournalItem> items = draw.journal(20);
+    std::vector<std::byte> bytes = version == 0 ? memory_of(items) : encoded(items);
+    for (std::uint64_t i = draw.below(4); i > 0; --i)
+      bytes[draw.below(bytes.size())] = static_cast<std::byte>(draw.number());
+    if (seed % 3 == 0) bytes.resize(draw.below(bytes.size()));
+    try {
+      const std::vector<JournalItem> found = decoded(bytes, version);
+      for (const JournalItem& item : found)
+        ASSERT_EQ(item.payload.size() + sizeof item.head, item.head.words * 8U);
+    } catch (const InvalidArgument& error) {
+      EXPECT_THAT(error.what(), HasSubstr("the journal is damaged: invalid entry at byte "));
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 500);
+}
+
+TEST(JournalCodecTest, ACutEntryIsRefused) {
+  const std::vector<JournalItem> items = Draw(1).journal(12);
+  const std::vector<std::byte> bytes = encoded(items);
+  std::vector<std::size_t> ends = {0};
+  for (std::size_t i = 1; i <= items.size(); ++i)
+    ends.push_back(encoded({items.begin(), items.begin() + static_cast<std::ptrdiff_t>(i)}).size());
+  for (std::size_t cut = 0; cut < bytes.size(); ++cut) {
+    const auto whole = std::ranges::find(ends, cut);
+    if (whole != ends.end()) {
+      EXPECT_EQ(decoded(std::span(bytes).first(cut)).size(),
+                static_cast<std::size_t>(whole - ends.begin()));
+    } else {
+      EXPECT_THROW(decoded(std::span(bytes).first(cut)), InvalidArgument) << cut;
+    }
+  }
+}
+
+TEST(JournalCodecTest, ANewerVersionIsRefused) {
+  EXPECT_THAT([] { decoded({}, kJournalCodec + 1); },
+              ThrowsMessage<InvalidArgument>(AllOf(
+                  HasSubstr("version " + std::to_string(kJournalCodec + 1) + " of the format"),
+                  HasSubstr("reads versions 0 to " + std::to_string(kJournalCodec)),
+                  HasSubstr("newer o80"))));
+  EXPECT_THAT([] { decoded({}, -1); },
+              ThrowsMessage<InvalidArgument>(HasSubstr("the journal is damaged")));
+}
+
+TEST(JournalCodecTest, ABatchWhoseBlocksWereMissedIsDropped) {
+  Draw draw(4);
+  std::vector<std::byte> blocks = draw.batch(7);
+  while (blocks.size() < 3 * kBlockBytes) blocks = draw.batch(7);
+  JournalItem later;
+  later.head = {.kind = JournalKind::records, .what = 1, .id = 7};
+  later.payload.assign(blocks.begin() + kBlockBytes, blocks.end());
+  const std::vector<JournalItem> found = decoded(encoded({later}));
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].head.kind, JournalKind::dropped);
+  EXPECT_EQ(found[0].head.id, 7U);
+}
+
+TEST(JournalCodecTest, StatusesOfTheFirstFilesAreRead) {
+  JournalItem item;
+  item.head = {.kind = JournalKind::status, .lane = 3, .what = 2, .number = 5};
+  const StatusWord ended{.status = 3, .reason = 4, .detail = 5, .iteration = -6};
+  for (const std::uint64_t id : {9, 11}) append(item.payload, std::array{id, ended.packed()});
+  item.head.words = static_cast<std::uint16_t>((sizeof item.head + item.payload.size()) / 8);
+
+  const std::vector<JournalItem> found = decoded(memory_of({item}), 0);
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].head.kind, JournalKind::statuses);
+  EXPECT_EQ(found[0].head.numbers(), 2U);
+  std::vector<std::byte> runs;
+  for (const std::uint64_t id : {9, 11}) append(runs, JournalStatusRun{id, 1, ended.packed()});
+  EXPECT_EQ(found[0].payload, runs);
+}
+
+// ------------------------------------------------------------------------------ unknown kinds
+
+/// A batch of one lane in a file of a later o80, and the decision on it.
+class LaterFileTest : public StationTest {
+ protected:
+  void SetUp() override {
+    StationTest::SetUp();
+    Station station;
+    station.start();
+    description_ = UntypedFrontend("pair").description();
+  }
+  void begin_batch(std::uint32_t records, std::uint32_t blocks) {
+    BatchRecord batch;
+    batch.records = records;
+    batch.blocks = blocks;
+    LittleEndianWriter put(records_);
+    put.u16(1U, journal_format::kBatchFields);
+    put.u32(0U, 0U);
+    journal_format::batch_fields(put, batch);
+  }
+  void add_command(Profile profile = Profile::linear) {
+    RecordHead head;
+    head.profile = profile;
+    LittleEndianWriter put(records_);
+    put.u16(2U, journal_format::kRecordFields);
+    put.u32(8U, 8U);
+    journal_format::record_fields(put, head);
+    put.u64(0U);
+  }
+  void add_unknown(std::uint16_t kind, std::size_t fields, std::size_t payload) {
+    LittleEndianWriter put(records_);
+    put.u16(kind, fields);
+    put.u32(payload, payload);
+    put.bytes(std::vector<std::byte>(fields + payload, std::byte{0x5A}));
+  }
+  void add_entry(std::uint8_t kind, std::span<const std::byte> payload) {
+    JournalHead head;
+    head.kind = static_cast<JournalKind>(kind);
+    head.number = numbers_++;
+    LittleEndianWriter put(file_);
+    put.u32(34 + payload.size());
+    journal_format::head_fields(put, head);
+    put.bytes(payload);
+  }
+  std::vector<JournalEntry> entries() {
+    if (!records_.empty()) add_entry(1, records_);
+    add_entry(4, std::vector<std::byte>(24));
+    std::vector<JournalEntry> entries;
+    RecordedJournal(description_).decode(file_, entries);
+    return entries;
+  }
+
+  std::shared_ptr<const Description> description_;
+  std::vector<std::byte> records_;
+  std::vector<std::byte> file_;
+  std::uint64_t numbers_ = 0;
+};
+
+TEST_F(LaterFileTest, AKnownBatchHasNothingUnknown) {
+  begin_batch(1, 2);
+  add_command();
+  const std::vector<JournalEntry> found = entries();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].unknown, "");
+  ASSERT_EQ(found[0].records.size(), 1U);
+  EXPECT_EQ(found[0].records[0].kind, JournalRecord::Kind::command);
+}
+
+TEST_F(LaterFileTest, ARecordOfAnUnknownKindIsSkippedAndNamed) {
+  using Kind = JournalRecord::Kind;
+  for (const std::size_t fields : {0U, 5U, 27U, 300U}) {
+    for (const std::size_t payload : {0U, 16U, 500U}) {
+      records_.clear();
+      file_.clear();
+      numbers_ = 0;
+      begin_batch(3, 4);
+      add_command();
+      add_unknown(11, fields, payload);
+      add_command();
+      const std::vector<JournalEntry> found = entries();
+      ASSERT_EQ(found.size(), 1U);
+      std::vector<Kind> kinds;
+      for (const JournalRecord& record : found[0].records) kinds.push_back(record.kind);
+      EXPECT_THAT(kinds, ElementsAre(Kind::command, Kind::unknown, Kind::command));
+      EXPECT_EQ(found[0].records[1].unknown, "record kind 11");
+      EXPECT_EQ(found[0].unknown, "record kind 11");
+      EXPECT_FALSE(found[0].records_lost);
+    }
+  }
+}
+
+TEST_F(LaterFileTest, ACommandWithAnUnknownWordIsNotReadAsAnother) {
+  begin_batch(2, 3);
+  add_command(static_cast<Profile>(99));
+  add_command();
+  const std::vector<JournalEntry> found = entries();
+  ASSERT_EQ(found.size(), 1U);
+  ASSERT_EQ(found[0].records.size(), 2U);
+  EXPECT_EQ(found[0].records[0].kind, JournalRecord::Kind::unknown);
+  EXPECT_EQ(found[0].unknown, "profile 99");
+}
+
+TEST_F(LaterFileTest, AnEntryOfAnUnknownKindIsListed) {
+  add_entry(200, std::vector<std::byte>(13));
+  const std::vector<JournalEntry> found = entries();
+  ASSERT_EQ(found.size(), 2U);
+  EXPECT_EQ(found[0].kind, JournalKind::none);
+  EXPECT_EQ(found[0].unknown, "entry kind 200");
+  EXPECT_EQ(found[1].kind, JournalKind::taken);
+}
+
+TEST_F(LaterFileTest, AKnownKindWithOtherFieldsIsRefused) {
+  begin_batch(1, 2);
+  add_unknown(2, 28, 8);
+  EXPECT_THROW(entries(), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace o80::test

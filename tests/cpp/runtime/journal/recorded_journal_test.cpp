@@ -1,0 +1,210 @@
+// A journal that is read raw, as a recorder reads it, and decoded later.
+
+#include "runtime/journal/recorded_journal.hpp"
+
+#include <gmock/gmock.h>
+
+#include <random>
+#include <tuple>
+
+#include "o80/base/error.hpp"
+#include "runtime/frontend/raw_journal.hpp"
+#include "runtime/journal/decision_journal.hpp"
+#include "runtime/station.hpp"
+
+namespace o80::test {
+namespace {
+
+constexpr std::size_t kMuch = 1 << 24;
+
+/// What an entry says, to compare two of them.
+auto facts_of(const JournalEntry& entry) {
+  return std::tuple(entry.kind, entry.number, entry.missed, entry.iteration, entry.lane,
+                    entry.owner, entry.who, entry.id, entry.ticket, entry.at, entry.burst,
+                    entry.records.size(), entry.records_lost, entry.blocks, entry.status,
+                    entry.reason, entry.halt, entry.cause, entry.cut, entry.text, entry.actuator,
+                    entry.state);
+}
+
+auto facts_of(const std::vector<JournalEntry>& entries) {
+  std::vector<decltype(facts_of(entries.front()))> facts;
+  facts.reserve(entries.size());
+  for (const JournalEntry& entry : entries) facts.push_back(facts_of(entry));
+  return facts;
+}
+
+class RecordedJournalTest : public StationTest {
+ protected:
+  explicit RecordedJournalTest(std::int64_t journal = 1 << 20)
+      : station({.segment = "pair", .journal = journal}) {
+    station.start();
+    commander.emplace("pair");
+    observer.emplace("pair", FrontendOptions{.access = Access::read_only});
+  }
+  /// Batches of one to three commands, some of them for later, a request, an interrupt and a halt.
+  void play(int batches) {
+    std::mt19937 random(7);
+    for (int i = 0; i < batches; ++i) {
+      for (unsigned left = random() % 3 + 1; left > 0; --left) {
+        add(*commander, random() % 2, 0.125 * (random() % 9), {.pace = iterations(3)});
+      }
+      if (i == batches / 2) add_request(*commander, Reset{.seed = 5});
+      PulseOptions options;
+      if (i % 5 == 0) options.at = station.last() + 4;
+      commander->pulse(options);
+      station.run(2);
+      if (i % 7 == 0) station.backend.interrupt(1);
+    }
+    commander->halt("enough");
+    station.run(2);
+  }
+  std::shared_ptr<const Description> description() const { return observer->description(); }
+  std::vector<JournalEntry> entries_of(Journal journal) const {
+    std::vector<JournalEntry> entries;
+    for (JournalEntry entry; journal.next(entry);) entries.push_back(entry);
+    return entries;
+  }
+
+  Station station;
+  std::optional<UntypedFrontend> commander;
+  std::optional<UntypedFrontend> observer;
+};
+
+TEST_F(RecordedJournalTest, GivesTheSameEntriesAsTheRing) {
+  play(40);
+  RawJournal raw(*observer, 0);
+  std::vector<JournalEntry> entries;
+  RecordedJournal(description()).decode(raw.read(kMuch).bytes, entries);
+  EXPECT_GT(entries.size(), 100U);
+  EXPECT_EQ(facts_of(entries), facts_of(entries_of(Journal(*observer))));
+}
+
+TEST_F(RecordedJournalTest, PartsOfAnySizeGiveTheSameEntries) {
+  play(40);
+  for (const std::size_t most : {1, 100, 1000, 3000}) {
+    RawJournal raw(*observer, 0);
+    RecordedJournal journal(description());
+    std::vector<JournalEntry> entries;
+    std::uint64_t next = 0;
+    for (RawJournal::Entries part; (part = raw.read(most)).next != part.first;) {
+      EXPECT_EQ(part.first, next);
+      next = part.next;
+      journal.decode(part.bytes, entries);
+    }
+    EXPECT_EQ(facts_of(entries), facts_of(entries_of(Journal(*observer)))) << most;
+  }
+}
+
+TEST_F(RecordedJournalTest, ASuccessorGoesOnWhereTheLastReadEnded) {
+  play(10);
+  const RawJournal::Entries first = RawJournal(*observer, 0).read(1000);
+  play(10);
+  const RawJournal::Entries second = RawJournal(*observer, first.next).read(kMuch);
+  EXPECT_EQ(second.first, first.next);
+
+  RecordedJournal journal(description());
+  std::vector<JournalEntry> entries;
+  journal.decode(first.bytes, entries);
+  journal.decode(second.bytes, entries);
+  EXPECT_EQ(facts_of(entries), facts_of(entries_of(Journal(*observer))));
+}
+
+TEST_F(RecordedJournalTest, ASuccessorGoesOnWithinALargeBatch) {
+  for (int i = 0; i < 3000; ++i) add(*commander, 0, 0.001 * i);
+  commander->pulse();
+  station.run(30);
+  RawJournal raw(*observer, 0);
+  std::vector<RawJournal::Entries> parts;
+  for (RawJournal::Entries part; (part = raw.read(1)).next != part.first;) parts.push_back(part);
+  const std::vector<JournalEntry> there = entries_of(Journal(*observer));
+  ASSERT_FALSE(there.empty());
+  ASSERT_EQ(there.front().records.size(), 3000U);
+  ASSERT_GT(parts.size(), 4U) << "its blocks are several entries";
+  for (std::size_t i = 1; i < 4; ++i) {
+    RecordedJournal journal(description());
+    std::vector<JournalEntry> entries;
+    for (std::size_t k = 0; k < i; ++k) journal.decode(parts[k].bytes, entries);
+    journal.decode(RawJournal(*observer, parts[i].first).read(kMuch).bytes, entries);
+    EXPECT_EQ(facts_of(entries), facts_of(there)) << i;
+  }
+}
+
+TEST_F(RecordedJournalTest, EntriesBeforeTheFirstAreNotReturned) {
+  play(20);
+  RawJournal raw(*observer, 0);
+  std::vector<JournalEntry> entries;
+  RecordedJournal(description(), 60).decode(raw.read(kMuch).bytes, entries);
+  ASSERT_FALSE(entries.empty());
+  EXPECT_GE(entries.front().number, 60U);
+  EXPECT_EQ(entries.front().missed, 0U);
+}
+
+TEST_F(RecordedJournalTest, DamagedBytesEndInAnErrorOrInFewerEntries) {
+  play(20);
+  RawJournal raw(*observer, 0);
+  const std::vector<std::byte> whole = raw.read(kMuch).bytes;
+  std::mt19937 random(3);
+  int errors = 0;
+  for (int i = 0; i < 2000; ++i) {
+    std::vector<std::byte> damaged = whole;
+    for (int k = 0; k < 3; ++k) damaged[random() % damaged.size()] = std::byte(random());
+    if (i % 4 == 0) damaged.resize(random() % damaged.size());
+    std::vector<JournalEntry> entries;
+    try {
+      RecordedJournal(description()).decode(damaged, entries);
+    } catch (const InvalidArgument&) {
+      ++errors;
+    }
+    // the shortest entry of statuses has one run
+    EXPECT_LE(entries.size(),
+              damaged.size() * kMostStatuses / (sizeof(JournalHead) + sizeof(JournalStatusRun)));
+  }
+  EXPECT_GT(errors, 100);
+}
+
+TEST_F(StationTest, ABackendWithoutAJournalHasNoEntries) {
+  Station station({.segment = "pair", .journal = 0});
+  station.start();
+  UntypedFrontend frontend("pair");
+  add(frontend, 0, 0.5);
+  frontend.pulse();
+  station.run(3);
+  RawJournal raw(frontend, 0);
+  EXPECT_FALSE(raw.exists());
+  EXPECT_TRUE(raw.read(kMuch).bytes.empty());
+}
+
+class SmallRingTest : public RecordedJournalTest {
+ protected:
+  SmallRingTest() : RecordedJournalTest(1) {}
+};
+
+TEST_F(SmallRingTest, NumbersTellWhatWasMissed) {
+  play(2);
+  RawJournal raw(*observer, 0);
+  const RawJournal::Entries first = raw.read(kMuch);
+  const std::uint64_t ring = observer->link()->segment.view().shape.journal_bytes;
+  play(static_cast<int>(ring / 200));
+  const RawJournal::Entries second = raw.read(2 * ring);
+  EXPECT_GT(second.first, first.next);
+
+  RecordedJournal journal(description());
+  std::vector<JournalEntry> entries;
+  journal.decode(first.bytes, entries);
+  const std::size_t before = entries.size();
+  journal.decode(second.bytes, entries);
+  ASSERT_LT(before, entries.size());
+  std::uint64_t expected = first.next;
+  for (std::size_t i = before; i < entries.size(); ++i) {
+    // entries of batches in transfer are counted, not returned
+    EXPECT_LE(entries[i].missed, entries[i].number - expected);
+    if (i == before)
+      EXPECT_GE(entries[i].missed, second.first - first.next);
+    else
+      EXPECT_EQ(entries[i].missed, 0U);
+    expected = entries[i].number + 1;
+  }
+}
+
+}  // namespace
+}  // namespace o80::test
