@@ -287,7 +287,7 @@ def compiled_headers(tmp_path_factory: pytest.TempPathFactory) -> Flags:
 
 
 def errors(compiler: str, place: str, text: str, flags: tuple[str, ...]) -> list[str]:
-    """Of the driver with this text in the place."""
+    """Messages of the compiler for the driver with this text in the place."""
     compiled = subprocess.run(
         [compiler, *LANGUAGE, "-fsyntax-only", *flags, "-x", "c++", "-"],
         input=DRIVER % (RIGHT | {place: text}),

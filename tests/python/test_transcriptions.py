@@ -29,7 +29,7 @@ def sentence(model: Path) -> str:
 def words(source: Path) -> set[str]:
     """Words of a source and of its header, without comments."""
     headers = [
-        *ROOT.glob(f"src/*/{source.stem}.hpp"),
+        *ROOT.glob(f"src/**/{source.stem}.hpp"),
         *ROOT.glob(f"include/o80/*/{source.stem}.hpp"),
     ]
     code = "\n".join(file.read_text() for file in (source, *headers))

@@ -33,7 +33,7 @@ class HostileObserver {
 
   explicit HostileObserver(const std::string& directory)
       : child_([directory](const ChildProcess::Ready& ready) {
-          if (setresgid(kStranger, kStranger, kStranger) != 0 ||
+          if (geteuid() == kStranger || setresgid(kStranger, kStranger, kStranger) != 0 ||
               setresuid(kStranger, kStranger, kStranger) != 0)
             _exit(2);
           // with the test, however that ends; to be asked for after a change of user

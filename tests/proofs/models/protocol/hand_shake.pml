@@ -2,9 +2,10 @@
 // be killed anywhere.
 //
 // Transcribed from src/runtime/backend/backend.cpp (step, publish), backend_burst.cpp (end_burst),
-// backend_lives.cpp (look_at_lives, on_owner_death), batch.cpp (Burst::wait_done) and
-// src/memory/ring/lane_sender.cpp (wait_until, sleep), signal.cpp (BellWaiter, ring_bell),
-// lane_receiver.cpp (flush). Sleeps are cut into slices, which end at any time, but do end.
+// backend_lives.cpp (look_at_lives, on_owner_death), src/runtime/frontend/batch.cpp
+// (Burst::wait_done), src/memory/ring/lane_sender.cpp (wait_until, sleep), lane_receiver.cpp (flush)
+// and src/memory/segment/signal.cpp (BellWaiter, ring_bell). Sleeps are cut into
+// slices, which end at any time, but do end.
 //
 // safety: two bursts never mix; an answer is of the frontend's own burst and comes after its rows
 // ltl:    while the backend lives, each living frontend gets its answer, whoever else is killed, and

@@ -2,9 +2,9 @@
 // nothing, over what a dead backend left, over a file without a commanders' file, or over a living
 // backend that may stop or be killed.
 //
-// Transcribed from src/memory/segment/segment_draft.cpp, named_segment.cpp, owned_segment.cpp (release,
-// remove) and segment_list.cpp (clean). One step is one system call. A dead process keeps its locks
-// until the kernel has torn it down, at any later time. A segment file and the commanders' file of
+// Transcribed from src/memory/segment/segment_draft.cpp, named_segment.cpp, owned_segment.cpp
+// (release, remove) and segment_list.cpp (clean). One step is one system call. A dead
+// process keeps its locks until the kernel has torn it down, at any later time. A segment file and the commanders' file of
 // its epoch have the same number here.
 //
 // safety: a living segment is never renamed over or unlinked; one backend at a time has the name; a
