@@ -8,6 +8,10 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("base", "describe", "memory", "control", "runtime", "robot")
+ROOMS = {
+    "memory": ("os", "segment", "ring"),
+    "runtime": ("journal", "backend", "frontend", "replay"),
+}
 INCLUDE = re.compile(r'^#include "(?:o80/)?(\w+)/', re.MULTILINE)
 CAST = re.compile(r"\bcast<(.*?)>\(")
 CASTER = re.compile(r"std::(string|string_view|vector|optional|pair|tuple|shared_ptr|array)\b")
@@ -34,6 +38,26 @@ def test_a_layer_uses_only_those_before_it(layer: str) -> None:
     ]
 
     assert not upward
+
+
+@pytest.mark.parametrize(("layer", "rooms"), ROOMS.items())
+def test_a_room_of_a_layer_uses_only_those_before_it(layer: str, rooms: tuple[str, ...]) -> None:
+    folder = ROOT / "src" / layer
+    assert {path.name for path in folder.iterdir()} == set(rooms)
+    upward = [
+        f"{file.relative_to(ROOT)} includes {used}"
+        for place, room in enumerate(rooms)
+        for file in (folder / room).iterdir()
+        for used in re.findall(rf'^#include "{layer}/(\w+)/', file.read_text(), re.MULTILINE)
+        if used not in rooms[: place + 1]
+    ]
+    assert not upward
+
+
+def test_a_room_holds_few_files() -> None:
+    """At most 25 in src; a source with its header counts as one."""
+    rooms = {file.parent for file in (ROOT / "src").rglob("*.[hc]pp")}
+    assert not [room for room in rooms if len({file.stem for file in room.iterdir()}) > 25]
 
 
 def test_every_folder_of_the_core_is_a_layer() -> None:
