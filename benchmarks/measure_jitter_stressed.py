@@ -1,5 +1,7 @@
-"""The lateness of measure_jitter.py on a machine under stress: every processor computes, moves memory
-and switches, and 64 processes wait for every row of the loop and read the newest one too.
+"""The lateness of measure_jitter.py on a machine under stress.
+
+Every processor computes, moves memory and switches, and 64 processes wait for every row of the
+loop and read the newest one too.
 """
 
 import os

@@ -6,9 +6,10 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import MappingProxyType
 
 import pytest
 
@@ -65,11 +66,16 @@ RAY = {
 }
 
 
-def run(command: list[str], folder: Path = ROOT, timeout: float = 120, **variables: str) -> str:
+def run(
+    command: list[str],
+    folder: Path = ROOT,
+    timeout: float = 120,
+    variables: Mapping[str, str] = MappingProxyType({}),
+) -> str:
     """Runs a program to its end; its output."""
     done = subprocess.run(
         command,
-        env=os.environ | variables,
+        env={**os.environ, **variables},
         capture_output=True,
         text=True,
         timeout=timeout,
@@ -130,7 +136,9 @@ def end_processes_of(folder: str) -> None:
 @pytest.mark.timeout(900)
 def test_the_example_with_ray_collects_the_same_in_every_process(ray_folder: str) -> None:
     example = ROOT / "examples" / "python" / "ray_rollouts.py"
-    output = run([sys.executable, str(example)], timeout=600, **RAY, RAY_TMPDIR=ray_folder)
+    output = run(
+        [sys.executable, str(example)], timeout=600, variables={**RAY, "RAY_TMPDIR": ray_folder}
+    )
     for line in SAYS[example.stem]:
         assert line in output
 
