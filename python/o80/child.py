@@ -12,10 +12,10 @@ from weakref import WeakSet
 
 COLLECT = 1.0  # [s] for the exit code of a process that has ended
 
-_children: WeakSet["subprocess.Popen[bytes]"] = WeakSet()
+_children: WeakSet[subprocess.Popen[bytes]] = WeakSet()
 
 
-def start_child(command: Sequence[str | Path], **options: Any) -> "subprocess.Popen[bytes]":
+def start_child(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[bytes]:
     """Starts a program that ends at the end of its standard input. options: of Popen.
 
     In a forked child its pipes are closed, so that it ends with the parent.
@@ -23,12 +23,14 @@ def start_child(command: Sequence[str | Path], **options: Any) -> "subprocess.Po
     # A process group of its own: Ctrl-C reaches only this program, which ends the child in order.
     # Not a session of its own: the kernel divides processor time between sessions first, so a robot
     # alone would get as much as all programs that read it.
-    child = subprocess.Popen(command, stdin=subprocess.PIPE, process_group=0, **options)
+    child: subprocess.Popen[bytes] = subprocess.Popen(
+        command, stdin=subprocess.PIPE, process_group=0, **options
+    )
     _children.add(child)
     return child
 
 
-def ends_within(child: "subprocess.Popen[bytes]", timeout: float | None) -> bool:
+def ends_within(child: subprocess.Popen[bytes], timeout: float | None) -> bool:
     """True if it ends within `timeout`. Ctrl-C ends this wait at once, unlike Popen.wait."""
     if child.poll() is not None:
         return True
@@ -45,7 +47,7 @@ def ends_within(child: "subprocess.Popen[bytes]", timeout: float | None) -> bool
 
 
 def end_child(
-    child: "subprocess.Popen[bytes]", grace: float, also: signal.Signals | None = None
+    child: subprocess.Popen[bytes], grace: float, also: signal.Signals | None = None
 ) -> None:
     """Ends its standard input, sends a signal `also`, and kills it after `grace` [s]."""
     if child.stdin is not None:
