@@ -52,12 +52,15 @@ def found(place: str) -> type[Any]:
 def _file(path: Path) -> Any:
     """Imports a file as the module of its name; its folder is searched for other modules."""
     path = path.resolve()
-    known = sys.modules.get(path.stem)
-    if known is not None and getattr(known, "__file__", None) == str(path):
-        return known
-    if str(path.parent) not in sys.path:
+    if path.stem not in sys.modules and str(path.parent) not in sys.path:
         sys.path.insert(0, str(path.parent))
-    return importlib.import_module(path.stem)
+    module = importlib.import_module(path.stem)
+    if getattr(module, "__file__", None) != str(path):
+        raise ImportError(
+            f"this program has another module '{path.stem}', of "
+            f"{getattr(module, '__file__', None) or 'Python itself'}: rename the file"
+        )
+    return module
 
 
 def place_of(driver: type[Any]) -> str:

@@ -1,0 +1,263 @@
+"""A suite of checks for a robot, as one function for your tests.
+
+from o80.testing import check_robot
+
+def test_my_arm() -> None:
+    check_robot("build/my_arm.so", {"gain": 2.0})
+"""
+
+import contextlib
+import math
+import random
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from o80 import robots
+from o80.columns import columns_of, values_of
+from o80.errors import InvalidArgument
+from o80.history import History
+from o80.replaying.conditions import reads_the_world
+from o80.replaying.replay import replay
+
+if TYPE_CHECKING:
+    from o80.frontend import Frontend
+
+_ITERATIONS = 40  # of a script
+_COPIES = 3
+_TURNS = 3
+_WAIT = 60.0  # [s] for the first rows of a process
+
+
+def check_robot(
+    robot: Any,
+    options: Mapping[str, Any] | None = None,
+    *,
+    seed: int = 0,
+    stops_within: float = 10.0,
+    simulated: bool = False,
+) -> list[str]:
+    """Checks that a simulated robot keeps what o80 builds on, and raises AssertionError if not.
+
+    1. It begins inside its limits, and every number that it observes is finite.
+    2. A run is repeated by a replay, bit for bit.
+    3. A reset with the same seed gives the same motion, whatever was before.
+    4. A restored snapshot holds the whole state: the same commands give the same rows.
+    5. Copies in a group do what single ones do.
+    6. As a process of its own it stops in order, and soon.
+
+    The robot is moved at random inside its limits; numbers without a minimum and a maximum stay
+    where they begin. So robots that may be hardware are not started: those that read the world, and
+    those that do not serve the requests snapshot and restore, unless `simulated` is given.
+
+    robot: name, library, file or class, as for `o80.robots.load`.
+    options: of the robot.
+    seed: of the random commands.
+    stops_within: seconds that a stop may take.
+    simulated: it is no hardware, although it serves no snapshots.
+
+    Returns what was not checked, a sentence each: for example that it serves no reset. Raises
+    AssertionError, which says what was found; InvalidArgument; DriverError.
+    """
+    return _Suite(robot, dict(options or {}), seed, stops_within).run(simulated)
+
+
+class _Suite:
+    """The checks of one robot."""
+
+    def __init__(self, robot: Any, options: dict[str, Any], seed: int, stops_within: float) -> None:
+        self._robot = robots.load(robot)
+        self._options = options
+        self._seed = seed
+        self._stops_within = stops_within
+        self._served: set[str] = set()
+        self._left: list[str] = []
+
+    def run(self, simulated: bool) -> list[str]:
+        schema = self._robot.describe(**self._options)
+        why = "" if simulated and not schema["of_the_world"] else reads_the_world(schema)
+        if why:
+            cure = "" if schema["of_the_world"] else ". If it is a simulation, give simulated=True"
+            raise InvalidArgument(
+                f"check_robot moves a robot at random, so it does not start '{schema['robot']}': "
+                f"{why}{cure}"
+            )
+        self._served = {request["name"] for request in schema["requests"]}
+        with self._inline() as arm:
+            self._begins_inside_its_limits(arm)
+        self._needs(("snapshot", "restore"), self._replays, "a replay")
+        self._needs(("reset",), self._resets_by_its_seed, "seeds of resets")
+        self._needs(("snapshot", "restore"), self._keeps_all_in_a_snapshot, "snapshots")
+        self._copies_equal_single_ones()
+        self._stops()
+        return self._left
+
+    def _inline(self, **more: Any) -> Any:
+        return self._robot.inline(**more, **self._options)
+
+    def _needs(self, requests: Sequence[str], check: Callable[[], None], what: str) -> None:
+        if lacking := [name for name in requests if name not in self._served]:
+            self._left.append(f"{what}: the robot does not serve {' and '.join(lacking)}")
+        else:
+            check()
+
+    # ------------------------------------------------------------------ the checks
+
+    def _begins_inside_its_limits(self, arm: "Frontend") -> None:
+        first = arm.history(since=0, until=0)
+        finite = {each.name: values_of(first, each)[0] for each in columns_of(arm.schema)}
+        for name, value in finite.items():
+            assert np.isfinite(value), f"{name} is {value} in row 0"
+        bounded = 0
+        for actuator in arm.actuators:
+            for number in actuator.numbers:
+                dot = f".{number.name}" if number.name else ""
+                value = float(finite[f"observed.{actuator.name}{dot}"])
+                bounded += math.isfinite(number.minimum) and math.isfinite(number.maximum)
+                assert number.minimum <= value <= number.maximum, (
+                    f"observed.{actuator.name}{dot} is {value:g} in row 0, outside its limits from "
+                    f"{number.minimum:g} to {number.maximum:g}"
+                )
+        if arm.actuators and not bounded:
+            self._left.append("motion: no number has a minimum and a maximum")
+
+    def _replays(self) -> None:
+        with self._inline() as arm:
+            act = _Actions(arm, self._seed)
+            for _ in range(3):
+                act.play()
+            if "reset" in self._served:
+                arm.request("reset", **self._fields(arm, "reset", 1))
+                act.play()
+            report = replay(arm)
+            assert report.identical, f"a run is not repeated by its replay: {report}"
+
+    def _resets_by_its_seed(self) -> None:
+        with self._inline() as arm:
+            found = []
+            for turn in range(_TURNS):
+                _Actions(arm, self._seed + 1 + turn).play()  # another past for each
+                arm.request("reset", **self._fields(arm, "reset", 7))
+                found.append(self._motion(arm))
+            for other in found[1:]:
+                _compare(found[0], other, "after two resets with the same seed")
+
+    def _keeps_all_in_a_snapshot(self) -> None:
+        with self._inline() as arm:
+            _Actions(arm, self._seed).play()
+            arm.request("snapshot", **self._fields(arm, "snapshot", 0))
+            found = []
+            for turn in range(_TURNS):
+                _Actions(arm, self._seed + 1 + turn).play()  # another past for each
+                arm.request("restore", **self._fields(arm, "restore", 0))
+                found.append(self._motion(arm))
+            for other in found[1:]:
+                _compare(found[0], other, "after the same snapshot was restored twice")
+
+    def _motion(self, arm: "Frontend") -> History:
+        """Rows of a script that is the same in each call."""
+        begin = arm.published
+        _Actions(arm, self._seed + 100).play()
+        return arm.history(since=begin)
+
+    def _copies_equal_single_ones(self) -> None:
+        with contextlib.ExitStack() as stack:
+            singles = [stack.enter_context(self._inline()) for _ in range(_COPIES)]
+            group = stack.enter_context(self._inline(copies=_COPIES))
+            for turn, single in enumerate(singles):
+                for one in (single, group[turn]):
+                    act = _Actions(one, self._seed + turn)
+                    act.play(10)
+                _compare(
+                    single.history(8),
+                    group[turn].history(8),
+                    f"in copy {turn} of a group and in a single robot",
+                )
+
+    def _stops(self) -> None:
+        process = self._robot.start(**self._options)
+        try:
+            with process.frontend() as arm:
+                arm.wait_for(arm.published + 2, timeout=_WAIT)
+            begin = time.monotonic()
+        finally:
+            process.stop()
+        took = time.monotonic() - begin
+        assert took < self._stops_within, (
+            f"its process took {took:.1f} s to stop: no verb of the driver may wait so long"
+        )
+
+    @staticmethod
+    def _fields(arm: "Frontend", request: str, value: int) -> dict[str, int]:
+        """Values for the seed or slot of a request, as far as it has one."""
+        (described,) = (each for each in arm.schema["requests"] if each["name"] == request)
+        fields = {field["name"] for field in (described.get("type") or {}).get("fields", ())}
+        return {name: value for name in ("seed", "slot") if name in fields}
+
+
+class _Actions:
+    """Random commands inside the limits of a robot, the same for the same seed."""
+
+    def __init__(self, arm: "Frontend", seed: int) -> None:
+        self._arm = arm
+        self._random = random.Random(seed)
+        self._targets = [*_bounded(arm)]
+
+    def play(self, iterations: int = _ITERATIONS) -> None:
+        """Bursts so many iterations, with commands in between."""
+        while iterations > 0:
+            for actuator, target in self._choose():
+                self._arm.add_command(
+                    actuator,
+                    target,
+                    iterations=self._random.randrange(1, 12),
+                    mode=self._random.choice(["queue", "overwrite"]),
+                )
+            count = min(iterations, self._random.randrange(1, 6))
+            self._arm.burst(count)
+            iterations -= count
+
+    def _choose(self) -> Iterator[tuple[int, Any]]:
+        for actuator, ranges in self._targets:
+            if self._random.random() > 0.3:
+                continue
+            drawn = {name: self._draw(low, high) for name, (low, high) in ranges.items()}
+            yield actuator, drawn.get("", drawn)
+
+    def _draw(self, low: float, high: float) -> float:
+        value = low + self._random.random() * (high - low)
+        whole = float(round(value))  # for integers
+        return whole if low <= whole <= high and high - low > 10 else value
+
+
+def _bounded(arm: "Frontend") -> Iterator[tuple[int, dict[str, tuple[float, float]]]]:
+    """Index of each actuator, and the ranges of its numbers with a minimum and a maximum."""
+    for actuator in arm.actuators:
+        ranges = {
+            number.name: (number.minimum, number.maximum)
+            for number in actuator.numbers
+            if math.isfinite(number.minimum)
+            and math.isfinite(number.maximum)
+            and number.name.isidentifier() | (number.name == "")
+        }
+        if ranges:
+            yield actuator.index, ranges
+
+
+def _compare(one: History, other: History, when: str) -> None:
+    """Raises AssertionError with the first number that differs in the two, row by row."""
+    assert len(one) == len(other), f"{len(one)} and {len(other)} rows {when}"
+    found = []
+    for column in columns_of(one.schema):
+        if column.origin != "robot":
+            continue
+        a, b = values_of(one, column), values_of(other, column)
+        differs = np.flatnonzero((a != b) & ~((a != a) & (b != b)))
+        if len(differs):
+            row = int(differs[0])
+            found.append((row, column.name, a[row].item(), b[row].item()))
+    if found:
+        row, name, a, b = min(found)
+        raise AssertionError(f"{name} is {a!r} and {b!r} {when}, {row} rows later")

@@ -1,0 +1,145 @@
+"""`check_robot` passes right robots, and says what is wrong with others."""
+
+from pathlib import Path
+
+import pytest
+
+import o80
+from o80.testing import check_robot
+
+CART = """
+import time
+import numpy as np
+import o80
+
+
+class Cart:
+    of_the_world = False
+    actuators = ("x",)
+    limits = {"x": o80.Limits(minimum=-1.0, maximum=1.0)}
+    requests = {
+        "reset": {"seed": np.uint64},
+        "snapshot": {"slot": np.uint32},
+        "restore": {"slot": np.uint32},
+    }
+    made = 0
+
+    def __init__(self):
+        type(self).made += 1
+        self.x, self.speed, self.kept, self.past = 0.0, 0.0, {}, 0.0
+
+    def write(self, desired):
+        self.speed += 0.1 * (desired[0] - self.x) - 0.05 * self.speed
+        self.x = min(max(self.x + self.speed, -1.0), 1.0)
+        self.past += abs(desired[0])
+
+    def read(self, reading):
+        reading.observed[0] = self.x
+
+    def on_reset(self, fields):
+        self.x, self.speed = 0.01 * float(fields.seed), 0.0
+        return o80.StartAfresh()
+
+    def on_snapshot(self, fields):
+        self.kept[int(fields.slot)] = (self.x, self.speed)
+
+    def on_restore(self, fields):
+        self.x, self.speed = self.kept[int(fields.slot)]
+        return o80.StartAfresh()
+"""
+
+
+def written(folder: Path, name: str, *changes: tuple[str, str]) -> str:
+    """Place of the cart with some of its text replaced, in a file of this name."""
+    text = CART
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    (folder / f"{name}.py").write_text(text)
+    return f"{folder / name}.py:Cart"
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_right_robot_passes(tmp_path: Path, seed: int) -> None:
+    assert check_robot(written(tmp_path, f"right_cart_{seed}"), seed=seed) == []
+
+
+@pytest.mark.parametrize("muscle", ["linear", "hill"])
+def test_the_simulated_arm_passes(muscle: str) -> None:
+    assert check_robot("pam", {"muscle": muscle, "start_noise": 0.01}) == []
+
+
+def test_two_joints_pass() -> None:
+    assert check_robot("two_joints") == []
+
+
+def test_a_robot_without_requests_is_checked_as_far_as_it_goes(tmp_path: Path) -> None:
+    plain = written(tmp_path, "plain_cart", ("    requests = {", "    requests = {} and {"))
+    with pytest.raises(o80.InvalidArgument, match="simulated=True"):
+        check_robot(plain)
+    assert check_robot(plain, simulated=True) == [
+        "a replay: the robot does not serve snapshot and restore",
+        "seeds of resets: the robot does not serve reset",
+        "snapshots: the robot does not serve snapshot and restore",
+    ]
+
+
+def test_a_robot_of_the_world_is_not_moved(tmp_path: Path) -> None:
+    real = written(tmp_path, "real_cart", ("of_the_world = False", "of_the_world = True"))
+    with pytest.raises(o80.InvalidArgument, match="not start 'cart': the robot reads the world"):
+        check_robot(real, simulated=True)
+
+
+WRONG: dict[str, tuple[str, list[tuple[str, str]]]] = {
+    "begins_outside": (
+        r"observed\.x is 2 in row 0, outside its limits from -1 to 1",
+        [("self.past = 0.0,", "self.past = 2.0,")],
+    ),
+    "differs_by_instance": (
+        "a run is not repeated by its replay",
+        [("= self.x\n", "= self.x + 1e-3 * type(self).made\n")],
+    ),
+    "resets_in_part": (
+        r"observed\.x is .* after two resets with the same seed",
+        [("float(fields.seed), 0.0", "float(fields.seed), self.speed")],
+    ),
+    "keeps_a_part": (
+        r"observed\.x is .* after the same snapshot was restored twice",
+        [
+            ("= (self.x, self.speed)", "= (self.x, 0.0)"),
+            ("self.x, self.speed = self.kept", "self.x, _ = self.kept"),
+        ],
+    ),
+    "shares_between_copies": (
+        "in copy . of a group and in a single robot",
+        [
+            (
+                "self.speed += 0.1",
+                "type(self).made += 1\n        self.speed += 1e-3 * self.made + 0.1",
+            ),
+            ("requests = {", "requests = {} and {"),
+        ],
+    ),
+    "stops_late": (
+        r"its process took .* s to stop",
+        [("def on_reset", "def stop(self):\n        time.sleep(0.2)\n\n    def on_reset")],
+    ),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_what_is_wrong_is_said(tmp_path: Path, name: str) -> None:
+    said, changes = WRONG[name]
+    wrong = written(tmp_path, name, *changes)
+    with pytest.raises(AssertionError, match=said):
+        check_robot(wrong, simulated=True, stops_within=0.1 if name == "stops_late" else 30.0)
+
+
+def test_another_file_with_the_name_of_a_loaded_one_is_refused(tmp_path: Path) -> None:
+    """It must not become the robot of the first file."""
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    o80.robots.load(written(first, "same_cart"))
+    with pytest.raises(o80.DriverError, match=rf"another module 'same_cart', of {first}.*rename"):
+        o80.robots.load(written(second, "same_cart", ("0.05", "0.06")))
