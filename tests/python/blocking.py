@@ -88,7 +88,7 @@ COMPUTING = {"ChainedBurst.run", "GroupBurst.run", "GroupRequest.run", "InlineGr
 def waiting_methods() -> set[str]:
     """All that is public, takes a timeout, and waits for somebody."""
     found = set()
-    for name in [*o80.__all__, "robots.Robot", "robots.Process"]:
+    for name in [*vars(o80)["__all__"], "robots.Robot", "robots.Process"]:
         thing: Any = o80
         for part in name.split("."):
             thing = getattr(thing, part)

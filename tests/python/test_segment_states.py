@@ -42,7 +42,7 @@ def viewed():
 
 if user := int(sys.argv.pop(1)):
     # this user may not be able to import anything: import all that is needed
-    for name in o80.__all__:
+    for name in vars(o80)["__all__"]:
         getattr(o80, name)
     for words in ("list", "list --json", "info x", "stop x", "stop --all", "clean x", "halt x"):
         say(words.split(), O80_DIRECTORY="/nowhere")

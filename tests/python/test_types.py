@@ -55,7 +55,7 @@ def test_every_public_name_is_documented() -> None:
     import o80
 
     undocumented = []
-    for name in o80.__all__:
+    for name in vars(o80)["__all__"]:
         thing = getattr(o80, name)
         if not inspect.isclass(thing) and not inspect.isroutine(thing):
             continue
