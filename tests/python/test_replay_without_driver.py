@@ -240,6 +240,26 @@ def test_a_recording_that_begins_late_is_replayed_from_where_nothing_acts(
     assert "--without-driver" in done.stdout, done.stdout
 
 
+def test_the_journal_says_that_nothing_acts_however_much_is_written(
+    segment: str, tmp_path: Path
+) -> None:
+    """Bursts without commands fill its ring more than once."""
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment, history=64, journal=0.5) as arm:
+        arm.add_command("elbow", 0.5, iterations=20)
+        arm.burst(100)
+        first = arm.journal()[0].number
+        while arm.journal()[0].number < first + 30_000:
+            for _ in range(1000):
+                arm.burst(1)
+        with o80.Recording(path, arm):
+            arm.add_command("elbow", 0.1, iterations=20)
+            arm.burst(30)
+    (run,) = o80.replay(path, driver=False)
+    assert run.identical, run
+    assert run.rows > 60
+
+
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of a robot of the world."""

@@ -368,7 +368,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     controller.finish_pending();
     under_way_ = false;
     count_burst();
-    if (journal.has_acted() && is_at_rest()) journal.at_rest();
+    if (journal.lacks_rest() && is_at_rest()) journal.at_rest();
   }
   journal.flush();
   wake_sleepers(segment.view(),

@@ -10,7 +10,11 @@
 namespace o80 {
 
 DecisionJournal::DecisionJournal(const SegmentView& view)
-    : writer_(view), view_(view), named_(view.shape.lanes), acts_(writer_.is_on()) {}
+    : writer_(view),
+      view_(view),
+      named_(view.shape.lanes),
+      acts_(writer_.is_on()),
+      half_(writer_.bytes() / 2) {}
 
 void DecisionJournal::begin_blocks(std::uint32_t lane, std::uint64_t sender,
                                    std::uint32_t most) noexcept {

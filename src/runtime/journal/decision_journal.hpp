@@ -72,11 +72,12 @@ class DecisionJournal {
   // rows in which nothing acts
   /// Something acts from now on, which another entry tells.
   void acts() noexcept { acts_ = is_on(); }
-  /// True if something has acted since the last at_rest().
-  bool has_acted() const noexcept { return acts_; }
-  /// Nothing acts any more, and the row of this iteration shows the whole state of the controller.
+  /// True if something has acted since the last at_rest(), or half a ring was written since.
+  bool lacks_rest() const noexcept { return acts_ || writer_.position() - rest_ > half_; }
+  /// Nothing acts now, and the row of this iteration shows the whole state of the controller.
   void at_rest() noexcept {
     acts_ = false;
+    rest_ = writer_.position();
     note(JournalKind::at_rest, 0, 0);
   }
 
@@ -170,7 +171,7 @@ class DecisionJournal {
   void name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   void name_again(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   bool is_far(const Named& named) const noexcept {
-    return writer_.position() - named.position > writer_.bytes() / 2;
+    return writer_.position() - named.position > half_;
   }
 
   JournalWriter writer_;
@@ -183,6 +184,8 @@ class DecisionJournal {
   std::uint32_t status_lane_ = 0;
   Iteration iteration_ = 0;
   bool acts_;
+  std::uint64_t rest_ = 0;  // position of the newest entry at_rest
+  std::uint64_t half_;      // of the ring
 };
 
 }  // namespace o80
