@@ -1,6 +1,7 @@
 #include <array>
 #include <list>
 #include <map>
+#include <string_view>
 
 #include "describe/table.hpp"
 #include "runtime/frontend/link.hpp"
@@ -81,6 +82,11 @@ class Auditor {
     }
   }
 
+  /// Somebody has control: the dead may hold it for a moment yet.
+  static bool is_of_control(const o80::Error& error) {
+    return std::string_view(error.what()).find("exclusive control") != std::string_view::npos;
+  }
+
   /// The dead hold nothing for long: neither lanes nor control.
   void be_heard(o80::UntypedFrontend& frontend) {
     actor_.slot.call = "pulse of the auditor";
@@ -89,14 +95,15 @@ class Auditor {
     while (o80::monotonic_now() - began < 10'000 * kMillisecond) {
       try {
         frontend.add_purge_own();
-        const o80::Batch batch = frontend.pulse();
-        batch.wait(std::chrono::seconds(10));
-        refusal = batch.rejection();
-        if (refusal.empty()) return;
+        frontend.pulse().wait(std::chrono::seconds(10));
+        return;
       } catch (const o80::LaneFull&) {
         frontend.forget_added();
       } catch (const o80::NoLane&) {
         frontend.forget_added();
+      } catch (const o80::Error& error) {
+        if (!is_of_control(error)) throw;
+        refusal = error.what();
       }
       actor_.pause(kMillisecond);
     }
@@ -127,8 +134,7 @@ class Auditor {
       } catch (const o80::TimeoutError&) {
         throw;
       } catch (const o80::Error& error) {
-        // the dead may hold control for a moment yet
-        if (std::string(error.what()).find("exclusive") == std::string::npos) throw;
+        if (!is_of_control(error)) throw;
         refused(error.what());
       }
     }
