@@ -172,8 +172,8 @@ def send_anything(arm: o80.Frontend, choose: random.Random) -> o80.Batch:
             pace = {"profile": "as_sent"}
         place = choose.choice([-1.0, 0.0, 0.1, choose.uniform(-2.5, 2.5)])
         names = choose.sample(NAMES, 1) if "speed" in pace else choose.sample(NAMES, 2)
-        mode = choose.choice(["queue", "overwrite"])
-        arm.add_command(names, [{"position": place}] * len(names), mode=mode, **pace)
+        pace["mode"] = choose.choice(["queue", "overwrite"])
+        arm.add_command(names, [{"position": place}] * len(names), **pace)
     if choose.random() < 0.2:
         arm.add_purge(choose.choice(NAMES))
     return arm.pulse()
