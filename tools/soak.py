@@ -115,9 +115,14 @@ def user(this: Round) -> Iterator[None]:
     home = tempfile.mkdtemp(prefix="soak-home-")
     this.environment |= {"HOME": home, "PYTHONPYCACHEPREFIX": home}
     written = [this.folder, Path(home), *(ROOT / "build" / each for each in ("hypothesis", "test"))]
-    written += [ROOT / "build/dev/Testing", ROOT / "build/pytest"]
+    written += [ROOT / "build/dev/Testing", ROOT / "build/pytest", ROOT / "build/mypy-users"]
+    files = [ROOT / "build/mypy-users.lock", ROOT / "build/dev/install_manifest.txt"]
     for path in written:
         path.mkdir(parents=True, exist_ok=True)
+    for path in files:
+        path.touch()
+    written += files
+    for path in written:
         subprocess.run(["chown", "-R", "65534", path], check=True)
     try:
         yield
@@ -144,7 +149,7 @@ def disk(this: Round) -> contextlib.AbstractContextManager[None]:
 @contextlib.contextmanager
 def memory(this: Round) -> Iterator[None]:
     """A small /dev/shm, which no other program sees."""
-    mount = 'mount -t tmpfs -o size=256M tmpfs /dev/shm && exec "$0" "$@"'
+    mount = 'mount -t tmpfs -o size=512M tmpfs /dev/shm && exec "$0" "$@"'
     this.prefix[:0] = ["unshare", "-m", "sh", "-c", mount]
     yield
 

@@ -12,6 +12,19 @@ from weakref import WeakSet
 
 COLLECT = 1.0  # [s] for the exit code of a process that has ended
 
+
+class _Child(subprocess.Popen[bytes]):
+    """A child that ends when it is lost, for example to Ctrl-C before its starter has it."""
+
+    def __del__(self) -> None:
+        # Popen keeps a lost process that runs, and its pipes with it
+        pipe = getattr(self, "stdin", None)
+        if pipe is not None:
+            with contextlib.suppress(OSError):
+                pipe.close()
+        super().__del__()
+
+
 _children: WeakSet[subprocess.Popen[bytes]] = WeakSet()
 
 
@@ -23,9 +36,7 @@ def start_child(command: Sequence[str | Path], **options: Any) -> subprocess.Pop
     # A process group of its own: Ctrl-C reaches only this program, which ends the child in order.
     # Not a session of its own: the kernel divides processor time between sessions first, so a robot
     # alone would get as much as all programs that read it.
-    child: subprocess.Popen[bytes] = subprocess.Popen(
-        command, stdin=subprocess.PIPE, process_group=0, **options
-    )
+    child = _Child(command, stdin=subprocess.PIPE, process_group=0, **options)
     _children.add(child)
     return child
 

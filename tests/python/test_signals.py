@@ -4,6 +4,7 @@ import contextlib
 import os
 import pty
 import re
+import select
 import shutil
 import signal
 import subprocess
@@ -19,6 +20,7 @@ from blocking import CALLS
 from interrupting import at_every_moment
 
 import o80
+from o80.child import start_child
 
 WAIT = 60.0  # [s] longer than any wait should take
 
@@ -403,6 +405,18 @@ def recording(name: str, folder: Path) -> None:
 def in_a_process(name: str, _: Path) -> None:
     with o80.robots.load("two_joints").start(name):
         pass
+
+
+@pytest.mark.filterwarnings("ignore::ResourceWarning")
+def test_a_child_that_is_lost_ends() -> None:
+    """As when Ctrl-C comes between the start of a process and the object that keeps it."""
+    child = start_child(["cat"])
+    end = os.pidfd_open(child.pid)
+    try:
+        del child
+        assert select.select([end], [], [], WAIT)[0]
+    finally:
+        os.close(end)
 
 
 @pytest.mark.filterwarnings(
