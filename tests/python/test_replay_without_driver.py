@@ -220,6 +220,31 @@ def test_it_begins_at_any_row_in_which_nothing_acts(segment: str, seed: int) -> 
                 assert run.rows == 400 - row
 
 
+def test_it_does_not_begin_between_a_purge_and_a_batch_that_it_still_purges(segment: str) -> None:
+    """One for a later iteration, sent before the purge. What is left of it acts in rows 20 to 23."""
+    with o80.Backend(segment, ["one", "other"]) as backend:
+        backend.publish([0.0, 0.0])
+        with o80.Frontend(segment) as arm, o80.Frontend(segment) as second:
+            arm.add_command(["one", "other"], [1.0, 1.0], iterations=4)
+            later = arm.pulse(at=20)
+            for row in range(1, 40):
+                if row == 8:
+                    second.add_purge("other")
+                    second.pulse()
+                desired = backend.step()
+                assert desired is not None
+                backend.publish(desired)
+            assert later.statuses == [o80.Status.PURGED]
+        with o80.Frontend(segment, read_only=True, dead=True) as arm:
+            begins = []
+            for row in (4, 12, 30):
+                (run,) = o80.replay(arm, since=row)
+                assert run.identical, run
+                begins.append(run.notes[0])
+    row_of = "the replay begins at rest in row"
+    assert begins == [f"{row_of} 4", f"{row_of} 24", f"{row_of} 30"]
+
+
 def test_a_recording_that_begins_late_is_replayed_from_where_nothing_acts(
     segment: str, tmp_path: Path
 ) -> None:

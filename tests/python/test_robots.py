@@ -1,6 +1,7 @@
 """Robots: found, loaded, started as processes and inside this one."""
 
 import gc
+import importlib
 import os
 import shutil
 import signal
@@ -313,3 +314,38 @@ def test_a_process_that_was_stopped_leaves_nothing_open(segment: str) -> None:
     gc.collect()
 
     assert set(os.listdir("/proc/self/fd")) <= before
+
+
+DRIVER = """
+class Joint:
+    actuators = ("x",)
+
+    def read(self, reading):
+        reading.observed[0] = 0.0
+"""
+
+
+def test_another_file_with_the_name_of_a_loaded_one_is_refused(tmp_path: Path) -> None:
+    """It must not become the robot of the first file."""
+    places = []
+    for folder in ("first", "second"):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "same_joint.py").write_text(DRIVER)
+        places.append(f"{tmp_path / folder / 'same_joint.py'}:Joint")
+    o80.robots.load(places[0])
+    said = rf"another module 'same_joint', of {tmp_path / 'first'}.*rename the file"
+    with pytest.raises(o80.DriverError, match=said):
+        o80.robots.load(places[1])
+
+
+def test_a_file_that_was_imported_by_a_link_is_the_same_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "real").mkdir()
+    (tmp_path / "link").symlink_to(tmp_path / "real")
+    (tmp_path / "real" / "linked_joint.py").write_text(DRIVER)
+    monkeypatch.syspath_prepend(tmp_path / "link")
+    importlib.import_module("linked_joint")
+    for folder in ("real", "link"):
+        place = f"{tmp_path / folder / 'linked_joint.py'}:Joint"
+        assert o80.robots.load(place).name == "joint"

@@ -133,13 +133,3 @@ def test_what_is_wrong_is_said(tmp_path: Path, name: str) -> None:
     wrong = written(tmp_path, name, *changes)
     with pytest.raises(AssertionError, match=said):
         check_robot(wrong, simulated=True, stops_within=0.1 if name == "stops_late" else 30.0)
-
-
-def test_another_file_with_the_name_of_a_loaded_one_is_refused(tmp_path: Path) -> None:
-    """It must not become the robot of the first file."""
-    first, second = tmp_path / "first", tmp_path / "second"
-    first.mkdir()
-    second.mkdir()
-    o80.robots.load(written(first, "same_cart"))
-    with pytest.raises(o80.DriverError, match=rf"another module 'same_cart', of {first}.*rename"):
-        o80.robots.load(written(second, "same_cart", ("0.05", "0.06")))

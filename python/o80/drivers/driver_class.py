@@ -55,10 +55,11 @@ def _file(path: Path) -> Any:
     if path.stem not in sys.modules and str(path.parent) not in sys.path:
         sys.path.insert(0, str(path.parent))
     module = importlib.import_module(path.stem)
-    if getattr(module, "__file__", None) != str(path):
+    file = getattr(module, "__file__", None)
+    if file is None or Path(file).resolve() != path:
         raise ImportError(
-            f"this program has another module '{path.stem}', of "
-            f"{getattr(module, '__file__', None) or 'Python itself'}: rename the file"
+            f"this program has another module '{path.stem}', of {file or 'Python itself'}: rename "
+            f"the file"
         )
     return module
 

@@ -5,6 +5,8 @@ Without a driver: at row 0, at a fresh start, or at a row in which nothing acts.
 
 from __future__ import annotations
 
+import bisect
+import itertools
 import struct
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -63,6 +65,35 @@ class SlotsKept:
         return None
 
 
+class Purges:
+    """Purges before a start that still end commands behind it.
+
+    Of batches that were sent before a purge and taken after it, for example because they were sent
+    for a later iteration. A replay that begins between the two does not know the purge.
+    """
+
+    def __init__(self, entries: Iterator[_core.JournalEntry]) -> None:
+        taken: list[tuple[int, int, bool]] = []  # number, ticket, whether it purges
+        base = 0
+        for entry in entries:
+            if entry.kind == "order_lost":
+                base += 1 << 64  # earlier purges end nothing any more
+            elif entry.kind == "taken":
+                purges = any(record.kind == "purge" for record in entry.records)
+                taken.append((entry.number, base + entry.ticket, purges))
+        self._numbers = [number for number, _, _ in taken]
+        purged = (ticket if purges else -1 for _, ticket, purges in taken)
+        self._newest_purge = [*itertools.accumulate(purged, max)]
+        tickets = (ticket for _, ticket, _ in reversed(taken))
+        self._oldest_behind = [*itertools.accumulate(tickets, min)][::-1]
+
+    def reach_past(self, number: int) -> bool:
+        """True if a purge before the entry with this number ends a command behind it."""
+        at = bisect.bisect_left(self._numbers, number)
+        is_inside = 0 < at < len(self._numbers)
+        return is_inside and self._newest_purge[at - 1] > self._oldest_behind[at]
+
+
 def find_start(run: RecordedRun, since: int) -> Start | None:
     """The first one at row `since` or later, or None.
 
@@ -74,7 +105,7 @@ def find_start(run: RecordedRun, since: int) -> Start | None:
         for block in run.blocks()
         for row in block.iteration[(block.rows["fresh"] != 0) & (block.rows["halted"] == 0)]
     }
-    requests = Requests(run.schema)
+    requests, purges = Requests(run.schema), Purges(run.entries())
     snapshots: dict[int, bytes] = {}
     sent: set[tuple[int, int]] = set()  # lane and id of requests
     running: set[tuple[int, int]] = set()
@@ -87,6 +118,7 @@ def find_start(run: RecordedRun, since: int) -> Start | None:
             named = list(requests.of(entry))
             first = named[0] if named else ("", -1, 0)
             is_start = entry.iteration >= since and entry.iteration in begun and not running
+            is_start = is_start and not purges.reach_past(entry.number)
             if is_start and (first[0] == "reset" or first[:2] in _restores(snapshots)):
                 return Start(entry.iteration, entry.number, first[0], snapshots)
             sent.update((entry.lane, number) for _, _, number in named)
@@ -104,13 +136,14 @@ def find_fresh_start(run: RecordedRun, since: int) -> Start | None:
         for block in run.blocks()
         for row in block.iteration[(block.rows["fresh"] != 0) & (block.rows["halted"] == 0)]
     }
+    purges = Purges(run.entries())
     taken = (-1, -1, 0)  # iteration, lane and length of the last batch
     for entry in run.entries():
         if entry.kind == "taken":
             taken = (entry.iteration, entry.lane, len(entry.records))
         elif entry.kind == "fresh_start" and entry.iteration in begun:
             is_alone = taken[:2] != (entry.iteration, entry.lane) or taken[2] == 1
-            if is_alone and entry.iteration >= since:
+            if is_alone and entry.iteration >= since and not purges.reach_past(entry.number):
                 return Start(entry.iteration, entry.number, "fresh start")
     return None
 
@@ -121,7 +154,12 @@ def find_rest(run: RecordedRun, since: int) -> Start | None:
     The journal marks where such rows begin; they end before the next entry by which something acts.
     The masks of the row must be clear, as those of a backend that begins.
     """
-    ranges = [each for each in _rests(run.entries()) if each[1] >= since]
+    purges = Purges(run.entries())
+    ranges = [
+        each
+        for each in _rests(run.entries())
+        if each[1] >= since and not purges.reach_past(each[2])
+    ]
     for block in run.blocks():
         calm = (block.rows["fresh"] == 0) & (block.rows["halted"] == 0)
         calm &= block.iteration >= since
