@@ -221,7 +221,7 @@ def test_it_begins_at_any_row_in_which_nothing_acts(segment: str, seed: int) -> 
 
 
 def test_it_does_not_begin_between_a_purge_and_a_batch_that_it_still_purges(segment: str) -> None:
-    """One for a later iteration, sent before the purge. What is left of it acts in rows 20 to 23."""
+    """One for a later iteration. What is left of it acts in rows 20 to 23."""
     with o80.Backend(segment, ["one", "other"]) as backend:
         backend.publish([0.0, 0.0])
         with o80.Frontend(segment) as arm, o80.Frontend(segment) as second:
