@@ -41,7 +41,7 @@ def check_robot(
 ) -> list[str]:
     """Checks that a simulated robot keeps what o80 builds on, and raises AssertionError if not.
 
-    1. It begins inside its limits, and every number that it observes is finite.
+    1. It begins inside its limits; it moves without a halt, and all its numbers stay finite.
     2. A run is repeated by a replay, bit for bit.
     3. A reset with the same seed gives the same motion, whatever was before.
     4. A restored snapshot holds the whole state: the same commands give the same rows.
@@ -59,7 +59,8 @@ def check_robot(
     simulated: it is no hardware, although it serves no snapshots.
 
     Returns what was not checked, a sentence each: for example that it serves no reset. Raises
-    AssertionError, which says what was found; InvalidArgument; DriverError.
+    AssertionError, which says what was found; BackendHalted and DriverError if the robot halts or
+    fails when it is moved; InvalidArgument.
     """
     return _Suite(robot, dict(options or {}), seed, stops_within).run(simulated)
 
@@ -86,7 +87,7 @@ class _Suite:
             )
         self._served = {request["name"] for request in schema["requests"]}
         with self._inline() as arm:
-            self._begins_inside_its_limits(arm)
+            self._begins_and_moves(arm)
         self._needs(("snapshot", "restore"), self._replays, "a replay")
         self._needs(("reset",), self._resets_by_its_seed, "seeds of resets")
         self._needs(("snapshot", "restore"), self._keeps_all_in_a_snapshot, "snapshots")
@@ -105,16 +106,14 @@ class _Suite:
 
     # ------------------------------------------------------------------ the checks
 
-    def _begins_inside_its_limits(self, arm: "Frontend") -> None:
+    def _begins_and_moves(self, arm: "Frontend") -> None:
         first = arm.history(since=0, until=0)
-        finite = {each.name: values_of(first, each)[0] for each in columns_of(arm.schema)}
-        for name, value in finite.items():
-            assert np.isfinite(value), f"{name} is {value} in row 0"
+        values = {each.name: values_of(first, each)[0] for each in columns_of(arm.schema)}
         bounded = 0
         for actuator in arm.actuators:
             for number in actuator.numbers:
                 dot = f".{number.name}" if number.name else ""
-                value = float(finite[f"observed.{actuator.name}{dot}"])
+                value = float(values[f"observed.{actuator.name}{dot}"])
                 bounded += math.isfinite(number.minimum) and math.isfinite(number.maximum)
                 assert number.minimum <= value <= number.maximum, (
                     f"observed.{actuator.name}{dot} is {value:g} in row 0, outside its limits from "
@@ -122,6 +121,11 @@ class _Suite:
                 )
         if arm.actuators and not bounded:
             self._left.append("motion: no number has a minimum and a maximum")
+        _Actions(arm, self._seed).play()
+        rows = arm.history(since=0)
+        for column in columns_of(arm.schema):
+            at = np.flatnonzero(~np.isfinite(values_of(rows, column)))
+            assert not len(at), f"{column.name} is NaN or infinite in row {rows.iteration[at[0]]}"
 
     def _replays(self) -> None:
         with self._inline() as arm:

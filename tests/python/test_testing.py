@@ -95,6 +95,16 @@ WRONG: dict[str, tuple[str, list[tuple[str, str]]]] = {
         r"observed\.x is 2 in row 0, outside its limits from -1 to 1",
         [("self.past = 0.0,", "self.past = 2.0,")],
     ),
+    "loses_a_number": (
+        r"extended\.force is NaN or infinite in row \d+",
+        [
+            ("made = 0", "made = 0\n    extended = {'force': float}"),
+            (
+                "= self.x\n",
+                "= self.x\n        reading.extended = [np.nan if self.past > 1.0 else 0.0]\n",
+            ),
+        ],
+    ),
     "differs_by_instance": (
         "a run is not repeated by its replay",
         [("= self.x\n", "= self.x + 1e-3 * type(self).made\n")],
@@ -125,6 +135,12 @@ WRONG: dict[str, tuple[str, list[tuple[str, str]]]] = {
         [("def on_reset", "def stop(self):\n        time.sleep(0.2)\n\n    def on_reset")],
     ),
 }
+
+
+def test_a_robot_that_halts_when_it_is_moved_is_told(tmp_path: Path) -> None:
+    limits = ("maximum=1.0)", "maximum=1.0, error=1e-3)")
+    with pytest.raises(o80.BackendHalted, match="further apart than its error limit"):
+        check_robot(written(tmp_path, "halting_cart", limits))
 
 
 @pytest.mark.parametrize("name", WRONG)

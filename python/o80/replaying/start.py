@@ -68,8 +68,8 @@ class SlotsKept:
 class Purges:
     """Purges before a start that still end commands behind it.
 
-    Of batches that were sent before a purge and taken after it, for example because they were sent
-    for a later iteration. A replay that begins between the two does not know the purge.
+    A purge also ends commands that were sent before it and are taken after it, for example because
+    they were sent for a later iteration. A replay that begins between the two does not know it.
     """
 
     def __init__(self, entries: Iterator[_core.JournalEntry]) -> None:

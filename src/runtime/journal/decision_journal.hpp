@@ -70,7 +70,7 @@ class DecisionJournal {
   explicit DecisionJournal(const SegmentView& view);
 
   // rows in which nothing acts
-  /// Something acts from now on, which another entry tells.
+  /// Something acts from now on; another entry says what.
   void acts() noexcept { acts_ = is_on(); }
   /// True if something has acted since the last at_rest(), or half a ring was written since.
   bool lacks_rest() const noexcept { return acts_ || writer_.position() - rest_ > half_; }

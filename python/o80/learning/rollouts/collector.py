@@ -91,7 +91,7 @@ class Collector:
 
     @property
     def copies(self) -> int:
-        """How many the environment steps together."""
+        """Number of copies that the environment steps together."""
         return self._environments.num_envs
 
     @property
