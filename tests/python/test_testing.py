@@ -101,7 +101,8 @@ WRONG: dict[str, tuple[str, list[tuple[str, str]]]] = {
             ("made = 0", "made = 0\n    extended = {'force': float}"),
             (
                 "= self.x\n",
-                "= self.x\n        reading.extended = [np.nan if self.past > 1.0 else 0.0]\n",
+                "= self.x\n"
+                "        reading.extended = {'force': np.nan if self.past > 1.0 else 0.0}\n",
             ),
         ],
     ),
