@@ -105,7 +105,7 @@ class Backend final : public o80::RequestServer {
     if (!backend_) {
       throw o80::Closed("the backend of segment '" + name_ + "' was closed while it was in step");
     }
-    if (step == o80::Step::ended && backend_->unreadable()) {
+    if (step == o80::Step::ended && backend_->phase() == o80::Phase::unreadable) {
       throw InvalidArgument("'" + name_ + "' cannot go on: " + std::string(backend_->failure()));
     }
     return step == o80::Step::run;

@@ -104,7 +104,7 @@ bool Loop::cannot_begin() {
 // commands => desired => hardware, wait, hardware => observed, the row is published
 Ended Loop::run() noexcept {
   pacer_.begin(monotonic_now());
-  while (!finished_ && backend_.step() == Step::run) {
+  while (view_.finished == 0 && backend_.step() == Step::run) {
     if (!iterate()) break;
   }
   brake();
@@ -116,7 +116,6 @@ Ended Loop::run() noexcept {
 void Loop::brake() noexcept {
   if (!paced_ || !fault_.empty()) return;
   const std::int64_t end = monotonic_now() + kLongestBraking;
-  braking_ = true;
   while (monotonic_now() < end && backend_.brake() == Step::run) {
     if (!iterate()) return;
   }
@@ -124,19 +123,22 @@ void Loop::brake() noexcept {
 
 Step Loop::run_granted(std::uint32_t most) noexcept {
   if (guard_.forked()) return Step::ended;
-  for (std::uint32_t i = 0; i < most && !ended_; ++i) {
-    const Step step = finished_ ? Step::ended : backend_.try_step();
-    if (step == Step::standing) return step;
-    if (step == Step::ended || !iterate()) stop();
+  Step step = Step::run;
+  for (std::uint32_t i = 0; i < most && step == Step::run; ++i) {
+    step = view_.finished != 0 ? Step::ended : backend_.try_step();
+    if (step == Step::run && !iterate()) step = Step::ended;
   }
-  return ended_ ? Step::ended : Step::run;
+  if (step == Step::ended) stop();
+  return step;
 }
 
 Step Loop::replay(Iteration last) noexcept {
-  while (!ended_ && backend_.iteration() <= last) {
-    if (backend_.step() == Step::ended || !iterate()) stop();
+  while (backend_.iteration() <= last) {
+    if (backend_.step() == Step::run && iterate()) continue;
+    stop();
+    return Step::ended;
   }
-  return ended_ ? Step::ended : Step::run;
+  return Step::run;
 }
 
 bool Loop::iterate() noexcept {
@@ -171,7 +173,7 @@ bool Loop::pace() noexcept {
   // moves, a stop does not shorten the period: the robot would have to move faster.
   bool over = !in_time;
   const bool moves = backend_.acts() && backend_.schema().head.period <= kLongestBraking;
-  while (!over && (moves || braking_ || !backend_.stop_asked())) {
+  while (!over && (moves || !backend_.stop_asked() || backend_.phase() == Phase::braking)) {
     const std::int64_t slice = std::min(pacer_.due(), monotonic_now() + kSlice);
     over = sleep_until(slice) && slice == pacer_.due();
   }
@@ -199,6 +201,7 @@ bool Loop::read() noexcept {
 bool Loop::read_into_view() noexcept {
   view_.iteration = backend_.iteration();
   view_.time = backend_.time();
+  const std::uint32_t finished = view_.finished;  // stays set
   view_.finished = view_.has_desired = view_.missed = view_.halted = view_.reported = 0;
   view_.halt_text.text[0] = 0;
   // reports change only while requests run, and by drivers that say so
@@ -209,8 +212,9 @@ bool Loop::read_into_view() noexcept {
     }
     reported_ = any;
   }
-  if (!calls(Verb::read, [&] { return robot_->read(view_); })) return failed("read");
-  finished_ = finished_ || view_.finished != 0;
+  const bool reads = calls(Verb::read, [&] { return robot_->read(view_); });
+  view_.finished = (reads ? view_.finished : 0) | finished;
+  if (!reads) return failed("read");
   note_halt(view_);
   reported_ = reported_ || view_.reported != 0;
   if (view_.reported != 0) note_requests(view_);
@@ -304,8 +308,7 @@ Served Loop::resume() noexcept {
 }
 
 Ended Loop::stop() noexcept {
-  if (!ended_) {
-    ended_ = true;
+  if (backend_.phase() != Phase::ended) {
     calls(Verb::stop, [&] {
       robot_->stop();
       return true;

@@ -46,7 +46,7 @@ class Loop final : public RequestServer {
   Step run_granted(std::uint32_t most) noexcept;
   /// Bursting only: as UntypedBackend::begin_direct; run_granted then runs the iterations.
   bool begin_direct(const DirectBurst& burst) noexcept {
-    return !ended_ && !finished_ && backend_.begin_direct(burst);
+    return view_.finished == 0 && backend_.begin_direct(burst);
   }
   /// The current row. Between two iterations: the last one.
   const std::byte* row() noexcept { return backend_.observed() - backend_.layout().observed; }
@@ -106,13 +106,10 @@ class Loop final : public RequestServer {
   ForkGuard guard_;
   UntypedBackend backend_;
   Pacer pacer_;
-  bool paced_;             // real time: by the clock or by the driver's wait()
-  bool accepts_reading_;   // in real time: of row 0
-  bool braking_ = false;   // the actuators come to rest before the end
-  bool finished_ = false;  // by Reading::finish()
-  bool ended_ = false;
-  std::string unread_;  // why a resume could not read
-  std::string fault_;   // capacity reserved, so that run() does not allocate
+  const bool paced_;            // real time: by the clock or by the driver's wait()
+  const bool accepts_reading_;  // in real time: of row 0
+  std::string unread_;          // why a resume could not read
+  std::string fault_;           // capacity reserved, so that run() does not allocate
   std::vector<std::uint64_t> interrupted_;
   std::vector<RequestReport> reports_;  // of each request
   bool reported_ = true;                // `reports_` must be filled before the next reading

@@ -79,6 +79,17 @@ enum class Step : std::uint8_t {
   ended      // the backend must end: see stop_asked() and failure()
 };
 
+/// What a backend is doing. See ARCHITECTURE.md, The state of a backend.
+enum class Phase : std::uint8_t {
+  starting,    // row 0 is not published yet
+  ready,       // between two iterations
+  iterating,   // from `step` to `publish`
+  unreadable,  // a fresh start failed, for example by a NaN in its reading: no iteration follows
+  stopping,    // all commands have ended; between two iterations before an end in order
+  braking,     // from `brake` to `publish`
+  ended        // no row follows
+};
+
 /// The side that iterates, in bytes. Call `publish` for row 0, then `step` and `publish` in turn.
 ///
 /// Writer:   the loop's thread; `ask_to_stop` and `halt` any thread or signal handler.
@@ -149,6 +160,8 @@ class UntypedBackend {
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept;
   /// One bit for each actuator: it comes to rest within its limits, without a command.
   const std::uint64_t* braking() const noexcept;
+  /// What it is doing; for the thread of the loop.
+  Phase phase() const noexcept;
   /// The current iteration; 0 before the first `step`.
   Iteration iteration() const noexcept;
   /// Time of the current iteration, on the schema's clock [ns].
@@ -188,8 +201,6 @@ class UntypedBackend {
   /// Reason for which `step` returned `ended` without ask_to_stop() (a failed request or fresh
   /// start, the policy `stop`), or for which row 0 was refused; empty if there is none.
   std::string_view failure() const noexcept;
-  /// True if the backend ended because a fresh start failed, for example by a NaN in its reading.
-  bool unreadable() const noexcept;
   /// Ends the backend: frontends learn that no row follows. `text`: the fault of a failed one.
   void end(BackendState stopped_or_failed, std::string_view text = {}) noexcept;
 

@@ -1,171 +1,23 @@
 #include "o80/runtime/backend.hpp"
 
 #include <algorithm>
-#include <bit>
-#include <cstdlib>
+#include <cassert>
 #include <cstring>
 #include <limits>
 #include <memory>
-#include <sstream>
 #include <string>
 
 #include "base/crash_point.hpp"
-#include "control/number_plan.hpp"
 #include "describe/number_name.hpp"
-#include "describe/table.hpp"
-#include "o80/base/version.hpp"
 #include "runtime/backend/backend_body.hpp"
-#include "runtime/backend/run_option_texts.hpp"
-#include "runtime/journal/provenance_bytes.hpp"
+#include "runtime/backend/backend_options.hpp"
 #include "runtime/journal/recorded_decisions.hpp"
 
 namespace o80 {
 
 namespace {
 
-constexpr std::uint64_t kDefaultHistoryBytes = 16U << 20;
-constexpr std::uint64_t kDefaultHistoryRows = 100'000;
-constexpr std::int64_t kDefaultPeriod = 1'000'000;  // [ns]
-constexpr std::int64_t kPeriodRounding = 100'000;
-/// Least journal of a backend [bytes]: a quarter holds the blocks that one iteration copies.
-constexpr std::uint64_t kLeastBackendJournal = 8 * kWorkPerIteration * kBlockBytes;
 constexpr std::int64_t kForEver = std::numeric_limits<std::int64_t>::max();
-
-std::string rate_text(std::int64_t period) {
-  std::ostringstream text;
-  text << 1e9 / static_cast<double>(period) << " Hz (" << static_cast<double>(period) * 1e-6
-       << " ms)";
-  return text.str();
-}
-
-/// The requested period, the robot's own, or 1 ms.
-std::int64_t period_of(const Schema& schema, const BackendOptions& options) {
-  const std::int64_t own = schema.head.period;
-  if (options.period < 0) {
-    throw InvalidArgument("the period must be positive, got " + std::to_string(options.period) +
-                          " ns");
-  }
-  // printed frequencies are rounded: 166.667 Hz means 6 ms
-  const bool same = std::abs(options.period - own) * kPeriodRounding <= own;
-  if (options.period > 0 && own > 0 && !same) {
-    throw InvalidArgument("robot '" + std::string(schema.head.robot.view()) + "' runs at " +
-                          rate_text(own) + ", not at " + rate_text(options.period) +
-                          ": leave the frequency out, or ask for its own");
-  }
-  if (own > 0) return own;
-  return options.period > 0 ? options.period : kDefaultPeriod;
-}
-
-Schema prepared(Schema schema, const BackendOptions& options) {
-  if (options.silence > 0 && options.stale == Stale::hold) {
-    throw InvalidArgument(
-        "the watchdog (silence) needs a policy: set stale to purge, halt or stop, not to hold");
-  }
-  if (options.silence < 0) {
-    throw InvalidArgument("silence must be 0 (no watchdog) or a number of iterations, got " +
-                          std::to_string(options.silence));
-  }
-  if (options.permission < 0400 || options.permission > 0777) {
-    std::ostringstream why;
-    why << "permission must be an octal mode such as 0600, 0640 or 0660, got " << options.permission
-        << " (octal " << std::oct << options.permission << ")";
-    throw InvalidArgument(why.str());
-  }
-  schema.head.period = period_of(schema, options);
-  schema.head.bursting = options.bursting ? 1 : 0;
-  schema.head.clock = options.bursting ? Clock::simulated : Clock::monotonic;
-  schema.head.stale = options.stale_policy();
-  schema.head.silence = options.silence;
-  schema.head.block = round_up(schema.head.block, 8);
-  check(schema);
-  return schema;
-}
-
-std::uint64_t rows_of(const BackendOptions& options, std::uint32_t row_bytes) {
-  if (options.history > 0) return options.history;
-  return std::clamp<std::uint64_t>(kDefaultHistoryBytes / row_bytes, 16, kDefaultHistoryRows);
-}
-
-/// Size of the journal: twice the largest batch, unless the options say otherwise.
-std::uint64_t journal_bytes_of(const BackendOptions& options) {
-  if (options.journal == 0) return 0;
-  if (options.journal < 0) {
-    const std::uint64_t lane = std::uint64_t{std::bit_ceil(options.lane_blocks)} * kBlockBytes;
-    return std::max(2 * lane, kLeastBackendJournal);
-  }
-  return std::bit_ceil(std::max(static_cast<std::uint64_t>(options.journal), kLeastBackendJournal));
-}
-
-/// The options with the values that take the place of the defaults.
-BackendOptions effective(const Schema& schema, const BackendOptions& options) {
-  BackendOptions effective = options;
-  effective.period = schema.head.period;
-  effective.history = rows_of(options, row_layout(schema).size);
-  effective.lane_blocks = std::bit_ceil(options.lane_blocks);
-  effective.journal = static_cast<std::int64_t>(journal_bytes_of(options));
-  return effective;
-}
-
-/// Wall-clock time of the moment at which the clock of the rows is 0 [ns].
-std::int64_t wall_clock_offset(const Schema& schema) {
-  if (schema.head.clock == Clock::simulated) return wall_clock_now();
-  // of several readings the one with the shortest time in between
-  std::int64_t offset = 0;
-  std::int64_t shortest = std::numeric_limits<std::int64_t>::max();
-  for (int i = 0; i < 5; ++i) {
-    const std::int64_t before = monotonic_now();
-    const std::int64_t wall = wall_clock_now();
-    const std::int64_t took = monotonic_now() - before;
-    if (took >= shortest) continue;
-    shortest = took;
-    offset = wall - before - took / 2;
-  }
-  return offset;
-}
-
-Provenance provenance_of(const Schema& schema, const BackendOptions& options) {
-  Provenance provenance = options.provenance;
-  if (provenance.robot.empty()) provenance.robot = schema.head.robot.str();
-  for (auto& option : texts_of(effective(schema, options)))
-    provenance.run_options.push_back(std::move(option));
-  provenance.version = version();
-  provenance.source_hash = source_hash();
-  provenance.motion_rules = kMotionRules;
-  provenance.wall_clock_offset = wall_clock_offset(schema);
-  return provenance;
-}
-
-OwnedSegment segment_of(const Schema& schema, const Provenance& provenance,
-                        const BackendOptions& given) {
-  const BackendOptions options = effective(schema, given);
-  const std::vector<std::byte> bytes = to_bytes(schema);
-  const std::vector<std::byte> provenance_bytes = to_bytes(provenance);
-  SegmentSpec spec;
-  spec.name = options.segment;
-  spec.schema = bytes;
-  spec.provenance = provenance_bytes;
-  spec.row_bytes = row_layout(schema).size;
-  spec.rows = options.history;
-  spec.lanes = options.lanes;
-  spec.lane_blocks = options.lane_blocks;
-  spec.journal_bytes = static_cast<std::uint64_t>(options.journal);
-  spec.permission = options.permission;
-  spec.inherits_halt = !options.bursting && !options.resume;
-  spec.anonymous = options.anonymous;
-  return OwnedSegment::create(spec);
-}
-
-/// The time between two rows that halts [ns]; 0: none does.
-std::int64_t longest_gap(const Schema& schema, const BackendOptions& options) {
-  constexpr std::int64_t kPeriods = 20;
-  constexpr std::int64_t kLeast = 100'000'000;
-  if (options.bursting) return 0;
-  if (options.gap >= 0) return options.gap;
-  const bool moves = schema.head.of_the_world != 0 && !schema.actuators.empty();
-  const std::int64_t least = moves ? std::max(kPeriods * schema.head.period, kLeast) : 0;
-  const std::int64_t own = schema.head.gap * std::int64_t{1000};
-  return own > 0 && (least == 0 || own < least) ? own : least;
-}
 
 std::size_t largest_request(const Schema& schema) {
   std::size_t size = 0;
@@ -223,70 +75,108 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
 }
 
-// ------------------------------------------------------------------------------ step, publish
+// ------------------------------------------------------------------------------ state
 
-/// In bursting mode waits at most `at_most` [ns] for a burst.
+void UntypedBackend::Body::enter(Phase next) noexcept {
+  assert(may_follow(next, phase));
+  phase = next;
+}
+
+// ------------------------------------------------------------------------------ step
+
+/// Commands => desired, in four stages: watch, take, wait, move. A bursting backend waits at most
+/// `at_most` [ns] for a burst.
 Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
+  if (phase == Phase::ended) return Step::ended;
   if (recorded_ != nullptr) return step_recorded();
   if (burst_.is_direct()) return step_direct();
   const std::int64_t give_up =
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
-  const std::uint32_t most_looks = 2 + pool.size() / kWorkPerIteration;
-  std::uint32_t looks = 0;
-  const bool stands = schema.head.bursting != 0 && !burst_.runs();
+  const bool waited = !is_granted();
+  std::uint32_t scans = 0;
   while (true) {
-    look_at_lives();
-    watch_halt();
-    start_afresh_after_request();
+    watch();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
-    share_ = {};
-    if (!burst_.runs()) {
-      take_due();
-      take_batches();
-    }
+    take_commands();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
-    if (schema.head.bursting == 0 || burst_.runs()) {
+    if (is_granted()) {
       // a pulse that came in this step is a sign of life; a halt may end the burst
       watch_silence();
       watch_halt();
-      if (schema.head.bursting == 0 || burst_.runs()) break;
+      if (is_granted()) break;
     }
-    // before waiting, report all pending statuses
-    const bool all_told = controller.finish_pending();
-    journal.flush();
-    wake_sleepers(segment.view(), {.lanes = lanes.announce()});
-    if (staging.busy() || !all_told) continue;
-    // invalid blocks may have used up the budget of this scan: scan again, a limited number of
-    // times
-    if (lanes.has_pending() && ++looks < most_looks) continue;
-    const std::int64_t left =
-        give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
-    if (left <= 0) return Step::standing;
-    bell.wait(lanes.bell_seen(), std::min(left, kSlice));
+    if (!wait_for_burst(give_up, scans)) return Step::standing;
   }
   O80_CRASH_POINT("backend.after_take");
-  // A group command waits until its dropped members are reported. Report all of them first, so that
-  // a burst does not depend on how long the backend has waited before.
-  while (stands && !controller.finish_pending()) {
-  }
-  if (burst_.runs()) {
-    share_ = {};
-    take_due();
-  }
-  if (burst_.is_in_last_iteration()) history.expect(current);
-  move();
+  if (burst_.runs()) begin_iteration_of_burst(waited);
+  move(Phase::iterating);
   show_acts();
   O80_CRASH_POINT("backend.after_step");
   return Step::run;
 }
 
-/// Commands => desired.
-void UntypedBackend::Body::move() noexcept {
-  under_way_ = true;
+/// Batches => queues, within the budget of an iteration; none during a burst.
+inline void UntypedBackend::Body::take_commands() noexcept {
+  share_ = {};
+  if (burst_.runs()) return;
+  take_due();
+  take_batches();
+}
+
+/// Waits for the bell, until `give_up` [ns]; false if that is over. First reports all pending
+/// statuses. `scans` counts scans of the lanes that found invalid blocks.
+bool UntypedBackend::Body::wait_for_burst(std::int64_t give_up, std::uint32_t& scans) noexcept {
+  const bool all_told = controller.finish_pending();
+  journal.flush();
+  wake_sleepers(segment.view(), {.lanes = lanes.announce()});
+  if (staging.busy() || !all_told) return true;
+  // invalid blocks may have used up the budget of this scan: scan again, a limited number of times
+  const std::uint32_t max_scans = 2 + pool.size() / kWorkPerIteration;
+  if (lanes.has_pending() && ++scans < max_scans) return true;
+  const std::int64_t left = give_up > 0 && give_up < kForEver ? give_up - monotonic_now() : give_up;
+  if (left <= 0) return false;
+  bell.wait(lanes.bell_seen(), std::min(left, kSlice));
+  return true;
+}
+
+/// Batches that are due in this iteration of a burst => queues. `first`: the burst has just begun.
+void UntypedBackend::Body::begin_iteration_of_burst(bool first) noexcept {
+  // A group command waits until its dropped members are reported. Report all of them first, so that
+  // a burst does not depend on how long the backend has waited before.
+  while (first && !controller.finish_pending()) {
+  }
+  if (!burst_.runs()) return;  // its commands have ended
+  share_ = {};
+  take_due();
+  if (burst_.is_in_last_iteration()) history.expect(current);
+}
+
+/// Queues => desired.
+void UntypedBackend::Body::move(Phase under_way) noexcept {
+  enter(under_way);
   outbox_.begin_step();
   controller.step(current, row() + layout.observed);
   outbox_.end_step();
 }
+
+/// One iteration before an end in order: commands have ended, actuators brake.
+Step UntypedBackend::Body::brake() noexcept {
+  if (phase == Phase::stopping || phase == Phase::braking) {
+    if (!controller.braking()) return Step::ended;
+  } else {
+    const bool is_unreadable = phase == Phase::unreadable;
+    enter(Phase::stopping);
+    journal.stopping();
+    if (is_unreadable) return Step::ended;  // the position is unknown, so the robot cannot brake
+    const bool acted = acts();
+    purge_to_stop();
+    if (!acted) return Step::ended;
+  }
+  move(Phase::braking);
+  return Step::run;
+}
+
+// ------------------------------------------------------------------------------ publish
 
 std::int64_t UntypedBackend::Body::real_time() const noexcept {
   return recorded_ == nullptr ? monotonic_now() : recorded_->time(current);
@@ -324,8 +214,10 @@ bool UntypedBackend::Body::publish_first() noexcept {
   return true;
 }
 
+/// Reading, desired states => row. Then statuses, and whoever waits is woken. `fresh`: the row of a
+/// fresh start, which comes within a step.
 void UntypedBackend::Body::publish(bool fresh) noexcept {
-  if (!begun_) {
+  if (!has_begun()) {
     controller.restart(row() + layout.observed, begins_with, current);
     if (recorded_ == nullptr) {
       watch_halt();
@@ -333,8 +225,23 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
       obey_recorded();
     }
   }
+  fill_row(fresh);
+  history.publish(current, row());
+  watch_row(fresh);
+  tell_ended_requests(fresh);
+  if (!fresh) end_iteration();
+  journal.flush();
+  wake_sleepers(segment.view(),
+                {.lanes = !fresh && lanes.announce(), .rows = row_signal.announce(current)});
+  if (!has_begun()) {
+    segment.set_state(BackendState::running);
+    enter(Phase::ready);
+  }
+  journal.set_iteration(++current);
+}
 
-  // observed and extended are in the row already: add head, desired and masks
+/// Adds head, desired states and masks: observed and extended are in the row already.
+inline void UntypedBackend::Body::fill_row(bool fresh) noexcept {
   RowHead head;
   head.iteration = current;
   head.time = time();
@@ -354,33 +261,34 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
     std::memcpy(row() + layout.clamped, controller.clamped_mask(), layout.mask_words * 8);
     std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
   }
-  history.publish(current, row());
+}
+
+/// Row => halts: error limits, readings, gaps.
+inline void UntypedBackend::Body::watch_row(bool fresh) noexcept {
   // before a fresh start the robot may be away from its desired states
-  if (!errors_.empty() && begun_ && !fresh && !will_start_afresh()) watch_errors();
+  if (!errors_.empty() && has_begun() && !fresh && !will_start_afresh()) watch_errors();
   watch_readings();
   if (!followed_.empty()) watch_followers(fresh);
   if (gaps_.is_on()) watch_gaps(fresh);
-  tell_ended_requests(fresh);
+}
 
-  // report statuses, then wake waiting processes
-  if (!fresh) {
-    outbox_.report_row();
-    controller.finish_pending();
-    under_way_ = false;
-    count_burst();
-    if (journal.lacks_rest() && is_at_rest()) journal.at_rest();
+/// Reports the statuses that belong to the row, and counts the iteration of a burst.
+inline void UntypedBackend::Body::end_iteration() noexcept {
+  outbox_.report_row();
+  controller.finish_pending();
+  if (phase == Phase::iterating) {
+    enter(Phase::ready);
+  } else if (phase == Phase::braking) {
+    enter(Phase::stopping);
   }
-  journal.flush();
-  wake_sleepers(segment.view(),
-                {.lanes = !fresh && lanes.announce(), .rows = row_signal.announce(current)});
-  if (!begun_) segment.set_state(BackendState::running);
-  begun_ = true;
-  journal.set_iteration(++current);
+  count_burst();
+  if (journal.lacks_rest() && is_at_rest()) journal.at_rest();
 }
 
 void UntypedBackend::Body::end(BackendState state, std::string_view text) noexcept {
   if (guard_.forked()) return;  // only the parent ends its backend
-  if (segment.state() != BackendState::starting && segment.state() != BackendState::running) return;
+  if (phase == Phase::ended) return;
+  enter(Phase::ended);
   // the current burst gets no last row: its waiter raises BackendGone
   burst_.end();
   reject_all(Reason::stopped);
@@ -446,6 +354,7 @@ double UntypedBackend::difference(std::uint32_t offset, std::uint32_t order) con
 const std::uint64_t* UntypedBackend::braking() const noexcept {
   return body_->controller.braking_mask();
 }
+Phase UntypedBackend::phase() const noexcept { return body_->phase; }
 Iteration UntypedBackend::iteration() const noexcept { return body_->current; }
 std::int64_t UntypedBackend::time() const noexcept { return body_->time(); }
 void UntypedBackend::set_timing(const Timing& timing) noexcept { body_->set_timing(timing); }
@@ -482,7 +391,6 @@ bool UntypedBackend::stop_asked() const noexcept {
   return body_->stop.load(std::memory_order_relaxed);
 }
 std::string_view UntypedBackend::failure() const noexcept { return body_->failure.data(); }
-bool UntypedBackend::unreadable() const noexcept { return body_->unreadable; }
 
 void UntypedBackend::end(BackendState stopped_or_failed, std::string_view text) noexcept {
   body_->end(stopped_or_failed, text);

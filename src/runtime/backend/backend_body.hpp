@@ -47,6 +47,35 @@ inline constexpr std::uint32_t kExpressWork = 512;
 /// What a user may do about a reading that cannot be.
 inline constexpr std::string_view kToResume = "resume with --accept-reading";
 
+/// The transitions that are drawn in ARCHITECTURE.md, The state of a backend.
+constexpr bool may_follow(Phase next, Phase now) noexcept {
+  switch (next) {
+    case Phase::starting:
+      return false;
+    case Phase::ready:
+      return now == Phase::starting || now == Phase::iterating;
+    case Phase::iterating:
+      return now == Phase::ready;
+    case Phase::unreadable:
+      return now == Phase::ready || now == Phase::unreadable;
+    case Phase::stopping:
+      return now == Phase::ready || now == Phase::unreadable || now == Phase::braking;
+    case Phase::braking:
+      return now == Phase::stopping;
+    case Phase::ended:
+      return now != Phase::ended;
+  }
+  return false;
+}
+
+/// What this backend has done about the halt in force.
+enum class HaltStage : std::uint8_t {
+  none,         // none is in force
+  unexplained,  // the driver has halted; the requester has not written its reason yet
+  explained,    // the driver has halted, the reason is known
+  resumed       // the driver has resumed, but another halt was requested meanwhile
+};
+
 /// Implementation of UntypedBackend: its parts, and the order in which batches reach the
 /// controller.
 class UntypedBackend::Body final : public StatusSink, public BatchHandler {
@@ -72,7 +101,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool may_begin(std::uint32_t actuator, std::uint32_t lane, CommandId id) noexcept override;
 
   std::byte* row() noexcept { return reinterpret_cast<std::byte*>(row_.data()); }
-  bool has_begun() const noexcept { return begun_; }
+  bool has_begun() const noexcept { return phase != Phase::starting; }
   bool is_in_forked_child() noexcept;
   bool publish_first() noexcept;
   bool watches_readings() const noexcept { return !readings_.empty(); }
@@ -115,11 +144,32 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Timing timing;
   std::atomic<bool> stop{false};
   std::array<char, 248> failure{};
-  bool unreadable = false;  // a fresh start failed
-  Iteration current = 0;    // the current iteration; between two iterations, the next one
+  Phase phase = Phase::starting;
+  Iteration current = 0;  // the current iteration; between two iterations, the next one
   const std::byte* begins_with = nullptr;  // first desired states; null: the observed ones
 
  private:
+  // an iteration, in the order of its stages
+  void enter(Phase next) noexcept;
+  bool is_under_way() const noexcept {
+    return phase == Phase::iterating || phase == Phase::braking;
+  }
+  bool is_granted() const noexcept { return schema.head.bursting == 0 || burst_.runs(); }
+  /// Deaths and halts => ended commands. Then the fresh start that an ended request needs.
+  void watch() noexcept {
+    look_at_lives();
+    watch_halt();
+    start_afresh_after_request();
+  }
+  void take_commands() noexcept;
+  bool wait_for_burst(std::int64_t give_up, std::uint32_t& scans) noexcept;
+  void begin_iteration_of_burst(bool first) noexcept;
+  void move(Phase under_way) noexcept;
+  void fill_row(bool fresh) noexcept;
+  void watch_row(bool fresh) noexcept;
+  void end_iteration() noexcept;
+  std::int64_t real_time() const noexcept;
+
   // batches => controller
   void take_due() noexcept {
     if (!schedule.empty()) take_all_due();
@@ -151,9 +201,6 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool is_undisturbed() const noexcept;
   Step step_direct() noexcept;
 
-  void move() noexcept;
-  std::int64_t real_time() const noexcept;
-
   // replay
   Step step_recorded() noexcept;
   bool will_start_afresh() const noexcept;
@@ -165,7 +212,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void watch_halt() noexcept {
     if (halts.look()) {
       begin_halt();
-    } else if (reason_missing_) {
+    } else if (halt_stage_ == HaltStage::unexplained) {
       complete_reason();
     }
     if (schedule.has_aside()) end_scheduled();
@@ -243,8 +290,6 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::vector<Iteration> last_life_;  // of each lane: last sign of life of its owner
   std::uint32_t seen_changes_ = 0;
   std::uint32_t seen_rounds_ = 0;
-  bool begun_ = false;      // row 0 is published
-  bool under_way_ = false;  // true from step to publish
   StatusOutbox outbox_;
 
   WorkShare share_;
@@ -261,7 +306,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::array<std::atomic<std::uint64_t>, kHaltCauses> own_halts_{};
   std::uint64_t halted_below_ = 0;  // batches with lower tickets were sent before the last halt
   std::uint32_t shown_acts_ = 0;    // as in Counters::acts
-  bool reason_missing_ = false;     // the requester of the halt has not written its reason yet
+  HaltStage halt_stage_ = HaltStage::none;
   ErrorWatch errors_;
   ReadingWatch readings_;
   ReadingWatch followed_;  // of actuators that follow
@@ -275,8 +320,6 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Iteration missed_periods_ = 0;    // of these, not yet counted by the watchdog
   Iteration missed_at_ = 0;         // row behind the first of them
   Iteration counted_periods_ = 0;   // those counted last
-  bool stopping_ = false;           // braking before an end in order
-  bool driver_halted_ = false;      // the driver's halt() was called
 
   BurstGrant burst_;
 };

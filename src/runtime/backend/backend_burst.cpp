@@ -1,6 +1,8 @@
-// How a burst is granted, counted and ended. See ARCHITECTURE.md, Bursting.
+// How a burst is granted, counted and ended; and direct bursts, which an inline group runs without
+// a batch. See ARCHITECTURE.md, Bursting.
 
 #include "runtime/backend/backend_body.hpp"
+#include "runtime/backend/direct_burst.hpp"
 
 namespace o80 {
 
@@ -33,9 +35,50 @@ void UntypedBackend::Body::end_burst(Iteration row, BurstEnd end) noexcept {
 /// Ends the burst after the current iteration; between two iterations, at once.
 void UntypedBackend::Body::stop_burst(BurstEnd end) noexcept {
   if (!burst_.runs()) return;
-  if (under_way_) return burst_.shorten();
+  if (is_under_way()) return burst_.shorten();
   end_burst(current - 1, end);
   lanes.look_again();
+}
+
+// ------------------------------------------------------------------------------ direct bursts
+
+/// True if nothing but the present frontend of the loop's thread acts: then a direct burst does
+/// what a batch would do. Where a journal is written, batches are needed for their entries.
+bool UntypedBackend::Body::is_undisturbed() const noexcept {
+  const bool alone = recorded_ == nullptr && !journal.is_on() && silence_ == 0;
+  const bool calm = !halts.acts() && holder_.is_nobody() && !burst_.runs();
+  const bool nothing_waits =
+      !staging.busy() && schedule.empty() && !schedule.has_aside() && !running.any();
+  return alone && calm && nothing_waits && lanes.are_quiet() &&
+         !stop.load(std::memory_order_relaxed);
+}
+
+/// As a step that takes a batch: first what has happened since the last iteration.
+bool UntypedBackend::Body::begin_direct(const DirectBurst& burst) noexcept {
+  if (phase == Phase::ended) return false;
+  watch();
+  if (!is_undisturbed() || !controller.has_no_command(burst.targets.actuators)) return false;
+  while (!controller.finish_pending()) {
+  }
+  burst_.begin_direct(burst.iterations);
+  DirectTargets targets = burst.targets;
+  targets.first = current + burst.delay;
+  controller.give(targets);
+  return true;
+}
+
+/// An iteration of a direct burst.
+Step UntypedBackend::Body::step_direct() noexcept {
+  look_at_lives();
+  watch_halt();
+  if (stop.load(std::memory_order_relaxed)) return Step::ended;
+  if (!burst_.runs()) return Step::standing;  // cut by the halt
+  move(Phase::iterating);
+  return Step::run;
+}
+
+bool UntypedBackend::begin_direct(const DirectBurst& burst) noexcept {
+  return body_->begin_direct(burst);
 }
 
 }  // namespace o80

@@ -32,8 +32,9 @@ void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) n
 }
 
 void UntypedBackend::Body::complete_reason() noexcept {
-  reason_missing_ = !halts.show(halts.halt().iteration);
-  if (!reason_missing_) journal.halt(JournalKind::halt_reason, halts.halt());
+  if (!halts.show(halts.halt().iteration)) return;
+  halt_stage_ = HaltStage::explained;
+  journal.halt(JournalKind::halt_reason, halts.halt());
 }
 
 /// Updates Counters::acts before the desired states are written. If this backend is killed while
@@ -73,22 +74,6 @@ void UntypedBackend::Body::watch_gaps(bool fresh) noexcept {
   ask_to_halt(HaltCause::overruns, text.view());
 }
 
-/// One iteration before an end in order: commands have ended, actuators brake.
-Step UntypedBackend::Body::brake() noexcept {
-  if (!stopping_) {
-    stopping_ = true;
-    journal.stopping();
-    if (unreadable) return Step::ended;  // the position is unknown, so the robot cannot brake
-    const bool acted = acts();
-    purge_to_stop();
-    if (!acted) return Step::ended;
-  } else if (!controller.braking()) {
-    return Step::ended;
-  }
-  move();
-  return Step::run;
-}
-
 void UntypedBackend::Body::purge_to_stop() noexcept {
   controller.purge(kEveryActuator, current, Reason::stopped);
   drop_running({Status::purged, Reason::stopped});
@@ -106,7 +91,9 @@ void UntypedBackend::Body::set_timing(const Timing& now) noexcept {
 
 /// Ends all commands and makes every actuator brake.
 void UntypedBackend::Body::begin_halt() noexcept {
-  reason_missing_ = !halts.show(current);
+  const bool driver_halted =
+      halt_stage_ == HaltStage::unexplained || halt_stage_ == HaltStage::explained;
+  halt_stage_ = halts.show(current) ? HaltStage::explained : HaltStage::unexplained;
   journal.halt(JournalKind::halt, halts.halt());
   // batches with a lower ticket that are committed later were sent before the halt: they end as
   // halted when they are taken
@@ -115,12 +102,11 @@ void UntypedBackend::Body::begin_halt() noexcept {
   controller.halt(current);
   drop_running({Status::halted, Reason::halted});
   stop_burst(BurstEnd::cut);
-  if (!driver_halted_ && !readings_.empty()) begin_to_watch();
-  if (!driver_halted_ && server_ != nullptr &&
-      !asks("the handler of a halt", &RequestServer::halt)) {
+  if (driver_halted) return;
+  if (!readings_.empty()) begin_to_watch();
+  if (server_ != nullptr && !asks("the handler of a halt", &RequestServer::halt)) {
     fail("the robot failed in the call that begins a halt");
   }
-  driver_halted_ = true;
 }
 
 /// Checks the scheduled batches that a halt or the watchdog has set aside, a bounded number in each
@@ -198,7 +184,7 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id, std::uint
       return refuse(served.why(), Reason::driver);
     }
   }
-  driver_halted_ = false;
+  halt_stage_ = HaltStage::resumed;
   const bool confirmed = recorded_ == nullptr || recorded_->confirms(JournalKind::resume);
   // before the halt is cleared: a driver's thread that halts again for the same reason from then on
   // requests a new halt
@@ -206,7 +192,7 @@ Outcome UntypedBackend::Body::resume(std::uint32_t lane, CommandId id, std::uint
   if (!confirmed || !halts.clear()) {
     return refuse("another halt was requested meanwhile: read its reason, then resume that one");
   }
-  reason_missing_ = false;
+  halt_stage_ = HaltStage::none;
   journal.resume(lane, taking_owner_, number);
   if (recorded_ != nullptr && !recorded_->begins_with_fresh_start(current)) {
     return refuse("the reading was refused in the recorded run", Reason::reading);

@@ -14,7 +14,7 @@ Step UntypedBackend::Body::step_recorded() noexcept {
   // as before a burst: see step()
   while (granted && !controller.finish_pending()) {
   }
-  move();
+  move(Phase::iterating);
   return Step::run;
 }
 

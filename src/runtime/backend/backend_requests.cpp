@@ -19,7 +19,7 @@ void UntypedBackend::Body::interrupt(std::uint32_t actuator) noexcept {
     recorded_->interrupt(current, static_cast<std::uint16_t>(actuator),
                          schema.actuators[actuator].name.view());
   }
-  journal.interrupted(actuator, !under_way_);
+  journal.interrupted(actuator, !is_under_way());
   controller.interrupt(actuator, current);
 }
 
@@ -72,7 +72,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
   auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
   // a simulator may be put anywhere, a robot of the world cannot
-  const bool judges = schema.head.of_the_world != 0 && recorded_ == nullptr && begun_;
+  const bool judges = schema.head.of_the_world != 0 && recorded_ == nullptr && has_begun();
   if (judges) {
     if (!halts.acts()) {
       readings_.begin(reading.observed);
@@ -91,7 +91,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
     reads = can_begin(reading.desired, "the desired states of a fresh start");
   }
   if (!reads) {
-    unreadable = true;
+    if (has_begun()) enter(Phase::unreadable);
     stop.store(true, std::memory_order_relaxed);
     return reject_request(lane, id, failure.data());
   }
@@ -142,7 +142,7 @@ void UntypedBackend::Body::put_back_reading() noexcept {
 /// before, unless a fresh start lies between them.
 void UntypedBackend::Body::begin_to_watch() noexcept {
   auto* before = reinterpret_cast<std::byte*>(last_row_.data());
-  const bool has_before = begun_ && current > 1 && unpack<RowHead>(row()).fresh == 0 &&
+  const bool has_before = has_begun() && current > 1 && unpack<RowHead>(row()).fresh == 0 &&
                           HistoryReader(segment.view()).read(current - 2, before);
   readings_.begin((has_before ? before : row()) + layout.observed);
   read_at_ = time();
@@ -159,9 +159,9 @@ void UntypedBackend::Body::watch_readings() noexcept {
 
 /// Notes each reading of actuators that follow, for the next command.
 void UntypedBackend::Body::watch_followers(bool fresh) noexcept {
-  if (timing.missed && begun_ && !fresh) return;
+  if (timing.missed && has_begun() && !fresh) return;
   const std::int64_t since = time() - std::exchange(followed_at_, time());
-  if (!begun_ || fresh) return followed_.begin(row() + layout.observed);
+  if (!has_begun() || fresh) return followed_.begin(row() + layout.observed);
   const std::int64_t elapsed = std::max(since, schema.head.period);
   followed_.add(row() + layout.observed, kInMotion * static_cast<double>(elapsed) * 1e-9);
 }
@@ -223,8 +223,8 @@ bool UntypedBackend::Body::judge_first(bool again) noexcept {
 /// Judges the first two readings of an embedded backend: row 0 by its bounds, the next by how far
 /// the robot can have come. If the second is wrong, the backend ends.
 bool UntypedBackend::Body::judge_against_first() noexcept {
-  if (begun_ && timing.missed) return true;
-  if (begun_) {
+  if (has_begun() && timing.missed) return true;
+  if (has_begun()) {
     judges_first_ = false;
   } else {
     readings_.begin(row() + layout.observed);
@@ -233,7 +233,7 @@ bool UntypedBackend::Body::judge_against_first() noexcept {
   ShortText<248> why;
   if (!is_misread(row() + layout.observed, "begin with accept_reading", why)) return true;
   note_failure(why.view());
-  if (begun_) stop.store(true, std::memory_order_relaxed);
+  if (has_begun()) stop.store(true, std::memory_order_relaxed);
   return false;
 }
 

@@ -9,7 +9,7 @@
 #include "o80/robot/run.hpp"
 #include "robot/loop.hpp"
 #include "robot/puppet.hpp"
-#include "runtime/backend/run_option_texts.hpp"
+#include "runtime/backend/backend_options.hpp"
 
 namespace o80::test {
 namespace {

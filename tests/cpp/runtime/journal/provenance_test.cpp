@@ -6,7 +6,7 @@
 #include "control/number_plan.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "o80/base/version.hpp"
-#include "runtime/backend/run_option_texts.hpp"
+#include "runtime/backend/backend_options.hpp"
 #include "runtime/journal/provenance_bytes.hpp"
 #include "runtime/station.hpp"
 
