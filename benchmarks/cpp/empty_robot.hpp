@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "o80/o80.hpp"
-#include "robot/inline_robot.hpp"
-#include "robot/loop.hpp"
+#include "robot/group/inline_robot.hpp"
+#include "robot/loop/loop.hpp"
 #include "sample.hpp"
 
 namespace o80::bench {

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "control/batch_builder.hpp"
+#include "control/batch/batch_builder.hpp"
 #include "memory/ring/lane.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/backend.hpp"

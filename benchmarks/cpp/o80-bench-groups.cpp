@@ -8,8 +8,8 @@
 #include <array>
 
 #include "o80/describe/layout.hpp"
-#include "robot/inline_group.hpp"
-#include "robot/library.hpp"
+#include "robot/driver/library.hpp"
+#include "robot/group/inline_group.hpp"
 #include "sample.hpp"
 
 namespace o80::bench {

@@ -8,7 +8,7 @@
 #include <sstream>
 #include <string>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "empty_robot.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "sample.hpp"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "benchmarks/cpp/sample.hpp"
-#include "control/number_motion.hpp"
+#include "control/motion/number_motion.hpp"
 
 namespace o80::bench {
 namespace {

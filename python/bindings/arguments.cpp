@@ -5,7 +5,7 @@
 #include <cmath>
 #include <string>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "enums.hpp"
 #include "o80/base/error.hpp"
 #include "waiting.hpp"

@@ -2,7 +2,7 @@
 
 #include <nanobind/nanobind.h>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "o80/control/command.hpp"
 
 // Conversions of enums, which are strings in Python (o80.words).

@@ -11,7 +11,7 @@
 #include "o80/runtime/move.hpp"
 #include "o80/runtime/not_completed.hpp"
 #include "observation.hpp"
-#include "robot/inline_group.hpp"
+#include "robot/group/inline_group.hpp"
 
 namespace nb = nanobind;
 

@@ -11,7 +11,7 @@
 
 #include "o80/runtime/frontend.hpp"
 #include "observation.hpp"
-#include "robot/inline_robot.hpp"
+#include "robot/group/inline_robot.hpp"
 
 /// A native frontend that no Python object owns yet: attached, or of an inline robot.
 struct Attachment {

@@ -8,8 +8,8 @@
 
 #include "arguments.hpp"
 #include "batch.hpp"
-#include "control/record.hpp"
-#include "control/state_layout.hpp"
+#include "control/batch/record.hpp"
+#include "control/motion/state_layout.hpp"
 #include "frontend.hpp"
 #include "states.hpp"
 #include "verb.hpp"

@@ -1,6 +1,6 @@
-// Copies of a robot that are stepped together (robot/inline_group.hpp).
+// Copies of a robot that are stepped together (robot/group/inline_group.hpp).
 
-#include "robot/inline_group.hpp"
+#include "robot/group/inline_group.hpp"
 
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
@@ -18,7 +18,7 @@
 #include "frontend.hpp"
 #include "loop_options.hpp"
 #include "pickling.hpp"
-#include "robot/library.hpp"
+#include "robot/driver/library.hpp"
 #include "states.hpp"
 #include "waiting.hpp"
 

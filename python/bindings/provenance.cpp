@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "bindings.hpp"
-#include "control/number_plan.hpp"
+#include "control/motion/number_plan.hpp"
 #include "frontend.hpp"
 
 namespace nb = nanobind;

@@ -24,8 +24,8 @@
 #include "o80/base/error.hpp"
 #include "o80/base/version.hpp"
 #include "o80/robot/run.hpp"
-#include "robot/library.hpp"
-#include "robot/robot_provenance.hpp"
+#include "robot/driver/library.hpp"
+#include "robot/loop/robot_provenance.hpp"
 #include "schema_builder.hpp"
 
 namespace nb = nanobind;

@@ -1,4 +1,4 @@
-#include "robot/replay.hpp"
+#include "robot/loop/replay.hpp"
 
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -18,7 +18,7 @@
 #include "loop_options.hpp"
 #include "o80/runtime/observation.hpp"
 #include "open_replay.hpp"
-#include "robot/library.hpp"
+#include "robot/driver/library.hpp"
 #include "runtime/replay/driverless_replay.hpp"
 #include "waiting.hpp"
 

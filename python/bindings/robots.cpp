@@ -10,8 +10,8 @@
 #include "frontend.hpp"
 #include "loop_options.hpp"
 #include "o80/base/error.hpp"
-#include "robot/inline_robot.hpp"
-#include "robot/library.hpp"
+#include "robot/driver/library.hpp"
+#include "robot/group/inline_robot.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;

@@ -9,7 +9,7 @@
 #include <type_traits>
 
 #include "arguments.hpp"
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "describe/visit_number.hpp"
 #include "o80/base/error.hpp"
 

@@ -1,6 +1,6 @@
 """Options of a backend and its loop that every robot has.
 
-The one description is in src/robot/loop_options.cpp.
+The one description is in src/robot/loop/loop_options.cpp.
 """
 
 import numbers

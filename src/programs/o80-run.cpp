@@ -5,7 +5,7 @@
 #include <exception>
 
 #include "o80/robot/run.hpp"
-#include "robot/library.hpp"
+#include "robot/driver/library.hpp"
 
 int main(int argc, char** argv) {
   if (argc < 2 || std::strcmp(argv[1], "--help") == 0 || argv[1][0] == '-') {

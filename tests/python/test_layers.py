@@ -10,7 +10,9 @@ ROOT = Path(__file__).resolve().parents[2]
 LAYERS = ("base", "describe", "memory", "control", "runtime", "robot")
 ROOMS = {
     "memory": ("os", "segment", "ring"),
+    "control": ("motion", "batch", "queue"),
     "runtime": ("journal", "backend", "frontend", "replay"),
+    "robot": ("driver", "loop", "group"),
 }
 INCLUDE = re.compile(r'^#include "(?:o80/)?(\w+)/', re.MULTILINE)
 CAST = re.compile(r"\bcast<(.*?)>\(")

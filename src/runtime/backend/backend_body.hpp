@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/short_text.hpp"
-#include "control/controller.hpp"
+#include "control/queue/controller.hpp"
 #include "memory/os/fork.hpp"
 #include "memory/ring/history.hpp"
 #include "memory/ring/lane.hpp"

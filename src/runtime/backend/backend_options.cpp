@@ -11,7 +11,7 @@
 #include <utility>
 #include <vector>
 
-#include "control/number_plan.hpp"
+#include "control/motion/number_plan.hpp"
 #include "describe/table.hpp"
 #include "o80/base/version.hpp"
 #include "runtime/backend/work_share.hpp"

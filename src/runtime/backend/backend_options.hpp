@@ -17,7 +17,7 @@ OwnedSegment segment_of(const Schema& schema, const Provenance& provenance,
 /// The time between two rows that halts [ns]; 0: none does.
 std::int64_t longest_gap(const Schema& schema, const BackendOptions& options);
 /// The options of a backend as names and texts, each as its loop option of that name takes it
-/// (robot/loop_options.hpp). An option that is off and has no text for it is left out.
+/// (robot/loop/loop_options.hpp). An option that is off and has no text for it is left out.
 Provenance::Options texts_of(const BackendOptions& options);
 
 }  // namespace o80

@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 
 namespace o80 {
 

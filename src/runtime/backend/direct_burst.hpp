@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "control/controller.hpp"
+#include "control/queue/controller.hpp"
 
 namespace o80 {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "base/short_text.hpp"
-#include "control/state_layout.hpp"
+#include "control/motion/state_layout.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80 {

@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "control/controller.hpp"
-#include "control/pool.hpp"
+#include "control/batch/pool.hpp"
+#include "control/queue/controller.hpp"
 #include "memory/ring/lane_receiver.hpp"
 #include "runtime/backend/schedule.hpp"
 #include "runtime/journal/decision_journal.hpp"

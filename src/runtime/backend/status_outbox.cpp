@@ -1,6 +1,6 @@
 #include "runtime/backend/status_outbox.hpp"
 
-#include "control/visit_block.hpp"
+#include "control/motion/visit_block.hpp"
 
 namespace o80 {
 

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "control/status_sink.hpp"
+#include "control/batch/status_sink.hpp"
 #include "memory/ring/lane_receiver.hpp"
 #include "memory/ring/status_word.hpp"
 #include "runtime/journal/decision_journal.hpp"

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "control/batch_plan.hpp"
-#include "control/record.hpp"
+#include "control/batch/batch_plan.hpp"
+#include "control/batch/record.hpp"
 
 namespace o80 {
 

@@ -4,7 +4,7 @@
 #include <unordered_map>
 
 #include "base/printable.hpp"
-#include "control/number_plan.hpp"
+#include "control/motion/number_plan.hpp"
 #include "describe/number_name.hpp"
 #include "memory/os/atomic_words.hpp"
 #include "memory/segment/running_slot.hpp"

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "base/short_text.hpp"
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "o80/base/nearest_name.hpp"
 
 namespace o80 {

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "control/state_layout.hpp"
+#include "control/motion/state_layout.hpp"
 #include "o80/runtime/move.hpp"
 
 namespace o80 {

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "base/ring.hpp"
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 
 namespace o80 {
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "control/batch_builder.hpp"
-#include "control/limits.hpp"
+#include "control/batch/batch_builder.hpp"
+#include "control/batch/command_check.hpp"
 #include "memory/ring/history.hpp"
 #include "memory/ring/lane_sender.hpp"
 #include "memory/segment/attached_segment.hpp"

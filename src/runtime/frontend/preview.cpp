@@ -4,7 +4,7 @@
 
 #include <cstring>
 
-#include "control/controller.hpp"
+#include "control/queue/controller.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/frontend/ends_text.hpp"
 #include "runtime/frontend/link.hpp"

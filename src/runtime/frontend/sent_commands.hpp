@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 
 namespace o80 {
 

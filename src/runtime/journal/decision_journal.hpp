@@ -5,8 +5,8 @@
 #include <string_view>
 #include <vector>
 
-#include "control/record.hpp"
-#include "control/status_sink.hpp"
+#include "control/batch/record.hpp"
+#include "control/batch/status_sink.hpp"
 #include "memory/ring/journal.hpp"
 #include "memory/ring/status_word.hpp"
 #include "o80/describe/rows.hpp"

@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "memory/ring/journal.hpp"
 #include "memory/ring/status_word.hpp"
 #include "runtime/journal/decision_journal.hpp"

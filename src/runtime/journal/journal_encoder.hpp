@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "base/little_endian.hpp"
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "o80/memory/journal_kind.hpp"
 #include "runtime/journal/journal_format.hpp"
 

@@ -6,7 +6,7 @@
 #include <string_view>
 #include <utility>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 
 namespace o80 {
 

@@ -3,7 +3,7 @@
 #include <cstring>
 #include <string>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "o80/base/error.hpp"
 
 namespace o80 {

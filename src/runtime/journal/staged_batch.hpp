@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "control/pool.hpp"
+#include "control/batch/pool.hpp"
 
 namespace o80 {
 

@@ -3,7 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "control/visit_block.hpp"
+#include "control/motion/visit_block.hpp"
 
 namespace {
 

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "bounded/counted_work.hpp"
-#include "control/number_motion.hpp"
+#include "control/motion/number_motion.hpp"
 
 namespace o80::test {
 namespace {

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "control/batch_builder.hpp"
-#include "control/controller.hpp"
-#include "control/pool.hpp"
-#include "control/record.hpp"
+#include "control/batch/batch_builder.hpp"
+#include "control/batch/pool.hpp"
+#include "control/batch/record.hpp"
+#include "control/queue/controller.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80::test {

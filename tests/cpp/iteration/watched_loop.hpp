@@ -15,7 +15,7 @@
 
 #include "iteration/interception.hpp"
 #include "o80/robot/make_table.hpp"
-#include "robot/loop.hpp"
+#include "robot/loop/loop.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

@@ -10,7 +10,7 @@
 
 #include "o80/robot/make_table.hpp"
 #include "o80/robot/plant_requests.hpp"
-#include "robot/inline_group.hpp"
+#include "robot/group/inline_group.hpp"
 #include "robot/puppet.hpp"
 
 namespace o80::test {

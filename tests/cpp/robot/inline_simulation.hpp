@@ -10,7 +10,7 @@
 
 #include "o80/runtime/robot_types.hpp"
 #include "o80/runtime/typed_frontend.hpp"
-#include "robot/inline_robot.hpp"
+#include "robot/group/inline_robot.hpp"
 
 namespace o80 {
 

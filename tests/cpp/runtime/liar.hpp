@@ -8,7 +8,7 @@
 #include <memory>
 #include <random>
 
-#include "control/batch_builder.hpp"
+#include "control/batch/batch_builder.hpp"
 #include "memory/ring/lane.hpp"
 #include "runtime/station.hpp"
 

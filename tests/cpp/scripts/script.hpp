@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80::test {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 
 namespace o80::test {
 

@@ -3,7 +3,7 @@
 #include <map>
 #include <utility>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "o80/runtime/journal.hpp"
 
 namespace torture {

@@ -5,8 +5,8 @@
 #include <cstdio>
 #include <map>
 
-#include "control/record.hpp"
-#include "control/status_sink.hpp"
+#include "control/batch/record.hpp"
+#include "control/batch/status_sink.hpp"
 
 namespace torture {
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <set>
 
-#include "control/status_sink.hpp"
+#include "control/batch/status_sink.hpp"
 #include "torture/judge.hpp"
 
 namespace torture {

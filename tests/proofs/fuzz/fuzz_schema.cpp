@@ -6,9 +6,9 @@
 #include <cstring>
 #include <vector>
 
-#include "control/controller.hpp"
-#include "control/limits.hpp"
-#include "control/pool.hpp"
+#include "control/batch/command_check.hpp"
+#include "control/batch/pool.hpp"
+#include "control/queue/controller.hpp"
 #include "describe/table.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "memory/private_directory.hpp"
-#include "robot/driver_instance.hpp"
+#include "robot/driver/driver_instance.hpp"
 #include "robot/inline_simulation.hpp"
 
 namespace o80::pam {

@@ -11,7 +11,7 @@
 #include "engine/version.hpp"
 #include "memory/private_directory.hpp"
 #include "places.hpp"
-#include "robot/library.hpp"
+#include "robot/driver/library.hpp"
 
 namespace o80::mujoco {
 namespace {

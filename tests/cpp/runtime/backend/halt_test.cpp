@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "control/batch_builder.hpp"
+#include "control/batch/batch_builder.hpp"
 #include "memory/child_process.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/station.hpp"

@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "control/batch_builder.hpp"
+#include "control/batch/batch_builder.hpp"
 #include "memory/child_process.hpp"
 #include "memory/ring/lane.hpp"
 #include "memory/segment/segment_name.hpp"

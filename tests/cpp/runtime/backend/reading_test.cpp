@@ -6,7 +6,7 @@
 #include <limits>
 #include <random>
 
-#include "control/batch_builder.hpp"
+#include "control/batch/batch_builder.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "readings_played.hpp"

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "control/batch_builder.hpp"
+#include "control/batch/batch_builder.hpp"
 #include "memory/child_process.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "runtime/station.hpp"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "control/state_layout.hpp"
+#include "control/motion/state_layout.hpp"
 #include "describe/described.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "o80/runtime/typed_frontend.hpp"

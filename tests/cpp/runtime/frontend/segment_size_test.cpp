@@ -4,7 +4,7 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
-#include "control/record.hpp"
+#include "control/batch/record.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "o80/runtime/backend.hpp"
 

@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "control/batch_builder.hpp"
+#include "control/batch/batch_builder.hpp"
 
 namespace o80::test {
 namespace {

@@ -3,7 +3,7 @@
 #include <fstream>
 #include <random>
 
-#include "control/number_plan.hpp"
+#include "control/motion/number_plan.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "o80/base/version.hpp"
 #include "runtime/backend/backend_options.hpp"

@@ -8,7 +8,7 @@
 #include <random>
 #include <thread>
 
-#include "control/controller.hpp"
+#include "control/queue/controller.hpp"
 #include "o80/runtime/journal.hpp"
 #include "runtime/station.hpp"
 

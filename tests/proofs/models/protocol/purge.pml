@@ -4,7 +4,7 @@
 //
 // Transcribed from src/memory/ring/lane_sender.cpp (send), lane_receiver.cpp (look, next) and
 // src/runtime/backend/backend_batches.cpp (take_batches, take_in_order, stage_ahead, take_express),
-// src/control/controller.cpp (take_commands, take_step) and src/control/purge_tickets.hpp.
+// src/control/queue/controller.cpp (take_commands, take_step) and src/control/queue/purge_tickets.hpp.
 // An iteration copies one block in order and one ahead in each lane; a command has two blocks.
 //
 // safety: what was committed before the purge drew its ticket never acts once the purge was taken;

@@ -1,0 +1,107 @@
+#include "control/batch/batch_builder.hpp"
+
+#include <cassert>
+#include <cstring>
+#include <limits>
+
+#include "o80/base/error.hpp"
+
+namespace o80 {
+
+std::byte* BatchBuilder::open(const RecordHead& head, std::uint64_t payload_bytes) {
+  const std::size_t first = blocks_.size();
+  const std::uint64_t all = first + blocks_of(payload_bytes);
+  if (payload_bytes > std::numeric_limits<std::uint32_t>::max() ||
+      all > std::numeric_limits<std::uint32_t>::max()) {
+    throw LaneFull("a batch of " + std::to_string(all) +
+                   " blocks is larger than any lane: send it in several pulses");
+  }
+  blocks_.resize(all);
+  RecordHead written = head;
+  written.payload_bytes = static_cast<std::uint32_t>(payload_bytes);
+  std::byte* bytes = blocks_[first].bytes.data();
+  std::memcpy(bytes, &written, sizeof written);
+  ++counts_[static_cast<std::size_t>(head.kind)];
+  if (head.kind != RecordKind::member) ++records_;
+  return bytes + sizeof written;
+}
+
+std::uint32_t BatchBuilder::add(const RecordHead& head, std::span<const std::byte> payload) {
+  std::byte* bytes = open(head, payload.size());
+  if (!payload.empty()) std::memcpy(bytes, payload.data(), payload.size());
+  return records_ - 1;
+}
+
+std::uint32_t BatchBuilder::group(std::span<const Member> members,
+                                  std::span<const std::int64_t> times, std::uint32_t rows) {
+  assert(!members.empty());
+  const std::size_t before = blocks_.size();
+  const auto counts = counts_;
+  RecordHead head = members.front().head;
+  head.kind = RecordKind::group;
+  head.actuator = 0;
+  head.masked = 0;
+  head.rows = static_cast<std::uint32_t>(members.size());
+  add(head);
+  try {
+    for (const Member& member : members) {
+      add_command(member, RecordKind::member, times, rows);
+    }
+  } catch (...) {
+    // remove the incomplete group
+    blocks_.resize(before);
+    counts_ = counts;
+    --records_;
+    throw;
+  }
+  return records_ - 1;
+}
+
+void BatchBuilder::add_command(const Member& member, RecordKind kind,
+                               std::span<const std::int64_t> times, std::uint32_t rows) {
+  const auto& [of, mask, states] = member;
+  assert(times.empty() || (times.size() == rows && of.pace == Pace::duration));
+  RecordHead head = of;
+  head.kind = kind;
+  head.masked = mask.empty() ? 0 : 1;
+  head.rows = rows;
+  std::byte* bytes = open(head, mask.size_bytes() + times.size_bytes() + states.size_bytes());
+  for (const auto part : {std::as_bytes(mask), std::as_bytes(times), states}) {
+    if (!part.empty()) std::memcpy(bytes, part.data(), part.size());
+    bytes += part.size();
+  }
+}
+
+std::uint32_t BatchBuilder::mark(std::string_view text) {
+  if (text.empty() || text.size() > kMostMarkBytes) {
+    throw InvalidArgument("a mark has 1 to " + std::to_string(kMostMarkBytes) +
+                          " bytes of text, got " + std::to_string(text.size()));
+  }
+  return add(head_of(RecordKind::mark), std::as_bytes(std::span(text)));
+}
+
+std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
+  BatchRecord written = batch;
+  written.kind = RecordKind::batch;
+  written.records = records_;
+  written.blocks = static_cast<std::uint32_t>(blocks_.size());
+  const bool is_express = !has_commands() && requests() == 0 && of(RecordKind::mark) == 0 &&
+                          records_ > 0 && records_ <= kMostExpressRecords && batch.at == kNow &&
+                          batch.burst == 0 && (batch.flags & kBurstUntilEnded) == 0;
+  if (is_express) written.flags |= kExpress;
+  std::memcpy(blocks_.front().bytes.data(), &written, sizeof written);
+
+  // records get the ids after the batch's two; members get the id of their group
+  RecordHead head;
+  std::uint32_t place = 0;
+  for (std::size_t block = 1; block < blocks_.size(); block += blocks_of(head.payload_bytes)) {
+    std::byte* bytes = blocks_[block].bytes.data();
+    std::memcpy(&head, bytes, sizeof head);
+    if (head.kind != RecordKind::member) ++place;
+    head.id = record_id(batch.id, place - 1);
+    std::memcpy(bytes, &head, sizeof head);
+  }
+  return blocks_;
+}
+
+}  // namespace o80

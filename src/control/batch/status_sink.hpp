@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstdint>
+
+#include "control/batch/record.hpp"
+
+namespace o80 {
+
+/// How a record ends, or begins.
+struct Outcome {
+  Status status = Status::completed;  // of a request that ends later, active
+  Reason reason = Reason::none;
+  std::uint8_t detail = 0;
+  std::int64_t late = 0;  // for `limits`: iterations more than asked
+};
+
+/// A change of the status of a record or a batch.
+struct StatusChange {
+  /// batch: it was taken or rejected; batch_end: its last record has ended; of_rejected: a record
+  /// that ends because its whole batch was rejected.
+  enum class Of : std::uint8_t { record, batch, batch_end, of_rejected };
+
+  std::uint32_t lane = 0;
+  CommandId id = 0;
+  Status status = Status::none;
+  Reason reason = Reason::none;
+  std::uint8_t detail = 0;  // for `exclusive`: the lane that has control
+  Iteration iteration = 0;
+  Of of = Of::record;
+  std::uint16_t late = 0;  // for `limits`: iterations more than asked, at most 65535
+};
+
+/// Receives status changes from the controller, and decides whether a follower may begin.
+class StatusSink {
+ public:
+  virtual void changed(const StatusChange& change) noexcept = 0;
+  /// Blocks of a lane were returned to the pool, by a record or a batch.
+  virtual void freed(std::uint32_t lane, std::uint32_t blocks) noexcept = 0;
+  /// Asked before an actuator that has followed while it waited for others begins their command
+  /// `id` of `lane`. False: all its commands end as interrupted, with the reason `reading`.
+  virtual bool may_begin(std::uint32_t /*actuator*/, std::uint32_t /*lane*/,
+                         CommandId /*id*/) noexcept {
+    return true;
+  }
+
+ protected:
+  ~StatusSink() = default;
+};
+
+}  // namespace o80

@@ -1,0 +1,91 @@
+#include "control/motion/number_motion.hpp"
+
+#include <algorithm>
+#include <utility>
+
+namespace o80 {
+
+std::int64_t NumberMotion::plan_for(const Asked& asked) noexcept {
+  PlanTask task{asked, asked.start ? Moment{*asked.start} : guard_.moment(), guard_.stop(),
+                guard_.rates(), asked.start || guard_.stays()};
+  task.span.include(asked.target);
+  task.span.include(task.from.position);
+  guard_.begin(task.span);
+  if (!accelerates()) task.span.include(former_target_);
+
+  planned_ = true;
+  // without limits it jumps to where it starts, which is no speed
+  const double from = task.from.position;
+  jumps_ = asked.start && !has_rates() && guard_.admits(from);
+  const bool starts_elsewhere =
+      asked.start && !jumps_ && (from != guard_.position() || !guard_.at_rest());
+  follows_ = leaves_ || starts_elsewhere || !guard_.admits(guard_.position());
+  return plan_.propose(task);
+}
+
+void NumberMotion::settle(std::int64_t iterations) noexcept {
+  if (std::exchange(jumps_at_once_, false)) {
+    if (iterations == 1) {
+      planned_ = true;
+      follows_ = !guard_.admits(guard_.position());
+      return plan_.line(asked_.target, asked_.target);
+    }
+    plan_for(asked_);
+  }
+  if (jumps_) guard_.restart(plan_.task().from.position);
+  plan_.settle(iterations);
+}
+
+/// One iteration by `move`, as far as bounds of the integral allow; returns the one that stops it.
+template <class Move>
+Limit NumberMotion::move(Move&& move) noexcept {
+  const double before = guard_.position();
+  if (integral_) integral_->note(guard_);
+  move();
+  stands_ = false;
+  const Limit bound = integral_ ? hold_back() : Limit::none;
+  former_difference_ = std::exchange(difference_, guard_.position() - before);
+  return bound;
+}
+
+Limit NumberMotion::hold_back() noexcept {
+  const auto [bound, velocity] = integral_->admit(guard_.position());
+  if (bound == Limit::none) return bound;
+  guard_ = integral_->noted();
+  guard_.follow_within_bounds();
+  if (!guard_.pass(velocity)) guard_.follow(velocity);
+  follows_ = planned_;
+  held_back_ = true;
+  stands_ = integral_->stands();
+  return bound;
+}
+
+Limit NumberMotion::step(double low, double high) noexcept {
+  Limit limit = Limit::none;
+  const Limit bound = move([&] {
+    const double wanted = std::clamp(plan_.next(), low, high);
+    if (!follows_ && guard_.pass(wanted)) return;
+    follows_ = true;
+    limit = leave() ? Limit::acceleration : guard_.follow(wanted);
+  });
+  return bound != Limit::none ? bound : limit;
+}
+
+bool NumberMotion::brake() noexcept {
+  bool moves = is_away();
+  const Limit bound = move([&] {
+    const double before = guard_.position();
+    if (moves) {
+      guard_.widen(*rest_);
+      guard_.follow(*rest_);
+    } else if (!leave()) {
+      guard_.brake();
+    }
+    moves = moves || guard_.position() != before || !stays();
+  });
+  // what stands at a bound is no longer held away from rest
+  if (stands_) held_ = false;
+  return moves || bound != Limit::none;
+}
+
+}  // namespace o80

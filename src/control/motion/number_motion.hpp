@@ -1,0 +1,166 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "control/motion/integral_bound.hpp"
+#include "control/motion/number_limiter.hpp"
+#include "control/motion/number_plan.hpp"
+#include "control/motion/state_layout.hpp"
+
+namespace o80 {
+
+/// The motion of one number of a state: a plan, and the guard of its limits behind it.
+///
+/// Realtime: yes.
+class NumberMotion {
+ public:
+  /// `rest`: its value without a command, if any. `integral`: bounds of what it moves, if any.
+  NumberMotion(const NumberLimiter& guard, std::optional<double> rest,
+               std::unique_ptr<IntegralBound> integral = nullptr) noexcept
+      : guard_(guard), rest_(rest), integral_(std::move(integral)) {}
+
+  /// Where what it moves is: before each step() or brake().
+  void observe(const StateLayout& layout, const std::byte* observed) noexcept {
+    if (integral_) integral_->observe(layout.number(integral_->number(), observed));
+  }
+  /// True if these bounds have changed its motion since begin().
+  bool was_held_back() const noexcept { return held_back_; }
+  /// True if they hold it back in this iteration, and it stands.
+  bool stands() const noexcept { return stands_; }
+  /// First (order 1) or second difference of its positions, to the iteration before.
+  double difference(std::uint32_t order) const noexcept {
+    return order == 1 ? difference_ : difference_ - former_difference_;
+  }
+
+  const NumberLimiter& guard() const noexcept { return guard_; }
+  double position() const noexcept { return guard_.position(); }
+  const NumberPlan& plan() const noexcept { return plan_; }
+  /// True while a command moves it on a straight line.
+  bool is_on_line() const noexcept { return planned_ && plan_.is_line(); }
+  /// True if it has a limit of speed or acceleration: rows are followed, not shown.
+  bool has_rates() const noexcept {
+    return std::isfinite(guard_.rates().speed) || std::isfinite(guard_.rates().acceleration);
+  }
+  bool accelerates() const noexcept { return std::isfinite(guard_.rates().acceleration); }
+
+  /// Sets the position, at rest.
+  void restart(double position) noexcept {
+    guard_.restart(position);
+    planned_ = follows_ = held_ = leaves_ = held_back_ = stands_ = false;
+    difference_ = former_difference_ = 0.0;
+  }
+  /// One iteration of a motion that was made elsewhere.
+  void trace(double position) noexcept { guard_.accept(position); }
+  /// A command begins: notes from which motion.
+  void begin() noexcept {
+    former_target_ = planned_ ? plan_.target() : guard_.position();
+    held_back_ = false;
+    end();
+  }
+
+  /// Proposes a number of iterations for a plan to rest at the target.
+  std::int64_t propose(const Asked& asked) noexcept {
+    // mostly nothing limits a set-point: it needs no plan
+    jumps_at_once_ =
+        !has_rates() && asked.iterations <= 1 && !asked.start && !std::isfinite(asked.cruise);
+    if (!jumps_at_once_) return plan_for(asked);
+    asked_ = asked;
+    return 1;
+  }
+  /// Then plans it for `iterations`, at least those.
+  void settle(std::int64_t iterations) noexcept;
+  /// A straight line to the next row of a trajectory, to be followed; line_for() sets its length.
+  void line(double start, double target) noexcept {
+    if (!planned_) {
+      Span stop = guard_.stop();
+      stop.include(start);
+      guard_.begin(stop);
+      planned_ = follows_ = true;
+    }
+    guard_.widen(target);
+    plan_.line(start, target);
+  }
+  void line_for(std::int64_t iterations) noexcept { plan_.line_for(iterations); }
+  /// Goes to the target within the limits, whatever they keep it from (Profile::as_sent).
+  void follow_as_sent(double target) noexcept {
+    if (!planned_) guard_.begin();
+    planned_ = follows_ = true;
+    plan_.line(target, target);
+  }
+  /// The span of what is followed reaches to here.
+  void widen(double position) noexcept {
+    if (follows_) guard_.widen(position);
+  }
+
+  /// One iteration of the plan, in the range of its kind; returns the limit that changed it.
+  Limit step(double low, double high) noexcept;
+  /// True if nothing of the plan, which is over, is left to follow.
+  bool arrived() const noexcept {
+    return !follows_ || (!leaves_ && guard_.position() == plan_.target());
+  }
+  bool follows() const noexcept { return follows_; }
+  /// The plan ends, at its target if that is `arrived`: what follows is another command, or none.
+  /// If the shortest stop would leave the bounds, the plan goes on until it stays inside.
+  void end(bool arrived = false) noexcept {
+    if (planned_ && !follows_ && !guard_.stops_inside()) {
+      former_ = plan_;
+      leaves_ = true;
+    }
+    planned_ = follows_ = false;
+    guard_.follow_within_bounds();
+    // a jump is no speed
+    if (arrived && !accelerates()) guard_.rest();
+  }
+  /// One iteration without a command: to rest, as fast as the limits allow. True while it moves.
+  bool brake() noexcept;
+
+  bool has_rest() const noexcept { return rest_.has_value(); }
+  /// Stays where it is, away from its rest value, until hold(false).
+  void hold(bool holds) noexcept { held_ = holds && rest_.has_value(); }
+  bool is_held_away() const noexcept { return held_ && guard_.position() != *rest_; }
+  /// True if braking would change nothing.
+  bool at_rest() const noexcept {
+    const bool moves_integral = integral_ && guard_.position() != 0.0;
+    return guard_.at_rest() && !is_away() && !moves_integral;
+  }
+  /// True if braking would not move it.
+  bool stays() const noexcept { return guard_.stays() && !is_away() && !leaves_; }
+  /// True if it rests, or has no limit of acceleration and can rest at once.
+  bool rests() const noexcept { return stays() && (guard_.at_rest() || !accelerates()); }
+
+ private:
+  bool is_away() const noexcept { return rest_ && !held_ && guard_.position() != *rest_; }
+  /// One iteration of the former plan, if a stop would leave the bounds.
+  bool leave() noexcept {
+    if (leaves_) leaves_ = !guard_.stops_inside();
+    return leaves_ && guard_.pass(former_.next());
+  }
+  template <class Move>
+  Limit move(Move&& move) noexcept;
+  Limit hold_back() noexcept;
+  std::int64_t plan_for(const Asked& asked) noexcept;
+
+  NumberLimiter guard_;
+  std::optional<double> rest_;
+  NumberPlan plan_;
+  bool planned_ = false;  // a command moves it by `plan_`
+  bool follows_ = false;  // `plan_` may break limits
+  bool held_ = false;
+  bool jumps_at_once_ = false;  // propose() needed no plan
+  Asked asked_;                 // then
+  bool jumps_ = false;          // the plan begins at its start
+  // goes on with the former plan, until a stop would stay inside the bounds
+  bool leaves_ = false;
+  NumberPlan former_;
+  double former_target_ = 0.0;
+  double difference_ = 0.0;  // of the positions of the last two iterations, and of those before
+  double former_difference_ = 0.0;
+  std::unique_ptr<IntegralBound> integral_;
+  bool held_back_ = false;
+  bool stands_ = false;
+};
+
+}  // namespace o80

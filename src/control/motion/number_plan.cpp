@@ -1,0 +1,175 @@
+#include "control/motion/number_plan.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace o80 {
+namespace {
+
+// rounding must not exceed a limit, nor add an iteration
+constexpr double kPlanRounding = 1e-9;
+// numbers of iterations that the search for the fewest of a smooth motion tries
+constexpr double kStride = 1.15;
+constexpr int kMostStrides = 8;
+constexpr int kMostHalvings = 10;
+
+/// The fraction `share` between `from` and `to`, never outside, despite rounding and overflow.
+double between(double from, double to, double share) noexcept {
+  const double distance = to - from;
+  const double value = from + distance * share;
+  const double low = std::min(from, to);
+  const double high = std::max(from, to);
+  if (value >= low && value <= high) return value;
+  if (std::isfinite(distance)) return std::clamp(value, low, high);
+  const double weighed = from * (1.0 - share) + to * share;
+  return std::isfinite(weighed) ? weighed : to;
+}
+
+}  // namespace
+
+std::int64_t iterations_of(double distance, double speed) noexcept {
+  if (!std::isfinite(speed)) return 1;
+  const double up = std::ceil(std::abs(distance) / speed * (1.0 - kPlanRounding));
+  if (!(up <= static_cast<double>(kLongestPlan))) return kLongestPlan + 1;
+  return std::max<std::int64_t>(1, static_cast<std::int64_t>(up));
+}
+
+std::int64_t NumberPlan::propose(const PlanTask& task) noexcept {
+  task_ = task;
+  has_fastest_ = false;
+  const std::int64_t asked = task.iterations;
+  const bool is_smooth = task.profile == Profile::minimum_jerk;
+  if (asked > 0 && is_smooth && std::isfinite(task.rates.acceleration) && smooth(asked)) {
+    return asked;
+  }
+  std::int64_t least = fewest();
+  if (is_smooth && std::isfinite(task.cruise) && least <= kLongestPlan) {
+    least = fewest_smooth(least);
+  }
+  return std::max(asked, least);
+}
+
+/// The fewest iterations of a motion at full speed, or at the cruising speed asked for.
+std::int64_t NumberPlan::fewest() noexcept {
+  Rates rates = task_.rates;
+  rates.speed = std::min(rates.speed, task_.cruise);
+  const double distance = std::abs(task_.target - task_.from.position);
+  if (!std::isfinite(rates.acceleration)) {
+    return iterations_of(task_.target - task_.line_start, rates.speed);
+  }
+  // no motion is shorter; beyond the range of the plan nothing is computed
+  const double least =
+      std::max({distance / rates.speed, std::sqrt(distance / rates.acceleration),
+                std::cbrt(distance / rates.jerk), std::abs(task_.from.speed) / rates.acceleration,
+                rates.acceleration / rates.jerk / 2.0});
+  if (!(least <= static_cast<double>(kLongestPlan))) return kLongestPlan + 1;
+  fastest_ = FastestMotion(task_.from, task_.target, rates);
+  has_fastest_ = true;
+  return fastest_.iterations();
+}
+
+/// The fewest iterations, from about `least` on, in which a smooth motion keeps the speed asked for
+/// and all limits; `least` if there are none.
+std::int64_t NumberPlan::fewest_smooth(std::int64_t least) noexcept {
+  std::int64_t few = 0;
+  std::int64_t enough = std::max<std::int64_t>(1, least - 3);
+  for (int i = 0; !smooth(enough); ++i) {
+    if (i == kMostStrides) return least;
+    few = enough;
+    enough = static_cast<std::int64_t>(std::ceil(static_cast<double>(enough) * kStride));
+  }
+  while (enough - few > 1) {
+    const std::int64_t middle = few + (enough - few) / 2;
+    (smooth(middle) ? enough : few) = middle;
+  }
+  return smooth_for_ = enough;
+}
+
+bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {
+  const SmoothMotion::Extremes most = motion.extremes();
+  const double speed =
+      std::min(task_.rates.speed, std::max(task_.cruise, std::abs(task_.from.speed)));
+  const auto within = [](double value, double limit) {
+    return value <= limit * (1.0 + kPlanRounding / 2.0);
+  };
+  const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
+                          std::max(std::abs(task_.span.low), std::abs(task_.span.high));
+  return most.positions.low >= task_.span.low - rounding &&
+         most.positions.high <= task_.span.high + rounding && within(most.speed, speed) &&
+         within(most.acceleration, task_.rates.acceleration) && within(most.jerk, task_.rates.jerk);
+}
+
+/// Plans a smooth motion; false if none keeps all limits in this number of iterations.
+bool NumberPlan::smooth(std::int64_t iterations) noexcept {
+  smooth_for_ = iterations;
+  shape_ = Shape::smooth;
+  smooth_ = SmoothMotion(task_.from, task_.target, iterations);
+  if (fits(smooth_)) return true;
+  const bool moves = task_.from.speed != 0.0 || task_.from.acceleration != 0.0;
+  if (!std::isfinite(task_.rates.acceleration) && moves && stop_then_smooth(iterations))
+    return true;
+  if (!task_.stays || !moves) return false;
+  // it can begin as from rest, if the step from its present speed to the first one keeps the limits
+  smooth_ = SmoothMotion({task_.from.position}, task_.target, iterations);
+  const double first = smooth_.position(1.0) - task_.from.position;
+  const double second = smooth_.position(2.0) - smooth_.position(1.0);
+  const double a1 = first - task_.from.speed;
+  const double a2 = second - first;
+  return std::abs(a1) <= task_.rates.acceleration &&
+         std::abs(a1 - task_.from.acceleration) <= task_.rates.jerk &&
+         std::abs(a2 - a1) <= task_.rates.jerk && fits(smooth_);
+}
+
+/// Without a limit of acceleration: comes to rest in a half, a quarter, ... of the iterations, the
+/// most that stay inside, and then goes to the target.
+bool NumberPlan::stop_then_smooth(std::int64_t iterations) noexcept {
+  stop_ = iterations / 2;
+  for (int i = 0; i < kMostHalvings && stop_ > 0; ++i, stop_ /= 2) {
+    const auto r = static_cast<double>(stop_);
+    const double rest =
+        task_.from.position + r * task_.from.speed / 2.0 + r * r * task_.from.acceleration / 12.0;
+    if (!(rest >= task_.span.low && rest <= task_.span.high)) continue;
+    to_stop_ = SmoothMotion(task_.from, rest, stop_);
+    if (!fits(to_stop_)) continue;
+    smooth_ = SmoothMotion({rest}, task_.target, iterations - stop_);
+    if (!fits(smooth_)) continue;
+    shape_ = Shape::stop_first;
+    return true;
+  }
+  return false;
+}
+
+void NumberPlan::settle(std::int64_t iterations) noexcept {
+  done_ = 0;
+  iterations_ = iterations;
+  const bool accelerates = std::isfinite(task_.rates.acceleration);
+  const bool is_smooth = task_.profile == Profile::minimum_jerk && (accelerates || iterations > 1);
+  const std::int64_t proposed = smooth_for_;
+  if (is_smooth && smooth(iterations)) return;
+  shape_ = Shape::line;
+  if (!accelerates) return;
+  if (!has_fastest_) fewest();
+  if (fastest_.iterations() > iterations && is_smooth && proposed > 0 && smooth(proposed)) return;
+  fastest_.stretch(iterations);
+  shape_ = Shape::fastest;
+}
+
+double NumberPlan::next() noexcept {
+  ++done_;
+  if (done_ >= iterations_) return task_.target;
+  const auto i = static_cast<double>(done_);
+  switch (shape_) {
+    case Shape::line:
+      return between(task_.line_start, task_.target, i / static_cast<double>(iterations_));
+    case Shape::smooth:
+      return done_ < smooth_for_ ? smooth_.position(i) : task_.target;
+    case Shape::stop_first:
+      return done_ <= stop_ ? to_stop_.position(i)
+                            : smooth_.position(static_cast<double>(done_ - stop_));
+    case Shape::fastest:
+      break;
+  }
+  return fastest_.next();
+}
+
+}  // namespace o80

@@ -1,0 +1,124 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "control/motion/fastest_motion.hpp"
+#include "control/motion/smooth_motion.hpp"
+#include "o80/control/command.hpp"
+
+namespace o80 {
+
+/// Version of the rules that make desired states of commands. It grows when the same commands give
+/// other desired states; recordings say under which rules they were made.
+///
+/// 1: a profile that the limiter follows.
+/// 2: each command is planned to rest at its target within the limits; set-points. Faults that were
+///    mended since, of about one motion in a million, have not raised it.
+inline constexpr std::int64_t kMotionRules = 2;
+
+/// The limit that kept a number from its wanted position, or that makes a motion long.
+enum class Limit : std::uint8_t {
+  none,
+  minimum,
+  maximum,
+  speed,
+  acceleration,
+  jerk,
+  below_integral,  // the minimum and the maximum of what the number moves
+  above_integral
+};
+
+/// The longest plan [iterations]. A command that needs more is rejected.
+inline constexpr std::int64_t kLongestPlan = std::int64_t{1} << 31;
+
+/// The iterations of a distance at a speed [1/iteration], at least 1. Rounding adds none.
+std::int64_t iterations_of(double distance, double speed) noexcept;
+
+/// How a command asks for the target of one number.
+struct Asked {
+  double target = 0.0;
+  double line_start = 0.0;      // where a straight line begins
+  std::optional<double> start;  // a place to start from at rest, instead of its own
+  std::int64_t iterations = 0;  // 0: as few as the limits allow
+  double cruise = std::numeric_limits<double>::infinity();  // speed asked for [1/iteration]
+  Profile profile = Profile::linear;
+};
+
+/// What a plan is for: one number, from its present motion to rest at a target.
+struct PlanTask : Asked {
+  Moment from;
+  // where a smooth motion stays: position, target, and shortest stop (without a limit of
+  // acceleration: former target)
+  Span span;
+  Rates rates{};
+  bool stays = true;  // it may stop at once
+};
+
+/// The way of one number to its target: a position for each iteration, within its limits of speed,
+/// acceleration and jerk, and at rest at the target in the last one (docs/commands.md).
+///
+/// Realtime: yes, bounded time.
+class NumberPlan {
+ public:
+  /// Returns the number of iterations that it takes: those asked for, or the fewest that the limits
+  /// allow. More than kLongestPlan: it cannot be planned.
+  std::int64_t propose(const PlanTask& task) noexcept;
+  /// Plans the motion for `iterations`, at least those of propose().
+  void settle(std::int64_t iterations) noexcept;
+  /// A straight line that no limit changes; line_for() sets its length.
+  void line(double start, double target) noexcept {
+    task_.line_start = start;
+    task_.target = target;
+    shape_ = Shape::line;
+    line_for(1);
+  }
+  void line_for(std::int64_t iterations) noexcept {
+    iterations_ = iterations;
+    done_ = 0;
+  }
+
+  /// The position in the next iteration; from the last one on the exact target.
+  double next() noexcept;
+  const PlanTask& task() const noexcept { return task_; }
+  double target() const noexcept { return task_.target; }
+  /// For a straight line: the share of the way that is done.
+  double share() const noexcept {
+    return static_cast<double>(done_) / static_cast<double>(iterations_);
+  }
+  bool is_line() const noexcept { return shape_ == Shape::line; }
+  /// The limit that makes the motion long.
+  Limit slowest() const noexcept {
+    const double distance = std::abs(task_.target - task_.from.position);
+    const double by_speed = distance / task_.rates.speed;
+    const double by_acceleration = 2.0 * std::sqrt(distance / task_.rates.acceleration);
+    const double by_jerk = std::cbrt(32.0 * distance / task_.rates.jerk);
+    if (by_jerk > std::max(by_speed, by_acceleration)) return Limit::jerk;
+    return by_acceleration > by_speed ? Limit::acceleration : Limit::speed;
+  }
+
+ private:
+  enum class Shape : std::uint8_t { line, smooth, stop_first, fastest };
+
+  std::int64_t fewest() noexcept;
+  std::int64_t fewest_smooth(std::int64_t least) noexcept;
+  bool smooth(std::int64_t iterations) noexcept;
+  bool fits(const SmoothMotion& motion) const noexcept;
+  bool stop_then_smooth(std::int64_t iterations) noexcept;
+
+  PlanTask task_;
+  Shape shape_ = Shape::line;
+  bool has_fastest_ = false;  // `fastest_` is the motion of task_
+  std::int64_t iterations_ = 1;
+  std::int64_t done_ = 0;
+  std::int64_t stop_ = 0;        // iterations of `to_stop_`
+  std::int64_t smooth_for_ = 0;  // iterations of `smooth_`
+  SmoothMotion to_stop_;
+  SmoothMotion smooth_;
+  FastestMotion fastest_;
+};
+
+}  // namespace o80

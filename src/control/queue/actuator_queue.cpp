@@ -1,0 +1,307 @@
+#include "control/queue/actuator_queue.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "control/batch/command_check.hpp"
+#include "control/batch/record_check.hpp"
+
+namespace o80 {
+namespace {
+
+// most waypoints of a trajectory that are skipped in one iteration, because they end before it
+constexpr int kMostPassed = 256;
+
+}  // namespace
+
+ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
+                             const StateLayout& layout, BlockPool& pool, Ledger& ledger,
+                             std::byte* desired, std::uint32_t lanes)
+    : layout_(&layout),
+      pool_(&pool),
+      ledger_(&ledger),
+      desired_(desired),
+      motion_(schema, row, layout),
+      carry_(schema.head.period),
+      period_(static_cast<double>(schema.head.period) / 1e9),
+      usual_profile_(usual_profile(schema, row)),
+      when_idle_(row.when_idle),
+      queue_(pool, lanes),
+      mask_(layout.mask_words()),
+      next_mask_(mask_.size()),
+      scratch_((layout.size() + 7) / 8) {}
+
+void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
+  const bool is_overwritten = outcome.status == Status::overwritten;
+  const bool in_force = in_force_ && is_overwritten;
+  if (runs_ == Runs::alone) ledger_->drop(record_, outcome, iteration);
+  // the motion of an overwritten command goes on until its successor begins
+  if (!is_overwritten) motion_.end();
+  stop();
+  in_force_ = in_force;
+  motion_.hold(false);
+  while (!queue_.empty()) ledger_->drop(queue_.take_any(), outcome, iteration);
+}
+
+/// Begins what runs in this iteration: a row, or a command; false if there is none.
+bool ActuatorQueue::begin(Iteration iteration, const std::byte* observed,
+                          std::uint32_t& late_budget) noexcept {
+  if (!planned_ && may_give_way() && end_late(iteration, late_budget)) {
+    const RecordHead& next = pool_->head(queue_.front());
+    if (may_begin(next, iteration) && gives_way_to(next)) give_way(iteration);
+  }
+  if (runs_ != Runs::nothing && (!needs_row(iteration) || begin_row(iteration))) return true;
+  while (end_late(iteration, late_budget)) {
+    const RecordHead& head = pool_->head(queue_.front());
+    // while it waits for the others of a group it brakes
+    if (!may_begin(head, iteration)) return false;
+    begin_command(observed);
+    if (begin_row(iteration)) return true;
+    if (late_budget == 0) return false;
+    --late_budget;
+  }
+  return false;
+}
+
+/// One iteration of what runs, which may be its last.
+ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
+  // rows of a trajectory widen the span in which the limiter follows it
+  for (std::uint32_t i = 0; i < kReadAhead && ahead_left_ > 0; ++i, --ahead_left_) {
+    ahead_.read(scratch(), layout_->size());
+    motion_.widen(scratch());
+  }
+  const Limited limited = motion_.step(iteration, desired_);
+  if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
+  if (iteration >= motion_.last() && rows_left_ == 0) {
+    if (motion_.stands()) {
+      // bounds of an integral hold it back: it ends where it is
+      const BlockIndex record = leave();
+      end_motion();
+      end(record, {Status::interrupted, Reason::limits, limited.packed()}, iteration);
+    } else if (motion_.arrived()) {
+      end_running(iteration);
+    } else if (runs_ == Runs::queued && pool_->head(record_).rows > 1) {
+      take_out();
+    }
+  }
+  return limited.limit == Limit::none ? Moved::active : Moved::clamped;
+}
+
+ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* observed,
+                                          const std::byte* target) noexcept {
+  motion_.observe(observed);
+  const SetPoint set_point{usual_profile_};
+  if (masked_ || !is_in_force(set_point) || !layout_->same(target, motion_.target(), nullptr)) {
+    motion_.begin(nullptr);
+    layout_->copy(motion_.target(), target);
+    Motion::Course course;
+    course.profile = usual_profile_;
+    motion_.settle(iteration, motion_.propose(course, desired_));
+  }
+  set_point_ = set_point;
+  pace_ = Pace::direct;
+  masked_ = planned_ = false;
+  rows_left_ = ahead_left_ = 0;
+  in_force_ = true;
+  runs_ = Runs::given;
+  return advance(iteration);
+}
+
+void ActuatorQueue::end_running(Iteration iteration) noexcept {
+  in_force_ = pace_ == Pace::direct;
+  if (in_force_) motion_.hold(true);
+  late_ += iteration - motion_.last();
+  motion_.end(true);
+  const BlockIndex record = leave();
+  if (record == kNoBlock) return;
+  if (late_ > 0) carry_.reset();
+  holder_ = ledger_->lane_of(record);
+  Outcome outcome;
+  if (late_ > 0 && asked_ > 0) outcome = {outcome.status, Reason::limits, reason_.packed(), late_};
+  ledger_->end(record, outcome, iteration);
+}
+
+/// Rejects commands whose `until` has passed; false if no command is left to begin.
+bool ActuatorQueue::end_late(Iteration iteration, std::uint32_t& late_budget) noexcept {
+  while (!queue_.empty()) {
+    const BlockIndex record = queue_.front();
+    const RecordHead& late = pool_->head(record);
+    if (late.pace != Pace::until || late.amount >= iteration) return true;
+    if (late_budget == 0) return false;
+    --late_budget;
+    carry_.reset();
+    queue_.pop();
+    ledger_->end(record, {Status::rejected, Reason::late}, iteration);
+  }
+  return false;
+}
+
+void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
+  // head => mask, times, rows
+  record_ = queue_.front();
+  const RecordHead& head = pool_->head(record_);
+  rows_ = Cursor(*pool_, record_, sizeof(RecordHead), head.payload_bytes);
+  bool same_mask = std::exchange(masked_, head.masked != 0) == (head.masked != 0);
+  if (masked_) {
+    rows_.read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());
+    same_mask = same_mask && mask_ == next_mask_;
+    mask_.swap(next_mask_);
+  }
+  const SetPoint next{head.profile, head.start, head.amount};
+  keeps_plan_ = same_mask && head.pace == Pace::direct && is_in_force(next) && is_next_row_target();
+  // targets of a generator are one motion
+  const bool streams = same_mask && in_force_ && set_point_.profile == Profile::as_sent &&
+                       head.profile == Profile::as_sent;
+  time_ = 0;
+  if (is_timed(head)) {
+    // the check has stored the position of the rows
+    times_ = rows_;
+    rows_ = rows_of_timed(*pool_, head, layout_->size());
+  }
+  pace_ = head.pace;
+  rows_left_ = head.rows;
+  ahead_ = rows_;
+  ahead_left_ = 0;
+  runs_ = Runs::queued;
+  begun_ = false;
+  late_ = 0;
+  reason_ = {};
+  in_force_ = pace_ == Pace::direct;
+  set_point_ = next;
+  motion_.hold(false);
+  if (keeps_plan_ || streams) return;
+  motion_.begin(mask());
+  if (head.start == Start::observed) motion_.start_at(observed);
+}
+
+void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* observed) noexcept {
+  const RecordHead* head = next_member();
+  // set-points of each iteration go each by itself
+  if (head == nullptr || (head->pace == Pace::direct && head->rows > 1)) return;
+  if (runs_ == Runs::queued) {
+    if (iteration <= motion_.last() || rows_left_ == 0) return;
+  } else {
+    if (runs_ != Runs::nothing && !gives_way_to(*head)) return;
+    if (!may_begin(*head, iteration)) return;
+    if (runs_ != Runs::nothing) give_way(iteration);
+    begin_command(observed);
+  }
+  plan_row(iteration);
+  ledger_->groups().offer(*head, CommandGroups::Offer::iterations, iteration, row_iterations_);
+  planned_ = true;
+}
+
+/// Begins the planned row; false if the command would take too long and is rejected.
+bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
+  const RecordHead& head = pool_->head(record_);
+  if (std::exchange(planned_, false)) {
+    row_iterations_ = ledger_->groups().agreed(head);
+  } else {
+    plan_row(iteration);
+  }
+  const bool is_asked = pace_ != Pace::speed && row_iterations_ <= asked_;
+  if (row_iterations_ > kLongestPlan && !is_asked) {
+    queue_.pop();
+    end_motion();
+    ledger_->end(record_, {Status::rejected, Reason::invalid, Limited{Limit::speed, 0}.packed()},
+                 iteration);
+    return false;
+  }
+  if (keeps_plan_) {
+    motion_.extend(iteration + row_iterations_ - 1);
+  } else if (pace_ == Pace::direct && set_point_.profile == Profile::as_sent) {
+    motion_.follow_as_sent(iteration);
+  } else {
+    motion_.settle(iteration, row_iterations_);
+  }
+  if (asked_ > 0 && row_iterations_ > asked_) {
+    if (late_ == 0) reason_ = motion_.slowest();
+    late_ += row_iterations_ - asked_;
+    carry_.reset();
+  }
+  if (!std::exchange(begun_, true)) {
+    Outcome outcome{Status::active};
+    if (late_ > 0) outcome = {Status::active, Reason::limits, reason_.packed(), late_};
+    ledger_->activate(record_, iteration, outcome);
+    if (head.rows > 1 && motion_.follows_rows()) ahead_left_ = head.rows;
+  }
+  if (pace_ == Pace::direct && rows_left_ == 0) take_out();
+  return true;
+}
+
+/// Reads the next waypoint: its target and number of iterations.
+void ActuatorQueue::plan_row(Iteration iteration) noexcept {
+  if (begun_ && pace_ == Pace::direct) {
+    // a set-point of a row of them: it replaces the one before, or is equal to it
+    keeps_plan_ = is_next_row_target();
+    if (!keeps_plan_) motion_.begin(mask());
+  } else if (begun_) {
+    motion_.next_row();
+  }
+  if (keeps_plan_) {
+    rows_.read(scratch(), layout_->size());
+    --rows_left_;
+    asked_ = 0;
+    row_iterations_ = std::max<std::int64_t>(1, motion_.last() - iteration + 1);
+    return;
+  }
+  read_row();
+  const RecordHead& head = pool_->head(record_);
+  const Motion::Course next = course(head, iteration);
+  const bool is_as_sent = head.profile == Profile::as_sent;
+  row_iterations_ = is_as_sent ? 1 : motion_.propose(next, desired_);
+  asked_ = next.iterations;
+  // of several actuators, others may be slower
+  if (head.pace == Pace::speed && !is_member(head)) asked_ = motion_.asked_by_speed();
+}
+
+Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration) noexcept {
+  Motion::Course next;
+  next.profile = head.profile;
+  next.first = layout_->first_commanded(mask());
+  next.is_row = head.rows > 1 && head.profile == Profile::linear && head.pace != Pace::fastest &&
+                head.pace != Pace::direct;
+  switch (head.pace) {
+    case Pace::direct:
+      if (head.amount > 0 && motion_.accelerates()) {
+        next.iterations = std::max<std::int64_t>(
+            1, std::llround(2e-9 * static_cast<double>(head.amount) / period_));
+      }
+      break;
+    case Pace::fastest:
+      next.profile = Profile::linear;
+      break;
+    case Pace::iterations:
+      next.iterations = std::max<std::int64_t>(1, head.amount);
+      break;
+    case Pace::until:
+      carry_.reset();
+      next.iterations = head.amount - iteration + 1;
+      break;
+    case Pace::speed:
+      next.cruise = head.speed * period_;
+      break;
+    case Pace::duration:
+      next.iterations = is_timed(head) ? row_of_own_time() : carry_.iterations(head.amount);
+      break;
+  }
+  return next;
+}
+
+/// Skips waypoints that end before the next iteration; the iterations of the first that does not.
+std::int64_t ActuatorQueue::row_of_own_time() noexcept {
+  const auto next = [&] {
+    std::int64_t end = time_;
+    times_.read(&end, sizeof end);
+    return end - std::exchange(time_, end);
+  };
+  std::int64_t duration = next();
+  for (int i = 0; i < kMostPassed && rows_left_ > 0 && carry_.pass(duration); ++i) {
+    read_row();
+    duration = next();
+  }
+  return carry_.iterations(duration);
+}
+
+}  // namespace o80

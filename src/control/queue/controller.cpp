@@ -1,0 +1,209 @@
+#include "control/queue/controller.hpp"
+
+#include <algorithm>
+#include <bit>
+#include <limits>
+#include <utility>
+
+namespace o80 {
+namespace {
+
+/// Calls `visit(index)` for each bit set.
+template <class Visit>
+void each_bit(std::uint64_t word, std::uint32_t base, Visit&& visit) noexcept {
+  for (; word != 0; word &= word - 1) {
+    visit(base + static_cast<std::uint32_t>(std::countr_zero(word)));
+  }
+}
+
+}  // namespace
+
+Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, std::uint32_t lanes)
+    : pool_(pool),
+      sink_(sink),
+      ledger_(pool, sink),
+      layouts_(layouts_of_types(schema)),
+      planner_(schema, layouts_, pool, lanes),
+      purge_tickets_(lanes, static_cast<std::uint32_t>(schema.actuators.size())),
+      desired_((schema.head.block + kBlockBytes - 1) / kBlockBytes) {
+  const auto count = static_cast<std::uint32_t>(schema.actuators.size());
+  const std::uint32_t words = mask_words(count);
+  for (Mask* mask :
+       {&active_mask_, &clamped_mask_, &braking_mask_, &busy_, &stepped_, &follow_, &dropped_}) {
+    mask->resize(words);
+  }
+  actuators_.reserve(count);
+  auto* block = reinterpret_cast<std::byte*>(desired_.data());
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const ActuatorRow& row = schema.actuators[i];
+    offsets_.push_back(row.offset);
+    actuators_.emplace_back(schema, row, *layouts_[row.type], pool_, ledger_, block + row.offset,
+                            lanes);
+    set(busy_, i);
+    if (row.when_idle == WhenIdle::follow) set(follow_, i);
+  }
+}
+
+/// Begins the commands of several actuators whose members are next in all queues.
+void Controller::step_groups(Iteration iteration, const std::byte* observed,
+                             std::uint32_t& late_budget) noexcept {
+  // end dropped members first, so that the others of their group do not wait for them
+  told_ = ledger_.report_ends(kStatusesPerIteration);
+  if (ledger_.undecided_groups() == 0) return;
+  const auto each_busy = [&](auto&& visit) {
+    for (std::size_t word = 0; word < busy_.size(); ++word) {
+      each_bit(busy_[word], static_cast<std::uint32_t>(word * 64), visit);
+    }
+  };
+  each_busy([&](std::uint32_t i) { actuators_[i].arrive(iteration, late_budget); });
+  each_busy([&](std::uint32_t i) {
+    if (!actuators_[i].follows()) return;
+    const BlockIndex group = actuators_[i].beginning_group(iteration);
+    if (group == kNoBlock) return;
+    if (sink_.may_begin(i, ledger_.lane_of(group), pool_.head(group).id)) return;
+    actuators_[i].drop({Status::interrupted, Reason::reading}, iteration);
+  });
+  each_busy([&](std::uint32_t i) { actuators_[i].agree_on_carry(iteration); });
+  each_busy([&](std::uint32_t i) { actuators_[i].plan_with_others(iteration, of(i, observed)); });
+}
+
+void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
+  std::uint32_t late_budget = kStatusesPerIteration;
+  told_ = 0;
+  if (ledger_.open_groups() > 0) step_groups(iteration, observed, late_budget);
+  const bool gives = given_.acts(iteration);
+  if (gives) step_given(iteration, observed);
+  for (std::size_t word = 0; word < busy_.size(); ++word) {
+    const auto base = static_cast<std::uint32_t>(word * 64);
+    const std::uint64_t stepped = gives ? stepped_[word] : 0;
+    std::uint64_t active = stepped;
+    std::uint64_t clamped = gives ? clamped_mask_[word] & stepped : 0;
+    std::uint64_t braking = 0;
+
+    // idle actuators follow the observed state, busy ones step
+    each_bit(follow_[word] & ~busy_[word], base,
+             [&](std::uint32_t i) { actuators_[i].follow(of(i, observed)); });
+    each_bit(busy_[word] & ~stepped, base, [&](std::uint32_t i) {
+      using Moved = ActuatorQueue::Moved;
+      ActuatorQueue& queue = actuators_[i];
+      const std::uint64_t bit = std::uint64_t{1} << (i % 64);
+      const Moved moved = queue.step(iteration, of(i, observed), late_budget);
+      // the queue is not empty if late commands have used up their budget
+      if (moved == Moved::idle && queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
+      if (moved == Moved::idle) return;
+      active |= bit;
+      if (moved == Moved::braking) braking |= bit;
+      if (moved == Moved::clamped) clamped |= bit;
+    });
+    active_mask_[word] = active;
+    clamped_mask_[word] = clamped;
+    braking_mask_[word] = braking;
+  }
+  told_ += kStatusesPerIteration - late_budget;
+}
+
+/// The targets of this iteration => desired.
+void Controller::step_given(Iteration iteration, const std::byte* observed) noexcept {
+  const bool first = !std::exchange(was_given_, true);
+  if (first) std::ranges::fill(dropped_, 0);
+  std::ranges::fill(stepped_, 0);
+  const auto step = static_cast<std::size_t>(iteration - given_.first);
+  const std::byte* states = given_.states;
+  for (const std::uint32_t i : given_.actuators) {
+    const std::size_t size = actuators_[i].layout().size();
+    const std::byte* target = states + step * size;
+    states += given_.steps * size;
+    if (masked(dropped_.data(), i)) continue;
+    if (first) actuators_[i].begin_given(given_.mode);
+    clamped_mask_[i / 64] &= ~(std::uint64_t{1} << (i % 64));
+    if (actuators_[i].go_to(iteration, of(i, observed), target) == ActuatorQueue::Moved::clamped) {
+      set(clamped_mask_, i);
+    }
+    set(stepped_, i);
+    set(busy_, i);
+  }
+}
+
+void Controller::take(std::uint32_t lane, BlockIndex batch, BatchHandler& handler) noexcept {
+  std::uint32_t budget = std::numeric_limits<std::uint32_t>::max();
+  planner_.check(lane, batch, budget);
+  const std::optional<Plan> plan = planner_.plan(batch);
+  const Iteration taken_at = handler.iteration();
+  if (!plan) return ledger_.reject(lane, batch, {Status::rejected, Reason::invalid}, taken_at);
+
+  const Taking from{lane, pool_.batch(batch).ticket};
+  const BlockChain spare{plan->spare_first, pool_.chain(batch).last, plan->spare_blocks};
+  ledger_.enter(lane, batch, spare, plan->missing_from, plan->effort.groups, taken_at);
+  for (BlockIndex step = plan->steps; step != kNoBlock;) {
+    const BlockIndex record = step;
+    step = pool_.head(record).own[Own::kNextStep];
+    take_step(from, record, handler);
+  }
+  ledger_.close(batch, taken_at);
+}
+
+void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& handler) noexcept {
+  const RecordHead& head = pool_.head(record);
+  // read before the request: a fresh start in it increases the iteration
+  const Iteration now = handler.iteration();
+  const auto end = [&](const Outcome& outcome) { ledger_.end(record, outcome, now); };
+  switch (head.kind) {
+    case RecordKind::command:
+    case RecordKind::overwriter_overwritten:
+    case RecordKind::overwriter_purged:
+      return take_commands(from, record, now);
+    case RecordKind::purge: {
+      const bool own = head.only_own != 0;
+      purge_tickets_.raise(own ? from.lane : PurgeTickets::kEveryLane, head.actuator, from.ticket);
+      if (own) {
+        purge_lane(from.lane, head.actuator, now);
+      } else {
+        purge(head.actuator, now);
+      }
+      return end({});
+    }
+    case RecordKind::request: {
+      const Cursor payload(pool_, record, sizeof(RecordHead), head.payload_bytes);
+      const Outcome outcome = handler.request(from.lane, head.id, record, head.actuator, payload);
+      if (outcome.status == Status::active) return ledger_.activate(record, now);
+      return end(outcome);
+    }
+    case RecordKind::take_control:
+      return end(handler.take_control(from.lane));
+    case RecordKind::release_control:
+      return end(handler.release_control(from.lane));
+    case RecordKind::resume:
+      return end(handler.resume(from.lane, head.id, static_cast<std::uint64_t>(head.amount),
+                                head.accepts != 0));
+    case RecordKind::overwritten_list:
+      return ledger_.drop(record, {Status::overwritten}, now);
+    case RecordKind::purged_list:
+      return ledger_.drop(record, {Status::purged}, now);
+    case RecordKind::completed_list:
+      return ledger_.drop(record, {Status::completed}, now);
+    default:
+      ledger_.drop(record, {Status::rejected, Reason::invalid}, now);
+  }
+}
+
+/// Appends a list of commands to its queue, unless a purge or their own batch has ended them.
+void Controller::take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept {
+  const RecordHead& head = pool_.head(first);
+  if (purge_tickets_.cover(from.lane, head.actuator, from.ticket)) {
+    // purged commands must not overwrite commands that were sent after the purge
+    return ledger_.drop(first, {Status::purged}, iteration);
+  }
+  ActuatorQueue& queue = actuators_[head.actuator];
+  if (head.mode == Mode::overwrite) {
+    O80_COUNT(queue_dropped);
+    queue.drop({Status::overwritten}, iteration);
+  }
+  if (head.kind != RecordKind::command) {
+    const bool overwritten = head.kind == RecordKind::overwriter_overwritten;
+    return ledger_.drop(first, {overwritten ? Status::overwritten : Status::purged}, iteration);
+  }
+  queue.append(first, planner_.tail(first), from.lane);
+  set(busy_, head.actuator);
+}
+
+}  // namespace o80

@@ -1,0 +1,544 @@
+#include "robot/group/inline_group.hpp"
+
+#include <sched.h>
+
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "control/batch/batch_builder.hpp"
+#include "control/batch/command_check.hpp"
+#include "memory/os/futex.hpp"
+#include "memory/segment/signal.hpp"
+#include "robot/group/descriptor_limit.hpp"
+#include "runtime/frontend/link.hpp"
+
+namespace o80 {
+
+namespace {
+
+/// Files of a copy: three of its backend, three of its frontend, three of another frontend.
+constexpr std::size_t kDescriptorsPerCopy = 9;
+constexpr std::int64_t kClosePoll = 1'000'000;  // [ns]
+constexpr std::size_t kMostNamed = 3;           // failed copies in the text of an error
+
+/// The group whose call this thread works for.
+thread_local const InlineGroup* working_for = nullptr;
+
+std::size_t threads_of(const InlineGroup::Options& options) {
+  if (options.threads > 0) return options.threads;
+  cpu_set_t allowed;
+  CPU_ZERO(&allowed);
+  const bool known = sched_getaffinity(0, sizeof allowed, &allowed) == 0;
+  const auto processors = known ? static_cast<std::size_t>(CPU_COUNT(&allowed)) : 1;
+  return std::clamp<std::size_t>(processors, 1, std::max<std::size_t>(1, options.copies));
+}
+
+std::string text_of(const std::exception_ptr& error) {
+  try {
+    std::rethrow_exception(error);
+  } catch (const std::exception& thrown) {
+    return thrown.what();
+  } catch (...) {
+    return "an unknown exception";
+  }
+}
+
+std::string text_of(const std::string& group, const std::vector<CopyFailed::Failure>& failures) {
+  std::string text = "copy " + std::to_string(failures.front().copy) + " of '" + group +
+                     "' failed: " + text_of(failures.front().error);
+  if (failures.size() == 1) return text;
+  text += ". So did ";
+  for (std::size_t i = 1; i < failures.size() && i < kMostNamed; ++i) {
+    text += (i == 1 ? "copy " : ", copy ") + std::to_string(failures[i].copy);
+  }
+  if (failures.size() > kMostNamed) {
+    text += " and " + std::to_string(failures.size() - kMostNamed) + " more";
+  }
+  return text;
+}
+
+void refuse_size(const char* what, std::size_t given, std::size_t wanted, const char* unit) {
+  if (given == wanted) return;
+  throw InvalidArgument(std::string("the ") + what + " of a call of a group take " +
+                        std::to_string(wanted) + ' ' + unit + ", the memory given has " +
+                        std::to_string(given));
+}
+
+}  // namespace
+
+struct InlineGroup::Copy {
+  explicit Copy(std::shared_ptr<InlineRobot> inline_robot)
+      : robot(std::move(inline_robot)),
+        frontend(robot->backend(), robot),
+        row(frontend.layout().size / 8) {}
+
+  std::byte* bytes() noexcept { return reinterpret_cast<std::byte*>(row.data()); }
+
+  std::shared_ptr<InlineRobot> robot;
+  UntypedFrontend frontend;
+  std::vector<std::uint64_t> row;  // the newest one, for requests
+  std::exception_ptr error;        // of this call
+  bool chosen = false;             // for this call
+};
+
+/// Marks the group as running while it lives.
+class InlineGroup::Call {
+ public:
+  explicit Call(InlineGroup& group) : group_(group), outer_(innermost_) {
+    group.check_usable();
+    std::uint32_t free = 0;
+    if (!group.running_.compare_exchange_strong(free, 1, std::memory_order_acquire)) {
+      throw Error("the group of '" + group.name_ +
+                  "' runs a call of another thread (or is this a signal handler?): call it from "
+                  "one thread at a time");
+    }
+    if (!group.pool_->try_claim()) {
+      group.running_.store(0, std::memory_order_release);
+      throw Error("the threads of the group of '" + group.name_ +
+                  "' run a call of the group that it shares them with: call one after the other");
+    }
+    innermost_ = this;
+  }
+  Call(const Call&) = delete;
+  Call& operator=(const Call&) = delete;
+  ~Call() {
+    innermost_ = outer_;
+    group_.pool_->release();
+    group_.running_.store(0, std::memory_order_release);
+  }
+  /// True if this thread has called the group and the call has not returned: in a signal handler.
+  static bool is_within(const InlineGroup* group) noexcept {
+    const Call* call = innermost_;
+    while (call != nullptr && &call->group_ != group) call = call->outer_;
+    return call != nullptr;
+  }
+
+ private:
+  inline static thread_local const Call* innermost_ = nullptr;  // of this thread
+
+  InlineGroup& group_;
+  const Call* outer_;
+};
+
+/// Marks a group as running in the call of another one, while it lives.
+class InlineGroup::FollowingCall {
+ public:
+  FollowingCall(InlineGroup& leader, InlineGroup* group) : group_(group) {
+    if (group_ == nullptr) return;
+    group_->check_usable();
+    std::uint32_t free = 0;
+    if (!group_->running_.compare_exchange_strong(free, 1, std::memory_order_acquire)) {
+      throw Error("the group of '" + group_->name_ + "' runs a call of another thread: call it " +
+                  "from one thread at a time");
+    }
+    group_->leader_.store(&leader, std::memory_order_relaxed);
+  }
+  FollowingCall(const FollowingCall&) = delete;
+  FollowingCall& operator=(const FollowingCall&) = delete;
+  ~FollowingCall() {
+    if (group_ == nullptr) return;
+    group_->leader_.store(nullptr, std::memory_order_relaxed);
+    group_->running_.store(0, std::memory_order_release);
+  }
+
+ private:
+  InlineGroup* group_;
+};
+
+BackendOptions InlineGroup::default_options() {
+  BackendOptions options;
+  options.history = 64;
+  options.lanes = 2;
+  options.lane_blocks = 256;
+  options.journal = 0;
+  return options;
+}
+
+InlineGroup::InlineGroup(const RobotTable& table, const OptionValues& options, const Options& group,
+                         const KeepWaiting& keep_waiting)
+    : name_(table.name),
+      otherwise_(keep_waiting),
+      go_on_([this] { return go_on(); }),
+      pool_(group.sharing != nullptr ? group.sharing->pool_
+                                     : std::make_shared<WorkerPool>(threads_of(group) - 1)) {
+  if (group.copies == 0) throw InvalidArgument("a group needs at least one copy, got 0");
+  allow_descriptors(group.copies * kDescriptorsPerCopy,
+                    std::to_string(group.copies) + " copies of '" + name_ + "'");
+  copies_.reserve(group.copies);
+  for (std::size_t i = 0; i < group.copies; ++i) {
+    add_copy(table, options, group.backend);
+    if (keep_waiting && !keep_waiting()) {
+      throw Cancelled("the start of the group of '" + name_ + "' was cancelled by the caller");
+    }
+  }
+}
+
+InlineGroup::~InlineGroup() { close(); }
+
+void InlineGroup::add_copy(const RobotTable& table, const OptionValues& options,
+                           const BackendOptions& backend) {
+  BackendOptions own = backend;
+  own.segment = name_ + "[" + std::to_string(copies_.size()) + "]";
+  own.anonymous = true;
+  copies_.push_back(std::make_unique<Copy>(std::make_shared<InlineRobot>(
+      std::make_unique<DriverInstance>(table, options), std::move(own), go_on_)));
+  const auto schema_of = [](const Copy& copy) { return copy.frontend.link()->segment.schema(); };
+  if (!std::ranges::equal(schema_of(*copies_.back()), schema_of(*copies_.front()))) {
+    throw DriverError("copy " + std::to_string(copies_.size() - 1) + " of '" + name_ +
+                      "' describes itself differently than copy 0: all copies of a group must "
+                      "have the same description");
+  }
+}
+
+const Description& InlineGroup::description() const {
+  return *copies_.front()->frontend.link()->description;
+}
+
+std::uint32_t InlineGroup::request_index(const std::string& name) const {
+  return copies_.front()->frontend.request_index(name);
+}
+
+void InlineGroup::check_usable() const {
+  // called in every burst: no text is built unless it is thrown
+  if (guard_.forked()) guard_.check("the group of '" + name_ + "'");
+  if (closed_.load(std::memory_order_relaxed)) {
+    throw Closed("the group of '" + name_ + "' was closed: start a new one");
+  }
+}
+
+std::shared_ptr<UntypedFrontend> InlineGroup::attach(std::size_t copy) const {
+  check_usable();
+  const std::shared_ptr<InlineRobot>& robot = at(copy).robot;
+  return std::make_shared<UntypedFrontend>(robot->backend(), robot);
+}
+
+void InlineGroup::publish_as(std::size_t copy, const std::string& name) {
+  const Call call(*this);
+  at(copy).robot->publish_as(name);
+}
+
+InlineGroup::Copy& InlineGroup::at(std::size_t copy) const {
+  if (copy >= copies_.size()) {
+    throw InvalidArgument("the group of '" + name_ + "' has copies 0 to " +
+                          std::to_string(copies_.size() - 1) + ", there is no copy " +
+                          std::to_string(copy));
+  }
+  return *copies_[copy];
+}
+
+// ------------------------------------------------------------------------------ a call
+
+/// True inside a call of this group, or of one that it follows, in one of the threads of that call.
+bool InlineGroup::runs_here() const noexcept {
+  const auto is_inside = [](const InlineGroup* group) {
+    return group != nullptr && (working_for == group || Call::is_within(group));
+  };
+  return is_inside(this) || is_inside(leader_.load(std::memory_order_relaxed));
+}
+
+/// Whether the iterations of a copy go on; called about every 50 ms of a burst.
+bool InlineGroup::go_on() {
+  InlineGroup* const leader = leader_.load(std::memory_order_relaxed);
+  if (leader != nullptr && working_for == leader) return leader->go_on();
+  // a frontend of a single copy
+  if (working_for != this) return !otherwise_ || otherwise_();
+  if (std::this_thread::get_id() == caller_) look_around();
+  return !cancelled_.load(std::memory_order_relaxed);
+}
+
+/// In the calling thread: asks every 50 ms whether the call goes on.
+void InlineGroup::look_around() noexcept {
+  const std::int64_t now = monotonic_now();
+  if (now < ask_at_ || cancelled_.load(std::memory_order_relaxed)) return;
+  ask_at_ = now + kSlice;
+  bool cancelled = false;
+  try {
+    cancelled = *ask_ && !(*ask_)();
+  } catch (...) {
+    asked_ = std::current_exception();
+    cancelled = true;
+  }
+  timed_out_ = !cancelled && deadline_.over();
+  if (cancelled || timed_out_) cancelled_.store(true, std::memory_order_relaxed);
+}
+
+/// Calls each(place, copy) for the chosen copies, on all threads; `place` is that in `chosen`.
+template <class Each>
+void InlineGroup::for_each(std::span<const std::uint32_t> chosen, Timeout timeout,
+                           const KeepWaiting& keep_waiting, Each&& each) {
+  const Call call(*this);
+  choose(chosen);
+  ask_ = &keep_waiting;
+  ask_at_ = monotonic_now() + kSlice;
+  deadline_ = Deadline(timeout);
+  caller_ = std::this_thread::get_id();
+  const auto task = [&](std::uint32_t place) noexcept {
+    if (cancelled_.load(std::memory_order_relaxed)) return;
+    Copy& copy = *copies_[chosen[place]];
+    const InlineGroup* const before = std::exchange(working_for, this);
+    try {
+      each(place, copy);
+    } catch (...) {
+      copy.error = std::current_exception();
+      failed_.store(true, std::memory_order_relaxed);
+    }
+    working_for = before;
+  };
+  const auto look = [this]() noexcept { look_around(); };
+  pool_->run(static_cast<std::uint32_t>(chosen.size()), task, look);
+  if (guard_.forked()) check_usable();
+  if (failed_.load(std::memory_order_relaxed) || cancelled_.load(std::memory_order_relaxed)) {
+    throw_failures();
+  }
+}
+
+/// Throws InvalidArgument unless each number is that of a copy and occurs once.
+void InlineGroup::choose(std::span<const std::uint32_t> chosen) {
+  std::size_t valid = 0;
+  while (valid < chosen.size() && chosen[valid] < copies_.size() &&
+         !std::exchange(copies_[chosen[valid]]->chosen, true)) {
+    ++valid;
+  }
+  for (const std::uint32_t copy : chosen.first(valid)) copies_[copy]->chosen = false;
+  if (valid == chosen.size()) return;
+  at(chosen[valid]);
+  throw InvalidArgument("copy " + std::to_string(chosen[valid]) + " of '" + name_ +
+                        "' is named twice: name each copy once");
+}
+
+/// Ends a call that was cancelled or in which copies failed.
+void InlineGroup::throw_failures() {
+  std::vector<CopyFailed::Failure> failures;
+  for (std::size_t i = 0; i < copies_.size(); ++i) {
+    if (copies_[i]->error) failures.push_back({i, std::exchange(copies_[i]->error, nullptr)});
+  }
+  failed_ = false;
+  const bool cancelled = cancelled_.exchange(false);
+  const bool timed_out = std::exchange(timed_out_, false);
+  if (const std::exception_ptr asked = std::exchange(asked_, nullptr)) {
+    std::rethrow_exception(asked);
+  }
+  check_usable();  // closed during the call
+  if (timed_out) {
+    throw TimeoutError("the call of the group of '" + name_ +
+                       "' was not done in time: pass a longer timeout. Each copy is between two "
+                       "iterations");
+  }
+  if (cancelled) throw Cancelled("the call of the group of '" + name_ + "' was cancelled");
+  throw CopyFailed(text_of(name_, failures), failures);
+}
+
+// ------------------------------------------------------------------------------ what a call does
+
+void InlineGroup::check(const BurstPlan& plan) const {
+  const CommandCheck& robot = copies_.front()->frontend.command_check();
+  const Schema& schema = description().schema;
+  std::size_t states = 0;
+  for (const std::uint32_t actuator : plan.actuators) {
+    const std::uint32_t index = robot.actuator(std::int64_t{actuator});
+    states += schema.types[schema.actuators[index].type].size;
+  }
+  refuse_size("targets", plan.targets.size(), copies() * plan.steps * states, "bytes");
+  if (plan.iterations < 1) {
+    throw InvalidArgument("the iterations of a burst must be at least 1, got " +
+                          std::to_string(plan.iterations));
+  }
+  if (plan.delay < 0 || plan.delay >= plan.iterations) {
+    throw InvalidArgument("the delay of a burst of " + std::to_string(plan.iterations) +
+                          " iterations must be at least 0 and less than these, got " +
+                          std::to_string(plan.delay));
+  }
+  const auto iterations = static_cast<std::size_t>(plan.iterations);
+  refuse_size("rows", plan.rows.size(), copies() * iterations * description().layout.size, "bytes");
+  const std::uint64_t kept = copies_.front()->frontend.link()->history.rows();
+  if (iterations > kept) {
+    throw InvalidArgument("the " + std::to_string(iterations) + " rows of a burst of '" + name_ +
+                          "' do not fit into its history of " + std::to_string(kept) +
+                          ": start the group with history=" + std::to_string(iterations));
+  }
+}
+
+void InlineGroup::check(const BurstPlan& plan, const Following& then) const {
+  if (then.group == this || then.group->pool_ != pool_ || then.group->copies() != copies()) {
+    throw InvalidArgument("the group of '" + then.group->name_ + "' must have as many copies as '" +
+                          name_ + "', and share its threads: start it with threads=first_group");
+  }
+  if (then.plan->steps != plan.iterations) {
+    throw InvalidArgument("a burst that follows one of " + std::to_string(plan.iterations) +
+                          " iterations needs as many steps, got " +
+                          std::to_string(then.plan->steps));
+  }
+  refuse_size("targets", then.targets.size(), then.plan->targets.size(), "bytes");
+  const std::size_t last = then.plan->steps - 1;
+  const std::size_t own = then.targets.size() / copies();
+  for (const Feed& feed : then.feeds) {
+    const bool fits = std::size_t{feed.from} + feed.size <= description().layout.size &&
+                      feed.to + last * feed.stride + feed.size <= own;
+    if (!fits) throw InvalidArgument("a number of the rows lies outside of rows or targets");
+  }
+}
+
+void InlineGroup::burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen,
+                        Timeout timeout, const KeepWaiting& keep_waiting, const Following* then) {
+  const bool may_be_direct = this->may_be_direct(plan);
+  const bool follows_directly = then != nullptr && then->group->may_be_direct(*then->plan);
+  const FollowingCall following(*this, then == nullptr ? nullptr : then->group);
+  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy&) {
+    burst_copy(plan, may_be_direct, chosen[place]);
+    if (then != nullptr) follow(plan, *then, follows_directly, chosen[place]);
+  });
+}
+
+void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uint32_t i) {
+  Copy& copy = *copies_[i];
+  const std::size_t targets = plan.targets.size() / copies();
+  const std::size_t rows = plan.rows.size() / copies();
+  const std::span<const std::byte> to = plan.targets.subspan(i * targets, targets);
+  const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
+  if (!may_be_direct || !burst_directly(copy, plan, to, own)) {
+    if (!plan.actuators.empty()) {
+      if (is_each_iteration(plan.command.pace)) {
+        copy.frontend.add_set_points(plan.actuators, plan.steps, to, plan.command.mode);
+      } else {
+        copy.frontend.add_trajectories(plan.actuators, plan.steps, to, plan.command);
+      }
+    }
+    PulseOptions pulse;
+    if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
+    copy.frontend.burst_rows(own, {}, go_on_, pulse);
+  }
+  read_gathered(i, own.data() + rows - description().layout.size);
+}
+
+/// Rows of the copy => targets of the copy that follows => its burst.
+void InlineGroup::follow(const BurstPlan& plan, const Following& then, bool may_be_direct,
+                         std::uint32_t i) {
+  const std::size_t size = description().layout.size;
+  const std::byte* rows = plan.rows.data() + i * (plan.rows.size() / copies());
+  std::byte* targets = then.targets.data() + i * (then.targets.size() / copies());
+  for (const Feed& feed : then.feeds) {
+    for (std::size_t step = 0; step < then.plan->steps; ++step) {
+      std::byte* to = targets + feed.to + step * feed.stride;
+      const std::byte* from = rows + step * size + feed.from;
+      if (feed.size == sizeof(double)) {  // mostly: no call
+        std::memcpy(to, from, sizeof(double));
+      } else {
+        std::memcpy(to, from, feed.size);
+      }
+    }
+  }
+  then.group->burst_copy(*then.plan, may_be_direct, i);
+}
+
+/// True if the targets of each actuator are for consecutive iterations of the burst.
+bool InlineGroup::may_be_direct(const BurstPlan& plan) const {
+  const std::size_t actuators = description().schema.actuators.size();
+  for (auto each = plan.actuators.begin(); each != plan.actuators.end(); ++each) {
+    const bool again = std::find(plan.actuators.begin(), each, *each) != each;
+    if (*each >= actuators || again) return false;  // the batch says what is wrong
+  }
+  return is_each_iteration(plan.command.pace) && plan.steps > 0 &&
+         static_cast<std::int64_t>(plan.steps) <= plan.iterations - plan.delay;
+}
+
+/// Runs the burst of a copy without a batch. False if it needs one.
+bool InlineGroup::burst_directly(Copy& copy, const BurstPlan& plan,
+                                 std::span<const std::byte> targets,
+                                 std::span<std::byte> rows) const {
+  Link& link = *copy.frontend.link();
+  link.check_usable();
+  if (!link.builder.empty()) return false;
+  // the batch says which target is wrong
+  if (!link.command_check.admits(plan.actuators, plan.steps, targets.data())) return false;
+  DirectBurst burst{plan.iterations, plan.delay, {}};
+  if (!plan.actuators.empty()) {
+    burst.targets = {plan.actuators, plan.steps, targets.data(), plan.command.mode, 0};
+  }
+  const std::optional<std::size_t> done = copy.robot->run(burst, rows);
+  if (!done) return false;
+  if (static_cast<std::int64_t>(*done) == plan.iterations) return true;
+  link.segment.throw_if_gone();
+  const Iteration last = copy.frontend.published();
+  const std::string halt = link.halt_text(last + 1);
+  throw BackendHalted("the burst of '" + copy.frontend.segment() + "' ended in iteration " +
+                      std::to_string(last) + ": " + (halt.empty() ? "it was cut" : halt));
+}
+
+void InlineGroup::request(std::uint32_t request, std::span<const std::uint32_t> chosen,
+                          std::span<const std::byte> payloads, Timeout timeout,
+                          const KeepWaiting& keep_waiting, std::span<std::byte> rows) {
+  check_usable();
+  const std::size_t row = description().layout.size;
+  if (!rows.empty()) refuse_size("rows", rows.size(), copies() * row, "bytes");
+  const std::size_t size = payloads.size() / std::max<std::size_t>(1, chosen.size());
+  const CommandCheck& robot = copies_.front()->frontend.command_check();
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    robot.request(request, payloads.subspan(i * size, size));
+  }
+  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy& copy) {
+    BatchBuilder batch;
+    batch.request(static_cast<std::uint16_t>(request), payloads.subspan(place * size, size));
+    const Batch sent = copy.frontend.pulse_to_end(batch);
+    copy.frontend.wait_until_ended(sent, {}, go_on_);
+    throw_unless_completed(request, sent);
+    copy.frontend.latest(copy.bytes());
+    read_gathered(chosen[place], copy.bytes());
+    if (!rows.empty()) std::memcpy(rows.data() + chosen[place] * row, copy.bytes(), row);
+  });
+}
+
+void InlineGroup::throw_unless_completed(std::uint32_t request, const Batch& batch) const {
+  const Handle handle = batch.handle(0);
+  if (handle.status == Status::completed) return;
+  const std::string text = "request '" + description().schema.requests[request].name.str() +
+                           "' was not completed: " + handle.text;
+  if (handle.status == Status::halted) throw BackendHalted(text);
+  throw Error(text);
+}
+
+void InlineGroup::latest(std::span<const std::uint32_t> chosen, std::span<std::byte> rows) {
+  const std::size_t row = description().layout.size;
+  refuse_size("rows", rows.size(), chosen.size() * row, "bytes");
+  const Call call(*this);
+  choose(chosen);
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    copies_[chosen[i]]->frontend.latest(rows.data() + i * row);
+  }
+}
+
+void InlineGroup::gather(RowGather gather, Gathered memory) {
+  refuse_size("observations", memory.observations.size(), copies() * gather.numbers.size(),
+              "numbers");
+  refuse_size("flags", memory.flags.size(), copies() * gather.flags.size(), "flags");
+  const Call call(*this);
+  gather_ = std::move(gather);
+  gathered_ = memory;
+  for (std::uint32_t i = 0; i < copies_.size(); ++i) {
+    copies_[i]->frontend.latest(copies_[i]->bytes());
+    read_gathered(i, copies_[i]->bytes());
+  }
+}
+
+void InlineGroup::read_gathered(std::uint32_t copy, const std::byte* row) noexcept {
+  const std::size_t numbers = gather_.numbers.size();
+  const std::size_t flags = gather_.flags.size();
+  gather_.read(row, gathered_.observations.subspan(copy * numbers, numbers),
+               gathered_.flags.subspan(copy * flags, flags));
+}
+
+void InlineGroup::close() noexcept {
+  closed_.store(true, std::memory_order_relaxed);
+  for (const auto& copy : copies_) {
+    if (copy->robot) copy->robot->stop();
+  }
+  // in a signal handler during a call: the end of that call, which throws Closed, comes later
+  if (runs_here() || guard_.forked()) return;
+  while (running_.load(std::memory_order_acquire) != 0) futex_wait(running_, 1, kClosePoll);
+  for (const auto& copy : copies_) {
+    copy->frontend.close();
+    copy->robot.reset();  // a published segment goes with it
+  }
+}
+
+}  // namespace o80

@@ -1,0 +1,115 @@
+#include "robot/loop/loop_report.hpp"
+
+#include <pthread.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <utility>
+
+#include "base/printable.hpp"
+#include "memory/os/futex.hpp"
+#include "o80/base/time.hpp"
+#include "o80/runtime/frontend.hpp"
+#include "robot/loop/service_manager.hpp"
+
+namespace o80 {
+
+namespace {
+constexpr std::int64_t kReportPeriod = 1'000'000'000;   // between two looks [ns]
+constexpr std::int64_t kBetweenLines = 10'000'000'000;  // about late iterations [ns]
+
+void say(const std::string& text) { std::fprintf(stderr, "o80: %s\n", text.c_str()); }
+
+/// What lasts, so that it is the status of the service too.
+void say_state(const std::string& text) {
+  say(text);
+  tell_service_manager("STATUS=" + text);
+}
+
+std::string words_for(const Halt& halt) {
+  std::string text = "halted in iteration " + std::to_string(halt.iteration) + " (halt " +
+                     std::to_string(halt.number) + ", cause " + std::string(to_text(halt.cause));
+  if (!halt.who_text().empty()) text += ", asked for by " + printable(halt.who_text());
+  text += ")";
+  if (!halt.reason().empty()) text += ": " + printable(halt.reason());
+  return text;
+}
+}  // namespace
+
+std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t now) {
+  if (!first_ || row.overruns == first_->overruns) {
+    first_ = row;
+    return std::nullopt;
+  }
+  if (said_at_ != 0 && now - said_at_ < kBetweenLines) return std::nullopt;
+  said_at_ = now;
+  const RowHead before = *std::exchange(first_, row);
+  const auto rows = static_cast<std::uint32_t>(row.iteration - before.iteration);
+  const double rate =
+      rows * 1e9 / static_cast<double>(std::max<std::int64_t>(row.time - before.time, 1));
+  return late_text(row.overruns - before.overruns, rows, rate, period_) + ", " +
+         std::to_string(row.skipped - before.skipped) +
+         " periods were skipped. See docs/real_time.md, or lower --frequency";
+}
+
+std::optional<std::string> HangReport::look(const LoopState& loop, std::int64_t now) {
+  std::string text = loop.hang();
+  if (text.empty()) {
+    return std::exchange(hangs_, false) ? std::optional("the loop continues") : std::nullopt;
+  }
+  if (hangs_ && now - said_at_ < kBetweenLines) return std::nullopt;
+  hangs_ = true;
+  said_at_ = now;
+  return text;
+}
+
+LoopReport::LoopReport(std::string segment) : segment_(std::move(segment)) {
+  // signals are for the loop's thread
+  sigset_t every;
+  sigset_t before;
+  sigfillset(&every);
+  pthread_sigmask(SIG_BLOCK, &every, &before);
+  thread_ = std::thread([this] { run(); });
+  const sched_param ordinary{};
+  pthread_setschedparam(thread_.native_handle(), SCHED_OTHER, &ordinary);
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+LoopReport::~LoopReport() {
+  stop_.store(1, std::memory_order_seq_cst);
+  futex_wake(stop_, kEverybody);
+  thread_.join();
+}
+
+void LoopReport::run() noexcept {
+  try {
+    // the loop may have ended before this thread began: then stop waiting for its segment
+    const KeepWaiting goes_on = [this] { return stop_.load(std::memory_order_acquire) == 0; };
+    // attach before row 0, so that a start() that hangs is reported too
+    const UntypedFrontend watcher(
+        segment_,
+        {.timeout = {}, .access = Access::read_only, .starting = true, .keep_waiting = goes_on});
+    OverrunReport overruns(watcher.period());
+    HangReport hangs;
+    std::uint64_t halted = 0;
+    while (stop_.load(std::memory_order_acquire) == 0) {
+      const std::int64_t moment = monotonic_now();
+      if (const auto line = hangs.look(loop_state(watcher, moment), moment)) say(*line);
+      if (watcher.published() >= 0) {
+        if (const auto line = overruns.look(watcher.latest().head(), moment)) say(*line);
+      }
+      const std::optional<Halt> halt = watcher.halted();
+      const std::uint64_t now = halt ? halt->number : 0;
+      if (now != halted && halt) say_state(words_for(*halt));
+      if (now != halted && !halt) say_state("resumed");
+      halted = now;
+      futex_wait(stop_, 0, kReportPeriod);
+    }
+  } catch (const std::exception&) {
+    return;  // the backend has ended: there is nothing left to report
+  }
+}
+
+}  // namespace o80

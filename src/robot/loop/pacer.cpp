@@ -1,0 +1,66 @@
+#include "robot/loop/pacer.hpp"
+
+#include <time.h>
+
+namespace o80 {
+
+bool Pacer::in_time(std::int64_t now) noexcept {
+  overrun_ = false;
+  if (now > due_) count_overrun();
+  return !overrun_;
+}
+
+const Timing& Pacer::next(std::int64_t now) noexcept {
+  timing_.missed = false;
+  timing_.lateness = now - due_;
+  due_ += period_;
+  if (due_ <= now) {
+    const std::int64_t missed = (now - due_) / period_ + 1;
+    timing_.skipped += static_cast<std::uint32_t>(missed);
+    due_ += missed * period_;
+    count_overrun();
+  }
+  return timing_;
+}
+
+const Timing& Pacer::tick(std::int64_t now) noexcept {
+  timing_.missed = false;
+  timing_.lateness = now - due_;
+  // the robot has a clock of its own: a tick counts for the nearest period
+  if (timing_.lateness > 0) {
+    const auto missed = static_cast<std::uint32_t>((timing_.lateness + period_ / 2) / period_);
+    timing_.skipped += missed;
+    if (missed > 0) count_overrun();
+  }
+  // late ticks compensate early ones
+  ahead_ -= timing_.lateness + period_ / kClockTolerance;
+  if (ahead_ > 0) {
+    ++fast_.ticks;
+    fast_.time += period_ + timing_.lateness;
+  } else {
+    ahead_ = 0;
+    fast_ = {};
+  }
+  due_ = now + period_;
+  return timing_;
+}
+
+const Timing& Pacer::missed() noexcept {
+  count_overrun();
+  timing_.missed = true;
+  return timing_;
+}
+
+void Pacer::count_overrun() noexcept {
+  if (!overrun_) ++timing_.overruns;
+  overrun_ = true;
+}
+
+bool sleep_until(std::int64_t due) noexcept {
+  timespec until;
+  until.tv_sec = due / 1'000'000'000;
+  until.tv_nsec = due % 1'000'000'000;
+  return clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &until, nullptr) == 0;
+}
+
+}  // namespace o80

@@ -1,0 +1,64 @@
+#include "robot/loop/replay.hpp"
+
+#include <algorithm>
+#include <string_view>
+#include <utility>
+
+#include "o80/base/error.hpp"
+#include "runtime/journal/recorded_entry_check.hpp"
+
+namespace o80 {
+
+namespace {
+
+/// The options of the recorded run, for a backend that nobody halts or reads the journal of.
+BackendOptions replaying(BackendOptions options) {
+  options.resume = true;  // halts come from the recording
+  options.journal = 0;
+  return options;
+}
+
+/// Throws if this robot may be hardware. The recording may describe another robot than this one.
+void check_simulated(const Schema& schema) {
+  const auto serves = [&](std::string_view name) {
+    return std::ranges::any_of(schema.requests,
+                               [&](const RequestRow& row) { return row.name.view() == name; });
+  };
+  const bool simulated = schema.head.of_the_world == 0 && serves("snapshot") && serves("restore");
+  if (simulated) return;
+  throw DriverError("robot '" + schema.head.robot.str() +
+                    "' is not started for a replay: it may be hardware, because it reads the world "
+                    "or does not serve the requests snapshot and restore of a simulation");
+}
+
+}  // namespace
+
+Replay::Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options)
+    : lanes_(options.lanes), loop_(std::move(robot), replaying(std::move(options)), &recorded_) {
+  check_simulated(loop_.backend().schema());
+}
+
+void Replay::begin_at(Iteration first) noexcept { loop_.begin_at(first - 1); }
+
+void Replay::load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) {
+  if (loop_.load_snapshot(slot, bytes)) return;
+  throw DriverError("the robot cannot take the recorded snapshot of slot " + std::to_string(slot) +
+                    ": replay the recording with the driver that it was made with");
+}
+
+void Replay::add(const JournalEntry& entry) {
+  check_recorded(entry, loop_.backend().schema(), lanes_);
+  recorded_.add(entry);
+}
+
+bool Replay::run(std::span<const std::int64_t> times) {
+  if (times.empty()) return true;
+  const auto last = next() + static_cast<Iteration>(times.size()) - 1;
+  recorded_.set_times(next(), times);
+  if (!std::exchange(started_, true)) loop_.start();
+  return loop_.replay(last) == Step::run;
+}
+
+std::string Replay::fault() const { return loop_.fault(); }
+
+}  // namespace o80

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+
+#include "o80/runtime/journal.hpp"
+#include "robot/driver/driver_instance.hpp"
+#include "robot/loop/loop.hpp"
+#include "runtime/journal/recorded_decisions.hpp"
+
+namespace o80 {
+
+/// Repeats a recorded run: the same robot with the same options, whose backend obeys the recorded
+/// decisions at their iterations. Its rows are in a segment of its own, as those of any robot.
+/// See ARCHITECTURE.md, Replay.
+///
+/// Writer: one thread.
+class Replay {
+ public:
+  /// `options`: those of the recorded run, with another segment name. Throws as Loop, and
+  /// DriverError, before the robot is started, if it may be hardware.
+  Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options);
+
+  /// Begins at this iteration instead of row 0: `run` first publishes the row before it, which
+  /// shows the start state, and obeys the decisions of this iteration and later ones. Call it
+  /// before `add` and `run`.
+  void begin_at(Iteration first) noexcept;
+  /// Fills a slot of the driver with a recorded snapshot. Throws DriverError if it refuses.
+  void load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes);
+  /// Adds the next entry of the recorded journal. Add all of an iteration before it runs. Throws
+  /// InvalidArgument for an entry that no backend writes.
+  void add(const JournalEntry& entry);
+  /// Runs one iteration for each time, the first of them the first row [ns]. False if the driver
+  /// failed or has ended: see fault(). The last row must not be followed by a decision of the same
+  /// iteration.
+  bool run(std::span<const std::int64_t> times);
+
+  const std::optional<DecisionMismatch>& mismatch() const noexcept { return recorded_.mismatch(); }
+  /// The failure of the driver, or empty.
+  std::string fault() const;
+  const std::string& segment() const noexcept { return loop_.backend().name(); }
+  /// The iteration that runs next.
+  Iteration next() const noexcept { return loop_.backend().iteration(); }
+
+ private:
+  std::uint32_t lanes_;
+  RecordedDecisions recorded_;
+  Loop loop_;
+  bool started_ = false;
+};
+
+}  // namespace o80

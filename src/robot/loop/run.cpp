@@ -1,0 +1,234 @@
+#include "o80/robot/run.hpp"
+
+#include <pthread.h>
+#include <signal.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cmath>
+#include <cstdio>
+#include <cstring>
+#include <iterator>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string_view>
+#include <thread>
+
+#include "base/printable.hpp"
+#include "describe/number_name.hpp"
+#include "memory/segment/owned_segment.hpp"
+#include "o80/base/error.hpp"
+#include "o80/robot/real_time.hpp"
+#include "robot/loop/loop.hpp"
+#include "robot/loop/loop_report.hpp"
+#include "robot/loop/robot_provenance.hpp"
+#include "robot/loop/run_options.hpp"
+#include "robot/loop/service_manager.hpp"
+
+namespace o80 {
+
+namespace {
+
+std::atomic<bool> stop_asked{false};
+std::atomic<Loop*> running_loop{nullptr};
+std::mutex ending;  // held by the thread of watch_input() while it uses the loop
+
+/// Runs in a signal handler: async-signal-safe operations only.
+void stop_on_signal(int) {
+  stop_asked.store(true);
+  if (Loop* loop = running_loop.load()) loop->ask_to_stop();
+}
+
+/// While this object exists, SIGINT, SIGTERM and SIGHUP stop the loop in order, and SIGPIPE is
+/// ignored.
+class StopSignals {
+ public:
+  StopSignals() {
+    stop_asked = false;
+    struct sigaction action{};
+    for (std::size_t i = 0; i < std::size(kStops); ++i) {
+      action.sa_handler = stop_on_signal;
+      sigaction(kStops[i], nullptr, &before_[i]);
+      // started with nohup: a robot continues after its terminal has closed
+      if (kStops[i] == SIGHUP && before_[i].sa_handler == SIG_IGN) continue;
+      sigaction(kStops[i], &action, nullptr);
+    }
+    action.sa_handler = SIG_IGN;
+    sigaction(SIGPIPE, &action, &pipe_before_);
+  }
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+  ~StopSignals() {
+    for (std::size_t i = 0; i < std::size(kStops); ++i) {
+      sigaction(kStops[i], &before_[i], nullptr);
+    }
+    sigaction(SIGPIPE, &pipe_before_, nullptr);
+  }
+
+ private:
+  static constexpr int kStops[] = {SIGINT, SIGTERM, SIGHUP};
+  struct sigaction before_[std::size(kStops)]{};
+  struct sigaction pipe_before_{};
+};
+
+/// While this object exists, signals stop this loop.
+class Running {
+ public:
+  explicit Running(Loop& loop) {
+    running_loop = &loop;
+    if (stop_asked) loop.ask_to_stop();
+  }
+  Running(const Running&) = delete;
+  Running& operator=(const Running&) = delete;
+  ~Running() {
+    const std::scoped_lock lock(ending);
+    running_loop = nullptr;
+  }
+};
+
+/// Stops the loop at the end of the standard input, that is, when the starting process has ended.
+void watch_input() {
+  // signals are for the loop's thread
+  sigset_t every;
+  sigset_t before;
+  sigfillset(&every);
+  pthread_sigmask(SIG_BLOCK, &every, &before);
+  std::thread([] {
+    char byte;
+    ssize_t got = 0;
+    while ((got = read(STDIN_FILENO, &byte, 1)) > 0 || (got < 0 && errno == EINTR)) {
+    }
+    const std::scoped_lock lock(ending);
+    stop_on_signal(0);
+  }).detach();
+  pthread_sigmask(SIG_SETMASK, &before, nullptr);
+}
+
+/// Prints to the standard error, after what the driver has printed so far.
+void complain(const char* text) {
+  std::fflush(stdout);
+  std::fprintf(stderr, "o80: %s\n", text);
+}
+
+/// Publishes the fault of a robot that cannot be constructed in a small segment, so that waiting
+/// frontends raise it.
+void leave_fault(const RobotTable& table, const RunOptions& run, const char* why) noexcept {
+  const BackendOptions& options = run.backend;
+  try {
+    BackendOptions least;
+    least.segment = options.segment;
+    least.permission = options.permission;
+    least.history = 1;
+    least.lanes = 1;
+    least.lane_blocks = 16;
+    least.provenance = provenance_of(table, run.robot);
+    UntypedBackend backend(Schema(), least);
+    backend.end(BackendState::failed, why);
+  } catch (const std::exception& error) {
+    if (std::string_view(error.what()) == why) return;  // the caller reports it
+    std::fprintf(stderr, "o80: the fault cannot be published for waiting frontends: %s\n",
+                 error.what());
+  }
+}
+
+std::unique_ptr<Loop> make_loop(const RobotTable& table, const RunOptions& options) {
+  OwnedSegment::refuse_if_taken(options.backend.segment);
+  try {
+    BackendOptions backend = options.backend;
+    backend.provenance.run_options = texts_of(options.real_time);
+    return std::make_unique<Loop>(std::make_unique<DriverInstance>(table, options.robot), backend);
+  } catch (const SegmentTaken&) {
+    throw;
+  } catch (const std::exception& error) {
+    leave_fault(table, options, error.what());
+    throw;
+  }
+}
+
+/// The names of the numbers without an acceleration limit, which a halt or stop brings to rest in
+/// one iteration: at most three, and how many more there are.
+std::string stops_at_once(const Schema& schema) {
+  constexpr std::uint32_t kNamed = 3;
+  std::string names;
+  std::uint32_t count = 0;
+  for (std::uint32_t i = 0; i < schema.actuators.size(); ++i) {
+    const ActuatorRow& row = schema.actuators[i];
+    std::uint32_t number = 0;
+    schema.each_scalar(row.type, [&](std::uint32_t, const FieldRow& field) {
+      const LimitRow& limit = schema.limits[row.first_limit + number];
+      const std::uint32_t here = number++;
+      const bool moves = field.kind != Kind::boolean && field.kind != Kind::enumeration;
+      if (!moves || std::isfinite(limit.acceleration)) return;
+      if (count++ >= kNamed) return;
+      ShortText<200> name;
+      name_number(schema, i, here, name);
+      names += (names.empty() ? "" : ", ") + std::string(name.view());
+    });
+  }
+  return count > kNamed ? names + " and " + std::to_string(count - kNamed) + " more" : names;
+}
+
+void announce(const RobotTable& table, const UntypedBackend& backend) {
+  const SchemaHead& head = backend.schema().head;
+  std::printf("%s runs on segment '%s', ", table.name, backend.name().c_str());
+  if (head.bursting != 0) {
+    std::printf("bursting, %g ms an iteration", static_cast<double>(head.period) * 1e-6);
+  } else {
+    std::printf("%g Hz", 1e9 / static_cast<double>(head.period));
+  }
+  std::printf(", pid %d\n", getpid());
+  const std::string at_once = stops_at_once(backend.schema());
+  if (head.bursting == 0 && !at_once.empty()) {
+    std::printf("no acceleration limit on %s: a halt or stop ends its motion in one iteration\n",
+                at_once.c_str());
+  }
+  std::fflush(stdout);
+}
+
+int run_robot(const RobotTable& table, const RunOptions& options) {
+  const StopSignals signals;
+  const std::unique_ptr<Loop> loop = make_loop(table, options);
+  const Running running(*loop);
+  if (options.until_eof) watch_input();
+  std::optional<LoopReport> report(std::in_place, loop->backend().name());
+  loop->start();
+  for (const std::string& refused : set_up_real_time(options.real_time)) {
+    complain(refused.c_str());
+  }
+  announce(table, loop->backend());
+  tell_service_manager("READY=1\nSTATUS=runs on segment '" + loop->backend().name() + "'");
+  const Ended ended = loop->run();
+  report.reset();
+  if (!ended.in_order) complain(ended.fault.c_str());
+  tell_service_manager("STOPPING=1\nSTATUS=" +
+                       (ended.in_order ? "stopped" : printable(ended.fault)));
+  return ended.in_order ? 0 : 1;
+}
+
+}  // namespace
+
+const char* program_name(const char* path) noexcept {
+  const char* slash = std::strrchr(path, '/');
+  return slash == nullptr ? path : slash + 1;
+}
+
+int run(const RobotTable& table, int argc, char** argv) {
+  try {
+    const RunOptions options = parse_run_options(table, argc, argv);
+    if (options.help) {
+      std::fputs(run_help(table).c_str(), stdout);
+      return 0;
+    }
+    return run_robot(table, options);
+  } catch (const InvalidArgument& error) {
+    complain(error.what());
+    return 2;
+  } catch (const std::exception& error) {
+    complain(error.what());
+    return 1;
+  }
+}
+
+}  // namespace o80

@@ -1,0 +1,297 @@
+#include "control/batch/record_check.hpp"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstring>
+#include <map>
+#include <random>
+
+#include "control/rig.hpp"
+
+namespace o80::test {
+namespace {
+
+Schema robot() {
+  Schema schema = plain_robot(2, 2);
+  LabelRow label;
+  label.name = NameText("open");
+  label.value = 3;
+  schema.labels.push_back(label);
+  FieldRow grip = scalar_field("grip", Kind::enumeration);
+  grip.size = 4;
+  grip.labels = 1;
+  const auto gripper = schema.add_type(
+      "Gripper", {scalar_field("hot", Kind::boolean), grip, scalar_field("f", Kind::float32)});
+  schema.add_actuators("gripper", gripper, 1, false);
+  schema.add_request("shake", gripper, "shake it");
+  return schema;
+}
+
+/// A batch of one record whose head or payload somebody has spoilt: what becomes of the record.
+template <class Spoil>
+StatusChange spoilt(RecordHead head, const std::vector<std::byte>& states, Spoil&& spoil,
+                    const std::vector<std::uint64_t>& mask = {},
+                    const std::vector<std::int64_t>& times = {}, std::uint32_t rows = 1) {
+  Rig rig(robot());
+  rig.add(0, direct(), {7.0, 7.0});
+  rig.batch.command(head, mask, times, rows, states);
+  rig.add(1, direct(), {5.0, 5.0});
+  BatchRecord record;
+  record.id = 1;
+  const auto sealed = rig.batch.seal(record);
+  std::vector<Block> blocks(sealed.begin(), sealed.end());
+  std::memcpy(&head, blocks[2].bytes.data(), sizeof head);
+  spoil(head, reinterpret_cast<double*>(blocks[2].bytes.data() + sizeof head));
+  std::memcpy(blocks[2].bytes.data(), &head, sizeof head);
+  rig.controller.take(0, rig.place(blocks), rig);
+  rig.run(10);
+  EXPECT_EQ(rig.witness.ends_of(3), 1U);
+  EXPECT_EQ(rig.witness.status(3), Status::completed) << "the record before is no worse for it";
+  EXPECT_EQ(rig.witness.ends_of(5), 1U);
+  if (head.payload_bytes <= 16 && mask.empty() && times.empty()) {
+    EXPECT_EQ(rig.witness.status(5), Status::completed) << "nor is the one behind";
+  }
+  EXPECT_EQ(rig.witness.status(2), Status::completed);
+  EXPECT_TRUE(rig.all_blocks_back());
+  return rig.witness.last(4);
+}
+
+template <class Spoil>
+bool refused(RecordHead head, Spoil&& spoil) {
+  const StatusChange change = spoilt(head, bytes_of<double>({1.0, 2.0}), spoil);
+  return change.status == Status::rejected && change.reason == Reason::invalid;
+}
+
+TEST(RecordCheck, AProperRecordPasses) {
+  EXPECT_FALSE(refused(over(1), [](RecordHead&, double*) {}));
+  EXPECT_FALSE(refused(at_speed(1e5), [](RecordHead&, double*) {}));
+}
+
+TEST(RecordCheck, EveryFieldOutOfItsRangeIsRefused) {
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.actuator = 3; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.actuator = kEveryActuator; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.mode = static_cast<Mode>(2); }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.pace = static_cast<Pace>(5); }));
+  EXPECT_TRUE(
+      refused(direct(), [](RecordHead& h, double*) { h.profile = static_cast<Profile>(3); }));
+  EXPECT_TRUE(refused(over(3), [](RecordHead& h, double*) { h.profile = Profile::as_sent; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.amount = -1; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.start = static_cast<Start>(2); }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.masked = 1; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.masked = 2; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.id = 77; }));
+  for (int kind = 0; kind < 256; ++kind) {
+    if (kind == static_cast<int>(RecordKind::command)) continue;
+    if (kind == static_cast<int>(RecordKind::mark)) continue;  // holds any bytes
+    EXPECT_TRUE(
+        refused(direct(), [&](RecordHead& h, double*) { h.kind = static_cast<RecordKind>(kind); }));
+  }
+}
+
+TEST(RecordCheck, SizesThatDoNotFitAreRefused) {
+  for (const std::uint32_t bytes : {0U, 8U, 15U, 17U, 100U, 1000U, 0x7FFFFFFFU, 0xFFFFFFFFU}) {
+    EXPECT_TRUE(refused(direct(), [&](RecordHead& h, double*) { h.payload_bytes = bytes; }));
+  }
+  for (const std::uint32_t rows : {0U, 2U, 0x10000001U, 0xFFFFFFFFU}) {
+    EXPECT_TRUE(refused(direct(), [&](RecordHead& h, double*) { h.rows = rows; }));
+  }
+}
+
+TEST(RecordCheck, PacesThatNoOneCanKeepAreRefused) {
+  constexpr auto kLeast = std::numeric_limits<std::int64_t>::min();
+  constexpr auto kMost = std::numeric_limits<std::int64_t>::max();
+  for (const std::int64_t amount : {kLeast, std::int64_t{-1}, kMost}) {
+    EXPECT_TRUE(refused(over(1), [&](RecordHead& h, double*) { h.amount = amount; }));
+    EXPECT_TRUE(refused(during(1), [&](RecordHead& h, double*) { h.amount = amount; }));
+  }
+  EXPECT_TRUE(refused(until(1), [&](RecordHead& h, double*) { h.amount = kMost; }));
+  EXPECT_EQ(spoilt(until(1), bytes_of<double>({1.0, 2.0}),
+                   [&](RecordHead& h, double*) { h.amount = kLeast; })
+                .reason,
+            Reason::late);
+  for (const double speed : {0.0, -1.0, std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    EXPECT_TRUE(refused(at_speed(1.0), [&](RecordHead& h, double*) { h.speed = speed; }));
+  }
+}
+
+TEST(RecordCheck, TargetsThatAreNoNumbersAreRefused) {
+  for (const double value : {std::nan(""), HUGE_VAL, -HUGE_VAL}) {
+    EXPECT_TRUE(refused(direct(), [&](RecordHead&, double* state) { state[0] = value; }));
+    EXPECT_TRUE(refused(direct(), [&](RecordHead&, double* state) { state[1] = value; }));
+  }
+}
+
+TEST(RecordCheck, BooleansEnumerationsAndFloatsOfAStateAreLookedAt) {
+  RecordHead head = direct();
+  head.actuator = 2;
+  struct Gripper {
+    std::uint8_t hot = 1;
+    std::int32_t grip = 3;
+    float f = 1.0F;
+  };
+  const auto reason = [&](const Gripper& gripper) {
+    return spoilt(head, bytes_of_one(gripper), [](RecordHead&, double*) {}).reason;
+  };
+  EXPECT_EQ(reason({}), Reason::none);
+  EXPECT_EQ(reason({2, 3, 1.0F}), Reason::invalid);
+  EXPECT_EQ(reason({1, 4, 1.0F}), Reason::invalid);
+  EXPECT_EQ(reason({1, 3, NAN}), Reason::invalid);
+}
+
+TEST(RecordCheck, MasksOfNumbersThatAreNotThereAreRefused) {
+  const auto nothing = [](RecordHead&, double*) {};
+  const auto states = bytes_of<double>({1.0, 2.0});
+  EXPECT_EQ(spoilt(direct(), states, nothing, {0b11}).status, Status::completed);
+  EXPECT_EQ(spoilt(direct(), states, nothing, {0b00}).status, Status::completed);
+  EXPECT_EQ(spoilt(direct(), states, nothing, {0b100}).reason, Reason::invalid);
+}
+
+TEST(RecordCheck, TimesThatRunBackwardsAreRefused) {
+  const auto nothing = [](RecordHead&, double*) {};
+  const auto states = bytes_of(std::vector<double>(6));
+  const auto reason = [&](const std::vector<std::int64_t>& times) {
+    return spoilt(during(0), states, nothing, {}, times, 3).reason;
+  };
+  EXPECT_EQ(reason({0, 1, 1}), Reason::none);
+  EXPECT_EQ(reason({-1, 1, 2}), Reason::invalid);
+  EXPECT_EQ(reason({3, 2, 4}), Reason::invalid);
+  EXPECT_EQ(reason({0, 1, std::numeric_limits<std::int64_t>::max()}), Reason::invalid);
+  EXPECT_EQ(spoilt(until(9), states, nothing, {}, {}, 3).reason, Reason::invalid);
+}
+
+TEST(RecordCheck, ABatchWhoseHeadIsGarbageIsRejectedWhole) {
+  for (int spoil = 0; spoil < 5; ++spoil) {
+    Rig rig(robot());
+    for (int i = 0; i < 3; ++i) rig.add(0, direct(), {7.0, 7.0});
+    const auto sealed = rig.batch.seal({});
+    std::vector<Block> blocks(sealed.begin(), sealed.end());
+    BatchRecord record;
+    std::memcpy(&record, blocks[0].bytes.data(), sizeof record);
+    if (spoil == 0) record.kind = RecordKind::command;
+    if (spoil == 1) record.records = 0xFFFFFFFF;
+    if (spoil == 2) record.records = 4;
+    if (spoil == 3) record.blocks = 3;
+    if (spoil == 4) record.blocks = 400;
+    std::memcpy(blocks[0].bytes.data(), &record, sizeof record);
+    rig.controller.take(0, rig.place(blocks), rig);
+    rig.run(5);
+    EXPECT_EQ(rig.witness.last(0).reason, Reason::invalid);
+    EXPECT_EQ(rig.witness.last(1).status, Status::rejected);
+    EXPECT_EQ(rig.witness.last(2).status, Status::rejected);
+    EXPECT_EQ(rig.witness.changes.size(), 5U);
+    EXPECT_EQ(rig.desired(), 0.0);
+    EXPECT_TRUE(rig.all_blocks_back());
+    EXPECT_EQ(rig.witness.freed_blocks[0], 4U);
+  }
+}
+
+TEST(RecordCheck, ABatchWithFewerRecordsThanBlocksFreesThemAll) {
+  Rig rig(robot());
+  for (int i = 0; i < 3; ++i) rig.add(0, direct(), {7.0, 7.0});
+  const auto sealed = rig.batch.seal({});
+  std::vector<Block> blocks(sealed.begin(), sealed.end());
+  const std::uint32_t records = 1;
+  std::memcpy(blocks[0].bytes.data() + offsetof(BatchRecord, records), &records, 4);
+  rig.controller.take(0, rig.place(blocks), rig);
+  rig.run(2);
+  EXPECT_EQ(rig.witness.status(2), Status::completed);
+  EXPECT_EQ(rig.witness.status(3), Status::none);
+  EXPECT_TRUE(rig.all_blocks_back());
+}
+
+// Batches that were proper before bytes of theirs were changed at random: whatever they are, every
+// record ends once, every block comes back, and desired states stay numbers.
+TEST(RecordCheck, MarksWithoutTextOrWithTooMuchAreRefused) {
+  for (const std::uint32_t length : {0U, kMostMarkBytes + 1}) {
+    Rig rig(robot());
+    rig.batch.mark(std::string(kMostMarkBytes, 'x'));
+    BatchRecord record;
+    record.id = 1;
+    const auto sealed = rig.batch.seal(record);
+    std::vector<Block> blocks(sealed.begin(), sealed.end());
+    blocks.resize(blocks.size() + 1);
+    record.records = 1;
+    record.blocks = static_cast<std::uint32_t>(blocks.size());
+    std::memcpy(blocks[0].bytes.data(), &record, sizeof record);
+    RecordHead head;
+    std::memcpy(&head, blocks[1].bytes.data(), sizeof head);
+    head.payload_bytes = length;
+    std::memcpy(blocks[1].bytes.data(), &head, sizeof head);
+    rig.controller.take(0, rig.place(blocks), rig);
+    rig.run(2);
+    EXPECT_EQ(rig.witness.last(3).reason, Reason::invalid) << length;
+    EXPECT_TRUE(rig.all_blocks_back());
+  }
+}
+
+TEST(RecordCheck, GarbageDoesNoHarm) {
+  std::mt19937_64 random(7);
+  const auto any = [&](std::uint64_t low, std::uint64_t high) {
+    return std::uniform_int_distribution<std::uint64_t>(low, high)(random);
+  };
+  for (int round = 0; round < 6000; ++round) {
+    Rig rig(robot(), 256);
+    std::uint64_t sent_blocks = 0;
+    for (int pulse = 0; pulse < 3; ++pulse) {
+      for (std::uint64_t i = any(0, 6); i > 0; --i) {
+        RecordHead head = over(static_cast<std::int64_t>(any(0, 5)));
+        head.pace = static_cast<Pace>(any(0, 4));
+        if (head.pace == Pace::speed) head.speed = 1000.0;
+        head.profile = static_cast<Profile>(any(0, 1));
+        head.mode = static_cast<Mode>(any(0, 1));
+        switch (any(0, 6)) {
+          case 0:
+            rig.batch.request(0, std::vector<std::byte>(12));
+            break;
+          case 1:
+            rig.batch.purge(static_cast<std::uint16_t>(any(0, 3)));
+            break;
+          case 2:
+            rig.batch.take_control();
+            break;
+          case 3:
+            rig.add_rows(static_cast<std::uint32_t>(any(0, 1)), direct(), 20,
+                         std::vector<double>(40, 1.0));
+            break;
+          default:
+            rig.add(static_cast<std::uint32_t>(any(0, 1)), head, {1.0, 2.0});
+        }
+      }
+      BatchRecord record;
+      record.id = rig.sent = 1 + 100 * static_cast<CommandId>(pulse);
+      const auto sealed = rig.batch.seal(record);
+      std::vector<Block> blocks(sealed.begin(), sealed.end());
+      for (std::uint64_t spoilt = any(0, 8); spoilt > 0; --spoilt) {
+        const std::size_t block = any(0, blocks.size() - 1);
+        // mostly in the heads, where it hurts; the batch keeps its id, or it would be another's
+        const std::size_t at = any(0, 2) == 0 ? any(0, 63) : any(0, 23);
+        if (block == 0 && at >= 8 && at < 16) continue;
+        blocks[block].bytes[at] = static_cast<std::byte>(any(0, 3) == 0 ? any(0, 255) : any(0, 8));
+      }
+      if (any(0, 9) == 0) blocks.pop_back();
+      sent_blocks += blocks.size();
+      rig.batch.clear();
+      if (blocks.empty()) continue;
+      const BlockIndex batch = rig.place(blocks);
+      if (any(0, 1) == 0) rig.check(0, batch, static_cast<std::uint32_t>(any(0, 9)));
+      rig.controller.take(0, batch, rig);
+      for (std::uint64_t i = any(0, 3); i > 0; --i) rig.step();
+    }
+    rig.controller.purge(kEveryActuator, rig.next);
+    rig.run(3);
+    ASSERT_TRUE(rig.all_blocks_back()) << round;
+    ASSERT_EQ(rig.witness.freed_blocks[0], sent_blocks) << round;
+    for (std::uint32_t number = 0; number < 4; ++number) {
+      ASSERT_TRUE(std::isfinite(rig.desired(number))) << round;
+    }
+    std::map<CommandId, int> ends;
+    for (const StatusChange& change : rig.witness.changes) {
+      if (is_end(change.status)) ++ends[change.id];
+    }
+    for (const auto& [id, count] : ends) ASSERT_EQ(count, 1) << id << " in round " << round;
+  }
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,293 @@
+#include "control/motion/motion.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "control/rig.hpp"
+
+namespace o80::test {
+namespace {
+
+using testing::ElementsAre;
+
+TEST(Limiter, TargetsOutsideTheBoundsAreRejected) {
+  Schema schema = plain_robot(2);
+  schema.actuator(0).limits({.minimum = -1.0, .maximum = 2.5});
+  Rig rig(schema);
+  rig.add(1, over(4), {4.0});
+  rig.add(0, over(4), {4.0});
+  const CommandId batch = rig.pulse();
+  rig.run(4);
+  EXPECT_EQ(rig.desired(0), 0.0);
+  EXPECT_EQ(rig.desired(1), 4.0);
+  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::completed);
+  EXPECT_EQ(rig.witness.last(batch + 3).status, Status::rejected);
+  EXPECT_EQ(rig.witness.last(batch + 3).reason, Reason::invalid);
+}
+
+TEST(Limiter, NothingMovesFasterThanItsSpeed) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits({.speed = 500.0});  // half a unit an iteration
+  Rig rig(schema);
+  rig.add(0, over(2), {2.0});
+  rig.add(0, over(2), {1.5});
+  const CommandId batch = rig.pulse();
+  EXPECT_THAT(rig.run(6), ElementsAre(0.5, 1.0, 1.5, 2.0, 1.75, 1.5));
+  EXPECT_EQ(rig.witness.last(batch + 2).reason, Reason::limits);
+  EXPECT_EQ(rig.witness.last(batch + 3).reason, Reason::none);
+}
+
+TEST(Limiter, ATrajectoryIsFollowedInsideItsSpanToItsLastRow) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits({.speed = 1000.0, .acceleration = 100'000.0});
+  Rig rig(schema);
+  // half a unit an iteration, five iterations until it is that fast
+  rig.add_rows(0, over(10), 2, {5.0, 10.0});
+  rig.add(0, over(20), {0.0});
+  const CommandId batch = rig.pulse();
+  bool was_clamped = false;
+  double furthest = 0.0;
+  for (int i = 0; i < 60 && !is_end(rig.witness.status(batch + 2)); ++i) {
+    rig.step();
+    was_clamped = was_clamped || rig.clamped();
+    furthest = std::max(furthest, rig.desired());
+  }
+  EXPECT_TRUE(was_clamped) << "a straight line begins with a jump of velocity";
+  EXPECT_LE(furthest, 10.0);
+  EXPECT_EQ(rig.witness.status(batch + 2), Status::overwritten) << "behind its rows it gives way";
+  rig.run(60);
+  EXPECT_EQ(rig.witness.status(batch + 3), Status::completed);
+  EXPECT_EQ(rig.desired(), 0.0);
+}
+
+TEST(Limiter, ATrajectoryGoesOnUntilItsLastRowIsReached) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits({.speed = 1000.0, .acceleration = 10'000.0, .jerk = 1e6});
+  Rig rig(schema);
+  rig.add_rows(0, over(5), 3, {5.0, -5.0, 10.0});
+  const CommandId batch = rig.pulse();
+  double furthest = 0.0;
+  double lowest = 0.0;
+  for (int i = 0; i < 1000 && !is_end(rig.witness.status(batch + 2)); ++i) {
+    rig.step();
+    furthest = std::max(furthest, rig.desired());
+    lowest = std::min(lowest, rig.desired());
+  }
+  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::completed);
+  EXPECT_EQ(rig.witness.last(batch + 2).reason, Reason::limits);
+  EXPECT_EQ(rig.desired(), 10.0);
+  EXPECT_LE(furthest, 10.0);
+  EXPECT_GE(lowest, -5.0);
+  for (const double position : rig.run(50)) ASSERT_EQ(position, 10.0);
+}
+
+TEST(Limiter, OutsideTheBoundsAStateMovesInwardWithinItsSpeed) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits({.minimum = 0.0, .maximum = 1.0, .speed = 500.0});
+  Rig rig(schema);
+  rig.observe(0, 5.0);  // it starts outside
+  rig.controller.restart(rig.observed.data(), nullptr, 0);
+  EXPECT_THAT(rig.run(1), ElementsAre(5.0));
+  rig.add(0, over(100), {0.5});
+  rig.pulse();
+  EXPECT_NEAR(rig.run(1)[0], 4.955, 1e-12) << "inward as fast as the command goes";
+  EXPECT_NEAR(rig.run(99)[98], 0.5, 1e-12);
+}
+
+TEST(Limiter, AStateOutsideItsBoundsDoesNotJumpToThem) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits({.maximum = 1.0});
+  Rig rig(schema);
+  rig.observe(0, 1.2);
+  rig.controller.restart(rig.observed.data(), nullptr, 0);
+  rig.add(0, over(10'000), {0.0});
+  rig.pulse();
+  EXPECT_NEAR(rig.run(1)[0], 1.2 - 1.2e-4, 1e-12);
+  EXPECT_FALSE(rig.clamped());
+}
+
+TEST(Limiter, APurgedMotionBrakesAndTheRowSaysSo) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits({.speed = 1000.0, .acceleration = 100'000.0});
+  Rig rig(schema);
+  rig.add(0, smoothly(over(50)), {10.0});
+  rig.pulse();
+  rig.run(25);
+  const double before = rig.desired();
+  rig.batch.purge(0);
+  rig.pulse();
+  rig.step();
+  EXPECT_TRUE(rig.braking());
+  EXPECT_TRUE(rig.active());
+  EXPECT_GT(rig.desired(), before);
+  rig.run(10);
+  EXPECT_FALSE(rig.braking());
+  EXPECT_FALSE(rig.active());
+  EXPECT_FALSE(rig.controller.braking());
+  const double stopped = rig.desired();
+  EXPECT_THAT(rig.run(2), ElementsAre(stopped, stopped));
+}
+
+TEST(Limiter, TheNextMotionContinuesOneThatBrakes) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits({.speed = 1000.0, .acceleration = 10'000.0});
+  Rig rig(schema);
+  rig.add(0, smoothly(over(100)), {20.0});
+  rig.pulse();
+  rig.run(50);
+  rig.batch.purge(0);
+  rig.add(0, smoothly(over(200)), {30.0});
+  const CommandId batch = rig.pulse();
+  for (int i = 0; i < 200; ++i) {
+    rig.step();
+    ASSERT_FALSE(rig.clamped()) << i;
+  }
+  EXPECT_EQ(rig.witness.status(batch + 3), Status::completed);
+}
+
+TEST(Limiter, AStatusSaysWhichLimitItWas) {
+  Schema schema = plain_robot(1, 2);
+  schema.actuator(0).limits("x1", {.minimum = -0.5, .maximum = 0.5, .speed = 100.0});
+  Rig rig(schema);
+  rig.add(0, over(3), {9.0, 0.5});
+  const CommandId batch = rig.pulse();
+  rig.run(5);
+  const StatusChange told = rig.witness.last(batch + 2);
+  EXPECT_EQ(told.status, Status::completed);
+  EXPECT_EQ(told.reason, Reason::limits);
+  EXPECT_EQ(told.detail, (Limited{Limit::speed, 1}.packed()));
+}
+
+TEST(Limiter, TheFastestWayIsFollowedToTheTargetAndRests) {
+  Schema schema = plain_robot(1, 2);
+  schema.actuator(0).limits("x0", {.speed = 1000.0, .acceleration = 10'000.0});
+  schema.actuator(0).limits("x1", {.speed = 500.0, .acceleration = 10'000.0, .jerk = 1e6});
+  Rig rig(schema);
+  RecordHead fastest;
+  fastest.pace = Pace::fastest;
+  rig.add(0, fastest, {100.0, -40.0});
+  const CommandId batch = rig.pulse();
+  int iterations = 0;
+  int first_there = 0;
+  while (rig.controller.active()) {
+    rig.step();
+    ++iterations;
+    ASSERT_FALSE(rig.clamped()) << iterations;
+    if (first_there == 0 && rig.desired(0) == 100.0) first_there = iterations;
+  }
+  EXPECT_EQ(rig.witness.status(batch + 2), Status::completed);
+  EXPECT_EQ(iterations, 200) << "100 at full speed, and as long to reach it and to leave it";
+  EXPECT_GE(first_there, iterations - 1);
+  EXPECT_EQ(rig.desired(0), 100.0);
+  EXPECT_EQ(rig.desired(1), -40.0);
+  rig.step();
+  EXPECT_FALSE(rig.braking());
+}
+
+TEST(Limiter, ARestingNumberGoesToRestWithinItsLimits) {
+  Schema schema = plain_robot(1, 2);
+  schema.actuator(0).rests_at("x1", 0.0).limits("x1", {.speed = 500.0});
+  Rig rig(schema);
+  rig.add(0, over(4), {1.0, 2.0});
+  rig.pulse();
+  rig.run(4);
+  EXPECT_EQ(rig.desired(1), 2.0) << "the target is hit";
+  EXPECT_THAT(rig.run(5, 1), ElementsAre(1.5, 1.0, 0.5, 0.0, 0.0));
+  EXPECT_EQ(rig.desired(0), 1.0) << "the other number stays";
+  EXPECT_FALSE(rig.braking());
+}
+
+TEST(Limiter, ARestingNumberThatStandsForAMomentGoesOnToItsRest) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0)
+      .limits({.speed = 1500.0, .acceleration = 20'000.0, .jerk = 2e7})
+      .rests_at("", 0.0);
+  Rig rig(schema);
+  rig.observe(0, -2000.0);
+  rig.controller.restart(rig.observed.data(), nullptr, 0);
+  rig.observe(0, 250.0);  // far ahead: for an instant the limiter slows down for it
+  rig.add(0, from_observed(smoothly(at_speed(200'000.0))), {0.0});
+  rig.pulse();
+  rig.run(5000);
+  EXPECT_EQ(rig.desired(), 0.0);
+  EXPECT_FALSE(rig.braking());
+}
+
+TEST(Limiter, ADirectValueOfARestingNumberStaysUntilSomethingTakesItsPlace) {
+  Schema schema = plain_robot(1, 2);
+  schema.actuator(0).rests_at("x1", 0.5);
+  Rig rig(schema);
+  rig.add(0, direct(), {1.0, 2.0});
+  rig.pulse(3);
+  rig.run(5);
+  EXPECT_EQ(rig.desired(1), 2.0);
+  EXPECT_FALSE(rig.active());
+  EXPECT_TRUE(rig.controller.acts(3));
+  EXPECT_FALSE(rig.controller.acts(2));
+  rig.controller.purge_lane(2, kEveryActuator, rig.next);
+  EXPECT_EQ(rig.run(1, 1)[0], 2.0) << "it is not that lane's";
+  rig.controller.purge_lane(3, kEveryActuator, rig.next);
+  EXPECT_EQ(rig.run(1, 1)[0], 0.5);
+  EXPECT_TRUE(rig.braking()) << "it moved without a command";
+  EXPECT_FALSE(rig.controller.acts(3));
+  rig.step();
+  EXPECT_FALSE(rig.braking());
+}
+
+TEST(Limiter, ASpeedPaceAtTheMaximumIsNotClampedByRounding) {
+  for (const double speed : {0.1, 0.3, 1.0 / 3.0, 0.7, 12.34567}) {
+    for (const bool smooth : {false, true}) {
+      constexpr double kFar = 1e6 / 7.0;  // where a number is rounded more than its steps are
+      Schema schema = plain_robot(1);
+      schema.actuator(0).limits({.speed = speed});
+      Rig rig(schema);
+      rig.observe(0, kFar);
+      rig.controller.restart(rig.observed.data(), nullptr, 0);
+      const RecordHead head = at_speed(speed);
+      rig.add(0, smooth ? smoothly(head) : head, {kFar + 0.3});
+      const CommandId batch = rig.pulse();
+      while (rig.controller.active()) {
+        rig.step();
+        ASSERT_FALSE(rig.clamped());
+      }
+      EXPECT_EQ(rig.witness.status(batch + 2), Status::completed);
+    }
+  }
+}
+
+TEST(Limiter, IntegersAndFloatsStayInsideTheirLimits) {
+  Schema schema;
+  schema.head.period = kMillisecond;
+  const auto type = schema.add_type(
+      "State", {scalar_field("i32", Kind::int32), scalar_field("f32", Kind::float32),
+                scalar_field("flag", Kind::boolean)});
+  schema.add_actuators("joint", type, 1);
+  schema.actuator(0).limits("i32", {.minimum = -3.5, .maximum = 3.5, .speed = 100.0});
+  schema.actuator(0).limits("f32", {.maximum = 0.1, .speed = 20.0});
+  schema.actuator(0).limits("flag", {.maximum = 0.0});
+  Rig rig(schema);
+  struct {
+    std::int32_t i32 = 3;
+    float f32 = std::nextafter(0.1F, 0.0F);  // the largest below the maximum
+    bool flag = true;
+  } target;
+  std::vector<std::byte> bytes(12);
+  std::memcpy(bytes.data(), &target.i32, 4);
+  std::memcpy(bytes.data() + 4, &target.f32, 4);
+  bytes[8] = std::byte{1};
+  rig.batch.command(direct(), bytes);
+  rig.pulse();
+  for (int i = 1; i <= 50; ++i) {
+    rig.step();
+    EXPECT_EQ(rig.desired_as<std::int32_t>(0), std::round(std::min(i, 30) * 0.1)) << "to nearest";
+    EXPECT_LE(static_cast<double>(rig.desired_as<float>(4)), 0.1);
+    EXPECT_EQ(rig.desired_as<std::uint8_t>(8), 1) << "a boolean has no limits";
+  }
+  EXPECT_EQ(rig.desired_as<float>(4), target.f32);
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,384 @@
+#include "control/queue/controller.hpp"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "control/rig.hpp"
+#include "o80/base/error.hpp"
+
+namespace o80::test {
+namespace {
+
+using testing::ElementsAre;
+
+Schema robot_with_requests() {
+  Schema schema = plain_robot(2);
+  const auto home = schema.add_type("Home", {scalar_field("speed", Kind::float64)});
+  schema.add_request("home", home, "go home");
+  schema.add_request("nothing", kNoType, "no payload");
+  return schema;
+}
+
+TEST(Controller, OverwritingDropsWhatRunsAndWhatIsQueuedAndStartsAtOnce) {
+  Rig rig(plain_robot(1));
+  rig.add(0, over(4), {4.0});
+  rig.add(0, over(4), {8.0});
+  const CommandId first = rig.pulse();
+  EXPECT_THAT(rig.run(2), ElementsAre(1.0, 2.0));
+  rig.add(0, overwriting(over(2)), {0.0});
+  const CommandId second = rig.pulse();
+  EXPECT_THAT(rig.run(3), ElementsAre(1.0, 0.0, 0.0));
+  for (const CommandId dropped : {first + 2, first + 3}) {
+    EXPECT_EQ(rig.witness.status(dropped), Status::overwritten);
+    EXPECT_EQ(rig.witness.last(dropped).iteration, 3);
+  }
+  EXPECT_EQ(rig.witness.status(first + 1), Status::completed) << "nobody is left waiting";
+  EXPECT_EQ(rig.witness.status(second + 2), Status::completed);
+}
+
+TEST(Controller, OverwritingConcernsOneActuatorOnly) {
+  Rig rig(plain_robot(2));
+  rig.add(0, over(4), {4.0});
+  rig.add(1, over(4), {4.0});
+  rig.pulse();
+  rig.run(2);
+  rig.add(1, overwriting(direct()), {0.0});
+  rig.pulse();
+  rig.step();
+  EXPECT_EQ(rig.desired(0), 3.0);
+  EXPECT_EQ(rig.desired(1), 0.0);
+}
+
+TEST(Controller, OverwritingDropsEarlierCommandsOfItsOwnBatchToo) {
+  Rig rig(plain_robot(1));
+  rig.add(0, over(4), {4.0});
+  rig.add(0, overwriting(over(2)), {2.0});
+  rig.add(0, over(1), {5.0});
+  const CommandId batch = rig.pulse();
+  EXPECT_THAT(rig.run(3), ElementsAre(1.0, 2.0, 5.0));
+  EXPECT_EQ(rig.witness.status(batch + 2), Status::overwritten);
+  EXPECT_EQ(rig.witness.of(batch + 2).size(), 1U) << "it never was active";
+}
+
+TEST(Controller, APurgeDropsWithoutASuccessor) {
+  Rig rig(plain_robot(2));
+  for (std::uint32_t actuator : {0, 1}) {
+    rig.add(actuator, over(4), {4.0});
+    rig.add(actuator, over(4), {8.0});
+  }
+  const CommandId first = rig.pulse();
+  rig.run(2);
+  rig.batch.purge(0);
+  const CommandId second = rig.pulse();
+  EXPECT_THAT(rig.run(2), ElementsAre(2.0, 2.0));
+  EXPECT_EQ(rig.desired(1), 4.0);
+  EXPECT_EQ(rig.witness.status(first + 2), Status::purged);
+  EXPECT_EQ(rig.witness.last(first + 3).iteration, 3);
+  EXPECT_EQ(rig.witness.status(second + 2), Status::completed);
+  rig.batch.purge(kEveryActuator);
+  rig.pulse();
+  rig.run(1, 1);
+  EXPECT_FALSE(rig.controller.active());
+  EXPECT_EQ(rig.witness.status(first + 1), Status::completed);
+  EXPECT_TRUE(rig.all_blocks_back());
+}
+
+TEST(Controller, APurgeActsInTheOrderOfItsBatch) {
+  Rig rig(plain_robot(2));
+  rig.add(0, over(4), {4.0});
+  rig.add(1, over(4), {4.0});
+  rig.batch.purge(0);
+  rig.add(0, over(2), {1.0});
+  rig.add(1, over(4), {0.0});
+  const CommandId batch = rig.pulse();
+  EXPECT_THAT(rig.run(3), ElementsAre(0.5, 1.0, 1.0));
+  EXPECT_EQ(rig.desired(1), 3.0);
+  EXPECT_EQ(rig.witness.status(batch + 2), Status::purged);
+  EXPECT_EQ(rig.witness.status(batch + 5), Status::completed);
+}
+
+TEST(Controller, AFrontendMayPurgeOnlyWhatItSent) {
+  Rig rig(plain_robot(2));
+  rig.add(0, over(2), {2.0});
+  const CommandId mine = rig.pulse(0);
+  rig.add(0, over(2), {4.0});
+  rig.add(1, over(2), {4.0});
+  const CommandId theirs = rig.pulse(1);
+  rig.add(0, over(2), {9.0});
+  const CommandId mine_too = rig.pulse(0);
+  rig.batch.purge_own(kEveryActuator);
+  rig.pulse(0);
+  EXPECT_THAT(rig.run(3), ElementsAre(2.0, 4.0, 4.0));
+  EXPECT_EQ(rig.desired(1), 4.0);
+  EXPECT_EQ(rig.witness.status(mine + 2, 0), Status::purged);
+  EXPECT_EQ(rig.witness.status(mine_too + 2, 0), Status::purged);
+  EXPECT_EQ(rig.witness.status(theirs + 2, 1), Status::completed);
+  EXPECT_EQ(rig.witness.status(theirs + 3, 1), Status::completed);
+}
+
+TEST(Controller, ADeadFrontendIsPurgedWhateverItShares) {
+  Rig rig(plain_robot(1));
+  for (std::uint32_t lane : {0, 1, 0, 2, 0}) {
+    rig.add(0, over(2), {1.0 + lane});
+    rig.pulse(lane);
+  }
+  rig.step();
+  rig.controller.purge_lane(0, kEveryActuator, rig.next, Reason::dead_frontend);
+  EXPECT_THAT(rig.run(5), ElementsAre(1.25, 2.0, 2.5, 3.0, 3.0));
+  EXPECT_EQ(rig.witness.last(3, 0).reason, Reason::dead_frontend);
+  EXPECT_EQ(rig.witness.last(3, 0).iteration, 2);
+  EXPECT_TRUE(rig.all_blocks_back());
+  EXPECT_EQ(rig.witness.freed_blocks[0], 6U);
+  EXPECT_EQ(rig.witness.freed_blocks[1], 2U);
+}
+
+TEST(Controller, AnInterruptEndsEverythingInItsIteration) {
+  Rig rig(plain_robot(2));
+  rig.add(0, over(8), {8.0});
+  rig.add(0, over(8), {0.0});
+  rig.add(1, over(8), {8.0});
+  const CommandId batch = rig.pulse();
+  rig.run(3);
+  rig.controller.interrupt(0, 3);
+  EXPECT_THAT(rig.run(2), ElementsAre(3.0, 3.0));
+  EXPECT_FALSE(rig.active(0));
+  EXPECT_TRUE(rig.active(1));
+  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::interrupted);
+  EXPECT_EQ(rig.witness.last(batch + 2).iteration, 3);
+  EXPECT_EQ(rig.witness.last(batch + 3).status, Status::interrupted);
+  rig.controller.interrupt(77, 3);  // there is none: nothing happens
+}
+
+TEST(Controller, ABatchIsActiveWhenTakenAndCompletedWhenItsLastCommandHasEnded) {
+  Rig rig(plain_robot(2));
+  rig.add(0, over(5), {1.0});
+  rig.add(1, over(2), {1.0});
+  rig.run(3);
+  const CommandId batch = rig.pulse();
+  rig.run(10);
+  ASSERT_EQ(rig.witness.of(batch).size(), 1U);
+  EXPECT_EQ(rig.witness.last(batch).status, Status::active);
+  EXPECT_EQ(rig.witness.last(batch).iteration, 4);
+  ASSERT_EQ(rig.witness.of(batch + 1).size(), 1U);
+  EXPECT_EQ(rig.witness.last(batch + 1).status, Status::completed);
+  EXPECT_EQ(rig.witness.last(batch + 1).iteration, 8);
+}
+
+TEST(Controller, AnEmptyBatchIsCompletedAtOnce) {
+  Rig rig(plain_robot(1));
+  const CommandId batch = rig.pulse();
+  EXPECT_EQ(rig.witness.status(batch), Status::active);
+  EXPECT_EQ(rig.witness.status(batch + 1), Status::completed);
+  EXPECT_EQ(rig.witness.last(batch + 1).iteration, 1);
+  EXPECT_EQ(rig.witness.freed_blocks[0], 1U);
+  EXPECT_TRUE(rig.all_blocks_back());
+}
+
+TEST(Controller, ARejectedBatchEndsWithAllItsRecords) {
+  Rig rig(robot_with_requests());
+  rig.add(0, over(5), {1.0});
+  rig.batch.request(1, {});
+  rig.batch.purge(0);
+  const std::uint64_t blocks = rig.batch.blocks();
+  const BlockIndex first = rig.send(3);
+  rig.controller.reject(3, first, Reason::exclusive, 5, 7);
+  EXPECT_EQ(rig.witness.status(rig.sent, 3), Status::rejected) << "told at once";
+  while (!rig.controller.finish_pending()) {
+  }
+  for (CommandId id = rig.sent; id < rig.sent + 5; ++id) {
+    ASSERT_EQ(rig.witness.of(id, 3).size(), 1U);
+    EXPECT_EQ(rig.witness.last(id, 3).status, Status::rejected);
+    EXPECT_EQ(rig.witness.last(id, 3).reason, Reason::exclusive);
+    EXPECT_EQ(rig.witness.last(id, 3).detail, 5);
+    EXPECT_EQ(rig.witness.last(id, 3).iteration, 7);
+  }
+  EXPECT_EQ(rig.witness.freed_blocks[3], blocks);
+  EXPECT_TRUE(rig.all_blocks_back());
+  EXPECT_TRUE(rig.requests.empty());
+}
+
+TEST(Controller, ABatchMayBeRejectedAfterItWasChecked) {
+  Rig rig(plain_robot(1));
+  for (int i = 0; i < 10; ++i) rig.add(0, over(5), {1.0});
+  const BlockIndex half = rig.send();
+  EXPECT_FALSE(rig.check(0, half, 3));
+  rig.controller.reject(0, half, Reason::late, 0, 7);
+  rig.controller.finish_pending();
+  for (int i = 0; i < 10; ++i) rig.add(0, over(5), {1.0});
+  const BlockIndex whole = rig.send();
+  EXPECT_TRUE(rig.check(0, whole, 100));
+  rig.controller.reject(0, whole, Reason::late, 0, 7);
+  rig.controller.finish_pending();
+  EXPECT_TRUE(rig.all_blocks_back());
+  EXPECT_EQ(rig.witness.changes.size(), 24U);
+}
+
+TEST(Controller, ABatchCheckedBitByBitIsTakenAsIfAtOnce) {
+  Rig rig(plain_robot(2));
+  for (int i = 0; i < 10; ++i) rig.add(0, direct(), {1.0 + i});
+  for (int i = 0; i < 10; ++i) rig.add(1, direct(), {2.0 + i});
+  const BlockIndex batch = rig.send();
+  int calls = 1;
+  while (!rig.check(0, batch, 3)) ++calls;
+  EXPECT_GE(calls, 6);
+  EXPECT_LE(calls, 20);
+  EXPECT_TRUE(rig.witness.changes.empty()) << "nothing has happened yet";
+  rig.controller.take(0, batch, rig);
+  EXPECT_THAT(rig.run(3), ElementsAre(1.0, 2.0, 3.0));
+  EXPECT_EQ(rig.desired(1), 4.0);
+}
+
+TEST(Controller, TheRowsOfOneLongTrajectoryAreCheckedBitByBitToo) {
+  for (const double last : {7.0, std::nan("")}) {
+    Rig rig(plain_robot(1, 2), 10'000);
+    std::vector<double> rows(10'000, 1.0);
+    std::vector<std::int64_t> times(5'000, 5);
+    rows.back() = last;
+    rig.add_rows(0, during(0), 5'000, rows, times, {0b10});
+    const BlockIndex batch = rig.send();
+    int calls = 1;
+    while (!rig.check(0, batch, 100)) ++calls;
+    EXPECT_NEAR(calls, 19, 1) << "8 + 16 bytes a row, 6400 bytes a call";
+    rig.controller.take(0, batch, rig);
+    rig.step();
+    EXPECT_EQ(rig.witness.last(rig.sent + 2).reason,
+              std::isnan(last) ? Reason::invalid : Reason::none);
+    EXPECT_EQ(rig.active(), !std::isnan(last));
+  }
+}
+
+TEST(Controller, RequestsAreServedInOrderWithTheBatch) {
+  Rig rig(robot_with_requests());
+  rig.add(0, over(2), {1.0});
+  rig.batch.request(0, bytes_of_one(2.5));
+  rig.batch.take_control();
+  rig.batch.release_control();
+  rig.batch.request(1, {});
+  const CommandId batch = rig.pulse(2);
+  ASSERT_EQ(rig.requests.size(), 2U);
+  EXPECT_EQ(rig.requests[0].lane, 2U);
+  EXPECT_EQ(rig.requests[0].id, batch + 3);
+  EXPECT_EQ(rig.requests[0].index, 0U);
+  EXPECT_EQ(rig.requests[0].bytes, 8U);
+  EXPECT_EQ(rig.requests[1].index, 1U);
+  EXPECT_THAT(rig.controls, ElementsAre(std::pair(2U, true), std::pair(2U, false)));
+  EXPECT_EQ(rig.witness.status(batch + 3, 2), Status::completed);
+  EXPECT_EQ(rig.witness.status(batch + 1, 2), Status::none);
+  rig.run(2);
+  EXPECT_EQ(rig.witness.status(batch + 1, 2), Status::completed);
+}
+
+TEST(Controller, ARequestMayBeRejectedByTheDriver) {
+  Rig rig(robot_with_requests());
+  rig.outcome = {Status::rejected, Reason::driver, 0};
+  rig.batch.request(1, {});
+  const CommandId batch = rig.pulse();
+  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::rejected);
+  EXPECT_EQ(rig.witness.last(batch + 2).reason, Reason::driver);
+}
+
+TEST(Controller, AFreshStartPurgesWhatCameBeforeItAndKeepsWhatComesAfter) {
+  Rig rig(robot_with_requests());
+  rig.add(0, over(8), {8.0});
+  const CommandId before = rig.pulse(1);
+  rig.run(2);
+  rig.observe(0, 5.0);
+  rig.fresh_start = true;
+  rig.add(0, over(8), {8.0});
+  rig.batch.request(1, {});
+  rig.add(0, over(2), {7.0});
+  const CommandId batch = rig.pulse(0);
+  EXPECT_EQ(rig.next, 4) << "row 3 is the fresh start";
+  EXPECT_EQ(rig.desired(), 5.0);
+  EXPECT_THAT(rig.run(2), ElementsAre(6.0, 7.0));
+  EXPECT_EQ(rig.witness.last(before + 2, 1).status, Status::purged);
+  EXPECT_EQ(rig.witness.last(before + 2, 1).reason, Reason::fresh_start);
+  EXPECT_EQ(rig.witness.last(before + 2, 1).iteration, 3);
+  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::purged);
+  EXPECT_EQ(rig.witness.last(batch + 3).status, Status::completed);
+  EXPECT_EQ(rig.witness.last(batch + 3).iteration, 3) << "the request bears that of its row";
+  EXPECT_EQ(rig.witness.last(batch + 4).status, Status::completed);
+  EXPECT_EQ(rig.witness.last(batch + 1).iteration, 5);
+}
+
+TEST(Controller, ARestoredStartTakesTheDesiredStateItIsGiven) {
+  Rig rig(plain_robot(1));
+  rig.observe(0, 1.0);
+  const double desired = 3.0;
+  rig.controller.restart(rig.observed.data(), reinterpret_cast<const std::byte*>(&desired), 9);
+  EXPECT_EQ(rig.desired(), 3.0);
+  EXPECT_THAT(rig.run(1), ElementsAre(3.0));
+}
+
+TEST(Controller, DroppingALongQueueTellsAThousandStatusesAnIterationEachOfTheDrop) {
+  Rig rig(plain_robot(1), 10'000);
+  for (int i = 0; i < 5000; ++i) rig.add(0, over(5), {1.0});
+  const CommandId batch = rig.pulse();
+  rig.step();
+  rig.controller.purge(kEveryActuator, rig.next);
+  rig.witness.changes.clear();
+  for (int iteration = 0; iteration < 4; ++iteration) {
+    const std::size_t before = rig.witness.changes.size();
+    rig.step();
+    EXPECT_EQ(rig.witness.changes.size() - before, Controller::kStatusesPerIteration);
+    EXPECT_TRUE(rig.controller.pending());
+  }
+  rig.step();
+  EXPECT_FALSE(rig.controller.pending());
+  ASSERT_EQ(rig.witness.changes.size(), 5001U);
+  for (const StatusChange& change : rig.witness.changes) EXPECT_EQ(change.iteration, 2);
+  EXPECT_EQ(rig.witness.changes.back().id, batch + 1);
+  EXPECT_TRUE(rig.all_blocks_back());
+}
+
+TEST(Controller, SeveralFrontendsCommandAtOnceAndTheirIdsNeverClash) {
+  Rig rig(plain_robot(1));
+  rig.add(0, direct(), {1.0});
+  const CommandId mine = rig.pulse(0);
+  rig.add(0, direct(), {2.0});
+  const CommandId theirs = rig.pulse(1);
+  EXPECT_EQ(mine, theirs) << "ids are a lane's own";
+  EXPECT_THAT(rig.run(2), ElementsAre(1.0, 2.0));
+  EXPECT_EQ(rig.witness.last(mine + 2, 0).iteration, 1);
+  EXPECT_EQ(rig.witness.last(theirs + 2, 1).iteration, 2);
+}
+
+TEST(Controller, BlocksAreGivenBackAsSoonAsTheirRecordEnds) {
+  Rig rig(plain_robot(1));
+  rig.add_rows(0, direct(), 20, std::vector<double>(20));
+  rig.add(0, over(5), {1.0});
+  rig.pulse(1);
+  rig.run(20);
+  EXPECT_EQ(rig.witness.freed_blocks[1], 4U) << "48 + 160 bytes";
+  rig.run(5);
+  EXPECT_EQ(rig.witness.freed_blocks[1], 6U) << "the batch's own included";
+  EXPECT_EQ(rig.witness.freed_blocks[0], 0U);
+  EXPECT_TRUE(rig.all_blocks_back());
+}
+
+TEST(Controller, ARobotWithoutActuatorsIteratesAndServesRequests) {
+  Schema schema;
+  schema.head.period = kMillisecond;
+  schema.add_request("nothing", kNoType, "no payload");
+  Rig rig(schema);
+  rig.batch.request(0, {});
+  rig.batch.purge(kEveryActuator);
+  const CommandId batch = rig.pulse();
+  rig.run(0);
+  rig.step();
+  EXPECT_EQ(rig.witness.status(batch + 1), Status::completed);
+  EXPECT_FALSE(rig.controller.active());
+}
+
+TEST(Controller, AStateWithoutNumbersIsRefusedWhenTheControllerIsMade) {
+  Schema schema;
+  schema.add_actuators("joint", schema.add_type("Empty", {}), 1);
+  BlockPool pool(8);
+  Witness witness;
+  EXPECT_THROW(Controller(schema, pool, witness), InvalidArgument);
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,594 @@
+// How a loop halts, resumes and stops in order, with a driver that can fail in each of its verbs.
+
+#include <fcntl.h>
+#include <gmock/gmock.h>
+#include <linux/userfaultfd.h>
+#include <sys/ioctl.h>
+#include <sys/mman.h>
+#include <sys/syscall.h>
+#include <unistd.h>
+
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <limits>
+#include <random>
+#include <stdexcept>
+#include <thread>
+
+#include "memory/segment/verb_word.hpp"
+#include "readings_played.hpp"
+#include "robot/loop/loop.hpp"
+#include "robot/puppet.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class LoopHaltTest : public PuppetTest {
+ protected:
+  static std::unique_ptr<Loop> bursting_loop(const OptionValues& options = {}) {
+    auto loop = std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), options),
+                                       BackendOptions{.segment = "puppet", .bursting = true});
+    loop->start();
+    return loop;
+  }
+  static Loop timed_loop() {
+    return {std::make_unique<DriverInstance>(table(), OptionValues{}),
+            BackendOptions{.segment = "puppet", .period = 100'000}};
+  }
+};
+
+TEST_F(LoopHaltTest, ADriverHaltsWithItsReading) {
+  const auto loop = bursting_loop();
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    if (reading.iteration() >= 3) reading.halt("the belt slipped");
+  };
+  UntypedFrontend frontend("puppet");
+  add(frontend, 0, 10.0, {.pace = iterations(10)});
+  frontend.start_burst(10);
+  EXPECT_EQ(loop->run_granted(kAll), Step::standing);
+  EXPECT_EQ(frontend.published(), 3);
+  ASSERT_TRUE(frontend.halted());
+  EXPECT_EQ(frontend.halted()->cause, HaltCause::driver);
+  EXPECT_EQ(frontend.halted()->number, 1U);
+  EXPECT_EQ(frontend.halted()->reason(), "the belt slipped");
+  EXPECT_EQ(Puppet::calls.halted, 1) << "the driver is told that a halt begins";
+}
+
+TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
+  const auto loop = bursting_loop();
+  UntypedFrontend frontend("puppet");
+  const std::uint64_t number = frontend.halt("");
+  loop->run_granted(kAll);
+  const auto resume = [&] {
+    BatchBuilder builder;
+    builder.resume(number);
+    const Batch batch = frontend.pulse(builder);
+    loop->run_granted(kAll);
+    return batch.handle(0);
+  };
+  Puppet::on_resume = [] { return Served::rejected("the door is open"); };
+  EXPECT_EQ(resume().text, "the door is open");
+  EXPECT_TRUE(frontend.halted());
+  Puppet::on_resume = {};
+  EXPECT_EQ(resume().status, Status::completed);
+  EXPECT_FALSE(frontend.halted());
+  EXPECT_EQ(frontend.latest().head().fresh, 1U);
+  EXPECT_EQ(Puppet::calls.halted, 1);
+  EXPECT_EQ(Puppet::calls.resumed, 2);
+}
+
+TEST_F(LoopHaltTest, ADriverThatFailsToHaltEndsTheLoop) {
+  const auto loop = bursting_loop({{"fails", "halt"}});
+  UntypedFrontend frontend("puppet");
+  frontend.halt("");
+  EXPECT_EQ(loop->run_granted(kAll), Step::ended);
+  EXPECT_THAT(loop->fault(), AllOf(HasSubstr("failed in halt"), HasSubstr("no brake")));
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+// ------------------------------------------------------------------------------ readings
+
+TEST_F(LoopHaltTest, AFirstReadingThatIsNoNumberIsAFaultThatNamesIt) {
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    reading.observed[1] = std::numeric_limits<double>::quiet_NaN();
+  };
+  EXPECT_THAT(message_of<DriverError>([] { bursting_loop(); }),
+              AllOf(HasSubstr("actuator 'right'"), HasSubstr("is NaN or infinite")));
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+TEST_F(LoopHaltTest, SoIsOneOfAFreshStart) {
+  const auto loop = bursting_loop();
+  UntypedFrontend frontend("puppet");
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    if (reading.fresh()) reading.observed[0] = std::numeric_limits<double>::infinity();
+  };
+  add_request(frontend, Poke{.how = 2});
+  frontend.pulse();
+  EXPECT_EQ(loop->run_granted(kAll), Step::ended);
+  EXPECT_THAT(loop->fault(), HasSubstr("actuator 'left'"));
+}
+
+// ------------------------------------------------------------------------------ ends in order
+
+TEST_F(LoopHaltTest, AStopBrakesWithinTheLimitsAndThenStopsTheDriver) {
+  Puppet::limits = {.speed = 1000.0, .acceleration = 1e6};  // of iterations: 0.1 and 0.01
+  std::vector<double> written;
+  Puppet::on_write = [&](const Desired<Puppet>& desired) { written.push_back(desired[0]); };
+  Loop loop = timed_loop();
+  loop.start();
+  std::thread user([&] {
+    UntypedFrontend frontend("puppet");
+    send(frontend, 0, 1000.0, {.pace = speed(1000.0), .profile = Profile::linear});
+    while (frontend.latest().iteration() < 200 || desired(frontend.latest()) < 5.0) {
+    }
+    loop.ask_to_stop();
+  });
+  const Ended ended = loop.run();
+  user.join();
+  EXPECT_TRUE(ended.in_order);
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+  ASSERT_GT(written.size(), 10U);
+  double before = written.front();  // from 0
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    const double step = written[i] - written[i - 1];
+    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
+    before = step;
+  }
+  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+}
+
+TEST_F(LoopHaltTest, ARobotThatIsDoneBrakesBeforeItIsStopped) {
+  Puppet::limits = {.speed = 1000.0, .acceleration = 1e6};  // of iterations: 0.1 and 0.01
+  std::vector<double> written;
+  Puppet::on_write = [&](const Desired<Puppet>& desired) { written.push_back(desired[0]); };
+  Puppet::on_read = [&](Reading<Puppet>& reading) {
+    if (!written.empty() && written.back() > 5.0) reading.finish();
+  };
+  Loop loop = timed_loop();
+  loop.start();
+  UntypedFrontend frontend("puppet");
+  send(frontend, 0, 1000.0, {.pace = speed(1000.0), .profile = Profile::linear});
+  EXPECT_TRUE(loop.run().in_order);
+  ASSERT_GT(written.size(), 10U);
+  double before = written.front();  // from 0
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    const double step = written[i] - written[i - 1];
+    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
+    before = step;
+  }
+  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+TEST_F(LoopHaltTest, ARobotThatDoesNothingIsStoppedAtOnce) {
+  Loop loop = timed_loop();
+  loop.start();
+  loop.ask_to_stop();
+  EXPECT_TRUE(loop.run().in_order);
+  EXPECT_EQ(Puppet::calls.written, 0);
+}
+
+TEST_F(LoopHaltTest, BrakingThatTakesTooLongIsCut) {
+  Puppet::limits = {.speed = 1000.0, .acceleration = 1.0};  // a quarter of an hour to stop
+  Loop loop = timed_loop();
+  loop.start();
+  std::int64_t asked = 0;
+  std::thread user([&] {
+    UntypedFrontend frontend("puppet");
+    send(frontend, 0, 1e6, {.pace = speed(1000.0), .profile = Profile::linear});
+    frontend.wait_for(15'000, kPatience);
+    asked = monotonic_now();
+    loop.ask_to_stop();
+  });
+  EXPECT_TRUE(loop.run().in_order);
+  const std::int64_t took = monotonic_now() - asked;
+  user.join();
+  EXPECT_GT(took, 900'000'000);
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+TEST_F(LoopHaltTest, AFailedVerbLeavesNoTimeForBraking) {
+  Puppet::limits = {.speed = 1000.0, .acceleration = 1.0};
+  Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{{"fails", "write"}}),
+            BackendOptions{.segment = "puppet", .period = 100'000});
+  loop.start();
+  const int before = Puppet::calls.written;
+  EXPECT_FALSE(loop.run().in_order);
+  EXPECT_EQ(Puppet::calls.written - before, 3);
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+// ------------------------------------------------------------------------------ verbs that hang
+
+TEST_F(LoopHaltTest, AVerbThatDoesNotReturnIsSeenFromOutside) {
+  std::atomic<bool> hangs{true};
+  Puppet::on_write = [&](const Desired<Puppet>& desired) {
+    while (desired.iteration() == 2 && hangs) std::this_thread::yield();
+  };
+  Loop loop = timed_loop();
+  loop.start();
+  std::thread runner([&] { static_cast<void>(loop.run()); });
+  const AttachedSegment observer =
+      AttachedSegment::attach("puppet", Access::read_only, Deadline(kPatience));
+  SlowVerb slow;
+  while (slow.verb != Verb::write || monotonic_now() - slow.since < 50'000'000) {
+    slow = slow_verb(observer.view());
+  }
+  EXPECT_EQ(to_text(slow.verb), "write");
+  hangs = false;
+  loop.ask_to_stop();
+  runner.join();
+}
+
+// ------------------------------------------------------------------------- readings
+
+/// A bursting puppet that is commanded, halted and resumed; its sensor may lie.
+class ReadingTest : public LoopHaltTest {
+ protected:
+  void begin(const Limits& limits) {
+    Puppet::limits = limits;
+    Puppet::on_write = [this](const Desired<Puppet>& desired) { written_ = desired[0]; };
+    Puppet::on_read = [this](Reading<Puppet>& reading) {
+      reading.observed[0] += moved_ + offset_ + (reading.fresh() ? fresh_offset_ : 0.0);
+    };
+    loop_ = bursting_loop();
+    frontend_ = std::make_unique<UntypedFrontend>("puppet");
+  }
+  void run(int iterations) {
+    frontend_->start_burst(iterations);
+    loop_->run_granted(kAll);
+  }
+  std::uint64_t halt() {
+    const std::uint64_t number = frontend_->halt("");
+    run(1);
+    return number;
+  }
+  Handle resume(std::uint64_t number, bool accepts = false) {
+    BatchBuilder builder;
+    builder.resume(number, accepts);
+    const Batch batch = frontend_->pulse(builder);
+    loop_->run_granted(kAll);
+    return batch.handle(0);
+  }
+  bool is_alive() { return loop_->fault().empty(); }
+
+  std::unique_ptr<Loop> loop_;
+  std::unique_ptr<UntypedFrontend> frontend_;
+  double written_ = 0.0;
+  double moved_ = 0.0;         // by hand, or noise
+  double offset_ = 0.0;        // of every reading
+  double fresh_offset_ = 0.0;  // of the reading of a fresh start
+};
+
+TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
+  std::mt19937 random(3);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  const double period = 1e-3;
+  for (int i = 0; i < readings_played(63); ++i) {
+    Limits limits{.minimum = -5.0, .maximum = 5.0, .speed = uniform(0.5, 4.0)};
+    if (i % 2 == 0) limits.error = uniform(0.1, 1.0);
+    begin(limits);
+    offset_ = fresh_offset_ = moved_ = 0.0;
+    add(*frontend_, 0, uniform(-2.0, 2.0), {.pace = iterations(20)});
+    run(static_cast<int>(uniform(1.0, 30.0)));
+    const std::uint64_t number = halt();
+    run(static_cast<int>(uniform(1.0, 5.0)));
+
+    const double tolerance = limits.speed * period + (i % 2 == 0 ? limits.error / 10.0 : 0.0);
+    const double sizes[] = {2.1 * tolerance, 10.0 * tolerance, 10.0,        1e6,
+                            1e300,           kInfinity,        std::nan("")};
+    const double wrong = std::copysign(sizes[i % 7], uniform(-1.0, 1.0));
+    const int when = i % 3;
+    if (when == 0) fresh_offset_ = wrong;
+    if (when == 1) offset_ = wrong;  // of the last row, and from then on
+    if (when == 2) {                 // of one row
+      offset_ = wrong;
+      run(1);
+      offset_ = 0.0;
+    } else {
+      run(1);
+    }
+    const double before = written_;
+    const Handle handle = resume(number);
+    run(3);
+    EXPECT_EQ(written_, before);
+    ASSERT_TRUE(is_alive());
+    if (when == 2) {
+      // it has come back by itself, or will in the next row
+      if (handle.status != Status::completed) {
+        EXPECT_EQ(resume(number).status, Status::completed) << resume(number).text;
+      }
+    } else {
+      EXPECT_EQ(handle.status, Status::rejected) << i;
+      EXPECT_TRUE(frontend_->halted());
+      offset_ = fresh_offset_ = 0.0;
+      run(1);
+      const std::uint64_t again = frontend_->halted()->number;
+      EXPECT_EQ(resume(again).status, Status::completed) << i << ": " << resume(again).text;
+    }
+    EXPECT_EQ(written_, before);
+    frontend_.reset();
+    loop_.reset();
+  }
+}
+
+TEST_F(ReadingTest, OneTurnOffInEveryRowIsRefusedUntilItIsAccepted) {
+  begin({.speed = 2.0, .error = 0.3});
+  run(10);
+  offset_ = 6.283;
+  run(1);  // halts by its error limit
+  run(5000);
+  ASSERT_TRUE(frontend_->halted());
+  const std::uint64_t number = frontend_->halted()->number;
+  const Handle handle = resume(number);
+  EXPECT_EQ(handle.status, Status::rejected);
+  EXPECT_EQ(handle.reason, Reason::reading);
+  EXPECT_THAT(handle.text, AllOf(HasSubstr("actuator 'left' was read at 6.283 after 0"),
+                                 HasSubstr("resume with --accept-reading")));
+  EXPECT_EQ(written_, 0.0);
+  EXPECT_EQ(resume(number, true).status, Status::completed);
+  run(1);
+  EXPECT_EQ(written_, 6.283);
+}
+
+TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
+  std::mt19937 random(5);
+  const auto uniform = [&](double low, double high) {
+    return std::uniform_real_distribution(low, high)(random);
+  };
+  for (int i = 0; i < readings_played(20); ++i) {
+    const Limits limits{.speed = uniform(0.5, 4.0), .error = uniform(0.1, 1.0)};
+    begin(limits);
+    double place = 0.0;
+    const std::uint64_t number = halt();
+    const double motion = uniform(-1.0, 1.0) * limits.speed * 1e-3;
+    const double noise = limits.error / 20.0;
+    for (int k = 0; k < 50; ++k) {
+      place += motion;
+      moved_ = place + uniform(-noise, noise);
+      run(1);
+    }
+    const Handle handle = resume(number);
+    EXPECT_EQ(handle.status, Status::completed) << handle.text;
+    moved_ = 0.0;
+    frontend_.reset();
+    loop_.reset();
+  }
+}
+
+TEST_F(ReadingTest, TheNoiseThatADriverDescribesIsAllowedAndNoMore) {
+  // with a limit of speed, beside it; without, alone
+  for (const Limits& limits : {Limits{.speed = 2.0, .error = 5.0, .noise = 0.05},
+                               Limits{.error = 5.0, .noise = 0.05}, Limits{.noise = 0.05}}) {
+    const double reach = 0.05 + (std::isfinite(limits.speed) ? 0.002 : 0.0);
+    for (const double step : {0.99, -0.99, 1.01, -1.01}) {
+      begin(limits);
+      const std::uint64_t number = halt();
+      run(3);
+      fresh_offset_ = step * reach;
+      EXPECT_EQ(resume(number).status == Status::completed, std::abs(step) < 1.0) << step;
+      fresh_offset_ = 0.0;
+      frontend_.reset();
+      loop_.reset();
+    }
+  }
+}
+
+TEST_F(ReadingTest, ARobotThatCollidedResumesWhereItIs) {
+  begin({.speed = 2.0, .acceleration = 15.0, .error = 0.05});
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    reading.observed[0] = std::min(reading.observed[0], 0.3);
+  };
+  add(*frontend_, 0, 1.0);
+  run(1000);
+  ASSERT_TRUE(frontend_->halted()) << "it is held back";
+  EXPECT_EQ(frontend_->halted()->cause, HaltCause::error);
+  run(1000);
+  const Handle handle = resume(frontend_->halted()->number);
+  EXPECT_EQ(handle.status, Status::completed) << handle.text;
+}
+
+TEST_F(ReadingTest, OneWrongReadingThatHaltsItIsForgotten) {
+  begin({.speed = 2.0, .error = 0.05});
+  run(10);
+  offset_ = 3.0;
+  run(1);
+  offset_ = 0.0;
+  run(10);
+  ASSERT_TRUE(frontend_->halted());
+  const Handle handle = resume(frontend_->halted()->number);
+  EXPECT_EQ(handle.status, Status::completed) << handle.text;
+}
+
+TEST_F(ReadingTest, ARobotOfTheWorldCannotComeFarByARequest) {
+  for (const bool of_the_world : {false, true}) {
+    Puppet::of_the_world = of_the_world;
+    begin({.speed = 2.0});
+    run(10);
+    add_request(*frontend_, Poke{.how = 2});  // it is at 7 and starts afresh
+    const Batch batch = frontend_->pulse();
+    run(3);
+    EXPECT_TRUE(is_alive());
+    EXPECT_EQ(frontend_->halted().has_value(), of_the_world);
+    EXPECT_EQ(written_, of_the_world ? 0.0 : 7.0);
+    if (of_the_world) {
+      EXPECT_EQ(batch.handle(0).reason, Reason::reading);
+      EXPECT_THAT(batch.handle(0).text, HasSubstr("was read at 7 after 0"));
+      const std::uint64_t number = frontend_->halted()->number;
+      EXPECT_EQ(resume(number, true).status, Status::completed);
+    }
+    frontend_.reset();
+    loop_.reset();
+  }
+}
+
+TEST_F(ReadingTest, AFreshStartBeforeAHaltIsNoStep) {
+  begin({.speed = 2.0});
+  run(10);
+  add_request(*frontend_, Poke{.how = 2});  // a simulator: it is at 7
+  frontend_->pulse();
+  loop_->run_granted(kAll);
+  const std::uint64_t number = halt();
+  run(3);
+  const Handle handle = resume(number);
+  EXPECT_EQ(handle.status, Status::completed) << handle.text;
+}
+
+TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
+  begin({});
+  const std::uint64_t number = halt();
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    if (reading.fresh()) throw std::runtime_error("the cable is off");
+  };
+  const Handle handle = resume(number);
+  EXPECT_EQ(handle.status, Status::rejected);
+  EXPECT_THAT(handle.text, HasSubstr("the cable is off"));
+  EXPECT_TRUE(frontend_->halted());
+  run(2);
+  EXPECT_EQ(Puppet::calls.halted, 2) << "the driver had resumed";
+  Puppet::on_read = {};
+  EXPECT_EQ(resume(frontend_->halted()->number).status, Status::completed);
+  EXPECT_TRUE(is_alive());
+}
+
+TEST_F(ReadingTest, RowZeroInRealTimeIsReadUntilTwoReadingsAgree) {
+  Puppet::limits = {.speed = 2.0};
+  int reads = 0;
+  const auto start = [&](double every, bool accepts) {
+    Puppet::on_read = [&reads, every](Reading<Puppet>& reading) {
+      if (reads++ == 0 || every != 0.0) reading.observed[0] = 7.0 + every * reads;
+    };
+    reads = 0;
+    Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
+              BackendOptions{.segment = "puppet", .period = 100'000, .accept_reading = accepts});
+    loop.start();
+    return UntypedFrontend("puppet").latest().iteration();
+  };
+  EXPECT_EQ(start(0.0, false), 0);
+  EXPECT_EQ(reads, 3) << "the second differs from the first, the third agrees";
+  try {
+    start(5.0, false);
+    FAIL();
+  } catch (const DriverError& error) {
+    EXPECT_THAT(error.what(), AllOf(HasSubstr("actuator 'left' was read at"),
+                                    HasSubstr("start with --accept-reading")));
+  }
+  EXPECT_EQ(start(5.0, true), 0);
+  EXPECT_EQ(reads, 1);
+}
+
+// ------------------------------------------------------------------------- gaps
+
+/// Memory whose first touch takes `seconds`, as a page that must be read from a slow disk.
+class SlowPage {
+ public:
+  explicit SlowPage(double seconds) : seconds_(seconds) {
+    fd_ = static_cast<int>(::syscall(SYS_userfaultfd, O_CLOEXEC | UFFD_USER_MODE_ONLY));
+    if (fd_ < 0) return;
+    page_ = ::mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+    uffdio_api api{.api = UFFD_API, .features = 0, .ioctls = 0};
+    uffdio_register watched{.range = {.start = address(), .len = kSize},
+                            .mode = UFFDIO_REGISTER_MODE_MISSING,
+                            .ioctls = 0};
+    if (::ioctl(fd_, UFFDIO_API, &api) != 0) throw std::runtime_error("no userfaultfd");
+    if (::ioctl(fd_, UFFDIO_REGISTER, &watched) != 0) throw std::runtime_error("no userfaultfd");
+    filler_ = std::thread([this] { fill(); });
+  }
+  SlowPage(const SlowPage&) = delete;
+  SlowPage& operator=(const SlowPage&) = delete;
+  ~SlowPage() {
+    if (fd_ < 0) return;
+    touch();
+    filler_.join();
+    ::munmap(page_, kSize);
+    ::close(fd_);
+  }
+  /// A kernel may give nobody such memory.
+  bool is_there() const { return fd_ >= 0; }
+  void touch() { *static_cast<volatile char*>(page_) = 1; }
+
+ private:
+  static constexpr std::size_t kSize = 4096;
+
+  std::uint64_t address() const { return reinterpret_cast<std::uint64_t>(page_); }
+  void fill() {
+    uffd_msg message{};
+    while (::read(fd_, &message, sizeof message) != sizeof message) {
+    }
+    std::this_thread::sleep_for(std::chrono::duration<double>(seconds_));
+    alignas(kSize) static char zeros[kSize];
+    uffdio_copy copy{.dst = address(),
+                     .src = reinterpret_cast<std::uint64_t>(zeros),
+                     .len = kSize,
+                     .mode = 0,
+                     .copy = 0};
+    if (::ioctl(fd_, UFFDIO_COPY, &copy) != 0) std::abort();
+  }
+
+  double seconds_;
+  int fd_ = -1;
+  void* page_ = nullptr;
+  std::thread filler_;
+};
+
+/// A loop in real time whose driver stalls once, in iteration 20.
+class GapTest : public LoopHaltTest {
+ protected:
+  std::string cause_after(const std::function<void()>& stall, std::int64_t gap) {
+    Puppet::on_write = [&](const Desired<Puppet>& desired) {
+      if (desired.iteration() == 20) stall();
+    };
+    Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
+              BackendOptions{.segment = "puppet", .period = 1'000'000, .gap = gap});
+    loop.start();
+    std::thread runner([&] { static_cast<void>(loop.run()); });
+    UntypedFrontend frontend("puppet");
+    const Iteration later = frontend.wait_for(25, kPatience).iteration();
+    const auto halt = frontend.halted();
+    loop.ask_to_stop();
+    runner.join();
+    EXPECT_GE(later, 25);
+    return halt ? std::string(halt->reason()) : "";
+  }
+};
+
+TEST_F(GapTest, AVerbThatHangsAndReturnsHaltsWithItsLength) {
+  const std::function<void()> hang = [] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  };
+  EXPECT_THAT(cause_after(hang, 250'000'000),
+              AllOf(HasSubstr("no iteration for "), HasSubstr("longer than --gap 0.25")));
+  EXPECT_EQ(cause_after(hang, 0), "");
+}
+
+TEST_F(GapTest, SoDoesAPageThatComesLate) {
+  SlowPage page(0.3);
+  const std::function<void()> touch = [&] {
+    if (page.is_there()) return page.touch();
+    // a container may forbid such pages: then this is the verb that hangs
+    std::this_thread::sleep_for(std::chrono::milliseconds(300));
+  };
+  EXPECT_THAT(cause_after(touch, 250'000'000), HasSubstr("longer than --gap 0.25"));
+}
+
+TEST_F(GapTest, ADriverDescribesAShorterOne) {
+  const auto hang = [] { std::this_thread::sleep_for(std::chrono::milliseconds(300)); };
+  Puppet::own_gap = 250'000'000;
+  EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.25"));
+  Puppet::of_the_world = true;
+  EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.1:")) << "the default is less";
+  Puppet::own_gap = 50'000'000;
+  EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.05"));
+  EXPECT_EQ(cause_after(hang, 3'600'000'000'000), "") << "an option has the last word";
+}
+
+}  // namespace
+}  // namespace o80::test

@@ -1,0 +1,274 @@
+#include "robot/loop/loop.hpp"
+
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <array>
+#include <atomic>
+#include <string_view>
+#include <tuple>
+
+#include "robot/puppet.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Pair;
+
+class LoopTest : public PuppetTest {
+ protected:
+  static std::unique_ptr<Loop> make(const OptionValues& options = {}, bool bursting = true) {
+    return std::make_unique<Loop>(
+        std::make_unique<DriverInstance>(table(), options),
+        BackendOptions{.segment = "puppet", .period = 200'000, .bursting = bursting});
+  }
+};
+
+TEST_F(LoopTest, StartsThenReadsThenIsRunning) {
+  const auto loop = make();
+  EXPECT_EQ(Puppet::calls.started, 0) << "the name is taken before the hardware is touched";
+  EXPECT_THROW(UntypedFrontend("puppet", {.timeout = kAtOnce}), TimeoutError);
+  loop->start();
+  EXPECT_EQ(Puppet::calls.started, 1);
+  EXPECT_EQ(Puppet::calls.read, 1);
+  EXPECT_EQ(Puppet::calls.written, 0);
+  EXPECT_EQ(UntypedFrontend("puppet").latest().iteration(), 0);
+}
+
+TEST_F(LoopTest, WritesAndReadsOnceAnIteration) {
+  const auto loop = make();
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  add(frontend, 1, 4.0, {.pace = iterations(4)});
+  frontend.start_burst(5);
+  std::vector<Iteration> written;
+  Puppet::on_write = [&](const Desired<Puppet>& desired) {
+    written.push_back(desired.iteration());
+    EXPECT_EQ(desired.active(1), desired.iteration() <= 4);
+    EXPECT_FALSE(desired.active(0));
+    EXPECT_EQ(desired.time(), desired.iteration() * 200'000);
+    EXPECT_DOUBLE_EQ(desired.period(), 2e-4);
+  };
+  EXPECT_EQ(loop->run_granted(kAll), Step::standing);
+  EXPECT_THAT(written, ::testing::ElementsAre(1, 2, 3, 4, 5));
+  EXPECT_EQ(Puppet::calls.read, 6);
+  EXPECT_EQ(observed(frontend.latest(), 1), 4.0);
+}
+
+/// A driver that forks in one of its functions, and whose child returns from it.
+class ForkingLoop : public LoopTest,
+                    public ::testing::WithParamInterface<std::tuple<const char*, bool>> {
+ protected:
+  void fork_at(Iteration now) {
+    if (child_ == 0) _exit(kGoesOn);
+    if (now != 2) return;
+    child_ = fork();
+    if (child_ == 0) dup2(said_[1], STDERR_FILENO);
+  }
+  /// How the child ended, and what it said.
+  std::pair<int, std::string> end_of_child() {
+    close(said_[1]);
+    std::string text;
+    char part = 0;
+    while (read(said_[0], &part, 1) == 1) text += part;
+    close(said_[0]);
+    int status = -1;
+    EXPECT_EQ(waitpid(child_, &status, 0), child_);
+    return {WEXITSTATUS(status), text};
+  }
+
+  static constexpr int kGoesOn = 7;
+  pid_t child_ = -1;
+  std::array<int, 2> said_{};
+};
+
+TEST_P(ForkingLoop, EndsTheChildWhichTouchesNothing) {
+  const auto [verb, bursting] = GetParam();
+  ASSERT_EQ(pipe(said_.data()), 0);
+  const bool writes = std::string_view(verb) == "write";
+  Puppet::on_write = [&](const Desired<Puppet>& desired) {
+    if (writes || child_ == 0) fork_at(desired.iteration());
+  };
+  Puppet::on_read = [&](Reading<Puppet>& reading) {
+    if (!writes || child_ == 0) fork_at(reading.iteration());
+  };
+  const auto loop = make({{"finish_at", "4"}}, bursting);
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  if (bursting) frontend.start_burst(4);
+  EXPECT_TRUE(loop->run().in_order);
+
+  EXPECT_THAT(end_of_child(), Pair(1, HasSubstr(std::string("'puppet' forked in ") + verb)));
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(frontend.published(), 4);
+  EXPECT_EQ(frontend.life(), Life::stopped);
+}
+
+INSTANTIATE_TEST_SUITE_P(, ForkingLoop,
+                         ::testing::Combine(::testing::Values("write", "read"), ::testing::Bool()));
+
+/// What frontends see of a loop that fails, wherever.
+class LoopFails : public LoopTest,
+                  public ::testing::WithParamInterface<std::pair<const char*, const char*>> {};
+
+TEST_P(LoopFails, OnTheWayAndSaysSoInTheSegmentAndStopsItsDriverOnce) {
+  const auto [fails, why] = GetParam();
+  auto loop = make({{"fails", fails}});
+  std::thread waiter([why] {
+    // whoever waits to attach raises it
+    const std::string text =
+        message_of<BackendFailed>([] { UntypedFrontend("puppet", {.timeout = kPatience}); });
+    EXPECT_THAT(text, AllOf(HasSubstr("'puppet'"), HasSubstr(why)));
+  });
+  EXPECT_THAT(message_of<DriverError>([&] { loop->start(); }), HasSubstr(why));
+  waiter.join();
+  loop.reset();
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(Puppet::calls.destroyed, 1);
+  EXPECT_THROW(UntypedFrontend("puppet", {.timeout = kPatience}), BackendFailed);
+}
+
+INSTANTIATE_TEST_SUITE_P(WhileItStarts, LoopFails,
+                         ::testing::Values(std::pair("start", "failed in start: no power"),
+                                           std::pair("first_read", "failed in read: blind")));
+
+class LoopBreaks : public LoopFails {};
+
+TEST_P(LoopBreaks, InAnIterationAndSaysSoInTheSegmentAndStopsItsDriverOnce) {
+  const auto [fails, why] = GetParam();
+  auto loop = make({{"fails", fails}});
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  std::thread runner([&] {
+    const Ended ended = loop->run();
+    EXPECT_FALSE(ended.in_order);
+    EXPECT_THAT(ended.fault, HasSubstr(why));
+  });
+  add(frontend, 0, 1.0, {.pace = iterations(100)});
+  EXPECT_THAT(message_of<BackendFailed>([&] { frontend.burst(10, kPatience); }), HasSubstr(why));
+  runner.join();
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(frontend.published(), 2) << "the iteration that failed has no row";
+  EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(3, kPatience); }), HasSubstr(why));
+  loop.reset();
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+INSTANTIATE_TEST_SUITE_P(WhileItRuns, LoopBreaks,
+                         ::testing::Values(std::pair("write", "failed in write: wire cut"),
+                                           std::pair("read", "failed in read: went blind"),
+                                           std::pair("fault", "failed in read: too hot"),
+                                           std::pair("odd", "not a std::exception")));
+
+Batch poke(UntypedFrontend& frontend, std::uint32_t how) {
+  add_request(frontend, Poke{how});
+  return frontend.pulse();
+}
+
+TEST_F(LoopTest, ServesRequests) {
+  const auto loop = make();
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  const Batch done = poke(frontend, 0);
+  const Batch rejected = poke(frontend, 1);
+  const Batch fresh = poke(frontend, 2);
+  EXPECT_EQ(loop->run_granted(kAll), Step::standing);
+  EXPECT_EQ(done.handle(0).status, Status::completed);
+  EXPECT_EQ(rejected.handle(0).status, Status::rejected);
+  EXPECT_EQ(rejected.handle(0).text, "not now");
+  EXPECT_EQ(fresh.handle(0).iteration, 1);
+  const UntypedObservation row = frontend.latest();
+  EXPECT_EQ(row.head().fresh, 1U);
+  EXPECT_EQ(desired(row, 1), 8.0);
+}
+
+TEST_F(LoopTest, EndsWhenARequestFailsOrThrows) {
+  for (const auto& [how, why] : {std::pair(3U, "poked too hard"), std::pair(4U, "ouch")}) {
+    Puppet::calls = {};
+    const auto loop = make();
+    loop->start();
+    UntypedFrontend frontend("puppet");
+    const Batch batch = poke(frontend, how);
+    EXPECT_EQ(loop->run_granted(kAll), Step::ended);
+    EXPECT_THAT(loop->fault(), AllOf(HasSubstr("failed in poke"), HasSubstr(why)));
+    EXPECT_EQ(batch.handle(0).text, why);
+    EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(1, kPatience); }),
+                HasSubstr(why));
+    EXPECT_EQ(Puppet::calls.stopped, 1);
+  }
+}
+
+TEST_F(LoopTest, EndsInOrderWhenTheDriverIsDone) {
+  const auto loop = make({{"finish_at", "4"}});
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  const Burst burst = frontend.start_burst(10);
+  EXPECT_EQ(loop->run_granted(kAll), Step::ended);
+  EXPECT_EQ(loop->fault(), "");
+  EXPECT_EQ(frontend.published(), 4) << "that row is there";
+  EXPECT_EQ(frontend.life(), Life::stopped);
+  EXPECT_THROW(burst.wait(kPatience), BackendStopped);
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+TEST_F(LoopTest, InterruptsWhatTheDriverSays) {
+  const auto loop = make();
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  add(frontend, 1, 9.0, {.pace = iterations(9)});
+  const Batch batch = frontend.pulse_to_end();
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    if (reading.iteration() == 3) reading.interrupt(1);
+  };
+  EXPECT_EQ(loop->run_granted(kAll), Step::standing);
+  EXPECT_EQ(batch.handle(0).status, Status::interrupted);
+  EXPECT_EQ(batch.handle(0).iteration, 3);
+  EXPECT_EQ(frontend.published(), 3);
+}
+
+TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
+  const auto loop = make({}, false);
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  std::thread runner([&] { EXPECT_TRUE(loop->run().in_order); });
+  const std::int64_t begin = frontend.wait_for(1, kPatience).time();
+  const UntypedObservation row = frontend.wait_for(51, kPatience);
+  EXPECT_GE(row.time() - begin, 49 * 200'000) << "never faster than its period";
+  loop->ask_to_stop();
+  runner.join();
+  EXPECT_EQ(frontend.life(), Life::stopped);
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+TEST_F(LoopTest, PublishesAnOverrunAndSkipsThePeriodsInsteadOfHurrying) {
+  const auto loop = make({}, false);
+  loop->start();
+  UntypedFrontend frontend("puppet");
+  Puppet::on_write = [](const Desired<Puppet>& desired) {
+    if (desired.iteration() != 5) return;
+    const std::int64_t until = monotonic_now() + 2'100'000;  // ten periods and a half
+    while (monotonic_now() < until) {
+    }
+  };
+  std::thread runner([&] { loop->run(); });
+  const RowHead before = frontend.wait_for(4, kPatience).head();
+  const RowHead late = frontend.wait_for(5, kPatience).head();
+  const RowHead after = frontend.wait_for(40, kPatience).head();
+  loop->ask_to_stop();
+  runner.join();
+  EXPECT_GE(late.overruns, before.overruns + 1);
+  EXPECT_GE(late.skipped, before.skipped + 9);
+  EXPECT_GE(late.lateness, 1'800'000);
+  EXPECT_GE(after.time - late.time, 34 * 200'000) << "what follows keeps its period";
+}
+
+TEST_F(LoopTest, ASecondOneOfItsNameIsRefused) {
+  const auto loop = make();
+  EXPECT_THAT(message_of<SegmentTaken>([] { make(); }), HasSubstr("puppet"));
+  EXPECT_EQ(Puppet::calls.started, 0);
+}
+
+}  // namespace
+}  // namespace o80::test

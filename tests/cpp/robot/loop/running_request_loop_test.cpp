@@ -1,0 +1,136 @@
+// A driver whose requests take time, behind the table of functions and in the loop.
+
+#include <gmock/gmock.h>
+
+#include <functional>
+#include <memory>
+
+#include "control/batch/batch_builder.hpp"
+#include "robot/loop/loop.hpp"
+#include "robot/puppet.hpp"
+
+namespace o80::test {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+class RunningRequestLoopTest : public PuppetTest {
+ protected:
+  RunningRequestLoopTest()
+      : loop_(std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), OptionValues{}),
+                                     BackendOptions{.segment = "puppet", .bursting = true})) {
+    loop_->start();
+    frontend_ = std::make_unique<UntypedFrontend>("puppet");
+  }
+  Batch poke(std::uint32_t how) {
+    add_request(*frontend_, Poke{.how = how});
+    return frontend_->pulse();
+  }
+  void burst(int iterations) {
+    frontend_->start_burst(iterations);
+    loop_->run_granted(kAll);
+  }
+
+  std::unique_ptr<Loop> loop_;
+  std::unique_ptr<UntypedFrontend> frontend_;
+};
+
+TEST_F(RunningRequestLoopTest, TheReadingTellsProgressAndEnd) {
+  std::vector<bool> ran;
+  Puppet::on_read = [&](Reading<Puppet>& reading) {
+    ran.push_back(reading.runs<Poke>());
+    if (reading.iteration() == 2) reading.progress<Poke>("half way");
+    if (reading.iteration() == 4) reading.ended<Poke>(Served::done());
+  };
+  const Batch batch = poke(5);
+  burst(1);
+  EXPECT_EQ(batch.handle(0).progress, "feels the poke");
+  burst(2);
+  EXPECT_EQ(batch.handle(0).progress, "half way") << "it stays until the next one";
+  burst(2);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(batch.handle(0).iteration, 4);
+  EXPECT_EQ(ran, (std::vector<bool>{true, true, true, true, false}));
+}
+
+TEST_F(RunningRequestLoopTest, AnEndAndAProgressInOneReadingAreAnEnd) {
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    reading.ended<Poke>(Served::rejected("slipped"));
+    reading.progress<Poke>("nearly there");
+    reading.ended<Poke>(Served::done());
+  };
+  const Batch batch = poke(5);
+  burst(1);
+  EXPECT_EQ(batch.handle(0).status, Status::rejected);
+  EXPECT_EQ(batch.handle(0).text, "slipped") << "the first end stands";
+}
+
+TEST_F(RunningRequestLoopTest, WhatDoesNotRunCannotEnd) {
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    reading.ended<Poke>(Served::failed("of what?"));
+    reading.progress<Poke>("of what?");
+  };
+  burst(3);
+  EXPECT_EQ(frontend_->published(), 3);
+  EXPECT_THAT(frontend_->running_requests(), IsEmpty());
+}
+
+TEST_F(RunningRequestLoopTest, AFailureEndsTheLoopWithItsName) {
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    reading.ended<Poke>(Served::failed("the gear broke"));
+  };
+  poke(5);
+  burst(3);
+  EXPECT_THAT(loop_->fault(), AllOf(HasSubstr("failed in poke"), HasSubstr("the gear broke")));
+  EXPECT_EQ(frontend_->published(), 1) << "its row is still published";
+  EXPECT_EQ(Puppet::calls.stopped, 1);
+}
+
+TEST_F(RunningRequestLoopTest, MayEndInTheReadingOfAnothersFreshStart) {
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    if (reading.fresh()) reading.ended<Poke>(Served::start_afresh());
+  };
+  const Batch batch = poke(5);
+  burst(1);
+  ASSERT_EQ(batch.handle(0).status, Status::active);
+  // a resume is a fresh start that asks no handler
+  const std::uint64_t number = frontend_->halt("");
+  loop_->run_granted(kAll);
+  EXPECT_EQ(batch.handle(0).status, Status::halted);
+  BatchBuilder resume;
+  resume.resume(number);
+  frontend_->pulse(resume);
+  loop_->run_granted(kAll);
+  EXPECT_FALSE(frontend_->halted());
+}
+
+TEST_F(RunningRequestLoopTest, AReadingBringsItsOwnFreshStart) {
+  Puppet::on_read = [](Reading<Puppet>& reading) {
+    if (reading.iteration() == 2 && !reading.fresh()) reading.ended<Poke>(Served::start_afresh());
+    if (reading.fresh()) reading.observed = {7, 8};
+  };
+  const Batch batch = poke(5);
+  burst(2);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  EXPECT_EQ(frontend_->latest().head().fresh, 1U);
+  EXPECT_EQ(desired(frontend_->latest(), 1), 8.0);
+}
+
+// ------------------------------------------------------------------------------ recoverable faults
+
+TEST_F(RunningRequestLoopTest, AResumeCannotRun) {
+  Puppet::on_resume = [] { return Served::running("warming up"); };
+  const std::uint64_t number = frontend_->halt("");
+  loop_->run_granted(kAll);
+  BatchBuilder resume;
+  resume.resume(number);
+  const Batch batch = frontend_->pulse(resume);
+  loop_->run_granted(kAll);
+  EXPECT_THAT(batch.handle(0).text, HasSubstr("resume it again when it is"));
+  EXPECT_TRUE(frontend_->halted());
+}
+
+}  // namespace
+}  // namespace o80::test
