@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "control/batch/batch_builder.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/backend.hpp"
 

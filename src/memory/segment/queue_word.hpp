@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "memory/segment/segment.hpp"
+#include "memory/segment/segment_layout.hpp"
 #include "o80/base/time.hpp"
 
 namespace o80 {

@@ -14,7 +14,7 @@
 #include "control/queue/controller.hpp"
 #include "memory/os/fork.hpp"
 #include "memory/ring/history.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_receiver.hpp"
 #include "memory/segment/halt_word.hpp"
 #include "memory/segment/liveness.hpp"
 #include "memory/segment/owned_segment.hpp"

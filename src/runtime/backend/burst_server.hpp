@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_receiver.hpp"
 #include "memory/segment/liveness.hpp"
 #include "memory/segment/owned_segment.hpp"
 #include "memory/segment/signal.hpp"

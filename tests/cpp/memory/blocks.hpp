@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "memory/os/atomic_words.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_receiver.hpp"
+#include "memory/ring/lane_sender.hpp"
 
 namespace o80 {
 

@@ -8,7 +8,8 @@
 #include <vector>
 
 #include "memory/private_directory.hpp"
-#include "memory/segment/segment.hpp"
+#include "memory/segment/attached_segment.hpp"
+#include "memory/segment/owned_segment.hpp"
 
 namespace o80 {
 

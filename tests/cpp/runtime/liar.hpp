@@ -9,7 +9,7 @@
 #include <random>
 
 #include "control/batch/batch_builder.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

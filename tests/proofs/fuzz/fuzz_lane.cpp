@@ -16,7 +16,7 @@
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
 #include "memory/os/atomic_words.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "memory/segment/liveness.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/backend.hpp"

@@ -14,7 +14,7 @@
 
 #include "memory/child_process.hpp"
 #include "memory/os/fork.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "memory/segment/liveness.hpp"
 #include "memory/segments.hpp"
 

@@ -12,7 +12,7 @@
 #include <thread>
 
 #include "memory/os/futex.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "memory/segment/liveness.hpp"
 #include "memory/segment/segment_draft.hpp"
 #include "memory/segments.hpp"

@@ -1,4 +1,5 @@
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_receiver.hpp"
+#include "memory/ring/lane_sender.hpp"
 
 #include <gmock/gmock.h>
 

@@ -6,7 +6,7 @@
 #include <thread>
 
 #include "memory/child_process.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "memory/segments.hpp"
 
 namespace o80 {

@@ -14,7 +14,7 @@
 
 #include "control/batch/batch_builder.hpp"
 #include "memory/child_process.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "runtime/liar.hpp"
 #include "runtime/shared_scene.hpp"

@@ -7,7 +7,6 @@
 #include <thread>
 
 #include "memory/child_process.hpp"
-#include "memory/ring/lane.hpp"
 #include "runtime/liar.hpp"
 #include "runtime/shared_scene.hpp"
 #include "runtime/station.hpp"

@@ -10,7 +10,7 @@
 
 #include "describe/table.hpp"
 #include "memory/child_process.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "runtime/frontend/loop_state.hpp"
 #include "runtime/station.hpp"

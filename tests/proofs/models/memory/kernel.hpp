@@ -6,7 +6,8 @@
 /// state in which everybody sleeps.
 
 #include "memory/ring/history.hpp"
-#include "memory/ring/lane.hpp"
+#include "memory/ring/lane_receiver.hpp"
+#include "memory/ring/lane_sender.hpp"
 #include "memory/segment/segment_layout.hpp"
 #include "memory/segment/signal.hpp"
 
