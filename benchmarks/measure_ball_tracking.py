@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 import o80
 from o80_devices.ball_tracking import Tracker, four_cameras
-from o80_devices.ball_tracking.image_source import ImageSource
-from o80_devices.ball_tracking.scene import Scene
-from o80_devices.ball_tracking.throws import FLIGHT, Throws
+from o80_devices.cameras.image_source import ImageSource
+from o80_devices.cameras.scene import Scene
+from o80_devices.cameras.throws import FLIGHT, Throws
 from sampling import rounds, sample, seconds
 
 RATE = 180.0

@@ -17,8 +17,8 @@ from typing import Any
 
 import o80
 from o80_devices.ball_launcher.launcher import Status
-from o80_devices.ball_tracking.newest_image import CameraReason
 from o80_devices.ball_tracking.server_messages import ServerReason
+from o80_devices.cameras.newest_image import CameraReason
 from o80_devices.fakes.qualisys import FakeQualisys
 from o80_devices.fakes.tracking_server import FakeTrackingServer, thrown
 from o80_devices.motion_capture import Reason

@@ -7,7 +7,7 @@ import pytest
 
 import o80
 from o80_devices.ball_tracking import SyntheticCameras
-from o80_devices.ball_tracking.ball_of_segment import BallOfSegment
+from o80_devices.cameras.ball_of_segment import BallOfSegment
 
 PERIOD = 2_000_000  # [ns]
 BALL = np.dtype([(name, float, (3,)) for name in ("position", "velocity", "spin")])

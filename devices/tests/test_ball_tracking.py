@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from o80_devices.ball_tracking import Reason, Tracker, four_cameras
 from o80_devices.ball_tracking.flight_track import Tracked
-from o80_devices.ball_tracking.scene import Scene
-from o80_devices.ball_tracking.throws import FLIGHT, PAUSE, FlyingBall, Throws
 from o80_devices.ball_tracking.tracker import TrackerOptions
+from o80_devices.cameras.scene import Scene
+from o80_devices.cameras.throws import FLIGHT, PAUSE, FlyingBall, Throws
 
 FloatArray = NDArray[np.float64]
 RATE = 180.0

@@ -14,13 +14,14 @@ from numpy.typing import NDArray
 
 import o80
 from o80.drivers import Reading
-from o80_devices.ball_tracking import Rig, calibrate, four_cameras
-from o80_devices.ball_tracking import lenses as lens_files
-from o80_devices.ball_tracking.board import Board, lens_of
-from o80_devices.ball_tracking.calibration import triangulated, without_place
-from o80_devices.ball_tracking.lenses import Lens
-from o80_devices.ball_tracking.scene import Scene
-from o80_devices.ball_tracking.waved_ball import WavedBall
+from o80_devices.ball_tracking import Rig, four_cameras
+from o80_devices.calibration import calibrate
+from o80_devices.calibration import lenses as lens_files
+from o80_devices.calibration.board import Board, lens_of
+from o80_devices.calibration.bundle import triangulated, without_place
+from o80_devices.calibration.lenses import Lens
+from o80_devices.calibration.waved_ball import WavedBall
+from o80_devices.cameras.scene import Scene
 
 pytestmark = pytest.mark.check  # needs OpenCV, which only `make check` installs
 
@@ -343,7 +344,7 @@ def test_a_picture_of_each_camera_is_saved(files: Files, cameras: str, tmp_path:
 def test_cameras_that_see_no_ball_are_told(
     files: Files, segment: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from o80_devices.ball_tracking import waved_ball
+    from o80_devices.calibration import waved_ball
 
     monkeypatch.setattr(ScriptedCameras, "shows", "nothing")
     monkeypatch.setattr(ScriptedCameras, "pictures", [np.zeros((480, 640, 3), np.uint8)])

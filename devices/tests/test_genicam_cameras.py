@@ -13,11 +13,12 @@ import pytest
 from exclusive import alone_with
 
 import o80
-from o80_devices.ball_tracking import GenicamCameras, aravis
-from o80_devices.ball_tracking.image_source import ImageSource
-from o80_devices.ball_tracking.newest_image import CameraReason, NewestImage
-from o80_devices.ball_tracking.pixel_formats import PixelFormat, rgb_of
-from o80_devices.ball_tracking.rig import Rig, RigCamera
+from o80_devices.ball_tracking import GenicamCameras
+from o80_devices.cameras import aravis
+from o80_devices.cameras.image_source import ImageSource
+from o80_devices.cameras.newest_image import CameraReason, NewestImage
+from o80_devices.cameras.pixel_formats import PixelFormat, rgb_of
+from o80_devices.cameras.rig import Rig, RigCamera
 
 WAIT = 60.0  # [s] longer than anything here takes
 ROBOT = o80.robots.load(GenicamCameras)
@@ -127,7 +128,7 @@ def test_a_camera_that_is_not_there_is_a_marked_gap_beside_another_one(
 
 
 def test_the_cameras_that_answer_are_listed(wire_camera: WireCamera) -> None:
-    command = [sys.executable, "-m", "o80_devices.ball_tracking.list_cameras"]
+    command = [sys.executable, "-m", "o80_devices.cameras.list_cameras"]
     end = time.monotonic() + WAIT
     while True:  # until it has started
         listed = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=True)

@@ -13,7 +13,7 @@ from o80_devices.ball_launcher import LAUNCH_MODEL, LaunchModel
 from o80_devices.ball_launcher.fit import SCALES, SCATTERS, TABLE, distances, fitted, halves, main
 from o80_devices.ball_launcher.fit import scatter as scatter_of
 from o80_devices.ball_launcher.recorded_shots import recorded_shots
-from o80_devices.ball_tracking.rig import Rig
+from o80_devices.cameras.rig import Rig
 
 ROOT = Path(__file__).resolve().parents[2]
 DATA = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data")) / "spin_2022"

@@ -8,9 +8,9 @@ import pytest
 
 import o80
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL
-from o80_devices.ball_tracking.rig import Table
 from o80_devices.ball_tracking.server_messages import ServerReason
 from o80_devices.ball_tracking.tracking_server import TrackingServer
+from o80_devices.cameras.rig import Table
 from o80_devices.fakes.ball_launcher import PLACE, YAW
 from o80_devices.fakes.launched_balls import SECOND, LaunchedBalls, TrackedLauncher
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import o80
-from o80_devices.ball_tracking.rig import four_cameras
 from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
 from o80_devices.ball_tracking.server_messages import (
     SECOND,
@@ -21,8 +20,9 @@ from o80_devices.ball_tracking.server_messages import (
     ServerReason,
     ServerTrack,
 )
-from o80_devices.ball_tracking.throws import Throws
 from o80_devices.ball_tracking.tracking_server import Options, TrackingServer
+from o80_devices.cameras.rig import four_cameras
+from o80_devices.cameras.throws import Throws
 from o80_devices.fakes.tracking_server import FakeTrackingServer, thrown
 
 PATIENCE = 60.0  # [s] longer than anything here takes on any machine

@@ -8,8 +8,8 @@ import pytest
 
 import o80
 from o80_devices.ball_tracking import BallTracker, Reason, VideoCameras, four_cameras
-from o80_devices.ball_tracking.scene import Scene
-from o80_devices.ball_tracking.throws import Throws
+from o80_devices.cameras.scene import Scene
+from o80_devices.cameras.throws import Throws
 
 pytestmark = pytest.mark.check  # needs OpenCV, which only `make check` installs
 

@@ -26,7 +26,7 @@ import o80
 from o80.errors import InvalidArgument
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.recorded_shots import Setting, Shot, recorded_shots
-from o80_devices.ball_tracking.rig import Rig, Table
+from o80_devices.cameras.rig import Rig, Table
 
 FloatArray = NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from o80.drivers import Reading, option
 from o80_devices.ball_tracking import colour
 from o80_devices.ball_tracking.ball_row import EXTENDED, UNITS, Reason
 from o80_devices.ball_tracking.flight_track import Tracked
-from o80_devices.ball_tracking.image_source import ImageSource
-from o80_devices.ball_tracking.rig import Rig, four_cameras
 from o80_devices.ball_tracking.tracker import Tracker, TrackerOptions
+from o80_devices.cameras.image_source import ImageSource
+from o80_devices.cameras.rig import Rig, four_cameras
 
 MOST_AHEAD = 4  # periods by which images may come before they are due, in all
 

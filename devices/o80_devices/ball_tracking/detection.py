@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80_devices import _vision
-from o80_devices.ball_tracking.rig import Rig
+from o80_devices.cameras.rig import Rig
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]

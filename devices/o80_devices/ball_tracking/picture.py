@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from o80.extras import needed
-from o80_devices.ball_tracking.rig import four_cameras
-from o80_devices.ball_tracking.scene import Scene
-from o80_devices.ball_tracking.throws import FLIGHT, Throws
 from o80_devices.ball_tracking.tracker import Tracker
+from o80_devices.cameras.rig import four_cameras
+from o80_devices.cameras.scene import Scene
+from o80_devices.cameras.throws import FLIGHT, Throws
 
 RATE = 180.0
 SHOWN = 0.55  # the moment whose images are drawn [s]

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from o80_devices.ball_tracking.ball_row import Reason
 from o80_devices.ball_tracking.flight_track import FlightTrack, Tracked
-from o80_devices.ball_tracking.rig import four_cameras
+from o80_devices.cameras.rig import four_cameras
 from o80_devices.clock import Capture, ClockMap
 
 FloatArray = NDArray[np.float64]

@@ -13,7 +13,7 @@ from o80_devices.ball_tracking import colour
 from o80_devices.ball_tracking.ball_row import Reason
 from o80_devices.ball_tracking.detection import Detector
 from o80_devices.ball_tracking.flight_track import FlightTrack, Tracked
-from o80_devices.ball_tracking.rig import Rig
+from o80_devices.cameras.rig import Rig
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]

@@ -9,8 +9,8 @@ from threading import Event, Lock, Thread
 import numpy as np
 
 from o80_devices.ball_launcher.launch_model import Launch
-from o80_devices.ball_tracking.rig import Rig, Table
 from o80_devices.ball_tracking.server_messages import Message
+from o80_devices.cameras.rig import Rig, Table
 from o80_devices.fakes.tracking_server import RATE, FakeTrackingServer
 
 SECOND = 1_000_000_000  # [ns]

@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 
 from o80_devices import zeromq
-from o80_devices.ball_tracking.rig import four_cameras
 from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
 from o80_devices.ball_tracking.server_messages import Message
-from o80_devices.ball_tracking.throws import Throws
+from o80_devices.cameras.rig import four_cameras
+from o80_devices.cameras.throws import Throws
 from o80_devices.fakes import numbers
 
 SECOND = 1_000_000_000  # [ns]

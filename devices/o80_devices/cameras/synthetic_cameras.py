@@ -8,10 +8,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from o80.drivers import Reading, Seed, option
-from o80_devices.ball_tracking.ball_of_segment import BallOfSegment
-from o80_devices.ball_tracking.rig import Rig, four_cameras
-from o80_devices.ball_tracking.scene import Scene
-from o80_devices.ball_tracking.throws import Throws
+from o80_devices.cameras.ball_of_segment import BallOfSegment
+from o80_devices.cameras.rig import Rig, four_cameras
+from o80_devices.cameras.scene import Scene
+from o80_devices.cameras.throws import Throws
 
 
 class SyntheticCameras:

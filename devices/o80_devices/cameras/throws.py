@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from o80_devices.ball_tracking.rig import Rig, Table
+from o80_devices.cameras.rig import Rig, Table
 
 FloatArray = NDArray[np.float64]
 

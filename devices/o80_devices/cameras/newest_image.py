@@ -10,8 +10,8 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from o80_devices.ball_tracking import aravis
-from o80_devices.ball_tracking.pixel_formats import rgb_of
+from o80_devices.cameras import aravis
+from o80_devices.cameras.pixel_formats import rgb_of
 from o80_devices.clock import Capture, ClockMap
 from o80_devices.trouble import Trouble
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 import o80
-from o80_devices.ball_tracking.throws import FlyingBall
+from o80_devices.cameras.throws import FlyingBall
 
 RETRY = 50_000_000
 """Between two attempts to attach [ns]."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
-from o80_devices.ball_tracking.rig import Rig, RigCamera
+from o80_devices.cameras.rig import Rig, RigCamera
 
 Image = NDArray[np.uint8]
 

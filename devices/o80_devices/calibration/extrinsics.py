@@ -8,20 +8,18 @@ images, then give the size and the frame of the world. Needs the extra `cameras`
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80.errors import InvalidArgument
-from o80_devices import _vision
-from o80_devices.ball_tracking.rig import RigCamera
-from o80_devices.ball_tracking.waved_ball import check_motion
-from o80_devices.ball_tracking.world_frame import in_world
+from o80_devices.calibration.bundle import adjusted, first_places, triangulated
+from o80_devices.calibration.waved_ball import check_motion
+from o80_devices.calibration.world_frame import in_world
+from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]
-LEAST_SHARED = 20
-"""Moments in which two cameras must see the waved ball together."""
 LEAST_DEPTH = 0.02
 """Extent of the waved ball's places in their thinnest direction, as a share of the widest."""
 
@@ -49,15 +47,13 @@ def places_from_ball(
         counts is seen by at least two cameras.
     Raises InvalidArgument, MissingExtra.
     """
-    from o80_devices.ball_tracking import bundle
-
     waved = np.asarray(waved, float)
     if waved.shape[1:] != (len(lenses), 2):
         raise InvalidArgument(
             f"waved must have the shape (moments, {len(lenses)}, 2), got {waved.shape}"
         )
     check_motion(lenses, waved)
-    cameras = bundle.adjusted(bundle.first_places(lenses, waved), waved)
+    cameras = adjusted(first_places(lenses, waved), waved)
     _check_depth(cameras, waved)
     marks = np.moveaxis(np.asarray(corner_pixels, float), 0, 1)
     seen = triangulated(cameras, marks)
@@ -96,20 +92,6 @@ def _check_corners(
         )
 
 
-def triangulated(cameras: Sequence[RigCamera], pixels: FloatArray) -> FloatArray:
-    """(n, cameras, 2) [px] => (n, 3) [m]; NaN where fewer than two cameras see the point."""
-    models = [camera.model() for camera in cameras]
-    points = np.full((len(pixels), 3), np.nan)
-    for i, row in enumerate(pixels):
-        seen = [(k, x, y, 0.0) for k, (x, y) in enumerate(row) if np.isfinite(x)]
-        if len(seen) < 2:
-            continue
-        found = _vision.locate(models, np.array(seen), tolerance=20.0, least=len(seen))
-        if found is not None:
-            points[i] = found[0]
-    return points
-
-
 def reprojection(cameras: Sequence[RigCamera], pixels: FloatArray) -> float:
     """Root mean square of the distances in the images [px], of points seen by two or more."""
     points = triangulated(cameras, pixels)
@@ -136,8 +118,3 @@ def left_out_distances(cameras: Sequence[RigCamera], pixels: FloatArray) -> Floa
     distances = np.concatenate(moved)
     kept: FloatArray = distances[np.isfinite(distances)]
     return kept
-
-
-def without_place(camera: RigCamera) -> RigCamera:
-    """The lens alone."""
-    return replace(camera, rotation=tuple(np.eye(3).ravel().tolist()), translation=(0.0, 0.0, 0.0))

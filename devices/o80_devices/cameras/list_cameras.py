@@ -1,11 +1,11 @@
-"""Lists the GenICam cameras that answer: python -m o80_devices.ball_tracking.list_cameras"""
+"""Lists the GenICam cameras that answer: python -m o80_devices.cameras.list_cameras"""
 
 from __future__ import annotations
 
 import sys
 
 import o80
-from o80_devices.ball_tracking import aravis
+from o80_devices.cameras import aravis
 
 
 def main() -> None:

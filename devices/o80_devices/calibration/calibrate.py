@@ -1,9 +1,9 @@
 """The command that calibrates a rig of cameras.
 
-python -m o80_devices.ball_tracking.calibrate lenses boards/ --board 9x6 --square 0.03
-python -m o80_devices.ball_tracking.calibrate pictures --segment video_cameras
-python -m o80_devices.ball_tracking.calibrate wave --segment video_cameras
-python -m o80_devices.ball_tracking.calibrate places --corners corners.json
+python -m o80_devices.calibration.calibrate lenses boards/ --board 9x6 --square 0.03
+python -m o80_devices.calibration.calibrate pictures --segment video_cameras
+python -m o80_devices.calibration.calibrate wave --segment video_cameras
+python -m o80_devices.calibration.calibrate places --corners corners.json
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ import numpy as np
 
 import o80
 from o80.errors import InvalidArgument, TimeoutError
-from o80_devices.ball_tracking import board as boards
-from o80_devices.ball_tracking import calibration, colour, lenses
-from o80_devices.ball_tracking.image_source import ImageSource
-from o80_devices.ball_tracking.rig import Rig, RigCamera
-from o80_devices.ball_tracking.table_corners import TableCorners
-from o80_devices.ball_tracking.waved_ball import BallFinder, WavedBall, collected
-from o80_devices.ball_tracking.world_frame import left_out_errors
+from o80_devices.ball_tracking import colour
+from o80_devices.calibration import board as boards
+from o80_devices.calibration import bundle, extrinsics, lenses
+from o80_devices.calibration.table_corners import TableCorners
+from o80_devices.calibration.waved_ball import BallFinder, WavedBall, collected
+from o80_devices.calibration.world_frame import left_out_errors
+from o80_devices.cameras.image_source import ImageSource
+from o80_devices.cameras.rig import Rig, RigCamera
 
 ATTACHING = 10.0
 """For the segment of the cameras to appear [s]."""
@@ -148,7 +149,7 @@ def calibrate_places(given: argparse.Namespace) -> None:
     corners = TableCorners.load(given.corners)
     pixels = corners.of(names)
     fit, held_out = waved.parts()
-    placed = calibration.places_from_ball(cameras, fit, corners.table.corners, pixels)
+    placed = extrinsics.places_from_ball(cameras, fit, corners.table.corners, pixels)
     rig = Rig(placed.cameras, table=corners.table)
     rig.check()
     tell_places(placed, held_out)
@@ -157,17 +158,17 @@ def calibrate_places(given: argparse.Namespace) -> None:
     print(f"written: {given.output}")
 
 
-def tell_places(placed: calibration.Calibrated, held_out: calibration.FloatArray) -> None:
+def tell_places(placed: extrinsics.Calibrated, held_out: extrinsics.FloatArray) -> None:
     print("camera                x [m]    y [m]    z [m]")
     for camera in placed.cameras:
         print("{:16} {:8.3f} {:8.3f} {:8.3f}".format(camera.name, *camera.place))
-    found = np.isfinite(calibration.triangulated(placed.cameras, held_out)).all(1).sum()
+    found = np.isfinite(bundle.triangulated(placed.cameras, held_out)).all(1).sum()
     print(f"reprojection of the moments that were fitted: {placed.residual:.3f} px")
     if found:
-        away = calibration.reprojection(placed.cameras, held_out)
+        away = extrinsics.reprojection(placed.cameras, held_out)
         print(f"reprojection of those that were held out:     {away:.3f} px")
     print(f"{len(held_out) - found} of {len(held_out)} held-out moments do not fit")
-    moved = 1e3 * calibration.left_out_distances(placed.cameras, held_out)
+    moved = 1e3 * extrinsics.left_out_distances(placed.cameras, held_out)
     if len(moved):
         mean, most = moved.mean(), np.percentile(moved, 95)
         print(f"a held-out place, with and without one of its cameras: {mean:.1f} mm apart")
@@ -175,9 +176,9 @@ def tell_places(placed: calibration.Calibrated, held_out: calibration.FloatArray
 
 
 def tell_corners(
-    cameras: Sequence[RigCamera], known: calibration.FloatArray, pixels: calibration.FloatArray
+    cameras: Sequence[RigCamera], known: extrinsics.FloatArray, pixels: extrinsics.FloatArray
 ) -> None:
-    seen = calibration.triangulated(cameras, np.moveaxis(pixels, 0, 1))
+    seen = bundle.triangulated(cameras, np.moveaxis(pixels, 0, 1))
     there = np.isfinite(seen).all(1)
     away = 1e3 * np.linalg.norm(seen - known, axis=1)[there]
     print(f"corners of the table: {away.mean():.1f} mm from where they are, at most", end=" ")
@@ -201,7 +202,7 @@ def two_numbers(text: str) -> tuple[int, int]:
 
 def parser() -> argparse.ArgumentParser:
     made = argparse.ArgumentParser(
-        prog="python -m o80_devices.ball_tracking.calibrate",
+        prog="python -m o80_devices.calibration.calibrate",
         description="Calibrates a rig of cameras: lenses, then pictures and wave, then places.",
     )
     steps = made.add_subparsers(required=True, metavar="STEP")

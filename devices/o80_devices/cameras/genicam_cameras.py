@@ -10,9 +10,9 @@ import numpy as np
 
 from o80.drivers import Desired, Reading, option
 from o80.errors import InvalidArgument
-from o80_devices.ball_tracking import aravis
-from o80_devices.ball_tracking.newest_image import Arrivals, CameraReason, NewestImage
-from o80_devices.ball_tracking.pixel_formats import PixelFormat
+from o80_devices.cameras import aravis
+from o80_devices.cameras.newest_image import Arrivals, CameraReason, NewestImage
+from o80_devices.cameras.pixel_formats import PixelFormat
 from o80_devices.motion_capture.frame_pace import FramePace
 
 SECOND = 1_000_000_000  # [ns]
@@ -51,7 +51,7 @@ class GenicamCameras:
         if not self._sources:
             raise InvalidArgument(
                 "name the cameras: --sources 192.168.0.11,192.168.0.12 (`python -m "
-                "o80_devices.ball_tracking.list_cameras` lists them; Fake_1 needs no camera)"
+                "o80_devices.cameras.list_cameras` lists them; Fake_1 needs no camera)"
             )
         if len(set(self._sources)) < len(self._sources):
             raise InvalidArgument(f"a camera is named twice: --sources {config.sources}")

@@ -13,15 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80.errors import InvalidArgument, TimeoutError
-from o80_devices.ball_tracking.board import (
+from o80_devices.calibration.board import (
     LEAST_PICTURES,
     Board,
     board_reprojection,
     lens_of,
     picture,
 )
-from o80_devices.ball_tracking.image_source import ImageSource
-from o80_devices.ball_tracking.rig import RigCamera
+from o80_devices.cameras.image_source import ImageSource
+from o80_devices.cameras.rig import RigCamera
 
 FORMAT = "o80-ball-lenses-1"
 FloatArray = NDArray[np.float64]

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from o80_devices.ball_tracking.rig import Rig, Table
+from o80_devices.cameras.rig import Rig, Table
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]

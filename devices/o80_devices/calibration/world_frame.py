@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80.errors import InvalidArgument
-from o80_devices.ball_tracking.rig import RigCamera
+from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]
 WORST_FIT = 0.02

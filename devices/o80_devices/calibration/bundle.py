@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,11 +11,13 @@ from numpy.typing import NDArray
 
 from o80.errors import InvalidArgument
 from o80.extras import needed
-from o80_devices.ball_tracking import calibration
-from o80_devices.ball_tracking.board import PURPOSE
-from o80_devices.ball_tracking.rig import RigCamera
+from o80_devices import _vision
+from o80_devices.calibration.board import PURPOSE
+from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]
+LEAST_SHARED = 20
+"""Moments in which two cameras must see the waved ball together."""
 
 
 def first_places(lenses: Sequence[RigCamera], waved: FloatArray) -> list[RigCamera]:
@@ -24,7 +27,7 @@ def first_places(lenses: Sequence[RigCamera], waved: FloatArray) -> list[RigCame
     have found (perspective of n points).
     """
     cv2: Any = needed("cv2", "cameras", PURPOSE, package="o80-devices")
-    flat = [calibration.without_place(lens) for lens in lenses]
+    flat = [without_place(lens) for lens in lenses]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(waved).all(-1))
     shared = seen.T.astype(int) @ seen.astype(int)
     np.fill_diagonal(shared, 0)
@@ -38,7 +41,7 @@ def first_places(lenses: Sequence[RigCamera], waved: FloatArray) -> list[RigCame
 
     while len(placed) < len(lenses):
         known = sorted(placed)
-        points = calibration.triangulated([placed[k] for k in known], waved[:, known])
+        points = triangulated([placed[k] for k in known], waved[:, known])
         found = np.isfinite(points).all(1)
         counts = {k: int((found & seen[:, k]).sum()) for k in range(len(lenses)) if k not in placed}
         following = max(counts, key=lambda k: counts[k])
@@ -56,10 +59,10 @@ def first_places(lenses: Sequence[RigCamera], waved: FloatArray) -> list[RigCame
 
 
 def _enough(lenses: Sequence[RigCamera], a: int, b: int, count: int) -> None:
-    if count < calibration.LEAST_SHARED:
+    if count < LEAST_SHARED:
         raise InvalidArgument(
             f"{lenses[a].name} and {lenses[b].name} see the ball together in {count} moments, "
-            f"{calibration.LEAST_SHARED} are needed: wave it where both see it"
+            f"{LEAST_SHARED} are needed: wave it where both see it"
         )
 
 
@@ -77,7 +80,7 @@ def adjusted(cameras: Sequence[RigCamera], waved: FloatArray) -> list[RigCamera]
     rotations: Any = needed(
         "scipy.spatial.transform", "cameras", PURPOSE, package="o80-devices"
     ).Rotation
-    points = calibration.triangulated(cameras, waved)
+    points = triangulated(cameras, waved)
     used = np.isfinite(points).all(1)
     points, waved = points[used], waved[used]
     seen: NDArray[np.bool_] = np.asarray(np.isfinite(waved).all(-1))
@@ -115,3 +118,22 @@ def adjusted(cameras: Sequence[RigCamera], waved: FloatArray) -> list[RigCamera]
         residuals, begin, jac_sparsity=rows, x_scale="jac", loss="soft_l1", max_nfev=60, ftol=1e-7
     )
     return placed(found.x)
+
+
+def triangulated(cameras: Sequence[RigCamera], pixels: FloatArray) -> FloatArray:
+    """(n, cameras, 2) [px] => (n, 3) [m]; NaN where fewer than two cameras see the point."""
+    models = [camera.model() for camera in cameras]
+    points = np.full((len(pixels), 3), np.nan)
+    for i, row in enumerate(pixels):
+        seen = [(k, x, y, 0.0) for k, (x, y) in enumerate(row) if np.isfinite(x)]
+        if len(seen) < 2:
+            continue
+        found = _vision.locate(models, np.array(seen), tolerance=20.0, least=len(seen))
+        if found is not None:
+            points[i] = found[0]
+    return points
+
+
+def without_place(camera: RigCamera) -> RigCamera:
+    """The lens alone."""
+    return replace(camera, rotation=tuple(np.eye(3).ravel().tolist()), translation=(0.0, 0.0, 0.0))

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from o80.errors import InvalidArgument, TimeoutError
 from o80_devices import _vision
 from o80_devices.ball_tracking import colour
-from o80_devices.ball_tracking.image_source import ImageSource
-from o80_devices.ball_tracking.rig import RigCamera
+from o80_devices.cameras.image_source import ImageSource
+from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from o80.errors import InvalidArgument
 from o80.extras import needed
-from o80_devices.ball_tracking.rig import RigCamera
+from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]
