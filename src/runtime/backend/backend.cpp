@@ -1,14 +1,12 @@
 #include "o80/runtime/backend.hpp"
 
 #include <algorithm>
-#include <cassert>
 #include <cstring>
 #include <limits>
 #include <memory>
 #include <string>
 
 #include "base/crash_point.hpp"
-#include "describe/number_name.hpp"
 #include "runtime/backend/backend_body.hpp"
 #include "runtime/backend/backend_options.hpp"
 #include "runtime/journal/recorded_decisions.hpp"
@@ -75,11 +73,17 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
   for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
 }
 
-// ------------------------------------------------------------------------------ state
+// ------------------------------------------------------------------------------ state and time
 
-void UntypedBackend::Body::enter(Phase next) noexcept {
-  assert(may_follow(next, phase));
-  phase = next;
+/// True in a child that was forked since: the robot and the segment belong to its parent.
+bool UntypedBackend::Body::is_in_forked_child() noexcept {
+  if (!guard_.forked()) return false;
+  note_failure("this process was forked: the backend belongs to its parent");
+  return true;
+}
+
+std::int64_t UntypedBackend::Body::real_time() const noexcept {
+  return recorded_ == nullptr ? monotonic_now() : recorded_->time(current);
 }
 
 // ------------------------------------------------------------------------------ step
@@ -116,7 +120,7 @@ Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
 }
 
 /// Batches => queues, within the budget of an iteration; none during a burst.
-inline void UntypedBackend::Body::take_commands() noexcept {
+void UntypedBackend::Body::take_commands() noexcept {
   share_ = {};
   if (burst_.runs()) return;
   take_due();
@@ -178,34 +182,6 @@ Step UntypedBackend::Body::brake() noexcept {
 
 // ------------------------------------------------------------------------------ publish
 
-std::int64_t UntypedBackend::Body::real_time() const noexcept {
-  return recorded_ == nullptr ? monotonic_now() : recorded_->time(current);
-}
-
-/// Finds NaN or infinity in the first reading or in a fresh start, which are refused because no
-/// command could start from there. True if there is one; `why` names the first.
-bool UntypedBackend::Body::name_not_finite(const std::byte* states, std::string_view what,
-                                           ShortText<248>& why) const noexcept {
-  const std::optional<NotFinite> found = controller.not_finite(states);
-  if (!found) return false;
-  name_number(schema, found->actuator, found->number, why);
-  why.add(" is NaN or infinite in ").add(what);
-  return true;
-}
-
-bool UntypedBackend::Body::can_begin(const std::byte* states, std::string_view what) noexcept {
-  ShortText<248> why;
-  if (name_not_finite(states, what, why)) note_failure(why.view());
-  return why.view().empty();
-}
-
-/// True in a child that was forked since: the robot and the segment belong to its parent.
-bool UntypedBackend::Body::is_in_forked_child() noexcept {
-  if (!guard_.forked()) return false;
-  note_failure("this process was forked: the backend belongs to its parent");
-  return true;
-}
-
 bool UntypedBackend::Body::publish_first() noexcept {
   if (!can_begin(row() + layout.observed, "the first reading")) return false;
   if (!agrees_with_first()) return false;
@@ -241,7 +217,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
 }
 
 /// Adds head, desired states and masks: observed and extended are in the row already.
-inline void UntypedBackend::Body::fill_row(bool fresh) noexcept {
+void UntypedBackend::Body::fill_row(bool fresh) noexcept {
   RowHead head;
   head.iteration = current;
   head.time = time();
@@ -264,7 +240,7 @@ inline void UntypedBackend::Body::fill_row(bool fresh) noexcept {
 }
 
 /// Row => halts: error limits, readings, gaps.
-inline void UntypedBackend::Body::watch_row(bool fresh) noexcept {
+void UntypedBackend::Body::watch_row(bool fresh) noexcept {
   // before a fresh start the robot may be away from its desired states
   if (!errors_.empty() && has_begun() && !fresh && !will_start_afresh()) watch_errors();
   watch_readings();
@@ -273,7 +249,7 @@ inline void UntypedBackend::Body::watch_row(bool fresh) noexcept {
 }
 
 /// Reports the statuses that belong to the row, and counts the iteration of a burst.
-inline void UntypedBackend::Body::end_iteration() noexcept {
+void UntypedBackend::Body::end_iteration() noexcept {
   outbox_.report_row();
   controller.finish_pending();
   if (phase == Phase::iterating) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cassert>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -150,7 +151,10 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
  private:
   // an iteration, in the order of its stages
-  void enter(Phase next) noexcept;
+  void enter(Phase next) noexcept {
+    assert(may_follow(next, phase));
+    phase = next;
+  }
   bool is_under_way() const noexcept {
     return phase == Phase::iterating || phase == Phase::braking;
   }
@@ -161,13 +165,13 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
     watch_halt();
     start_afresh_after_request();
   }
-  void take_commands() noexcept;
+  inline void take_commands() noexcept;
   bool wait_for_burst(std::int64_t give_up, std::uint32_t& scans) noexcept;
   void begin_iteration_of_burst(bool first) noexcept;
   void move(Phase under_way) noexcept;
-  void fill_row(bool fresh) noexcept;
-  void watch_row(bool fresh) noexcept;
-  void end_iteration() noexcept;
+  inline void fill_row(bool fresh) noexcept;
+  inline void watch_row(bool fresh) noexcept;
+  inline void end_iteration() noexcept;
   std::int64_t real_time() const noexcept;
 
   // batches => controller

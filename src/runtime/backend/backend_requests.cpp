@@ -2,6 +2,7 @@
 
 #include <cstring>
 
+#include "describe/number_name.hpp"
 #include "o80/describe/describe.hpp"
 #include "runtime/backend/backend_body.hpp"
 #include "runtime/journal/recorded_decisions.hpp"
@@ -129,6 +130,23 @@ Outcome UntypedBackend::Body::begin_afresh(std::uint32_t lane,
 }
 
 // ------------------------------------------------------------------------------ readings
+
+/// Finds NaN or infinity in the first reading or in a fresh start, which are refused because no
+/// command could start from there. True if there is one; `why` names the first.
+bool UntypedBackend::Body::name_not_finite(const std::byte* states, std::string_view what,
+                                           ShortText<248>& why) const noexcept {
+  const std::optional<NotFinite> found = controller.not_finite(states);
+  if (!found) return false;
+  name_number(schema, found->actuator, found->number, why);
+  why.add(" is NaN or infinite in ").add(what);
+  return true;
+}
+
+bool UntypedBackend::Body::can_begin(const std::byte* states, std::string_view what) noexcept {
+  ShortText<248> why;
+  if (name_not_finite(states, what, why)) note_failure(why.view());
+  return why.view().empty();
+}
 
 void UntypedBackend::Body::keep_reading() noexcept {
   if (layout.block > 0) std::memcpy(last_row_.data(), row() + layout.observed, layout.block);
