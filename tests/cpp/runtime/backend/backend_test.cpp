@@ -339,6 +339,29 @@ TEST_F(BackendTest, RepeatsARestoredRunBitForBit) {
   }
 }
 
+TEST_F(BackendTest, ItsPhaseFollowsStepPublishBrakeAndEnd) {
+  Station station;
+  UntypedBackend& backend = station.backend;
+  Phase at_publish = Phase::ready;
+  station.before_publish = [&] { at_publish = backend.phase(); };
+  EXPECT_EQ(backend.phase(), Phase::starting);
+  station.start();
+  EXPECT_EQ(backend.phase(), Phase::ready);
+  UntypedFrontend frontend("pair");
+  send(frontend, 0, 1.0, {.pace = iterations(9)});
+  station.run(1);
+  EXPECT_EQ(at_publish, Phase::iterating);
+  EXPECT_EQ(backend.phase(), Phase::ready);
+  EXPECT_EQ(backend.brake(), Step::run);
+  EXPECT_EQ(backend.phase(), Phase::braking);
+  EXPECT_TRUE(backend.publish());
+  EXPECT_EQ(backend.phase(), Phase::stopping);
+  EXPECT_EQ(backend.brake(), Step::ended);
+  backend.end(BackendState::stopped);
+  EXPECT_EQ(backend.phase(), Phase::ended);
+  EXPECT_EQ(backend.try_step(), Step::ended);
+}
+
 TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {
   auto station = std::make_unique<Station>();
   station->start();
