@@ -79,7 +79,7 @@ enum class Step : std::uint8_t {
   ended      // the backend must end: see stop_asked() and failure()
 };
 
-/// What a backend is doing. See ARCHITECTURE.md, The state of a backend.
+/// Phase of a backend: its place between start and end. See ARCHITECTURE.md, The state of a backend.
 enum class Phase : std::uint8_t {
   starting,    // row 0 is not published yet
   ready,       // between two iterations
@@ -160,7 +160,7 @@ class UntypedBackend {
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept;
   /// One bit for each actuator: it comes to rest within its limits, without a command.
   const std::uint64_t* braking() const noexcept;
-  /// What it is doing; for the thread of the loop.
+  /// Phase of the backend. For the thread of the loop.
   Phase phase() const noexcept;
   /// The current iteration; 0 before the first `step`.
   Iteration iteration() const noexcept;

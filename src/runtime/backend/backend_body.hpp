@@ -69,7 +69,7 @@ constexpr bool may_follow(Phase next, Phase now) noexcept {
   return false;
 }
 
-/// What this backend has done about the halt in force.
+/// Progress of the halt in force.
 enum class HaltStage : std::uint8_t {
   none,         // none is in force
   unexplained,  // the driver has halted; the requester has not written its reason yet
