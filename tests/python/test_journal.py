@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import o80
-from o80.journal import Journal, JournalEntry
+from o80.rows.journal import Journal, JournalEntry
 
 WAIT = 30.0  # [s] longer than any wait should take
 

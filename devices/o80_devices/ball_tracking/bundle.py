@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.extras import needed
 from o80.errors import InvalidArgument
-from o80.extras import needed
 from o80_devices.ball_tracking import calibration
 from o80_devices.ball_tracking.board import PURPOSE
 from o80_devices.ball_tracking.rig import RigCamera

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from o80.extras import needed
+from o80.base.extras import needed
 from o80_devices.ball_tracking.rig import four_cameras
 from o80_devices.ball_tracking.scene import Scene
 from o80_devices.ball_tracking.throws import FLIGHT, Throws

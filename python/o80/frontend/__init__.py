@@ -16,7 +16,3 @@
 Methods under `if TYPE_CHECKING` are compiled, because programs call them thousands of times a
 second. The build takes their signatures and docstrings from there (python/bindings/verbs.py).
 """
-
-from o80.frontend.frontend import Frontend
-
-__all__ = ["Frontend"]

@@ -5,13 +5,13 @@ from typing import Literal, overload
 
 import numpy as np
 
-from o80 import _core
-from o80.enumerations import labelled
-from o80.errors import NotBursting
+import o80._core as _core
+from o80.base.errors import NotBursting
+from o80.base.words import LateWord, ModeWord, ProfileWord, StartWord
 from o80.frontend.moving import Moving
 from o80.prepared_burst import PreparedBurst, checked_count
-from o80.trajectory import common_labels, common_type
-from o80.words import LateWord, ModeWord, ProfileWord, StartWord
+from o80.rows.enumerations import labelled
+from o80.rows.targets import common_labels, common_type
 
 
 class Bursting(Moving):

@@ -7,17 +7,17 @@ from typing import TYPE_CHECKING, Any, SupportsIndex
 
 import numpy as np
 
-from o80 import _core
-from o80.errors import BackendHalted, InvalidArgument, RequestRejected, TimeoutError
+import o80._core as _core
+from o80.base.errors import BackendHalted, InvalidArgument, RequestRejected, TimeoutError
+from o80.base.words import Status
 from o80.frontend.observing import Observing
-from o80.trajectory import states_of, times_of
-from o80.words import Status
+from o80.rows.targets import states_of, times_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
-    from o80.running_request import RunningRequest
-    from o80.words import LateWord, ModeWord, ProfileWord, StartWord
+    from o80.base.words import LateWord, ModeWord, ProfileWord, StartWord
+    from o80.frontend.running_request import RunningRequest
 
 
 class Commanding(Observing):
@@ -232,6 +232,6 @@ class Commanding(Observing):
     @property
     def running_requests(self) -> list[RunningRequest]:
         """The requests that take time and have not ended, oldest first, whoever sent them."""
-        from o80.running_request import RunningRequest
+        from o80.frontend.running_request import RunningRequest
 
         return [RunningRequest(*fields) for fields in self._running_requests]

@@ -3,7 +3,7 @@
 from contextlib import AbstractContextManager
 from typing import Self, cast
 
-from o80 import _core
+import o80._core as _core
 from o80.frontend.bursting import Bursting
 
 

@@ -8,14 +8,14 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from o80 import _core
-from o80.cached import cached
-from o80.layout import Layout
+import o80._core as _core
+from o80.base.cached import cached
+from o80.rows.layout import Layout
 
 if TYPE_CHECKING:
-    from o80.actuator import Actuator
-    from o80.provenance import Provenance
-    from o80.words import LifeWord
+    from o80.base.words import LifeWord
+    from o80.rows.actuators import Actuator
+    from o80.rows.provenance import Provenance
 
 
 class Describing(_core.Frontend):
@@ -60,7 +60,7 @@ class Describing(_core.Frontend):
     @property
     def provenance(self) -> Provenance:
         """How the backend was started: options, versions, and the offset to the wall clock."""
-        from o80.provenance import Provenance
+        from o80.rows.provenance import Provenance
 
         return Provenance.from_fields(_core.provenance_fields(self))
 
@@ -78,8 +78,8 @@ class Describing(_core.Frontend):
     @cached
     def actuators(self) -> list[Actuator]:
         """The actuators: index, name, unit, limits."""
-        from o80.actuator import actuators_of
-        from o80.tables import Actuators
+        from o80.rows.actuators import actuators_of
+        from o80.rows.tables import Actuators
 
         return Actuators(actuators_of(self.schema), self.schema)
 

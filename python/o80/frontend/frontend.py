@@ -6,15 +6,17 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, cast
 
-from o80 import _core, at_exit, frontend_classes
-from o80.cached import cached
-from o80.errors import Error, InvalidArgument, SchemaMismatch, UsedAfterFork
+import o80._core as _core
+from o80.base import shutdown
+from o80.base.cached import cached
+from o80.base.errors import Error, InvalidArgument, SchemaMismatch, UsedAfterFork
+from o80.base.words import OnErrorWord
+from o80.frontend import frontend_classes
 from o80.frontend.halting import Halting
-from o80.layout import Layout
-from o80.words import OnErrorWord
+from o80.rows.layout import Layout
 
 if TYPE_CHECKING:
-    from o80.aio import Waits
+    from o80.frontend.aio import Waits
 
 
 class Frontend(Halting):
@@ -87,12 +89,12 @@ class Frontend(Halting):
         super().__init__(attachment, self._decoder)
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
         self._is_set_up = True
-        at_exit.close_later(self)
+        shutdown.close_later(self)
 
     @cached
     def aio(self) -> "Waits":
         """The waiting methods as asyncio coroutines: `await arm.aio.wait_for_next()`."""
-        from o80.aio import Waits  # here, because most programs do not need asyncio
+        from o80.frontend.aio import Waits  # here, because most programs do not need asyncio
 
         return Waits(self)
 

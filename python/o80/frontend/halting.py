@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from o80.checked import whole
+from o80.base.argument_checks import whole
 from o80.frontend.controlling import Controlling
 
 if TYPE_CHECKING:
-    from o80.halts import Halt
+    from o80.frontend.halts import Halt
 
 
 class Halting(Controlling):
@@ -35,7 +35,7 @@ class Halting(Controlling):
         fields = self._halted
         if fields is None:
             return None
-        from o80.halts import Halt
+        from o80.frontend.halts import Halt
 
         number, cause, iteration, who, text = fields
         return Halt(number, cause, None if iteration < 0 else iteration, who, text)

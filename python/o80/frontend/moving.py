@@ -3,9 +3,9 @@
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any, SupportsIndex, TypeAlias
 
-from o80 import _core
+import o80._core as _core
+from o80.base.words import ModeWord, ProfileWord, StartWord
 from o80.frontend.previewing import Previewing
-from o80.words import ModeWord, ProfileWord, StartWord
 
 #: A number, a mapping from fields to numbers, or one of these for each actuator.
 Tolerance: TypeAlias = float | Mapping[str, Any] | Sequence[float | Mapping[str, Any]]

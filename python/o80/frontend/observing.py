@@ -4,13 +4,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from o80 import _core
-from o80.checked import whole
-from o80.errors import Error
+import o80._core as _core
+from o80.base.argument_checks import whole
+from o80.base.errors import Error
 from o80.frontend.watching import Watching
-from o80.history import History
-from o80.selection import Selection
-from o80.states import States
+from o80.rows.history import History
+from o80.rows.selection import Selection
+from o80.rows.states import States
 
 
 class Observing(Watching):

@@ -10,8 +10,8 @@ import numpy as np
 from o80.frontend.commanding import Commanding
 
 if TYPE_CHECKING:
-    from o80.preview import Preview
-    from o80.words import ProfileWord, StartWord
+    from o80.base.words import ProfileWord, StartWord
+    from o80.frontend.preview import Preview
 
 
 class Previewing(Commanding):
@@ -64,6 +64,6 @@ class Previewing(Commanding):
             every,
         )
         rows = np.frombuffer(desired, np.dtype([("desired", self._layout.states)]))
-        from o80.preview import Preview
+        from o80.frontend.preview import Preview
 
         return Preview(len(rows), late, text, self._layout.many(rows, "desired"))

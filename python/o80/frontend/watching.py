@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from o80 import _core
+import o80._core as _core
 from o80.frontend.describing import Describing
 
 if TYPE_CHECKING:
-    from o80.journal import JournalEntry
+    from o80.rows.journal import JournalEntry
 
 
 class Watching(Describing):
@@ -22,7 +22,7 @@ class Watching(Describing):
 
         Also for a read-only frontend, and after the end of the backend. Raises Closed.
         """
-        from o80.journal import Journal  # late: most processes that attach never ask
+        from o80.rows.journal import Journal  # late: most processes that attach never ask
 
         return Journal(self, since).read()
 

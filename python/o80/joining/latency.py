@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.columns import Column, values_of
-from o80.errors import Error, InvalidArgument
-from o80.history import History
-from o80.joining.norm import columns_below
-from o80.joining.picked import NANOSECOND
+from o80.base.errors import Error, InvalidArgument
+from o80.joining.field_norm import columns_below
+from o80.joining.row_selection import NANOSECOND
 from o80.joining.sources import Timed, timed
+from o80.rows.columns import Column, values_of
+from o80.rows.history import History
 
 if TYPE_CHECKING:
     from o80.joining.sources import Source

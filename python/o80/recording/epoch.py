@@ -9,18 +9,18 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.errors import RecordingError
-from o80.machine import this_machine
+from o80.base.errors import RecordingError
+from o80.base.machine import this_machine
 from o80.recording.blocks import Block
 from o80.recording.joint_states import JointWriter
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import PACKAGE, row_type
 
 if TYPE_CHECKING:
-    from o80.frontend import Frontend
-    from o80.layout import Layout
+    from o80.frontend.frontend import Frontend
     from o80.recording.file_writer import FileWriter
     from o80.recording.scan import Scan
+    from o80.rows.layout import Layout
 
 DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""

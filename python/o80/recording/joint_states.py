@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.layout import Layout, is_plain
 from o80.recording.blocks import Block
 from o80.recording.message_plan import ENCAPSULATION
+from o80.rows.layout import Layout, is_plain
 
 if TYPE_CHECKING:
     from o80.recording.epoch import EpochNote

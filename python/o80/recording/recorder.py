@@ -8,13 +8,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from o80.errors import Error, InvalidArgument, RecordingError
+from o80.base.errors import Error, InvalidArgument, RecordingError
+from o80.frontend.segments import segments
 from o80.recording.marks import Mark, add_mark
 from o80.recording.output import Predecessor, next_file, opened, opened_in
 from o80.recording.reader import files_of
 from o80.recording.source import Source
 from o80.recording.split import Split
-from o80.segment_list import segments
 
 BETWEEN_SEARCHES = 0.5  # for segments that match a pattern [s]
 

@@ -4,9 +4,9 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 
-from o80 import _core
-from o80.errors import BackendGone, RecordingError, SegmentError, TimeoutError
-from o80.frontend import Frontend
+import o80._core as _core
+from o80.base.errors import BackendGone, RecordingError, SegmentError, TimeoutError
+from o80.frontend.frontend import Frontend
 from o80.recording.blocks import Block, SingleMessage
 from o80.recording.epoch import GAP, RowWriter, note_of
 from o80.recording.file_writer import FileWriter, MessageBlock

@@ -4,7 +4,7 @@ import math
 import time
 from dataclasses import dataclass
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 
 _BYTES = {"k": 1e3, "M": 1e6, "G": 1e9}
 _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from o80 import _core
+import o80._core as _core
 from o80.replaying.motion_rules import MotionRules
 from o80.replaying.start import SlotsKept, Start
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from o80 import _core
+    import o80._core as _core
 
 
 @dataclass(frozen=True)

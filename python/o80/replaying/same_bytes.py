@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.columns import columns_of
-from o80.difference import OF_THE_CLOCK
+from o80.joining.difference import OF_THE_CLOCK
+from o80.rows.columns import columns_of
 
 if TYPE_CHECKING:
-    from o80.history import History
+    from o80.rows.history import History
 
 
 def same_bytes(one: History, other: History) -> bool:

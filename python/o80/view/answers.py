@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-import o80
-from o80.history import History
+from o80.base.errors import Error, InvalidArgument, ReadOnly
+from o80.frontend.frontend import Frontend
+from o80.frontend.halts import halt as halt_backend
+from o80.rows.history import History
+from o80.view.answer_cache import Kept
 from o80.view.curves import Panels
-from o80.view.kept import Kept
 from o80.view.scene import Scene
 from o80.view.source import NothingToShow, Source
 from o80.view.source_list import SourceList
@@ -87,17 +89,17 @@ class Answers:
         """Halts a live segment."""
         source = self._live(asked)
         reason = str(asked.get("reason", ""))[:LONGEST_REASON] or "from o80 view"
-        return {"halt": o80.halt(source.name, reason)}
+        return {"halt": halt_backend(source.name, reason)}
 
     def resume(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Clears a halt; only with --control."""
         source = self._live(asked)
         if not self._control:
-            raise o80.ReadOnly(
+            raise ReadOnly(
                 f"this view does not control: start it with --control, or use "
                 f"`o80 resume {source.name}`"
             )
-        with o80.Frontend(source.name, 1.0) as frontend:
+        with Frontend(source.name, 1.0) as frontend:
             frontend.resume(int(asked["number"]), timeout=5.0)
         return {}
 
@@ -106,7 +108,7 @@ class Answers:
         for source in self._sources.now():
             if source.live and source.name == asked.get("segment"):
                 return source
-        raise o80.InvalidArgument(f"this view does not show a segment {asked.get('segment')!r}")
+        raise InvalidArgument(f"this view does not show a segment {asked.get('segment')!r}")
 
 
 class _Shown:
@@ -121,7 +123,7 @@ class _Shown:
         if "model" in schema:
             try:
                 self.scene = Scene(schema, source.model, trusted=source.trusted)
-            except o80.Error as error:
+            except Error as error:
                 self.no_scene = str(error)
 
     def introduction(self, source: Source) -> dict[str, Any]:
@@ -187,7 +189,7 @@ def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
 def _has_model(source: Source) -> bool:
     try:
         return "model" in source.schema
-    except o80.Error:
+    except Error:
         return False
 
 

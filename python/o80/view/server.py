@@ -12,7 +12,7 @@ import socket
 from collections.abc import Callable, Mapping
 from typing import Any
 
-import o80
+from o80.base.errors import Error
 from o80.view.gate import Gate
 from o80.view.guard import ANY, Guard
 from o80.view.head import Head
@@ -25,7 +25,7 @@ Answer = Callable[[dict[str, Any]], dict[str, Any]]
 
 
 class PageServer:
-    """Serves one page and its requests, given by path. Raises o80.Error if the port is taken."""
+    """Serves one page and its requests, given by path. Raises Error if the port is taken."""
 
     def __init__(self, host: str, port: int, answers: Mapping[str, Answer]) -> None:
         listener = _listen(host, port)
@@ -67,7 +67,7 @@ class PageServer:
             return Reply(400, b"the request must be a JSON object")
         try:
             return Reply.json(200, answer(asked))
-        except o80.Error as error:
+        except Error as error:
             return Reply.json(409, {"error": str(error)})
         except (TypeError, ValueError, KeyError, OverflowError) as error:
             return Reply.json(400, {"error": f"invalid request: {error}"})
@@ -87,7 +87,7 @@ def _listen(host: str, port: int) -> socket.socket:
             listener.close()
             raise
     except (OSError, OverflowError, UnicodeError) as error:
-        raise o80.Error(_why_not(host, port, error)) from error
+        raise Error(_why_not(host, port, error)) from error
     return listener
 
 
