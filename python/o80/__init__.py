@@ -62,13 +62,14 @@ if TYPE_CHECKING:
     from o80.drivers.backend import Backend as Backend
     from o80.drivers.backend import Running as Running
     from o80.drivers.backend import StartAfresh as StartAfresh
-    from o80.frontend.first import wait_for_first as wait_for_first
     from o80.frontend.frontend import Frontend as Frontend
-    from o80.frontend.frontend_classes import register_frontend as register_frontend
-    from o80.frontend.halts import Halt as Halt
-    from o80.frontend.halts import halt as halt
-    from o80.frontend.preview import Preview as Preview
-    from o80.frontend.running_request import RunningRequest as RunningRequest
+    from o80.frontend.frontend import register_frontend as register_frontend
+    from o80.frontend.frontend import wait_for_first as wait_for_first
+    from o80.frontend.reader import Journal as Journal
+    from o80.frontend.results import Halt as Halt
+    from o80.frontend.results import Preview as Preview
+    from o80.frontend.results import RunningRequest as RunningRequest
+    from o80.frontend.results import halt as halt
     from o80.frontend.segments import Segment as Segment
     from o80.frontend.segments import clean as clean
     from o80.frontend.segments import segments as segments
@@ -95,7 +96,6 @@ if TYPE_CHECKING:
     from o80.rows.actuators import Actuator as Actuator
     from o80.rows.actuators import Number as Number
     from o80.rows.history import History as History
-    from o80.rows.journal import Journal as Journal
     from o80.rows.journal import JournalCommand as JournalCommand
     from o80.rows.journal import JournalEntry as JournalEntry
     from o80.rows.limits import IntegralBounds as IntegralBounds
@@ -113,27 +113,24 @@ else:  # a type checker that read this would accept every name
         "drivers.backend": "Backend Running StartAfresh",
         "burst_group": "BurstGroup burst",
         "chained_burst": "ChainedBurst",
-        "frontend.first": "wait_for_first",
-        "frontend.frontend": "Frontend",
-        "frontend.frontend_classes": "register_frontend",
-        "frontend.halts": "Halt halt",
+        "frontend.frontend": "Frontend register_frontend wait_for_first",
+        "frontend.reader": "Journal",
+        "frontend.results": "Halt Preview RunningRequest halt",
         "rows.history": "History",
         "inline_group": "Gather Gathered GroupBurst GroupRequest InlineGroup",
         "base.installation": "prefix",
         "joining.align": "Aligned AlignedHistory align",
         "joining.latency": "Latency latency",
-        "rows.journal": "Journal JournalCommand JournalEntry",
+        "rows.journal": "JournalCommand JournalEntry",
         "rows.limits": "IntegralBounds Limits",
         "playing.playback": "Playback play",
         "prepared_burst": "PreparedBurst",
-        "frontend.preview": "Preview",
         "rows.provenance": "Provenance ProvenanceFile",
         "rows.record": "Record",
         "recording.reader": "RecordingFile open",
         "recording.recording": "Recording",
         "replaying.replay": "replay",
         "replaying.report": "ReplayReport RunReport",
-        "frontend.running_request": "RunningRequest",
         "frontend.segments": "Segment clean segments",
         "rows.states": "States",
         "frontend.stopping": "stop",

@@ -18,9 +18,7 @@ WAIT = 60.0  # [s] longer than any wait should take
 # what calls import when they are first used: an interrupt during `exec` of a text, of which
 # dataclasses are made, makes Python end with the status of an interrupt that nobody caught
 for _module in (
-    "frontend.halts",
-    "frontend.preview",
-    "frontend.running_request",
+    "frontend.results",
     "rows.actuators",
     "rows.journal",
     "rows.provenance",

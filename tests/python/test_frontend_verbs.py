@@ -11,6 +11,7 @@ import o80.frontend
 from o80 import _core
 
 CLASSES = [each for each in o80.Frontend.__mro__ if each.__module__.startswith("o80.frontend.")]
+NAMES = [each.__name__ for each in CLASSES]
 SOURCES = sorted({Path(inspect.getfile(each)) for each in CLASSES})
 
 
@@ -19,7 +20,7 @@ def declared(*, compiled: bool) -> dict[str, ast.FunctionDef]:
     found: dict[str, ast.FunctionDef] = {}
     for source in SOURCES:
         for cls in ast.parse(source.read_text()).body:
-            if not isinstance(cls, ast.ClassDef):
+            if not isinstance(cls, ast.ClassDef) or cls.name not in NAMES:
                 continue
             blocks = [block for block in cls.body if isinstance(block, ast.If)]
             body = [verb for block in blocks for verb in block.body] if compiled else cls.body

@@ -13,7 +13,8 @@ import numpy as np
 from o80.base.errors import Error, TimeoutError
 from o80.base.screen import style
 from o80.frontend.frontend import Frontend
-from o80.rows.journal import Journal, JournalCommand, JournalEntry
+from o80.frontend.reader import Journal
+from o80.rows.journal import JournalCommand, JournalEntry
 
 _LOOK = 0.05  # between two looks for new entries [s]
 _BEFORE = 10  # entries of a living backend that are printed at the start

@@ -9,8 +9,7 @@ from o80.base.awaiting import in_thread
 from o80.base.words import LateWord, ModeWord, ProfileWord, StartWord
 
 if TYPE_CHECKING:
-    from o80.frontend.frontend import Frontend
-    from o80.frontend.moving import Tolerance
+    from o80.frontend.commander import Commander, Tolerance
 
 
 class Waits:
@@ -23,7 +22,7 @@ class Waits:
     `on_error` is "continue".
     """
 
-    def __init__(self, frontend: "Frontend") -> None:
+    def __init__(self, frontend: "Commander") -> None:
         self._frontend = frontend
 
     async def wait_for(self, iteration: int, timeout: float | None = None) -> _core.Observation:

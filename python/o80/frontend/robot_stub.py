@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from o80.base.errors import SchemaMismatch
-from o80.frontend import frontend_classes
-from o80.frontend.frontend import Frontend
+from o80.frontend.commander import Commander
+from o80.frontend.frontend import Frontend, class_of
+from o80.frontend.reader import Reader
 from o80.rows import history
 from o80.rows.layout import is_plain
 
@@ -139,10 +140,10 @@ def array_type(field: Mapping[str, Any]) -> str:
     return f"NDArray[np.{field['kind']}{'_' if field['kind'] == 'bool' else ''}]"
 
 
-def verbs_of(source: Path, cls: str | None = None) -> Iterator[ast.FunctionDef]:
-    """The public methods that a file declares."""
+def verbs_of(source: Path, cls: str) -> Iterator[ast.FunctionDef]:
+    """The public methods of a class in a file."""
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ClassDef) and cls in (None, node.name):
+        if isinstance(node, ast.ClassDef) and node.name == cls:
             for inner in node.body:
                 block = inner.body if isinstance(inner, ast.If) else [inner]
                 for verb in block:
@@ -179,7 +180,7 @@ class Module:
 
     def parts(self, segment: str) -> Iterator[str]:
         """The text, part by part."""
-        base = frontend_classes.of(self._schema["robot"])
+        base = class_of(self._schema["robot"])
         own = base is not None and base is not Frontend
         yield HEAD.format(
             robot=self._schema["robot"],
@@ -305,9 +306,8 @@ class Module:
         """Lines of the methods of the frontend that the robot changes."""
         types = {**ROW, "States": states}
         found: dict[str, list[ast.FunctionDef]] = {}
-        classes = [each for each in Frontend.__mro__ if each.__module__.startswith("o80.frontend.")]
-        for source in sorted({Path(inspect.getfile(each)) for each in classes}):
-            for verb in verbs_of(source):
+        for cls in (Reader, Commander, Frontend):
+            for verb in verbs_of(Path(inspect.getfile(cls)), cls.__name__):
                 found.setdefault(verb.name, []).append(verb)
         for name, verbs in found.items():
             last = verbs[-1]

@@ -2,22 +2,15 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 import o80._core as _core
-from o80.base.argument_checks import whole
 from o80.base.words import Reason, Status
 from o80.rows.enumerations import labelled
 from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, record_of
 from o80.rows.record import Record
-
-if TYPE_CHECKING:
-    from o80.frontend.describing import Describing
-
-_MOST = 4096  # native entries converted at a time
-_NEVER = 2**62  # a number that no entry reaches
 
 
 @dataclass(frozen=True)
@@ -75,40 +68,6 @@ class JournalEntry:
     #: Parts of the entry or its commands that this o80 does not know, such as "entry kind 30" (the
     #: kind is "none" then): a newer one has recorded it.
     unknown: str = ""
-
-
-class Journal:
-    """Reads the journal of a frontend's backend, in order and without waiting.
-
-    since: number of the first entry to read (None: the oldest that there is).
-    new: only entries written from now on.
-
-    Used by one thread. Works with read-only frontends, and with those of a backend that has ended.
-    """
-
-    def __init__(
-        self, frontend: "Describing", since: int | None = None, *, new: bool = False
-    ) -> None:
-        self._core = _core.Journal(frontend)
-        self._decoder = EntryDecoder(frontend._layout.schema)
-        if new:
-            self._core.seek_end()
-        elif since is not None:
-            self._core.seek(min(whole(since, "since", 0), _NEVER))
-
-    @property
-    def exists(self) -> bool:
-        """False if the backend was started without a journal."""
-        return self._core.exists
-
-    def read(self) -> list[JournalEntry]:
-        """The entries since the last call."""
-        entries = self._core.read(_MOST)
-        found = [self._decoder.entry(entry) for entry in entries]
-        while len(entries) == _MOST:
-            entries = self._core.read(_MOST)
-            found += [self._decoder.entry(entry) for entry in entries]
-        return found
 
 
 def marks_in(entries: Iterable[JournalEntry]) -> list[tuple[str, int]]:
