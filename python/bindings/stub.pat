@@ -3,7 +3,7 @@ _core.__prefix__:
     import numpy.typing
     import typing
     from o80.rows.record import Record
-    from o80.rows.states import States
+    from o80.rows.record import States
     from o80.base.words import Reason, Status
 
 # public verbs of a frontend are declared in o80.frontend

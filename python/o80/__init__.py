@@ -12,8 +12,7 @@ from o80._core import Stream as Stream
 from o80._core import version as version
 
 # imported first, so that exit handlers registered after `import o80` run before its own
-from o80.base import forks as _forks  # noqa: F401
-from o80.base import shutdown as _shutdown  # noqa: F401
+from o80.base import lifecycle as _lifecycle  # noqa: F401
 from o80.base.errors import BackendFailed as BackendFailed
 from o80.base.errors import BackendGone as BackendGone
 from o80.base.errors import BackendHalted as BackendHalted
@@ -94,22 +93,22 @@ if TYPE_CHECKING:
     from o80.replaying.report import ReplayReport as ReplayReport
     from o80.replaying.report import RunReport as RunReport
     from o80.rows.actuators import Actuator as Actuator
+    from o80.rows.actuators import IntegralBounds as IntegralBounds
+    from o80.rows.actuators import Limits as Limits
     from o80.rows.actuators import Number as Number
     from o80.rows.history import History as History
     from o80.rows.journal import JournalCommand as JournalCommand
     from o80.rows.journal import JournalEntry as JournalEntry
-    from o80.rows.limits import IntegralBounds as IntegralBounds
-    from o80.rows.limits import Limits as Limits
     from o80.rows.provenance import Provenance as Provenance
     from o80.rows.provenance import ProvenanceFile as ProvenanceFile
     from o80.rows.record import Record as Record
-    from o80.rows.states import States as States
+    from o80.rows.record import States as States
     from o80.view.view import View as View
 else:  # a type checker that read this would accept every name
     # Imported when they are first used: they need NumPy, which takes most of the time of
     # `import o80`, and commands such as `o80 list` do not need them.
     _LAZY = {
-        "rows.actuators": "Actuator Number",
+        "rows.actuators": "Actuator IntegralBounds Limits Number",
         "drivers.backend": "Backend Running StartAfresh",
         "burst_group": "BurstGroup burst",
         "chained_burst": "ChainedBurst",
@@ -122,17 +121,15 @@ else:  # a type checker that read this would accept every name
         "joining.align": "Aligned AlignedHistory align",
         "joining.latency": "Latency latency",
         "rows.journal": "JournalCommand JournalEntry",
-        "rows.limits": "IntegralBounds Limits",
         "playing.playback": "Playback play",
         "prepared_burst": "PreparedBurst",
         "rows.provenance": "Provenance ProvenanceFile",
-        "rows.record": "Record",
+        "rows.record": "Record States",
         "recording.reader": "RecordingFile open",
         "recording.recording": "Recording",
         "replaying.replay": "replay",
         "replaying.report": "ReplayReport RunReport",
         "frontend.segments": "Segment clean segments",
-        "rows.states": "States",
         "frontend.stopping": "stop",
         "view.view": "View",
         "base.words": "Mode Profile Reason Start Status",

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base import shutdown
+from o80.base import lifecycle
 from o80.base.argument_checks import whole
-from o80.base.closeable import Closeable
 from o80.base.errors import InvalidArgument, UsedAfterFork
+from o80.base.lifecycle import Closeable
 from o80.base.words import ModeWord, ProfileWord, StartWord
 from o80.frontend.frontend import Frontend
 from o80.gather import Comparison, Gather, Gathered, flags_from, numbers_from
@@ -55,7 +55,7 @@ class InlineGroup(Closeable):
         self._all = np.arange(group.copies, dtype=np.uint32)
         self._frontends: dict[int, Frontend] = {}
         self._closed = False
-        shutdown.close_later(self)
+        lifecycle.close_later(self)
 
     @property
     def copies(self) -> int:

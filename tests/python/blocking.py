@@ -18,11 +18,11 @@ WAIT = 60.0  # [s] longer than any wait should take
 # what calls import when they are first used: an interrupt during `exec` of a text, of which
 # dataclasses are made, makes Python end with the status of an interrupt that nobody caught
 for _module in (
+    "base.screen",
     "frontend.results",
     "rows.actuators",
     "rows.journal",
     "rows.provenance",
-    "rows.tables",
 ):
     importlib.import_module(f"o80.{_module}")
 

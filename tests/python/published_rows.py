@@ -23,9 +23,10 @@ from rosbags.highlevel import AnyReader
 import o80
 from o80.datasets import lerobot, minari
 from o80.datasets.episodes import episodes_of
-from o80.datasets.export import columns_in, write
+from o80.datasets.export import write
 from o80.difference import first_difference
 from o80.plot import plot
+from o80.rows.history import columns_in
 from o80.view.base64_arrays import packed
 from o80.view.curves import Panels
 

@@ -342,7 +342,7 @@ def test_a_child_forked_while_another_thread_imports_a_module_imports_it_too(
     thread = threading.Thread(target=importlib.import_module, args=["slowly_imported"])
     thread.start()
     assert begun.wait(WAIT)
-    monkeypatch.setattr("o80.base.forks.LONGEST", WAIT)
+    monkeypatch.setattr("o80.base.lifecycle.LONGEST", WAIT)
     os.register_at_fork(before=go_on.set)  # registered last, so called before the wait of o80
     told = in_child(lambda: importlib.import_module("slowly_imported"))
     thread.join(WAIT)

@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from o80._core import Batch, Handle, Observation
-    from o80.rows.command_ends import CommandEnd
+    from o80.base.words import CommandEnd
 
 
 def exception_text(error: BaseException) -> str:
@@ -74,7 +74,7 @@ class NotCompleted(Error):
     @property
     def ends(self) -> "list[CommandEnd]":
         """For each handle: iteration, status, actuators, reason and text."""
-        from o80.rows.command_ends import CommandEnd
+        from o80.base.words import CommandEnd
 
         return [
             CommandEnd(handle.iteration or 0, handle.status, names, handle.reason, handle.text)

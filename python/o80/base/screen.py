@@ -1,4 +1,4 @@
-"""Output of the command line: tables that fit a terminal, JSON for scripts, errors on stderr."""
+"""Texts for terminals (tables that fit, JSON, errors on stderr) and tables for notebooks."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from html import escape
 from typing import Any, TextIO
 
 _CODES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33"}
@@ -54,6 +55,17 @@ def print_table(
 
 def _names(columns: Sequence[Column]) -> list[str]:
     return [column.name for column in columns]
+
+
+def html(heads: Sequence[str], rows: Iterable[Sequence[Any]], above: str = "") -> str:
+    """An HTML table; all texts are escaped, because other users may have written them."""
+    lines = [f"<p>{escape(above)}</p>"] if above else []
+    cells = "".join(f"<th>{escape(head)}</th>" for head in heads)
+    lines.append(f"<table><thead><tr>{cells}</tr></thead><tbody>")
+    for row in rows:
+        cells = "".join(f"<td>{escape(str(cell))}</td>" for cell in row)
+        lines.append(f"<tr>{cells}</tr>")
+    return "\n".join([*lines, "</tbody></table>"])
 
 
 def print_json(value: Any) -> None:

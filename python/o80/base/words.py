@@ -4,7 +4,7 @@ Arguments accept the aliases at the end: a member of an enumeration, or the stri
 """
 
 from enum import StrEnum
-from typing import Literal, TypeAlias
+from typing import Literal, NamedTuple, TypeAlias
 
 
 class Mode(StrEnum):
@@ -61,6 +61,16 @@ class Reason(StrEnum):
     HALTED = "halted"
     FULL = "full"  #: too many batches of its frontend wait for later iterations
     READING = "reading"  #: the robot cannot be where it was read
+
+
+class CommandEnd(NamedTuple):
+    """The end of a command; of a request if it has no actuators."""
+
+    iteration: int
+    status: Status
+    actuators: tuple[str, ...]
+    reason: Reason = Reason.NONE
+    text: str = ""  #: the reason in words; a journal does not have it
 
 
 ModeWord: TypeAlias = Mode | Literal["queue", "overwrite"]

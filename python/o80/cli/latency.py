@@ -56,6 +56,6 @@ def _signal(text: str) -> str | Callable[[History], Any]:
     match = re.fullmatch(r"norm\((.+)\)", text)
     if match is None:
         return text
-    from o80.joining.field_norm import norm_of
+    from o80.joining.latency import norm_of
 
     return norm_of(match[1])

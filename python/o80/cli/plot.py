@@ -31,8 +31,8 @@ def plot(
     each.
     """
     from o80.joining import plot as plots
-    from o80.joining.timelines import Placed, origins
-    from o80.rows.command_ends import command_ends
+    from o80.joining.plot import Placed, origins
+    from o80.rows.journal import command_ends
 
     found: dict[str, Named] = {}
     for source in dict.fromkeys(sources):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import o80._core as _core
 from o80.base.screen import Column, bytes_text, plain, print_json, print_table, style
 from o80.frontend.condition import age_text
-from o80.rows.started_with import started_with
+from o80.rows.provenance import started_with
 
 if TYPE_CHECKING:
     from o80.recording.marks import Mark

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from o80.base.argument_checks import whole
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument
-from o80.rows.columns import columns_of, values_of
-from o80.rows.history import History
+from o80.rows.columns import columns_of
+from o80.rows.history import History, values_of
 
 if TYPE_CHECKING:
     from o80.recording.marks import Mark

@@ -9,48 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import o80._core as _core
 from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
-from o80.rows.columns import columns_of, values_of
-from o80.rows.history import History
+from o80.rows.columns import chosen, columns_of
+from o80.rows.history import History, columns_in
 
 Columns = dict[str, NDArray[Any]]
 Labels = dict[str, dict[int, str]]
-HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted")
-
-
-def columns_in(history: History) -> Columns:
-    """All numbers of all rows, by name, as in `History.to_frame`; enumerations as numbers."""
-    columns = {name: np.ascontiguousarray(getattr(history, name)) for name in HEAD}
-    for column in columns_of(history.schema):
-        columns[column.name] = values_of(history, column)
-    names = [actuator["name"] for actuator in history.schema["actuators"]]
-    for part in ("active", "clamped", "braking"):
-        mask = getattr(history, part)
-        columns.update({f"{part}.{name}": mask[:, i].copy() for i, name in enumerate(names)})
-    return columns
-
-
-def is_part(column: str, field: str) -> bool:
-    """Whether a field such as "observed.elbow", "elbow" or "extended" names or holds a column."""
-    for name in (column, column.partition(".")[2]):
-        if name == field or name.startswith((field + ".", field + "[")):
-            return True
-    return False
-
-
-def chosen(robot: str, columns: Sequence[str], fields: Sequence[str]) -> list[str]:
-    """The columns that some field names. Raises InvalidArgument for a field that names none."""
-    for field in fields:
-        if not any(is_part(column, field) for column in columns):
-            outer = {column.partition("[")[0] for column in columns}
-            short = {name.partition(".")[2] or name for name in outer}
-            known = [*sorted(short), *sorted(outer - short)]
-            raise InvalidArgument(
-                f"'{robot}' has no field '{field}'{_core.names_instead(field, known)}"
-            )
-    return [column for column in columns if any(is_part(column, field) for field in fields)]
 
 
 def write(path: Path, histories: Mapping[str, History], fields: Sequence[str] = ()) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base import argument_checks, shutdown
+from o80.base import argument_checks, lifecycle
 from o80.base.argument_checks import mapping, nothing
 from o80.base.errors import Closed, InvalidArgument, RequestRejected, exception_text
 from o80.base.loop_options import loop_texts, names_of
@@ -162,7 +162,7 @@ class Backend:
         self._extended = self._layout.labelled_extras(native.extended)
         native.serve_with = Server(self)
         self._native = native
-        shutdown.close_later(self)
+        lifecycle.close_later(self)
 
     def _states(self, block: Any) -> NDArray[Any]:
         """The states in a block of memory."""

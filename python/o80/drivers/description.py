@@ -11,7 +11,7 @@ import numpy as np
 import o80._core as _core
 from o80.base import argument_checks
 from o80.base.errors import InvalidArgument
-from o80.rows.limits import Limits
+from o80.rows.actuators import Limits
 
 # a dtype, a number type, an IntEnum, or a mapping from field names to any of these
 Described = Any

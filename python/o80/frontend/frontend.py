@@ -6,10 +6,10 @@ from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import o80._core as _core
-from o80.base import shutdown
+from o80.base import lifecycle
 from o80.base.cached import cached
-from o80.base.entry_points import announced
 from o80.base.errors import InvalidArgument, SchemaMismatch, UsedAfterFork
+from o80.base.installation import announced
 from o80.base.words import OnErrorWord
 from o80.frontend.commander import Commander
 from o80.rows.layout import Layout
@@ -92,7 +92,7 @@ class Frontend(Commander):
         super().__init__(attachment, self._decoder)
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
         self._is_set_up = True
-        shutdown.close_later(self)
+        lifecycle.close_later(self)
 
     @cached
     def aio(self) -> "Waits":

@@ -14,9 +14,8 @@ import o80._core as _core
 from o80.base.argument_checks import whole
 from o80.base.cached import cached
 from o80.base.errors import Error
-from o80.rows.history import History
+from o80.rows.history import History, Selection
 from o80.rows.layout import Layout
-from o80.rows.selection import Selection
 
 _MOST = 4096  # native entries of a journal converted at a time
 _NEVER = 2**62  # a number that no entry reaches
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
     from o80.rows.actuators import Actuator
     from o80.rows.journal import JournalEntry
     from o80.rows.provenance import Provenance
-    from o80.rows.states import States
+    from o80.rows.record import States
 
 
 class Reader(_core.Frontend):
@@ -91,8 +90,7 @@ class Reader(_core.Frontend):
     @cached
     def actuators(self) -> list[Actuator]:
         """The actuators: index, name, unit, limits."""
-        from o80.rows.actuators import actuators_of
-        from o80.rows.tables import Actuators
+        from o80.rows.actuators import Actuators, actuators_of
 
         return Actuators(actuators_of(self.schema), self.schema)
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import o80._core as _core
 
 if TYPE_CHECKING:
-    from o80.rows.states import States
+    from o80.rows.record import States
 
 
 @dataclass(frozen=True)

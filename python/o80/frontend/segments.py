@@ -1,9 +1,13 @@
 """The segments on this computer."""
 
+import os
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import o80._core as _core
-from o80.rows.tables import Segments
+
+if TYPE_CHECKING:
+    from o80.frontend.reader import Reader
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +32,21 @@ class Segment:
     def alive(self) -> bool:
         """True while its backend runs or starts; False also if that is unknown."""
         return self.life in ("starting", "running")
+
+
+class Segments(list[Segment]):
+    """Segments, in a notebook as `o80 list` shows them."""
+
+    def _repr_html_(self) -> str:
+        from o80.base.screen import html  # late: most processes show no table
+
+        return html(
+            ("segment", "state", "program", "pid", "user", ""),
+            [
+                (each.name, each.state, each.program, each.pid or "", each.user, each.problem)
+                for each in self
+            ],
+        )
 
 
 def segments() -> list[Segment]:
@@ -60,3 +79,20 @@ def clean(name: str | None = None) -> list[str]:
     if name is None:
         return _core.clean_dead()
     return [name] if _core.clean(name) else []
+
+
+def is_own(frontend: "Reader") -> bool:
+    """True for a segment of a robot that this user runs, or ran.
+
+    False for a recording that is played, which may come from a stranger, and for a robot of another
+    user.
+    """
+    if frontend.played:
+        return False
+    import pwd
+
+    try:
+        user = pwd.getpwuid(os.geteuid()).pw_name
+    except KeyError:
+        user = str(os.geteuid())
+    return any(each.name == frontend.segment and each.user == user for each in segments())

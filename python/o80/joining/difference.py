@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.errors import InvalidArgument
-from o80.datasets.export import columns_in
 from o80.rows.columns import columns_of
-from o80.rows.history import History
+from o80.rows.history import History, columns_in
 
 OF_THE_CLOCK = ("time", "lateness", "overruns", "skipped")
 """Columns that differ from run to run if the robot runs in real time."""

@@ -8,11 +8,9 @@ from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
-from o80.base.words import Status
-from o80.datasets.export import chosen
-from o80.rows.columns import Column, columns_of, values_of
-from o80.rows.command_ends import CommandEnd
-from o80.rows.history import History
+from o80.base.words import CommandEnd, Status
+from o80.rows.columns import Column, chosen, columns_of
+from o80.rows.history import History, values_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -216,3 +214,42 @@ def _shade(
     for i, (begin, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
         last = times[min(end, len(times) - 1)]
         ax.axvspan(times[begin], last, color=color, alpha=0.15, label=label if i == 0 else None)
+
+
+APART = 10_000_000_000  # runs further apart have axes of their own [ns]
+
+
+class Placed(NamedTuple):
+    """A history, and wall-clock time less row time [ns]; None: not known."""
+
+    history: History
+    wall_offset: int | None
+
+
+def origins(runs: Mapping[str, Placed]) -> tuple[dict[str, int], int]:
+    """The row time [ns] that is 0 on the axis of each run, and how many axes there are.
+
+    Runs that overlap on the wall clock, or follow each other within ten seconds, share an axis,
+    which begins with their first row. A run of another day begins at 0 by itself, and so does one
+    whose wall-clock time is not known.
+    """
+    known: list[tuple[int, int, str]] = []
+    found: dict[str, int] = {}
+    for name, (history, offset) in runs.items():
+        if not len(history):
+            found[name] = 0
+        elif offset is None:
+            found[name] = int(history.time[0])
+        else:
+            known.append((int(history.time[0]) + offset, int(history.time[-1]) + offset, name))
+    axes = sum(1 for run in runs.values() if run.wall_offset is None and len(run.history))
+    zero = end = None
+    for first, last, name in sorted(known):
+        if zero is None or end is None or first > end + APART:
+            zero, end = first, last
+            axes += 1
+        end = max(end, last)
+        offset = runs[name].wall_offset
+        assert offset is not None
+        found[name] = zero - offset
+    return found, axes

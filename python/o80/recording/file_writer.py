@@ -27,9 +27,8 @@ from mcap.records import (
 
 import o80._core as _core
 from o80.base.errors import RecordingError
-from o80.recording.locked_file import LockedFile
+from o80.recording.locked_file import LockedFile, reserve
 from o80.recording.scan import HEAD, MAGIC, Scan, scan
-from o80.recording.space import reserve
 from o80.recording.summary import bytes_of, end_of_file, room_for_end
 
 PROFILE = "ros2"

@@ -10,11 +10,10 @@ from typing import Any
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.journal_channel import CONTENT as JOURNAL
-from o80.recording.marks import Mark, marks_in
+from o80.recording.marks import Mark, Marks, marks_in
 from o80.recording.recorded_epoch import EpochPart, RecordedEpoch
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan
 from o80.rows.history import History
-from o80.rows.tables import Marks
 
 
 class RecordingFile:

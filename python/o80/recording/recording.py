@@ -8,9 +8,8 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from o80.base.closeable import Closeable
 from o80.base.errors import Closed
-from o80.base.shutdown import close_later
+from o80.base.lifecycle import Closeable, close_later
 from o80.frontend.frontend import Frontend
 from o80.recording.recorder import Recorder
 

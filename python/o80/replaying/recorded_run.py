@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 import o80._core as _core
 from o80.base.errors import InvalidArgument
 from o80.base.machine import Machine, this_machine
-from o80.frontend.own_robots import is_own
+from o80.frontend.segments import is_own
 
 if TYPE_CHECKING:
     from o80.frontend.frontend import Frontend

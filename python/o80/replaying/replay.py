@@ -29,7 +29,7 @@ from o80.replaying.entry_feed import EntryFeed
 from o80.replaying.motion_rules import MotionRules
 from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_in
 from o80.replaying.report import ReplayReport, RunReport
-from o80.replaying.runner import Runner, with_driver, without_driver
+from o80.replaying.runner import OtherRobot, Runner, with_driver, without_driver
 from o80.replaying.same_bytes import same_bytes
 from o80.replaying.start import Requests, SlotsKept, Start, find_fresh_start, find_rest, find_start
 from o80.rows.columns import columns_of
@@ -39,7 +39,6 @@ if TYPE_CHECKING:
     from o80.rows.history import History
 
 Progress = Callable[[str, int, int], None]
-OtherRobot = str | os.PathLike[str] | Mapping[str, str | os.PathLike[str]] | None
 
 _HISTORY = 4 * ROWS_AT_ONCE  # rows that the replay keeps: those of a block, and fresh starts
 

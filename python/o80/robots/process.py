@@ -12,7 +12,7 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 import o80._core as _core
-from o80.base import shutdown
+from o80.base import lifecycle
 from o80.base.child_process import end_child, ends_within, start_child
 from o80.base.errors import (
     DriverError,
@@ -42,7 +42,7 @@ class Process:
         self._output = output
         self._owner = os.getpid()
         self.segment = segment  #: name of its segment
-        shutdown.close_later(self)
+        lifecycle.close_later(self)
 
     @property
     def pid(self) -> int:

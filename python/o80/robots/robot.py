@@ -13,9 +13,8 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 import o80._core as _core
 from o80.base.argument_checks import whole
-from o80.base.entry_points import announced
 from o80.base.errors import DriverError, InvalidArgument
-from o80.base.installation import prefix
+from o80.base.installation import announced, prefix
 from o80.base.loop_options import did_you_mean, loop_options, loop_texts, names_of, text_of
 from o80.base.words import StaleWord
 from o80.frontend.frontend import Frontend

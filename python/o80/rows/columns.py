@@ -1,16 +1,14 @@
 """The numbers of a robot's rows, each with a name: "observed.elbow", "extended.force[2]"."""
 
 import itertools
-from collections.abc import Iterator
-from typing import TYPE_CHECKING, Any, NamedTuple
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+import o80._core as _core
+from o80.base.errors import InvalidArgument
 from o80.rows.layout import dtype_of_field, labels_of_field
-
-if TYPE_CHECKING:
-    from o80.rows.history import History
 
 
 class Column(NamedTuple):
@@ -57,12 +55,27 @@ def _numbers(
                 yield Column(name, dtype, offset, labels, origin)
 
 
-def values_of(history: "History", column: Column) -> NDArray[Any]:
-    """The numbers of a column as a contiguous copy: (T,)."""
-    values: NDArray[Any] = history.rows.getfield(column.dtype, column.offset).copy()
-    return values
-
-
 def value_of(row: Any, column: Column) -> Any:
     """The number of a column in an observation."""
     return np.ndarray((), column.dtype, row, column.offset)[()]
+
+
+def is_part(column: str, field: str) -> bool:
+    """Whether a field such as "observed.elbow", "elbow" or "extended" names or holds a column."""
+    for name in (column, column.partition(".")[2]):
+        if name == field or name.startswith((field + ".", field + "[")):
+            return True
+    return False
+
+
+def chosen(robot: str, columns: Sequence[str], fields: Sequence[str]) -> list[str]:
+    """The columns that some field names. Raises InvalidArgument for a field that names none."""
+    for field in fields:
+        if not any(is_part(column, field) for column in columns):
+            outer = {column.partition("[")[0] for column in columns}
+            short = {name.partition(".")[2] or name for name in outer}
+            known = [*sorted(short), *sorted(outer - short)]
+            raise InvalidArgument(
+                f"'{robot}' has no field '{field}'{_core.names_instead(field, known)}"
+            )
+    return [column for column in columns if any(is_part(column, field) for field in fields)]

@@ -1,22 +1,94 @@
 """Many observations at once."""
 
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any, overload
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Self, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base.argument_checks import whole
+from o80.base.argument_checks import whole, whole_or_none
 from o80.base.errors import InvalidArgument, RowOverwritten
 from o80.rows.layout import with_padding
-from o80.rows.record import Record
-from o80.rows.selection import Selection
-from o80.rows.states import States
-from o80.rows.tables import history_html
+from o80.rows.record import Record, States
 
 if TYPE_CHECKING:
     import pandas
+
+    from o80.rows.columns import Column
+
+LONGEST = 2.0**62  # duration [ns], 146 years
+_HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted")
+_ENDS = 5  # rows of each end of a history that a notebook shows
+_COLUMNS = 16  # most numbers of its rows
+
+
+@dataclass(frozen=True)
+class Selection:
+    """Observations by number, by the last seconds, or by iterations and times."""
+
+    n: int | None
+    since: int | None
+    until: int | None
+    duration: int | None  #: before the newest observation [ns]
+    from_time: int | None  #: [ns]
+    to_time: int | None  #: [ns]
+
+    @classmethod
+    def checked(
+        cls,
+        n: int | None,
+        since: int | None,
+        until: int | None,
+        seconds: float | None,
+        from_time: int | None,
+        to_time: int | None,
+    ) -> Self:
+        """Makes a selection from the arguments of a call. Raises InvalidArgument."""
+        ends = since, until, from_time, to_time
+        if (n is not None) + (seconds is not None) + any(end is not None for end in ends) > 1:
+            raise InvalidArgument(
+                "give either n, or seconds, or any of since, until, from_time and to_time"
+            )
+        return cls(
+            n=whole_or_none(n, "n, the number of observations,", 0),
+            since=whole_or_none(since, "since"),
+            until=whole_or_none(until, "until"),
+            duration=None if seconds is None else _nanoseconds(seconds),
+            from_time=whole_or_none(from_time, "from_time"),
+            to_time=whole_or_none(to_time, "to_time"),
+        )
+
+    def range(
+        self,
+        oldest: int,
+        newest: int,
+        iteration_at: Callable[[int], int],
+        newest_time: Callable[[], int],
+    ) -> tuple[int, int]:
+        """First and last iteration between oldest and newest; empty if first is above last.
+
+        iteration_at: returns the newest iteration at or before a time, `oldest - 1` if there is
+            none.
+        """
+        first, last = oldest, newest
+        if newest < oldest:
+            return first, last
+        if self.n is not None:
+            first = max(first, newest + 1 - self.n)
+        if self.duration is not None:
+            first = max(first, iteration_at(newest_time() - self.duration) + 1)
+        if self.since is not None:
+            first = max(first, self.since)
+        if self.until is not None:
+            last = min(last, self.until)
+        if self.from_time is not None:
+            first = max(first, iteration_at(self.from_time - 1) + 1)
+        if self.to_time is not None:
+            last = min(last, iteration_at(self.to_time))
+        return first, last
 
 
 class History:
@@ -147,9 +219,7 @@ class History:
 
         Raises MissingExtra without pandas.
         """
-        from o80.rows.frames import frame_of
-
-        return frame_of(self)
+        return _frame_of(self)
 
     @property
     def iteration(self) -> NDArray[np.int64]:
@@ -247,10 +317,84 @@ class History:
 
     def _repr_html_(self) -> str:
         """As a table of a notebook: the first and the last rows."""
-        return history_html(self)
+        return _html_of(self)
 
     def __repr__(self) -> str:
         if not len(self):
             return "<o80.History of no observation>"
         first, last = int(self.iteration[0]), int(self.iteration[-1])
         return f"<o80.History of {len(self)} observations, {first} to {last}>"
+
+
+def values_of(history: History, column: "Column") -> NDArray[Any]:
+    """The numbers of a column as a contiguous copy: (T,)."""
+    values: NDArray[Any] = history.rows.getfield(column.dtype, column.offset).copy()
+    return values
+
+
+def columns_in(history: History) -> dict[str, NDArray[Any]]:
+    """All numbers of all rows, by name, as in `History.to_frame`; enumerations as numbers."""
+    from o80.rows.columns import columns_of  # late: most processes that attach never ask
+
+    columns = {name: np.ascontiguousarray(getattr(history, name)) for name in _HEAD}
+    for column in columns_of(history.schema):
+        columns[column.name] = values_of(history, column)
+    names = [actuator["name"] for actuator in history.schema["actuators"]]
+    for part in ("active", "clamped", "braking"):
+        mask = getattr(history, part)
+        columns.update({f"{part}.{name}": mask[:, i].copy() for i, name in enumerate(names)})
+    return columns
+
+
+def _frame_of(history: History) -> "pandas.DataFrame":
+    """A row for each observation, a column for each number."""
+    from o80.base.extras import needed
+    from o80.rows.columns import columns_of
+
+    pandas = needed("pandas", "pandas", "a data frame")
+    data: dict[str, Any] = columns_in(history)
+    index = pandas.Index(data.pop("iteration"), name="iteration")
+    for column in columns_of(history.schema):
+        if column.labels is not None:
+            data[column.name] = _categories(pandas, data[column.name], column.labels)
+    return pandas.DataFrame(data, index=index)
+
+
+def _categories(pandas: Any, values: NDArray[Any], labels: dict[str, int]) -> Any:
+    """Labels of an enumeration as categories; other values become missing values."""
+    codes = np.full(len(values), -1)
+    for code, value in enumerate(labels.values()):
+        codes[values == value] = code
+    return pandas.Categorical.from_codes(codes, list(labels))
+
+
+def _html_of(history: History) -> str:
+    """The first and the last rows of a history."""
+    from o80.base.screen import html  # late: most processes show no table
+    from o80.rows.columns import columns_of
+
+    columns = [*columns_of(history.schema)]
+    shown = columns[:_COLUMNS]
+    more = f"; {len(columns) - len(shown)} more numbers a row" if len(columns) > _COLUMNS else ""
+    count = len(history)
+    places = [*range(count)]
+    if count > 2 * _ENDS:
+        places = [*range(_ENDS), *range(count - _ENDS, count)]
+    rows: list[list[Any]] = []
+    for place in places:
+        row = history.rows[place : place + 1]
+        rows.append([row["iteration"][0], row["time"][0]])
+        for column in shown:
+            value = row.getfield(column.dtype, column.offset)[0].item()
+            words = [word for word, number in (column.labels or {}).items() if number == value]
+            rows[-1].append(words[0] if words else f"{value:.6g}")
+    if len(places) < count:
+        rows.insert(_ENDS, ["…"] * (2 + len(shown)))
+    heads = ["iteration", "time [ns]", *(column.name for column in shown)]
+    return html(heads, rows, f"{count} observations{more}")
+
+
+def _nanoseconds(seconds: float) -> int:
+    if isinstance(seconds, (bool, str)) or not math.isfinite(seconds) or seconds < 0:
+        raise InvalidArgument(f"seconds must be a finite number of at least 0, got {seconds!r}")
+    return round(min(seconds * 1e9, LONGEST))

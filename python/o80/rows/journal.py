@@ -7,10 +7,22 @@ from typing import Any
 import numpy as np
 
 import o80._core as _core
-from o80.base.words import Reason, Status
+from o80.base.words import CommandEnd, Reason, Status
 from o80.rows.enumerations import labelled
 from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, record_of
 from o80.rows.record import Record
+
+ENDS = frozenset(
+    {
+        Status.COMPLETED,
+        Status.LIMITED,
+        Status.OVERWRITTEN,
+        Status.PURGED,
+        Status.INTERRUPTED,
+        Status.REJECTED,
+        Status.HALTED,
+    }
+)
 
 
 @dataclass(frozen=True)
@@ -79,6 +91,29 @@ def marks_in(entries: Iterable[JournalEntry]) -> list[tuple[str, int]]:
         for command in entry.commands
         if command.kind == "mark"
     ]
+
+
+def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:
+    """The ends of all commands whose batch is among the entries, in their order."""
+    actuators: dict[tuple[int | None, int], tuple[str, ...]] = {}
+    ends = []
+    for entry in entries:
+        commands = [each for each in entry.commands if each.kind == "command"]
+        if entry.kind == "rejected":
+            ends += [
+                CommandEnd(
+                    entry.iteration, Status.REJECTED, each.actuators, entry.reason or Reason.NONE
+                )
+                for each in commands
+            ]
+            continue
+        actuators.update({(entry.lane, each.id): each.actuators for each in commands})
+        if entry.kind == "status" and entry.status in ENDS and entry.id is not None:
+            named = actuators.pop((entry.lane, entry.id), None)
+            if named is not None:
+                reason = entry.reason or Reason.NONE
+                ends.append(CommandEnd(entry.iteration, entry.status, named, reason))
+    return ends
 
 
 class EntryDecoder:

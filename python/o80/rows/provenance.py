@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
-from o80.rows.tables import provenance_html
+from o80.base.screen import html, plain, style
 
 _TEXTS = ("robot", "version", "source_hash", "library", "library_sha256", "built_with")
 
@@ -43,7 +43,8 @@ class Provenance:
 
     def _repr_html_(self) -> str:
         """As a table of a notebook."""
-        return provenance_html(self)
+        lines = [line.partition(" ") for line in started_with(self)]
+        return html(("started with", ""), [(what, text.strip()) for what, _, text in lines])
 
     def as_json(self) -> str:
         """As one line of JSON, which `from_json` reads. Pure ASCII."""
@@ -90,3 +91,26 @@ class Provenance:
             for file in given.get("files", ())
         )
         return cls(**{**given, "files": files})
+
+
+def started_with(provenance: Provenance) -> list[str]:
+    """Library, options and versions, in lines."""
+    lines = []
+    if provenance.library:
+        built = f"  {style(plain(provenance.built_with), 'dim')}" if provenance.built_with else ""
+        lines.append(f"library  {plain(provenance.library)}{built}")
+    if provenance.options:
+        lines.append(f"options  {_assignments(provenance.options)}")
+    lines.append(f"loop     {_assignments(provenance.run_options)}")
+    for file in provenance.files:
+        hashed = f"sha256 {file.sha256[:12]}" if file.sha256 else "not read"
+        lines.append(f"file     {plain(file.path)}  {style(hashed, 'dim')}")
+    version = (
+        f"{provenance.version}, sources {provenance.source_hash[:12]}, "
+        f"motion rules {provenance.motion_rules}"
+    )
+    return [*lines, f"o80      {plain(version)}"]
+
+
+def _assignments(options: dict[str, str]) -> str:
+    return ", ".join(f"{plain(name)}={plain(text)}" for name, text in options.items())

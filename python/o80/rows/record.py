@@ -1,16 +1,13 @@
-"""Values with names, read as attributes or by key."""
+"""Values with names, read as attributes or by key, and the type of a robot's states."""
 
 from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.rows.enumerations import labelled
-
-if TYPE_CHECKING:
-    from o80.rows.states import States
 
 
 class Record:
@@ -81,3 +78,26 @@ class Record:
 
     def __repr__(self) -> str:
         return f"Record({', '.join(f'{name}={self[name]}' for name in self)})"
+
+
+if TYPE_CHECKING:
+
+    class States(np.ndarray[Any, np.dtype[Any]]):
+        """The states of all actuators, of one row or of T rows.
+
+        For a robot with one group of actuators: a NumPy array, (actuators,) or (T, actuators), with
+        the dtype of the state: float64, or structured, with `states["position"]` for a field. For a
+        robot with several groups: an o80.Record, with `states.joints` or `states["joints"]` for a
+        group.
+
+        A type checker accepts both uses, because the robot is known only at run time; there
+        `isinstance(states, o80.Record)` distinguishes them.
+        """
+
+        def __getattr__(self, name: str) -> "States": ...
+        def keys(self) -> tuple[str, ...]:
+            """The names of the groups."""
+            ...
+
+else:
+    States: TypeAlias = np.ndarray | Record

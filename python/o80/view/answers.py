@@ -2,7 +2,8 @@
 
 import math
 import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,6 @@ from o80.base.errors import Error, InvalidArgument, ReadOnly
 from o80.frontend.frontend import Frontend
 from o80.frontend.results import halt as halt_backend
 from o80.rows.history import History
-from o80.view.answer_cache import Kept
 from o80.view.curves import Panels
 from o80.view.scene import Scene
 from o80.view.source import NothingToShow, Source
@@ -208,3 +208,31 @@ def _window(asked: dict[str, Any]) -> float:
     if not 0.0 < window <= LONGEST_WINDOW:
         raise ValueError(f"window must be positive and at most {LONGEST_WINDOW:g} s, got {window}")
     return window
+
+
+SHARED_FOR = 0.08  # [s], less than the time between two requests of a page
+LOAD = 10.0  # an answer that took long is kept this many times as long
+MOST = 64
+
+
+class Kept:
+    """Answers by what was asked. Many pages, long rows and long windows cost at most a tenth of a
+    processor, because what took long is kept longer."""
+
+    def __init__(self) -> None:
+        self._answers: dict[Hashable, tuple[float, Any]] = {}
+        self._lock = threading.Lock()
+
+    def get(self, asked: Hashable, work: Callable[[], Any]) -> Any:
+        """The answer of `work`, or the one that another page has just got."""
+        with self._lock:
+            begin = time.monotonic()
+            until, answer = self._answers.get(asked, (0.0, None))
+            if begin < until:
+                return answer
+            answer = work()
+            end = time.monotonic()
+            if len(self._answers) >= MOST:
+                self._answers = {key: kept for key, kept in self._answers.items() if kept[0] > end}
+            self._answers[asked] = end + max(SHARED_FOR, LOAD * (end - begin)), answer
+            return answer

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80._core import Observation
-from o80.rows.columns import Column, columns_of, value_of, values_of
-from o80.rows.history import History
+from o80.rows.columns import Column, columns_of, value_of
+from o80.rows.history import History, values_of
 from o80.view.base64_arrays import packed
 
 POINTS = 400  # of a curve

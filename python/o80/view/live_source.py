@@ -9,8 +9,8 @@ from o80._core import Observation
 from o80.base.errors import Error, RowOverwritten, TimeoutError
 from o80.frontend.condition import age_text, rate_text
 from o80.frontend.frontend import Frontend
-from o80.frontend.own_robots import is_own
 from o80.frontend.results import Halt
+from o80.frontend.segments import is_own
 from o80.rows.history import History
 from o80.view.source import NothingToShow, Source
 
