@@ -17,7 +17,7 @@ import numpy as np
 import o80._core as _core
 from o80.base.errors import DriverError, InvalidArgument
 from o80.frontend.frontend import Frontend
-from o80.joining.difference import Difference, RobotsDifferError, first_difference
+from o80.joining.difference import Difference, RobotsDifferError, first_difference, same_bytes
 from o80.replaying.conditions import (
     TOLERANCE,
     blended_columns,
@@ -25,12 +25,10 @@ from o80.replaying.conditions import (
     other_arithmetic,
     reads_the_world,
 )
-from o80.replaying.entry_feed import EntryFeed
-from o80.replaying.motion_rules import MotionRules
+from o80.replaying.entry_feed import EntryFeed, MotionRules
 from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_in
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.runner import OtherRobot, Runner, with_driver, without_driver
-from o80.replaying.same_bytes import same_bytes
 from o80.replaying.start import Requests, SlotsKept, Start, find_fresh_start, find_rest, find_start
 from o80.rows.columns import columns_of
 
