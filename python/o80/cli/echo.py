@@ -18,7 +18,7 @@ from o80.base.screen import complain, style
 from o80.cli.attach import attach
 from o80.cli.journal_lines import follow, print_recorded
 from o80.cli.values import RowValues, text
-from o80.frontend.condition import halt_text, pace_text
+from o80.frontend.backend_texts import halt_text, pace_text
 from o80.frontend.frontend import Frontend
 
 _LOOK = 1.0  # between two checks of a loop that publishes no row [s]

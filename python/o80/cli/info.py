@@ -12,7 +12,7 @@ import typer
 import o80._core as _core
 from o80.base.screen import Column, print_json, print_table, style
 from o80.cli.attach import attach
-from o80.frontend.condition import halt_text, pace_text, running_texts, watchdog_text
+from o80.frontend.backend_texts import halt_text, pace_text, running_texts, watchdog_text
 from o80.rows.actuators import ACTUATOR_HEADS, actuator_rows, field_text
 from o80.rows.provenance import started_with
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import o80._core as _core
 from o80.base.screen import Column, bytes_text, plain, print_json, print_table, style
-from o80.frontend.condition import age_text
+from o80.frontend.backend_texts import age_text
 from o80.rows.provenance import started_with
 
 if TYPE_CHECKING:

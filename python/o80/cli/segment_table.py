@@ -9,7 +9,7 @@ from typing import Any
 import o80._core as _core
 from o80.base.errors import Error, SegmentError
 from o80.base.screen import Column, print_json, print_table, style
-from o80.frontend.condition import age_text, halt_text, rate_text, running_texts
+from o80.frontend.backend_texts import age_text, halt_text, rate_text, running_texts
 from o80.frontend.segments import Segment
 from o80.frontend.segments import segments as all_segments
 

@@ -119,7 +119,7 @@ class _Shown:
         self.panels = Panels(schema)
         self.scene: Scene | None = None
         self.no_scene = "The driver of this robot names no model, so there is no 3D view."
-        self._kept = Kept()
+        self._kept = AnswerCache()
         if "model" in schema:
             try:
                 self.scene = Scene(schema, source.model, trusted=source.trusted)
@@ -215,7 +215,7 @@ LOAD = 10.0  # an answer that took long is kept this many times as long
 MOST = 64
 
 
-class Kept:
+class AnswerCache:
     """Answers by what was asked. Many pages, long rows and long windows cost at most a tenth of a
     processor, because what took long is kept longer."""
 

@@ -7,7 +7,7 @@ from typing import Any
 import o80._core as _core
 from o80._core import Observation
 from o80.base.errors import Error, RowOverwritten, TimeoutError
-from o80.frontend.condition import age_text, rate_text
+from o80.frontend.backend_texts import age_text, rate_text
 from o80.frontend.frontend import Frontend
 from o80.frontend.results import Halt
 from o80.frontend.segments import is_own
