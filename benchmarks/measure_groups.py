@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import o80
-from o80.loop_options import text_of
+from o80.base.loop_options import text_of
 from o80_table_tennis.rig.ball_records import ball_options
 from o80_table_tennis.settings import RigSettings
 from o80_table_tennis.world.scene import MODEL

@@ -57,7 +57,7 @@ def main() -> None:
             sample("import_numpy_and_10_ms", "ms", numpy + ON_TOP)
             sample("first_attach", "ms", timed(ATTACH, segment))
             # with Frontend, which needs NumPy: `import o80` alone leaves that to its first use
-            sample("import_o80", "ms", importing("o80.frontend"))
+            sample("import_o80", "ms", importing("o80.frontend.frontend"))
             sample("o80_list", "s", seconds(lambda: listing(folder)))
 
 

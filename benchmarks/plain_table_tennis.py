@@ -14,7 +14,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from o80.loop_options import text_of
+from o80.base.loop_options import text_of
 from o80_table_tennis.balls.sampled_flight import SampledFlight
 from o80_table_tennis.rig.ball_records import BallReader, ball_options
 from o80_table_tennis.rig.pressure_range import PressureRange

@@ -9,7 +9,7 @@ find_package(nanobind CONFIG REQUIRED)
 
 # signatures and docstrings of compiled verbs stand in the classes of o80.frontend
 set(verb_texts ${PROJECT_BINARY_DIR}/python/verbs.hpp)
-file(GLOB frontend_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/python/o80/frontend/*.py)
+set(frontend_sources ${PROJECT_SOURCE_DIR}/python/o80/frontend/reader.py ${PROJECT_SOURCE_DIR}/python/o80/frontend/commander.py)
 add_custom_command(
   OUTPUT ${verb_texts}
   COMMAND ${Python_EXECUTABLE} ${PROJECT_SOURCE_DIR}/python/bindings/verbs.py ${verb_texts} ${frontend_sources}

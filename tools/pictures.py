@@ -13,8 +13,8 @@ from matplotlib.figure import Figure
 import o80
 from chromium import Chromium
 from motion_pictures import draw_paces, draw_streaming
-from o80.command_ends import command_ends
 from o80.plot import plot
+from o80.rows.journal import command_ends
 from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.report.rendering import Scene, write_picture
 from o80_table_tennis.settings import TaskSettings

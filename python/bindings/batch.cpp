@@ -20,9 +20,9 @@ using o80::Handle;
 
 namespace {
 
-/// The iterator of a coroutine of o80.awaiting, for `__await__`.
+/// The iterator of a coroutine of o80.base.awaiting, for `__await__`.
 nb::object awaited(nb::handle self) {
-  return nb::module_::import_("o80.awaiting").attr("end_of")(self).attr("__await__")();
+  return nb::module_::import_("o80.base.awaiting").attr("end_of")(self).attr("__await__")();
 }
 
 /// The iteration; nothing (None) if there is none yet.

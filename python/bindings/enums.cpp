@@ -38,7 +38,7 @@ nb::object member(Value value, const char* type) {
   const auto index = static_cast<std::size_t>(value) < count ? static_cast<std::size_t>(value) : 0;
   if (known[index] == nullptr) {
     const std::string_view text = o80::to_text(value);
-    known[index] = nb::module_::import_("o80.words")
+    known[index] = nb::module_::import_("o80.base.words")
                        .attr(type)(nb::str(text.data(), text.size()))
                        .release()
                        .ptr();

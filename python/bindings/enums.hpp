@@ -5,7 +5,7 @@
 #include "control/batch/record.hpp"
 #include "o80/control/command.hpp"
 
-// Conversions of enums, which are strings in Python (o80.words).
+// Conversions of enums, which are strings in Python (o80.base.words).
 
 o80::Mode mode_of(nanobind::handle word);
 o80::Profile profile_of(nanobind::handle word);

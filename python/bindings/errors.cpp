@@ -49,7 +49,7 @@ void set_copy_failed(const o80::CopyFailed& failed) {
 nb::object observation_of(const o80::UntypedObservation& row) {
   auto description =
       std::make_shared<o80::Description>(o80::Description{row.schema(), row.layout()});
-  nb::object layout = nb::module_::import_("o80.layout").attr("Layout")(nb::cast(description));
+  nb::object layout = nb::module_::import_("o80.rows.layout").attr("Layout")(nb::cast(description));
   auto decoder = std::make_shared<const Decoder>(std::move(description), std::move(layout));
   return nb::cast(Observation(std::move(decoder), o80::UntypedObservation(row)));
 }
@@ -80,7 +80,7 @@ void set_not_reached(const o80::NotReached& error) {
   PyErr_SetObject(type.ptr(), raised.ptr());
 }
 
-/// Raises the class of o80.errors with the name of the C++ class.
+/// Raises the class of o80.base.errors with the name of the C++ class.
 void translate(const std::exception_ptr& thrown, void*) {
 #define O80_TRANSLATE(Name)                       \
   catch (const o80::Name& error) {                \
@@ -121,7 +121,9 @@ void translate(const std::exception_ptr& thrown, void*) {
 
 }  // namespace
 
-nb::object python_error(const char* name) { return nb::module_::import_("o80.errors").attr(name); }
+nb::object python_error(const char* name) {
+  return nb::module_::import_("o80.base.errors").attr(name);
+}
 
 void set_error(const nb::object& type, const char* text) {
   // the text may come from memory that other processes write: invalid UTF-8 must not hide the error

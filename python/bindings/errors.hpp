@@ -4,7 +4,7 @@
 
 #include <string>
 
-/// A class of o80.errors.
+/// A class of o80.base.errors.
 nanobind::object python_error(const char* name);
 /// Sets the error indicator of Python; the caller throws nanobind::python_error.
 void set_error(const nanobind::object& type, const char* text);

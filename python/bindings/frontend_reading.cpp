@@ -166,7 +166,7 @@ void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend) {
       .def(
           "__anext__",
           [](nb::handle self) {
-            return nb::module_::import_("o80.awaiting").attr("next_of")(self);
+            return nb::module_::import_("o80.base.awaiting").attr("next_of")(self);
           },
           nb::sig("def __anext__(self) "
                   "-> collections.abc.Coroutine[typing.Any, typing.Any, Observation]"))

@@ -59,7 +59,7 @@ auto word(Value Owner::* member) {
   };
 }
 
-/// A getter of a member that is an enumeration of o80.words.
+/// A getter of a member that is an enumeration of o80.base.words.
 template <class Value>
 auto enumeration(Value o80::JournalEntry::* member) {
   return [member](const o80::JournalEntry& self) { return python_word(self.*member); };

@@ -104,7 +104,7 @@ void bind_observation(nb::module_& m) {
       .def(
           "__reduce__",
           [](const Decoder& self) {
-            return nb::make_tuple(nb::module_::import_("o80.layout").attr("decoder_of"),
+            return nb::make_tuple(nb::module_::import_("o80.rows.layout").attr("decoder_of"),
                                   nb::make_tuple(table_of(*self.description)));
           },
           nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"));

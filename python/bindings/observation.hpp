@@ -7,7 +7,7 @@
 
 #include "o80/runtime/observation.hpp"
 
-/// Converts rows of one robot to arrays: the methods of its o80.layout.Layout, looked up once.
+/// Converts rows of one robot to arrays: the methods of its o80.rows.layout.Layout, looked up once.
 struct Decoder {
   Decoder(std::shared_ptr<const o80::Description> description, nanobind::object layout);
 

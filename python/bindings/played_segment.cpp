@@ -34,7 +34,7 @@ o80::Provenance::Options options_in(nb::handle object, const char* name) {
   return options;
 }
 
-/// Copy of an o80.provenance.Provenance in C++.
+/// Copy of an o80.rows.provenance.Provenance in C++.
 o80::Provenance provenance_in(nb::handle object) {
   o80::Provenance provenance;
   provenance.robot = text_in(object, "robot");

@@ -2,9 +2,8 @@
 _core.__prefix__:
     import numpy.typing
     import typing
-    from o80.record import Record
-    from o80.states import States
-    from o80.words import Reason, Status
+    from o80.base.words import Reason, Status
+    from o80.rows.record import Record, States
 
 # public verbs of a frontend are declared in o80.frontend
 ^_core\.Frontend\.[a-z]\w*$:

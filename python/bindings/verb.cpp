@@ -34,7 +34,7 @@ void explain(const Verb& verb, PyObject* const* arguments, Py_ssize_t count, PyO
     for (Py_ssize_t i = 0; i < named; ++i) {
       keywords[nb::handle(PyTuple_GET_ITEM(names, i))] = nb::handle(arguments[count + i]);
     }
-    const nb::object refuse = nb::module_::import_("o80.calls").attr("refuse");
+    const nb::object refuse = nb::module_::import_("o80.base.signatures").attr("refuse");
     refuse(verb.text->signature, nb::handle(arguments[0]), given, keywords);
     error.restore();
   } catch (nb::python_error& refused) {
@@ -82,7 +82,7 @@ PyObject* help_of_verb(PyObject* self, void* /*unused*/) {
 
 PyObject* signature_of_verb(PyObject* self, void* /*unused*/) {
   try {
-    const nb::object signature = nb::module_::import_("o80.calls").attr("signature_of");
+    const nb::object signature = nb::module_::import_("o80.base.signatures").attr("signature_of");
     return signature(verb_of(self)->text->signature).release().ptr();
   } catch (nb::python_error& error) {
     error.restore();

@@ -4,8 +4,8 @@ from collections.abc import Generator, Mapping
 from types import MappingProxyType
 from typing import Any, Literal, overload
 
-from o80 import _core
-from o80.frontend import Frontend
+import o80._core as _core
+from o80.frontend.frontend import Frontend
 
 
 class BurstGroup:
@@ -42,7 +42,7 @@ class BurstGroup:
 
     def __await__(self) -> Generator[Any, None, dict[Frontend, _core.Observation]]:
         """As `wait`, for a task of asyncio; a task that is cancelled cancels the bursts."""
-        from o80.awaiting import in_thread
+        from o80.base.awaiting import in_thread
 
         return in_thread(self.wait).__await__()
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from o80 import _core
-from o80.errors import InvalidArgument
+import o80._core as _core
+from o80.base.errors import InvalidArgument
 
 if TYPE_CHECKING:
     from o80.group_burst import Copies, GroupBurst

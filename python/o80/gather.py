@@ -9,10 +9,10 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from o80.checked import mapping, sequence
-from o80.columns import Column, columns_of
-from o80.errors import InvalidArgument
-from o80.loop_options import did_you_mean
+from o80.base.argument_checks import mapping, sequence
+from o80.base.errors import InvalidArgument
+from o80.base.loop_options import did_you_mean
+from o80.rows.columns import Column, columns_of
 
 #: A path of a number, a comparison, and a value (or the label of an enumeration).
 Comparison = tuple[str, Literal["==", "!=", "<", "<=", ">", ">="], float | str]

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from o80 import _core
+import o80._core as _core
+from o80.base.errors import InvalidArgument
 from o80.chained_burst import ChainedBurst
-from o80.errors import InvalidArgument
 from o80.prepared_burst import fill_targets
 
 #: Numbers of copies, each once, a slice, or a mask with a bool for each copy; None: all of them.

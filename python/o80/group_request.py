@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80 import _core
+import o80._core as _core
 from o80.group_burst import Copies, chosen_copies
 
 

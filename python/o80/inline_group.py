@@ -17,19 +17,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80 import _core, at_exit
-from o80.checked import whole
-from o80.closeable import Closeable
-from o80.enumerations import labelled
-from o80.errors import InvalidArgument, UsedAfterFork
-from o80.frontend import Frontend
+import o80._core as _core
+from o80.base import lifecycle
+from o80.base.argument_checks import whole
+from o80.base.errors import InvalidArgument, UsedAfterFork
+from o80.base.lifecycle import Closeable
+from o80.base.words import ModeWord, ProfileWord, StartWord
+from o80.frontend.frontend import Frontend
 from o80.gather import Comparison, Gather, Gathered, flags_from, numbers_from
 from o80.group_burst import GroupBurst, chosen_copies
 from o80.group_request import GroupRequest
-from o80.layout import Layout, dtype_of_type, labels_of_type
 from o80.prepared_burst import checked_count
-from o80.trajectory import common_labels, common_type, state_types
-from o80.words import ModeWord, ProfileWord, StartWord
+from o80.rows.enumerations import labelled
+from o80.rows.layout import Layout, dtype_of_type, labels_of_type
+from o80.rows.targets import common_labels, common_type, state_types
 
 if TYPE_CHECKING:
     from o80.group_burst import Copies
@@ -54,7 +55,7 @@ class InlineGroup(Closeable):
         self._all = np.arange(group.copies, dtype=np.uint32)
         self._frontends: dict[int, Frontend] = {}
         self._closed = False
-        at_exit.close_later(self)
+        lifecycle.close_later(self)
 
     @property
     def copies(self) -> int:

@@ -11,7 +11,7 @@ import sys
 from collections.abc import Iterable, Sequence
 from typing import Any
 
-import o80
+from o80.frontend.segments import segments
 
 _ACTUATORS = {  # the argument that names actuators
     "add_command": 0,
@@ -116,7 +116,7 @@ def _resolved(path: list[str], namespace: dict[str, Any]) -> Any:
     """The object of a name, or None. No property of the user's objects is called."""
     found = namespace.get(path[0])
     for name in path[1:]:
-        if _is_ours(found) or found is o80:
+        if _is_ours(found) or found is sys.modules["o80"]:
             found = getattr(found, name, None)
         else:
             found = inspect.getattr_static(found, name, None)
@@ -139,10 +139,16 @@ def _arguments(
     found = _resolved(owner or [verb], namespace)
     is_first = keyword is not None or place == 0
     if inspect.ismodule(found) and found.__name__ == "o80.robots":
-        return (each.name for each in o80.robots.list()) if verb == "load" and is_first else None
-    if found is o80 or (not owner and getattr(found, "__module__", "").startswith("o80.")):
+        if verb != "load" or not is_first:
+            return None
+        from o80.robots.robot import list as all_robots
+
+        return (each.name for each in all_robots())
+    if found is sys.modules["o80"] or (
+        not owner and getattr(found, "__module__", "").startswith("o80.")
+    ):
         is_segment = verb in _SEGMENTS and is_first
-        return (each.name for each in o80.segments()) if is_segment else None
+        return (each.name for each in segments()) if is_segment else None
     layout = getattr(found, "_layout", None) if _is_ours(found) else None
     if layout is None or not owner:
         return None

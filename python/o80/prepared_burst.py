@@ -7,12 +7,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from o80 import _core
-from o80.checked import whole
-from o80.enumerations import numbers_of
-from o80.errors import InvalidArgument
-from o80.trajectory import states_from
-from o80.words import LateWord
+import o80._core as _core
+from o80.base.argument_checks import whole
+from o80.base.errors import InvalidArgument
+from o80.base.words import LateWord
+from o80.rows.enumerations import numbers_of
+from o80.rows.targets import states_from
 
 
 class PreparedBurst:

@@ -8,9 +8,9 @@ signal.signal(signal.SIGINT, signal.SIG_DFL)  # until the loop stops in order by
 
 def main() -> int:
     """Returns the exit code."""
-    from o80 import _core
+    import o80._core as _core
+    from o80.base.errors import Error
     from o80.drivers.driver_class import found_to_run, library_of
-    from o80.errors import Error
 
     place, *flags = sys.argv[1:]
     try:

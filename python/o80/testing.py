@@ -1,6 +1,5 @@
 """A suite of checks for a robot, as one function for your tests.
 
-from o80.testing import check_robot
 
 def test_my_arm() -> None:
     check_robot("build/my_arm.so", {"gain": 2.0})
@@ -15,15 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from o80 import robots
-from o80.columns import columns_of, values_of
-from o80.errors import InvalidArgument
-from o80.history import History
+import o80.robots.robot as robots
+from o80.base.errors import InvalidArgument
 from o80.replaying.conditions import reads_the_world
 from o80.replaying.replay import replay
+from o80.rows.columns import columns_of
+from o80.rows.history import History, values_of
 
 if TYPE_CHECKING:
-    from o80.frontend import Frontend
+    from o80.frontend.frontend import Frontend
 
 _ITERATIONS = 40  # of a script
 _COPIES = 3

@@ -12,19 +12,17 @@ from pathlib import Path
 from typing import Any
 
 import o80
-from o80.process import start_process
+from o80.robots.process import start_process
 
 WAIT = 60.0  # [s] longer than any wait should take
 # what calls import when they are first used: an interrupt during `exec` of a text, of which
 # dataclasses are made, makes Python end with the status of an interrupt that nobody caught
 for _module in (
-    "actuator",
-    "halts",
-    "journal",
-    "preview",
-    "provenance",
-    "running_request",
-    "tables",
+    "base.screen",
+    "frontend.results",
+    "rows.actuators",
+    "rows.journal",
+    "rows.provenance",
 ):
     importlib.import_module(f"o80.{_module}")
 

@@ -23,11 +23,12 @@ from rosbags.highlevel import AnyReader
 import o80
 from o80.datasets import lerobot, minari
 from o80.datasets.episodes import episodes_of
+from o80.datasets.export import write
 from o80.difference import first_difference
-from o80.export import columns_in, write
 from o80.plot import plot
+from o80.rows.history import columns_in
+from o80.view.base64_arrays import packed
 from o80.view.curves import Panels
-from o80.view.packed import packed
 
 WAIT = 30.0  # [s] longer than any wait should take
 Columns = dict[str, NDArray[Any]]

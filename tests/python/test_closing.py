@@ -15,7 +15,7 @@ import pytest
 from processes import end_of
 
 import o80
-from o80.layout import HEAD
+from o80.rows.layout import HEAD
 
 WAIT = 30.0  # [s] longer than any wait should take
 
@@ -316,7 +316,7 @@ def test_a_child_forked_while_another_thread_computes_a_value_computes_its_own(
         with process.frontend() as arm:
             assert len(arm.history(1)) == 1
 
-    monkeypatch.setattr("o80.layout.HEAD", Blocking(HEAD))
+    monkeypatch.setattr("o80.rows.layout.HEAD", Blocking(HEAD))
     thread = threading.Thread(target=look)
     thread.start()
     assert begun.wait(WAIT)
@@ -342,7 +342,7 @@ def test_a_child_forked_while_another_thread_imports_a_module_imports_it_too(
     thread = threading.Thread(target=importlib.import_module, args=["slowly_imported"])
     thread.start()
     assert begun.wait(WAIT)
-    monkeypatch.setattr("o80.forks.LONGEST", WAIT)
+    monkeypatch.setattr("o80.base.lifecycle.LONGEST", WAIT)
     os.register_at_fork(before=go_on.set)  # registered last, so called before the wait of o80
     told = in_child(lambda: importlib.import_module("slowly_imported"))
     thread.join(WAIT)

@@ -64,7 +64,7 @@ def test_a_flipped_bit_of_any_number_is_found(
 
 def number_bytes(history: o80.History) -> list[int]:
     """First bytes of the numbers of the states: padding is no number."""
-    from o80.columns import columns_of
+    from o80.rows.columns import columns_of
 
     begin = history.schema["row"]["desired"]
     columns = columns_of(history.schema)

@@ -21,9 +21,9 @@ from mixed_robots import ROBOTS
 from numpy.typing import NDArray
 
 import o80
-from o80.enumerations import Enumeration, enumeration_of, labelled
-from o80.export import write
-from o80.layout import Layout, labels_of_type
+from o80.datasets.export import write
+from o80.rows.enumerations import Enumeration, enumeration_of, labelled
+from o80.rows.layout import Layout, labels_of_type
 
 WORDS = st.from_regex(r"[a-z][a-z0-9]{0,8}", fullmatch=True).filter(lambda word: word != "mro")
 KINDS = st.sampled_from([f"{sign}{size}" for sign in "iu" for size in (1, 2, 4, 8)])

@@ -16,11 +16,12 @@ from mixed_robots import GROUPS, ROBOTS, SENSORS, Mode, recorded
 
 import o80
 from o80.cli.histories import histories
-from o80.columns import columns_of
-from o80.command_ends import command_ends
-from o80.export import columns_in, write
+from o80.datasets.export import write
+from o80.joining.plot import Placed, origins
 from o80.plot import plot
-from o80.timelines import Placed, origins
+from o80.rows.columns import columns_of
+from o80.rows.history import columns_in
+from o80.rows.journal import command_ends
 
 
 def read(path: Path, name: str) -> dict[str, Any]:

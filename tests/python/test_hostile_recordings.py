@@ -16,11 +16,11 @@ import pytest
 
 import o80
 from o80 import _core
-from o80.machine import Machine
-from o80.provenance import Provenance
+from o80.base.machine import Machine
 from o80.recording.epoch import EpochNote
 from o80.recording.marks import Mark
 from o80.replaying.recorded_run import FileRun, runs_in
+from o80.rows.provenance import Provenance
 
 RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
 RECORDING = RECORDINGS / "codec_1.mcap"

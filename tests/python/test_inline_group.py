@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 import o80
-from o80.layout import with_padding
+from o80.rows.layout import with_padding
 
 COPIES = 5
 

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 import o80
-from o80.journal import Journal, JournalEntry
+from o80.frontend.reader import Journal
+from o80.rows.journal import JournalEntry
 
 WAIT = 30.0  # [s] longer than any wait should take
 

@@ -15,11 +15,11 @@ import pytest
 
 import o80
 from o80 import _core
-from o80.provenance import Provenance
+from o80.base.words import ProfileWord
 from o80.recording.journal_channel import Entries
 from o80.recording.recorder import Recorder
-from o80.replaying.motion_rules import MotionRules
-from o80.words import ProfileWord
+from o80.replaying.entry_feed import MotionRules
+from o80.rows.provenance import Provenance
 
 WAIT = 60.0  # [s] longer than any command should take
 NEWER = _core.JOURNAL_CODEC + 1

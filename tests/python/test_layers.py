@@ -1,5 +1,7 @@
-"""Each layer of the core includes only itself and the layers before it."""
+"""A layer of the core includes only itself and the layers before it; so do the rooms of Python."""
 
+import ast
+import graphlib
 import re
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,6 +15,30 @@ ROOMS = {
     "control": ("motion", "batch", "queue"),
     "runtime": ("journal", "backend", "frontend", "replay"),
     "robot": ("driver", "loop", "group"),
+}
+PYTHON = ROOT / "python" / "o80"
+# rooms of the Python package by floor: a room uses those of lower floors only
+FLOORS = (
+    ("base",),
+    ("rows",),
+    ("drivers", "frontend"),
+    ("groups", "recording"),
+    ("datasets", "joining", "learning", "playing", "robots", "view"),
+    ("replaying",),
+    ("cli",),
+)
+FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
+# the face of the package: what users import or start; nothing inside uses it
+FACE = ("__init__", "difference", "errors", "notebook", "plot", "run_driver", "stub", "testing")
+# files that will stand in a room when there is one kind of prepared burst
+LOOSE = {
+    "burst_group": "frontend",
+    "chained_burst": "groups",
+    "gather": "groups",
+    "group_burst": "groups",
+    "group_request": "groups",
+    "inline_group": "groups",
+    "prepared_burst": "frontend",
 }
 INCLUDE = re.compile(r'^#include "(?:o80/)?(\w+)/', re.MULTILINE)
 CAST = re.compile(r"\bcast<(.*?)>\(")
@@ -66,6 +92,70 @@ def test_every_folder_of_the_core_is_a_layer() -> None:
     folders = {file.name for file in (ROOT / "include" / "o80").iterdir() if file.is_dir()}
 
     assert folders <= set(LAYERS)
+
+
+def module_of(file: Path) -> str:
+    """The name of a module below o80: "rows.layout"; of a package its folder."""
+    parts = file.relative_to(PYTHON).with_suffix("").parts
+    return ".".join(parts[:-1] if parts[-1] == "__init__" and len(parts) > 1 else parts)
+
+
+MODULES = {module_of(file): file for file in PYTHON.rglob("*.py")}
+
+
+def imports_of(file: Path) -> set[str]:
+    """The modules of o80 that a file imports, also late or for type checkers; "__init__": o80."""
+    names: set[str] = set()
+    for node in ast.walk(ast.parse(file.read_text())):
+        if isinstance(node, ast.Import):
+            names |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module == "o80":
+            names.add("o80")
+        elif isinstance(node, ast.ImportFrom):
+            names |= {f"{node.module}.{alias.name}" for alias in node.names}
+    ours = (name.removeprefix("o80").lstrip(".") for name in names if re.match(r"o80\b", name))
+    return {known(path) for path in ours if not path.startswith("_core")} - {module_of(file)}
+
+
+def known(path: str) -> str:
+    """The module that holds a name: "rows.layout" of "rows.layout.Layout"."""
+    while path and path not in MODULES:
+        path = path.rpartition(".")[0]
+    return path or "__init__"
+
+
+IMPORTS = {module: imports_of(file) for module, file in MODULES.items()}
+
+
+def room_of(module: str) -> str:
+    return LOOSE.get(module, module.partition(".")[0])
+
+
+def test_the_python_package_has_few_rooms_on_few_floors() -> None:
+    rooms = {room_of(module) for module in MODULES} - set(FACE)
+
+    assert rooms == set(FLOOR_OF)
+    assert len(rooms) <= 14
+    assert len(FLOORS) <= 8
+
+
+def test_a_python_room_uses_only_those_below_it_and_nothing_uses_the_face() -> None:
+    wrong = [
+        f"{module} imports {used}"
+        for module, imports in IMPORTS.items()
+        if module not in FACE
+        for used in imports
+        if room_of(used) != room_of(module)
+        and (used in FACE or FLOOR_OF[room_of(used)] >= FLOOR_OF[room_of(module)])
+    ]
+
+    assert not wrong
+
+
+def test_python_modules_import_in_no_circle() -> None:
+    graph = {m: {u for u in used if not {m, u} <= set(LOOSE)} for m, used in IMPORTS.items()}
+
+    assert [*graphlib.TopologicalSorter(graph).static_order()]  # raises CycleError
 
 
 def reached_from(header: str) -> set[str]:

@@ -26,7 +26,8 @@ def test_import_and_list_load_neither_numpy_nor_a_parser() -> None:
 
 def test_the_first_attach_loads_little_beyond_numpy(segment: str) -> None:
     attach = f"import o80; o80.Frontend({segment!r}).latest()"
-    late = "{'json', 'html', 'inspect', 'datetime', 'o80.journal', 'o80.robots', 'o80.provenance'}"
+    late = "{'json', 'html', 'inspect', 'datetime', 'o80.robots', 'o80.rows.journal', "
+    late += "'o80.rows.provenance'}"
     program = f"import sys, numpy; had = set(sys.modules); {attach}; "
     program += f"print(sorted({late} & (set(sys.modules) - had)))"
     with o80.Backend(segment, ["joint"]) as backend:

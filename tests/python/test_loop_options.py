@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import o80
-from o80.loop_options import LoopOption, loop_options
+from o80.base.loop_options import LoopOption, loop_options
 
 WAIT = 30.0  # [s] longer than any wait should take
 DOCS = Path(__file__).parents[2] / "docs" / "options.md"

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import o80
-from o80.installation import prefix
+from o80.base.installation import prefix
 
 
 def test_of_an_inline_robot_has_the_effective_options(segment: str) -> None:

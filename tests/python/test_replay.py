@@ -16,10 +16,10 @@ from hypothesis import strategies as st
 
 import o80
 from o80 import _core
-from o80.columns import columns_of
-from o80.machine import this_machine
+from o80.base.machine import this_machine
 from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
 from o80.replaying.replay import replay_runs
+from o80.rows.columns import columns_of
 
 RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
 NAMES = ("shoulder", "elbow")

@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 
 import o80
-from o80.provenance import Provenance, ProvenanceFile
 from o80.replaying.recorded_run import FileRun, LiveRun, runs_in
 from o80.replaying.replay import replay_runs
 from o80.replaying.trust import options_of
+from o80.rows.provenance import Provenance, ProvenanceFile
 
 
 @pytest.fixture

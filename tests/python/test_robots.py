@@ -66,7 +66,7 @@ def test_robots_of_further_folders_are_found(
 def test_a_robot_whose_package_is_missing_names_it(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("o80.robots.announced", lambda group: {})
+    monkeypatch.setattr("o80.robots.robot.announced", lambda group: {})
 
     with pytest.raises(o80.DriverError, match=f"`pip install o80-{name}`.*O80_ROBOT_PATH"):
         o80.robots.load(name)

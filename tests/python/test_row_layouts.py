@@ -19,8 +19,8 @@ from published_rows import Published, check_every_reader
 
 import o80
 from o80.drivers import Reading
-from o80.layout import with_padding
-from o80.trajectory import states_of
+from o80.rows.layout import with_padding
+from o80.rows.targets import states_of
 
 LAYOUTS = settings(ROBOTS, max_examples=int(os.environ.get("O80_LAYOUTS", ROBOTS.max_examples)))
 SEEDS = st.integers(0, 2**32 - 1)

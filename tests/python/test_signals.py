@@ -20,7 +20,7 @@ from blocking import CALLS
 from interrupting import at_every_moment
 
 import o80
-from o80.child import start_child
+from o80.base.child_process import start_child
 
 WAIT = 60.0  # [s] longer than any wait should take
 

@@ -17,7 +17,7 @@ from mixed_robots import GROUPS, ROBOTS, SENSORS
 from test_typing import mypy
 
 import o80
-from o80.stub import digest_of, module_of
+from o80.frontend.robot_stub import digest_of, module_of
 
 O80 = str(Path(sys.executable).parent / "o80")
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from o80.extras import needed
+from o80.base.extras import needed
 
 ACCELERATED = "o80/TableTennis-v0"
 """Runs as fast as the machine can; the same seed gives the same episode, bit for bit."""

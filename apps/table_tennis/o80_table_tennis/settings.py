@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from numbers import Real
 
-from o80.checked import whole
+from o80.base.argument_checks import whole
 
 from .task.actions import FINE, largest_change
 from .task.ball_play import HitTask, ReturnTask, SmashTask

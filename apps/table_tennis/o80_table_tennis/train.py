@@ -18,7 +18,7 @@ import typer
 from rich.console import Console
 
 import o80
-from o80.extras import needed
+from o80.base.extras import needed
 
 if TYPE_CHECKING:
     from .learning.settings import LearningSettings

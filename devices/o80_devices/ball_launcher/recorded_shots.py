@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.extras import needed
 from o80.errors import InvalidArgument
-from o80.extras import needed
 
 FORMATS = (".hdf5", ".h5")
 FEWEST_ROWS = 20

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from o80.extras import needed
+from o80.base.extras import needed
 from o80_devices.ball_tracking.tracker import Tracker
 from o80_devices.cameras.rig import four_cameras
 from o80_devices.cameras.scene import Scene

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.extras import needed
 from o80.errors import InvalidArgument
-from o80.extras import needed
+from o80.base.extras import needed
 from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.extras import needed
 from o80.errors import InvalidArgument
-from o80.extras import needed
 from o80_devices import _vision
 from o80_devices.calibration.board import PURPOSE
 from o80_devices.cameras.rig import RigCamera

@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.extras import needed
 from o80.drivers import Reading, option
 from o80.errors import InvalidArgument
-from o80.extras import needed
 from o80_devices.trouble import Trouble
 
 Image = NDArray[np.uint8]

@@ -5,8 +5,8 @@ from __future__ import annotations
 import os
 import sys
 
-import o80
-from o80.cli.screen import complain
+from o80.base.errors import Error
+from o80.base.screen import complain
 
 __all__ = ["main"]
 
@@ -15,7 +15,7 @@ def main() -> None:
     """Entry point. Exceptions of o80 become one line and exit code 1."""
     try:
         _run(sys.argv[1:])
-    except o80.Error as error:
+    except Error as error:
         complain(str(error))
         sys.exit(1)
     except KeyboardInterrupt:

@@ -6,7 +6,8 @@ from typing import Annotated
 
 import typer
 
-import o80
+import o80._core as _core
+from o80.base import installation
 from o80.cli.clean import clean
 from o80.cli.diff import diff
 from o80.cli.echo import echo
@@ -72,8 +73,8 @@ def root(
 ) -> None:
     """Run robots, see what runs, read it, stop it."""
     if version:
-        typer.echo(o80.__version__)
+        typer.echo(_core.version())
         raise typer.Exit()
     if prefix:
-        typer.echo(o80.prefix())
+        typer.echo(installation.prefix())
         raise typer.Exit()

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-import o80
-from o80.cli.screen import complain
+from o80.base.errors import TimeoutError
+from o80.base.screen import complain
+from o80.frontend.frontend import Frontend
 
 
-def attach(segment: str, *, wait: bool | None = None, read_only: bool = True) -> o80.Frontend:
+def attach(segment: str, *, wait: bool | None = None, read_only: bool = True) -> Frontend:
     """A frontend of an existing segment; a read-only one also attaches to a dead segment.
 
     wait: True waits for a segment that does not exist yet and says so; None: the command has no
         flag --wait.
     """
     try:
-        return o80.Frontend(segment, 0.0, read_only=read_only, dead=read_only and not wait)
-    except o80.TimeoutError as error:
+        return Frontend(segment, 0.0, read_only=read_only, dead=read_only and not wait)
+    except TimeoutError as error:
         if wait is None:
             raise
         if not wait:
-            raise o80.TimeoutError(f"{error} With --wait, echo waits for it.") from None
+            raise TimeoutError(f"{error} With --wait, echo waits for it.") from None
         complain(f"waiting; Ctrl-C ends it. {error}")
-    return o80.Frontend(segment, None, read_only=read_only)
+    return Frontend(segment, None, read_only=read_only)

@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
-import o80
-from o80 import _core
-from o80.cli.screen import complain
+import o80._core as _core
+from o80.base.errors import Error, SegmentError
+from o80.base.screen import complain
+from o80.frontend.segments import clean as clean_segments
+from o80.frontend.segments import segments as all_segments
 
 
 def clean(
@@ -23,14 +25,14 @@ def clean(
     if segments:
         _clean_named(segments)
         return
-    removed = o80.clean()
+    removed = clean_segments()
     for name in removed:
         print(f"removed {name}")
     if removed:
         return
-    there = o80.segments()
+    there = all_segments()
     if not there and (problem := _core.directory_problem()):
-        raise o80.SegmentError(problem)
+        raise SegmentError(problem)
     counts = {
         "running": sum(entry.alive for entry in there),
         "unknown": sum(entry.life == "unknown" for entry in there),
@@ -41,15 +43,15 @@ def clean(
 
 def _clean_named(names: list[str]) -> None:
     failed = False
-    known = [entry.name for entry in o80.segments()]
+    known = [entry.name for entry in all_segments()]
     for name in dict.fromkeys(names):
         # remove the others even if one cannot be removed
         try:
-            if o80.clean(name):
+            if clean_segments(name):
                 print(f"removed {name}")
                 continue
             complain(f"there is no segment '{name}'{_core.names_instead(name, known)}")
-        except o80.Error as error:
+        except Error as error:
             complain(str(error))
         failed = True
     if failed:

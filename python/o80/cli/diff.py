@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-import o80
+from o80.base.errors import InvalidArgument
 from o80.cli.histories import Named, histories
+from o80.rows.history import History
 
 
 def _tolerances(texts: list[str] | None) -> dict[str, float]:
@@ -44,13 +45,13 @@ def diff(
 
     Times and counts of late iterations are left out for robots that ran in real time.
     """
-    from o80.difference import first_difference
+    from o80.joining.difference import first_difference
 
     tolerances = _tolerances(tolerance)
     left_out = [name for name in ignore.split(",") if name]
     pairs = _pairs(list(histories(one, segment)), list(histories(other, segment)))
     if not pairs:
-        raise o80.InvalidArgument(f"{one} and {other} hold no segment")
+        raise InvalidArgument(f"{one} and {other} hold no segment")
     different = False
     for name, mine, others in pairs:
         found = first_difference(mine, others, ignore=left_out, tolerances=tolerances)
@@ -60,7 +61,7 @@ def diff(
         raise typer.Exit(1)
 
 
-def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, o80.History, o80.History]]:
+def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, History, History]]:
     """The same runs of the same segments; two single ones may have different names."""
     if len(ours) == len(theirs) == 1:
         return [(ours[0].name, ours[0].history, theirs[0].history)]
@@ -68,7 +69,7 @@ def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, o80.Histor
     lacking = {(each.name, each.number) for each in ours} ^ set(there)
     if lacking:
         names = ", ".join(f"{name} (run {number})" for name, number in sorted(lacking)[:5])
-        raise o80.InvalidArgument(f"only one of them has: {names}. Choose one with --segment")
+        raise InvalidArgument(f"only one of them has: {names}. Choose one with --segment")
     return [
         (
             each.name if each.number == 0 else f"{each.name}/{each.number}",

@@ -11,13 +11,15 @@ from typing import Annotated
 
 import typer
 
-import o80
-from o80 import _core
+import o80._core as _core
+from o80._core import Observation
+from o80.base.errors import InvalidArgument, TimeoutError
+from o80.base.screen import complain, style
 from o80.cli.attach import attach
-from o80.cli.condition import halt_text, pace_text
 from o80.cli.journal_lines import follow, print_recorded
-from o80.cli.screen import complain, style
 from o80.cli.values import RowValues, text
+from o80.frontend.backend_texts import halt_text, pace_text
+from o80.frontend.frontend import Frontend
 
 _LOOK = 1.0  # between two checks of a loop that publishes no row [s]
 _BETWEEN_REMARKS = 10.0  # between two remarks about one trouble [s]
@@ -75,7 +77,7 @@ def echo(
     """
     if segment.endswith(".mcap"):
         if not commands:
-            raise o80.InvalidArgument(
+            raise InvalidArgument(
                 f"{segment} is a recording: `o80 echo --commands {segment}` prints its decisions, "
                 f"and `o80 play {segment}` makes it a segment, whose rows o80 echo prints"
             )
@@ -97,9 +99,7 @@ def echo(
                 return
 
 
-def _rows(
-    frontend: o80.Frontend, rate: float | None, timeout: float | None
-) -> Iterator[o80.Observation]:
+def _rows(frontend: Frontend, rate: float | None, timeout: float | None) -> Iterator[Observation]:
     """Yields every row (rate None), or at most `rate` rows a second; prints why none comes."""
     remarks = _Remarks(frontend)
     row = frontend.latest()
@@ -115,7 +115,7 @@ def _rows(
             try:
                 row = frontend.wait_for(wanted, timeout=left)
                 break
-            except o80.TimeoutError:
+            except TimeoutError:
                 waited += left
                 if timeout is not None and waited >= timeout:
                     raise
@@ -125,7 +125,7 @@ def _rows(
 class _Remarks:
     """Remarks about halts and troubles of the loop, on stderr, at a limited rate."""
 
-    def __init__(self, frontend: o80.Frontend) -> None:
+    def __init__(self, frontend: Frontend) -> None:
         self._frontend = frontend
         self._halt = 0
         self._said = ""
@@ -157,7 +157,7 @@ class _Remarks:
 class _Printer:
     """Prints rows of one robot."""
 
-    def __init__(self, frontend: o80.Frontend, fields: list[str], as_json: bool) -> None:
+    def __init__(self, frontend: Frontend, fields: list[str], as_json: bool) -> None:
         self._frontend = frontend
         self._values = RowValues(frontend.schema)
         self._fields = fields
@@ -173,7 +173,7 @@ class _Printer:
             head = pace_text(_core.loop_state(self._frontend))
             print(f"{self._frontend.segment}: {head}", file=sys.stderr, flush=True)
 
-    def print(self, row: o80.Observation) -> None:
+    def print(self, row: Observation) -> None:
         """Prints a row in one line."""
         plain = self._values.plain(row)
         if self._fields:
@@ -181,7 +181,7 @@ class _Printer:
             plain = {"iteration": plain["iteration"], "time": plain["time"]} | chosen
         print(json.dumps(plain) if self._as_json else self._line(row, plain), flush=True)
 
-    def _line(self, row: o80.Observation, plain: dict[str, object]) -> str:
+    def _line(self, row: Observation, plain: dict[str, object]) -> str:
         parts = [f"{style(f'{row.iteration:>8}', 'bold')} {row.time * 1e-9:.3f} s"]
         if row.halted:
             parts.append(style("HALTED", "yellow"))

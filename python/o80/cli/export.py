@@ -9,10 +9,10 @@ from typing import Annotated
 
 import typer
 
-import o80
+from o80.base.errors import InvalidArgument
+from o80.base.screen import complain
+from o80.base.unwritable import writing
 from o80.cli.histories import histories
-from o80.cli.screen import complain
-from o80.unwritable import writing
 
 
 class Format(StrEnum):
@@ -50,16 +50,16 @@ def export(
     """
     if form is not None:
         if fields:
-            raise o80.InvalidArgument("--fields is for rows: leave it out with --format")
+            raise InvalidArgument("--fields is for rows: leave it out with --format")
         _export_episodes(source, output, segment, form, every)
         return
     if every != 1:
-        raise o80.InvalidArgument("--every is for data sets: give --format lerobot or minari too")
-    from o80.export import write
+        raise InvalidArgument("--every is for data sets: give --format lerobot or minari too")
+    from o80.datasets.export import write
 
     found = list(histories(source, segment))
     if not found:
-        raise o80.InvalidArgument(f"{source} holds no segment")
+        raise InvalidArgument(f"{source} holds no segment")
     restarted = {each.name for each in found if each.number > 0}
     named = {
         f"{each.name}/{each.number}" if each.name in restarted else each.name: each.history
@@ -76,8 +76,9 @@ def _export_episodes(
 ) -> None:
     from o80.datasets import lerobot, minari
     from o80.datasets.episodes import episodes_of
+    from o80.recording.reader import open as open_recording
 
-    episodes = episodes_of(o80.open(source), segment, every=every)
+    episodes = episodes_of(open_recording(source), segment, every=every)
     write = {Format.LEROBOT: lerobot.write, Format.MINARI: minari.write}[form]
     with writing(output):
         write(output, episodes)

@@ -6,8 +6,9 @@ from typing import Annotated
 
 import typer
 
-import o80
+from o80.base.errors import InvalidArgument
 from o80.cli.attach import attach
+from o80.frontend.results import halt as halt_backend
 
 
 def halt(
@@ -18,7 +19,7 @@ def halt(
 
     Not a safety function: keep an emergency stop that needs no computer.
     """
-    number = o80.halt(segment, reason)
+    number = halt_backend(segment, reason)
     print(f"halt {number} of {segment}; go on with: o80 resume {segment} {number}")
 
 
@@ -55,7 +56,7 @@ def resume(
 
 def _number(text: str, segment: str) -> int:
     if not text.isdecimal() or int(text) == 0:
-        raise o80.InvalidArgument(
+        raise InvalidArgument(
             f"the number of a halt must be a positive whole number, got '{text}': "
             f"`o80 info {segment}` shows it; without a number the halt in force is cleared"
         )

@@ -7,9 +7,10 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import o80
+from o80.base.errors import BackendGone, InvalidArgument
 from o80.cli.attach import attach
-from o80.journal import JournalEntry, marks_in
+from o80.rows.history import History
+from o80.rows.journal import JournalEntry, marks_in
 
 
 @dataclass(frozen=True)
@@ -18,7 +19,7 @@ class Named:
 
     name: str  #: of the segment
     number: int  #: of the run, from 0; runs of a segment in one file
-    history: o80.History
+    history: History
     wall_offset: int | None  #: wall clock less row time [ns]; None: not known
     journal: Callable[[], list[JournalEntry]]  #: what its backend decided, as far as known
     marks: list[tuple[str, int]] = field(default_factory=list)  #: name and iteration
@@ -32,17 +33,19 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
     if not source.endswith(".mcap"):
         with attach(source) as frontend:
             if frontend.published < 0:
-                raise o80.BackendGone(f"segment '{source}' has no row")
+                raise BackendGone(f"segment '{source}' has no row")
             history = frontend.history(seconds=seconds)
             real_time = frontend.schema["clock"] == "monotonic"
             offset = time.time_ns() - time.monotonic_ns() if real_time else None
             entries = frontend.journal()
             yield Named(source, 0, history, offset, lambda: entries, marks_in(entries))
         return
-    recording = o80.open(Path(source))
+    from o80.recording.reader import open as open_recording
+
+    recording = open_recording(Path(source))
     if only is not None and only not in recording.segments:
         there = ", ".join(recording) or "none"
-        raise o80.InvalidArgument(f"no segment '{only}' in {source}; there are: {there}")
+        raise InvalidArgument(f"no segment '{only}' in {source}; there are: {there}")
     for name in [only] if only is not None else list(recording):
         epochs, of_run = recording[name].epochs, recording.marks_by_run(name)
         for number, epoch in enumerate(epochs):

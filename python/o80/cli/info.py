@@ -9,12 +9,12 @@ from typing import Annotated, Any
 
 import typer
 
-from o80 import _core
+import o80._core as _core
+from o80.base.screen import Column, print_json, print_table, style
 from o80.cli.attach import attach
-from o80.cli.condition import halt_text, pace_text, running_texts, watchdog_text
-from o80.cli.screen import Column, print_json, print_table, style
-from o80.started_with import started_with
-from o80.tables import ACTUATOR_HEADS, actuator_rows, field_text
+from o80.frontend.backend_texts import halt_text, pace_text, running_texts, watchdog_text
+from o80.rows.actuators import ACTUATOR_HEADS, actuator_rows, field_text
+from o80.rows.provenance import started_with
 
 
 def info(

@@ -10,23 +10,25 @@ from typing import Any
 
 import numpy as np
 
-import o80
-from o80.cli.screen import style
-from o80.journal import Journal, JournalCommand, JournalEntry
+from o80.base.errors import Error, TimeoutError
+from o80.base.screen import style
+from o80.frontend.frontend import Frontend
+from o80.frontend.reader import Journal
+from o80.rows.journal import JournalCommand, JournalEntry
 
 _LOOK = 0.05  # between two looks for new entries [s]
 _BEFORE = 10  # entries of a living backend that are printed at the start
 _MOST_NUMBERS = 8  # of a target
 
 
-def follow(frontend: o80.Frontend, count: int, as_json: bool, timeout: float | None) -> None:
+def follow(frontend: Frontend, count: int, as_json: bool, timeout: float | None) -> None:
     """Prints the last entries, then new ones; ends after `count` of both, 0: never.
 
     Of a dead backend it then raises the reason of its end.
     """
     journal = Journal(frontend)
     if not journal.exists:
-        raise o80.Error(f"'{frontend.segment}' has no journal: its backend was started without one")
+        raise Error(f"'{frontend.segment}' has no journal: its backend was started without one")
     lines = _Lines(as_json)
     alive = frontend.alive
     there = [(entry, lines.line(entry)) for entry in journal.read()]
@@ -52,13 +54,15 @@ def follow(frontend: o80.Frontend, count: int, as_json: bool, timeout: float | N
         if entries:
             waited_since = time.monotonic()
         elif timeout is not None and time.monotonic() - waited_since >= timeout:
-            raise o80.TimeoutError(f"'{frontend.segment}' decided nothing for {timeout:g} s")
+            raise TimeoutError(f"'{frontend.segment}' decided nothing for {timeout:g} s")
         time.sleep(_LOOK)
 
 
 def print_recorded(path: str, count: int, as_json: bool) -> None:
     """Prints the entries in a recording; with `count` the last ones of each run of a robot."""
-    recording = o80.open(path)
+    from o80.recording.reader import open as open_recording
+
+    recording = open_recording(path)
     for name in recording:
         epochs = recording[name].epochs
         for number, epoch in enumerate(epochs):

@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-import o80
+from o80.base.errors import InvalidArgument
 from o80.cli.attach import attach
 
 if TYPE_CHECKING:
-    from o80.history import History
+    from o80.rows.history import History
 
 
 def latency(
@@ -35,14 +35,15 @@ def latency(
     Move the robot to and fro, without a fixed rhythm, while both segments see it.
     """
     from o80.joining.latency import latency as estimate
+    from o80.recording.reader import open as open_recording
 
-    file = None if recording is None else o80.open(recording)
+    file = None if recording is None else open_recording(recording)
     with ExitStack() as opened:
         signals = []
         for text in (first, second):
             name, colon, field = text.partition(":")
             if not colon or not name or not field:
-                raise o80.InvalidArgument(
+                raise InvalidArgument(
                     f"write SEGMENT:FIELD, for example arm:observed.elbow, not '{text}'"
                 )
             source: Any = file[name] if file is not None else opened.enter_context(attach(name))
@@ -55,6 +56,6 @@ def _signal(text: str) -> str | Callable[[History], Any]:
     match = re.fullmatch(r"norm\((.+)\)", text)
     if match is None:
         return text
-    from o80.joining.norm import norm_of
+    from o80.joining.latency import norm_of
 
     return norm_of(match[1])

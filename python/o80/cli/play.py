@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-import o80
+from o80.base.errors import InvalidArgument
 from o80.cli.stop_request import StopRequest
 
 if TYPE_CHECKING:
@@ -86,7 +86,9 @@ def play(
             f"must be later than --from ({begin:g} s), got {end:g} s", param_hint="--to"
         )
     stop = StopRequest()
-    with o80.play(
+    from o80.playing.playback import play as play_recording
+
+    with play_recording(
         path,
         segment,
         speed=math.inf if fast else 1.0 if speed is None else speed,
@@ -111,9 +113,11 @@ def play(
 def _names(path: Path, segments: list[str] | None, name: str | None) -> dict[str, str]:
     if name is None:
         return {}
-    found = segments or list(o80.open(path))
+    from o80.recording.reader import open as open_recording
+
+    found = segments or list(open_recording(path))
     if len(found) != 1:
-        raise o80.InvalidArgument(
+        raise InvalidArgument(
             f"--name is for one segment, and {len(found)} are played ({', '.join(found)}): choose "
             f"one with --segment, or rename all with --prefix"
         )

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-import o80
+from o80.base.errors import InvalidArgument
+from o80.base.screen import complain
+from o80.base.unwritable import writing
 from o80.cli.histories import Named, histories
-from o80.cli.screen import complain
-from o80.unwritable import writing
 
 
 def plot(
@@ -30,9 +30,9 @@ def plot(
     Each run of a robot that was restarted has panels of its own. Runs of different times begin at 0
     each.
     """
-    from o80 import plot as plots
-    from o80.command_ends import command_ends
-    from o80.timelines import Placed, origins
+    from o80.joining import plot as plots
+    from o80.joining.plot import Placed, origins
+    from o80.rows.journal import command_ends
 
     found: dict[str, Named] = {}
     for source in dict.fromkeys(sources):
@@ -41,7 +41,7 @@ def plot(
             if len(each.history):
                 found[f"{source}: {name}" if name in found else name] = each
     if not found:
-        raise o80.InvalidArgument(f"{', '.join(sources)}: no rows to plot")
+        raise InvalidArgument(f"{', '.join(sources)}: no rows to plot")
     zeros, axes = origins(
         {name: Placed(each.history, each.wall_offset) for name, each in found.items()}
     )
@@ -59,7 +59,7 @@ def plot(
     if output is not None:
         known = figure.canvas.get_supported_filetypes()
         if output.suffix[1:].lower() not in known:
-            raise o80.InvalidArgument(
+            raise InvalidArgument(
                 f"unknown format '{output.suffix}' of {output}: choose one of .png, .pdf, .svg"
             )
         with writing(output):
@@ -70,5 +70,5 @@ def plot(
     from matplotlib import pyplot
 
     if pyplot.get_backend().lower() == "agg":
-        raise o80.InvalidArgument("there is no screen for a window: write a picture with --output")
+        raise InvalidArgument("there is no screen for a window: write a picture with --output")
     pyplot.show()

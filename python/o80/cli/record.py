@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from o80.cli.screen import bytes_text, complain
+from o80.base.screen import bytes_text, complain
 from o80.cli.stop_request import StopRequest
 
 if TYPE_CHECKING:
-    from o80.frontend import Frontend
+    from o80.frontend.frontend import Frontend
     from o80.recording.recorder import Recorder
     from o80.recording.source import Source
 

@@ -7,11 +7,10 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import o80
-from o80 import _core
-from o80.cli.condition import age_text
-from o80.cli.screen import Column, bytes_text, plain, print_json, print_table, style
-from o80.started_with import started_with
+import o80._core as _core
+from o80.base.screen import Column, bytes_text, plain, print_json, print_table, style
+from o80.frontend.backend_texts import age_text
+from o80.rows.provenance import started_with
 
 if TYPE_CHECKING:
     from o80.recording.marks import Mark
@@ -33,7 +32,9 @@ COLUMNS = (
 
 def recording_info(path: Path, *, as_json: bool = False) -> None:
     """Prints what a recording holds. Raises RecordingError."""
-    recording = o80.open(path)
+    from o80.recording.reader import open as open_recording
+
+    recording = open_recording(path)
     runs = [
         (name, number, epoch)
         for name in recording

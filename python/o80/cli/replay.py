@@ -8,9 +8,9 @@ from typing import Annotated
 
 import typer
 
-import o80
+from o80.base.screen import plain
 from o80.cli.diff import _tolerances
-from o80.cli.screen import plain
+from o80.frontend.frontend import Frontend
 
 _ENOUGH = 1000  # rows for a speed that is not that of the start
 
@@ -95,7 +95,7 @@ def replay(
         raise typer.Exit(2)
 
 
-def _attached(name: str) -> o80.Frontend:
+def _attached(name: str) -> Frontend:
     from o80.cli.attach import attach
 
     return attach(name)

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import typer
 
-import o80
-from o80.cli.screen import style
+from o80.base.installation import prefix
+from o80.base.screen import style
 
 
 def run(context: typer.Context) -> None:
@@ -28,13 +28,17 @@ def run(context: typer.Context) -> None:
         _print_robots()
         raise typer.Exit(0 if arguments else 2)
     robot, flags = arguments[0], arguments[1:]
-    if (place := o80.robots.place_of(robot)) is not None:
+    import o80.robots.robot as robots
+
+    if (place := robots.place_of(robot)) is not None:
         os.execv(sys.executable, [sys.executable, "-u", "-m", "o80.run_driver", place, *flags])
-    program = Path(o80.prefix()) / "bin" / "o80-run"
-    os.execv(program, [str(program), str(o80.robots.path_of(robot)), *flags])
+    program = Path(prefix()) / "bin" / "o80-run"
+    os.execv(program, [str(program), str(robots.path_of(robot)), *flags])
 
 
 def _print_robots() -> None:
     print(style("Robots", "bold"))
-    for robot in o80.robots.list():
+    import o80.robots.robot as robots
+
+    for robot in robots.list():
         print(f"  {robot.name:<16} {robot.path}")

@@ -14,15 +14,16 @@ def save(
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")],
 ) -> None:
     """Save what segments still hold, also those of robots that have ended or crashed."""
-    import o80
+    from o80.base.errors import SegmentError
+    from o80.frontend.segments import segments as all_segments
     from o80.recording.recorder import Recorder
 
-    there = {segment.name for segment in o80.segments() if segment.readable}
+    there = {segment.name for segment in all_segments() if segment.readable}
     for name in names:
         if not any(sign in name for sign in "*?[") and name not in there:
-            raise o80.SegmentError(f"there is no segment '{name}' (see `o80 list`)")
+            raise SegmentError(f"there is no segment '{name}' (see `o80 list`)")
         if not any(fnmatch.fnmatchcase(segment, name) for segment in there):
-            raise o80.SegmentError(f"no segment matches '{name}' (see `o80 list`)")
+            raise SegmentError(f"no segment matches '{name}' (see `o80 list`)")
     recorder = Recorder(output, names)
     try:
         recorder.catch_up()

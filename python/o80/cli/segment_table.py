@@ -6,10 +6,12 @@ import os
 import time
 from typing import Any
 
-import o80
-from o80 import _core
-from o80.cli.condition import age_text, halt_text, rate_text, running_texts
-from o80.cli.screen import Column, print_json, print_table, style
+import o80._core as _core
+from o80.base.errors import Error, SegmentError
+from o80.base.screen import Column, print_json, print_table, style
+from o80.frontend.backend_texts import age_text, halt_text, rate_text, running_texts
+from o80.frontend.segments import Segment
+from o80.frontend.segments import segments as all_segments
 
 _COLUMNS = (
     Column("segment"),
@@ -37,13 +39,13 @@ _STYLES = {
 
 def print_segments(*, as_json: bool) -> None:
     """Prints all backends of this machine, as a table or as JSON."""
-    rows = [_row(entry) for entry in o80.segments()]
+    rows = [_row(entry) for entry in all_segments()]
     if as_json:
         print_json(rows)
         return
     if not rows:
         if problem := _core.directory_problem():
-            raise o80.SegmentError(problem)
+            raise SegmentError(problem)
         where = f" in {os.environ['O80_DIRECTORY']}" if os.environ.get("O80_DIRECTORY") else ""
         print(f"Nothing runs{where}. Start a robot with {style('o80 run two_joints', 'bold')}.")
         return
@@ -56,7 +58,7 @@ def print_segments(*, as_json: bool) -> None:
         print(style("Dead segments can still be read; o80 clean removes them.", "dim"))
 
 
-def _row(entry: o80.Segment) -> dict[str, Any]:
+def _row(entry: Segment) -> dict[str, Any]:
     row: dict[str, Any] = {
         "segment": entry.name,
         "state": entry.state,
@@ -85,7 +87,7 @@ def _row(entry: o80.Segment) -> dict[str, Any]:
         return row
     try:
         state = _core.backend_state(entry.name)
-    except o80.Error:
+    except Error:
         return row  # it has ended since
     loop = state.loop
     row |= {

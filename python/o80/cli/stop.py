@@ -6,9 +6,11 @@ from typing import Annotated
 
 import typer
 
-import o80
-from o80 import _core
-from o80.cli.screen import complain
+import o80._core as _core
+from o80.base.errors import Error, InvalidArgument, SegmentError
+from o80.base.screen import complain
+from o80.frontend.segments import segments as all_segments
+from o80.frontend.stopping import stop as stop_backend
 
 
 def stop(
@@ -17,7 +19,7 @@ def stop(
     timeout: Annotated[float, typer.Option(help="Seconds to wait for the end of each.")] = 5.0,
 ) -> None:
     """Stop backends in order: robots brake, drivers stop, frontends raise BackendStopped."""
-    there = o80.segments() if every else []
+    there = all_segments() if every else []
     names = [entry.name for entry in there if entry.alive] if every else (segments or [])
     unseen = [entry.name for entry in there if entry.life == "unknown"]
     if unseen:
@@ -25,16 +27,16 @@ def stop(
     if not names:
         if every:
             if not there and (problem := _core.directory_problem()):
-                raise o80.SegmentError(problem)
+                raise SegmentError(problem)
             print("Nothing that this user can see runs." if unseen else "Nothing runs.")
             return
-        raise o80.InvalidArgument("name the segments to stop (see `o80 list`), or give --all")
+        raise InvalidArgument("name the segments to stop (see `o80 list`), or give --all")
     failed = False
     for name in dict.fromkeys(names):
         # stop the others even if one cannot be stopped
         try:
-            o80.stop(name, timeout)
-        except o80.Error as error:
+            stop_backend(name, timeout)
+        except Error as error:
             complain(str(error))
             failed = True
         else:

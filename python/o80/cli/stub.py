@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-import o80
+from o80.base.unwritable import writing
 from o80.cli.attach import attach
-from o80.stub import module_of
-from o80.unwritable import writing
+from o80.frontend.robot_stub import module_of
+from o80.frontend.segments import segments as all_segments
 
 
 def stub(
@@ -26,11 +26,13 @@ def stub(
 
     o80 stub arm -o my_arm.py, and in a program: from my_arm import attach
     """
-    if any(entry.name == name and entry.readable for entry in o80.segments()):
+    if any(entry.name == name and entry.readable for entry in all_segments()):
         with attach(name) as frontend:
             text = module_of(frontend.schema, name)
     else:
-        text = module_of(o80.robots.load(name).describe())
+        import o80.robots.robot as robots
+
+        text = module_of(robots.load(name).describe())
     if output is None:
         print(text, end="")
     else:

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import o80
-from o80 import _core
+import o80._core as _core
+from o80._core import Observation
+from o80.base.errors import InvalidArgument
 
 
 class RowValues:
@@ -15,7 +16,7 @@ class RowValues:
         self._schema = schema
         self._actuators: list[str] = [actuator["name"] for actuator in schema["actuators"]]
 
-    def plain(self, row: o80.Observation) -> dict[str, Any]:
+    def plain(self, row: Observation) -> dict[str, Any]:
         """A row as plain values for JSON; enumerations as labels."""
         sensors = self._schema.get("extended")
         return {
@@ -40,7 +41,7 @@ class RowValues:
             return _described(states, groups[0]["type"])
         return {group["name"]: _described(states[group["name"]], group["type"]) for group in groups}
 
-    def acting(self, row: o80.Observation) -> str:
+    def acting(self, row: Observation) -> str:
         """The actuators that commands drive, and those that brake."""
         active, braking = row.active, row.braking
         driven = [name for i, name in enumerate(self._actuators) if active[i] and not braking[i]]
@@ -69,10 +70,10 @@ class RowValues:
             if step not in known:
                 where = f"'{walked}' has no value" if walked else "a row has no field"
                 if not known:
-                    raise o80.InvalidArgument(f"--fields: {where} '{step}': it is a plain value")
+                    raise InvalidArgument(f"--fields: {where} '{step}': it is a plain value")
                 names = [name for name in known if not name.isdecimal()] or list(known)
                 instead = _core.names_instead(step, names)
-                raise o80.InvalidArgument(f"--fields: {where} '{step}'{instead}")
+                raise InvalidArgument(f"--fields: {where} '{step}'{instead}")
             value = value[known[step]]
             walked = f"{walked}.{step}" if walked else step
         return value

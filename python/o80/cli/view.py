@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from o80.cli.screen import complain
+from o80.base.screen import complain
 
 
 def view(

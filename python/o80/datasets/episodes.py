@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.cached import cached
-from o80.checked import whole
-from o80.columns import columns_of, values_of
-from o80.errors import InvalidArgument
-from o80.history import History
+from o80.base.argument_checks import whole
+from o80.base.cached import cached
+from o80.base.errors import InvalidArgument
+from o80.rows.columns import columns_of
+from o80.rows.history import History, values_of
 
 if TYPE_CHECKING:
     from o80.recording.marks import Mark

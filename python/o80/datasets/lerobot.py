@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.errors import InvalidArgument
+from o80.base.extras import needed
 from o80.datasets.episodes import Episode, Episodes
-from o80.errors import InvalidArgument
-from o80.extras import needed
 
 VERSION = "v3.0"
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"

@@ -4,9 +4,9 @@ from pathlib import Path
 
 import numpy as np
 
+from o80.base.errors import InvalidArgument
+from o80.base.extras import needed
 from o80.datasets.episodes import Episode, Episodes
-from o80.errors import InvalidArgument
-from o80.extras import needed
 
 
 def write(path: Path, episodes: Episodes) -> None:

@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80 import _core
-from o80.backend import KEEPS
-from o80.checked import mapping, nothing
-from o80.description import SchemaWriter
+import o80._core as _core
+from o80.base.argument_checks import mapping, nothing
+from o80.base.errors import Error, InvalidArgument, RequestRejected, exception_text
+from o80.drivers.backend import KEEPS
+from o80.drivers.description import SchemaWriter
 from o80.drivers.reading import Answer, Desired, Differences, DriverFaultError, Reading
-from o80.errors import Error, InvalidArgument, RequestRejected, exception_text
-from o80.layout import Layout, dtype_of_type, record_of
+from o80.rows.layout import Layout, dtype_of_type, record_of
 
 NANOSECOND = 1e-9
 

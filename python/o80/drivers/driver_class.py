@@ -12,10 +12,10 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from o80 import _core
+import o80._core as _core
+from o80.base.errors import DriverError, InvalidArgument
 from o80.drivers.adapter import Adapter, check_verbs
 from o80.drivers.option import Options
-from o80.errors import DriverError, InvalidArgument
 
 #: the driver that this process imports, if it is the process of a robot
 imported_to_run = ""

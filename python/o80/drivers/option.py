@@ -9,8 +9,8 @@ from collections.abc import Callable, Sequence
 from enum import Enum
 from typing import Any, Literal, NewType, get_args, get_origin
 
-from o80 import _core
-from o80.errors import InvalidArgument
+import o80._core as _core
+from o80.base.errors import InvalidArgument
 
 Seed = NewType("Seed", int)
 """A field of this type is drawn at each start, unless it is given, and recorded."""

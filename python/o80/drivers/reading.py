@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80 import _core, checked
-from o80.backend import Running, StartAfresh, check_end, fill
-from o80.errors import InvalidArgument
-from o80.layout import Layout
+import o80._core as _core
+from o80.base import argument_checks
+from o80.base.errors import InvalidArgument
+from o80.drivers.backend import Running, StartAfresh, check_end, fill
+from o80.rows.layout import Layout
 
 #: from offsets in the desired block and an order to the differences of those numbers
 Differences = Callable[[list[int], int], list[float]]
@@ -148,11 +149,11 @@ class Reading:
 
     def halt(self, reason: str) -> None:
         """Halts the robot. May be repeated with each reading; the same text is the same halt."""
-        self._halt = checked.text(reason, "the reason of reading.halt")
+        self._halt = argument_checks.text(reason, "the reason of reading.halt")
 
     def fault(self, reason: str) -> None:
         """Ends the loop at once; frontends raise the reason."""
-        raise DriverFaultError(checked.text(reason, "the reason of reading.fault"))
+        raise DriverFaultError(argument_checks.text(reason, "the reason of reading.fault"))
 
     def finish(self) -> None:
         """Ends the loop in order: in real time the robot brakes first."""
@@ -177,7 +178,7 @@ class Reading:
 
     def progress(self, request: str, text: str) -> None:
         """Sets the text that frontends see while a request runs: at most 247 bytes."""
-        self._report(request, Answer.RUNNING, checked.text(text, "reading.progress"))
+        self._report(request, Answer.RUNNING, argument_checks.text(text, "reading.progress"))
 
     def ended(
         self, request: str, answer: StartAfresh | None = None, *, rejected: str | None = None

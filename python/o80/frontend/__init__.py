@@ -1,22 +1,11 @@
-"""o80.Frontend, the side that commands and reads: a file for each group of methods.
+"""o80.Frontend, the side that commands and reads, as three classes, and what belongs to it.
 
-| file | methods |
+| file | methods of o80.Frontend |
 |---|---|
-| describing.py | description of the robot: names, actuators, requests, period, life |
-| watching.py | rate_reached, overruns, missed_ticks, row_age, slow_verb, trouble |
-| observing.py | latest, wait_for, wait_for_next, stream, history, ... |
-| commanding.py | add_command, add_trajectory, add_request, purge, pulse, pulse_and_wait, ... |
-| previewing.py | preview |
-| moving.py | move_to |
-| bursting.py | burst, prepared_burst |
-| controlling.py | exclusive control |
-| halting.py | halt, halted, resume, keep_alive |
+| reader.py | the robot and its backend, the loop, rows: latest, wait_for, stream, history, ... |
+| commander.py | add_command, pulse, request, preview, move_to, burst, control, halt, resume, ... |
 | frontend.py | opening, closing, attaching again |
 
 Methods under `if TYPE_CHECKING` are compiled, because programs call them thousands of times a
 second. The build takes their signatures and docstrings from there (python/bindings/verbs.py).
 """
-
-from o80.frontend.frontend import Frontend
-
-__all__ = ["Frontend"]

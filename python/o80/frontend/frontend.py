@@ -1,23 +1,28 @@
-"""Opening, closing and attaching a frontend again."""
+"""Frontend: opens, closes and attaches again; classes for single robots; a wait for several."""
 
-import contextlib
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, cast
 
-from o80 import _core, at_exit, frontend_classes
-from o80.cached import cached
-from o80.errors import Error, InvalidArgument, SchemaMismatch, UsedAfterFork
-from o80.frontend.halting import Halting
-from o80.layout import Layout
-from o80.words import OnErrorWord
+import o80._core as _core
+from o80.base import lifecycle
+from o80.base.cached import cached
+from o80.base.errors import InvalidArgument, SchemaMismatch, UsedAfterFork
+from o80.base.installation import announced
+from o80.base.words import OnErrorWord
+from o80.frontend.commander import Commander
+from o80.rows.layout import Layout
 
 if TYPE_CHECKING:
-    from o80.aio import Waits
+    from o80.frontend.aio import Waits
+
+GROUP = "o80.frontends"
+
+_registered: dict[str, type["Frontend"]] = {}
 
 
-class Frontend(Halting):
+class Frontend(Commander):
     """A frontend of the backend that owns a segment: sends commands, reads observations.
 
     segment: name of the segment.
@@ -47,7 +52,7 @@ class Frontend(Halting):
         dead: bool = False,
     ) -> Self:
         attachment = _core.attach(segment, timeout, read_only, dead)
-        chosen = frontend_classes.of(attachment.robot) if cls is Frontend else None
+        chosen = class_of(attachment.robot) if cls is Frontend else None
         self = super().__new__(cls if chosen is None else cast(type[Self], chosen))
         self._attachment = attachment
         return self
@@ -71,7 +76,7 @@ class Frontend(Halting):
     @classmethod
     def _of(cls, attachment: _core.Attachment, *, unnamed: bool) -> "Frontend":
         """The frontend of an inline robot. unnamed: o80 chose the name of its segment."""
-        chosen = frontend_classes.of(attachment.robot) or cls
+        chosen = class_of(attachment.robot) or cls
         self = _core.Frontend.__new__(chosen)
         assert isinstance(self, Frontend)
         self._on_error = "purge"
@@ -87,12 +92,12 @@ class Frontend(Halting):
         super().__init__(attachment, self._decoder)
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
         self._is_set_up = True
-        at_exit.close_later(self)
+        lifecycle.close_later(self)
 
     @cached
     def aio(self) -> "Waits":
         """The waiting methods as asyncio coroutines: `await arm.aio.wait_for_next()`."""
-        from o80.aio import Waits  # here, because most programs do not need asyncio
+        from o80.frontend.aio import Waits  # here, because most programs do not need asyncio
 
         return Waits(self)
 
@@ -159,12 +164,6 @@ class Frontend(Halting):
             self._purge_on_error()
         self.close()
 
-    def _purge_on_error(self) -> None:
-        """Drops the commands of this frontend after an error, unless they shall continue."""
-        if self._on_error == "purge":
-            with contextlib.suppress(Error):
-                self._purge_own()
-
     def __reduce__(self) -> tuple[Callable[..., "Frontend"], tuple[Any, ...]]:
         if self._arguments is None:
             raise TypeError(
@@ -195,3 +194,45 @@ def _open_again(
 ) -> Frontend:
     """Opens a pickled frontend again."""
     return cls(segment, timeout, read_only=read_only, on_error=on_error, dead=dead)
+
+
+def register_frontend(robot: str, cls: type["Frontend"]) -> None:
+    """Registers a subclass that `o80.Frontend(...)` returns for segments of this robot.
+
+    A package can do the same with an entry point of the group "o80.frontends".
+    """
+    _registered[robot] = cls
+
+
+def class_of(robot: str) -> type["Frontend"] | None:
+    """The class of that robot, or None."""
+    if robot not in _registered and robot in announced(GROUP):
+        _registered[robot] = announced(GROUP)[robot].load()
+    return _registered.get(robot)
+
+
+def wait_for_first(
+    members: Iterable[Frontend] | Mapping[Frontend, int], timeout: float | None = None
+) -> dict[Frontend, _core.Observation]:
+    """Waits until the first of several backends has published a row.
+
+    members: frontends, for the next observation of each, as with `Frontend.wait_for_next`; or a
+        mapping from frontends to iterations.
+    timeout: for the first row [s].
+
+    Returns the observations that are published: of one frontend or more. Raises TimeoutError, and
+    BackendGone with the segment's name if a backend ends before any row is published. It needs no
+    thread and does not poll: it sleeps on all segments at once. With read-only frontends, and on
+    Linux before 5.16, it looks every millisecond instead.
+    """
+    wanted: list[tuple[Frontend, int | None]] = (
+        list(members.items())
+        if isinstance(members, Mapping)
+        else [(member, None) for member in dict.fromkeys(members)]
+    )
+    for member, _ in wanted:
+        if not isinstance(member, Frontend):
+            raise InvalidArgument(f"members must be frontends of o80, got {member!r}")
+    found = _core.wait_for_first(wanted, timeout)
+    by_member: dict[_core.Frontend, _core.Observation] = dict(found)
+    return {member: by_member[member] for member, _ in wanted if member in by_member}

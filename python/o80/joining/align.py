@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from o80 import _core
-from o80.errors import InvalidArgument
-from o80.history import History
-from o80.joining.picked import NANOSECOND, NOWHERE, before, blanked, linear, nearest
+import o80._core as _core
+from o80.base.errors import InvalidArgument
+from o80.joining.row_selection import NANOSECOND, NOWHERE, before, blanked, linear, nearest
 from o80.joining.sources import Timed, timed
+from o80.rows.history import History
 
 if TYPE_CHECKING:
     from o80.joining.sources import Sources

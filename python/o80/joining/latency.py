@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.columns import Column, values_of
-from o80.errors import Error, InvalidArgument
-from o80.history import History
-from o80.joining.norm import columns_below
-from o80.joining.picked import NANOSECOND
+import o80._core as _core
+from o80.base.errors import Error, InvalidArgument
+from o80.joining.row_selection import NANOSECOND
 from o80.joining.sources import Timed, timed
+from o80.rows.columns import Column, columns_of
+from o80.rows.history import History, values_of
 
 if TYPE_CHECKING:
     from o80.joining.sources import Source
@@ -177,3 +177,29 @@ def _peak(moments: FloatArray) -> tuple[float, float]:
     left, top, right = share[best - 1 : best + 2]
     bend = left - 2 * top + right
     return float(top), best + (0.5 * float((left - right) / bend) if bend < 0 else 0.0)
+
+
+def columns_below(history: History, path: str) -> list[Column]:
+    """The number that a path names, or all numbers below it. Raises InvalidArgument for none."""
+    columns = {column.name: column for column in columns_of(history.schema)}
+    chosen = [
+        column
+        for name, column in columns.items()
+        if name == path or name.startswith((path + ".", path + "["))
+    ]
+    if not chosen:
+        instead = _core.names_instead(path, list(columns))
+        raise InvalidArgument(f"there is no field '{path}'{instead}")
+    return chosen
+
+
+def norm_of(path: str) -> Callable[[History], NDArray[np.float64]]:
+    """Makes the Euclidean norm (T,) of all numbers below a path, such as "extended.velocity"."""
+
+    def norm(history: History) -> NDArray[np.float64]:
+        chosen = columns_below(history, path)
+        numbers = [values_of(history, column).astype(np.float64) for column in chosen]
+        length: NDArray[np.float64] = np.linalg.norm(numbers, axis=0)
+        return length
+
+    return norm

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.checked import whole
-from o80.errors import InvalidArgument
-from o80.history import History
+from o80.base.argument_checks import whole
+from o80.base.errors import InvalidArgument
+from o80.rows.history import History
 
 if TYPE_CHECKING:
-    from o80.frontend import Frontend
+    from o80.frontend.frontend import Frontend
     from o80.recording.reader import RecordedSegment, RecordingFile
     from o80.recording.recorded_epoch import RecordedEpoch
 

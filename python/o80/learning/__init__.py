@@ -10,7 +10,7 @@ Needs the extra `gym`. See docs/learning.md.
 
 from typing import TYPE_CHECKING
 
-from o80.extras import needed
+from o80.base.extras import needed
 
 needed("gymnasium", "gym", "o80.learning")
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from gymnasium import Space, spaces
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 from o80.learning.task import Index
 
 

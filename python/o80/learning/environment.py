@@ -8,7 +8,7 @@ import gymnasium
 import numpy as np
 from gymnasium.error import ResetNeeded
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 from o80.learning import episodes, infos
 from o80.learning.batches import batch_of_one, rows
 from o80.learning.task import EVERY, Task

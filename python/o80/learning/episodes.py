@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 from o80.learning.batches import fresh
 from o80.learning.task import Index, Outcome, Task
 

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium.utils import seeding
 from numpy.typing import NDArray
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 
 Seed = int | Sequence[int | None] | None
 

@@ -8,7 +8,7 @@ import numpy as np
 from gymnasium import Space, spaces
 from numpy.typing import NDArray
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 from o80.gather import Gather
 from o80.group_burst import GroupBurst
 from o80.inline_group import InlineGroup

@@ -11,7 +11,7 @@ from gymnasium.vector import AutoresetMode
 from numpy.typing import NDArray
 from stable_baselines3.common.vec_env import VecEnv
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 from o80.learning.batches import rows
 from o80.learning.vector_environment import VectorEnvironment
 

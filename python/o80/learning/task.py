@@ -11,8 +11,8 @@ import numpy as np
 from gymnasium import Space
 from numpy.typing import ArrayLike, NDArray
 
-from o80.checked import whole
-from o80.errors import InvalidArgument
+from o80.base.argument_checks import whole
+from o80.base.errors import InvalidArgument
 
 Index = slice | NDArray[np.intp]
 """Some copies, as an index of arrays over all copies: an array of numbers, or `EVERY`."""

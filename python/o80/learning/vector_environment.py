@@ -12,7 +12,7 @@ from gymnasium.vector import AutoresetMode
 from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 from o80.learning import episodes, infos
 from o80.learning.batches import checked_actions, put, rows
 from o80.learning.environment import checked_render_mode

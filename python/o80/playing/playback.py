@@ -9,11 +9,12 @@ from types import TracebackType
 
 import numpy as np
 
-from o80 import _core, at_exit
-from o80.checked import whole
-from o80.closeable import Closeable
-from o80.errors import InvalidArgument
-from o80.extras import needed
+import o80._core as _core
+from o80.base import lifecycle
+from o80.base.argument_checks import whole
+from o80.base.errors import InvalidArgument
+from o80.base.extras import needed
+from o80.base.lifecycle import Closeable
 from o80.playing.player import Player
 from o80.playing.track import Part, Track
 
@@ -100,7 +101,7 @@ class Playback(Closeable):
         except BaseException:
             self._end_all()
             raise
-        at_exit.close_later(self)
+        lifecycle.close_later(self)
         self._thread = threading.Thread(target=self._play, name="o80-playback", daemon=True)
         self._thread.start()
 

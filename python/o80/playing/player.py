@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80 import _core
-from o80.errors import InvalidArgument, RecordingError
-from o80.layout import with_padding
+import o80._core as _core
+from o80.base.errors import InvalidArgument, RecordingError
 from o80.playing.track import Part, Track
-from o80.provenance import Provenance
 from o80.recording.journal_channel import Entries
+from o80.rows.layout import with_padding
+from o80.rows.provenance import Provenance
 
 KEPT = 64 << 20  # most bytes of the rows that a segment keeps by default
 END = 2**62  # an iteration later than any

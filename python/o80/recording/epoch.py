@@ -1,25 +1,14 @@
 """One run of a backend in a recording: its channel, its description, its clock."""
 
 import re
-import time
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
-from o80.errors import RecordingError
-from o80.machine import this_machine
-from o80.recording.blocks import Block
-from o80.recording.joint_states import JointWriter
-from o80.recording.message_plan import MessagePlan
-from o80.recording.message_types import PACKAGE, row_type
+from o80.base.errors import RecordingError
 
 if TYPE_CHECKING:
-    from o80.frontend import Frontend
-    from o80.layout import Layout
-    from o80.recording.file_writer import FileWriter
+    from o80.frontend.reader import Reader
     from o80.recording.scan import Scan
 
 DESCRIPTION = "application/x-o80-description"
@@ -27,10 +16,8 @@ DESCRIPTION = "application/x-o80-description"
 GAP = "o80.gap"
 """Name of the metadata record of rows that were overwritten before they were read."""
 
-
-_NAME = re.compile(
-    r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}"
-)  # as src/memory/segment/segment_name.cpp allows
+# as src/memory/segment/segment_name.cpp allows
+_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
 
 
 @dataclass(frozen=True)
@@ -101,7 +88,7 @@ def topic_of(segment: str) -> str:
     return f"/{segment}"
 
 
-def note_of(frontend: "Frontend", number: int, begin: int) -> EpochNote:
+def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:
     """Note about the rows from `begin` on."""
     return EpochNote(
         segment=frontend.segment,
@@ -123,40 +110,3 @@ def channels_of(found: "Scan", content: str) -> dict[tuple[str, int], int]:
         and each.metadata.get("number", "").isdecimal()
         and "segment" in each.metadata
     }
-
-
-class RowWriter:
-    """Makes messages of the rows of one epoch."""
-
-    def __init__(
-        self, layout: "Layout", note: EpochNote, channel: int, joints: JointWriter | None
-    ) -> None:
-        self.note = note
-        self.channel = channel
-        self._joints = joints
-        self._plan = MessagePlan(row_type(layout), layout.size)
-
-    @classmethod
-    def added_to(cls, file: "FileWriter", frontend: "Frontend", note: EpochNote) -> "RowWriter":
-        """Adds message types, description and channels of an epoch to a file."""
-        layout = frontend._layout
-        message = row_type(layout)
-        schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
-        file.attach(note.attachment, DESCRIPTION, frontend._description.table(), time.time_ns())
-        file.add_metadata(
-            note.provenance,
-            {"json": frontend.provenance.as_json(), "machine": this_machine().as_json()},
-        )
-        channel = file.add_channel(topic_of(note.segment), schema, note.texts())
-        return cls(layout, note, channel, JointWriter.added_to(file, layout, note, None))
-
-    def blocks(self, rows: NDArray[np.void]) -> list[Block]:
-        """The messages of consecutive rows; of a robot with joints, also their states."""
-        raw = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
-        log_times = (rows["time"] + self.note.wall_offset).astype(np.uint64)
-        first = int(rows["iteration"][0])
-        block = Block.reserved(self.channel, log_times, first, self._plan.size)
-        self._plan.encode(raw, block.messages)
-        if self._joints is None:
-            return [block]
-        return [block, self._joints.block(raw, log_times, first)]

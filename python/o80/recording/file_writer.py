@@ -25,11 +25,10 @@ from mcap.records import (
     Schema,
 )
 
-import o80
-from o80.errors import RecordingError
-from o80.recording.locked_file import LockedFile
+import o80._core as _core
+from o80.base.errors import RecordingError
+from o80.recording.locked_file import LockedFile, reserve
 from o80.recording.scan import HEAD, MAGIC, Scan, scan
-from o80.recording.space import reserve
 from o80.recording.summary import bytes_of, end_of_file, room_for_end
 
 PROFILE = "ros2"
@@ -240,4 +239,4 @@ class FileWriter:
 
 def _beginning() -> bytes:
     """Bytes with which every file begins."""
-    return MAGIC + bytes_of(Header(PROFILE, f"o80 {o80.__version__}"))
+    return MAGIC + bytes_of(Header(PROFILE, f"o80 {_core.version()}"))

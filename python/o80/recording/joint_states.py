@@ -16,12 +16,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.layout import Layout, is_plain
 from o80.recording.blocks import Block
+from o80.recording.epoch import EpochNote
 from o80.recording.message_plan import ENCAPSULATION
+from o80.rows.layout import Layout, is_plain
 
 if TYPE_CHECKING:
-    from o80.recording.epoch import EpochNote
     from o80.recording.file_writer import FileWriter
 
 TYPE = "sensor_msgs/msg/JointState"
@@ -148,7 +148,7 @@ class JointWriter:
 
     @classmethod
     def added_to(
-        cls, file: "FileWriter", layout: Layout, note: "EpochNote", channel: int | None
+        cls, file: "FileWriter", layout: Layout, note: EpochNote, channel: int | None
     ) -> "JointWriter | None":
         """Adds a channel to a file, unless it has this one; None for a robot without joints."""
         joints = joints_of(layout)

@@ -8,7 +8,7 @@ import struct
 from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING
 
-from o80 import _core
+import o80._core as _core
 from o80.recording.blocks import SingleMessage
 from o80.recording.message_plan import ENCAPSULATION
 from o80.recording.scan import Scan, messages_of
@@ -16,7 +16,7 @@ from o80.recording.scan import Scan, messages_of
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
-    from o80.frontend import Frontend
+    from o80.frontend.frontend import Frontend
     from o80.recording.epoch import EpochNote
     from o80.recording.file_writer import FileWriter
 

@@ -7,10 +7,12 @@ A program that records writes them with `mark`; others note them in the journal 
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from datetime import datetime
 from typing import IO, Any
 
 import numpy as np
 
+from o80.base.screen import html
 from o80.recording.blocks import SingleMessage
 from o80.recording.file_writer import FileWriter
 from o80.recording.scan import Scan, messages_of
@@ -47,6 +49,24 @@ class Mark:
         if not is_whole:
             raise ValueError("a mark is damaged")
         return mark
+
+
+class Marks(list[Mark]):
+    """The marks of a recording, in a notebook as a table."""
+
+    def _repr_html_(self) -> str:
+        return html(
+            ("time", "mark", "rows", "values"),
+            [
+                (
+                    datetime.fromtimestamp(each.time * 1e-9).isoformat(" ", "milliseconds"),
+                    each.name,
+                    ", ".join(f"{name} {row}" for name, row in each.rows.items()),
+                    ", ".join(f"{name}={value}" for name, value in each.values.items()),
+                )
+                for each in self
+            ],
+        )
 
 
 def _plain(value: Any) -> Any:

@@ -10,7 +10,7 @@ import re
 from dataclasses import dataclass, field
 from typing import Any
 
-from o80.layout import HEAD, Layout, is_plain
+from o80.rows.layout import HEAD, Layout, is_plain
 
 PACKAGE = "o80"
 SEPARATOR = "=" * 80

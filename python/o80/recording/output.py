@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from o80.errors import RecordingError
+from o80.base.errors import RecordingError
+from o80.base.unwritable import reason
 from o80.recording import joint_states
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import EpochNote, channels_of
@@ -16,7 +17,6 @@ from o80.recording.journal_channel import last_entry_in
 from o80.recording.message_plan import ENCAPSULATION
 from o80.recording.reader import RecordingFile, files_of
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, content_of, has_end, index_of, scan
-from o80.unwritable import reason
 
 FILES = "*.mcap"
 

@@ -7,14 +7,13 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from o80.errors import InvalidArgument, RecordingError
-from o80.history import History
+from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.journal_channel import CONTENT as JOURNAL
-from o80.recording.marks import Mark, marks_in
+from o80.recording.marks import Mark, Marks, marks_in
 from o80.recording.recorded_epoch import EpochPart, RecordedEpoch
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan
-from o80.tables import Marks
+from o80.rows.history import History
 
 
 class RecordingFile:

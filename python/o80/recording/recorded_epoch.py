@@ -9,15 +9,11 @@ from typing import IO, Any, TypeVar
 
 import numpy as np
 
-from o80 import _core
-from o80.cached import cached
-from o80.checked import whole
-from o80.errors import InvalidArgument, RecordingError, SegmentError
-from o80.history import History
-from o80.journal import EntryDecoder, JournalEntry
-from o80.layout import decoder_of
-from o80.machine import Machine
-from o80.provenance import Provenance
+import o80._core as _core
+from o80.base.argument_checks import whole
+from o80.base.cached import cached
+from o80.base.errors import InvalidArgument, RecordingError, SegmentError
+from o80.base.machine import Machine
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import GAP, EpochNote
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
@@ -25,6 +21,10 @@ from o80.recording.journal_channel import Entries, codec_of, entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import Scan, attachment_of, content_of, index_of
+from o80.rows.history import History
+from o80.rows.journal import EntryDecoder, JournalEntry
+from o80.rows.layout import decoder_of
+from o80.rows.provenance import Provenance
 
 T = TypeVar("T")
 

@@ -1,22 +1,25 @@
 """Records segments into one file."""
 
 import fnmatch
+import math
 import os
 import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from o80.errors import Error, InvalidArgument, RecordingError
+from o80.base.errors import Error, InvalidArgument, RecordingError
+from o80.frontend.segments import segments
 from o80.recording.marks import Mark, add_mark
 from o80.recording.output import Predecessor, next_file, opened, opened_in
 from o80.recording.reader import files_of
 from o80.recording.source import Source
-from o80.recording.split import Split
-from o80.segment_list import segments
 
 BETWEEN_SEARCHES = 0.5  # for segments that match a pattern [s]
+_BYTES = {"k": 1e3, "M": 1e6, "G": 1e9}
+_SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 class Recorder:
@@ -181,3 +184,34 @@ class Recorder:
             matches = any(fnmatch.fnmatchcase(segment.name, each) for each in self._patterns)
             if matches and segment.readable and segment.name not in self.sources:
                 self._add(segment.name, from_now)
+
+
+@dataclass(frozen=True)
+class Split:
+    """The most that one file of a recording holds."""
+
+    bytes: float = math.inf
+    seconds: float = math.inf
+
+    @classmethod
+    def of(cls, text: str) -> "Split":
+        """Split by "500M" or "2G" (bytes), "600s", "10min" or "1h". Raises InvalidArgument."""
+        number = text.rstrip("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ ")
+        unit = text[len(number) :].strip()
+        try:
+            value = float(number)
+        except ValueError:
+            value = 0.0
+        if value > 0 and math.isfinite(value):
+            if unit in _BYTES:
+                return cls(bytes=value * _BYTES[unit])
+            if unit in _SECONDS:
+                return cls(seconds=value * _SECONDS[unit])
+        raise InvalidArgument(
+            f"split must be a size such as 500M or 2G, or a time such as 600s, 10min or 1h, "
+            f"got '{text}'"
+        )
+
+    def is_due(self, size: int, begun: float) -> bool:
+        """Whether a file of this size [bytes], begun at this monotonic time, is full."""
+        return size >= self.bytes or time.monotonic() - begun >= self.seconds

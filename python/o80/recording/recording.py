@@ -8,10 +8,9 @@ from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
-from o80.at_exit import close_later
-from o80.closeable import Closeable
-from o80.errors import Closed
-from o80.frontend import Frontend
+from o80.base.errors import Closed
+from o80.base.lifecycle import Closeable, close_later
+from o80.frontend.frontend import Frontend
 from o80.recording.recorder import Recorder
 
 BETWEEN_POLLS = 0.05  # [s]

@@ -32,7 +32,7 @@ from mcap.records import (
 from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from numpy.typing import NDArray
 
-from o80.errors import RecordingError
+from o80.base.errors import RecordingError
 from o80.recording.blocks import LENGTH_ENDS_AT, MESSAGE_HEAD
 
 MAGIC = b"\x89MCAP0\r\n"

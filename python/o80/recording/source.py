@@ -4,16 +4,17 @@ import time
 from collections.abc import Mapping
 from dataclasses import replace
 
-from o80 import _core
-from o80.errors import BackendGone, RecordingError, SegmentError, TimeoutError
-from o80.frontend import Frontend
+import o80._core as _core
+from o80.base.errors import BackendGone, RecordingError, SegmentError, TimeoutError
+from o80.frontend.frontend import Frontend
 from o80.recording.blocks import Block, SingleMessage
-from o80.recording.epoch import GAP, RowWriter, note_of
+from o80.recording.epoch import GAP, note_of
 from o80.recording.file_writer import FileWriter, MessageBlock
 from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import JournalWriter, codec_of
 from o80.recording.output import Written
+from o80.recording.row_writer import RowWriter
 
 LARGEST_BLOCK = 4 << 20  # of the rows read at once [bytes]
 BETWEEN_LOOKS = 0.05  # for a backend that is not there [s]

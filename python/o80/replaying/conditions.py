@@ -2,8 +2,8 @@
 
 from typing import Any
 
-from o80.machine import Machine, this_machine
-from o80.provenance import Provenance
+from o80.base.machine import Machine, this_machine
+from o80.rows.provenance import Provenance
 
 TOLERANCE = 1e-9
 """Largest difference that counts as equal where bits need not agree."""

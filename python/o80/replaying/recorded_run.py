@@ -6,17 +6,17 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
-from o80 import _core
-from o80.errors import InvalidArgument
-from o80.machine import Machine, this_machine
-from o80.own_robots import is_own
+import o80._core as _core
+from o80.base.errors import InvalidArgument
+from o80.base.machine import Machine, this_machine
+from o80.frontend.segments import is_own
 
 if TYPE_CHECKING:
-    from o80.frontend import Frontend
-    from o80.history import History
-    from o80.provenance import Provenance
+    from o80.frontend.frontend import Frontend
     from o80.recording.reader import RecordingFile
     from o80.recording.recorded_epoch import RecordedEpoch
+    from o80.rows.history import History
+    from o80.rows.provenance import Provenance
 
 ROWS_AT_ONCE = 1024  # Ctrl-C waits for them
 _BYTES_AT_ONCE = 1 << 20

@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from o80 import _core
-from o80.columns import columns_of
-from o80.difference import Difference, RobotsDifferError, first_difference
-from o80.errors import DriverError, InvalidArgument
-from o80.frontend import Frontend
+import o80._core as _core
+from o80.base.errors import DriverError, InvalidArgument
+from o80.frontend.frontend import Frontend
+from o80.joining.difference import Difference, RobotsDifferError, first_difference, same_bytes
 from o80.replaying.conditions import (
     TOLERANCE,
     blended_columns,
@@ -26,20 +25,18 @@ from o80.replaying.conditions import (
     other_arithmetic,
     reads_the_world,
 )
-from o80.replaying.entry_feed import EntryFeed
-from o80.replaying.motion_rules import MotionRules
+from o80.replaying.entry_feed import EntryFeed, MotionRules
 from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_in
 from o80.replaying.report import ReplayReport, RunReport
-from o80.replaying.runner import Runner, with_driver, without_driver
-from o80.replaying.same_bytes import same_bytes
+from o80.replaying.runner import OtherRobot, Runner, with_driver, without_driver
 from o80.replaying.start import Requests, SlotsKept, Start, find_fresh_start, find_rest, find_start
+from o80.rows.columns import columns_of
 
 if TYPE_CHECKING:
-    from o80.history import History
     from o80.recording.reader import RecordingFile
+    from o80.rows.history import History
 
 Progress = Callable[[str, int, int], None]
-OtherRobot = str | os.PathLike[str] | Mapping[str, str | os.PathLike[str]] | None
 
 _HISTORY = 4 * ROWS_AT_ONCE  # rows that the replay keeps: those of a block, and fresh starts
 
@@ -372,6 +369,6 @@ def _settled(block: History) -> History:
 
 
 def _joined(one: History, other: History) -> History:
-    from o80.history import History
+    from o80.rows.history import History
 
     return History._joined(one._decoder, [one, other])

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from o80.difference import Difference
+from o80.joining.difference import Difference
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -9,15 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from o80 import _core, robots
-from o80.loop_options import text_of
+import o80._core as _core
+import o80.robots.robot as robots
+from o80.base.loop_options import text_of
 from o80.replaying.start import Start, times_from
 from o80.replaying.trust import options_of, robot_of
 
 if TYPE_CHECKING:
-    from o80.history import History
     from o80.replaying.recorded_run import RecordedRun
-    from o80.replaying.replay import OtherRobot
+    from o80.rows.history import History
+
+OtherRobot = str | os.PathLike[str] | Mapping[str, str | os.PathLike[str]] | None
 
 # of the run options, those that decide what a backend does; the others are of its process
 _OF_BACKEND = ("lanes", "lane_blocks")

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
-    from o80 import _core
+    import o80._core as _core
     from o80.replaying.recorded_run import RecordedRun
 
 

@@ -13,12 +13,12 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from o80 import robots
-from o80.errors import DriverError, InvalidArgument
+import o80.robots.robot as robots
+from o80.base.errors import DriverError, InvalidArgument
 
 if TYPE_CHECKING:
-    from o80.provenance import Provenance
     from o80.replaying.recorded_run import RecordedRun
+    from o80.rows.provenance import Provenance
 
 _LARGEST_HASHED = 64 << 20  # [bytes], as when it was recorded
 

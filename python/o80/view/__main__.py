@@ -3,7 +3,7 @@
 import json
 import sys
 
-import o80
+from o80.base.errors import Error
 from o80.view.serve import page_server, wait_for_end
 
 
@@ -13,7 +13,7 @@ def main() -> int:
         with page_server(**json.loads(sys.argv[1])) as server:
             print(json.dumps({"url": server.url, "port": server.port}), flush=True)
             wait_for_end(until_eof=True)
-    except o80.Error as error:
+    except Error as error:
         print(json.dumps({"error": str(error)}), flush=True)
         return 1
     return 0

@@ -2,15 +2,17 @@
 
 import math
 import threading
-from collections.abc import Sequence
+import time
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 import numpy as np
 
-import o80
-from o80.history import History
+from o80.base.errors import Error, InvalidArgument, ReadOnly
+from o80.frontend.frontend import Frontend
+from o80.frontend.results import halt as halt_backend
+from o80.rows.history import History
 from o80.view.curves import Panels
-from o80.view.kept import Kept
 from o80.view.scene import Scene
 from o80.view.source import NothingToShow, Source
 from o80.view.source_list import SourceList
@@ -87,17 +89,17 @@ class Answers:
         """Halts a live segment."""
         source = self._live(asked)
         reason = str(asked.get("reason", ""))[:LONGEST_REASON] or "from o80 view"
-        return {"halt": o80.halt(source.name, reason)}
+        return {"halt": halt_backend(source.name, reason)}
 
     def resume(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Clears a halt; only with --control."""
         source = self._live(asked)
         if not self._control:
-            raise o80.ReadOnly(
+            raise ReadOnly(
                 f"this view does not control: start it with --control, or use "
                 f"`o80 resume {source.name}`"
             )
-        with o80.Frontend(source.name, 1.0) as frontend:
+        with Frontend(source.name, 1.0) as frontend:
             frontend.resume(int(asked["number"]), timeout=5.0)
         return {}
 
@@ -106,7 +108,7 @@ class Answers:
         for source in self._sources.now():
             if source.live and source.name == asked.get("segment"):
                 return source
-        raise o80.InvalidArgument(f"this view does not show a segment {asked.get('segment')!r}")
+        raise InvalidArgument(f"this view does not show a segment {asked.get('segment')!r}")
 
 
 class _Shown:
@@ -117,11 +119,11 @@ class _Shown:
         self.panels = Panels(schema)
         self.scene: Scene | None = None
         self.no_scene = "The driver of this robot names no model, so there is no 3D view."
-        self._kept = Kept()
+        self._kept = AnswerCache()
         if "model" in schema:
             try:
                 self.scene = Scene(schema, source.model, trusted=source.trusted)
-            except o80.Error as error:
+            except Error as error:
                 self.no_scene = str(error)
 
     def introduction(self, source: Source) -> dict[str, Any]:
@@ -187,7 +189,7 @@ def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
 def _has_model(source: Source) -> bool:
     try:
         return "model" in source.schema
-    except o80.Error:
+    except Error:
         return False
 
 
@@ -206,3 +208,31 @@ def _window(asked: dict[str, Any]) -> float:
     if not 0.0 < window <= LONGEST_WINDOW:
         raise ValueError(f"window must be positive and at most {LONGEST_WINDOW:g} s, got {window}")
     return window
+
+
+SHARED_FOR = 0.08  # [s], less than the time between two requests of a page
+LOAD = 10.0  # an answer that took long is kept this many times as long
+MOST = 64
+
+
+class AnswerCache:
+    """Answers by what was asked. Many pages, long rows and long windows cost at most a tenth of a
+    processor, because what took long is kept longer."""
+
+    def __init__(self) -> None:
+        self._answers: dict[Hashable, tuple[float, Any]] = {}
+        self._lock = threading.Lock()
+
+    def get(self, asked: Hashable, work: Callable[[], Any]) -> Any:
+        """The answer of `work`, or the one that another page has just got."""
+        with self._lock:
+            begin = time.monotonic()
+            until, answer = self._answers.get(asked, (0.0, None))
+            if begin < until:
+                return answer
+            answer = work()
+            end = time.monotonic()
+            if len(self._answers) >= MOST:
+                self._answers = {key: kept for key, kept in self._answers.items() if kept[0] > end}
+            self._answers[asked] = end + max(SHARED_FOR, LOAD * (end - begin)), answer
+            return answer

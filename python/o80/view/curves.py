@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80._core import Observation
-from o80.columns import Column, columns_of, value_of, values_of
-from o80.history import History
-from o80.view.packed import packed
+from o80.rows.columns import Column, columns_of, value_of
+from o80.rows.history import History, values_of
+from o80.view.base64_arrays import packed
 
 POINTS = 400  # of a curve
 MOST_PANELS = 12

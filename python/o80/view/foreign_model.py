@@ -11,7 +11,7 @@ import sys
 from typing import Any
 from xml.etree import ElementTree
 
-import o80
+from o80.base.errors import Error
 
 TIMEOUT = 20.0  # [s]
 LARGEST = 256 << 20  # of a compiled model [bytes]
@@ -35,7 +35,7 @@ sys.stdout.buffer.write(content.tobytes())
 
 
 def compiled(mjcf: str, mujoco: Any) -> Any:
-    """The model. Raises o80.Error."""
+    """The model. Raises Error."""
     text = without_files(mjcf)
     try:
         done = subprocess.run(
@@ -57,7 +57,7 @@ def compiled(mjcf: str, mujoco: Any) -> Any:
 
 
 def without_files(mjcf: str) -> str:
-    """The same model, if it names no file. Raises o80.Error."""
+    """The same model, if it names no file. Raises Error."""
     if "<!" in mjcf.replace("<!--", "").replace("<![CDATA[", ""):
         raise _unreadable("it has a document type")  # which may define entities
     try:
@@ -71,7 +71,7 @@ def without_files(mjcf: str) -> str:
             raise _unreadable(f"elements are nested more than {DEEPEST} deep")
         for name, value in element.attrib.items():
             if name.lower().startswith("file") and value:
-                raise o80.Error(
+                raise Error(
                     f"The model names a file, {value[:200]!r}, which is not read: the recording "
                     f"may come from a stranger. To read the files of models that you trust, start "
                     f"the view with --model-files."
@@ -80,5 +80,5 @@ def without_files(mjcf: str) -> str:
     return ElementTree.tostring(root, encoding="unicode")
 
 
-def _unreadable(why: str) -> o80.Error:
-    return o80.Error(f"the model of the robot cannot be read: {why}")
+def _unreadable(why: str) -> Error:
+    return Error(f"the model of the robot cannot be read: {why}")

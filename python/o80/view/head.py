@@ -7,7 +7,7 @@ number.
 import re
 from dataclasses import dataclass
 
-import o80
+from o80.base.errors import Error
 
 LARGEST_HEAD = 1 << 14  # [bytes]
 LARGEST_REQUEST = 1 << 16  # the body [bytes]
@@ -19,7 +19,7 @@ _NAME = re.compile(r"[\w!#$%&'*+.^`|~-]+", re.ASCII)
 _LENGTH = re.compile(r"[0-9]+")
 
 
-class Refused(o80.Error):
+class Refused(Error):  # noqa: N818
     """A head that is not obeyed."""
 
     def __init__(self, code: int, why: str) -> None:

@@ -4,11 +4,14 @@ import threading
 from collections.abc import Sequence
 from typing import Any
 
-import o80
-from o80 import _core
-from o80.cli.condition import age_text, rate_text
-from o80.history import History
-from o80.own_robots import is_own
+import o80._core as _core
+from o80._core import Observation
+from o80.base.errors import Error, RowOverwritten, TimeoutError
+from o80.frontend.backend_texts import age_text, rate_text
+from o80.frontend.frontend import Frontend
+from o80.frontend.results import Halt
+from o80.frontend.segments import is_own
+from o80.rows.history import History
 from o80.view.source import NothingToShow, Source
 
 GUARD_ROWS = 16  # the oldest rows may be overwritten while they are read
@@ -24,7 +27,7 @@ class LiveSource(Source):
     def __init__(self, name: str, *, model_files: bool = False) -> None:
         self._model_files = model_files
         self.name = self.label = name
-        self._frontend: o80.Frontend | None = None
+        self._frontend: Frontend | None = None
         self._journal: _core.RawJournal | None = None
         self._marks: list[tuple[str, int]] = []
         self._lock = threading.Lock()
@@ -37,10 +40,10 @@ class LiveSource(Source):
             if known is not None and known.alive:
                 return
             try:
-                found = o80.Frontend(self.name, 0.0, read_only=True, dead=True)
-            except o80.Error as error:
+                found = Frontend(self.name, 0.0, read_only=True, dead=True)
+            except Error as error:
                 self._problem = str(error)
-                self._state = "waiting" if isinstance(error, o80.TimeoutError) else "unknown"
+                self._state = "waiting" if isinstance(error, TimeoutError) else "unknown"
                 return
             if found.published < 0 or (known is not None and known.epoch == found.epoch):
                 self._problem = "" if known is not None else "there is no row yet"
@@ -54,7 +57,7 @@ class LiveSource(Source):
             # the former frontend is not closed: another thread may be reading with it
 
     @property
-    def _attached(self) -> o80.Frontend:
+    def _attached(self) -> Frontend:
         if self._frontend is None:
             raise NothingToShow(self._problem or f"waiting for segment '{self.name}'")
         return self._frontend
@@ -71,19 +74,19 @@ class LiveSource(Source):
         return self.extent_of(self._attached)
 
     @staticmethod
-    def extent_of(frontend: o80.Frontend) -> tuple[int, int]:
+    def extent_of(frontend: Frontend) -> tuple[int, int]:
         last = frontend.latest().time
         oldest = frontend.oldest
         first = frontend.history(since=oldest, until=oldest + GUARD_ROWS)
         return (int(first.time[0]) if len(first) else last), last
 
-    def row(self, time: int | None) -> o80.Observation:
+    def row(self, time: int | None) -> Observation:
         frontend = self._attached
         if time is None:
             return frontend.latest()
         try:
             return frontend.at_time(time)
-        except o80.RowOverwritten:
+        except RowOverwritten:
             oldest = frontend.oldest
             first = frontend.history(since=oldest, until=oldest + GUARD_ROWS)
             return first[0] if len(first) else frontend.latest()
@@ -128,7 +131,7 @@ class LiveSource(Source):
         }
 
 
-def _halt(halt: o80.Halt) -> dict[str, Any]:
+def _halt(halt: Halt) -> dict[str, Any]:
     reason = f": {halt.text}" if halt.text else ""
     by = f" by {halt.who}" if halt.who else ""
     return {"number": halt.number, "text": f"halted{by} (halt {halt.number}, {halt.cause}){reason}"}

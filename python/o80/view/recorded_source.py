@@ -6,9 +6,10 @@ from typing import Any
 
 import numpy as np
 
-import o80
-from o80.history import History
+from o80._core import Observation
+from o80.base.errors import Error
 from o80.recording.recorded_epoch import RecordedEpoch
+from o80.rows.history import History
 from o80.view.source import NothingToShow, Source
 
 AHEAD = 3_000_000_000  # [ns]: rows before and after the ones that are asked for
@@ -42,7 +43,7 @@ class RecordedSource(Source):
         try:
             self._extent = self._read_extent()
             self.zero = self._extent[0]
-        except o80.Error as error:
+        except Error as error:
             self._problem = str(error)
 
     def _read_extent(self) -> tuple[int, int]:
@@ -75,7 +76,7 @@ class RecordedSource(Source):
             raise NothingToShow(self._problem)
         return self._extent
 
-    def row(self, time: int | None) -> o80.Observation:
+    def row(self, time: int | None) -> Observation:
         first, last = self.extent()
         at = last if time is None else min(max(time, first), last)
         found = self._around(at, at)
@@ -84,7 +85,7 @@ class RecordedSource(Source):
             return found[place]
         return self._before(at)
 
-    def _before(self, time: int) -> o80.Observation:
+    def _before(self, time: int) -> Observation:
         """The newest row before a gap."""
         for begin, end in reversed(self._chunks):
             if begin <= time:

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-import o80
+from o80.base.errors import Error, MissingExtra
+from o80.view.base64_arrays import packed, packed_indices
 from o80.view.foreign_model import compiled
-from o80.view.packed import packed, packed_indices
 
 SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box", 7: "mesh"}
 DRAWN_GROUPS = 3  # geoms of groups 0 to 2; the others are shapes for collisions
@@ -23,7 +23,7 @@ class Scene:
     def __init__(self, schema: dict[str, Any], mjcf: str, *, trusted: bool) -> None:
         """trusted: the files that the model names may be read.
 
-        Raises o80.Error if the model cannot be read, MissingExtra without mujoco.
+        Raises Error if the model cannot be read, MissingExtra without mujoco.
         """
         described = schema["model"]
         self._mujoco = _mujoco()
@@ -52,7 +52,7 @@ class Scene:
                 spec.modelfiledir = str(Path(file).parent)
             return spec.compile()
         except ValueError as error:
-            raise o80.Error(f"the model of the robot cannot be read: {error}") from error
+            raise Error(f"the model of the robot cannot be read: {error}") from error
 
     def _place(self, value: dict[str, Any], schema: dict[str, Any]) -> "_Place | None":
         """None if the model has no such joint or body."""
@@ -188,7 +188,7 @@ def _mujoco() -> Any:
     try:
         import mujoco
     except ImportError as error:
-        raise o80.MissingExtra(
+        raise MissingExtra(
             'the 3D view needs mujoco, which is not installed: pip install "o80[view]"',
             name="mujoco",
         ) from error

@@ -4,19 +4,23 @@ A page sends its next request after it has shown the answer to the last one. So 
 finds one old answer at most, however long it stalled, and a slow page costs the server less.
 """
 
+import base64
 import contextlib
 import errno
+import hashlib
 import json
 import secrets
 import socket
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
 from typing import Any
 
-import o80
+from o80.base.errors import Error
 from o80.view.gate import Gate
 from o80.view.guard import ANY, Guard
 from o80.view.head import Head
-from o80.view.page_text import page_text
 from o80.view.reply import Reply
 
 BACKLOG = 4096  # connections that wait in the kernel until they are accepted
@@ -25,7 +29,7 @@ Answer = Callable[[dict[str, Any]], dict[str, Any]]
 
 
 class PageServer:
-    """Serves one page and its requests, given by path. Raises o80.Error if the port is taken."""
+    """Serves one page and its requests, given by path. Raises Error if the port is taken."""
 
     def __init__(self, host: str, port: int, answers: Mapping[str, Answer]) -> None:
         listener = _listen(host, port)
@@ -67,7 +71,7 @@ class PageServer:
             return Reply(400, b"the request must be a JSON object")
         try:
             return Reply.json(200, answer(asked))
-        except o80.Error as error:
+        except Error as error:
             return Reply.json(409, {"error": str(error)})
         except (TypeError, ValueError, KeyError, OverflowError) as error:
             return Reply.json(400, {"error": f"invalid request: {error}"})
@@ -87,7 +91,7 @@ def _listen(host: str, port: int) -> socket.socket:
             listener.close()
             raise
     except (OSError, OverflowError, UnicodeError) as error:
-        raise o80.Error(_why_not(host, port, error)) from error
+        raise Error(_why_not(host, port, error)) from error
     return listener
 
 
@@ -97,3 +101,34 @@ def _why_not(host: str, port: int, error: Exception) -> str:
     if isinstance(error, OverflowError):
         return f"port must be from 0 to 65535, got {port}"
     return f"cannot listen on {host}, port {port}: {getattr(error, 'strerror', None) or error}"
+
+
+SCRIPTS = ("vectors.js", "shapes.js", "scene.js", "curves.js", "lists.js", "timeline.js", "main.js")
+
+
+@dataclass(frozen=True)
+class Page:
+    """The page and its content security policy: no script or style but its own, no other host."""
+
+    html: bytes
+    policy: str
+
+
+@cache
+def page_text() -> Page:
+    """The page of `o80 view`."""
+    folder = files("o80.view") / "page"
+    script = "".join((folder / name).read_text() for name in SCRIPTS)
+    script = f'"use strict";\n{script}'
+    style = (folder / "style.css").read_text()
+    html = (folder / "page.html").read_text()
+    html = html.replace("/* style */", style).replace("/* script */", script)
+    policy = (
+        f"default-src 'none'; connect-src 'self'; img-src data:; script-src '{_hash(script)}'; "
+        f"style-src '{_hash(style)}'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    )
+    return Page(html.encode(), policy)
+
+
+def _hash(text: str) -> str:
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()

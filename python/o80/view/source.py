@@ -4,13 +4,14 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
-import o80
-from o80.history import History
+from o80._core import Observation
+from o80.base.errors import Error
+from o80.rows.history import History
 
 NANOSECONDS = 1e9
 
 
-class NothingToShow(o80.Error):
+class NothingToShow(Error):  # noqa: N818
     """There is no row yet, or no longer."""
 
 
@@ -44,7 +45,7 @@ class Source(ABC):
         """Times of the first and last row [ns]. Raises NothingToShow."""
 
     @abstractmethod
-    def row(self, time: int | None) -> o80.Observation:
+    def row(self, time: int | None) -> Observation:
         """The newest row at or before a time [ns], else the first; None: the newest row.
 
         Raises NothingToShow.

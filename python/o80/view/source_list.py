@@ -6,8 +6,9 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-import o80
-from o80 import _core
+import o80._core as _core
+from o80.base.errors import RecordingError
+from o80.frontend.segments import segments as all_segments
 from o80.view.live_source import LiveSource
 from o80.view.source import Source
 
@@ -63,7 +64,7 @@ class SourceList:
 
     def _look(self) -> None:
         if self._patterns:
-            for entry in o80.segments():
+            for entry in all_segments():
                 if entry.name not in self._live and any(
                     fnmatch.fnmatchcase(entry.name, pattern) for pattern in self._patterns
                 ):
@@ -85,5 +86,5 @@ def _runs_of(path: str, model_files: bool) -> list[Source]:
         )
     ]
     if not found:
-        raise o80.RecordingError(f"{path} holds no segment")
+        raise RecordingError(f"{path} holds no segment")
     return found

@@ -10,11 +10,11 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
-from o80 import at_exit
-from o80.child import end_child, start_child
-from o80.closeable import Closeable
-from o80.errors import Error, InvalidArgument, TimeoutError
-from o80.frontend import Frontend
+from o80.base import lifecycle
+from o80.base.child_process import end_child, start_child
+from o80.base.errors import Error, InvalidArgument, TimeoutError
+from o80.base.lifecycle import Closeable
+from o80.frontend.frontend import Frontend
 from o80.recording.reader import RecordingFile
 from o80.view.browser import open_browser as open_in_browser
 
@@ -59,7 +59,7 @@ class View(Closeable):
         }
         command = [sys.executable, "-m", "o80.view", json.dumps(options)]
         self._popen = start_child(command, stdout=subprocess.PIPE)
-        at_exit.close_later(self)
+        lifecycle.close_later(self)
         try:
             said = self._first_line()
         except BaseException:

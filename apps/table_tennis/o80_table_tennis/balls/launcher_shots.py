@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from o80.extras import needed
+from o80.base.extras import needed
 
 from .launches import Launch
 from .recordings import LAUNCHER_FRAME

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from o80.loop_options import text_of
+from o80.base.loop_options import text_of
 
 from ..rig.robot_options import arm_options, twin_options
 from ..settings import RigSettings

@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from o80.checked import whole
+from o80.base.argument_checks import whole
 
 from ..players.conditions import Conditions
 

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.extras import needed
+from o80.base.extras import needed
 
 from ..world.arm import JOINT_NAMES
 from ..world.ball import BALL_RADIUS

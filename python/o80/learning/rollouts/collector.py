@@ -12,8 +12,8 @@ from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from o80.checked import whole
-from o80.errors import Closed, InvalidArgument
+from o80.base.argument_checks import whole
+from o80.base.errors import Closed, InvalidArgument
 from o80.learning.rollouts.recorder import EpisodeSums, Recorder
 from o80.learning.rollouts.rollout import Rollout
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 
 Float32Array = NDArray[np.float32]
 

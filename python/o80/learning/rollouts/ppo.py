@@ -15,8 +15,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.errors import InvalidArgument
-from o80.extras import needed
+from o80.base.errors import InvalidArgument
+from o80.base.extras import needed
 from o80.learning.rollouts.collector import Collector
 from o80.learning.rollouts.rollout import Rollout
 from o80.learning.rollouts.sb3_policy import gaussian_policy

@@ -9,7 +9,7 @@ import numpy as np
 from gymnasium.vector import VectorEnv
 from numpy.typing import NDArray
 
-from o80.errors import InvalidArgument
+from o80.base.errors import InvalidArgument
 from o80.learning.rollouts.rollout import Ends, Rollout, arrays_of
 
 Numbers = NDArray[np.int64]

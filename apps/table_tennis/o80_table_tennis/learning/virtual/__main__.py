@@ -16,7 +16,7 @@ import typer
 from rich.console import Console
 
 import o80
-from o80.extras import needed
+from o80.base.extras import needed
 
 OUTPUT = Path("build/virtual_balls")
 SEEDS = [1, 2, 3]

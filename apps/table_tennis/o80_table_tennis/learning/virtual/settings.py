@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from o80.checked import whole
+from o80.base.argument_checks import whole
 
 from ...players.conditions import Conditions
 from .hindsight import Selection, best_balls, every_ball

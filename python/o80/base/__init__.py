@@ -1,0 +1,1 @@
+"""Errors, words, checks of arguments, processes and texts, which every room uses."""

@@ -1,0 +1,66 @@
+"""Checks of arguments. Each error names the argument, what it must be, and what it is."""
+
+import operator
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from o80.base.errors import InvalidArgument
+
+
+def whole(value: Any, name: str, least: int | None = None) -> int:
+    """A whole number. Raises InvalidArgument."""
+    try:
+        number = operator.index(value)
+    except TypeError:
+        raise InvalidArgument(f"{name} must be a whole number, got {value!r}") from None
+    if isinstance(value, bool):
+        raise InvalidArgument(f"{name} must be a whole number, got {value!r}")
+    if least is not None and number < least:
+        raise InvalidArgument(f"{name} must be at least {least}, got {number}")
+    return number
+
+
+def whole_or_none(value: Any, name: str, least: int | None = None) -> int | None:
+    """A whole number, or None. Raises InvalidArgument."""
+    return None if value is None else whole(value, name, least)
+
+
+def number(value: Any, name: str) -> float:
+    """A number, of Python or NumPy. Raises InvalidArgument."""
+    try:
+        if not isinstance(value, (bool, np.bool_, str, bytes)):
+            return float(value)
+    except (TypeError, ValueError, OverflowError):
+        pass
+    raise InvalidArgument(f"{name} must be a number, got {value!r}")
+
+
+def text(value: Any, name: str) -> str:
+    """A text. Raises InvalidArgument."""
+    if not isinstance(value, str):
+        raise InvalidArgument(f"{name} must be a text, got {value!r}")
+    return value
+
+
+def nothing(value: Any, call: str, otherwise: str = "") -> None:
+    """Refuses what a function of the user returned. Raises InvalidArgument."""
+    if value is not None:
+        raise InvalidArgument(f"{call} must return None{otherwise}; got {value!r}")
+
+
+def mapping(value: Any, name: str, holds: str) -> Mapping[Any, Any]:
+    """A mapping; None is an empty one. Raises InvalidArgument."""
+    if value is None:
+        return {}
+    if not isinstance(value, Mapping):
+        raise InvalidArgument(f"{name} must be a mapping from {holds}, got {value!r}")
+    return value
+
+
+def sequence(value: Any, name: str, example: str) -> Sequence[Any]:
+    """A sequence that is not a string, as a list. Raises InvalidArgument."""
+    if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)):
+        raise InvalidArgument(f"{name} must be a list such as {example}, got {value!r}")
+    return list(value)

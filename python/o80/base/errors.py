@@ -1,0 +1,231 @@
+"""Exceptions of o80: one class for each cause. The text says what to do."""
+
+import builtins
+from typing import TYPE_CHECKING, Any, NamedTuple, Optional
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from o80._core import Batch, Handle, Observation
+    from o80.base.words import CommandEnd
+
+
+def exception_text(error: BaseException) -> str:
+    """Type and text of any exception, also of one whose text cannot be had."""
+    try:
+        text = str(error)
+    except Exception:
+        text = ""
+    return f"{type(error).__name__}: {text}" if text else type(error).__name__
+
+
+class Error(Exception):
+    """Base class of all exceptions of o80."""
+
+
+class InvalidArgument(Error, ValueError):
+    """An argument has a value that cannot be used."""
+
+
+class TimeoutError(Error, builtins.TimeoutError):
+    """A wait ended by its timeout.
+
+    `batch` is the batch that was waited for, or None: wait again, or look at its `handles`.
+    """
+
+    def __init__(
+        self, text: str = "", batch: Optional["Batch"] = None, handles: "Sequence[Handle]" = ()
+    ) -> None:
+        super().__init__(text)
+        self.batch = batch
+        self._handles = handles
+
+    @property
+    def handles(self) -> "Sequence[Handle]":
+        """The handles of that batch, with their statuses; empty if there is no batch."""
+        return list(self._handles) if self.batch is None else self.batch.handles
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # another process cannot wait for the batch: keep its statuses
+        return type(self), (str(self), None, self.handles)
+
+
+class NotCompleted(Error):
+    """Commands or requests of a batch ended otherwise than completed, or all of it was rejected.
+
+    A command that a later command of the same frontend has overwritten is not among them.
+
+    handles: of those that did not complete, with their statuses.
+    observation: the row of the last iteration of the batch (the newest row if that one is gone).
+    """
+
+    def __init__(
+        self,
+        text: str,
+        handles: "Sequence[Handle]",
+        actuators: "Sequence[tuple[str, ...]]",
+        observation: "Observation",
+    ) -> None:
+        super().__init__(text)
+        self.handles = list(handles)
+        self._actuators = list(actuators)
+        self.observation = observation
+
+    @property
+    def ends(self) -> "list[CommandEnd]":
+        """For each handle: iteration, status, actuators, reason and text."""
+        from o80.base.words import CommandEnd
+
+        return [
+            CommandEnd(handle.iteration or 0, handle.status, names, handle.reason, handle.text)
+            for handle, names in zip(self.handles, self._actuators, strict=True)
+        ]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.handles, self._actuators, self.observation)
+
+
+class Miss(NamedTuple):
+    """A number that was observed too far from its target; of a NotReached."""
+
+    actuator: str
+    field: str  #: empty if the state is a number
+    target: float
+    observed: float
+    distance: float  #: NaN if `observed` is
+    tolerance: float
+    unit: str  #: of the four numbers
+
+
+class NotReached(TimeoutError):
+    """The robot was not observed within the tolerance of its targets in time.
+
+    misses: the numbers that were too far away; empty if only the commands had not ended.
+    observation: the row in which they were observed.
+    batch: the commands, those that have not ended continue; `handles` are theirs.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        batch: Optional["Batch"],
+        handles: "Sequence[Handle]",
+        misses: "Sequence[Miss]",
+        observation: "Observation",
+    ) -> None:
+        super().__init__(text, batch, handles)
+        self.misses = list(misses)
+        self.observation = observation
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), None, self.handles, self.misses, self.observation)
+
+
+class MissingExtra(Error, ImportError):
+    """A function needs an optional package; the text names the extra of o80 that installs it."""
+
+
+class SegmentTaken(Error):
+    """A living backend has the segment's name."""
+
+
+class SegmentError(Error):
+    """A file is not a segment of this version of o80, or cannot be created."""
+
+
+class SchemaMismatch(Error):
+    """The robot is described differently than expected."""
+
+
+class BackendGone(Error):
+    """The backend no longer iterates."""
+
+
+class BackendHalted(Error):
+    """The backend is halted: commands end or are rejected until a frontend resumes it."""
+
+
+class BackendStopped(BackendGone):
+    """The backend ended in order."""
+
+
+class BackendFailed(BackendGone):
+    """The driver reported a fault."""
+
+
+class BackendKilled(BackendGone):
+    """The process of the backend died."""
+
+
+class BackendSuperseded(BackendGone):
+    """A new backend has taken the name: call `reattach`, or open a new frontend."""
+
+
+class RowOverwritten(Error, LookupError):
+    """The history no longer holds that iteration."""
+
+
+class LaneFull(Error):
+    """The lane has no room for the batch; nothing was sent."""
+
+
+class NoLane(Error):
+    """All lanes of the segment are in use by other frontends."""
+
+
+class NotBursting(Error, RuntimeError):
+    """A burst was requested from a backend that runs in real time."""
+
+
+class ReadOnly(Error, RuntimeError):
+    """The frontend was opened with read_only=True."""
+
+
+class UsedAfterFork(Error, RuntimeError):
+    """The object belongs to the parent process."""
+
+
+class Closed(Error, RuntimeError):
+    """The object was closed."""
+
+
+class Cancelled(Error):
+    """A wait was cancelled by its caller."""
+
+
+class DriverError(Error, RuntimeError):
+    """A robot library or its driver failed."""
+
+
+class CopyFailed(Error):
+    """Copies of an inline group failed in a call; all others have done it.
+
+    The text names the copies. `errors` has the exception of each; the first one is the cause.
+    """
+
+    def __init__(self, text: str = "", errors: "Mapping[int, Exception] | None" = None) -> None:
+        super().__init__(text)
+        self.errors: dict[int, Exception] = dict(errors or {})
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return type(self), (str(self), self.errors)
+
+
+class RequestRejected(Error):
+    """A request was rejected; the text is the reason.
+
+    The handler of an embedded backend raises it to reject a request; the sender reads the text.
+    """
+
+
+class ControlTaken(Error):
+    """Another frontend has exclusive control."""
+
+
+class RecordingError(Error):
+    """A recording cannot be written or read; the text names the file and what to do."""
+
+
+for _class in [*vars().values()]:  # shown and pickled by the name under which users import them
+    if isinstance(_class, type) and _class.__module__ == __name__:
+        _class.__module__ = "o80.errors"

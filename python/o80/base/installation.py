@@ -1,0 +1,50 @@
+"""Folder of o80, and entry points by which installed packages register robots and frontends."""
+
+import os
+import sys
+from functools import cache
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+    from pathlib import Path
+
+
+@cache
+def announced(group: str) -> "dict[str, EntryPoint]":
+    """The entry points of a group, by name.
+
+    importlib.metadata takes milliseconds to import and to read all packages, so it is used only if
+    a package has an entry point of this group.
+    """
+    if not any(_names_group(folder or os.curdir, group.encode()) for folder in sys.path):
+        return {}
+    from importlib.metadata import entry_points
+
+    return {point.name: point for point in entry_points(group=group)}
+
+
+def _names_group(place: str, group: bytes) -> bool:
+    """True if a package in a folder of sys.path may have an entry point of the group."""
+    try:
+        names = os.listdir(place)
+    except NotADirectoryError:
+        return True  # an archive: importlib.metadata reads it
+    except OSError:
+        return False
+    for name in names:
+        if name.endswith((".dist-info", ".egg-info")):
+            try:
+                with open(os.path.join(place, name, "entry_points.txt"), "rb") as file:
+                    if group in file.read():
+                        return True
+            except OSError:
+                continue
+    return False
+
+
+def prefix() -> "Path":
+    """The folder that holds o80's include/, lib/ and bin/."""
+    from pathlib import Path
+
+    return Path(__file__).resolve().parents[1]

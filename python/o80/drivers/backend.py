@@ -1,0 +1,466 @@
+"""The side that iterates, inside a Python program."""
+
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80._core as _core
+from o80.base import argument_checks, lifecycle
+from o80.base.argument_checks import mapping, nothing
+from o80.base.errors import Closed, InvalidArgument, RequestRejected, exception_text
+from o80.base.loop_options import loop_texts, names_of
+from o80.base.words import IdleWord, StaleWord
+from o80.drivers.description import Described, Limit, SchemaWriter
+from o80.rows.enumerations import numbers_of
+from o80.rows.layout import Layout, record_of
+from o80.rows.record import Record
+
+
+@dataclass(frozen=True)
+class StartAfresh:
+    """Returned by the handler of a request after a jump of the robot, with its new reading.
+
+    The backend makes a fresh start: it drops all queues and publishes an extra row with this
+    reading and desired = observed (or `desired`). Iterations continue to count.
+    A driver (`o80.drivers`) returns StartAfresh(), and its next reading has the numbers.
+    """
+
+    observed: Any = None
+    extended: Any = None
+    desired: Any = None
+
+
+@dataclass(frozen=True)
+class Running:
+    """Returned by the handler of a request that runs until `Backend.end_request`.
+
+    progress: text that frontends see meanwhile; `Backend.progress` changes it.
+    """
+
+    progress: str = ""
+
+    def __post_init__(self) -> None:
+        argument_checks.text(self.progress, "progress of o80.Running")
+
+
+def check_end(answer: StartAfresh | None, rejected: str | None) -> None:
+    """Checks how a request ends. Raises InvalidArgument."""
+    if answer is not None and not isinstance(answer, StartAfresh):
+        raise InvalidArgument(
+            f"answer must be None or o80.StartAfresh(...), got {answer!r}; to reject the "
+            f"request, give rejected='why'"
+        )
+    if rejected is not None:
+        argument_checks.text(rejected, "rejected")
+        if answer is not None:
+            raise InvalidArgument("give either answer or rejected, not both")
+
+
+KEEPS = ", or raise o80.RequestRejected to keep the halt"
+
+Handler = Callable[[Record], StartAfresh | Running | None]
+
+
+class Backend:
+    """A backend whose loop runs in a Python program.
+
+        with o80.Backend("arm", ["shoulder", "elbow"]) as backend:
+            backend.publish(read())                    # row 0
+            while (desired := backend.step()) is not None:
+                write(desired)
+                backend.publish(read())
+
+    segment: the name that frontends attach to.
+    actuators: their names; or how many; or a mapping from groups to a dtype (one actuator),
+        (dtype, how many) or (dtype, names).
+    dtype: of the state of an actuator, unless the groups say it: a NumPy dtype, float, int, bool,
+        an IntEnum, or a mapping from field names to these.
+    extended: dtype (or mapping) of further sensor values.
+    requests: names of the requests it serves, each with the dtype of its fields, or None; see `on`.
+        Its fields have no defaults: the sender must give all of them.
+    limits: of actuators: o80.Limits, or (minimum, maximum, speed, ...), of the first number of the
+        state, or a mapping from fields to these; None is no limit.
+    rests_at: of actuators: a mapping from fields to the values to which they go without a command
+        (a velocity to 0).
+    when_idle: "hold" or "follow", for all actuators or a mapping from each.
+    units: of fields, by their name or by "group.field".
+    frequency: iterations a second [1/s] (None: 1000). The program keeps the pace itself; bursting,
+        it is that of simulated time.
+    bursting: `step` waits until a frontend asks for iterations.
+    robot: what it calls itself (None: as the segment).
+    history: observations kept (None: as many as 16 MiB hold, 100000 at most).
+    while_halted: requests that are served during a halt too, because they move nothing.
+    lanes, lane_blocks, journal, permission, stale, silence, resume: as for
+        `o80.robots.Robot.start`.
+    model: what `o80 view` draws: the path of an MJCF file, or its text.
+    joints: of the model, each with what moves it: an actuator, whose state must begin with a
+        float64, or (field, index) of an extended field of float64.
+    max_overruns: halt when so many rows within a second come half a period late, or later.
+    accept_reading: begin where the robot is read to be, even if it cannot have come there.
+
+    Leaving a `with` block by an exception ends it as failed: frontends raise its text.
+    Used by one thread; `stop` and `close` may come from any. Raises SegmentTaken, SegmentError,
+    InvalidArgument.
+    """
+
+    def __init__(
+        self,
+        segment: str,
+        actuators: Any = (),
+        dtype: Described = float,
+        *,
+        extended: Described | None = None,
+        requests: Mapping[str, Described | None] | None = None,
+        limits: Mapping[Any, Limit | Mapping[str, Limit]] | None = None,
+        rests_at: Mapping[Any, Mapping[str, float]] | None = None,
+        when_idle: IdleWord | Mapping[Any, IdleWord] = "hold",
+        units: Mapping[str, str] | None = None,
+        frequency: float | None = None,
+        bursting: bool = False,
+        robot: str | None = None,
+        history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        journal: float | None = None,
+        permission: int | None = None,
+        stale: StaleWord | None = None,
+        silence: int | None = None,
+        max_overruns: int | None = None,
+        resume: bool = False,
+        accept_reading: bool = False,
+        while_halted: Sequence[str] = (),
+        model: str | os.PathLike[str] | None = None,
+        joints: Mapping[str, int | str | tuple[str, int]] | None = None,
+    ) -> None:
+        loop = loop_texts(locals(), names_of("backend"))
+        requests = mapping(requests, "requests", "names to dtypes or None")
+        limits = mapping(limits, "limits", "actuators to limits")
+        rests_at = mapping(rests_at, "rests_at", "actuators to fields and values")
+        writer = SchemaWriter(robot or segment, mapping(units, "units", "fields to units"))
+        writer.add_actuators(actuators, dtype)
+        if extended is not None:
+            writer.set_extended(extended)
+        writer.add_requests(requests, while_halted)
+        writer.set_limits(limits)
+        writer.set_rests(rests_at)
+        writer.set_idle(when_idle)
+        writer.set_model(model, mapping(joints, "joints", "joints to what moves them"))
+        self._native: _core.Backend | None = None
+        native = _core.Backend(writer.builder, segment, loop)
+        self._layout = Layout(native.description)
+        self._segment = segment
+        self._handlers: dict[str, Handler] = {}
+        self._fresh_start: StartAfresh | None = None  # of a request that has ended
+        self._halt_handlers: dict[str, Callable[[], None]] = {}
+        self._observed = self._layout.labelled_states(self._states(native.observed))
+        self._fresh_desired = self._layout.labelled_states(self._states(native.fresh_desired))
+        self._extended = self._layout.labelled_extras(native.extended)
+        native.serve_with = Server(self)
+        self._native = native
+        lifecycle.close_later(self)
+
+    def _states(self, block: Any) -> NDArray[Any]:
+        """The states in a block of memory."""
+        element, shape = self._layout.states.subdtype or (self._layout.states, ())
+        return np.ndarray(shape, element, block)
+
+    @property
+    def _open(self) -> _core.Backend:
+        if self._native is None:
+            raise Closed(f"the backend of '{self._segment}' was closed: make a new one")
+        return self._native
+
+    # ------------------------------------------------------------------ publish and step
+
+    def publish(self, observed: Any = None, extended: Any = None) -> None:
+        """Publishes the reading of the current iteration as a row; the first one is row 0.
+
+        observed: an array (actuators,), or a mapping from groups to states.
+        extended: a mapping from fields to values, or a record. None, and fields that the mapping
+            leaves out, keep the values of the row before.
+
+        Raises InvalidArgument if row 0 has a number that is NaN, infinite or, in real time, too far
+        outside its bounds: publish it again when the robot reads. In real time also if the robot
+        cannot have come from row 0 to the next reading: one of the two is wrong, and the backend
+        ends.
+        """
+        native = self._open
+        if observed is not None:
+            fill(self._observed, observed, "observed")
+        if extended is not None:
+            fill(self._extended, extended, "extended")
+        native.publish()
+
+    def step(self, timeout: float | None = None) -> Any:
+        """Begins an iteration and returns its desired states, a new array or record; None after
+        `stop`.
+
+        In bursting mode it waits until a frontend requests iterations, and raises TimeoutError
+        after `timeout` [s]. It calls the handlers of requests. An exception of a handler (other
+        than RequestRejected) is raised here, and so is InvalidArgument for a StartAfresh with NaN
+        or infinite numbers: then close the backend.
+        """
+        native = self._open
+        if self._fresh_start is not None:
+            fresh, self._fresh_start = self._fresh_start, None
+            self._read_afresh(fresh)
+        if not native.step(timeout):
+            return None
+        states = self._states(native.desired())
+        return self._layout.of_states(states)
+
+    # ------------------------------------------------------------------ requests and halts
+
+    def on(self, request: str, handler: Handler) -> None:
+        """Sets the handler of a request, which is called between two iterations with its fields.
+
+        It returns None, StartAfresh if the robot jumped, or Running if it takes time. To reject the
+        request it raises RequestRejected; the sender reads the text.
+        """
+        self._index_of(request)
+        self._open.check()
+        self._handlers[request] = handler
+
+    def running(self, request: str) -> bool:
+        """True if a request was answered with Running and has not ended.
+
+        A halt ends it, unless it is one of `while_halted`: the program must then stop the motion.
+        """
+        return self._open.runs(self._index_of(request))
+
+    def progress(self, request: str, text: str) -> None:
+        """Sets the text that frontends see while a request runs: at most 247 bytes."""
+        self._open.show_progress(self._index_of(request), argument_checks.text(text, "progress"))
+
+    def end_request(
+        self, request: str, answer: StartAfresh | None = None, *, rejected: str | None = None
+    ) -> None:
+        """Ends a request that was answered with Running.
+
+        answer: None, or StartAfresh if the robot jumped: the next step makes a fresh start, and the
+            request ends with the row of that.
+        rejected: the reason of its failure, for the sender.
+
+        It ends with the row that is published next. No effect if it does not run any more.
+        """
+        index = self._index_of(request)
+        check_end(answer, rejected)
+        if not self._open.runs(index):
+            return
+        self._fresh_start = answer or self._fresh_start
+        self._open.end_request(index, answer is not None, rejected)
+
+    def _index_of(self, request: str) -> int:
+        known = [row["name"] for row in self._layout.schema["requests"]]
+        if request not in known:
+            instead = _core.names_instead(request, known)
+            raise InvalidArgument(f"there is no request '{request}'{instead}")
+        return known.index(request)
+
+    def _read_afresh(self, answer: StartAfresh) -> None:
+        read_afresh(answer, self._observed, self._extended, self._fresh_desired)
+
+    def on_halt(self, handler: Callable[[], None]) -> None:
+        """Sets a function to call when a halt begins: commands have ended, desired states brake."""
+        self._open.check()
+        self._halt_handlers["halt"] = handler
+
+    def on_resume(self, handler: Callable[[], None]) -> None:
+        """Sets a function to call before a halt is cleared; it raises RequestRejected to keep it.
+
+        Desired states then continue from the last observed states.
+        """
+        self._open.check()
+        self._halt_handlers["resume"] = handler
+
+    def halt(self, reason: str = "") -> None:
+        """Halts: commands end, actuators brake, nothing moves until a frontend resumes.
+
+        In force from the first `step` begun after it. May be called from any thread. The same
+        reason again is the same halt; another reason is another halt.
+        """
+        self._open.halt(argument_checks.text(reason, "the reason of a halt"))
+
+    def interrupt(self, actuator: int | str) -> None:
+        """Ends the commands of an actuator as interrupted, in the current iteration."""
+        rows = self._layout.schema["actuators"]
+        names = [row["name"] for row in rows]
+        if isinstance(actuator, str):
+            if actuator not in names:
+                instead = _core.names_instead(actuator, names)
+                raise InvalidArgument(f"there is no actuator '{actuator}'{instead}")
+            actuator = names.index(actuator)
+        if not 0 <= actuator < len(names):
+            raise InvalidArgument(f"there is no actuator {actuator}: there are {len(names)}")
+        self._open.interrupt(actuator)
+
+    def stop(self) -> None:
+        """Makes `step` return None. May be called from any thread."""
+        self._open.ask_to_stop()
+
+    def close(self, failure: str | None = None) -> None:
+        """Ends the backend, as failed if `failure` is given: frontends raise it with this text.
+
+        A `step` that waits in another thread raises Closed.
+        """
+        native, self._native = self._native, None
+        if native is None:
+            return
+        text = native.failure if failure is None else failure
+        native.end(bool(text), text)
+        self._handlers.clear()
+        self._halt_handlers.clear()
+
+    def _close_at_exit(self) -> None:
+        self.close()
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        raise TypeError(
+            f"a backend cannot be pickled, it belongs to this process: send its segment's name, "
+            f"and open o80.Frontend({self._segment!r}) there"
+        )
+
+    @property
+    def active(self) -> NDArray[np.bool_]:
+        """True where a command or braking gives the desired state: bool (actuators,)."""
+        bits = np.frombuffer(self._open.active(), np.uint8)
+        return np.unpackbits(bits, count=self._layout.actuators, bitorder="little").view(np.bool_)
+
+    @property
+    def iteration(self) -> int:
+        """The current iteration."""
+        return self._open.iteration
+
+    @property
+    def time(self) -> int:
+        """Time of the current iteration [ns]: monotonic clock, or simulated in bursting mode."""
+        return self._open.time
+
+    @property
+    def segment(self) -> str:
+        """The name of the segment, to which frontends attach."""
+        return self._segment
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The description of the robot for frontends."""
+        return self._layout.schema
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close(exception_text(error) if isinstance(error, Exception) else None)
+
+    def __repr__(self) -> str:
+        return f"<o80.Backend of '{self._segment}'{', closed' if self._native is None else ''}>"
+
+
+class Server:
+    """Calls the handlers of requests. Holds references to the backend's buffers only."""
+
+    def __init__(self, backend: Backend) -> None:
+        self._handlers = backend._handlers
+        self._halt_handlers = backend._halt_handlers
+        self._rows = backend._layout.schema["requests"]
+        self._observed = backend._observed
+        self._extended = backend._extended
+        self._desired = backend._fresh_desired
+
+    def __call__(self, index: int, payload: bytes) -> str | bool | tuple[str] | None:
+        """Returns None (done), a text (rejected), (text,) (running) or True (start afresh)."""
+        row = self._rows[index]
+        handler = self._handlers.get(row["name"])
+        if handler is None:
+            return (
+                f"request '{row['name']}' has no handler: the backend's program must call "
+                f"Backend.on({row['name']!r}, handler)"
+            )
+        fields = np.frombuffer(bytearray(payload), np.uint8)
+        try:
+            answer = handler(record_of(row["type"], fields))
+        except RequestRejected as why:
+            return str(why) or "the handler gave no reason"
+        if answer is None:
+            return None
+        if isinstance(answer, Running):
+            return (answer.progress,)
+        if not isinstance(answer, StartAfresh):
+            raise InvalidArgument(
+                f"the handler of '{row['name']}' must return None, o80.StartAfresh(...) or "
+                f"o80.Running(...), or raise o80.RequestRejected; got {answer!r}"
+            )
+        read_afresh(answer, self._observed, self._extended, self._desired)
+        return True
+
+    def halt(self) -> None:
+        """Called when a halt begins."""
+        if handler := self._halt_handlers.get("halt"):
+            nothing(handler(), "the handler of on_halt")
+
+    def resume(self) -> str | None:
+        """Called before a halt is cleared; returns the reason to keep it, or None."""
+        self._desired[...] = self._observed
+        handler = self._halt_handlers.get("resume")
+        if handler is None:
+            return None
+        try:
+            nothing(handler(), "the handler of on_resume", KEEPS)
+        except RequestRejected as why:
+            return str(why) or "the handler gave no reason"
+        return None
+
+
+def read_afresh(
+    answer: StartAfresh,
+    observed: NDArray[Any],
+    extended: NDArray[Any],
+    desired: NDArray[Any],
+) -> None:
+    """Writes the reading of a fresh start into the buffers of a row."""
+    if answer.observed is None:
+        raise InvalidArgument("StartAfresh needs the new reading: o80.StartAfresh(observed, ...)")
+    fill(observed, answer.observed, "observed")
+    if answer.extended is not None:
+        fill(extended, answer.extended, "extended")
+    desired[...] = observed
+    if answer.desired is not None:
+        fill(desired, answer.desired, "desired")
+
+
+def fill(block: NDArray[Any], values: Any, what: str) -> None:
+    """Writes states or sensor values into a buffer of a row."""
+    names = block.dtype.names
+    if isinstance(values, Record):
+        block[...] = np.asarray(values)
+    elif isinstance(values, Mapping):
+        for name, value in values.items():
+            if names is None or name not in names:
+                instead = _core.names_instead(str(name), list(names or ()))
+                raise InvalidArgument(f"{what} has no field {name!r}{instead}")
+            if isinstance(value, Mapping):  # NumPy would take it for one value, which is true
+                fill(block[name], value, f"{what}.{name}")
+                continue
+            try:
+                block[name] = value
+            except (TypeError, ValueError) as error:
+                raise InvalidArgument(f"{what}: field {name!r}: {error}") from error
+    else:
+        values = numbers_of(getattr(block, "_labels", None), values)
+        try:
+            array = np.asarray(values, block.dtype)
+        except (TypeError, ValueError) as error:
+            raise InvalidArgument(f"{what} cannot be read as {block.dtype}: {error}") from error
+        if array.shape != block.shape:
+            raise InvalidArgument(f"{what} must have the shape {block.shape}, got {array.shape}")
+        block[...] = array

@@ -1,0 +1,143 @@
+"""The waits of a frontend, for programs on asyncio."""
+
+import asyncio
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, SupportsIndex
+
+import o80._core as _core
+from o80.base.awaiting import in_thread
+from o80.base.words import LateWord, ModeWord, ProfileWord, StartWord
+
+if TYPE_CHECKING:
+    from o80.frontend.commander import Commander, Tolerance
+
+
+class Waits:
+    """The waiting methods of a frontend as coroutines: `await arm.aio.wait_for_next()`.
+
+    Arguments, results and exceptions are those of the methods with the same names. Several tasks
+    may wait at the same time. A cancelled task continues within 50 ms; the rest of its burst is
+    then cancelled too, as after a timeout. Commands that it has pulsed continue; a cancelled
+    `pulse_and_wait` purges those of its frontend, as an error in a `with` block does, unless
+    `on_error` is "continue".
+    """
+
+    def __init__(self, frontend: "Commander") -> None:
+        self._frontend = frontend
+
+    async def wait_for(self, iteration: int, timeout: float | None = None) -> _core.Observation:
+        """Waits for the observation of an iteration; see `Frontend.wait_for`."""
+        frontend = self._frontend
+        return await in_thread(lambda: frontend.wait_for(iteration, timeout))
+
+    async def wait_for_next(self, timeout: float | None = None) -> _core.Observation:
+        """The next observation in sequence; see `Frontend.wait_for_next`.
+
+        A cancelled task loses no observation. Tasks that each need every observation need a stream
+        each.
+        """
+        frontend = self._frontend
+        awaited = frontend._next
+        if frontend.published < awaited:
+            await in_thread(lambda: frontend._await_row(awaited, timeout))
+        return frontend.wait_for_next(timeout)
+
+    async def pulse_and_wait(
+        self,
+        timeout: float | None = None,
+        *,
+        at: int | None = None,
+        late: LateWord = "reject",
+        check: bool = True,
+    ) -> _core.Observation:
+        """Sends what was added and waits until it has ended; see `Frontend.pulse_and_wait`."""
+        frontend = self._frontend
+        try:
+            if frontend._is_inline:  # iterations of an inline robot run in the calling thread
+                return await in_thread(
+                    lambda: frontend.pulse_and_wait(timeout, at=at, late=late, check=check)
+                )
+            batch = frontend._pulse_to_end(at, late)
+            return await in_thread(lambda: frontend._wait_for_end(batch, timeout, check))
+        except asyncio.CancelledError:
+            if not frontend.closed:
+                frontend._purge_on_error()
+            raise
+
+    async def move_to(
+        self,
+        actuators: SupportsIndex | str | Sequence[SupportsIndex | str] | None,
+        targets: Any,
+        *,
+        tolerance: "Tolerance",
+        timeout: float | None = None,
+        duration: float | None = None,
+        speed: float | None = None,
+        until: int | None = None,
+        iterations: int | None = None,
+        fastest: bool = False,
+        mode: ModeWord = "queue",
+        profile: ProfileWord | None = None,
+        start: StartWord = "desired",
+    ) -> _core.Observation:
+        """Sends the robot to targets and waits until it is there; see `Frontend.move_to`."""
+        frontend = self._frontend
+        options: dict[str, Any] = {
+            "tolerance": tolerance,
+            "duration": duration,
+            "speed": speed,
+            "until": until,
+            "iterations": iterations,
+            "fastest": fastest,
+            "mode": mode,
+            "profile": profile,
+            "start": start,
+        }
+        if frontend._is_inline:
+            return await in_thread(
+                lambda: frontend.move_to(actuators, targets, timeout=timeout, **options)
+            )
+        move = frontend._start_move(actuators, targets, **options)
+        return await in_thread(lambda: frontend._wait_for_move(move, timeout))
+
+    async def burst(
+        self,
+        iterations: int = 1,
+        *,
+        timeout: float | None = None,
+        at: int | None = None,
+        late: LateWord = "reject",
+    ) -> _core.Observation:
+        """Sends what was added and bursts; see `Frontend.burst`."""
+        frontend = self._frontend
+        if frontend._is_inline:
+            return await in_thread(
+                lambda: frontend.burst(iterations, timeout=timeout, at=at, late=late)
+            )
+        burst = frontend.burst(iterations, wait=False, at=at, late=late)
+        try:
+            return await in_thread(lambda: burst.wait(timeout))
+        except BaseException:
+            burst.cancel()
+            raise
+
+    async def request(self, name: str, /, *, timeout: float | None = None, **fields: Any) -> None:
+        """Sends a request at once and waits for its answer; see `Frontend.request`."""
+        frontend = self._frontend
+        if frontend._is_inline:
+            await in_thread(lambda: frontend.request(name, timeout=timeout, **fields))
+            return
+        batch = frontend._send_request(name, fields)
+        await in_thread(lambda: frontend._wait_for_answer(name, batch, timeout))
+
+    async def resume(
+        self,
+        number: int | None = None,
+        *,
+        timeout: float | None = 5.0,
+        accept_reading: bool = False,
+    ) -> bool:
+        """Ends a halt; see `Frontend.resume`."""
+        return await in_thread(
+            lambda: self._frontend.resume(number, timeout=timeout, accept_reading=accept_reading)
+        )

@@ -1,0 +1,73 @@
+"""Texts about halted, hanging and late backends."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import o80._core as _core
+
+
+def halt_text(
+    segment: str, halt: tuple[int, str, int, str, str] | None, *, played: bool = False
+) -> str:
+    """The reason of a halt and the command that resumes; empty if there is no halt.
+
+    played: the halt is one of a recording.
+    """
+    if halt is None:
+        return ""
+    number, cause, iteration, who, text = halt
+    since = "" if iteration < 0 else f" since iteration {iteration}"
+    by = f", requested by {who}" if who else ""
+    reason = f": {text}" if text else ""
+    if played:
+        return f"was halted{since} when it was recorded{reason}"
+    return (
+        f"halted{since} (halt {number}, cause {cause}{by}){reason}. "
+        f"Go on with: o80 resume {segment} {number}"
+    )
+
+
+def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:
+    """A line for each running request."""
+    return [
+        f"request '{name}' of {who} has been running since iteration {since}"
+        + (f": {progress}" if progress else "")
+        for name, since, who, progress in running
+    ]
+
+
+def rate_text(rate: float | None, frequency: float) -> str:
+    """The rate that is reached [1/s] and the frequency that was requested."""
+    return f"{frequency:g} Hz" if rate is None else f"{_rounded(rate)} of {frequency:g} Hz"
+
+
+def _rounded(rate: float) -> str:
+    return f"{rate:.0f}" if rate >= 100 else f"{rate:.3g}"
+
+
+def pace_text(loop: _core.LoopState) -> str:
+    """Rate, overruns and age of the last row, in one line."""
+    if loop.bursting:
+        return f"bursting: runs when a frontend requests iterations; at row {loop.last}"
+    if loop.played and loop.row_age is None:
+        return f"a recording of {loop.frequency:g} Hz is played; at row {loop.last}"
+    age = "no row yet" if loop.row_age is None else f"last row {age_text(loop.row_age)} ago"
+    rate = rate_text(loop.rate, loop.frequency)
+    return f"{rate} reached, {loop.overruns} overruns, {loop.skipped} missed ticks, {age}"
+
+
+def age_text(seconds: float) -> str:
+    """A duration with one unit."""
+    for unit, length in (("h", 3600), ("min", 60)):
+        if seconds >= 2 * length:
+            return f"{seconds / length:.0f} {unit}"
+    return f"{seconds:.0f} s" if seconds >= 1 else f"{max(seconds, 0.0) * 1e3:.0f} ms"
+
+
+def watchdog_text(schema: dict[str, Any]) -> str:
+    """Text about what the backend does when a commander hangs or dies."""
+    silence, stale = schema["silence"], schema["stale"]
+    if silence:
+        return f"watchdog: {stale} after {silence} iterations without a sign of life"
+    return f"no watchdog (--silence); when a commander dies: {stale}"

@@ -1,0 +1,255 @@
+"""Curves of histories: desired and observed together, sensor values, halts, ends of commands."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.base.errors import InvalidArgument
+from o80.base.extras import needed
+from o80.base.words import CommandEnd, Status
+from o80.rows.columns import Column, chosen, columns_of
+from o80.rows.history import History, values_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+MOST_PANELS = 24
+PANEL = (9.0, 1.9)  # width and height [inch]
+MOST_OF_MARK = 36  # characters that fit in a panel
+PARTS = ("desired", "observed", "extended")
+END_STYLES = {"COMPLETED": ("|", "tab:green"), "OVERWRITTEN": ("|", "tab:purple")}
+STYLES = {"desired": "--", "observed": "-", "extended": "-"}
+
+
+class Curve(NamedTuple):
+    """One number of a robot over time."""
+
+    robot: str
+    panel: str  #: curves of one panel have this in common
+    column: Column
+    unit: str
+
+
+def plot(
+    histories: Mapping[str, History],
+    fields: Sequence[str] = (),
+    *,
+    ends: Mapping[str, Sequence[CommandEnd]] | None = None,
+    marks: Mapping[str, Sequence[tuple[str, int]]] | None = None,
+    origins: Mapping[str, int] | None = None,
+    label: str = "time [s]",
+    window: bool = False,
+) -> "Figure":
+    """A figure with a panel for each number; desired and observed share one.
+
+    histories: by name of robot.
+    fields: such as "observed.elbow", "elbow" (desired and observed), "extended.force", "extended";
+        empty: all states.
+    ends: ends of commands to mark, by name of robot: o80.command_ends.command_ends(arm.journal()).
+    marks: text and iteration of the marks of a recording, by name of robot.
+    origins: the time of a row [ns] that is 0 on the axis, by name of robot (None: the earliest row
+        of all). Give those of `o80.timelines.origins` if the clocks of the robots differ.
+    label: of the time axis.
+    window: a figure that `matplotlib.pyplot.show` shows.
+    Raises InvalidArgument for an unknown field, MissingExtra without matplotlib.
+    """
+    needed("matplotlib", "plot", "a plot")
+    curves = [
+        curve for name, history in histories.items() for curve in _chosen(name, history, fields)
+    ]
+    panels = list(dict.fromkeys((curve.robot, curve.panel) for curve in curves))
+    if not panels:
+        raise InvalidArgument(
+            "there is nothing to plot: the robot has no actuators. Name sensor values in fields, "
+            "for example extended"
+        )
+    if len(panels) > MOST_PANELS:
+        raise InvalidArgument(
+            f"{len(panels)} panels are too many for a picture (at most {MOST_PANELS}): name fields"
+        )
+    figure = _figure(len(panels), window)
+    axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
+    start = min(int(history.time[0]) for history in histories.values() if len(history))
+    for ax, panel in zip(axes, panels, strict=True):
+        drawn = [curve for curve in curves if (curve.robot, curve.panel) == panel]
+        history = histories[panel[0]]
+        zero = start if origins is None else origins[panel[0]]
+        times = np.asarray((history.time - zero) * 1e-9, np.float64)
+        _draw(ax, drawn, history, times, several=len(histories) > 1)
+        _mark_ends(ax, panel[1], history, times, (ends or {}).get(panel[0], ()))
+        _draw_marks(ax, history, times, (marks or {}).get(panel[0], ()))
+        ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    axes[-1].set_xlabel(label)
+    return figure
+
+
+def _figure(panels: int, window: bool) -> "Figure":
+    size = (PANEL[0], 0.8 + PANEL[1] * panels)
+    if window:
+        from matplotlib import pyplot
+
+        return pyplot.figure(figsize=size, layout="constrained")
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=size, layout="constrained")
+
+
+def _chosen(name: str, history: History, fields: Sequence[str]) -> Iterable[Curve]:
+    columns = {column.name: column for column in columns_of(history.schema)}
+    wanted = list(columns) if fields else [each for each in columns if _part(each) != "extended"]
+    if fields:
+        wanted = chosen(name, list(columns), fields)
+    units = _units(history.schema)
+    for each in wanted:
+        panel = each if _part(each) == "extended" else each.partition(".")[2]
+        yield Curve(name, panel, columns[each], units.get(panel.partition("[")[0], ""))
+
+
+def _part(column: str) -> str:
+    return column.partition(".")[0]
+
+
+def _units(schema: dict[str, Any]) -> dict[str, str]:
+    """Units by panel."""
+    units = {}
+    for actuator in schema["actuators"]:
+        for field in schema["groups"][actuator["group"]]["type"]["fields"]:
+            path = f"{actuator['name']}.{field['name']}" if field["name"] else actuator["name"]
+            units[path] = field["unit"]
+    for field in schema.get("extended", {}).get("fields", []):
+        units[f"extended.{field['name']}"] = field["unit"]
+    return units
+
+
+def _draw(
+    ax: "Axes",
+    curves: Sequence[Curve],
+    history: History,
+    times: NDArray[np.float64],
+    *,
+    several: bool,
+) -> None:
+    for curve in curves:
+        part = _part(curve.column.name)
+        color = {"desired": "tab:gray", "observed": "tab:blue"}.get(part, "tab:green")
+        values = values_of(history, curve.column)
+        ax.plot(times, values, STYLES[part], color=color, label=part, linewidth=1.2)
+        if curve.column.labels:
+            ax.set_yticks(list(curve.column.labels.values()), list(curve.column.labels))
+    first = curves[0]
+    title = f"{first.robot}: {first.panel}" if several else first.panel
+    ax.set_ylabel(f"{title}\n[{first.unit}]" if first.unit else title)
+    ax.grid(alpha=0.3)
+    _shade(ax, times, history.halted, "tab:red", "halted")
+    late = np.flatnonzero(np.diff(history.overruns.astype(np.int64), prepend=history.overruns[:1]))
+    if len(late):
+        at = np.full(len(late), 0.02)
+        label = "late iteration"
+        ax.plot(times[late], at, "|", color="tab:orange", transform=_shares(ax), label=label)
+
+
+def _mark_ends(
+    ax: "Axes",
+    panel: str,
+    history: History,
+    times: NDArray[np.float64],
+    ends: Sequence[CommandEnd],
+) -> None:
+    """Marks at the upper edge where commands of this actuator ended."""
+    if not len(history):
+        return
+    iterations = history.iteration
+    for status in Status:
+        places = {
+            int(np.searchsorted(iterations, end.iteration))
+            for end in ends
+            if end.status is status
+            and iterations[0] <= end.iteration <= iterations[-1]
+            and any(_is_of(panel, name) for name in end.actuators)
+        }
+        if places:
+            marker, color = END_STYLES.get(status.name, ("x", "tab:red"))
+            at = np.full(len(places), 0.95)
+            label = f"command {status.name.lower()}"
+            where = times[sorted(places)]
+            line = ax.plot(where, at, marker, color=color, transform=_shares(ax), label=label)
+            line[0].set(markersize=9 if marker == "|" else 6, markeredgewidth=2)
+
+
+def _draw_marks(
+    ax: "Axes",
+    history: History,
+    times: NDArray[np.float64],
+    marks: Sequence[tuple[str, int]],
+) -> None:
+    """A line with its text where the program that recorded made a mark."""
+    iterations = history.iteration
+    for text, iteration in marks:
+        if len(history) and iterations[0] <= iteration <= iterations[-1]:
+            at = times[np.searchsorted(iterations, iteration)]
+            ax.axvline(at, color="tab:olive", linewidth=1.0)
+            place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
+            # a mark holds any text: none of it is a formula
+            short = text if len(text) <= MOST_OF_MARK else text[: MOST_OF_MARK - 1] + "\u2026"
+            ax.text(at, 0.98, short, transform=_shares(ax), parse_math=False, **place)
+
+
+def _is_of(panel: str, actuator: str) -> bool:
+    return panel == actuator or panel.startswith((actuator + ".", actuator + "["))
+
+
+def _shares(ax: "Axes") -> Any:
+    """Data along x, shares of the panel along y."""
+    return ax.get_xaxis_transform()
+
+
+def _shade(
+    ax: "Axes", times: NDArray[np.float64], where: NDArray[np.bool_], color: str, label: str
+) -> None:
+    """Marks the spans of time in which something held."""
+    edges = np.flatnonzero(np.diff(where.astype(np.int8), prepend=0, append=0))
+    for i, (begin, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+        last = times[min(end, len(times) - 1)]
+        ax.axvspan(times[begin], last, color=color, alpha=0.15, label=label if i == 0 else None)
+
+
+APART = 10_000_000_000  # runs further apart have axes of their own [ns]
+
+
+class Placed(NamedTuple):
+    """A history, and wall-clock time less row time [ns]; None: not known."""
+
+    history: History
+    wall_offset: int | None
+
+
+def origins(runs: Mapping[str, Placed]) -> tuple[dict[str, int], int]:
+    """The row time [ns] that is 0 on the axis of each run, and how many axes there are.
+
+    Runs that overlap on the wall clock, or follow each other within ten seconds, share an axis,
+    which begins with their first row. A run of another day begins at 0 by itself, and so does one
+    whose wall-clock time is not known.
+    """
+    known: list[tuple[int, int, str]] = []
+    found: dict[str, int] = {}
+    for name, (history, offset) in runs.items():
+        if not len(history):
+            found[name] = 0
+        elif offset is None:
+            found[name] = int(history.time[0])
+        else:
+            known.append((int(history.time[0]) + offset, int(history.time[-1]) + offset, name))
+    axes = sum(1 for run in runs.values() if run.wall_offset is None and len(run.history))
+    zero = end = None
+    for first, last, name in sorted(known):
+        if zero is None or end is None or first > end + APART:
+            zero, end = first, last
+            axes += 1
+        end = max(end, last)
+        offset = runs[name].wall_offset
+        assert offset is not None
+        found[name] = zero - offset
+    return found, axes

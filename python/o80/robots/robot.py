@@ -1,0 +1,424 @@
+"""Finds, describes and starts robots."""
+
+import builtins
+import inspect
+import numbers
+import os
+import sys
+import warnings
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, overload
+
+import o80._core as _core
+from o80.base.argument_checks import whole
+from o80.base.errors import DriverError, InvalidArgument
+from o80.base.installation import announced, prefix
+from o80.base.loop_options import did_you_mean, loop_options, loop_texts, names_of, text_of
+from o80.base.words import StaleWord
+from o80.frontend.frontend import Frontend
+from o80.robots.process import Process, start_process
+
+if TYPE_CHECKING:
+    from importlib.metadata import EntryPoint
+
+    from o80.inline_group import InlineGroup
+
+GROUP = "o80.robots"
+
+
+@dataclass(frozen=True)
+class RobotFile:
+    """A robot that can be loaded by its name."""
+
+    name: str
+    path: Path
+
+
+@dataclass(frozen=True, kw_only=True)
+class Option:
+    """One option of a robot, a field of its described Config."""
+
+    name: str
+    kind: str  #: number, integer, boolean, text, "one of: a, b", or "3 x number"
+    default: str  #: as text
+    help: str
+    unit: str
+
+
+def list() -> builtins.list[RobotFile]:
+    """All robots with a name: in O80_ROBOT_PATH, bundled with o80, and in Python packages.
+
+    A package whose robot cannot be found is left out, with a RuntimeWarning.
+    """
+    found = {name: Path(path) for name, path in _core.find_robots()}
+    for name, point in announced(GROUP).items():
+        if name not in found:
+            try:
+                found[name] = _path_of(point)
+            except DriverError as error:
+                warnings.warn(str(error), RuntimeWarning, stacklevel=2)
+    return [RobotFile(name, path) for name, path in found.items()]
+
+
+def path_of(name_or_path: str | os.PathLike[str]) -> Path:
+    """The library of a robot, given its name or a path.
+
+    Raises DriverError for an unknown name, with the known robots in its text.
+    """
+    text = os.fspath(name_or_path)
+    if os.sep in text or (text.endswith(".so") and Path(text).exists()):
+        return Path(text).absolute()
+    found = dict(_core.find_robots())
+    if text in found:
+        return Path(found[text])
+    packaged = announced(GROUP)
+    if text in packaged:
+        return _path_of(packaged[text])
+    raise DriverError(_core.no_such_robot(text, [*found, *packaged]))
+
+
+def load(name_or_path: str | os.PathLike[str] | type[Any]) -> "Robot":
+    """Loads a robot: by its name, by the path of its library, or a driver class in Python.
+
+    A class is given itself, or as "module:Class" or "file.py:Class", which imports the module.
+    Raises DriverError with the known robots in its text.
+    """
+    if isinstance(name_or_path, type):
+        return PythonRobot(name_or_path)
+    place = os.fspath(name_or_path)
+    if is_place(place):
+        return PythonRobot(place)
+    if (announced_class := _announced_class(place)) is not None:
+        return PythonRobot(announced_class)
+    return Robot(_core.load_robot(str(path_of(name_or_path))))
+
+
+def is_place(text: str) -> bool:
+    """True for "module:Class" and "file.py:Class"."""
+    where, colon, name = text.rpartition(":")
+    return bool(colon and where) and name.isidentifier()
+
+
+def place_of(robot: str) -> str | None:
+    """Where the driver class of a robot is found, if it is in Python: "module:Class"."""
+    if is_place(robot):
+        return robot
+    driver = _announced_class(robot)
+    return None if driver is None else f"{driver.__module__}:{driver.__qualname__}"
+
+
+def _announced_class(name: str) -> type[Any] | None:
+    """The driver class that a Python package announces under a name."""
+    point = announced(GROUP).get(name)
+    if point is None or name in dict(_core.find_robots()):
+        return None
+    value = _value_of(point)
+    return value if isinstance(value, type) else None
+
+
+def _value_of(point: "EntryPoint") -> Any:
+    """Value of an entry point: a driver class, a path, or the result of its function."""
+    package = point.dist.name if point.dist is not None else point.module
+    try:
+        value = point.load()
+        return value if isinstance(value, type) or not callable(value) else value()
+    except Exception as error:
+        raise DriverError(
+            f"robot '{point.name}' is left out: the package {package}, which announces it, failed "
+            f"with {type(error).__name__}: {error}. Repair the package or uninstall it"
+        ) from error
+
+
+def _path_of(point: "EntryPoint") -> Path:
+    path = _value_of(point)
+    if isinstance(path, type):
+        return Path(inspect.getsourcefile(path) or path.__module__)
+    if not isinstance(path, (str, os.PathLike)):
+        raise DriverError(
+            f"entry point '{point.name}' of the group {GROUP} gives {path!r}: it must be a driver "
+            f"class, the path of a robot library, or a function that gives it"
+        )
+    return Path(path)
+
+
+class Robot:
+    """A loaded robot library. It does not touch hardware before it is started."""
+
+    def __init__(self, library: _core.RobotLibrary) -> None:
+        self._library = library
+
+    @property
+    def name(self) -> str:
+        """Name of the robot (from O80_ROBOT)."""
+        return self._library.name
+
+    @property
+    def path(self) -> Path:
+        """Path of the library."""
+        return Path(self._library.path)
+
+    @property
+    def built_with(self) -> str:
+        """Versions of o80 and of the libraries it links."""
+        return self._library.built_with
+
+    @property
+    def options(self) -> builtins.list[Option]:
+        """The robot's own options, besides those of every robot."""
+        return [
+            Option(
+                name=option.name,
+                kind=option.kind,
+                default=option.default,
+                help=option.help,
+                unit=option.unit,
+            )
+            for option in self._library.options
+        ]
+
+    def describe(self, **config: Any) -> dict[str, Any]:
+        """The description that its segment would have (`Frontend.schema`), without a start.
+
+        config: the robot's own options, see `options`. Raises DriverError, InvalidArgument.
+        """
+        return self._library.describe(self._config(config, ())).schema()
+
+    @property
+    def _program(self) -> builtins.list[str | Path]:
+        """Command that runs this robot in a process."""
+        return [prefix() / "bin" / "o80-run", self._library.path]
+
+    @property
+    def _environment(self) -> dict[str, str] | None:
+        """Environment variables of the robot's process; None: those of this one."""
+        return None
+
+    def start(
+        self,
+        segment: str | None = None,
+        *,
+        frequency: float | None = None,
+        bursting: bool = False,
+        history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        journal: float | None = None,
+        permission: int | None = None,
+        stale: StaleWord | None = None,
+        silence: int | None = None,
+        max_overruns: int | None = None,
+        gap: float | None = None,
+        accept_reading: bool = False,
+        resume: bool = False,
+        policy: Literal["other", "fifo", "rr"] | None = None,
+        priority: int | None = None,
+        cpus: Sequence[int] | None = None,
+        lock_memory: bool = False,
+        timeout: float | None = 30.0,
+        **config: Any,
+    ) -> Process:
+        """Starts the robot in a process of its own, which ends when this process ends.
+
+        segment: name of its segment (None: the name of the robot).
+        frequency: iterations a second [1/s]; in bursting mode, of simulated time. None: the robot's
+            own (for simulators, that of the model), or 1000.
+        bursting: run only the iterations that frontends request.
+        history: number of observations kept (None: as many as 16 MiB hold, at most 100000).
+        lanes, lane_blocks: frontends that may command at once, and blocks of 64 bytes that each
+            may have in flight.
+        journal: size of the journal [MiB] (None: twice the largest batch). A batch may be half as
+            large.
+        permission: the read bits permit users to observe, the write bits to command.
+        stale: policy for a frontend that dies, or gives no sign of life for `silence` iterations
+            while it has control or commands: "hold" does nothing, "purge" drops its commands,
+            "halt" halts the robot, "stop" stops it. None: "halt" with `silence`, else "hold". Signs
+            of life are a pulse, a wait for a batch and `keep_alive`, but not reading.
+        max_overruns: number of late iterations within a second that halts the robot.
+        gap: a longer time between two iterations halts the robot [s]; 0: none does; None: 20
+            periods and at least 0.1 s for robots of the world, none for simulations, or less if
+            the driver describes it.
+        accept_reading: start where the robot is read to be, even if it cannot have come there.
+        resume: start without a halt even if the previous process was halted, or was killed while
+            commands acted.
+        policy, priority, cpus, lock_memory: real-time scheduling; settings that the machine refuses
+            give a RuntimeWarning.
+        timeout: how long to wait until the robot runs [s].
+        config: the robot's own options, see `options`.
+
+        docs/options.md lists allowed values and defaults. Returns when the robot runs. Raises
+        DriverError with the driver's fault, SegmentTaken, InvalidArgument, TimeoutError.
+        """
+        known = names_of("start")
+        texts = loop_texts(locals(), known)
+        switches = {option.name for option in loop_options().values() if option.kind == "boolean"}
+        words = [
+            f"--{name.replace('_', '-')}" + ("" if name in switches else f"={text}")
+            for name, text in texts
+        ]
+        words += [f"--{name}={text}" for name, text in self._config(config, known)]
+        return start_process(self._program, segment or self.name, words, timeout, self._environment)
+
+    @overload
+    def inline(
+        self,
+        segment: str | None = None,
+        *,
+        frequency: float | None = None,
+        history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        journal: float | None = None,
+        permission: int | None = None,
+        stale: StaleWord | None = None,
+        silence: int | None = None,
+        copies: None = None,
+        threads: None = None,
+        **config: Any,
+    ) -> Frontend: ...
+    @overload
+    def inline(
+        self,
+        segment: None = None,
+        *,
+        copies: int,
+        threads: "int | InlineGroup | None" = None,
+        frequency: float | None = None,
+        history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        journal: float | None = None,
+        permission: int | None = None,
+        stale: StaleWord | None = None,
+        silence: int | None = None,
+        **config: Any,
+    ) -> "InlineGroup": ...
+    def inline(
+        self,
+        segment: str | None = None,
+        *,
+        frequency: float | None = None,
+        history: int | None = None,
+        lanes: int | None = None,
+        lane_blocks: int | None = None,
+        journal: float | None = None,
+        permission: int | None = None,
+        stale: StaleWord | None = None,
+        silence: int | None = None,
+        copies: int | None = None,
+        threads: "int | InlineGroup | None" = None,
+        **config: Any,
+    ) -> "Frontend | InlineGroup":
+        """Starts the robot in this process. A burst runs in the thread that requests it.
+
+        segment: name of its segment, to which others may attach (None: an unused name).
+        frequency, history, lanes, lane_blocks, journal, permission, stale, silence: as for `start`.
+        copies: start so many of them as an InlineGroup, which steps them together. Their segments
+            have no names. Copies keep 64 rows, two lanes of 256 blocks and no journal, unless these
+            options say otherwise.
+        threads: threads that step the copies, the calling one included (None: one for each
+            processor); or another group, whose threads are used: call the two in turn.
+        config: the robot's own options, see `options`.
+
+        Closing the frontend or the group stops the robot. Raises DriverError, SegmentTaken,
+        InvalidArgument.
+        """
+        known = names_of("inline")
+        texts = loop_texts(locals(), known)
+        own = self._config(config, known)
+        if copies is not None:
+            return self._group(copies, threads, segment, texts, own)
+        if threads is not None:
+            raise InvalidArgument("threads is for several copies: give copies too")
+        name = segment or _core.unused_segment_name(self.name)
+        try:
+            attachment = self._library.start_inline(name, texts, own)
+        except Exception:
+            if segment is None:
+                _core.clean(name)  # no other process can know this name
+            raise
+        return Frontend._of(attachment, unnamed=segment is None)
+
+    def _group(
+        self,
+        copies: int,
+        threads: "int | InlineGroup | None",
+        segment: str | None,
+        texts: builtins.list[tuple[str, str]],
+        own: builtins.list[tuple[str, str]],
+    ) -> "InlineGroup":
+        from o80.inline_group import InlineGroup
+
+        if segment is not None:
+            raise InvalidArgument(
+                "the copies of a group have no names: leave out segment, and name one of them with "
+                "`group.publish(copy, name)`"
+            )
+        count = whole(copies, "copies", 1)
+        sharing, workers = None, 0
+        if isinstance(threads, InlineGroup):
+            sharing = threads._group
+            sharing.check_usable()
+        elif threads is not None:
+            workers = whole(threads, "threads", 1)
+        return InlineGroup(_core.start_group(self._library, count, workers, sharing, texts, own))
+
+    def _config(
+        self, config: Mapping[str, Any], loop: Sequence[str]
+    ) -> builtins.list[tuple[str, str]]:
+        """Names and texts of the robot's own options. loop: other names, for the nearest one."""
+        kinds = {option.name: option.kind for option in self.options}
+        texts = []
+        for name, value in config.items():
+            if name not in kinds:
+                near = did_you_mean(name, [*kinds, "segment", *loop])
+                own = f": its own are {', '.join([*kinds][:5])}" if kinds else ": it has none"
+                raise InvalidArgument(f"robot '{self.name}' has no option '{name}'{near or own}")
+            if kinds[name] in ("number", "integer", "seed") and not isinstance(value, numbers.Real):
+                raise InvalidArgument(
+                    f"option '{name}' of robot '{self.name}' must be a {kinds[name]}, got {value!r}"
+                )
+            texts.append((name, text_of(value)))
+        return texts
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return load, (os.fspath(self.path),)
+
+    def __repr__(self) -> str:
+        return f"<o80.robots.Robot '{self.name}' of {self.path}>"
+
+
+class PythonRobot(Robot):
+    """A driver class in Python. Its process is a Python program."""
+
+    def __init__(self, driver: str | type[Any]) -> None:
+        """driver: the class, or where it is found. Raises DriverError."""
+        from o80.drivers.driver_class import found, library_of
+
+        self._class = found(driver) if isinstance(driver, str) else driver
+        super().__init__(library_of(self._class, driver if isinstance(driver, str) else None))
+
+    @property
+    def path(self) -> Path:
+        """Path of the file with the class."""
+        return Path(inspect.getsourcefile(self._class) or self._class.__module__)
+
+    @property
+    def _program(self) -> builtins.list[str | Path]:
+        place = self._library.path
+        if not place:
+            raise DriverError(
+                f"{self._class.__name__} was typed in, so another process cannot import it: write "
+                "it into a file, or use inline()"
+            )
+        return [sys.executable, "-u", "-m", "o80.run_driver", place]
+
+    @property
+    def _environment(self) -> dict[str, str]:
+        """With the folders in which modules are found here."""
+        folders = [folder or os.getcwd() for folder in sys.path]
+        return {**os.environ, "PYTHONPATH": os.pathsep.join(folders)}
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return load, (self._class,)

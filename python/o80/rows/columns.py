@@ -1,0 +1,81 @@
+"""The numbers of a robot's rows, each with a name: "observed.elbow", "extended.force[2]"."""
+
+import itertools
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+import o80._core as _core
+from o80.base.errors import InvalidArgument
+from o80.rows.layout import dtype_of_field, labels_of_field
+
+
+class Column(NamedTuple):
+    """One number of a row."""
+
+    name: str
+    dtype: np.dtype[Any]
+    offset: int  #: in the row
+    labels: dict[str, int] | None  #: of an enumeration
+    origin: str = "robot"  #: or "clock" or "world", from which its value comes (docs/drivers.md)
+
+
+def columns_of(schema: dict[str, Any]) -> Iterator[Column]:
+    """The columns of desired, observed and extended numbers."""
+    row = schema["row"]
+    for part in ("desired", "observed"):
+        counts = [0] * len(schema["groups"])
+        for actuator in schema["actuators"]:
+            group = schema["groups"][actuator["group"]]
+            offset = row[part] + group["offset"]
+            offset += counts[actuator["group"]] * group["type"]["size"]
+            counts[actuator["group"]] += 1
+            yield from _numbers(group["type"], f"{part}.{actuator['name']}", offset)
+    if "extended" in schema:
+        yield from _numbers(schema["extended"], "extended", row["extended"])
+
+
+def _numbers(
+    described: dict[str, Any], path: str, start: int, outer: str = "robot"
+) -> Iterator[Column]:
+    """The columns of a described type, in order. outer: origin of the field that holds it."""
+    for field in described["fields"]:
+        origin = field.get("origin", outer)
+        inner = f"{path}.{field['name']}" if field["name"] else path
+        dtype = dtype_of_field(field)
+        places = itertools.product(*map(range, field["shape"]))
+        for i, place in enumerate(places):
+            name = inner + "".join(f"[{k}]" for k in place)
+            offset = start + field["offset"] + i * dtype.itemsize
+            if field["kind"] == "struct":
+                yield from _numbers(field["type"], name, offset, origin)
+            else:
+                labels = labels_of_field(field)._labels_ if field["kind"] == "enum" else None
+                yield Column(name, dtype, offset, labels, origin)
+
+
+def value_of(row: Any, column: Column) -> Any:
+    """The number of a column in an observation."""
+    return np.ndarray((), column.dtype, row, column.offset)[()]
+
+
+def is_part(column: str, field: str) -> bool:
+    """Whether a field such as "observed.elbow", "elbow" or "extended" names or holds a column."""
+    for name in (column, column.partition(".")[2]):
+        if name == field or name.startswith((field + ".", field + "[")):
+            return True
+    return False
+
+
+def chosen(robot: str, columns: Sequence[str], fields: Sequence[str]) -> list[str]:
+    """The columns that some field names. Raises InvalidArgument for a field that names none."""
+    for field in fields:
+        if not any(is_part(column, field) for column in columns):
+            outer = {column.partition("[")[0] for column in columns}
+            short = {name.partition(".")[2] or name for name in outer}
+            known = [*sorted(short), *sorted(outer - short)]
+            raise InvalidArgument(
+                f"'{robot}' has no field '{field}'{_core.names_instead(field, known)}"
+            )
+    return [column for column in columns if any(is_part(column, field) for field in fields)]

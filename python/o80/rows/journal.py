@@ -1,0 +1,232 @@
+"""The journal of a backend: what it decided, in its order."""
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+import o80._core as _core
+from o80.base.words import CommandEnd, Reason, Status
+from o80.rows.enumerations import labelled
+from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, record_of
+from o80.rows.record import Record
+
+ENDS = frozenset(
+    {
+        Status.COMPLETED,
+        Status.LIMITED,
+        Status.OVERWRITTEN,
+        Status.PURGED,
+        Status.INTERRUPTED,
+        Status.REJECTED,
+        Status.HALTED,
+    }
+)
+
+
+@dataclass(frozen=True)
+class JournalCommand:
+    """A command, a request or an order of a batch, as its frontend sent it."""
+
+    #: command, purge, request, take_control, release_control, resume, mark or unknown
+    kind: str
+    id: int  #: the id that its `status` entries have
+    actuators: tuple[str, ...] = ()  #: of a command or a purge; of a purge of all: none
+    #: For each actuator its target: a number, or a dictionary of the fields that were given. For a
+    #: trajectory arrays, with a row for each waypoint.
+    targets: tuple[Any, ...] = ()
+    pace: str = ""  #: direct, duration, speed, until, iterations or fastest
+    amount: float | None = None  #: duration [s], iterations, the iteration of until, or the speed
+    mode: str = ""
+    profile: str = ""
+    start: str = ""
+    times: tuple[float, ...] = ()  #: of a trajectory with its own times [s]
+    only_own: bool = False  #: of a purge: only commands of its frontend
+    request: str = ""  #: the name of the request
+    fields: dict[str, Any] | None = None  #: its values
+    halt: int | None = None  #: of a resume
+    text: str = ""  #: of a mark
+    unknown: str = ""  #: of kind unknown: what a newer o80 has recorded, such as "record kind 10"
+
+
+@dataclass(frozen=True)
+class JournalEntry:
+    """One decision of a backend. Fields that its kind does not have are None or empty."""
+
+    number: int
+    #: taken, scheduled, rejected, status, halt, halt_reason, resume, control_taken,
+    #: control_released, control_lost, burst, burst_ended, died, silent, interrupted, fresh_start,
+    #: order_lost, stopping, ended or snapshot
+    kind: str
+    iteration: int
+    missed: int = 0  #: entries before this one that were overwritten before they were read
+    lane: int | None = None  #: the lane of the frontend that caused it
+    sender: str = ""  #: its process, or that of the halt; empty if unknown
+    id: int | None = None  #: of the batch; of a `status`: of the command
+    ticket: int | None = None  #: place of a batch in the order of all pulses
+    at: int | None = None  #: the iteration that a batch was sent for, if it is another one
+    burst: int | None = None  #: iterations that a burst may run; -1 until its batch has ended
+    cut: bool = False  #: of burst_ended: it ended early
+    commands: tuple[JournalCommand, ...] = ()
+    commands_lost: bool = False  #: they were overwritten before they were read
+    status: Status | None = None
+    reason: Reason | None = None
+    halt: int | None = None  #: number of a halt
+    cause: str = ""  #: of a halt
+    text: str = ""  #: the reason of a halt, or of the end of the backend
+    actuator: str = ""  #: that the driver interrupted
+    slot: int | None = None  #: in which the driver keeps a snapshot
+    #: Parts of the entry or its commands that this o80 does not know, such as "entry kind 30" (the
+    #: kind is "none" then): a newer one has recorded it.
+    unknown: str = ""
+
+
+def marks_in(entries: Iterable[JournalEntry]) -> list[tuple[str, int]]:
+    """Text and iteration of the marks that were taken."""
+    return [
+        (command.text, entry.iteration)
+        for entry in entries
+        if entry.kind == "taken"
+        for command in entry.commands
+        if command.kind == "mark"
+    ]
+
+
+def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:
+    """The ends of all commands whose batch is among the entries, in their order."""
+    actuators: dict[tuple[int | None, int], tuple[str, ...]] = {}
+    ends = []
+    for entry in entries:
+        commands = [each for each in entry.commands if each.kind == "command"]
+        if entry.kind == "rejected":
+            ends += [
+                CommandEnd(
+                    entry.iteration, Status.REJECTED, each.actuators, entry.reason or Reason.NONE
+                )
+                for each in commands
+            ]
+            continue
+        actuators.update({(entry.lane, each.id): each.actuators for each in commands})
+        if entry.kind == "status" and entry.status in ENDS and entry.id is not None:
+            named = actuators.pop((entry.lane, entry.id), None)
+            if named is not None:
+                reason = entry.reason or Reason.NONE
+                ends.append(CommandEnd(entry.iteration, entry.status, named, reason))
+    return ends
+
+
+class EntryDecoder:
+    """Converts native entries with the schema of a robot."""
+
+    def __init__(self, schema: dict[str, Any]) -> None:
+        self._schema = schema
+        self._names = [actuator["name"] for actuator in schema["actuators"]]
+        self._types = [
+            schema["groups"][actuator["group"]]["type"] for actuator in schema["actuators"]
+        ]
+
+    def entry(self, native: _core.JournalEntry) -> JournalEntry:
+        kind = native.kind
+        of_batch = kind in ("taken", "scheduled", "rejected")
+        of_lane = native.lane < 2**32 - 1
+        has_status = kind in ("status", "rejected")
+        return JournalEntry(
+            number=native.number,
+            kind=kind,
+            iteration=native.iteration,
+            missed=native.missed,
+            lane=native.lane if of_lane else None,
+            sender=native.who,
+            id=native.id if of_batch or kind in ("status", "burst", "burst_ended") else None,
+            ticket=native.ticket if of_batch else None,
+            at=native.at if of_batch and native.at not in (-1, native.iteration) else None,
+            burst=native.burst if native.burst != 0 else None,
+            cut=native.cut,
+            commands=tuple(self._command(record) for record in native.records),
+            commands_lost=native.records_lost,
+            status=native.status if has_status else None,
+            reason=native.reason if has_status else None,
+            halt=native.halt or None,
+            cause=native.cause if kind in ("halt", "halt_reason") else "",
+            text=native.text,
+            actuator=self._name(native.actuator) if kind == "interrupted" else "",
+            slot=native.slot if kind == "snapshot" else None,
+            unknown=native.unknown,
+        )
+
+    def _name(self, index: int) -> str:
+        name: str = self._names[index] if index < len(self._names) else str(index)
+        return name or str(index)
+
+    def _command(self, native: _core.JournalRecord) -> JournalCommand:
+        kind = native.kind
+        if kind == "command":
+            return JournalCommand(
+                kind=kind,
+                id=native.id,
+                actuators=tuple(self._name(target.actuator) for target in native.targets),
+                targets=tuple(self._target(target, native.rows) for target in native.targets),
+                pace=native.pace,
+                amount=_amount(native),
+                mode=native.mode,
+                profile=native.profile,
+                start=native.start,
+                times=tuple(time * 1e-9 for time in native.row_times),
+            )
+        if kind == "purge":
+            every = native.actuator >= len(self._names)
+            names = () if every else (self._name(native.actuator),)
+            return JournalCommand(kind, native.id, names, only_own=native.only_own)
+        if kind == "request":
+            described = self._schema["requests"][native.request]
+            record = record_of(described["type"], native.payload)
+            fields = {name: _plain(record[name]) for name in record}
+            return JournalCommand(kind, native.id, request=described["name"], fields=fields)
+        return JournalCommand(
+            kind, native.id, halt=native.halt or None, text=native.text, unknown=native.unknown
+        )
+
+    def _target(self, native: _core.JournalTarget, rows: int) -> Any:
+        """The rows of one actuator; of a struct the fields that were given."""
+        described = self._types[native.actuator]
+        states = np.frombuffer(native.states, dtype_of_type(described), rows)
+        known = labelled(states, labels_of_type(described))
+        whole = known if rows > 1 else known[0]
+        if is_plain(described):
+            return whole.item() if isinstance(whole, np.generic) else whole
+        given = iter(_bits(native.mask)) if native.mask else None
+        fields: dict[str, Any] = {}
+        for field in described["fields"]:
+            bits = [given is None or next(given) for _ in range(_numbers(field))]
+            if any(bits):
+                value = whole[field["name"]]
+                fields[field["name"]] = value.item() if isinstance(value, np.generic) else value
+        return fields
+
+
+def _plain(value: Any) -> Any:
+    """A value of a record without NumPy; an enumerated one knows its label."""
+    value = np.asarray(value) if isinstance(value, Record) else value
+    return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
+
+
+def _amount(native: _core.JournalRecord) -> float | None:
+    if native.pace == "speed":
+        return native.per_second
+    if native.pace == "duration":
+        return native.amount * 1e-9 if not native.row_times else None
+    return native.amount if native.pace in ("until", "iterations") else None
+
+
+def _bits(words: list[int]) -> Iterator[bool]:
+    for word in words:
+        yield from ((word >> bit) & 1 == 1 for bit in range(64))
+
+
+def _numbers(field: dict[str, Any]) -> int:
+    """Numbers in a described field, as a mask counts them."""
+    count = int(np.prod(field["shape"], dtype=int)) if field["shape"] else 1
+    if field["kind"] == "struct":
+        return count * sum(_numbers(part) for part in field["type"]["fields"])
+    return count

@@ -1,0 +1,357 @@
+"""Conversion of a robot's rows to NumPy arrays."""
+
+from collections.abc import Iterator
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80._core as _core
+from o80.base.cached import cached
+from o80.base.errors import InvalidArgument
+from o80.rows.enumerations import Enumeration, enumeration_of, labelled
+from o80.rows.record import Record
+
+HEAD = (
+    ("iteration", "i8"),
+    ("time", "i8"),
+    ("lateness", "i8"),
+    ("overruns", "u4"),
+    ("skipped", "u4"),
+    ("fresh", "u4"),
+    ("halted", "u4"),
+)
+
+
+def dtype_of_field(field: dict[str, Any]) -> np.dtype[Any]:
+    """The dtype of one element of a described field."""
+    kind = field["kind"]
+    if kind == "struct":
+        return dtype_of_type(field["type"])
+    if kind == "enum":
+        kind = f"{'i' if field['signed'] else 'u'}{field['size']}"
+    dtype: np.dtype[Any] = np.dtype(kind)
+    return dtype
+
+
+def is_plain(described: dict[str, Any]) -> bool:
+    """True if a described type is a plain number."""
+    fields = described["fields"]
+    return len(fields) == 1 and not fields[0]["name"]
+
+
+def dtype_of_type(described: dict[str, Any]) -> np.dtype[Any]:
+    """The dtype of a described struct or plain number."""
+    fields = described["fields"]
+    if is_plain(described):
+        return np.dtype((dtype_of_field(fields[0]), tuple(fields[0]["shape"])))
+    return np.dtype(
+        {
+            "names": [field["name"] for field in fields],
+            "formats": [(dtype_of_field(field), tuple(field["shape"])) for field in fields],
+            "offsets": [field["offset"] for field in fields],
+            "itemsize": described["size"],
+        }
+    )
+
+
+def labels_of_type(described: dict[str, Any]) -> Any:
+    """The enumeration of a plain field; of a struct those of its fields, by name."""
+    if is_plain(described):
+        return labels_of_field(described["fields"][0], described["name"])
+    found = {field["name"]: labels_of_field(field) for field in described["fields"]}
+    return {name: labels for name, labels in found.items() if labels}
+
+
+def labels_of_field(field: dict[str, Any], otherwise: str = "") -> Any:
+    """The labels of a field, empty or None without enumerations. otherwise: name for no name."""
+    if field["kind"] == "struct":
+        return labels_of_type(field["type"])
+    if field["kind"] != "enum":
+        return None
+    bits, is_signed = 8 * field["size"], field["signed"]
+    wrapped = 1 << bits
+    labels = []
+    for label, number in field["labels"].items():
+        value = number % wrapped  # an unsigned number is described as a signed one of 64 bits
+        labels.append((label, value - wrapped if is_signed and value >> (bits - 1) else value))
+    return enumeration_of(field["name"] or otherwise or "state", tuple(labels))
+
+
+def record_of(described: dict[str, Any], buffer: Any) -> Record:
+    """A record of a described type in the memory of a buffer."""
+    return Record(np.ndarray((), dtype_of_type(described), buffer), labels_of_type(described))
+
+
+def dtype_of_block(groups: list[dict[str, Any]], size: int) -> np.dtype[Any]:
+    """The dtype of all states of a robot."""
+    formats = [
+        (dtype_of_type(group["type"]), (group["count"],) if group["array"] else ())
+        for group in groups
+    ]
+    if len(groups) == 1 and not groups[0]["name"]:
+        return np.dtype(formats[0])
+    return np.dtype(
+        {
+            "names": [group["name"] for group in groups],
+            "formats": formats,
+            "offsets": [group["offset"] for group in groups],
+            "itemsize": size,
+        }
+    )
+
+
+def fields_of(described: dict[str, Any]) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
+    """Every field of a described type, also nested ones, with its struct."""
+    for field in described["fields"]:
+        yield described, field
+        if field["kind"] == "struct":
+            yield from fields_of(field["type"])
+
+
+def runs_of(dtype: np.dtype[Any], offset: int) -> Iterator[tuple[np.dtype[Any], int, int]]:
+    """The numbers of a dtype in order: (kind, offset, how many)."""
+    if dtype.subdtype is not None:
+        element, shape = dtype.subdtype
+        count = int(np.prod(shape))
+        if element.names is None:
+            yield element, offset, count
+            return
+        for i in range(count):
+            yield from runs_of(element, offset + i * element.itemsize)
+    elif dtype.names is None:
+        yield dtype, offset, 1
+    else:
+        assert dtype.fields is not None
+        for name in dtype.names:
+            member = dtype.fields[name]
+            yield from runs_of(member[0], offset + member[1])
+
+
+def joined(
+    runs: Iterator[tuple[np.dtype[Any], int, int]],
+) -> list[tuple[np.dtype[Any], int, int]]:
+    """The same runs; adjacent runs of one kind are joined."""
+    result: list[tuple[np.dtype[Any], int, int]] = []
+    for kind, offset, count in runs:
+        if result:
+            last, begin, length = result[-1]
+            if last == kind and begin + length * last.itemsize == offset:
+                result[-1] = (kind, begin, length + count)
+                continue
+        result.append((kind, offset, count))
+    return result
+
+
+def with_padding(rows: NDArray[Any]) -> NDArray[Any]:
+    """A view of rows as items without fields: its copies have the padding of the rows too.
+
+    NumPy copies rows field by field. It leaves out the padding, or leaves it undefined.
+    """
+    return rows.view(np.dtype((np.void, rows.itemsize)))
+
+
+class Layout:
+    """Reads the rows of one robot."""
+
+    def __init__(self, description: _core.Description) -> None:
+        schema = description.schema()
+        row = schema["row"]
+        self.schema = schema
+        self._description = description
+        self.size: int = row["size"]
+        self.actuators = len(schema["actuators"])
+        self.states = dtype_of_block(schema["groups"], row["observed"] - row["desired"])
+        self.extras = dtype_of_type(schema["extended"]) if "extended" in schema else np.dtype([])
+        self._desired_at: int = row["desired"]
+        self._observed_at: int = row["observed"]
+        self._extended_at: int = row["extended"]
+        self._active_at: int = row["active"]
+        self._clamped_at: int = row["clamped"]
+        self._braking_at: int = row["braking"]
+        self._mask_bytes: int = row["mask_words"] * 8
+        self._is_array = self.states.subdtype is not None
+        self._element, self._shape = self.states.subdtype or (self.states, ())
+        groups = {group["name"]: labels_of_type(group["type"]) for group in schema["groups"]}
+        #: enumerations of states, by group
+        self.labels = {name: labels for name, labels in groups.items() if labels}
+        #: enumerations of sensor values, by field
+        self.extended_labels = labels_of_type(schema["extended"]) if "extended" in schema else {}
+        self._is_plain_array = self._is_array and not self.labels
+
+    @cached
+    def row(self) -> np.dtype[Any]:
+        """The dtype of a whole row; masks as bytes, a bit for each actuator."""
+        parts = [(name, np.dtype(kind), self.schema["row"][name]) for name, kind in HEAD]
+        if self.actuators:
+            mask = np.dtype(("u1", (self._mask_bytes,)))
+            parts += [
+                ("desired", self.states, self._desired_at),
+                ("observed", self.states, self._observed_at),
+                ("active", mask, self._active_at),
+                ("clamped", mask, self._clamped_at),
+                ("braking", mask, self._braking_at),
+            ]
+        if self.extras.itemsize:
+            parts.append(("extended", self.extras, self._extended_at))
+        # NumPy saves only fields that are in the order of their offsets
+        parts.sort(key=lambda part: part[2])
+        names, formats, offsets = zip(*parts, strict=True)
+        return np.dtype(
+            {"names": names, "formats": formats, "offsets": offsets, "itemsize": self.size}
+        )
+
+    @cached
+    def runs(self) -> list[tuple[np.dtype[Any], int, int]]:
+        """All numbers of observed, then of extended: (kind, offset in the row, how many)."""
+        return joined(
+            run
+            for dtype, offset in (
+                (self.states, self._observed_at),
+                (self.extras, self._extended_at),
+            )
+            for run in runs_of(dtype, offset)
+        )
+
+    @cached
+    def enums(self) -> dict[str, type[Enumeration]]:
+        """An enum for each enumerated field: by its name, and by "Type.field".
+
+        If a state is a plain enum, its enum is named after the group, or "state".
+        """
+        found: dict[str, type[Enumeration]] = {}
+        ambiguous: set[str] = set()
+        types = [(group["type"], group["name"]) for group in self.schema["groups"]]
+        types += [(request["type"], request["name"]) for request in self.schema["requests"]]
+        if "extended" in self.schema:
+            types.append((self.schema["extended"], "extended"))
+        for described, place in types:
+            for owner, field in fields_of(described):
+                if field["kind"] != "enum":
+                    continue
+                name = field["name"] or owner["name"] or place or "state"
+                values = labels_of_field(field, owner["name"])
+                found[f"{owner['name']}.{name}" if field["name"] else name] = values
+                if name in found and found[name]._labels_ != values._labels_:
+                    ambiguous.add(name)
+                found.setdefault(name, values)
+        return {name: values for name, values in found.items() if name not in ambiguous}
+
+    def of_states(self, states: NDArray[Any]) -> Any:
+        """States as an array, or as a record of groups; they know their labels."""
+        if self._is_plain_array:
+            return states
+        return labelled(states, self.labels[""]) if self._is_array else Record(states, self.labels)
+
+    def labelled_states(self, states: NDArray[Any]) -> NDArray[Any]:
+        """The same states as an array to write: it takes labels."""
+        array: NDArray[Any] = labelled(
+            states, self.labels.get("") if self._is_array else self.labels
+        )
+        return array
+
+    def labelled_extras(self, buffer: Any) -> NDArray[Any]:
+        """The sensor values in a buffer as an array to write: it takes labels."""
+        array: NDArray[Any] = labelled(np.ndarray((), self.extras, buffer), self.extended_labels)
+        return array
+
+    # one row, as a buffer => arrays over its memory
+
+    def _block(self, row: Any, offset: int) -> Any:
+        return self.of_states(np.ndarray(self._shape, self._element, row, offset))
+
+    def desired(self, row: Any) -> Any:
+        return self._block(row, self._desired_at)
+
+    def observed(self, row: Any) -> Any:
+        return self._block(row, self._observed_at)
+
+    def extended(self, row: Any) -> Record:
+        return Record(np.ndarray((), self.extras, row, self._extended_at), self.extended_labels)
+
+    def _mask(self, row: Any, offset: int) -> NDArray[np.bool_]:
+        bits = np.ndarray((self._mask_bytes,), np.uint8, row, offset)
+        return np.unpackbits(bits, count=self.actuators, bitorder="little").view(np.bool_)
+
+    def active(self, row: Any) -> NDArray[np.bool_]:
+        return self._mask(row, self._active_at)
+
+    def clamped(self, row: Any) -> NDArray[np.bool_]:
+        return self._mask(row, self._clamped_at)
+
+    def braking(self, row: Any) -> NDArray[np.bool_]:
+        return self._mask(row, self._braking_at)
+
+    def flat(self, row: Any, dtype: Any = None) -> NDArray[Any]:
+        kind = np.dtype(np.float32 if dtype is None else dtype)
+        parts = [np.ndarray((count,), own, row, offset) for own, offset, count in self.runs]
+        if len(parts) == 1:
+            return parts[0].astype(kind)
+        if not parts:
+            return np.empty(0, kind)
+        return np.concatenate(parts, dtype=kind, casting="unsafe")
+
+    def text(self, row: Any) -> str:
+        lines = [f"<o80.Observation of iteration {row.iteration} at {row.time * 1e-9:.6f} s"]
+        if self.actuators:
+            lines += [f"  desired:  {row.desired}", f"  observed: {row.observed}"]
+        if self.extras.names:
+            lines.append(f"  extended: {row.extended}")
+        return "\n".join(lines) + ">"
+
+    # many rows, as an array of `row` => views with a first dimension
+
+    def check(self, rows: NDArray[Any]) -> None:
+        """Raises InvalidArgument if rows do not lie as the description says."""
+        if rows.dtype is self.row or rows.dtype == self.row:
+            return
+        raise InvalidArgument(
+            f"rows of {rows.dtype.itemsize} bytes do not lie as '{self.schema['robot']}' describes "
+            f"them ({self.size} bytes). NumPy's concatenate and where leave out padding: give them "
+            f"single fields, such as history.observed"
+        )
+
+    def many(self, rows: NDArray[Any], part: str) -> Any:
+        """The states of an array of rows: (T, actuators), or a record of groups."""
+        if not self.actuators:
+            return Record(np.empty(len(rows), np.dtype([])))
+        return self.of_states(rows[part])
+
+    def many_extras(self, rows: NDArray[Any]) -> Record:
+        """The extended values of an array of rows."""
+        if not self.extras.itemsize:
+            return Record(np.empty(len(rows), np.dtype([])))
+        return Record(rows["extended"], self.extended_labels)
+
+    @property
+    def model(self) -> str:
+        """The model (MJCF) that draws the robot; empty: none."""
+        return self._description.model()
+
+    def many_masks(self, rows: NDArray[Any], part: str) -> NDArray[np.bool_]:
+        """A mask of an array of rows: bool (T, actuators)."""
+        if not self.actuators:
+            return np.zeros((len(rows), 0), np.bool_)
+        bits = np.ascontiguousarray(rows[part])
+        unpacked = np.unpackbits(bits, axis=-1, count=self.actuators, bitorder="little")
+        return unpacked.view(np.bool_)
+
+    def many_flat(self, rows: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
+        """All observed numbers, then all extended ones: (T, numbers)."""
+        kind = np.dtype(np.float32 if dtype is None else dtype)
+        columns = sum(count for _, _, count in self.runs)
+        result = np.empty((len(rows), columns), kind)
+        column = 0
+        for own, offset, count in self.runs:
+            part = rows.getfield(np.dtype((own, (count,))), offset)
+            result[:, column : column + count] = part
+            column += count
+        return result
+
+
+@lru_cache(maxsize=64)
+def decoder_of(table: bytes) -> _core.Decoder:
+    """The decoder of pickled rows; `table` is the description in the format of a segment."""
+    description = _core.Description(table)
+    return _core.Decoder(description, Layout(description))

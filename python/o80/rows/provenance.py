@@ -1,0 +1,116 @@
+"""How a backend was started."""
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, fields
+from typing import Any, Self
+
+from o80.base.screen import html, plain, style
+
+_TEXTS = ("robot", "version", "source_hash", "library", "library_sha256", "built_with")
+
+
+@dataclass(frozen=True)
+class ProvenanceFile:
+    """A file that an option of a robot names."""
+
+    option: str
+    path: str  #: absolute
+    sha256: str  #: of its content, as ``sha256sum`` prints it; empty: not read
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """How a backend was started: what is needed to start the same robot again.
+
+    Texts of options are those that ``o80 run`` takes.
+    """
+
+    robot: str  #: name, as `o80.robots.load` takes it
+    options: dict[str, str]  #: of the robot, with defaults and drawn seeds
+    run_options: dict[str, str]  #: of the backend and its loop, with defaults
+    version: str  #: of o80
+    source_hash: str  #: of the sources of the o80 that ran it
+    #: A row's time plus this is wall-clock time, in ns since 1970. As of the start: the clocks may
+    #: drift apart, or be set, while the backend runs.
+    wall_clock_offset: int
+    library: str = ""  #: absolute path of the robot's library, program or FILE.py:Class
+    library_sha256: str = ""  #: of its content
+    built_with: str = ""  #: versions of what the robot was built with
+    files: tuple[ProvenanceFile, ...] = ()  #: that the robot's options name
+    #: Version of the rules that make desired states of commands; see `o80 replay`. Recordings that
+    #: do not say it were made under version 1.
+    motion_rules: int = 1
+
+    def _repr_html_(self) -> str:
+        """As a table of a notebook."""
+        lines = [line.partition(" ") for line in started_with(self)]
+        return html(("started with", ""), [(what, text.strip()) for what, _, text in lines])
+
+    def as_json(self) -> str:
+        """As one line of JSON, which `from_json` reads. Pure ASCII."""
+        import json  # late: most processes that attach never ask
+
+        return json.dumps(asdict(self), sort_keys=True)
+
+    @classmethod
+    def from_json(cls, text: str) -> Self:
+        """The provenance that `as_json` has written; fields of later versions are left out.
+
+        Raises ValueError, TypeError, KeyError, RecursionError if it is damaged.
+        """
+        import json
+
+        found = json.loads(text)
+        known = {field.name for field in fields(cls)}
+        provenance = cls.from_fields({name: found[name] for name in found if name in known})
+        if not all(isinstance(each, dict) for each in (provenance.options, provenance.run_options)):
+            raise TypeError("options are no mapping")
+        texts = [
+            *(getattr(provenance, name) for name in _TEXTS),
+            *(
+                text
+                for pairs in (provenance.options, provenance.run_options)
+                for text in (*pairs.keys(), *pairs.values())
+            ),
+            *(text for file in provenance.files for text in vars(file).values()),
+        ]
+        if not all(isinstance(text, str) for text in texts):
+            raise ValueError("a value is no text")
+        for number in (provenance.wall_clock_offset, provenance.motion_rules):
+            if not isinstance(number, int):
+                raise ValueError("a value is no whole number")
+        if not 0 <= provenance.motion_rules < 2**31:
+            raise ValueError("the version of the motion rules is out of range")
+        return provenance
+
+    @classmethod
+    def from_fields(cls, given: Mapping[str, Any]) -> Self:
+        """From a mapping of its fields; `files` as mappings or as sequences."""
+        files = tuple(
+            ProvenanceFile(**file) if isinstance(file, Mapping) else ProvenanceFile(*file)
+            for file in given.get("files", ())
+        )
+        return cls(**{**given, "files": files})
+
+
+def started_with(provenance: Provenance) -> list[str]:
+    """Library, options and versions, in lines."""
+    lines = []
+    if provenance.library:
+        built = f"  {style(plain(provenance.built_with), 'dim')}" if provenance.built_with else ""
+        lines.append(f"library  {plain(provenance.library)}{built}")
+    if provenance.options:
+        lines.append(f"options  {_assignments(provenance.options)}")
+    lines.append(f"loop     {_assignments(provenance.run_options)}")
+    for file in provenance.files:
+        hashed = f"sha256 {file.sha256[:12]}" if file.sha256 else "not read"
+        lines.append(f"file     {plain(file.path)}  {style(hashed, 'dim')}")
+    version = (
+        f"{provenance.version}, sources {provenance.source_hash[:12]}, "
+        f"motion rules {provenance.motion_rules}"
+    )
+    return [*lines, f"o80      {plain(version)}"]
+
+
+def _assignments(options: dict[str, str]) -> str:
+    return ", ".join(f"{plain(name)}={plain(text)}" for name, text in options.items())
