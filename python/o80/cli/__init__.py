@@ -33,6 +33,6 @@ def _run(words: list[str]) -> None:
         print_segments(as_json="--json" in words)
         sys.stdout.flush()
         return
-    from o80.cli.app import app
+    from o80.cli.app import run_app
 
-    app()
+    run_app(words)

@@ -1,31 +1,39 @@
-"""The program ``o80``: gathers the commands, one a file."""
+"""The program ``o80``: one command a file."""
 
 from __future__ import annotations
 
+import importlib
 from typing import Annotated
 
 import typer
 
 import o80._core as _core
 from o80.base import installation
-from o80.cli.clean import clean
-from o80.cli.diff import diff
-from o80.cli.echo import echo
-from o80.cli.export import export
-from o80.cli.halt import halt, resume
-from o80.cli.info import info
-from o80.cli.latency import latency
-from o80.cli.list_segments import list_segments
-from o80.cli.mark import mark
-from o80.cli.play import play
-from o80.cli.plot import plot
-from o80.cli.record import record
-from o80.cli.replay import replay
-from o80.cli.run import run
-from o80.cli.save import repair, save
-from o80.cli.stop import stop
-from o80.cli.stub import stub
-from o80.cli.view import view
+
+COMMANDS = {
+    "run": "run.run",
+    "list": "list_segments.list_segments",
+    "info": "info.info",
+    "stub": "stub.stub",
+    "echo": "echo.echo",
+    "record": "record.record",
+    "save": "save.save",
+    "repair": "save.repair",
+    "play": "play.play",
+    "plot": "plot.plot",
+    "view": "view.view",
+    "export": "export.export",
+    "diff": "diff.diff",
+    "latency": "latency.latency",
+    "replay": "replay.replay",
+    "mark": "mark.mark",
+    "halt": "halt.halt",
+    "resume": "halt.resume",
+    "stop": "stop.stop",
+    "clean": "clean.clean",
+}
+"""Module and function of each command, in the order of the help."""
+RAW = {"ignore_unknown_options": True, "allow_extra_args": True}
 
 app = typer.Typer(
     name="o80",
@@ -38,30 +46,6 @@ app = typer.Typer(
     epilog="A first try: [bold]o80 run two_joints[/bold] here, [bold]o80 list[/bold] and "
     "[bold]o80 echo two_joints[/bold] in another terminal.",
 )
-app.command(
-    "run",
-    context_settings={"ignore_unknown_options": True, "allow_extra_args": True},
-    add_help_option=False,
-)(run)
-app.command("list")(list_segments)
-app.command("info")(info)
-app.command("stub")(stub)
-app.command("echo")(echo)
-app.command("record")(record)
-app.command("save")(save)
-app.command("repair")(repair)
-app.command("play")(play)
-app.command("plot")(plot)
-app.command("view")(view)
-app.command("export")(export)
-app.command("diff")(diff)
-app.command("latency")(latency)
-app.command("replay")(replay)
-app.command("mark")(mark)
-app.command("halt")(halt)
-app.command("resume")(resume)
-app.command("stop")(stop)
-app.command("clean")(clean)
 
 
 @app.callback(invoke_without_command=True)
@@ -78,3 +62,19 @@ def root(
     if prefix:
         typer.echo(installation.prefix())
         raise typer.Exit()
+
+
+def run_app(words: list[str]) -> None:
+    """Runs the command that `words` begin with, or shows which there are.
+
+    Only the module of that command is imported: others need what takes long to import.
+    """
+    named = words[0] if words else ""
+    for name in [named] if named in COMMANDS else COMMANDS:
+        module, function = COMMANDS[name].split(".")
+        command = getattr(importlib.import_module(f"o80.cli.{module}"), function)
+        if name == "run":  # options of robots are not typer's
+            app.command(name, context_settings=RAW, add_help_option=False)(command)
+        else:
+            app.command(name)(command)
+    app(words)
