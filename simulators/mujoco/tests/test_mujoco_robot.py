@@ -2,6 +2,7 @@
 
 import random
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -59,9 +60,9 @@ def test_a_replay_begins_with_a_reset_or_a_snapshot_of_balls() -> None:
             arm.add_command(joint, choose.uniform(-1, 1), iterations=choose.randrange(1, 20))
             arm.burst(choose.randrange(1, 12))
 
-    options = {"balls": "ball", "surfaces": "ground=0.7, bench, paddle", "watched": "paddle"}
+    court: dict[str, Any] = {"model": MODELS / "court.xml", "balls": "ball", "watched": "paddle"}
     with o80.robots.load("mujoco").inline(
-        model=MODELS / "court.xml", history=400, **options
+        **court, surfaces="ground=0.7, bench, paddle", history=400
     ) as arm:
         play(arm)
         arm.request("snapshot", slot=2)
