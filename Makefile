@@ -33,8 +33,8 @@ wheel:
 	@tools/setup.sh wheels
 	@.venv/bin/python tools/wheels.py $(ARGS)
 
-# random scripts of motion, 100 000 by default: ARGS="--count 1000000", ARGS="--count 0 --arrivals
-# 10000000", or ARGS="--replay FILE"
+# random scripts of motion, 100 000 by default: ARGS="--count 1000000 --seed 5000000", or
+# ARGS="--count 0 --arrivals 10000000"
 scripts:
 	@tools/setup.sh tools
 	@.venv/bin/cmake --preset dev > /dev/null

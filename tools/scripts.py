@@ -1,7 +1,7 @@
-"""Plays random scripts on every processor, or replays one from a file (CONTRIBUTING.md).
+"""Plays random scripts on every processor (CONTRIBUTING.md).
 
 Each script is a robot and a list of what happens to it, made from a seed. A script that breaks a
-promise is shrunk and printed; save those lines to a file and give it to --replay.
+promise is shrunk and printed with its seed.
 """
 
 import argparse
@@ -31,11 +31,7 @@ def main() -> int:
         "--arrivals", type=int, default=100_000, help="short scripts that must arrive"
     )
     parser.add_argument("--iterations", type=int, default=480_000, help="beside the reference")
-    parser.add_argument("--replay", metavar="FILE", help="the only script to play")
     arguments = parser.parse_args()
-    if arguments.replay:
-        return start("Script.ReplaysAFile", O80_SCRIPT=arguments.replay).wait()
-
     jobs = len(os.sched_getaffinity(0))
     share = -(-arguments.count // jobs)
     running = [

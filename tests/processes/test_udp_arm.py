@@ -2,7 +2,6 @@
 
 import contextlib
 import os
-import signal
 import subprocess
 import time
 from collections.abc import Iterator
@@ -91,30 +90,6 @@ def resumed(arm: o80.Frontend) -> None:
             arm.resume(halt.number, timeout=1.0)
 
 
-def test_lost_late_repeated_and_reordered_packets_are_tolerated_and_counted(
-    build_prefix: Path, segment: str
-) -> None:
-    script = "drop 20-22, late 30, twice 40, swap 50"
-    with (
-        fake_arm(build_prefix, "--faults", script) as fake,
-        robot(build_prefix, segment, fake, "--tolerated", NEVER) as process,
-        o80.Frontend(segment) as arm,
-    ):
-        arm.wait_for(80, timeout=WAIT)
-        moved(arm)
-        rows = arm.history(10_000)
-        link = rows.extended
-        assert link["missed"][-1] >= 5
-        assert link["repeated"][-1] >= 2
-        # a tick without a packet keeps the reading and counts as an overrun
-        missed = np.flatnonzero(np.diff(link["missed"]) > 0) + 1
-        assert (rows.overruns[missed] > rows.overruns[missed - 1]).all()
-        assert (link["tick"][1:] >= link["tick"][:-1]).all()
-        assert arm.halted is None
-        process.send_signal(signal.SIGTERM)
-        assert process.wait(WAIT) == 0
-
-
 def test_a_restart_of_the_arm_halts_the_robot_and_resume_goes_on(
     build_prefix: Path, segment: str
 ) -> None:
@@ -139,41 +114,6 @@ def test_a_restart_of_the_arm_halts_the_robot_and_resume_goes_on(
         assert batch.statuses == [o80.Status.REJECTED]
         resumed(arm)
         moved(arm)
-
-
-def test_an_arm_whose_driver_stands_still_stops_by_itself_and_the_robot_halts(
-    build_prefix: Path, segment: str
-) -> None:
-    with (
-        fake_arm(build_prefix, "--timeout", "50") as fake,
-        robot(build_prefix, segment, fake, "--tolerated", NEVER) as process,
-        o80.Frontend(segment) as arm,
-    ):
-        fake.says("moving")
-        process.send_signal(signal.SIGSTOP)
-        fake.says("timed out")
-        process.send_signal(signal.SIGCONT)
-        end = time.monotonic() + WAIT
-        while arm.halted is None:
-            assert time.monotonic() < end
-            arm.wait_for_next(timeout=WAIT)
-        assert "no command reached it" in arm.halted.text
-        resumed(arm)
-
-
-def test_an_arm_that_never_comes_back_is_a_fault_that_frontends_raise(
-    build_prefix: Path, segment: str
-) -> None:
-    with (
-        fake_arm(build_prefix) as fake,
-        robot(build_prefix, segment, fake, "--give-up", "0.5") as process,
-        o80.Frontend(segment) as arm,
-    ):
-        arm.wait_for(10, timeout=WAIT)
-        fake.process.kill()
-        with pytest.raises(o80.BackendFailed, match="give-up"):
-            arm.wait_for(10**9, timeout=WAIT)
-        assert process.wait(WAIT) == 1
 
 
 def test_an_arm_that_does_not_answer_is_refused_at_the_start(

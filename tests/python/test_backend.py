@@ -1,6 +1,5 @@
 """A backend inside a Python program, by its own clock and bursting."""
 
-import os
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -33,41 +32,6 @@ def test_a_first_reading_has_to_be_numbers(segment: str) -> None:
         desired = backend.step()
         assert desired is not None
         assert desired["velocity"].tolist() == [2.0]
-
-
-def test_a_fresh_reading_has_to_be_numbers(segment: str) -> None:
-    backend = o80.Backend(segment, ["elbow"], requests={"home": None})
-    backend.publish([1.2])
-    backend.on("home", lambda _: o80.StartAfresh([NAN]))
-    with o80.Frontend(segment) as arm:
-        arm.add_request("home")
-        batch = arm.pulse()
-        with pytest.raises(o80.InvalidArgument, match=r"actuator 'elbow'.*fresh start"):
-            backend.step()
-        assert batch.handles[0].status == o80.Status.REJECTED
-        assert "'elbow'" in batch.handles[0].text
-        backend.close()
-        with pytest.raises(o80.BackendFailed, match="'elbow'"):
-            arm.wait_for(1, timeout=WAIT)
-
-
-def test_a_halt_is_not_resumed_while_the_reading_is_no_number(segment: str) -> None:
-    with o80.Backend(segment, ["elbow"]) as backend:
-        backend.publish([1.2])
-        with o80.Frontend(segment) as arm:
-            number = arm.halt()
-            backend.step()
-            backend.publish([NAN])
-            with pytest.raises(o80.TimeoutError):
-                arm.resume(number, timeout=0)
-            backend.step()
-            backend.publish([1.5])
-            assert arm.halted is not None
-            with pytest.raises(o80.TimeoutError):
-                arm.resume(number, timeout=0)
-            assert backend.step() is not None
-            assert arm.halted is None
-            assert arm.latest().desired.tolist() == [1.5]
 
 
 class Running:
@@ -413,23 +377,6 @@ def test_a_closed_backend_says_so(segment: str) -> None:
     with pytest.raises(o80.Closed):
         backend.step()
     assert "closed" in repr(backend)
-
-
-def test_a_forked_child_leaves_a_backend_to_its_parent(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend:
-        backend.publish([0.0])
-        child = os.fork()
-        if child == 0:
-            try:
-                backend.publish([1.0])
-            except o80.UsedAfterFork:
-                backend.close()
-                os._exit(0)
-            os._exit(1)
-        assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 0
-        with o80.Frontend(segment) as frontend:
-            assert frontend.alive
-            assert frontend.latest().iteration == 0
 
 
 def test_a_mapping_within_a_mapping_fills_the_fields_that_it_names(segment: str) -> None:

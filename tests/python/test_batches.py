@@ -56,17 +56,6 @@ def test_statuses_are_words_and_strings(arm: o80.Frontend) -> None:
     assert handle.ended
 
 
-def test_an_overwritten_command_says_so(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0, iterations=10)
-    first = arm.pulse()
-    arm.burst(2)
-    arm.add_command(0, 0.0, mode="overwrite")
-    arm.burst(1)
-
-    assert first.statuses == [o80.Status.OVERWRITTEN]
-    assert first.handles[0].iteration == 3
-
-
 def test_a_batch_for_an_iteration_is_taken_there(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0)
     batch = arm.pulse(at=5)
@@ -74,18 +63,6 @@ def test_a_batch_for_an_iteration_is_taken_there(arm: o80.Frontend) -> None:
 
     assert batch.first_iteration == 5
     assert arm.history(since=4, until=5).desired[:, 0].tolist() == [0.0, 1.0]
-
-
-def test_a_late_batch_is_rejected(arm: o80.Frontend) -> None:
-    arm.burst(10)
-    arm.add_command(0, 1.0)
-    batch = arm.pulse(at=5)
-    arm.burst(1)
-
-    assert batch.statuses == [o80.Status.REJECTED]
-    assert batch.handles[0].reason == o80.Reason.LATE
-    assert batch.handles[0].text
-    assert arm.latest().desired[0] == 0.0
 
 
 def test_a_late_batch_may_be_taken_now(arm: o80.Frontend) -> None:
@@ -126,43 +103,6 @@ def test_a_wait_that_times_out_carries_the_batch(process: o80.robots.Process) ->
         arm.purge()
         batch.wait(WAIT, check=False)
         assert batch.statuses == [o80.Status.PURGED]
-
-
-def test_a_purge_ends_the_wait_for_a_batch(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, process.frontend() as other:
-        arm.add_command(0, 1.0, duration=1000.0)
-        batch = arm.pulse()
-        other.purge()
-
-        with pytest.raises(o80.NotCompleted, match="'shoulder' was purged"):
-            batch.wait(WAIT)
-
-        assert batch.ended
-
-
-def test_pulse_and_wait_waits_for_every_actuator(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        arm.add_command(0, 0.5, iterations=3)
-        arm.add_command(1, -0.5, iterations=30)
-
-        observation = arm.pulse_and_wait(timeout=WAIT)
-
-        assert observation.desired.tolist() == [0.5, -0.5]
-
-
-def test_a_set_point_out_of_reach_goes_on_until_it_has_arrived(segment: str) -> None:
-    limits = {"a": (-1.0, 1.0, 10.0)}
-    with o80.Backend(segment, ["a"], limits=limits, frequency=100.0) as backend:
-        backend.publish([0.0])
-        with o80.Frontend(segment) as frontend:
-            frontend.add_command("a", 1.0)  # ten iterations at full speed
-            batch = frontend.pulse()
-            for iteration in range(1, 11):
-                desired = backend.step()
-                backend.publish(desired)
-                assert desired == pytest.approx([iteration / 10])
-            assert batch.statuses == [o80.Status.COMPLETED]
-            assert not frontend.history(10).clamped.any()
 
 
 def test_batches_outlive_their_frontend(process: o80.robots.Process) -> None:

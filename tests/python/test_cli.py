@@ -4,7 +4,6 @@ import contextlib
 import json
 import os
 import pty
-import pwd
 import signal
 import subprocess
 import sys
@@ -216,69 +215,6 @@ def test_a_killed_robot_is_shown_read_and_cleaned(
     assert "shoulder" in o80(folder, "info", "two_joints")
     assert "removed two_joints" in o80(folder, "clean")
     assert "Nothing to remove" in o80(folder, "clean")
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
-def test_a_file_of_another_user_is_listed_under_its_owner_and_not_believed(
-    folder: Path, robot: "subprocess.Popen[str]"
-) -> None:
-    os.chown(folder / "o80-two_joints", 65534, 65534)
-    owner = pwd.getpwuid(65534).pw_name
-    listed = " ".join(o80(folder, "list").split())
-    assert "unknown" in listed
-    assert f"belongs to user {owner}" in listed
-    assert f"O80_TRUST={owner}" in listed
-    assert f"belongs to user {owner}" in " ".join(
-        o80(folder, "info", "two_joints", fails=True).split()
-    )
-
-
-@pytest.mark.skipif(os.geteuid() != 0, reason="only root may give files away")
-def test_nothing_is_said_to_stand_still_that_was_not_seen(
-    folder: Path, robot: "subprocess.Popen[str]"
-) -> None:
-    os.chown(folder / "o80-two_joints", 65534, 65534)
-    owner = pwd.getpwuid(65534).pw_name
-
-    stopped = o80(folder, "stop", "two_joints", fails=True)
-    assert f"it is unknown whether 'two_joints' of user {owner} runs" in stopped
-    assert "nothing that this user can see runs" in o80(folder, "stop", "arm", fails=True)
-    assert "Nothing that this user can see runs" in o80(folder, "stop", "--all")
-    assert "two_joints (unknown)" in o80(folder, "info", "arm", fails=True)
-    assert "1 unknown: not removed" in o80(folder, "clean")
-    assert robot.poll() is None
-
-
-def test_every_text_names_the_same_state(folder: Path, robot: "subprocess.Popen[str]") -> None:
-    def expect(state: str) -> None:
-        listed = json.loads(o80(folder, "list", "--json"))
-        assert [row["state"] for row in listed] == [state]
-        assert f" {state} " in o80(folder, "list")
-        assert f"two_joints, {state}, rows" in o80(folder, "info", "two_joints")
-        assert f"two_joints ({state})" in o80(folder, "info", "arm", fails=True)
-
-    expect("running")
-    o80(folder, "halt", "two_joints")
-    expect("halted")
-    assert "has resumed" in o80(folder, "resume", "two_joints")
-    assert "is not halted" in o80(folder, "resume", "two_joints", "7")
-    expect("running")
-    robot.send_signal(signal.SIGKILL)
-    robot.wait()
-    expect("killed")
-    with (folder / "o80-two_joints").open("r+b") as file:  # of another version
-        file.seek(8)
-        file.write(b"\x4d")
-    assert [row["state"] for row in json.loads(o80(folder, "list", "--json"))] == ["unknown"]
-
-
-def test_a_living_robot_is_not_cleaned(folder: Path, robot: "subprocess.Popen[str]") -> None:
-    said = o80(folder, "clean", "two_joints", "nobody", fails=True)
-    assert "'two_joints' is not removed: it has a backend" in said
-    assert "o80 stop two_joints" in said
-    assert "--segment" not in said
-    assert "there is no segment 'nobody'" in said
-    assert "running" in o80(folder, "list")
 
 
 def test_a_second_robot_of_the_same_name_is_refused(

@@ -78,21 +78,6 @@ def test_a_name_that_is_taken_is_refused(recorded: Path, segment: str) -> None:
         run("play", recorded, "--speed", "100", "--name", f"{segment}-b")
 
 
-def test_a_killed_player_leaves_a_dead_segment_that_the_next_one_replaces(
-    recorded: Path, segment: str
-) -> None:
-    with (
-        subprocess.Popen(o80_command("play", recorded, "--fast"), text=True) as player,
-        o80.Frontend(segment, WAIT) as arm,
-    ):
-        arm.wait_for(150, timeout=WAIT)
-        player.kill()
-        with pytest.raises(o80.BackendKilled):
-            arm.wait_for(151, timeout=WAIT)
-        assert arm.published == 150
-    run("play", recorded, "--speed", "100")
-
-
 @pytest.mark.parametrize(
     ("words", "said"),
     [

@@ -3,13 +3,10 @@
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from mixed_robots import GROUPS, ROBOTS, SENSORS, recorded
+from mixed_robots import recorded
 
 import o80
 from o80.difference import Difference, first_difference
@@ -43,32 +40,6 @@ def test_the_first_iteration_and_field_are_told(segment: str) -> None:
     assert (found.iteration, found.field) == (1, "desired.elbow")
     assert found.values == (pytest.approx(0.025), pytest.approx(0.03))
     assert str(found).startswith("iteration 1, desired.elbow: 0.025")
-
-
-@ROBOTS
-@given(groups=GROUPS, sensors=SENSORS, seed=st.integers(0, 2**32 - 1), data=st.data())
-def test_a_flipped_bit_of_any_number_is_found(
-    groups: Any, sensors: Any, seed: int, data: st.DataObject
-) -> None:
-    history = recorded(groups, sensors, seed)
-    row = data.draw(st.integers(0, len(history) - 1))
-    part = data.draw(st.sampled_from(["desired", "observed"]))
-    begin = history.schema["row"][part]
-    other = changed(history, row, begin + data.draw(st.sampled_from(number_bytes(history))))
-    found = first_difference(history, other)
-
-    assert found is not None
-    assert found.iteration == history.iteration[row]
-    assert found.field.startswith(part)
-
-
-def number_bytes(history: o80.History) -> list[int]:
-    """First bytes of the numbers of the states: padding is no number."""
-    from o80.rows.columns import columns_of
-
-    begin = history.schema["row"]["desired"]
-    columns = columns_of(history.schema)
-    return [each.offset - begin for each in columns if each.name.startswith("desired")]
 
 
 def test_a_field_of_the_clock_is_left_out(segment: str) -> None:

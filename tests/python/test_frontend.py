@@ -1,9 +1,6 @@
 """A frontend: its life, what it knows of its robot, and what it leaves."""
 
 import builtins
-import os
-import pickle
-import threading
 import warnings
 
 import pytest
@@ -11,21 +8,6 @@ import pytest
 import o80
 
 WAIT = 30.0  # [s] longer than any wait should take
-
-
-def test_it_waits_for_a_backend_that_starts_later(segment: str) -> None:
-    found: list[str] = []
-
-    def attach() -> None:
-        with o80.Frontend(segment, timeout=WAIT) as frontend:
-            found.append(frontend.robot)
-
-    waiting = threading.Thread(target=attach)
-    waiting.start()
-    with o80.robots.load("two_joints").start(segment):
-        waiting.join(WAIT)
-
-    assert found == ["two_joints"]
 
 
 def test_it_gives_up_after_its_timeout(segment: str) -> None:
@@ -190,18 +172,6 @@ def test_a_full_lane_is_an_error_and_sends_nothing(segment: str) -> None:
         arm.pulse_and_wait(timeout=WAIT)
 
 
-def test_a_closed_frontend_says_so(arm: o80.Frontend) -> None:
-    arm.close()
-    arm.close()
-
-    assert arm.closed
-    for use in (arm.latest, arm.pulse, arm.wait_for_next, arm.history, arm.burst, arm.purge):
-        with pytest.raises(o80.Closed, match=arm.segment):
-            use()
-    with pytest.raises(o80.Closed):
-        arm.add_command(0, 1.0)
-
-
 def test_a_closed_inline_robot_leaves_no_segment(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0)
     batch = arm.pulse()
@@ -210,83 +180,6 @@ def test_a_closed_inline_robot_leaves_no_segment(arm: o80.Frontend) -> None:
 
     assert arm.segment not in [entry.name for entry in o80.segments()]
     assert batch.statuses == [o80.Status.PURGED]
-
-
-def test_a_pickled_frontend_attaches_again(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, pickle.loads(pickle.dumps(arm)) as copy:
-        assert isinstance(copy, o80.Frontend)
-        assert copy is not arm
-        assert copy.epoch == arm.epoch
-        copy.add_command(0, 0.5)
-        copy.pulse_and_wait(timeout=WAIT)
-
-
-def test_an_inline_frontend_cannot_be_pickled(arm: o80.Frontend) -> None:
-    with pytest.raises(TypeError, match="Attach to its segment"):
-        pickle.dumps(arm)
-
-
-def test_a_forked_child_is_told_to_open_its_own(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        arm.add_command(0, 0.5)
-        batch = arm.pulse()
-        batch.wait(WAIT)
-
-        assert run_in_child(lambda: use_after_fork(arm, batch)) == 0
-
-        arm.add_command(0, 1.0)
-        arm.pulse_and_wait(timeout=WAIT)
-
-
-def use_after_fork(arm: o80.Frontend, batch: o80.Batch) -> None:
-    for use in (arm.latest, arm.pulse, arm.wait_for_next, lambda: batch.statuses):
-        with pytest.raises(o80.UsedAfterFork, match="open it again in this process"):
-            use()
-    with pytest.raises(o80.UsedAfterFork):
-        arm.add_command(0, 1.0)
-    arm.close()
-    with o80.Frontend(arm.segment) as again:
-        again.add_command(0, 0.7)
-        again.pulse_and_wait(timeout=WAIT)
-
-
-def test_a_forked_child_leaves_an_inline_robot_to_its_parent(arm: o80.Frontend) -> None:
-    arm.burst(1)
-
-    assert run_in_child(arm.close) == 0
-
-    assert arm.alive
-    assert arm.burst(1).iteration == 2
-
-
-def run_in_child(work: object) -> int:
-    """Runs it in a forked child; its exit code, 0 if nothing was raised."""
-    assert callable(work)
-    child = os.fork()
-    if child == 0:
-        try:
-            work()
-        except BaseException as error:
-            os.write(2, repr(error).encode())
-            os._exit(1)
-        os._exit(0)
-    return os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-
-
-def test_it_attaches_again_after_the_robot_was_started_anew(segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with robot.start(segment) as process:
-        arm = process.frontend()
-        epoch = arm.epoch
-    assert not arm.alive
-    with robot.start(segment):
-        with pytest.raises(o80.BackendGone, match=segment):
-            arm.wait_for(10**9, timeout=WAIT)
-        arm.reattach()
-        assert arm.epoch != epoch
-        arm.add_command(0, 0.5)
-        assert arm.pulse_and_wait(timeout=WAIT).desired[0] == 0.5
-        arm.close()
 
 
 def test_it_refuses_to_attach_again_to_another_robot(segment: str) -> None:

@@ -4,57 +4,12 @@ import io
 import pickle
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
-from mixed_robots import GROUPS, ROBOTS, SENSORS, Mode, recorded
+from mixed_robots import Mode, recorded
 
 import o80
-
-
-@ROBOTS
-@given(GROUPS, SENSORS, st.integers(0, 2**32 - 1))
-def test_rows_of_any_robot_are_saved_and_loaded(groups: Any, sensors: Any, seed: int) -> None:
-    history = recorded(groups, sensors, seed)
-    file = io.BytesIO()
-    np.save(file, history.rows)
-    file.seek(0)
-    loaded = np.load(file)
-
-    assert loaded.dtype.names == history.rows.dtype.names
-    for name in loaded.dtype.names:
-        # as values: padding is not kept
-        assert repr(loaded[name].tolist()) == repr(history.rows[name].tolist())
-
-
-@ROBOTS
-@given(GROUPS, SENSORS, st.integers(0, 2**32 - 1))
-def test_histories_of_any_robot_are_pickled(groups: Any, sensors: Any, seed: int) -> None:
-    history = recorded(groups, sensors, seed)
-    copy = pickle.loads(pickle.dumps(history))
-
-    assert copy.rows.tobytes() == history.rows.tobytes()
-    assert str(copy[-1]) == str(history[-1])
-    assert pickle.loads(pickle.dumps(history[1:3])).iteration.tolist() == [1, 2]
-
-
-@ROBOTS
-@given(GROUPS, SENSORS, st.integers(0, 2**32 - 1))
-def test_frames_of_any_robot_hold_all_numbers(groups: Any, sensors: Any, seed: int) -> None:
-    history = recorded(groups, sensors, seed)
-    frame = history.to_frame()
-
-    assert frame.index.tolist() == history.iteration.tolist()
-    observed = frame[[name for name in frame if name.startswith(("observed.", "extended"))]]
-    numbers = observed.apply(_as_number).to_numpy(np.float64)
-    assert np.array_equal(numbers, history.flat(np.float64))
-
-
-def _as_number(column: Any) -> Any:
-    return column.map(lambda label: int(Mode[label])) if column.dtype == "category" else column
 
 
 def test_a_frame_names_parts_actuators_and_fields() -> None:
@@ -84,16 +39,6 @@ def test_an_empty_history_is_saved_too(arm: o80.Frontend) -> None:
     assert len(pickle.loads(pickle.dumps(empty))) == 0
 
 
-def test_hdf5_takes_the_rows(arm: o80.Frontend, tmp_path: Path) -> None:
-    h5py = pytest.importorskip("h5py")
-    arm.burst(20)
-    history = arm.history()
-    with h5py.File(tmp_path / "run.h5", "w") as file:
-        file["rows"] = history.rows
-    with h5py.File(tmp_path / "run.h5") as file:
-        assert np.array_equal(file["rows"]["observed"], history.observed)
-
-
 def test_a_history_itself_is_saved(arm: o80.Frontend, tmp_path: Path) -> None:
     h5py = pytest.importorskip("h5py")
     arm.add_command("elbow", 0.3, iterations=20)
@@ -110,14 +55,6 @@ def test_a_history_itself_is_saved(arm: o80.Frontend, tmp_path: Path) -> None:
         assert np.array_equal(rows["desired"], history.desired)
         assert np.array_equal(rows["iteration"], history.iteration)
     assert len(loaded["rest"]) == 11
-
-
-def test_every_second_row_has_all_numbers(arm: o80.Frontend) -> None:
-    arm.add_command("elbow", 0.3, iterations=20)
-    arm.burst(20)
-    history = arm.history()
-    assert np.array_equal(history[::2].flat(), history.flat()[::2])
-    assert history[::2].to_frame().equals(history.to_frame()[::2])
 
 
 def test_without_pandas_the_error_names_the_extra(

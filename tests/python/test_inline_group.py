@@ -1,10 +1,7 @@
 """Inline groups: copies of one robot in this process (o80.InlineGroup)."""
 
-import contextlib
 import os
 import pickle
-import resource
-import signal
 import subprocess
 import sys
 import threading
@@ -366,44 +363,6 @@ def test_ctrl_c_ends_a_call_between_two_iterations() -> None:
     assert ended.stdout == "interrupted\n", ended.stderr
 
 
-def test_a_forked_child_is_told_to_open_its_own(group: o80.InlineGroup) -> None:
-    burst = group.prepared_burst(4)
-    burst.targets = np.zeros((COPIES, 1, 2))
-    burst.run()
-    child = os.fork()
-    if child == 0:
-        code = 1
-        try:
-            burst.run()
-        except o80.UsedAfterFork:
-            code = 7
-        os._exit(code)
-    assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
-    burst.run()
-    assert burst.rows["iteration"][:, -1].tolist() == [8] * COPIES
-
-
-KILLED = """
-import o80
-group = o80.robots.load("two_joints").inline(copies=8)
-burst = group.prepared_burst(30)
-burst.targets[...] = 0.5
-print("ready", flush=True)
-while True:
-    burst.run()
-"""
-
-
-def test_a_killed_trainer_leaves_nothing() -> None:
-    process = subprocess.Popen([sys.executable, "-c", KILLED], stdout=subprocess.PIPE, text=True)
-    assert process.stdout is not None
-    assert process.stdout.readline() == "ready\n"
-    process.send_signal(signal.SIGKILL)
-    process.wait()
-    process.stdout.close()
-    assert files() == []
-
-
 def test_its_threads_release_the_interpreter(group: o80.InlineGroup) -> None:
     """Another Python thread runs while a call of the group waits for it."""
     ended = threading.Event()
@@ -424,18 +383,6 @@ def test_its_threads_release_the_interpreter(group: o80.InlineGroup) -> None:
         group.request("home", copies=[0], speed=1e-9)
     thread.join()
     assert ended.is_set()
-
-
-def test_many_copies_fit_into_the_files_of_a_process() -> None:
-    soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    with o80.robots.load("two_joints").inline(copies=200) as group:
-        burst = group.prepared_burst(2)
-        burst.targets = np.ones((200, 1, 2))
-        burst.run()
-        assert (burst.rows["desired"][:, -1] == 1).all()
-    now, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
-    assert now >= soft
-    resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
 
 
 def test_a_slice_names_copies(group: o80.InlineGroup) -> None:
@@ -462,30 +409,6 @@ def test_delayed_targets_are_taken_within_the_burst() -> None:
             np.testing.assert_array_equal(burst.rows["desired"][:, 2], burst.targets[:, 0])
         with pytest.raises(o80.InvalidArgument, match="delay of a burst of 5 iterations must be"):
             group.prepared_burst(5, delay=5)
-
-
-def workers() -> int:
-    """Threads of groups besides the calling ones."""
-    number = 0
-    for task in Path("/proc/self/task").iterdir():
-        with contextlib.suppress(OSError):  # another thread may end meanwhile
-            number += (task / "comm").read_text() == "o80-group\n"
-    return number
-
-
-def test_groups_that_share_threads_are_called_in_turn(group: o80.InlineGroup) -> None:
-    with o80.robots.load("two_joints").inline(copies=3, threads=group) as other:
-        assert other.threads == group.threads == 2
-        bursts = [each.prepared_burst(3) for each in (group, other)]
-        for burst in bursts:
-            burst.targets = np.zeros(burst.targets.shape)
-        for _ in range(50):
-            for burst in bursts:
-                burst.run()
-        assert workers() == 1
-        group.close()
-        bursts[1].run()
-        assert other.latest()["iteration"].tolist() == [153] * 3
 
 
 def test_groups_that_share_threads_refuse_to_be_called_at_the_same_time(

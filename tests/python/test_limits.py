@@ -55,23 +55,6 @@ def test_a_frontend_knows_all_limits(loop: Loop) -> None:
     assert joint.numbers[0].rest is None
 
 
-def test_the_fastest_way_keeps_every_limit_and_ends_on_its_target(loop: Loop) -> None:
-    loop.frontend.add_command("joint", {"position": 0.9}, fastest=True)
-    batch = loop.frontend.pulse()
-
-    history = loop.run(700)
-
-    assert batch.statuses == [o80.Status.COMPLETED]
-    position = np.concatenate([[0.0] * 3, history.desired["position"][:, 0]])
-    assert position[-1] == 0.9
-    speed = np.diff(position) * 1e3
-    acceleration = np.diff(speed) * 1e3
-    jerk = np.diff(acceleration) * 1e3
-    assert np.abs(speed).max() == pytest.approx(2.0, rel=1e-6)
-    assert np.abs(acceleration).max() <= 20.0 * (1 + 1e-6)
-    assert np.abs(jerk).max() <= 2000.0 * (1 + 1e-3)
-
-
 NUMBERS = ("minimum", "maximum", "speed", "acceleration", "jerk", "error", "noise")
 
 
@@ -106,44 +89,6 @@ def test_so_is_whatever_else_a_robot_is_described_with(segment: str) -> None:
             make()
 
 
-def test_a_purged_motion_brakes(loop: Loop) -> None:
-    loop.frontend.add_command("joint", {"position": 0.9}, duration=0.8)
-    loop.frontend.pulse()
-    loop.run(400)
-    loop.frontend.purge()
-
-    history = loop.run(300)
-
-    assert history.braking[0, 0]
-    assert not history.braking[-1, 0]
-    position = history.desired["position"][:, 0]
-    assert np.abs(np.diff(position, 2)).max() * 1e6 <= 20.0 * (1 + 1e-6)
-    assert position[-1] == position[-2]
-
-
-def test_with_acceleration_limits_a_motion_is_smooth_by_default(loop: Loop) -> None:
-    loop.frontend.add_command("joint", {"position": 0.5}, duration=0.7)
-    batch = loop.frontend.pulse()
-
-    history = loop.run(700)
-
-    assert batch.statuses == [o80.Status.COMPLETED]
-    assert not history.clamped.any()
-
-
-def test_a_set_point_goes_on_until_it_has_arrived(loop: Loop) -> None:
-    loop.frontend.add_command("joint", {"position": 0.5})
-    batch = loop.frontend.pulse()
-
-    history = loop.run(600)
-
-    assert batch.statuses == [o80.Status.COMPLETED]
-    position = history.desired["position"][:, 0]
-    assert position[-1] == 0.5
-    assert position.max() == 0.5
-    assert not history.clamped.any()
-
-
 def test_a_command_that_takes_longer_than_asked_says_by_how_much_and_why(loop: Loop) -> None:
     loop.frontend.add_command("joint", {"position": 0.5}, iterations=100)
     batch = loop.frontend.pulse()
@@ -160,17 +105,6 @@ def test_a_command_that_takes_longer_than_asked_says_by_how_much_and_why(loop: L
     assert ended.late == ended.iteration - begun.iteration + 1 - 100
     assert ended.text.startswith(f"{ended.late} iterations later than asked, because of its")
     assert begun.text == ended.text
-
-
-def test_a_velocity_rests_when_its_motion_is_over(loop: Loop) -> None:
-    loop.frontend.add_command("joint", {"velocity": 0.3}, iterations=10)
-    loop.frontend.pulse()
-
-    history = loop.run(12)
-
-    assert history.desired["velocity"][9, 0] == 0.3
-    assert history.desired["velocity"][10, 0] == 0.0
-    assert history.braking[10, 0]
 
 
 def test_the_fastest_way_needs_limits(loop: Loop) -> None:

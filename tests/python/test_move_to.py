@@ -71,14 +71,6 @@ def test_returns_the_first_observation_within_the_tolerance(joints: o80.Frontend
     assert observation.desired.joints["position"][0] == 1.0
 
 
-def test_leaves_what_was_added_and_not_pulsed(joints: o80.Frontend) -> None:
-    joints.add_command("joints_1", {"position": 0.5})
-    observation = joints.move_to("joints_0", 1.0, tolerance=0.1, timeout=WAIT)
-    assert joints.added == 1
-    assert observation.desired.joints["position"][1] == 0.0
-    joints.forget_added()
-
-
 def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend, segment: str) -> None:
     plant.stuck = True
     with pytest.raises(o80.NotReached) as raised:
@@ -99,25 +91,6 @@ def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend, segment: st
     )
 
 
-def test_a_script_ends_alike_however_slow_the_machine_is(
-    plant: Plant, joints: o80.Frontend
-) -> None:
-    plant.stuck = True
-    ends = []
-    for _ in range(3):
-        began = joints.published
-        with pytest.raises(o80.NotReached) as raised:
-            joints.move_to(0, 1.0, tolerance=0.1, timeout=0.05)
-        ends.append(raised.value.observation.iteration - began)
-    assert ends == [50, 50, 50]
-
-
-def test_judges_the_given_fields_only(joints: o80.Frontend) -> None:
-    joints.move_to(0, {"position": 0.5}, tolerance=0.01, timeout=WAIT)  # its velocity is 7
-    with pytest.raises(o80.NotReached, match="velocity of 'joints_0' is observed at 7 rad/s"):
-        joints.move_to(0, {"position": 0.5, "velocity": 0.0}, tolerance=0.01, timeout=0.02)
-
-
 def test_a_tolerance_may_be_given_for_each_field_and_actuator(joints: o80.Frontend) -> None:
     both = {"position": 0.5, "velocity": 0.0}
     joints.move_to(0, both, tolerance={"position": 0.01}, timeout=WAIT)
@@ -128,11 +101,6 @@ def test_a_tolerance_may_be_given_for_each_field_and_actuator(joints: o80.Fronte
         joints.move_to(
             None, [both, both], tolerance=[{"position": 0.01}, {"velocity": 1.0}], timeout=0.02
         )
-
-
-def test_a_boolean_must_be_equal(joints: o80.Frontend) -> None:
-    observation = joints.move_to(0, {"held": True}, tolerance=5.0, timeout=WAIT)
-    assert observation.observed.joints["held"].tolist() == [True, False]
 
 
 @pytest.mark.parametrize(
@@ -169,33 +137,6 @@ def test_takes_the_paces_of_a_command(arm: o80.Frontend) -> None:
         arm.move_to("elbow", 0.5, tolerance=3.0, iterations=20, speed=1.0)
     with pytest.raises(o80.InvalidArgument, match="outside its limits"):
         arm.move_to("elbow", 50.0, tolerance=3.0)
-
-
-def test_raises_if_its_command_did_not_complete(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        arm.wait_for(5, WAIT)
-        with pytest.raises(o80.NotCompleted, match="'elbow' was rejected"):
-            arm.move_to("elbow", 0.5, tolerance=0.1, timeout=WAIT, until=3)
-
-
-def test_in_real_time_a_command_that_has_not_ended_goes_on(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        with pytest.raises(o80.NotReached, match="has not ended and continues") as raised:
-            arm.move_to("elbow", 1.0, tolerance=1e-9, timeout=0.01, duration=1000.0)
-        assert [handle.ended for handle in raised.value.handles] == [False]
-        observation = arm.move_to(
-            "elbow", 0.01, tolerance=1e-3, timeout=WAIT, iterations=20, mode="overwrite"
-        )
-        assert abs(observation.observed[1] - 0.01) <= 1e-3
-
-
-def test_a_halt_ends_it(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, process.frontend() as other:
-        halts = threading.Timer(0, lambda: (arm.wait_for(20, WAIT), other.halt("it is hot")))
-        halts.start()
-        with pytest.raises(o80.BackendHalted, match="it is hot"):
-            arm.move_to("elbow", 1.0, tolerance=1e-9, timeout=WAIT, duration=1000.0)
-        halts.join()
 
 
 def test_is_awaited(process: o80.robots.Process, segment: str) -> None:

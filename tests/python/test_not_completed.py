@@ -9,7 +9,6 @@ import pytest
 import o80
 
 WAIT = 30.0  # [s] longer than any wait should take
-LONG = 1000.0  # [s] of a motion that somebody ends
 
 Wait = Callable[[o80.Frontend], object]
 
@@ -76,31 +75,6 @@ def test_with_check_false_they_only_wait(process: o80.robots.Process) -> None:
             batch.wait(WAIT, check=1)  # type: ignore[arg-type]
 
 
-def test_a_command_that_another_frontend_overwrote_raises(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, process.frontend() as other:
-        arm.add_command("elbow", 1.0, duration=LONG)
-        batch = arm.pulse()
-        other.add_command("elbow", 0.25, iterations=5, mode="overwrite")
-        other.pulse_and_wait(WAIT)
-
-        with pytest.raises(o80.NotCompleted, match="by a command of another frontend") as raised:
-            batch.wait(WAIT)
-        assert [end.status for end in raised.value.ends] == [o80.Status.OVERWRITTEN]
-
-
-def test_one_that_the_same_frontend_overwrote_does_not(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        arm.add_command("elbow", 1.0, duration=LONG)
-        slow = arm.pulse()
-        arm.add_command("elbow", 0.5, duration=LONG)  # of the same batch as its overwrite
-        arm.add_command("elbow", 0.25, iterations=5, mode="overwrite")
-        observation = arm.pulse_and_wait(WAIT)
-        slow.wait(WAIT)
-
-        assert slow.statuses == [o80.Status.OVERWRITTEN]
-        assert observation.desired[1] == 0.25
-
-
 def test_a_burst_overwrites_for_its_own_frontend_too(arm: o80.Frontend) -> None:
     arm.add_command("elbow", 1.0, iterations=1000)
     slow = arm.pulse()
@@ -110,103 +84,6 @@ def test_a_burst_overwrites_for_its_own_frontend_too(arm: o80.Frontend) -> None:
     prepared.run(WAIT)
     assert slow.statuses == [o80.Status.OVERWRITTEN]
     slow.wait(WAIT)
-
-
-@pytest.mark.parametrize("by_another", [True, False])
-def test_a_purge_raises_whoever_sent_it(process: o80.robots.Process, by_another: bool) -> None:
-    with process.frontend() as arm, process.frontend() as other:
-        arm.add_command("elbow", 1.0, duration=LONG)
-        batch = arm.pulse()
-        purge = (other if by_another else arm).purge("elbow")
-        purge.wait(WAIT)
-
-        with pytest.raises(o80.NotCompleted, match="'elbow' was purged in iteration"):
-            batch.wait(WAIT)
-
-
-def test_a_fresh_start_raises(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, process.frontend() as other:
-        arm.add_command("elbow", 1.0, duration=LONG)
-        batch = arm.pulse()
-        other.request("reset", seed=1, timeout=WAIT)
-
-        with pytest.raises(o80.NotCompleted, match="fresh start") as raised:
-            batch.wait(WAIT)
-        assert raised.value.ends[0].reason == o80.Reason.FRESH_START
-
-
-def test_an_interrupt_of_the_driver_raises(segment: str) -> None:
-    with o80.Backend(segment, ["a", "b"], frequency=100.0) as backend:
-        backend.publish([0.0, 0.0])
-        with o80.Frontend(segment) as arm:
-            arm.add_command(["a", "b"], [1.0, 1.0], iterations=2)
-            batch = arm.pulse()
-            backend.step()
-            backend.interrupt("b")
-            backend.publish([0.0, 0.0])
-            backend.step()
-            backend.publish([0.0, 0.0])
-            with pytest.raises(o80.NotCompleted, match="'a', 'b' were interrupted by the driver"):
-                batch.wait(WAIT)
-
-
-def test_a_batch_that_is_rejected_as_a_whole_raises(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        arm.wait_for(5, WAIT)
-        for wait in (
-            lambda: arm.pulse_and_wait(WAIT, at=3),
-            lambda: arm.pulse(at=3).wait(WAIT),
-        ):
-            arm.add_command("elbow", 0.5)
-            with pytest.raises(o80.NotCompleted, match=r"batch sent to .* was rejected: it came"):
-                wait()
-
-
-def test_a_request_of_a_batch_that_is_rejected_raises(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        arm.add_command("elbow", 0.1, iterations=3)
-        arm.add_request("snapshot", slot=8)
-        with pytest.raises(o80.NotCompleted, match="request 'snapshot' was rejected") as raised:
-            arm.pulse_and_wait(WAIT)
-        assert [end.actuators for end in raised.value.ends] == [()]
-
-
-def test_a_halt_stays_an_error_of_its_own(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        arm.add_command("elbow", 1.0, duration=LONG)
-        batch = arm.pulse()
-        arm.halt("the ball is on the floor")
-        with pytest.raises(o80.BackendHalted, match="the ball is on the floor"):
-            batch.wait(WAIT)
-        batch.wait(WAIT, check=False)
-        arm.add_command("elbow", 1.0)
-        with pytest.raises(o80.BackendHalted):
-            arm.pulse_and_wait(WAIT)
-
-
-def test_a_command_that_came_later_than_asked_has_completed(segment: str) -> None:
-    limits = {"a": (-1.0, 1.0, 1.0)}
-    with o80.Backend(segment, ["a"], limits=limits, frequency=100.0) as backend:
-        backend.publish([0.0])
-        with o80.Frontend(segment) as arm:
-            arm.add_command("a", 0.05, iterations=1)  # too fast: it takes five
-            batch = arm.pulse()
-            while not batch.ended:
-                desired = backend.step()
-                assert desired is not None
-                backend.publish(desired)
-            batch.wait(WAIT)
-            assert batch.handles[0].reason == o80.Reason.LIMITS
-
-
-def test_a_bursting_robot_raises_when_its_commands_have_ended(bursting: o80.robots.Process) -> None:
-    with bursting.frontend() as arm:
-        arm.burst(5)
-        arm.add_command("elbow", 0.5, until=3)
-        with pytest.raises(o80.NotCompleted, match="'elbow' was rejected in iteration 6"):
-            arm.pulse_and_wait(WAIT)
-        arm.add_command("elbow", 0.5, iterations=4)
-        assert arm.pulse_and_wait(WAIT).iteration == 10
 
 
 def test_an_inline_robot_does_so_too(arm: o80.Frontend) -> None:
@@ -235,25 +112,6 @@ def test_with_nothing_added_there_is_no_answer_of_a_robot_that_has_ended(segment
             asyncio.run(arm.aio.pulse_and_wait(WAIT))
 
 
-@pytest.mark.parametrize("is_bursting", [False, True])
-def test_a_robot_that_stops_is_gone_and_not_an_end_of_commands(
-    segment: str, is_bursting: bool
-) -> None:
-    with o80.Backend(segment, ["a"], bursting=is_bursting, frequency=100.0) as backend:
-        backend.publish([0.0])
-        with o80.Frontend(segment) as arm:
-            arm.add_command(0, 1.0, iterations=50)
-            batch = arm.pulse()
-            if not is_bursting:
-                assert backend.step() is not None
-                backend.publish([0.0])
-            backend.close()
-            with pytest.raises(o80.BackendGone):
-                batch.wait(WAIT)
-            with pytest.raises(o80.BackendGone):
-                batch.wait(WAIT, check=False)
-
-
 def test_the_error_is_data(process: o80.robots.Process) -> None:
     with process.frontend() as arm:
         too_late(arm)
@@ -265,12 +123,3 @@ def test_the_error_is_data(process: o80.robots.Process) -> None:
     assert error.ends == raised.value.ends
     assert error.observation.iteration == raised.value.observation.iteration
     assert error.observation.desired.tolist() == [0.0, 0.0]
-
-
-def test_no_control_is_still_said_as_such(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, process.frontend() as other, arm.control(WAIT):
-        with pytest.raises(o80.ControlTaken), other.control(WAIT):
-            pass
-        other.add_command(0, 0.5)
-        with pytest.raises(o80.NotCompleted, match="has exclusive control"):
-            other.pulse_and_wait(WAIT)

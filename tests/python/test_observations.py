@@ -137,16 +137,6 @@ def test_flat_is_all_observed_then_all_extended(mixed: o80.Backend) -> None:
         assert frontend.history(1).flat(np.float64).tolist() == [expected]
 
 
-def test_flat_of_plain_numbers(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0)
-    observation = arm.burst(1)
-
-    extended = observation.extended
-    whole = np.concatenate([observation.observed, [extended.homing], extended.effort])
-    assert np.array_equal(observation.flat(np.float64), whole)
-    assert np.array_equal(arm.history(1).flat(np.float64), whole[np.newaxis])
-
-
 def test_many_actuators_fill_several_words_of_a_mask(segment: str) -> None:
     with o80.Backend(segment, 130) as backend:
         backend.publish(np.zeros(130))
@@ -237,23 +227,7 @@ def test_histories_share_no_memory(arm: o80.Frontend) -> None:
     assert not other.observed.any()
 
 
-def test_old_rows_are_left_out_of_a_history(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, history=16) as arm:
-        arm.burst(100)
-
-        history = arm.history()
-        assert history.iteration.tolist() == list(range(85, 101))
-        assert arm.oldest == 85
-        assert len(arm.history(since=0, until=90)) == 6
-
-
 # ---------------------------------------------------------------------------- waiting
-
-
-def test_a_past_row_is_there_at_once(arm: o80.Frontend) -> None:
-    arm.burst(10)
-
-    assert arm.wait_for(4, timeout=0.0).iteration == 4
 
 
 def test_an_overwritten_row_names_the_oldest_one(segment: str) -> None:
@@ -279,16 +253,6 @@ def test_a_row_that_does_not_come_times_out(arm: o80.Frontend) -> None:
 def test_a_negative_row_is_refused(arm: o80.Frontend) -> None:
     with pytest.raises(o80.InvalidArgument):
         arm.wait_for(-1)
-
-
-def test_the_next_rows_come_in_sequence(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        first = arm.wait_for_next(WAIT).iteration
-
-        rows = [arm.wait_for_next(WAIT) for _ in range(20)]
-
-        assert [row.iteration for row in rows] == list(range(first + 1, first + 21))
-        assert not any(row.missed for row in rows)
 
 
 def test_a_slow_reader_is_told_what_it_missed(segment: str) -> None:

@@ -81,15 +81,6 @@ def test_a_recording_of_a_played_recording_is_the_same(
     assert rows_of(copy, segment).rows.tobytes() == rows_of(recorded, segment).rows.tobytes()
 
 
-def test_bursts_end_with_the_recording(recorded: Path, segment: str) -> None:
-    with o80.play(recorded, bursts=True), o80.Frontend(segment, WAIT) as arm:
-        assert arm.bursting
-        assert arm.burst(100).iteration == 100
-        with pytest.raises(o80.BackendStopped):
-            arm.burst(200, timeout=WAIT)
-        assert arm.published == 200
-
-
 def test_a_script_reads_a_robot_and_its_recording_alike(real_time: Path, segment: str) -> None:
     expected = rows_of(real_time, segment).iteration.tolist()
     found: list[list[int]] = []
@@ -147,21 +138,6 @@ def test_a_part_is_played(recorded: Path, segment: str) -> None:
                 arm.wait_for(49)
     with pytest.raises(o80.InvalidArgument, match="no row in the part"):
         o80.play(recorded, begin=1000.0)
-
-
-def test_commands_are_refused(recorded: Path, segment: str) -> None:
-    with o80.play(recorded, speed=math.inf), o80.Frontend(segment, WAIT) as arm:
-        for verb in (
-            lambda: arm.add_command("elbow", 0.1),
-            lambda: arm.request("reset", seed=1),
-            lambda: arm.halt("why"),
-            lambda: o80.halt(segment),
-            lambda: arm.purge(),
-        ):
-            with pytest.raises(o80.ReadOnly, match="a recording that is being played"):
-                verb()
-        with pytest.raises(o80.NotBursting, match="--bursts"):
-            arm.burst(1)
 
 
 def test_restarts_are_played_as_restarts(segment: str, tmp_path: Path) -> None:
@@ -272,20 +248,6 @@ def test_the_journal_is_played(recorded: Path, segment: str) -> None:
         arm.burst(190)
         assert decisions(arm.journal()) == decisions(expected)[: len(arm.journal())]
         assert any(entry.status is o80.Status.COMPLETED for entry in arm.journal())
-
-
-def test_halts_are_those_of_the_recording(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
-        arm.burst(5)
-        arm.halt("the belt slipped")
-        arm.burst(5)
-        recorded = arm.halted
-    with o80.play(path, bursts=True), o80.Frontend(segment, WAIT) as arm:
-        arm.burst(5)
-        assert arm.halted is None
-        arm.burst(1)
-        assert arm.halted == recorded
 
 
 def test_a_fault_of_the_recorded_robot_is_raised_again(segment: str, tmp_path: Path) -> None:

@@ -5,9 +5,7 @@ import json
 import os
 import subprocess
 import sys
-import time
 from pathlib import Path
-from typing import Any
 
 import o80
 from o80.base.installation import prefix
@@ -39,17 +37,6 @@ def test_of_a_process_has_the_options_of_its_loop(segment: str) -> None:
     assert "max_overruns" not in found.run_options
 
 
-def test_starts_the_same_robot_again(segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with robot.inline(segment, reach=1.25) as arm:
-        first, schema = arm.provenance, arm.schema
-    given: dict[str, Any] = {name: float(text) for name, text in first.options.items()}
-    with o80.robots.load(first.robot).inline(segment, **given) as again:
-        options = again.provenance.options
-        assert {name: float(text) for name, text in options.items()} == given
-        assert again.schema["actuators"] == schema["actuators"]
-
-
 def test_of_a_backend_in_a_program_has_its_options(segment: str) -> None:
     with o80.Backend(segment, ["a"], robot="gripper", frequency=100, journal=0) as backend:
         backend.publish([0.0])
@@ -60,15 +47,6 @@ def test_of_a_backend_in_a_program_has_its_options(segment: str) -> None:
     assert found.options == {}
     assert found.run_options["frequency"] == "100"
     assert found.run_options["journal"] == "0"
-
-
-def test_leads_from_the_time_of_a_row_to_the_wall_clock(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        before = time.time_ns()
-        row = arm.wait_for_next(timeout=30)
-        after = time.time_ns()
-        wall = row.time + arm.provenance.wall_clock_offset
-    assert before - 10_000_000 < wall < after + 10_000_000
 
 
 def test_reads_back_from_json(arm: o80.Frontend) -> None:
@@ -101,15 +79,6 @@ def test_keeps_texts_that_are_not_utf_8(segment: str, tmp_path: Path) -> None:
     assert Path(found.library) == library
     assert o80.Provenance.from_json(found.as_json()) == found
     assert "two??joints.so" in told
-
-
-def test_is_read_after_the_backend_was_killed(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment) as process:
-        arm = process.frontend(read_only=True)
-        os.kill(process.pid, 9)
-        process.wait(30)
-    with arm:
-        assert arm.provenance.robot == "two_joints"
 
 
 def test_info_shows_it(segment: str) -> None:

@@ -1,13 +1,12 @@
 """A driver class in Python is a robot like any other."""
 
-import math
 import os
 import re
 import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, cast
@@ -600,73 +599,6 @@ def test_a_driver_may_describe_a_shorter_gap(segment: str) -> None:
 # ---------------------------------------------------------------------- readings
 
 
-class Liar:
-    """An arm that is where it was commanded to, or is said to be elsewhere."""
-
-    @dataclass
-    class Config:
-        error: float = 0.0
-        noise: float = 0.0
-
-    actuators = ("elbow",)
-    requests = {"home": None}  # noqa: RUF012
-    lie = 0.0
-
-    def __init__(self, config: Config) -> None:
-        limits = o80.Limits(speed=2.0, error=config.error or math.inf, noise=config.noise)
-        self.limits = {"elbow": limits}
-        self.position = 0.0
-        written.clear()
-
-    def write(self, desired: Any) -> None:
-        self.position = float(desired.states[0])
-        written.append(self.position)
-
-    def read(self, reading: Reading) -> None:
-        reading.observed = [self.position + Liar.lie]
-
-    def on_home(self, fields: Any) -> o80.StartAfresh:
-        return o80.StartAfresh()
-
-
-written: list[float] = []  # by the arm that was made last
-
-
-def wrong_readings() -> Iterator[tuple[float, float, float]]:
-    """Differences that cannot be, each with an error limit and a noise; 0: not described."""
-    random = np.random.default_rng(4)
-    for i in range(24):
-        error = float(random.uniform(0.1, 1.0)) if i % 2 else 0.0
-        noise = float(random.uniform(0.01, 0.1)) if i % 3 == 0 else 0.0
-        tolerance = 2.0 * 1e-3 + (noise or error / 10)
-        sizes = (2.1 * tolerance, 3.0, 1e6, 1e300, math.inf, math.nan)
-        yield sizes[i // 4] * float(random.choice([-1.0, 1.0])), error, noise
-
-
-@pytest.mark.parametrize("how", ["resume", "request"])
-def test_a_wrong_reading_is_never_written(
-    how: str, segment: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    for lie, error, noise in wrong_readings():
-        monkeypatch.setattr(Liar, "lie", 0.0)
-        with o80.robots.load(Liar).inline(segment, error=error, noise=noise) as arm:
-            arm.add_command("elbow", 1.0, iterations=700)
-            arm.pulse()
-            arm.burst(500)
-            if how == "resume":
-                arm.halt("by hand")
-                arm.burst(100)
-            monkeypatch.setattr(Liar, "lie", lie)
-            with pytest.raises(o80.Error, match=r"'elbow' (was read|is NaN)"):
-                arm.resume() if how == "resume" else arm.request("home")
-            monkeypatch.setattr(Liar, "lie", 0.0)
-            assert arm.halted
-            arm.burst(100)
-            arm.resume()
-            arm.burst(2)
-            assert np.max(np.abs(np.diff(written))) <= 2.001e-3
-
-
 def test_an_arm_that_starts_where_it_cannot_be_does_not_start(segment: str, tmp_path: Path) -> None:
     file = tmp_path / "turning.py"
     file.write_text(
@@ -686,25 +618,6 @@ def test_an_arm_that_starts_where_it_cannot_be_does_not_start(segment: str, tmp_
         robot.start(segment)
     with robot.start(segment, accept_reading=True) as process, process.frontend() as arm:
         arm.wait_for(2, timeout=WAIT)
-
-
-def test_an_embedded_backend_ends_where_it_cannot_be(segment: str) -> None:
-    def begin(**options: Any) -> o80.Backend:
-        limits = {"elbow": o80.Limits(minimum=-1.0, maximum=1.0, speed=2.0)}
-        return o80.Backend(segment, ["elbow"], limits=limits, **options)
-
-    with begin() as backend:
-        with pytest.raises(o80.InvalidArgument, match="'elbow' was read at 5, too far outside"):
-            backend.publish([5.0])
-        backend.publish([0.5])
-        assert backend.step() == 0.5
-        with pytest.raises(o80.InvalidArgument, match="begin with accept_reading"):
-            backend.publish([-1e6])
-        assert backend.step() is None
-    with begin(accept_reading=True) as backend:
-        backend.publish([5.0])
-        backend.step()
-        backend.publish([-1e6])
 
 
 # ---------------------------------------------------------------------- differences

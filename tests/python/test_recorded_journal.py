@@ -10,7 +10,6 @@ import pytest
 import o80
 from o80.recording.recorded_epoch import RecordedEpoch
 from o80.recording.recorder import Recorder
-from o80.recording.scan import scan
 
 
 def recorded(path: Path) -> RecordedEpoch:
@@ -109,36 +108,6 @@ def test_entries_that_were_overwritten_are_a_gap(segment: str, tmp_path: Path) -
     assert [(entry.number, entry.kind, entry.id) for entry in entries][-len(numbers) :] == numbers
 
 
-def test_a_successor_goes_on_with_the_next_entry(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    for commands in (4, 0, 7):
-        recorder = Recorder(path, [arm.segment], proceed=True)
-        play(arm, commands)
-        recorder.catch_up()
-        recorder.finish()
-
-    assert texts(recorded(path).journal()) == texts(arm.journal())
-
-
-def test_wherever_a_file_is_cut_its_journal_is_continued(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment])
-    for _ in range(8):
-        play(arm, 2)
-        recorder.poll()
-    recorder.finish()
-    whole = path.read_bytes()
-    entries = texts(arm.journal())
-    chance = np.random.default_rng(5)
-    cuts = {each.chunk_start_offset for each in scan(path).chunks}
-    for cut in [*cuts, *chance.integers(0, len(whole), 30)]:
-        path.write_bytes(whole[: int(cut)])
-        recorder = Recorder(path, [arm.segment], proceed=True)
-        recorder.catch_up()
-        recorder.finish()
-        assert texts(recorded(path).journal()) == entries, f"cut at {cut}"
-
-
 def test_decisions_without_a_row_after_them_are_recorded(segment: str, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with o80.Backend(segment, ["a"]) as backend:
@@ -150,32 +119,6 @@ def test_decisions_without_a_row_after_them_are_recorded(segment: str, tmp_path:
             backend.step()
             recording.flush()
             assert [entry.kind for entry in recorded(path).journal()] == ["taken"]
-
-
-def test_a_damaged_journal_is_an_error_that_names_the_file(
-    arm: o80.Frontend, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], compression="none")
-    play(arm, 50)
-    recorder.catch_up()
-    recorder.finish()
-    whole = path.read_bytes()
-    chance = np.random.default_rng(1)
-    errors = []
-    for _ in range(300):
-        damaged = bytearray(whole)
-        for place in chance.integers(8, len(whole), 3):
-            damaged[place] = chance.integers(256)
-        path.write_bytes(damaged)
-        try:
-            for segment in o80.open(path).segments.values():
-                for epoch in segment.epochs:
-                    epoch.journal()
-        except o80.RecordingError as error:
-            errors.append(str(error))
-    assert len(errors) > 50
-    assert all(str(path) in error for error in errors)
 
 
 def echo(*words: str | Path) -> subprocess.CompletedProcess[str]:

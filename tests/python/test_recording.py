@@ -12,8 +12,6 @@ from mcap.reader import make_reader
 import o80
 from o80.recording.recorder import Recorder
 
-WAIT = 30.0  # [s] longer than any wait should take
-
 
 def test_a_program_records_what_it_does(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
@@ -37,14 +35,6 @@ def test_a_program_records_what_it_does(arm: o80.Frontend, tmp_path: Path) -> No
     )
     assert last.rows == {arm.segment: 60}
     assert first.time <= last.time
-
-
-def test_recording_begins_with_the_oldest_row(arm: o80.Frontend, tmp_path: Path) -> None:
-    arm.burst(10)
-    with o80.Recording(tmp_path / "run.mcap", arm):
-        pass
-
-    assert o80.open(tmp_path / "run.mcap")[arm.segment].history().iteration[0] == 0
 
 
 def test_a_robot_that_restarts_goes_on_in_the_same_file(segment: str, tmp_path: Path) -> None:
@@ -158,19 +148,6 @@ def test_the_last_rows_before_a_restart_are_not_lost(segment: str, tmp_path: Pat
     assert [epoch.rows for epoch in o80.open(tmp_path / "run.mcap")[segment].epochs] == [6, 1]
 
 
-def test_log_times_are_the_wall_clock(process: o80.robots.Process, tmp_path: Path) -> None:
-    import time
-
-    before = time.time_ns()
-    with process.frontend() as arm, o80.Recording(tmp_path / "run.mcap", arm):
-        arm.wait_for(arm.published + 20, timeout=WAIT)
-    after = time.time_ns()
-    epoch = o80.open(tmp_path / "run.mcap")[process.segment].epochs[0]
-    walls = epoch.history().time + epoch.wall_offset
-
-    assert before - 1e9 < walls[0] < walls[-1] < after + 1e9
-
-
 def test_log_times_are_those_of_the_segment(arm: o80.Frontend, tmp_path: Path) -> None:
     offsets = []
     for name in ("a.mcap", "b.mcap"):
@@ -196,18 +173,6 @@ def test_a_recording_says_how_its_robots_were_started(segment: str, tmp_path: Pa
 
     assert [epoch.provenance for epoch in epochs] == started
     assert [epoch.provenance.options["gain"] for epoch in epochs] == ["2.5", "3.5"]
-
-
-@pytest.mark.parametrize("value", [object(), {1, 2}])
-def test_a_mark_that_is_no_json_changes_nothing(
-    value: object, arm: o80.Frontend, tmp_path: Path
-) -> None:
-    with o80.Recording(tmp_path / "run.mcap", arm) as recording:
-        with pytest.raises(TypeError):
-            recording.mark("episode", value=value)
-        recording.mark("good")
-
-    assert [mark.name for mark in o80.open(tmp_path / "run.mcap").marks] == ["good"]
 
 
 def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_path: Path) -> None:

@@ -94,8 +94,10 @@ def test_wherever_it_is_cut_whole_chunks_are_read_and_continued(
         recorder.catch_up()
         recorder.finish()
 
-        read = o80.open(path)[arm.segment].history()
+        segment = o80.open(path)[arm.segment]
+        read = segment.history()
         assert read.rows.tobytes() == history.rows.tobytes(), f"cut at {cut}"
+        assert repr(segment.epochs[0].journal()) == repr(arm.journal()), f"cut at {cut}"
         with path.open("rb") as file:
             assert rows_in(file, arm) == len(read)
 

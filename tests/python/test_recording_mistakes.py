@@ -233,6 +233,7 @@ def test_a_damaged_file_is_a_recording_error_that_names_it(
             for name in file:
                 for epoch in file[name].epochs:
                     epoch.history()
+                    epoch.journal()
             len(file.marks)
         except o80.RecordingError as error:
             errors.append(str(error))

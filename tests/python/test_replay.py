@@ -1,7 +1,6 @@
 """A replay repeats every row of a run bit for bit, and finds the first one that differs."""
 
 import random
-import signal
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -21,7 +20,6 @@ from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
 from o80.replaying.replay import replay_runs
 from o80.rows.columns import columns_of
 
-RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
 NAMES = ("shoulder", "elbow")
 WAIT = 30.0  # [s] longer than any wait should take
 
@@ -104,42 +102,6 @@ def test_the_first_difference_of_another_option_is_told(segment: str) -> None:
         assert found.values[0] == arm.wait_for(6).observed[1]
         near = {"observed": 0.1, "extended": 0.1}
         assert o80.replay(arm, options={"gain": 7.6}, tolerances=near).identical
-
-
-def test_a_run_in_real_time_with_a_killed_commander_is_identical(segment: str) -> None:
-    """The death is recorded, and with it the purge; nobody dies in the replay."""
-    moves = (
-        f"import o80; arm = o80.Frontend({segment!r}); arm.add_command('elbow', 2.0, duration=60)\n"
-        f"arm.pulse(); print('sent', flush=True); input()"
-    )
-    with o80.robots.load("two_joints").start(segment, frequency=2000, stale="purge") as process:
-        arm = process.frontend()
-        commander = Commander(arm, 7)
-        with subprocess.Popen(
-            [sys.executable, "-c", moves], stdin=subprocess.PIPE, stdout=subprocess.PIPE
-        ) as child:
-            assert child.stdout is not None
-            assert child.stdout.readline() == b"sent\n"
-            arm.wait_for(arm.published + 20, timeout=WAIT)
-            child.send_signal(signal.SIGKILL)
-        while not any(entry.kind == "died" for entry in arm.journal()):
-            arm.wait_for(arm.published + 1, timeout=WAIT)
-        for _ in range(100):
-            commander.act()
-            arm.wait_for(arm.published + commander.random.randrange(10), timeout=WAIT)
-        report = o80.replay(arm)
-        assert report.identical, report
-        assert sum(run.rows for run in report) > 100
-
-
-def test_a_run_whose_robot_has_stopped_is_identical(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment, frequency=2000) as process:
-        arm = process.frontend()
-        arm.add_command("elbow", 1.0, duration=0.05)
-        arm.pulse()
-        arm.wait_for(20, timeout=WAIT)
-    assert o80.replay(arm).identical
-    arm.close()
 
 
 def test_a_history_without_row_0_is_not_replayed(segment: str) -> None:
@@ -232,17 +194,6 @@ def file_of(path: Path, arm: o80.Frontend, seed: int = 3) -> Path:
             run_bursts(arm, seed + part, 40)
             recording.flush()
     return path
-
-
-def test_a_recorded_run_is_identical(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = file_of(tmp_path / "run.mcap", arm)
-    rows = arm.published + 1
-    arm.close()
-    report = o80.replay(path)
-
-    assert report.identical, report
-    (run,) = report
-    assert (run.segment, run.rows) == (arm.segment, rows)
 
 
 def test_each_run_of_each_segment_is_replayed(segment: str, tmp_path: Path) -> None:
@@ -383,13 +334,6 @@ def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_pat
     assert "'gian'" in o80_replay(str(path), "--set", "gian=2").stderr
 
 
-def test_a_recording_of_an_older_version_repeats_as_far_as_its_motion_rules_do() -> None:
-    report = o80.replay(RECORDINGS / "format_1.mcap", ignore=("extended.homing",))
-    assert [run.difference for run in report] == [None, None]
-    for run in report:
-        assert "motion rules" in (run.gap or ""), run.gap
-
-
 def test_a_recording_in_several_files_repeats(segment: str, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with o80.robots.load("two_joints").inline(segment) as arm:
@@ -409,10 +353,3 @@ def test_the_command_says_when_rows_are_missing(segment: str) -> None:
         done = o80_replay(segment)
     assert done.returncode == 2
     assert "a replay begins at row 0" in done.stdout
-
-
-def test_nothing_is_left_in_shared_memory(arm: o80.Frontend) -> None:
-    arm.burst(3)
-    before = {entry.name for entry in o80.segments()}
-    o80.replay(arm)
-    assert {entry.name for entry in o80.segments()} == before

@@ -2,9 +2,7 @@
 
 import os
 import random
-import threading
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -16,120 +14,8 @@ import o80
 from o80.replaying.recorded_run import runs_in
 from o80.replaying.replay import replay_runs
 
-WAIT = 30.0  # [s] longer than any wait should take
 JOINT = {"position": float, "velocity": float}
 NAMES = ("shoulder", "elbow", "wrist")
-
-
-class World:
-    """A program with an embedded backend, whose robot does what nobody can predict."""
-
-    def __init__(self, segment: str, seed: int) -> None:
-        self.random = random.Random(seed)
-        limit = o80.Limits(minimum=-3.0, maximum=3.0, speed=400.0, acceleration=50000.0)
-        self.backend = o80.Backend(
-            segment,
-            NAMES,
-            JOINT,
-            extended={"force": float},
-            requests={"home": None, "jump": None, "look": None, "wait": None},
-            limits={"shoulder": {"position": limit}, "elbow": {"position": o80.Limits(error=2.5)}},
-            rests_at={name: {"velocity": 0.0} for name in NAMES},
-            when_idle={"wrist": "follow"},
-            history=200_000,
-            journal=64,
-            stale="purge",
-        )
-        self.place = np.zeros((3, 2))
-        self.backend.on("home", lambda _: o80.Running("on the way"))
-        self.backend.on("jump", self.jump)
-        self.backend.on("look", self.look)
-        self.backend.on("wait", lambda _: None)
-
-    def jump(self, _: Any) -> o80.StartAfresh:
-        self.place[:, 0] = [self.random.uniform(-1, 1) for _ in NAMES]
-        desired = None
-        if self.random.random() < 0.3:  # it knows better than its sensors
-            desired = self.states(self.place + 0.125)
-        return o80.StartAfresh(self.states(self.place), desired=desired)
-
-    def look(self, _: Any) -> None:
-        if self.random.random() < 0.5:
-            raise o80.RequestRejected("it is dark")
-
-    def states(self, numbers: Any) -> Any:
-        states = np.zeros(3, [("position", float), ("velocity", float)])
-        states["position"], states["velocity"] = numbers[:, 0], numbers[:, 1]
-        return states
-
-    def publish(self) -> None:
-        force = {"force": self.random.gauss(0, 1)}
-        self.backend.publish(self.states(self.place), force)
-
-    def run(self) -> None:
-        self.publish()
-        chance = self.random.random
-        while (desired := self.backend.step()) is not None:
-            noise = [[self.random.gauss(0, 0.01), self.random.gauss(0, 1)] for _ in NAMES]
-            self.place[:, 0] += 0.5 * (np.asarray(desired["position"]) - self.place[:, 0])
-            self.place += noise
-            if chance() < 0.002:
-                self.backend.interrupt(self.random.choice(NAMES))
-            if chance() < 0.001:
-                self.backend.halt(f"slipped {self.random.randrange(3)}")
-            if chance() < 0.001:
-                self.place[1, 0] += 3.0  # a collision: beyond the error limit
-            if self.backend.running("home") and chance() < 0.05:
-                fresh = o80.StartAfresh(self.states(self.place)) if chance() < 0.5 else None
-                self.backend.end_request("home", fresh)
-            self.publish()
-            if chance() < 0.002:
-                self.backend.interrupt(self.random.choice(NAMES))  # before the next step
-
-    @contextmanager
-    def running(self) -> Iterator[None]:
-        thread = threading.Thread(target=self.run)
-        thread.start()
-        try:
-            yield
-        finally:
-            self.backend.stop()
-            thread.join()
-
-
-def act(arm: o80.Frontend, choose: random.Random) -> None:
-    """Sends what random programs send."""
-    for _ in range(choose.randrange(3)):
-        actuators = choose.choice([["shoulder"], ["elbow"], ["wrist"], ["shoulder", "elbow"]])
-        arm.add_command(
-            actuators if len(actuators) > 1 else actuators[0],
-            [{"position": choose.uniform(-1.5, 1.5)} for _ in actuators]
-            if len(actuators) > 1
-            else {"position": choose.uniform(-1.5, 1.5)},
-            iterations=choose.randrange(2, 60),
-            mode=choose.choice(["queue", "overwrite"]),
-            start=choose.choice(["desired", "observed"]),
-            profile=choose.choice(["linear", "minimum_jerk"]),
-        )
-    if choose.random() < 0.3:
-        for request in choose.sample(["home", "jump", "look", "wait"], choose.randrange(1, 3)):
-            arm.add_request(request)
-    if choose.random() < 0.1:
-        arm.add_purge(choose.choice(NAMES))
-    later = choose.random() < 0.2
-    arm.pulse(at=arm.published + choose.randrange(30) if later else None)
-
-
-def drive(arm: o80.Frontend, seed: int, actions: int = 100) -> None:
-    choose = random.Random(seed)
-    for _ in range(actions):
-        if arm.halted:
-            with suppress(o80.BackendHalted):  # another halt came meanwhile
-                arm.resume(timeout=WAIT)
-        act(arm, choose)
-        if choose.random() < 0.03:
-            arm.halt("now and then")
-        arm.wait_for(arm.published + choose.randrange(1, 30), timeout=WAIT)
 
 
 def test_an_actuator_that_left_a_command_because_of_its_reading_leaves_it_again(
@@ -287,52 +173,32 @@ def test_the_journal_says_that_nothing_acts_however_much_is_written(
 
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A run of a robot of the world."""
+    """A run of a robot of the world: it moves by itself, and jumps when it is asked to."""
     path = tmp_path_factory.mktemp("run") / "run.mcap"
+    choose = random.Random(3)
+    place = np.zeros(3, [("position", float), ("velocity", float)])
     segment = f"test-{os.getpid()}-world"
-    world = World(segment, 3)
-    with (
-        world.backend,
-        world.running(),
-        o80.Frontend(segment) as arm,
-        o80.Recording(path, arm),
-    ):
-        drive(arm, 3)
+    with o80.Backend(segment, NAMES, JOINT, requests={"jump": None}) as backend:
+        backend.on("jump", lambda _: o80.StartAfresh(place.copy()))
+        backend.publish(place)
+        with o80.Frontend(segment) as arm, o80.Recording(path, arm):
+            for row in range(400):
+                if row % 60 == 59:
+                    arm.add_request("jump")
+                else:
+                    arm.add_command(
+                        choose.choice(NAMES),
+                        {"position": choose.uniform(-1, 1)},
+                        iterations=choose.randrange(1, 9),
+                        mode=choose.choice(["queue", "overwrite"]),
+                        start=choose.choice(["desired", "observed"]),
+                    )
+                arm.pulse()
+                place[:] = backend.step()
+                place["position"] += choose.gauss(0, 0.01)
+                backend.publish(place)
     o80.clean(segment)
     return path
-
-
-@pytest.mark.parametrize("seed", range(2))
-def test_desired_states_of_a_robot_of_the_world_repeat(segment: str, seed: int) -> None:
-    world = World(segment, seed)
-    with world.backend:
-        with world.running(), o80.Frontend(segment) as arm:
-            drive(arm, seed)
-            kinds = {(entry.kind, entry.cause) for entry in arm.journal()}
-        with o80.Frontend(segment, read_only=True, dead=True) as arm:
-            (run,) = o80.replay(arm)
-    assert run.identical, run
-    assert run.rows > 200
-    assert {kind for kind, _ in kinds} >= {"taken", "fresh_start", "halt", "interrupted", "resume"}
-    (note,) = (note for note in run.notes if "compared" in note)
-    assert "compared: desired states" in note
-    assert "not repeated: readings of the world" in note
-
-
-def test_a_changed_desired_state_is_found_at_its_row_and_field(recorded: Path) -> None:
-    (run,) = runs_in(o80.open(recorded))
-    fresh = np.concatenate([block.rows["fresh"] for block in run.blocks()])
-    choose = random.Random(1)
-    size = 16  # of a state [bytes]
-    for _ in range(6):
-        row = choose.choice(np.flatnonzero(fresh == 0).tolist())
-        actuator = choose.randrange(2)
-        byte = run.schema["row"]["desired"] + size * actuator + choose.randrange(8)
-        flipped = Flipped(run, row, byte, 1 << choose.randrange(8))
-        (report,) = replay_runs([flipped])
-        assert report.difference is not None
-        found = (report.difference.iteration, report.difference.field)
-        assert found == (row, f"desired.{NAMES[actuator]}.position")
 
 
 def test_a_changed_decision_is_found(recorded: Path) -> None:

@@ -4,13 +4,11 @@ import gc
 import importlib
 import os
 import shutil
-import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
-from processes import end_of
 
 import o80
 
@@ -178,44 +176,9 @@ def test_options_and_flags_reach_the_robot(segment: str) -> None:
         assert file.stat().st_mode & 0o777 == 0o640
 
 
-@pytest.mark.parametrize(
-    ("options", "text"),
-    [
-        ({"speed": 1.0}, "no option 'speed': its own are gain, reach"),
-        ({"gain": "fast"}, "gain"),
-        ({"gain": None}, "gain"),
-        ({"frequency": -1.0}, "frequency"),
-        ({"history": 0}, "history"),
-        ({"stale": "wait"}, "hold, purge, halt or stop"),
-        ({"policy": "best"}, "fifo"),
-    ],
-)
-def test_options_that_cannot_be_are_refused(
-    segment: str, options: dict[str, object], text: str
-) -> None:
-    with pytest.raises(o80.InvalidArgument, match=text):
-        o80.robots.load("two_joints").start(segment, **options)  # type: ignore[arg-type]
-
-
 def test_a_taken_name_is_refused(process: o80.robots.Process) -> None:
     with pytest.raises(o80.SegmentTaken, match=str(process.pid)):
         o80.robots.load("two_joints").start(process.segment)
-
-
-def test_a_process_ends_with_the_program_that_started_it(segment: str) -> None:
-    program = (
-        "import os, o80\n"
-        f"process = o80.robots.load('two_joints').start({segment!r})\n"
-        "print(process.pid, flush=True)\n"
-        "os.kill(os.getpid(), 9)\n"
-    )
-    starter = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=60
-    )
-    assert starter.returncode == -signal.SIGKILL, starter.stderr
-
-    end_of(int(starter.stdout))
-    assert segment not in [entry.name for entry in o80.segments() if entry.alive]
 
 
 def test_a_process_never_stopped_is_warned_about_and_stopped(segment: str) -> None:
@@ -243,59 +206,6 @@ def test_inline_robots_may_be_many(segment: str) -> None:
         one.burst(5)
         assert one.segment != other.segment
         assert other.latest().iteration == 0
-
-
-def test_others_watch_and_command_an_inline_robot(arm: o80.Frontend) -> None:
-    with o80.Frontend(arm.segment) as other:
-        other.add_command("elbow", 0.5)
-        batch = other.pulse()
-        assert arm.burst(1).desired[1] == 0.5
-        assert batch.statuses == [o80.Status.COMPLETED]
-        assert other.latest().iteration == 1
-
-
-def test_inline_options_that_cannot_be_are_refused(segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with pytest.raises(o80.InvalidArgument, match="gain, reach"):
-        robot.inline(segment, speed=1.0)
-    with pytest.raises(o80.InvalidArgument, match="gain"):
-        robot.inline(segment, gain="fast")
-    with pytest.raises(o80.InvalidArgument, match="frequency"):
-        robot.inline(segment, frequency=0.0)
-    with o80.Backend(segment, ["a"]), pytest.raises(o80.SegmentTaken, match=segment):
-        robot.inline(segment)
-
-
-def test_an_inline_robot_and_a_process_do_the_same(arm: o80.Frontend, segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with (
-        robot.start(f"{segment}-process", bursting=True) as process,
-        process.frontend() as other,
-    ):
-        for frontend in (arm, other):
-            frontend.add_command(0, 1.0, iterations=30, profile="minimum_jerk")
-            frontend.add_command("elbow", -0.5, duration=0.01)
-            frontend.burst(20)
-            frontend.add_command(0, 0.2, speed=20.0, mode="overwrite")
-            frontend.burst(100)
-
-        assert arm.history().rows.tobytes() == other.history().rows.tobytes()
-
-
-def test_an_open_inline_robot_is_given_back_when_the_interpreter_ends(segment: str) -> None:
-    program = (
-        "import o80\n"
-        f"arm = o80.robots.load('two_joints').inline({segment!r})\n"
-        "backend = o80.Backend('" + segment + "-b', ['a'])\n"
-        "backend.publish([0.0])\n"
-        "keep = [arm, backend]; keep.append(keep)\n"
-        "arm.burst(3)\n"
-    )
-    subprocess.run([sys.executable, "-c", program], check=True, timeout=60)
-
-    names = [entry.name for entry in o80.segments()]
-    assert segment not in names
-    assert f"{segment}-b" not in names
 
 
 def test_the_installation_is_found() -> None:

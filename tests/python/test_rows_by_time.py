@@ -72,17 +72,6 @@ def test_a_part_of_a_history_is_a_history(old: o80.Frontend, n: int, step: int, 
     assert part.select(from_time=time).iteration.tolist() == expected
 
 
-@settings(max_examples=15, deadline=None)
-@given(st.lists(st.integers(1, 40), max_size=6), TIMES)
-def test_times_are_found_while_rows_are_overwritten(bursts: list[int], time: int) -> None:
-    with o80.robots.load("two_joints").inline(next(_names), history=8) as frontend:
-        for burst in bursts:
-            frontend.burst(burst)
-            history = frontend.history()
-            expected = history.iteration[history.time <= time].tolist()
-            assert frontend.history(to_time=time).iteration.tolist() == expected
-
-
 def test_a_row_of_a_history_is_found_by_its_iteration(old: o80.Frontend) -> None:
     history = old.history(10)
     assert history.at_iteration(95).iteration == 95

@@ -1,6 +1,5 @@
 """Requests that take time."""
 
-import threading
 from collections.abc import Iterator
 
 import numpy as np
@@ -105,32 +104,6 @@ def test_another_request_may_end_it(backend: o80.Backend, segment: str) -> None:
         assert batch.handles[0].text == "abandoned"
 
 
-def test_a_second_one_is_rejected_with_a_sentence(backend: o80.Backend, segment: str) -> None:
-    with o80.Frontend(segment) as frontend:
-        home(frontend)
-        iterate(backend, frontend)
-        second = home(frontend)
-        iterate(backend, frontend)
-        assert second.handles[0].text == (
-            "'home' has been running since iteration 1: wait for its end"
-        )
-
-
-def test_a_halt_ends_it_unless_it_is_served_in_halts(backend: o80.Backend, segment: str) -> None:
-    with o80.Frontend(segment) as frontend:
-        homing = home(frontend)
-        frontend.add_request("calibrate")
-        calibrating = frontend.pulse()
-        iterate(backend, frontend)
-        frontend.halt("a hand in the cell")
-        iterate(backend, frontend)
-        assert homing.handles[0].status == o80.Status.HALTED
-        assert "a hand in the cell" in homing.handles[0].text
-        assert not backend.running("home")
-        assert calibrating.handles[0].status == o80.Status.ACTIVE
-        assert [each.name for each in frontend.running_requests] == ["calibrate"]
-
-
 def test_what_is_no_answer_or_no_end_is_refused(backend: o80.Backend, segment: str) -> None:
     with pytest.raises(o80.InvalidArgument, match="home, calibrate, abandon"):
         backend.end_request("hom")
@@ -168,12 +141,6 @@ def test_a_request_waits_for_its_end(arm: o80.Frontend) -> None:
     assert arm.running_requests == []
 
 
-def test_a_request_that_ends_at_once_runs_no_iteration(arm: o80.Frontend) -> None:
-    before = arm.published
-    arm.request("snapshot")
-    assert arm.published == before
-
-
 def test_desired_states_are_not_followed_while_it_runs(arm: o80.Frontend) -> None:
     arm.add_command(None, [0.5, 0.3])
     arm.burst(1000)
@@ -203,28 +170,6 @@ def test_a_halt_leaves_the_robot_where_it_is(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0)
     arm.burst(1000)
     assert arm.latest().observed[0] > 0.9, "it follows again"
-
-
-def test_a_request_that_a_halt_ends_raises(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, process.frontend() as other:
-        arm.add_command(None, [2.0, 2.0])
-        arm.pulse_and_wait(timeout=WAIT)
-        raised: list[Exception] = []
-
-        def ask() -> None:
-            try:
-                arm.request("home", speed=1e-3, timeout=WAIT)
-            except o80.Error as error:
-                raised.append(error)
-
-        thread = threading.Thread(target=ask)
-        thread.start()
-        while not other.running_requests:
-            other.wait_for_next(timeout=WAIT)
-        other.halt("stop that")
-        thread.join(WAIT)
-        assert isinstance(raised[0], o80.BackendHalted)
-        assert "stop that" in str(raised[0])
 
 
 def test_a_timeout_says_that_it_goes_on(process: o80.robots.Process) -> None:

@@ -18,54 +18,6 @@ WAIT = 60.0  # [s] longer than any wait should take
 ROOT = Path(__file__).resolve().parents[2]
 O80 = str(Path(sys.executable).parent / "o80")
 
-COMMANDER = """
-import os, signal, sys, time
-import o80
-arm = o80.Frontend({segment!r})
-arm.add_command(0, 3.0, iterations=10**9)
-arm.pulse()
-print("ready", flush=True)
-{then}
-"""
-
-
-class Commander:
-    """A program that moves the first joint, and then does something else."""
-
-    def __init__(self, segment: str, then: str) -> None:
-        self._program = subprocess.Popen(
-            [sys.executable, "-c", COMMANDER.format(segment=segment, then=then)],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert self._program.stdout is not None
-        assert self._program.stdout.readline() == "ready\n"
-
-    def send(self, number: int) -> None:
-        self._program.send_signal(number)
-
-    def close(self) -> None:
-        self._program.kill()
-        self._program.wait()
-        assert self._program.stdout is not None
-        self._program.stdout.close()
-
-
-Commanders = Callable[[str, str], Commander]
-
-
-@pytest.fixture
-def commander() -> Iterator[Commanders]:
-    started: list[Commander] = []
-
-    def start(segment: str, then: str) -> Commander:
-        started.append(Commander(segment, then))
-        return started[-1]
-
-    yield start
-    for each in started:
-        each.close()
-
 
 def until(true: Callable[[], object]) -> None:
     end = time.monotonic() + WAIT
@@ -76,94 +28,6 @@ def until(true: Callable[[], object]) -> None:
 
 def start(segment: str, **options: object) -> o80.robots.Process:
     return o80.robots.load("two_joints").start(segment, **options)  # type: ignore[arg-type]
-
-
-# ------------------------------------------------------------------------------ learners
-
-
-def test_a_learner_that_hangs_loses_its_commands(segment: str, commander: Commanders) -> None:
-    with start(segment, silence=50, stale="purge") as process, process.frontend() as arm:
-        commander(segment, "while True: time.sleep(3600)")
-        until(lambda: arm.latest().active[0])
-        until(lambda: not arm.latest().active[0])
-        assert arm.halted is None
-
-
-def test_a_learner_that_hangs_halts_the_robot_if_told_so(
-    segment: str, commander: Commanders
-) -> None:
-    with start(segment, silence=50, stale="halt") as process, process.frontend() as arm:
-        commander(segment, "while True: arm.latest()  # reading is no life")
-        until(lambda: arm.halted)
-        halt = arm.halted
-        assert halt is not None
-        assert halt.cause == "silence"
-        assert "pid" in halt.text
-
-
-def test_a_learner_that_shows_life_goes_on(segment: str, commander: Commanders) -> None:
-    with start(segment, silence=2000, stale="halt") as process, process.frontend() as arm:
-        commander(segment, "while True: arm.keep_alive(); time.sleep(0.01)")
-        until(lambda: arm.latest().active[0])
-        first = arm.latest().iteration
-        arm.wait_for(first + 4000, timeout=WAIT)
-        assert arm.halted is None
-        assert arm.latest().active[0]
-
-
-def test_a_wait_for_ones_own_batch_is_life(segment: str) -> None:
-    with start(segment, silence=400, stale="halt") as process, process.frontend() as arm:
-        arm.add_command(0, 1.0, iterations=2000)
-        arm.pulse_and_wait(timeout=WAIT)
-        assert arm.halted is None
-
-
-def test_a_learner_that_dies_halts_the_robot_if_told_so(
-    segment: str, commander: Commanders
-) -> None:
-    with start(segment, stale="halt") as process, process.frontend() as arm:
-        learner = commander(segment, "while True: time.sleep(3600)")
-        learner.send(signal.SIGKILL)
-        until(lambda: arm.halted)
-        halt = arm.halted
-        assert halt is not None
-        assert halt.cause == "dead_frontend"
-
-
-def test_a_halt_acts_while_others_flood_the_robot(segment: str, commander: Commanders) -> None:
-    flood = """
-while True:
-    try:
-        for _ in range(100): arm.add_command(1, 1.0, iterations=10)
-        arm.pulse()
-    except o80.LaneFull:
-        arm.forget_added()
-"""
-    with start(segment) as process, process.frontend() as arm:
-        for _ in range(3):
-            commander(segment, flood)
-        until(lambda: arm.latest().active[1])
-        before = arm.published
-        arm.halt("a flood")
-        until(lambda: arm.latest().halted)
-        halt = arm.halted
-        assert halt is not None
-        assert halt.iteration is not None
-        after = arm.history(since=halt.iteration)
-        assert halt.iteration > before
-        assert after.halted.all()
-        assert (after.desired == after.desired[0]).all(), "no command acts while it is halted"
-
-
-def test_a_busy_machine_of_a_learner_costs_nothing_that_is_queued(
-    segment: str, commander: Commanders
-) -> None:
-    with start(segment) as process, process.frontend() as arm:
-        learner = commander(segment, "while True: time.sleep(3600)")
-        learner.send(signal.SIGSTOP)  # it gets no processor
-        first = arm.latest().iteration
-        arm.wait_for(first + 300, timeout=WAIT)
-        assert arm.latest().active[0]
 
 
 # ------------------------------------------------------------------------------ ends of the process
@@ -276,28 +140,6 @@ def test_a_robot_goes_on_when_the_directory_is_full_and_a_second_one_is_refused(
     assert "has no room" in done.stdout
 
 
-def test_the_successor_of_a_killed_robot_starts_halted(segment: str) -> None:
-    process = start(segment)
-    with process.frontend() as arm:
-        arm.add_command(0, 3.0, iterations=10**9)
-        arm.pulse()
-        until(lambda: arm.latest().active[0])
-        os.kill(process.pid, signal.SIGKILL)
-        with pytest.raises(o80.BackendKilled):
-            arm.wait_for(10**12, timeout=WAIT)
-    with start(segment) as successor, successor.frontend() as arm:
-        halt = arm.halted
-        assert halt is not None
-        assert halt.cause == "predecessor"
-        assert arm.history()[0].halted
-        arm.add_command(0, 1.0)
-        with pytest.raises(o80.BackendHalted, match="killed while commands were active"):
-            arm.pulse_and_wait(timeout=WAIT)
-        arm.resume(halt.number)
-        arm.add_command(0, 0.1, iterations=5)
-        assert arm.pulse_and_wait(timeout=WAIT).desired[0] == 0.1
-
-
 def test_a_supervisor_may_resume_on_purpose(segment: str) -> None:
     process = start(segment)
     with process.frontend() as arm:
@@ -353,17 +195,6 @@ def test_a_halt_ends_a_burst_and_an_inline_robot_knows_it(arm: o80.Frontend) -> 
     arm.resume(number)
     arm.add_command(0, 1.0)
     assert arm.burst(1).desired[0] == 1.0
-
-
-def test_read_only_frontends_see_halts_and_may_not_ask_for_them(
-    process: o80.robots.Process, segment: str
-) -> None:
-    with o80.Frontend(segment, read_only=True) as reader, process.frontend() as arm:
-        assert reader.halted is None
-        with pytest.raises(o80.ReadOnly):
-            reader.halt()
-        arm.halt("x")
-        until(lambda: reader.halted)
 
 
 def test_an_embedded_backend_halts_and_resumes(segment: str) -> None:
@@ -427,22 +258,6 @@ def test_what_a_handler_of_a_halt_returns_is_checked(
                 arm.resume(timeout=0)
         with pytest.raises(o80.InvalidArgument, match=text):
             backend.step()
-
-
-def test_a_halt_may_be_resumed_at_once_while_the_robot_moves_and_another_has_control(
-    process: o80.robots.Process,
-) -> None:
-    """The example of docs/safety.md."""
-    with process.frontend() as arm, process.frontend() as other:
-        with other.control():
-            other.add_command(0, 3.0, iterations=10**9)
-            batch = other.pulse()
-            until(lambda: arm.latest().active[0])
-            number = arm.halt("the ball is on the floor")
-            assert arm.halted is not None
-            arm.resume(number)
-            assert arm.halted is None
-        assert batch.handles[0].status == o80.Status.HALTED
 
 
 # ------------------------------------------------------------------------------ the program o80

@@ -208,14 +208,6 @@ def test_none_names_all_actuators(arm: o80.Frontend) -> None:
     assert arm.latest().desired.tolist() == [0.1, 0.3]
 
 
-def test_they_take_as_long_as_the_slowest(arm: o80.Frontend) -> None:
-    arm.add_command(None, [0.1, 0.4], speed=100.0)
-    last = arm.pulse_and_wait(timeout=WAIT)
-
-    assert last.iteration == 4
-    assert np.allclose(arm.history(4).desired[:, 0], [0.025, 0.05, 0.075, 0.1])
-
-
 @pytest.mark.parametrize(
     "target",
     [0.5, [0.1], [0.1, 0.2, 0.3], "ab", {"shoulder": 1.0}, np.array(0.5), np.zeros((1, 2))],
@@ -246,20 +238,6 @@ def test_one_that_cannot_be_refuses_all(
     assert arm.added == 0
 
 
-def test_one_that_is_overwritten_leaves_the_others(arm: o80.Frontend) -> None:
-    arm.add_command(None, [0.4, 0.4], iterations=4)
-    batch = arm.pulse()
-    arm.burst(2, timeout=WAIT)
-    arm.add_command("elbow", 0.0, mode="overwrite")
-    arm.pulse()
-    arm.burst(1, timeout=WAIT)
-    assert batch.statuses == ["active"]
-    arm.burst(1, timeout=WAIT)
-
-    assert batch.statuses == ["overwritten"]
-    assert arm.latest().desired.tolist() == [0.4, 0.0]
-
-
 def test_each_of_them_is_named_once(arm: o80.Frontend) -> None:
     with pytest.raises(o80.InvalidArgument, match="'elbow' is named twice"):
         arm.add_command(["elbow", 1], [0.1, 0.2])
@@ -287,12 +265,6 @@ def test_a_trajectory_may_have_its_own_times(arm: o80.Frontend) -> None:
     assert arm.pulse_and_wait(timeout=WAIT).iteration == 10
     assert arm.history(since=2, until=2).desired[0, 1] == 1.0
     assert arm.history(since=6, until=6).desired[0, 1] == 1.5
-
-
-def test_a_trajectory_may_keep_a_speed(arm: o80.Frontend) -> None:
-    arm.add_trajectory([1.0, 0.5], 0, speed=100.0)
-
-    assert arm.pulse_and_wait(timeout=WAIT).iteration == 15
 
 
 def test_a_trajectory_of_chosen_actuators(arm: o80.Frontend) -> None:

@@ -64,11 +64,6 @@ def test_a_right_robot_passes(tmp_path: Path, seed: int) -> None:
     assert check_robot(written(tmp_path, f"right_cart_{seed}"), seed=seed) == []
 
 
-@pytest.mark.parametrize("muscle", ["linear", "hill"])
-def test_the_simulated_arm_passes(muscle: str) -> None:
-    assert check_robot("pam", {"muscle": muscle, "start_noise": 0.01}) == []
-
-
 def test_two_joints_pass() -> None:
     assert check_robot("two_joints") == []
 

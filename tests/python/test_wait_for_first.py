@@ -1,6 +1,5 @@
 """One wait for the rows of several backends."""
 
-import threading
 from collections.abc import Iterator
 
 import pytest
@@ -45,40 +44,6 @@ def test_it_says_what_was_missed(segment: str) -> None:
         frontend.burst(20)
         row = o80.wait_for_first([frontend])[frontend]
         assert (row.iteration, row.missed) == (frontend.oldest, frontend.oldest - 1)
-
-
-def test_every_row_of_robots_by_the_clock_comes_once(segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with (
-        robot.start(f"{segment}-fast", frequency=1000) as fast,
-        robot.start(f"{segment}-slow", frequency=200) as slow,
-        fast.frontend() as left,
-        slow.frontend() as right,
-        o80.Frontend(f"{segment}-slow", read_only=True) as reader,
-    ):
-        seen: dict[o80.Frontend, list[int]] = {left: [], right: [], reader: []}
-        while min(map(len, seen.values())) < 20:
-            for member, row in o80.wait_for_first([left, right, reader], timeout=WAIT).items():
-                seen[member].append(row.iteration - row.missed)
-        for iterations in seen.values():
-            assert len(set(iterations)) == len(iterations)
-            assert iterations == sorted(iterations)
-
-
-def test_the_end_of_one_ends_the_wait_naming_it(segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with (
-        robot.start(f"{segment}-left", bursting=True) as left,
-        robot.start(f"{segment}-right", bursting=True) as right,
-        left.frontend() as alive,
-        right.frontend() as ending,
-    ):
-        stopper = threading.Thread(target=right.stop)
-        stopper.start()
-        with pytest.raises(o80.BackendStopped, match=f"{segment}-right"):
-            o80.wait_for_first([alive, ending], timeout=WAIT)
-        stopper.join()
-        assert alive.alive
 
 
 @pytest.mark.parametrize("wrong", [[], {}])

@@ -1,4 +1,4 @@
-"""The package o80-pam: its robot is found by name, its README runs."""
+"""The package o80-pam: its robot is found by name and keeps what o80 builds on, its README runs."""
 
 import base64
 import re
@@ -7,9 +7,11 @@ import sys
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import o80
 import o80_pam
+from o80.testing import check_robot
 from o80.view.answers import Answers
 from o80.view.source_list import SourceList
 
@@ -20,6 +22,20 @@ def test_the_robot_is_found_by_its_name() -> None:
     assert o80_pam.library().is_file()
     assert o80.robots.load("pam").path == o80_pam.library()
     assert ("pam", o80_pam.library()) in [(r.name, r.path) for r in o80.robots.list()]
+
+
+@pytest.mark.parametrize("muscle", ["linear", "hill"])
+def test_it_keeps_what_o80_builds_on(muscle: str) -> None:
+    plant = {"dead_time": [0.02] * 4, "friction": [0.5] * 4, "start_noise": 0.01}
+    assert check_robot("pam", {"muscle": muscle, **plant}) == []
+
+
+def test_another_model_of_the_muscles_differs_in_the_first_iteration() -> None:
+    with o80.robots.load("pam").inline(muscle="linear") as arm:
+        arm.burst(20)
+        found = o80.replay(arm, options={"muscle": "hill"}).difference
+        assert found is not None
+        assert found.iteration <= 1
 
 
 def printed_by_the_readme(number: int, folder: Path) -> list[str]:

@@ -3,7 +3,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "control/batch/record.hpp"
@@ -62,13 +61,12 @@ struct ScriptStep {
 
 /// A robot and what happens to it, iteration by iteration, without a clock.
 ///
-/// It prints itself as a few lines of text, from which it can be read back and played again.
+/// It prints itself as a few lines of text.
 struct Script {
   std::vector<ActuatorSpec> actuators;
   std::vector<ScriptStep> steps;
 
   std::string text() const;
-  static Script parse(std::string_view text);
 
   /// The robot, iterating every millisecond. Number i of an actuator lies at its `offsets`.
   Schema schema() const;

@@ -1,10 +1,8 @@
 // Random scripts: whatever a robot is asked, and whatever it reads, its promises hold in every
-// iteration. CONTRIBUTING.md says how to play more of them and how to replay one.
+// iteration. CONTRIBUTING.md says how to play more of them.
 #include <gtest/gtest.h>
 
 #include <cstdlib>
-#include <fstream>
-#include <iterator>
 #include <map>
 #include <string>
 
@@ -21,13 +19,6 @@ constexpr std::size_t kMostShown = 6;
 std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
   const char* text = std::getenv(name);
   return text == nullptr ? otherwise : std::stoull(text);
-}
-
-TEST(Script, ReadsBackWhatItPrints) {
-  for (std::uint64_t seed = 0; seed < 50; ++seed) {
-    const std::string text = random_script(seed).text();
-    ASSERT_EQ(Script::parse(text).text(), text) << "seed " << seed;
-  }
 }
 
 TEST(Script, KeepsEveryPromise) {
@@ -62,16 +53,6 @@ TEST(Script, KeepsThePromisesItBroke) {
     const auto failure = play(script);
     if (failure) ADD_FAILURE() << "seed " << seed << ", " << report(script, *failure);
   }
-}
-
-TEST(Script, ReplaysAFile) {
-  const char* path = std::getenv("O80_SCRIPT");
-  if (path == nullptr) GTEST_SKIP() << "O80_SCRIPT names no file";
-  std::ifstream file(path);
-  ASSERT_TRUE(file) << path;
-  const Script script = Script::parse(std::string(std::istreambuf_iterator<char>(file), {}));
-  const auto failure = play(script);
-  if (failure) ADD_FAILURE() << report(script, *failure);
 }
 
 }  // namespace

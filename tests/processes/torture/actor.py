@@ -23,7 +23,6 @@ ACT = 0
 HANG, WRONG_ROW, FALSELY_TOLD, FALSE_DEATH, BAD_ERROR = 1, 2, 5, 6, 9
 STATUSES = list(o80.Status)
 UNDER_WAY, SENT, REFUSED = 1, 2, 3
-RESUME_UNKNOWN, RESUMED, RESUME_REFUSED = 1, 2, 3
 
 
 def mix(a: int, b: int = 0) -> int:
@@ -209,52 +208,6 @@ class Ledger:
             struct.pack_into("<I", actor.board, at + actor.at["told"], told)
 
 
-def halt(actor: Actor, robot: o80.Frontend, generation: int) -> None:
-    """Halts, and notes when that was asked for and when it was answered."""
-    place = actor.read("halts", "<I")
-    if place >= actor.at["most_halts"]:
-        return
-    base = actor.at["asked_halts"] + place * actor.at["halt_stride"]
-    struct.pack_into("<IIQqq", actor.board, base, UNDER_WAY, generation, 0, time.monotonic_ns(), 0)
-    actor.write("halts", "<I", place + 1)
-    try:
-        number = robot.halt("from Python")
-    except o80.BackendGone:
-        struct.pack_into("<I", actor.board, base, REFUSED)
-        raise
-    struct.pack_into("<q", actor.board, base + 24, time.monotonic_ns())
-    struct.pack_into("<Q", actor.board, base + 8, number)
-    struct.pack_into("<I", actor.board, base, SENT)
-
-
-def resume(actor: Actor, robot: o80.Frontend, generation: int) -> None:
-    """Tries to end the halt that acts, if one does."""
-    halted = robot.halted
-    place = actor.read("resumes", "<I")
-    if halted is None or place >= actor.at["most_halts"]:
-        return
-    base = actor.at["asked_resumes"] + place * actor.at["resume_stride"]
-    struct.pack_into("<IIQq", actor.board, base, RESUME_UNKNOWN, generation, halted.number, 0)
-    actor.write("resumes", "<I", place + 1)
-    timeout = actor.timeout()
-    try:
-        with actor.timed("resume in Python", timeout):
-            robot.resume(halted.number, timeout=timeout)
-    except o80.TimeoutError:
-        return
-    except (o80.BackendHalted, o80.LaneFull, o80.NoLane):
-        struct.pack_into("<I", actor.board, base, RESUME_REFUSED)
-        return
-    except o80.BackendGone:
-        raise
-    except o80.Error as error:
-        if "exclusive" not in str(error):
-            raise
-        return
-    struct.pack_into("<q", actor.board, base + 16, time.monotonic_ns())
-    struct.pack_into("<I", actor.board, base, RESUMED)
-
-
 def add_some(actor: Actor, robot: o80.Frontend, ledger: Ledger) -> None:
     for _ in range(actor.chance.randint(1, 5)):
         bits = 0x3FF0000000000000 | actor.chance.getrandbits(52)
@@ -300,10 +253,6 @@ def command(actor: Actor, robot: o80.Frontend, generation: int) -> None:
                     batch.wait(timeout, check=False)
             except o80.TimeoutError:
                 actor.count("timeouts")
-            if actor.chance.random() < 0.03:
-                halt(actor, robot, generation)
-            if actor.chance.random() < 0.3:
-                resume(actor, robot, generation)
             while len(open_batches) > 20:
                 ledger.settle(*_handles(open_batches.pop(0)))
     finally:

@@ -58,10 +58,6 @@ void Nursery::order(const Round& round, const Slot& slot, const std::string& dir
   place("commands", slot.commands);
   place("sent_batches", slot.sent_batches);
   place("sent_commands", slot.sent_commands);
-  place("halts", slot.halts);
-  place("asked_halts", slot.asked_halts);
-  place("resumes", slot.resumes);
-  place("asked_resumes", slot.asked_resumes);
   place("life_epoch", round.lives[0].epoch);
   place("generations", round.generations);
   place("life_doomed", round.lives[0].doomed_at);
@@ -71,9 +67,6 @@ void Nursery::order(const Round& round, const Slot& slot, const std::string& dir
   number("journal_stride", sizeof(JournalRow));
   number("batch_stride", sizeof(SentBatch));
   number("command_stride", sizeof(SentCommand));
-  number("halt_stride", sizeof(AskedHalt));
-  number("resume_stride", sizeof(AskedResume));
-  number("most_halts", kMostHalts);
   number("told", offsetof(SentCommand, told));
   number("told_at", offsetof(SentCommand, told_at));
   number("most_batches", kMostBatches);

@@ -37,10 +37,6 @@ LEFT_OUT = (
     # shorter than a few steps of an emulated processor
     "SpinnerAmongOthers.*",
     # computation only, minutes of it where the processor is emulated
-    "ControllerProperty.*",
-    "*FastestProperty.*",
-    "*LimiterTransparency.*",
-    "OverwriteSpan.*",
     "*Garbage*",
 )
 

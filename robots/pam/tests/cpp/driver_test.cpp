@@ -154,64 +154,10 @@ TEST_F(PamDriverTest, TakesAPresetAndSingleNumbersInsteadOfItsOwn) {
               ThrowsMessage<std::exception>(HasSubstr("friction of joint 3")));
 }
 
-TEST_F(PamDriverTest, RestoresPressuresThatHaveNotActedYet) {
-  InlineArm arm(OptionValues{{"preset", "identified"}});
-  arm.ask("agonist_1", arm.latest().desired()[0] + 2000);
-  arm.burst(5);
-  arm.request(Snapshot{.slot = 1});
-  arm.burst(80);
-  arm.request(Restore{.slot = 1});
-  arm.burst(79);
-  const auto first = arm.rows(79);
-  arm.request(Restore{.slot = 1});
-  arm.burst(79);
-  EXPECT_TRUE(arm.rows(79) == first);
-}
-
 class EveryMuscleModel : public PamDriverTest, public testing::WithParamInterface<std::string> {
  protected:
   OptionValues options() const { return {{"muscle", GetParam()}, {"start_noise", "0.01"}}; }
 };
-
-TEST_P(EveryMuscleModel, RepeatsBitForBitAfterARestore) {
-  InlineArm arm(options());
-  arm.move();
-  arm.burst(17);
-  arm.request(Snapshot{.slot = 3});
-  arm.ask("agonist_3", 20000, {.mode = Mode::overwrite});
-  arm.burst(60);
-  const auto once = arm.rows(60);
-
-  arm.move();
-  arm.burst(33);
-  arm.request(Restore{.slot = 3});
-  // the queues are empty after a restore: the rest of the motions is asked for again
-  arm.burst(60);
-  arm.request(Restore{.slot = 3});
-  arm.ask("agonist_3", 20000, {.mode = Mode::overwrite});
-  arm.burst(60);
-  const auto first = arm.rows(60);
-  arm.request(Restore{.slot = 3});
-  arm.ask("agonist_3", 20000, {.mode = Mode::overwrite});
-  arm.burst(60);
-
-  EXPECT_TRUE(arm.rows(60) == first);
-  EXPECT_FALSE(once == first);  // there the motions went on
-}
-
-TEST_P(EveryMuscleModel, DoesTheSameInTwoRuns) {
-  InlineArm one(options());
-  InlineArm other(options());
-  for (InlineArm* arm : {&one, &other}) {
-    arm->move();
-    arm->burst(100);
-    arm->request(Reset{.seed = 7});
-    arm->move();
-    arm->burst(100);
-  }
-
-  EXPECT_TRUE(one.rows(202) == other.rows(202));
-}
 
 TEST_P(EveryMuscleModel, StartsElsewhereWithAnotherSeedAndAlikeWithTheSame) {
   InlineArm arm(options());

@@ -143,16 +143,6 @@ TEST_F(DriverTest, GoesOnFromTheDesiredStatesOfASnapshot) {
   }
 }
 
-TEST_F(DriverTest, DoesTheSameInTwoRuns) {
-  Inline one(court({{"extra_balls", "1"}}));
-  Inline other(court({{"extra_balls", "1"}}));
-  for (Inline* robot : {&one, &other}) {
-    play(*robot, shot_at_the_paddle(*robot), 0);
-    robot->burst(500);
-  }
-  EXPECT_TRUE(one.rows(503) == other.rows(503));
-}
-
 TEST_F(DriverTest, StepsOfTheSimulatorShareAnIteration) {
   Inline coarse(court());
   Inline fine(court({{"steps", "4"}, {"timestep", "0.0005"}}));
@@ -206,19 +196,6 @@ TEST_F(DriverTest, ControlsDriveTheModelsOwnActuatorsWithinTheirRange) {
   EXPECT_EQ(seen.observed<double>(0), 1.5);
   EXPECT_GT(std::abs(seen.extended<JointState>("joints").position), 0.01);
   EXPECT_EQ(seen.extended<JointState>("joints").position, seen.extended<double>("angle"));
-}
-
-TEST_F(DriverTest, AModelOfPhysicsRepeatsBitForBitAfterARestore) {
-  Inline robot(pendulum());
-  robot.ask("motor", 1.5);
-  robot.burst(50);
-  robot.request(Snapshot{});
-  robot.burst(200);
-  const auto once = robot.rows(200);
-  robot.request(Restore{});
-  robot.burst(200);
-
-  EXPECT_TRUE(robot.rows(200) == once);
 }
 
 TEST_F(DriverTest, ADivergedSimulationIsAFault) {

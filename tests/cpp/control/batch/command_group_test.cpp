@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <cstdint>
-#include <map>
-#include <random>
 #include <vector>
 
 #include "control/rig.hpp"
@@ -235,96 +233,6 @@ TEST(CommandGroup, IsInvalidWholeIfOneMemberIs) {
   refused([](Head group, Head, Head) { group->rows = 0; });
   refused([](Head group, Head, Head) { group->rows = 1U << 31; });
   refused([](Head group, Head, Head) { group->kind = RecordKind::member; });
-}
-
-// ------------------------------------------------------------------------------ properties
-
-TEST(CommandGroup, BesideSingleCommandsEveryRecordEndsOnceAndAllBlocksComeBack) {
-  for (std::uint32_t seed = 0; seed < 300; ++seed) {
-    std::mt19937 random(seed);  // NOLINT(bugprone-random-generator-seed)
-    const auto below = [&](std::uint32_t n) { return static_cast<std::uint32_t>(random() % n); };
-    constexpr std::uint32_t kQueues = 4;
-    Schema schema = plain_robot(kQueues);
-    if (below(2) == 0) schema.actuator(1).limits({.speed = 900.0});
-    if (below(2) == 0) schema.actuator(2).when_idle(WhenIdle::follow);
-    schema.add_request("nothing", kNoType, "no payload");
-    Rig rig(schema);
-    std::map<std::uint32_t, std::uint64_t> blocks;
-    std::vector<std::pair<std::uint32_t, CommandId>> records;
-    for (int round = 0; round < 50; ++round) {
-      const std::uint32_t lane = below(3);
-      for (std::uint32_t i = 1 + below(6); i > 0; --i) {
-        RecordHead head;
-        switch (below(5)) {
-          case 0:
-            head = direct();
-            break;
-          case 1:
-            head = over(1 + below(8));
-            break;
-          case 2:
-            head = during(below(9) * 700'000);
-            break;
-          case 3:
-            head = at_speed(200.0 + below(3000));
-            break;
-          default:
-            head = until(rig.next + below(20));
-        }
-        if (below(2) == 0) head = smoothly(head);
-        if (below(3) == 0) head = overwriting(head);
-        std::vector<std::uint32_t> actuators;
-        for (std::uint32_t actuator = 0; actuator < kQueues; ++actuator) {
-          if (below(2) == 0) actuators.push_back(actuator);
-        }
-        const std::uint32_t rows = head.pace == Pace::until ? 1 : 1 + below(3);
-        std::vector<double> targets(actuators.size() * rows);
-        for (double& target : targets) target = below(100);
-        std::vector<std::int64_t> times;
-        if (head.pace == Pace::duration && rows > 1) {
-          for (std::uint32_t row = 0; row < rows; ++row) {
-            times.push_back((row == 0 ? 0 : times.back()) + below(4'000'000));
-          }
-        }
-        if (below(10) == 0) {
-          rig.batch.purge(static_cast<std::uint16_t>(below(kQueues)));
-        } else if (below(12) == 0) {
-          rig.batch.purge_own(kEveryActuator);
-        } else if (below(15) == 0) {
-          rig.batch.request(0, {});
-        } else if (actuators.empty()) {
-          rig.add(below(kQueues), head.pace == Pace::duration ? over(2) : head, {1.0});
-        } else {
-          add_group(rig, actuators, head, targets, rows, times);
-        }
-      }
-      blocks[lane] += rig.batch.blocks();
-      const std::uint32_t count = rig.batch.records();
-      rig.fresh_start = below(3) == 0;
-      const BlockIndex batch = rig.send(lane);
-      for (std::uint32_t i = 0; i < count; ++i) records.emplace_back(lane, record_id(rig.sent, i));
-      if (below(3) == 0) rig.check(lane, batch, 1 + below(9));
-      if (below(10) == 0) {
-        rig.controller.reject(lane, batch, Reason::late, 0, rig.next);
-      } else {
-        rig.controller.take(lane, batch, rig);
-      }
-      if (below(15) == 0) rig.controller.interrupt(below(kQueues), rig.next - 1);
-      if (below(15) == 0) rig.controller.purge_lane(lane, kEveryActuator, rig.next);
-      if (below(30) == 0) rig.controller.halt(rig.next);
-      for (std::uint32_t i = below(6); i > 0; --i) rig.step();
-    }
-    for (int i = 0; i < 5000 && (rig.controller.active() || rig.controller.pending()); ++i) {
-      rig.step();
-    }
-    ASSERT_FALSE(rig.controller.active()) << "nobody waits for ever, seed " << seed;
-    for (const auto& [lane, id] : records) {
-      ASSERT_EQ(rig.witness.ends_of(id, lane), 1U) << seed;
-      ASSERT_LE(rig.witness.of(id, lane).size(), 2U) << seed;
-    }
-    ASSERT_TRUE(rig.all_blocks_back()) << seed;
-    for (const auto& [lane, count] : blocks) ASSERT_EQ(rig.witness.freed_blocks[lane], count);
-  }
 }
 
 TEST(CommandGroups, ALaterOfferLeavesTheDelayOfItsMembers) {

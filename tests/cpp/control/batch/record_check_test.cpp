@@ -4,8 +4,6 @@
 
 #include <cmath>
 #include <cstring>
-#include <map>
-#include <random>
 
 #include "control/rig.hpp"
 
@@ -222,74 +220,6 @@ TEST(RecordCheck, MarksWithoutTextOrWithTooMuchAreRefused) {
     rig.run(2);
     EXPECT_EQ(rig.witness.last(3).reason, Reason::invalid) << length;
     EXPECT_TRUE(rig.all_blocks_back());
-  }
-}
-
-TEST(RecordCheck, GarbageDoesNoHarm) {
-  std::mt19937_64 random(7);
-  const auto any = [&](std::uint64_t low, std::uint64_t high) {
-    return std::uniform_int_distribution<std::uint64_t>(low, high)(random);
-  };
-  for (int round = 0; round < 6000; ++round) {
-    Rig rig(robot(), 256);
-    std::uint64_t sent_blocks = 0;
-    for (int pulse = 0; pulse < 3; ++pulse) {
-      for (std::uint64_t i = any(0, 6); i > 0; --i) {
-        RecordHead head = over(static_cast<std::int64_t>(any(0, 5)));
-        head.pace = static_cast<Pace>(any(0, 4));
-        if (head.pace == Pace::speed) head.speed = 1000.0;
-        head.profile = static_cast<Profile>(any(0, 1));
-        head.mode = static_cast<Mode>(any(0, 1));
-        switch (any(0, 6)) {
-          case 0:
-            rig.batch.request(0, std::vector<std::byte>(12));
-            break;
-          case 1:
-            rig.batch.purge(static_cast<std::uint16_t>(any(0, 3)));
-            break;
-          case 2:
-            rig.batch.take_control();
-            break;
-          case 3:
-            rig.add_rows(static_cast<std::uint32_t>(any(0, 1)), direct(), 20,
-                         std::vector<double>(40, 1.0));
-            break;
-          default:
-            rig.add(static_cast<std::uint32_t>(any(0, 1)), head, {1.0, 2.0});
-        }
-      }
-      BatchRecord record;
-      record.id = rig.sent = 1 + 100 * static_cast<CommandId>(pulse);
-      const auto sealed = rig.batch.seal(record);
-      std::vector<Block> blocks(sealed.begin(), sealed.end());
-      for (std::uint64_t spoilt = any(0, 8); spoilt > 0; --spoilt) {
-        const std::size_t block = any(0, blocks.size() - 1);
-        // mostly in the heads, where it hurts; the batch keeps its id, or it would be another's
-        const std::size_t at = any(0, 2) == 0 ? any(0, 63) : any(0, 23);
-        if (block == 0 && at >= 8 && at < 16) continue;
-        blocks[block].bytes[at] = static_cast<std::byte>(any(0, 3) == 0 ? any(0, 255) : any(0, 8));
-      }
-      if (any(0, 9) == 0) blocks.pop_back();
-      sent_blocks += blocks.size();
-      rig.batch.clear();
-      if (blocks.empty()) continue;
-      const BlockIndex batch = rig.place(blocks);
-      if (any(0, 1) == 0) rig.check(0, batch, static_cast<std::uint32_t>(any(0, 9)));
-      rig.controller.take(0, batch, rig);
-      for (std::uint64_t i = any(0, 3); i > 0; --i) rig.step();
-    }
-    rig.controller.purge(kEveryActuator, rig.next);
-    rig.run(3);
-    ASSERT_TRUE(rig.all_blocks_back()) << round;
-    ASSERT_EQ(rig.witness.freed_blocks[0], sent_blocks) << round;
-    for (std::uint32_t number = 0; number < 4; ++number) {
-      ASSERT_TRUE(std::isfinite(rig.desired(number))) << round;
-    }
-    std::map<CommandId, int> ends;
-    for (const StatusChange& change : rig.witness.changes) {
-      if (is_end(change.status)) ++ends[change.id];
-    }
-    for (const auto& [id, count] : ends) ASSERT_EQ(count, 1) << id << " in round " << round;
   }
 }
 

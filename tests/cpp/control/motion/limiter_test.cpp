@@ -84,31 +84,6 @@ TEST(Limiter, ATrajectoryGoesOnUntilItsLastRowIsReached) {
   for (const double position : rig.run(50)) ASSERT_EQ(position, 10.0);
 }
 
-TEST(Limiter, OutsideTheBoundsAStateMovesInwardWithinItsSpeed) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits({.minimum = 0.0, .maximum = 1.0, .speed = 500.0});
-  Rig rig(schema);
-  rig.observe(0, 5.0);  // it starts outside
-  rig.controller.restart(rig.observed.data(), nullptr, 0);
-  EXPECT_THAT(rig.run(1), ElementsAre(5.0));
-  rig.add(0, over(100), {0.5});
-  rig.pulse();
-  EXPECT_NEAR(rig.run(1)[0], 4.955, 1e-12) << "inward as fast as the command goes";
-  EXPECT_NEAR(rig.run(99)[98], 0.5, 1e-12);
-}
-
-TEST(Limiter, AStateOutsideItsBoundsDoesNotJumpToThem) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits({.maximum = 1.0});
-  Rig rig(schema);
-  rig.observe(0, 1.2);
-  rig.controller.restart(rig.observed.data(), nullptr, 0);
-  rig.add(0, over(10'000), {0.0});
-  rig.pulse();
-  EXPECT_NEAR(rig.run(1)[0], 1.2 - 1.2e-4, 1e-12);
-  EXPECT_FALSE(rig.clamped());
-}
-
 TEST(Limiter, APurgedMotionBrakesAndTheRowSaysSo) {
   Schema schema = plain_robot(1);
   schema.actuator(0).limits({.speed = 1000.0, .acceleration = 100'000.0});
@@ -187,17 +162,22 @@ TEST(Limiter, TheFastestWayIsFollowedToTheTargetAndRests) {
   EXPECT_FALSE(rig.braking());
 }
 
-TEST(Limiter, ARestingNumberGoesToRestWithinItsLimits) {
-  Schema schema = plain_robot(1, 2);
-  schema.actuator(0).rests_at("x1", 0.0).limits("x1", {.speed = 500.0});
-  Rig rig(schema);
-  rig.add(0, over(4), {1.0, 2.0});
-  rig.pulse();
-  rig.run(4);
-  EXPECT_EQ(rig.desired(1), 2.0) << "the target is hit";
-  EXPECT_THAT(rig.run(5, 1), ElementsAre(1.5, 1.0, 0.5, 0.0, 0.0));
-  EXPECT_EQ(rig.desired(0), 1.0) << "the other number stays";
-  EXPECT_FALSE(rig.braking());
+TEST(Limiter, TheFastestWayIsRefusedForANumberWithoutLimitsOfSpeedAndAcceleration) {
+  for (const Limits& limits : {Limits{}, Limits{.speed = 1.0}}) {
+    Schema robot = plain_robot(1, 2);
+    robot.actuator(0).limits("x0", {.speed = 1.0, .acceleration = 1.0});
+    robot.actuator(0).limits("x1", limits);
+    Rig rig(robot, 64);
+    rig.add(0, overwriting(paced(Pace::fastest, 0)), {0.1, 0.1});
+    const CommandId both = rig.pulse();
+    rig.step();
+    EXPECT_EQ(rig.witness.status(both + 2), Status::rejected);
+    // but the number that has them may be commanded alone
+    rig.add_rows(0, overwriting(paced(Pace::fastest, 0)), 1, {0.1, 0.0}, {}, {0b01});
+    const CommandId one = rig.pulse();
+    while (rig.controller.active()) rig.step();
+    EXPECT_EQ(rig.witness.status(one + 2), Status::completed);
+  }
 }
 
 TEST(Limiter, ARestingNumberThatStandsForAMomentGoesOnToItsRest) {

@@ -130,24 +130,6 @@ TEST_F(KillTest, IsNotForgottenWhileASuccessorHoldsTheLockOfTheDead) {
   EXPECT_EQ(attach().life(), Life::running);
 }
 
-TEST_F(KillTest, LetsOneOfTwoProcessesTakeOver) {
-  for (int round = 0; round < 10; ++round) {
-    ChildProcess dead(be_a_backend);
-    ASSERT_TRUE(dead.wait_until_ready());
-    dead.kill_now();
-    // who loses ends without a word
-    const auto start = [](const ChildProcess::Ready& ready) {
-      const OwnedSegment segment = OwnedSegment::create(small_spec());
-      ready();
-      pause_for_ever();
-    };
-    ChildProcess first(start), second(start);
-    const int won = (first.wait_until_ready() ? 1 : 0) + (second.wait_until_ready() ? 1 : 0);
-    EXPECT_EQ(won, 1);
-    EXPECT_EQ(directory_.files(), 2U);
-  }
-}
-
 TEST_F(KillTest, FreesTheLaneOfADeadFrontendAndKeepsWhatItCommitted) {
   const OwnedSegment segment = running_segment();
   LaneReceivers lanes(segment.view(), kTicketAt);
@@ -194,22 +176,6 @@ TEST_F(KillTest, WakesOthersWhenAWaiterIsKilledAsleep) {
   asleep.kill_now();
   publish(segment, 1);
   waiter.join();
-}
-
-TEST_F(KillTest, SweepsTheDraftOfAStarterKilledHalfWay) {
-  ChildProcess starter([](const ChildProcess::Ready& ready) {
-    const SegmentDraft draft("arm");
-    ready();
-    pause_for_ever();
-  });
-  ASSERT_TRUE(starter.wait_until_ready());
-  {
-    const OwnedSegment segment = OwnedSegment::create(small_spec("leg"));
-    EXPECT_EQ(directory_.files(), 4U);  // it lives: hands off
-  }
-  starter.kill_now();
-  const OwnedSegment segment = OwnedSegment::create(small_spec("leg"));
-  EXPECT_EQ(directory_.files(), 2U);
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <sys/stat.h>
 
 #include <fstream>
-#include <thread>
 
 #include "memory/segment/segment_name.hpp"
 #include "memory/segments.hpp"
@@ -105,33 +104,6 @@ TEST_F(OwnedSegmentTest, TellsThoseAttachedToItsPredecessorThatItIsSuperseded) {
   EXPECT_EQ(old.life(), Life::superseded);
   EXPECT_THROW(old.throw_if_gone(), BackendSuperseded);
   EXPECT_NE(old.epoch(), next.epoch());
-}
-
-TEST_F(OwnedSegmentTest, IsWonByExactlyOneOfManyStarters) {
-  for (int round = 0; round < 20; ++round) {
-    // every other round there is a dead one to take over
-    if (round % 2 == 1) running_segment().end(BackendState::failed);
-    std::atomic<int> won{0}, refused{0}, decided{0};
-    std::vector<std::thread> starters;
-    starters.reserve(4);
-    for (int i = 0; i < 4; ++i)
-      starters.emplace_back([&] {
-        try {
-          const OwnedSegment segment = OwnedSegment::create(small_spec());
-          ++won;
-          ++decided;
-          while (decided < 4) std::this_thread::yield();
-        } catch (const SegmentTaken&) {
-          ++refused;
-          ++decided;
-        }
-      });
-    for (std::thread& starter : starters) starter.join();
-
-    EXPECT_EQ(won, 1);
-    EXPECT_EQ(refused, 3);
-    EXPECT_EQ(directory_.files(), 0U);
-  }
 }
 
 TEST_F(OwnedSegmentTest, SweepsAwayTheDraftsOfDeadStarters) {

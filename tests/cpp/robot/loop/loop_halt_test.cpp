@@ -1,16 +1,9 @@
 // How a loop halts, resumes and stops in order, with a driver that can fail in each of its verbs.
 
-#include <fcntl.h>
 #include <gmock/gmock.h>
-#include <linux/userfaultfd.h>
-#include <sys/ioctl.h>
-#include <sys/mman.h>
-#include <sys/syscall.h>
-#include <unistd.h>
 
 #include <chrono>
 #include <cmath>
-#include <cstdlib>
 #include <limits>
 #include <random>
 #include <stdexcept>
@@ -487,58 +480,6 @@ TEST_F(ReadingTest, RowZeroInRealTimeIsReadUntilTwoReadingsAgree) {
 
 // ------------------------------------------------------------------------- gaps
 
-/// Memory whose first touch takes `seconds`, as a page that must be read from a slow disk.
-class SlowPage {
- public:
-  explicit SlowPage(double seconds) : seconds_(seconds) {
-    fd_ = static_cast<int>(::syscall(SYS_userfaultfd, O_CLOEXEC | UFFD_USER_MODE_ONLY));
-    if (fd_ < 0) return;
-    page_ = ::mmap(nullptr, kSize, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
-    uffdio_api api{.api = UFFD_API, .features = 0, .ioctls = 0};
-    uffdio_register watched{.range = {.start = address(), .len = kSize},
-                            .mode = UFFDIO_REGISTER_MODE_MISSING,
-                            .ioctls = 0};
-    if (::ioctl(fd_, UFFDIO_API, &api) != 0) throw std::runtime_error("no userfaultfd");
-    if (::ioctl(fd_, UFFDIO_REGISTER, &watched) != 0) throw std::runtime_error("no userfaultfd");
-    filler_ = std::thread([this] { fill(); });
-  }
-  SlowPage(const SlowPage&) = delete;
-  SlowPage& operator=(const SlowPage&) = delete;
-  ~SlowPage() {
-    if (fd_ < 0) return;
-    touch();
-    filler_.join();
-    ::munmap(page_, kSize);
-    ::close(fd_);
-  }
-  /// A kernel may give nobody such memory.
-  bool is_there() const { return fd_ >= 0; }
-  void touch() { *static_cast<volatile char*>(page_) = 1; }
-
- private:
-  static constexpr std::size_t kSize = 4096;
-
-  std::uint64_t address() const { return reinterpret_cast<std::uint64_t>(page_); }
-  void fill() {
-    uffd_msg message{};
-    while (::read(fd_, &message, sizeof message) != sizeof message) {
-    }
-    std::this_thread::sleep_for(std::chrono::duration<double>(seconds_));
-    alignas(kSize) static char zeros[kSize];
-    uffdio_copy copy{.dst = address(),
-                     .src = reinterpret_cast<std::uint64_t>(zeros),
-                     .len = kSize,
-                     .mode = 0,
-                     .copy = 0};
-    if (::ioctl(fd_, UFFDIO_COPY, &copy) != 0) std::abort();
-  }
-
-  double seconds_;
-  int fd_ = -1;
-  void* page_ = nullptr;
-  std::thread filler_;
-};
-
 /// A loop in real time whose driver stalls once, in iteration 20.
 class GapTest : public LoopHaltTest {
  protected:
@@ -567,16 +508,6 @@ TEST_F(GapTest, AVerbThatHangsAndReturnsHaltsWithItsLength) {
   EXPECT_THAT(cause_after(hang, 250'000'000),
               AllOf(HasSubstr("no iteration for "), HasSubstr("longer than --gap 0.25")));
   EXPECT_EQ(cause_after(hang, 0), "");
-}
-
-TEST_F(GapTest, SoDoesAPageThatComesLate) {
-  SlowPage page(0.3);
-  const std::function<void()> touch = [&] {
-    if (page.is_there()) return page.touch();
-    // a container may forbid such pages: then this is the verb that hangs
-    std::this_thread::sleep_for(std::chrono::milliseconds(300));
-  };
-  EXPECT_THAT(cause_after(touch, 250'000'000), HasSubstr("longer than --gap 0.25"));
 }
 
 TEST_F(GapTest, ADriverDescribesAShorterOne) {

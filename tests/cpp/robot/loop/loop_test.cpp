@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <array>
-#include <atomic>
 #include <string_view>
 #include <tuple>
 
@@ -262,12 +261,6 @@ TEST_F(LoopTest, PublishesAnOverrunAndSkipsThePeriodsInsteadOfHurrying) {
   EXPECT_GE(late.skipped, before.skipped + 9);
   EXPECT_GE(late.lateness, 1'800'000);
   EXPECT_GE(after.time - late.time, 34 * 200'000) << "what follows keeps its period";
-}
-
-TEST_F(LoopTest, ASecondOneOfItsNameIsRefused) {
-  const auto loop = make();
-  EXPECT_THAT(message_of<SegmentTaken>([] { make(); }), HasSubstr("puppet"));
-  EXPECT_EQ(Puppet::calls.started, 0);
 }
 
 }  // namespace

@@ -13,7 +13,6 @@
 #include <filesystem>
 #include <fstream>
 #include <map>
-#include <sstream>
 
 #include "memory/child_process.hpp"
 #include "o80/base/time.hpp"
@@ -134,19 +133,6 @@ TEST_F(RunTest, StopsWhenItsInputEndsIfToldSo) {
   program.close_input();
   EXPECT_EQ(program.end().code, 0);
   EXPECT_EQ(directory_.files(), 0U);
-}
-
-TEST_F(RunTest, ASecondOneOfTheNameIsRefusedNamingTheOwner) {
-  Program first(two_joints());
-  ASSERT_TRUE(first.says("runs on segment"));
-  Program second(two_joints());
-  const Outcome refused = second.end();
-  EXPECT_EQ(refused.code, 1);
-  EXPECT_THAT(refused.err, AllOf(HasSubstr("already has a backend"),
-                                 HasSubstr("pid " + std::to_string(first.pid()))));
-  EXPECT_EQ(UntypedFrontend("two_joints").life(), Life::running);
-  first.signal(SIGTERM);
-  EXPECT_EQ(first.end().code, 0);
 }
 
 TEST_F(RunTest, ASecondOneOfTheNameDoesNotEvenConstructItsDriver) {
@@ -348,24 +334,6 @@ TEST_F(RunTestWithTools, MakesOneSystemCallAnIterationTheOneThatPacesIt) {
   EXPECT_LE(woken, paced) << "and one to wake who waits";
   calls.erase("restart_syscall");  // the one in which it was found
   EXPECT_THAT(calls, ::testing::IsEmpty()) << "of any other kind";
-}
-
-TEST_F(RunTest, KilledItLeavesItsNameToTheNextAtOnce) {
-  Program first(two_joints());
-  ASSERT_TRUE(first.says("runs on segment"));
-  UntypedFrontend frontend("two_joints", {.timeout = kPatience});
-  frontend.wait_for(20, kPatience);
-  first.signal(SIGKILL);
-  EXPECT_EQ(first.end().code, -SIGKILL);
-  EXPECT_THROW(frontend.wait_for(1'000'000, kPatience), BackendKilled);
-  EXPECT_GE(frontend.history(20).count, 20U);
-  Program second(two_joints());
-  ASSERT_TRUE(second.says("runs on segment"));
-  EXPECT_EQ(frontend.life(), Life::superseded);
-  UntypedFrontend again("two_joints", {.timeout = kPatience});
-  again.wait_for(3, kPatience);
-  second.signal(SIGTERM);
-  EXPECT_EQ(second.end().code, 0);
 }
 
 }  // namespace

@@ -242,31 +242,7 @@ TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
   EXPECT_EQ(directory_.files(), 0U);
 }
 
-TEST_F(BackendTest, RefusesASecondOneOfItsNameNamingTheOwner) {
-  Station station;
-  EXPECT_THAT(message_of<SegmentTaken>([] { Station(); }),
-              HasSubstr("pid " + std::to_string(getpid())));
-}
-
 // ------------------------------------------------------------------------------ requests
-
-TEST_F(BackendTest, ServesRequestsInTheOrderOfTheBatch) {
-  Station station;
-  station.start();
-  UntypedFrontend frontend("pair");
-  station.now = {3, 4};
-  add_request<Snapshot>(frontend);
-  add_request<Refuse>(frontend);
-  add(frontend, 0, 1.0);
-  const Batch batch = frontend.pulse();
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
-  EXPECT_EQ(batch.handle(0).iteration, 1);
-  EXPECT_EQ(batch.handle(1).status, Status::rejected);
-  EXPECT_EQ(batch.handle(1).reason, Reason::driver);
-  EXPECT_EQ(batch.handle(1).text, "it does not want to");
-  EXPECT_EQ(batch.handle(2).status, Status::completed) << "the rest of the batch is taken";
-}
 
 TEST_F(BackendTest, StartsAfreshInARowOfItsOwn) {
   Station station;
@@ -307,36 +283,6 @@ TEST_F(BackendTest, AloneAFreshStartEndsItsBatchInItsOwnRow) {
   station.run(1);
   EXPECT_EQ(batch.last_iteration(), 1);
   EXPECT_EQ(frontend.wait_for(1, kAtOnce).head().fresh, 1U);
-}
-
-TEST_F(BackendTest, RepeatsARestoredRunBitForBit) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
-  UntypedFrontend frontend("pair");
-  const auto play = [&] {
-    add(frontend, 0, 0.7, {.pace = iterations(7), .profile = Profile::minimum_jerk});
-    add(frontend, 1, 0.3, {.pace = speed(40)});
-    frontend.start_burst(20);
-    station.drive();
-    return frontend.history(20);
-  };
-  send(frontend, 0, 0.1);
-  frontend.start_burst(3);
-  station.drive();
-  add_request<Snapshot>(frontend);
-  frontend.pulse();
-  station.drive();
-  const Rows once = play();
-  add_request<Restore>(frontend);
-  frontend.pulse();
-  station.drive();
-  const Rows again = play();
-  ASSERT_EQ(once.count, 20U);
-  ASSERT_EQ(again.count, 20U);
-  for (std::size_t i = 0; i < 20; ++i) {
-    // all but iteration and time
-    EXPECT_THAT(again.row(i).subspan(16), ::testing::ElementsAreArray(once.row(i).subspan(16)));
-  }
 }
 
 TEST_F(BackendTest, ItsPhaseFollowsStepPublishBrakeAndEnd) {

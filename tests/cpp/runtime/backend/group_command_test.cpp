@@ -44,19 +44,6 @@ TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
   EXPECT_THAT(desired(frontend, 1, 2, 1), ElementsAre(2, 4));
 }
 
-TEST_F(GroupCommandTest, WaitsForItsSlowestQueueAndTakesAsLongAsItsSlowestMember) {
-  Station station;
-  station.start();
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 3.0, {.pace = iterations(3)});
-  add_both(frontend, 3.5, 2.0, {.pace = speed(1000)});
-  const Batch batch = frontend.pulse();
-  station.run(5);
-  EXPECT_THAT(desired(frontend, 1, 5), ElementsAre(1, 2, 3, 3.25, 3.5));
-  EXPECT_THAT(desired(frontend, 1, 5, 1), ElementsAre(0, 0, 0, 1, 2));
-  EXPECT_EQ(batch.last_iteration(), 5);
-}
-
 TEST_F(GroupCommandTest, ATrajectoryIsOneToo) {
   Station station;
   station.start();
@@ -151,40 +138,6 @@ TEST_F(GroupCommandTest, ABatchStagedOverSeveralIterationsActsWhole) {
 }
 
 // ------------------------------------------------------------------------------ losing members
-
-TEST_F(GroupCommandTest, GoesOnWhenAnotherFrontendOverwritesOneMember) {
-  Station station;
-  station.start();
-  UntypedFrontend one("pair");
-  UntypedFrontend other("pair");
-  add_both(one, 8.0, 8.0, {.pace = iterations(8)});
-  const Batch batch = one.pulse();
-  station.run(2);
-  send(other, 1, 0.5, {.mode = Mode::overwrite});
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::active);
-  station.run(5);
-  EXPECT_EQ(batch.handle(0).status, Status::overwritten);
-  EXPECT_EQ(batch.handle(0).iteration, 8) << "when its last member ended";
-  EXPECT_EQ(desired(one.latest(), 0), 8.0);
-  EXPECT_EQ(desired(one.latest(), 1), 0.5);
-}
-
-TEST_F(GroupCommandTest, GoesOnWhenTheDriverInterruptsOneMember) {
-  Station station;
-  station.start();
-  UntypedFrontend frontend("pair");
-  add_both(frontend, 8.0, 8.0, {.pace = iterations(8)});
-  const Batch batch = frontend.pulse();
-  station.before_publish = [&] {
-    if (station.backend.iteration() == 3) station.backend.interrupt(1);
-  };
-  station.run(8);
-  EXPECT_EQ(batch.handle(0).status, Status::interrupted);
-  EXPECT_EQ(batch.handle(0).iteration, 8);
-  EXPECT_EQ(desired(frontend.latest(), 0), 8.0);
-  EXPECT_EQ(desired(frontend.latest(), 1), 3.0);
-}
 
 TEST_F(GroupCommandTest, EndsAtOnceWhenAllItsMembersDo) {
   const auto ends_as = [](auto&& end, Status status) {

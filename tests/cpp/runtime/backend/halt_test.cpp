@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "control/batch/batch_builder.hpp"
-#include "memory/child_process.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/station.hpp"
 
@@ -288,22 +287,6 @@ TEST_F(HaltTest, AReadingThatIsNoNumberHaltsWhereThereIsAnErrorLimit) {
   station.before_publish = [&] { station.now[1] = std::nan(""); };
   station.run(2);
   EXPECT_TRUE(UntypedFrontend("pair").halted());
-}
-
-TEST_F(HaltTest, StandsWhenWhoAskedIsKilled) {
-  Station station;
-  station.start();
-  ChildProcess child([](const ChildProcess::Ready& ready) {
-    halt("pair", "my last word", kPatience);
-    ready();
-    pause_for_ever();
-  });
-  ASSERT_TRUE(child.wait_until_ready());
-  child.kill_now();
-  station.run(1);
-  UntypedFrontend frontend("pair");
-  ASSERT_TRUE(frontend.halted());
-  EXPECT_EQ(frontend.halted()->reason(), "my last word");
 }
 
 }  // namespace

@@ -298,33 +298,6 @@ TEST_F(HostileTest, ControlFallsWithADeadHolderWhateverItWroteAboutItself) {
   });
 }
 
-TEST_F(HostileTest, TheBatchOfASuccessorBehindTheGarbageOfItsPredecessorIsTaken) {
-  Station station({.segment = "pair", .lanes = 1, .lane_blocks = 64});
-  station.start();
-  for (const std::uint64_t claimed : {0U, 3U, 9U}) {
-    {
-      // nothing that is a batch, a batch of nonsense, one that reaches into what comes after it
-      Liar liar;
-      auto* words = reinterpret_cast<std::uint64_t*>(liar.view().transport(0));
-      words += 8 * (liar.page().committed % 64);
-      for (int i = 0; i < 24; ++i) std::atomic_ref(words[i]).store(0);
-      BatchRecord batch{.records = 1, .blocks = static_cast<std::uint32_t>(claimed)};
-      batch.id = liar.sender().next_id();
-      liar.sender().draw_ids(batch.id + 3);
-      std::array<std::uint64_t, sizeof batch / 8> head;
-      std::memcpy(head.data(), &batch, sizeof batch);
-      for (std::size_t i = 0; i < head.size(); ++i) std::atomic_ref(words[i]).store(head[i]);
-      liar.page().committed += 3;
-      liar.leave();
-    }
-    UntypedFrontend successor("pair");
-    const Batch sent = send(successor, 0, 0.5);
-    station.run(3);
-    ASSERT_TRUE(sent.ended()) << claimed;
-    EXPECT_EQ(sent.handle(0).status, Status::completed) << claimed;
-  }
-}
-
 TEST_F(HostileTest, IdsByLeapsAreRefusedAndTheNextOwnerOfTheLaneIsToldTheTruth) {
   Station station({.segment = "pair", .lanes = 1, .lane_blocks = 64});
   station.start();

@@ -1,99 +1,12 @@
 // kill -9 of either side, at the level of frontends and backends.
 
-#include <signal.h>
-
-#include <cstdio>
-
 #include "memory/child_process.hpp"
-#include "o80/base/time.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {
 namespace {
 
 class KillTest : public StationTest {};
-
-/// A backend in a process of its own that iterates for ever.
-void iterate_for_ever(const ChildProcess::Ready& ready) {
-  Station station;
-  station.start();
-  ready();
-  while (true) {
-    station.iterate();
-    const timespec millisecond{.tv_sec = 0, .tv_nsec = 1'000'000};
-    nanosleep(&millisecond, nullptr);
-  }
-}
-
-/// Kills the backend in the middle of a wait; the time until the error [ms].
-double time_to_the_error(ChildProcess& backend, UntypedFrontend& frontend) {
-  std::int64_t killed = 0;
-  const KeepWaiting kill_once = [&] {
-    if (killed == 0) {
-      killed = monotonic_now();
-      ::kill(backend.pid(), SIGKILL);
-    }
-    return true;
-  };
-  EXPECT_THROW(frontend.wait_for(1'000'000, kPatience, kill_once), BackendKilled);
-  return static_cast<double>(monotonic_now() - killed) * 1e-6;
-}
-
-TEST_F(KillTest, AWaitingFrontendLearnsSoonThatItsBackendWasKilled) {
-  ChildProcess backend(iterate_for_ever);
-  ASSERT_TRUE(backend.wait_until_ready());
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(1'000'000)});
-  frontend.wait_for(20, kPatience);
-  const double milliseconds = time_to_the_error(backend, frontend);
-  RecordProperty("milliseconds", static_cast<int>(milliseconds));
-  std::printf("killed => error in %.1f ms\n", milliseconds);
-  EXPECT_THROW(batch.wait(kPatience), BackendKilled);
-  EXPECT_THROW(send(frontend, 0, 2.0), BackendKilled);
-
-  // its history is there to the end
-  const Iteration last = frontend.published();
-  EXPECT_GE(last, 20);
-  EXPECT_EQ(frontend.wait_for(last, kAtOnce).iteration(), last);
-  EXPECT_EQ(frontend.history(20).count, 20U);
-  const UntypedFrontend late("pair", {.timeout = kAtOnce, .dead = true});
-  EXPECT_EQ(late.life(), Life::killed);
-
-  // a new one takes the name over at once
-  backend.wait();
-  Station successor;
-  successor.start();
-  EXPECT_EQ(frontend.life(), Life::superseded);
-  EXPECT_EQ(UntypedFrontend("pair").latest().iteration(), 0);
-  EXPECT_EQ(frontend.wait_for(last, kAtOnce).iteration(), last) << "the old one stays readable";
-}
-
-TEST_F(KillTest, AForkedChildDoesNotKeepTheDeadAlive) {
-  int pipe_ends[2];
-  ASSERT_EQ(pipe(pipe_ends), 0);
-  ChildProcess backend([&](const ChildProcess::Ready& ready) {
-    Station station;
-    station.start();
-    const pid_t child = fork();
-    if (child == 0) pause_for_ever();
-    if (write(pipe_ends[1], &child, sizeof child) != sizeof child) return;
-    ready();
-    pause_for_ever();
-  });
-  ASSERT_TRUE(backend.wait_until_ready());
-  pid_t grandchild = 0;
-  ASSERT_EQ(read(pipe_ends[0], &grandchild, sizeof grandchild), ssize_t{sizeof grandchild});
-  UntypedFrontend frontend("pair");
-  EXPECT_LT(time_to_the_error(backend, frontend), 2000);
-  backend.wait();
-  EXPECT_EQ(::kill(grandchild, 0), 0) << "its child still lives";
-  Station successor;
-  successor.start();
-  EXPECT_EQ(UntypedFrontend("pair").latest().iteration(), 0);
-  ::kill(grandchild, SIGKILL);
-  ::close(pipe_ends[0]);
-  ::close(pipe_ends[1]);
-}
 
 /// A frontend in a process of its own that sends a long movement and takes control.
 class Commander {

@@ -347,17 +347,6 @@ TEST_F(SilenceTest, ASimulationNeedsNoWatchdog) {
   EXPECT_EQ(frontend.added(), 1U);
 }
 
-TEST_F(SilenceTest, AStreamOfDirectValuesIsLife) {
-  Station station(watched(Stale::purge), rest_at_zero);
-  station.start();
-  UntypedFrontend frontend("pair");
-  for (int i = 1; i < 10; ++i) {
-    send(frontend, 0, i);
-    station.run(5);
-    EXPECT_EQ(desired(frontend.latest()), i);
-  }
-}
-
 TEST_F(SilenceTest, TheSchemaTellsFrontends) {
   Station station(watched(Stale::halt, 7));
   station.start();

@@ -134,22 +134,5 @@ TEST_F(BatchTest, CopiesMeanTheSameBatch) {
   EXPECT_EQ(copy.handle(0).status, Status::completed);
 }
 
-TEST_F(BatchTest, GarbageInALaneIsRejectedAndHarmsNobody) {
-  Station station;
-  station.start();
-  UntypedFrontend frontend("pair");
-  BatchBuilder builder;
-  RecordHead head;
-  head.actuator = 77;
-  const double target = 1.0;
-  builder.command(head, std::as_bytes(std::span(&target, 1)));
-  const Batch bad = frontend.pulse(builder);
-  const Batch good = send(frontend, 0, 1.0);
-  station.run(2);
-  EXPECT_EQ(bad.handle(0).status, Status::rejected);
-  EXPECT_EQ(bad.handle(0).reason, Reason::invalid);
-  EXPECT_EQ(good.handle(0).status, Status::completed);
-}
-
 }  // namespace
 }  // namespace o80::test

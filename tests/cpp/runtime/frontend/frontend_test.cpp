@@ -13,26 +13,6 @@ using ::testing::HasSubstr;
 
 class FrontendTest : public StationTest {};
 
-TEST_F(FrontendTest, WaitsForABackendThatIsStillStarting) {
-  Station station;
-  std::atomic<bool> about_to_attach{false};
-  std::thread starter([&] {
-    while (!about_to_attach) std::this_thread::yield();
-    station.start();
-  });
-  about_to_attach = true;
-  const UntypedFrontend frontend("pair", {.timeout = kPatience});
-  starter.join();
-  EXPECT_EQ(frontend.latest().iteration(), 0);
-}
-
-TEST_F(FrontendTest, SaysWhatThereIsWhenItsBackendDoesNotCome) {
-  Station station;
-  station.start();
-  EXPECT_THAT(message_of<TimeoutError>([] { UntypedFrontend("arm", {.timeout = kAtOnce}); }),
-              AllOf(HasSubstr("arm"), HasSubstr("pair (running)")));
-}
-
 // ------------------------------------------------------------------------------ adding
 
 TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
@@ -58,20 +38,6 @@ TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
   EXPECT_THAT(refusal([&] { static_cast<void>(frontend.request_index("rest")); }),
               HasSubstr("Did you mean 'reset'?"));
   EXPECT_EQ(frontend.added(), 0U);
-}
-
-TEST_F(FrontendTest, FollowsATrajectoryRowByRow) {
-  Station station;
-  station.start();
-  UntypedFrontend frontend("pair");
-  const std::array<double, 3> rows{1, 2, 4};
-  frontend.add_trajectory(0, 3, std::as_bytes(std::span(rows)));
-  frontend.add_trajectory(1, 3, std::as_bytes(std::span(rows)), {.pace = iterations(2)});
-  const Batch batch = frontend.pulse();
-  EXPECT_EQ(batch.size(), 2U) << "one command for each actuator";
-  station.run(6);
-  EXPECT_THAT(desired(frontend, 1, 6), ElementsAre(1, 2, 4, 4, 4, 4));
-  EXPECT_THAT(desired(frontend, 1, 6, 1), ElementsAre(0.5, 1, 1.5, 2, 3, 4));
 }
 
 TEST_F(FrontendTest, TheLastStateOfATrajectoryIsNoDirectValue) {
@@ -208,21 +174,6 @@ TEST_F(FrontendTest, ABatchLargerThanItsLaneSaysHowToSendIt) {
   EXPECT_EQ(desired(frontend.latest()), 1.0);
 }
 
-TEST_F(FrontendTest, OneTooManyCommandingFrontendIsToldWhoTheOthersAre) {
-  Station station({.segment = "pair", .lanes = 2});
-  station.start();
-  std::array<UntypedFrontend, 3> frontends{UntypedFrontend("pair"), UntypedFrontend("pair"),
-                                           UntypedFrontend("pair")};
-  send(frontends[0], 0, 1.0);
-  send(frontends[1], 0, 1.0);
-  EXPECT_THAT(message_of<NoLane>([&] { send(frontends[2], 0, 1.0); }),
-              HasSubstr("pid " + std::to_string(getpid())));
-  EXPECT_EQ(frontends[2].latest().iteration(), 0) << "it still reads";
-  frontends[0] = UntypedFrontend("pair");
-  EXPECT_EQ(frontends[2].added(), 1U);
-  frontends[2].pulse();
-}
-
 TEST_F(FrontendTest, APureReaderTakesNoLaneAndMayBeReadOnly) {
   Station station({.segment = "pair", .lanes = 1});
   station.start();
@@ -252,68 +203,6 @@ TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
   EXPECT_EQ(desired(next.latest(), 0), 1.0) << "sent motion goes on";
   EXPECT_EQ(desired(next.latest(), 1), 2.0);
   EXPECT_EQ(batch.handle(0).status, Status::completed) << "a kept batch still answers";
-}
-
-TEST_F(FrontendTest, SeveralThreadsMayPulseThroughOne) {
-  Station station({.segment = "pair", .lanes = 1});
-  station.start();
-  UntypedFrontend frontend("pair");
-  constexpr int kEach = 200;
-  std::atomic<int> ready{0};
-  std::vector<std::thread> threads;
-  for (std::uint32_t actuator : {0U, 1U}) {
-    threads.emplace_back([&, actuator] {
-      for (int i = 0; i < kEach; ++i) {
-        add(frontend, actuator, i + 1);
-        frontend.pulse();
-      }
-      ++ready;
-    });
-  }
-  while (ready < 2) station.iterate();
-  for (std::thread& thread : threads) thread.join();
-  station.run(kEach + 10);  // so many batches are taken in several iterations
-  EXPECT_EQ(desired(frontend.latest(), 0), kEach);
-  EXPECT_EQ(desired(frontend.latest(), 1), kEach);
-}
-
-TEST_F(FrontendTest, APurgeDropsWithoutASuccessorAndLeavesNobodyWaiting) {
-  Station station;
-  station.start();
-  UntypedFrontend one("pair");
-  UntypedFrontend two("pair");
-  const Batch mine = send(one, 0, 9.0, {.pace = iterations(9)});
-  const Batch theirs = send(two, 0, 9.0, {.pace = iterations(9)});
-  station.run(2);
-  one.add_purge_own();
-  one.pulse();
-  station.run(1);
-  EXPECT_EQ(mine.handle(0).status, Status::purged);
-  EXPECT_THROW(mine.wait(kAtOnce), NotCompleted);
-  EXPECT_EQ(theirs.handle(0).status, Status::active);
-  one.add_purge(0);
-  one.pulse();
-  station.run(2);
-  EXPECT_EQ(theirs.handle(0).status, Status::purged);
-  EXPECT_THROW(theirs.wait(kAtOnce), NotCompleted);
-  EXPECT_FALSE(one.latest().active(0));
-}
-
-TEST_F(FrontendTest, ABatchRejectedWholeIsAnErrorForWhoWaitsForItsMotion) {
-  Station station;
-  station.start();
-  UntypedFrontend frontend("pair");
-  station.run(3);
-  std::thread runner([&] {
-    while (frontend.published() < 1000 && frontend.link()->lane_if_taken() == nullptr) {
-      std::this_thread::yield();
-    }
-    for (int i = 0; i < 100; ++i) station.iterate();
-  });
-  add(frontend, 0, 1.0);
-  EXPECT_THAT(message_of<Error>([&] { frontend.pulse_and_wait(kPatience, {.at = 1}); }),
-              HasSubstr("was rejected: it came after the iteration"));
-  runner.join();
 }
 
 // ------------------------------------------------------------------------------ reading
@@ -413,38 +302,6 @@ TEST_F(FrontendTest, AWaitEndsWhenItsCallerSaysSo) {
   EXPECT_THROW(frontend.wait_for(99, kPatience, [&] { return ++asked < 2; }), Cancelled);
   const Batch batch = send(frontend, 0, 1.0);
   EXPECT_THROW(batch.wait(kPatience, [] { return false; }), Cancelled);
-}
-
-TEST_F(FrontendTest, AWaitEndsWhenItsFrontendIsClosed) {
-  Station station;
-  station.start();
-  UntypedFrontend frontend("pair");
-  std::atomic<bool> waits{false};
-  std::thread closer([&] {
-    while (!waits) std::this_thread::yield();
-    frontend.close();
-  });
-  EXPECT_THROW(frontend.wait_for(99, kPatience,
-                                 [&] {
-                                   waits = true;
-                                   return true;
-                                 }),
-               Closed);
-  closer.join();
-}
-
-TEST_F(FrontendTest, MeetsTheSuccessorOfADeadBackendUnderTheSameName) {
-  auto station = std::make_unique<Station>();
-  station->start();
-  UntypedFrontend frontend("pair");
-  const std::uint64_t epoch = frontend.epoch();
-  station.reset();
-  EXPECT_THROW(frontend.wait_for(1, kPatience), BackendGone);
-  Station successor;
-  successor.start();
-  const UntypedFrontend next("pair");
-  EXPECT_NE(next.epoch(), epoch);
-  EXPECT_EQ(next.latest().iteration(), 0);
 }
 
 }  // namespace
