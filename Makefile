@@ -18,7 +18,7 @@ test:
 	@tools/setup.sh environment
 	@.venv/bin/python tools/test.py $(ARGS)
 
-# everything; ARGS chooses steps: make check ARGS="ruff mypy asan"
+# what `make test` leaves; ARGS chooses steps: make check ARGS="ruff mypy asan"
 check:
 	@tools/setup.sh check
 	@.venv/bin/python tools/check.py $(ARGS)

@@ -6,21 +6,21 @@ import subprocess
 import sys
 import time
 from collections import deque
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
-from outcomes import Outcomes, of_ctest, of_pytest
 from sources import ROOT
 
 BEGIN = time.monotonic()
 JOBS = len(os.sched_getaffinity(0))
 LOGS = ROOT / "build" / "test"
-PASSED = LOGS / "passed.json"  # what `make test` passed, on which files
 PYTHON = [sys.executable, "-m"]
-CTEST_CLOSING = r"^\d+% tests passed|^Total Test time"
-PYTEST_CLOSING = r"^left to make check|^left out|^=+ .*\b(passed|skipped|deselected)\b.* =+$"
+CLOSING = re.compile(  # lines with which ctest and pytest end
+    r"^\d+% tests passed|^Total Test time|^left to make check|^left out"
+    r"|^=+ .*\b(passed|skipped|deselected)\b.* =+$"
+)
 
 
 @dataclass(frozen=True)
@@ -29,12 +29,19 @@ class Step:
 
     name: str
     commands: list[list[str]]
-    closing: str = ""  # lines of its log that match this are shown when it passed; empty: the last
-    outcomes: Callable[[], Outcomes] = Outcomes
 
     @property
     def log(self) -> Path:
         return LOGS / f"{self.name}.log"
+
+    def lines(self) -> list[str]:
+        """The closing lines of ctest or pytest in its log, otherwise the last line."""
+        with self.log.open(errors="replace") as text:
+            return [line for line in text if CLOSING.search(line)] or self.last_lines(1)
+
+    def last_lines(self, count: int) -> list[str]:
+        with self.log.open(errors="replace") as text:
+            return list(deque(text, count))
 
 
 def use_tools() -> None:
@@ -49,22 +56,11 @@ def use_tools() -> None:
     LOGS.mkdir(parents=True, exist_ok=True)
 
 
-def processor_time() -> float:
-    """Processor time of all programs that were run so far and have ended [s]."""
-    times = os.times()
-    return times.children_user + times.children_system
-
-
-def last_lines(step: Step, count: int) -> list[str]:
-    with step.log.open(errors="replace") as text:
-        return list(deque(text, count))
-
-
-def closing_lines(step: Step) -> list[str]:
-    if not step.closing:
-        return last_lines(step, 1)
-    with step.log.open(errors="replace") as text:
-        return [line for line in text if re.search(step.closing, line)]
+def times() -> str:
+    """Time since the beginning, and processor time of all programs that were run and have ended."""
+    used = os.times()
+    processor = used.children_user + used.children_system
+    return f"{time.monotonic() - BEGIN:.0f} s ({processor:.0f} s of processor time)"
 
 
 def run(step: Step) -> bool:
@@ -82,7 +78,7 @@ def run(step: Step) -> bool:
                 break
     now = time.monotonic()
     verdict = "passed" if returned == 0 else f"FAILED ({step.log.relative_to(ROOT)})"
-    shown = closing_lines(step) if returned == 0 else last_lines(step, 400)
+    shown = step.lines() if returned == 0 else step.last_lines(400)
     took = f"{now - begin:.0f} s ({used:.0f} s of processor time)"
     text = f"{''.join(shown)}== {now - BEGIN:3.0f} s: {step.name}: {verdict} in {took}"
     print(text, flush=True)
@@ -123,31 +119,16 @@ def build(preset: str, *targets: str) -> list[list[str]]:
     ]
 
 
-def ctest(preset: str, *options: str, report: str | None = None) -> Step:
-    """Runs the tests of a preset that is built. The report is named after the preset by default."""
-    name = report or preset
-    file = LOGS / f"{name}.xml"
-    # a thread sanitizer of this age cannot stand the widest address randomisation
-    random_bits = int(Path("/proc/sys/vm/mmap_rnd_bits").read_text())
-    fixed_addresses = ["setarch", "-R"] if preset == "tsan" and random_bits > 28 else []
-    command = [
-        *fixed_addresses,
-        *("ctest", "--preset", preset, "-j", str(JOBS), "--output-junit", str(file)),
-        *options,
-    ]
-    return Step(name, [command], CTEST_CLOSING, lambda: of_ctest(file))
+def ctest(step: str, preset: str, *options: str) -> list[str]:
+    """Command that runs the tests of a preset that is built, and writes the report of a step."""
+    report = ["--output-junit", str(LOGS / f"{step}.xml")]
+    return ["ctest", "--preset", preset, "-j", str(JOBS), *report, *options]
 
 
-def cpp(preset: str, *options: str, report: str | None = None) -> Step:
-    """Builds a preset and runs its tests."""
-    tests = ctest(preset, *options, report=report)
-    return Step(tests.name, [*build(preset), *tests.commands], tests.closing, tests.outcomes)
+def pytest(step: str, *options: str, processes: int = JOBS + 1) -> list[str]:
+    """Command that runs tests in Python, each file in one process, and writes the report of a step.
 
-
-def pytest(*options: str, report: str = "pytest", processes: int = JOBS + 1) -> Step:
-    """Runs tests in Python, each file in one process. Many tests wait: one process more than there
-    are processors keeps these busy."""
-    file = LOGS / f"{report}.xml"
+    Many tests wait: one process more than there are processors keeps these busy.
+    """
     several = ["-n", str(processes), "--dist", "loadfile"] if processes > 1 else []
-    command = [*PYTHON, "pytest", *several, f"--junit-xml={file}", *options]
-    return Step(report, [command], PYTEST_CLOSING, lambda: of_pytest(file))
+    return [*PYTHON, "pytest", *several, f"--junit-xml={LOGS / f'{step}.xml'}", *options]

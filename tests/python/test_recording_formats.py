@@ -8,10 +8,13 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+import numpy as np
 import pytest
 
 import o80
 from o80 import _core
+from o80.cli.export import export
+from o80.cli.plot import plot
 from o80.recording.scan import scan
 
 RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
@@ -34,6 +37,9 @@ def make() -> ModuleType:
 def test_there_is_a_recording_of_each_version_of_the_format() -> None:
     assert sorted(CODECS) == sorted(NAMES)
     assert set(CODECS.values()) == set(range(_core.JOURNAL_CODEC + 1))
+    of_6fd9210 = "4a3cebb7be361ca103bc5a0bec934db8e99950d3d5567af4713e5a3c9d77d592"
+    (epoch, _) = o80.open(RECORDINGS / "codec_0.mcap")["joints"].epochs
+    assert epoch.provenance.source_hash == of_6fd9210
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -46,6 +52,22 @@ def test_a_recording_of_an_earlier_version_is_read(name: str, make: ModuleType) 
         for epoch in segment.epochs:
             assert epoch.journal_codec == CODECS[name]
             assert epoch.provenance.motion_rules == 1
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_recording_of_an_earlier_version_is_exported_and_plotted(
+    name: str, tmp_path: Path
+) -> None:
+    recording = RECORDINGS / f"{name}.mcap"
+    export(str(recording), tmp_path / "rows.npz", segment="joints")
+    plot([str(recording)], tmp_path / "rows.png", segment="joints")
+
+    (_, second) = o80.open(recording)["joints"].epochs
+    columns = np.load(tmp_path / "rows.npz")
+    rows = second.history()
+    assert np.array_equal(columns["joints/1/observed.elbow"], rows.observed[:, 1])
+    assert np.array_equal(columns["joints/1/time"], rows.time)
+    assert (tmp_path / "rows.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("name", NAMES)

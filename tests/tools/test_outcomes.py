@@ -2,7 +2,9 @@
 
 from pathlib import Path
 
-from outcomes import Outcomes, of_ctest, of_log, of_pytest
+import pytest
+
+from outcomes import Outcomes
 
 CTEST = """<testsuite>
   <testcase name="robot.Loop.Runs" status="run"><system-out>fine</system-out></testcase>
@@ -27,36 +29,32 @@ PYTEST = """<testsuites><testsuite>
 </testsuite></testsuites>"""
 
 
-def written(folder: Path, text: str) -> Path:
-    file = folder / "report"
-    file.write_text(text)
-    return file
+@pytest.fixture
+def found(tmp_path: Path) -> Outcomes:
+    found = Outcomes()
+    for text in (CTEST, PYTEST):
+        (tmp_path / "report").write_text(text)
+        found.read_report(tmp_path / "report")
+    return found
 
 
-def test_ctest_tells_what_passed_and_why_a_test_was_skipped(tmp_path: Path) -> None:
-    found = of_ctest(written(tmp_path, CTEST))
-
-    assert found.passed == {"robot.Loop.Runs"}
-    reason = "no user may be given a real-time priority here"
-    assert found.skipped == {"robot.RealTime.Locks": reason}
-
-
-def test_pytest_tells_what_passed_and_why_a_test_was_skipped(tmp_path: Path) -> None:
-    found = of_pytest(written(tmp_path, PYTEST))
-
-    assert found.passed == {"tests.python.test_a.test_passes"}
-    assert found.skipped == {"tests.python.test_a.test_skips": "no strace"}
+def test_reports_tell_what_passed_and_why_a_test_was_skipped(found: Outcomes) -> None:
+    assert found.passed == {"robot.Loop.Runs", "tests.python.test_a.test_passes"}
+    assert found.skipped == {
+        "robot.RealTime.Locks": "no user may be given a real-time priority here",
+        "tests.python.test_a.test_skips": "no strace",
+    }
 
 
-def test_a_skip_is_a_gap_unless_another_run_passed_that_test(tmp_path: Path) -> None:
-    found = of_ctest(written(tmp_path, CTEST))
-    assert list(found.gaps()) == ["robot.RealTime.Locks"]
-
-    found.add(Outcomes(passed={"robot.RealTime.Locks"}))
-    assert found.gaps() == {}
+def test_a_skip_is_a_gap_unless_another_run_passed_that_test(found: Outcomes) -> None:
+    found.passed.add("robot.RealTime.Locks")
+    assert list(found.gaps()) == ["tests.python.test_a.test_skips"]
 
 
 def test_a_step_that_says_it_was_skipped_is_a_gap(tmp_path: Path) -> None:
-    log = written(tmp_path, "building\nskipped: apt knows no kernel\n")
-    assert of_log("rt", log).gaps() == {"rt": "apt knows no kernel"}
-    assert of_log("rt", written(tmp_path, "all held\n")).gaps() == {}
+    log, found = tmp_path / "log", Outcomes()
+    log.write_text("all held\n")
+    assert not found.read_log("rt", log)
+    log.write_text("building\nskipped: apt knows no kernel\n")
+    assert found.read_log("rt", log)
+    assert found.gaps() == {"rt": "apt knows no kernel"}

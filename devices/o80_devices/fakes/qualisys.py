@@ -11,6 +11,7 @@ import math
 import random
 import re
 import socket
+import struct
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -18,25 +19,38 @@ from threading import Event, Lock, Thread
 
 from o80_devices.fakes import numbers
 from o80_devices.motion_capture.qualisys_packets import (
-    BODY,
-    EULER_BODY,
     GREETING,
-    MARKERS,
     PORT,
-    SIX_D_EULER,
     VERSION,
     Packets,
     Type,
     components_packet,
-    data_packet,
     packet,
     words_of,
 )
 
-HIDDEN = BODY.pack(*[math.nan] * 13)
-HIDDEN_EULER = EULER_BODY.pack(*[math.nan] * 6)
+RESIDUAL = 0.25  # [mm]
 CONNECTED = b"\x01"
 """The state of the server."""
+COMPONENTS = {
+    **{"3d": 1, "3dnolabels": 2, "3dres": 9, "3dnolabelsres": 10},  # it has no markers
+    **{"6d": 5, "6deuler": 6, "6dres": 11, "6deulerres": 12},
+}
+ANSWERS = {  # to commands that change nothing here
+    "qtmversion": "QTM Version is 2.17 (build 4000)",
+    "byteorder": "Byte order is little endian",
+    "takecontrol": "You are now master",
+    "releasecontrol": "You are now a regular client",
+    "new": "Creating new connection",
+    "close": "Closing connection",
+    "start": "Starting measurement",
+    "stop": "Stopping measurement",
+    "load": "Measurement loaded",
+    "save": "Measurement saved",
+    "loadproject": "Project loaded",
+    "trig": "Trig ok",
+    "event": "Event set",
+}
 Pose = tuple[Sequence[float], Sequence[float]]
 """Position [m], and the nine numbers of the rotation, row by row."""
 
@@ -46,8 +60,8 @@ class Stream:
     """How a client wants its frames."""
 
     send: Callable[[bytes], object]
-    euler: bool = False
-    """With angles instead of matrices, as the package motioncapture asks for."""
+    components: Sequence[str]
+    every: int  # frames
 
 
 @dataclass
@@ -61,8 +75,9 @@ class Faults:
 
 
 class FakeQualisys:
-    """Serves the RT protocol: bodies on circles of 0.1 m around (0, 0, number) [m], turning.
+    """Serves the RT protocol, all commands of its vendor's client but settings and calibrations.
 
+    Bodies move on circles of 0.1 m around (0, 0, number) [m], turning.
     poses: where the bodies are instead, by name and time [ns, monotonic]; None: it is not seen.
     A context manager. `restart` closes all connections and begins frames and stamps anew.
     """
@@ -142,33 +157,44 @@ class FakeQualisys:
                     self._wait_for(number + 1)
                     number = self._send_due(stream, number)
                 found = packets.receive(0.05 if stream is None else 0.0)
-                if found is not None and not self.faults.silent:
-                    command = words_of(found[1]).lower().strip()
-                    stream = self._begun(connected, command) or stream
-                    if stream is None or not command.startswith("streamframes"):
-                        self._answer(packets, connected, command)
+                if found is None or self.faults.silent:
+                    continue
+                verb, *words = words_of(found[1]).lower().split() or [""]
+                if verb == "streamframes":
+                    stream = self._stream(connected, words)
+                    if stream is not None or words == ["stop"]:
+                        continue
+                self._answer(packets, connected, verb, words)
 
-    def _begun(self, connected: socket.socket, command: str) -> Stream | None:
-        """The stream that a command begins, if it does."""
-        if command == "streamframes allframes 6dres":
-            return Stream(connected.sendall)
-        found = re.fullmatch(r"streamframes allframes udp:(\d+) 3dnolabels 6deuler", command)
-        if found is None:
+    def _stream(self, connected: socket.socket, words: list[str]) -> Stream | None:
+        """The stream that `streamframes` asks for; None to stop, or if it is not understood."""
+        asked = re.fullmatch(
+            r"(allframes|frequency:(\d+)|frequencydivisor:(\d+))( udp:(\d+))?(.*)", " ".join(words)
+        )
+        if asked is None or not set(asked[6].split()) <= set(COMPONENTS):
             return None
-        there = connected.getpeername()[0], int(found[1])
-        return Stream(lambda content: self._datagrams.sendto(content, there), euler=True)
+        every = max(1, round(self.frequency / int(asked[2])) if asked[2] else int(asked[3] or 1))
+        components = asked[6].split()
+        if not asked[5]:
+            return Stream(connected.sendall, components, every)
+        there = connected.getpeername()[0], int(asked[5])
+        return Stream(lambda content: self._datagrams.sendto(content, there), components, every)
 
-    def _answer(self, packets: Packets, connected: socket.socket, command: str) -> None:
-        if command == f"version {VERSION}":
-            packets.send(Type.COMMAND, f"Version set to {VERSION}")
-        elif command == "qtmversion":
-            packets.send(Type.COMMAND, "QTM Version is 2.17 (build 4000)")
-        elif command == "getstate":
+    def _answer(
+        self, packets: Packets, connected: socket.socket, verb: str, words: list[str]
+    ) -> None:
+        if verb == "version":
+            packets.send(Type.COMMAND, f"Version set to {' '.join(words)}")
+        elif verb in ANSWERS:
+            packets.send(Type.COMMAND, ANSWERS[verb])
+        elif verb == "getstate":
             connected.sendall(packet(Type.EVENT, CONNECTED))
-        elif command.startswith("getparameters"):
+        elif verb == "getparameters":
             packets.send(Type.XML, self._settings())
+        elif verb == "getcurrentframe" and set(words) <= set(COMPONENTS):
+            connected.sendall(self._frame(self._due(), words))
         else:
-            packets.send(Type.ERROR, f"Parse error: {command}")
+            packets.send(Type.ERROR, f"Parse error: {' '.join([verb, *words])}")
 
     def _settings(self) -> str:
         bodies = "".join(
@@ -187,29 +213,32 @@ class FakeQualisys:
         if left > 0.0:
             self._stopping.wait(min(left, 1.0 / self.frequency))
 
+    def _due(self) -> int:
+        """The number of the frame of now."""
+        return int((time.monotonic() - self._begin) * self.frequency)
+
     def _send_due(self, stream: Stream, number: int) -> int:
         """Sends the frame of now if it was not sent; returns its number."""
-        due = int((time.monotonic() - self._begin) * self.frequency)
+        due = self._due() // stream.every * stream.every
         if due == number:
             return number
         faults = self.faults
         if not faults.silent and faults.draw.random() >= faults.lose:
-            stream.send(self._frame(due, stream))
+            stream.send(self._frame(due, stream.components))
             self.frames_sent += 1
         return due
 
-    def _frame(self, number: int, stream: Stream) -> bytes:
+    def _frame(self, number: int, components: Sequence[str]) -> bytes:
         now = number / self.frequency
         poses = [
             None if name in self.faults.hidden else self._pose(index, now)
             for index, name in enumerate(self.bodies)
         ]
-        stamp = round(now * 1e6)
-        if stream.euler:
-            bodies = [HIDDEN_EULER if pose is None else packed_euler(pose) for pose in poses]
-            return components_packet(stamp, number, {MARKERS: [], SIX_D_EULER: bodies})
-        bodies = [HIDDEN if pose is None else packed(pose) for pose in poses]
-        return data_packet(stamp, number, bodies)
+        listed = {
+            COMPONENTS[name]: [packed(pose, name) for pose in poses] if name[0] == "6" else []
+            for name in components
+        }
+        return components_packet(round(now * 1e6), number, listed)
 
     def _pose(self, index: int, now: float) -> Pose | None:
         if self._poses is not None:
@@ -218,21 +247,18 @@ class FakeQualisys:
         return (0.1 * c, 0.1 * s, 1.0 * index), (c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
 
 
-def packed(pose: Pose) -> bytes:
-    """A body as it is sent: in millimetres, the rotation column by column."""
-    (x, y, z), rows = pose
-    columns = [rows[3 * i + j] for j in range(3) for i in range(3)]
-    return BODY.pack(1000.0 * x, 1000.0 * y, 1000.0 * z, *columns, 0.25)
-
-
-def packed_euler(pose: Pose) -> bytes:
-    """The same with angles: the rotation is roll about x, then pitch and yaw about the new axes."""
-    (x, y, z), rows = pose
-    roll = math.atan2(-rows[5], rows[8])
-    pitch = math.asin(max(-1.0, min(1.0, rows[2])))
-    yaw = math.atan2(-rows[1], rows[0])
-    angles = (math.degrees(each) for each in (roll, pitch, yaw))
-    return EULER_BODY.pack(1000.0 * x, 1000.0 * y, 1000.0 * z, *angles)
+def packed(pose: Pose | None, component: str) -> bytes:
+    """A body as it is sent: in millimetres and degrees; NaN if no camera sees it."""
+    (x, y, z), rows = pose or (3 * (math.nan,), 9 * (math.nan,))
+    if "euler" in component:  # roll about x, then pitch and yaw about the new axes
+        pitch = math.asin(min(max(rows[2], -1.0), 1.0))
+        angles = math.atan2(-rows[5], rows[8]), pitch, math.atan2(-rows[1], rows[0])
+        rotation = [math.degrees(each) for each in angles]
+    else:
+        rotation = [rows[3 * i + j] for j in range(3) for i in range(3)]  # column by column
+    residual = [RESIDUAL if pose else math.nan] if component.endswith("res") else []
+    numbers = (1000.0 * x, 1000.0 * y, 1000.0 * z, *rotation, *residual)
+    return struct.pack(f"<{len(numbers)}f", *numbers)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -1,4 +1,8 @@
-"""Packets of the real-time protocol of Qualisys Track Manager, little endian, both directions."""
+"""Packets of the real-time protocol of Qualisys Track Manager, little endian, both directions.
+
+The vendor's own client, qtm-rt 3.1, cannot take this place: a packet of 0 bytes or with a damaged
+number of components keeps it busy for ever, and it has no limit of a packet's size.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +30,9 @@ BODIES = struct.Struct("<Ihh")  # number, rates of dropped and out of sync frame
 # position [mm], rotation, residual [mm]. The rotation comes column by column: public clients map
 # it to a column-major matrix (qualisys_cpp_sdk's array of nine into an Eigen::Matrix3f)
 BODY = struct.Struct("<3f9ff")
-EULER_BODY = struct.Struct("<6f")  # position [mm], roll, pitch and yaw [degrees]
-MARKERS = 2  # without names
 MOST_COMPONENTS = 64
 MOST_BODIES = 1000
 NOT_ORTHOGONAL = 1e-2  # how far a rotation times its transpose may be from one
-SIX_D_EULER = 6
 SIX_D_WITH_RESIDUAL = 11
 
 

@@ -4,7 +4,7 @@ The files stay as they are when o80 changes, so that later versions must read wh
 change of the format gets a file of its own. The JSON beside a file says what must be found in it.
 
 format_1.mcap: journal in version 0, by one of the first recorders
-codec_0.mcap: journal in version 0, by the last one
+codec_0.mcap: journal in version 0, by the last one, commit 6fd9210
 codec_1.mcap: journal in version 1
 """
 
