@@ -19,7 +19,7 @@ from published_rows import Published, check_every_reader
 
 import o80
 from o80.drivers import Reading
-from o80.rows.layout import with_padding
+from o80.rows.layout import field_view, with_padding
 from o80.rows.targets import states_of
 
 LAYOUTS = settings(ROBOTS, max_examples=int(os.environ.get("O80_LAYOUTS", ROBOTS.max_examples)))
@@ -116,6 +116,20 @@ def test_rows_without_their_padding_are_no_history(segment: str) -> None:
     copy = pickle.loads(pickle.dumps(history))
     assert copy.extended.heat.tolist() == [20.0]
     o80.History(copy._decoder, history.rows)
+
+
+def test_a_view_of_fields_side_by_side_holds_their_numbers() -> None:
+    joints = np.dtype([("position", "f8", (3,)), ("velocity", "f8", (3,)), ("on", "?")], align=True)
+    rows = np.zeros((2, 4), [("iteration", "i8"), ("joints", joints)])
+    view = field_view(rows[:, -1], "joints.position", "joints.velocity")
+    rows["joints"]["velocity"][1, -1] = [1.0, 2.0, 3.0]
+    assert view.tolist() == [[0.0] * 6, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]]
+    assert field_view(rows, "iteration").shape == (2, 4, 1)
+    with pytest.raises(o80.InvalidArgument, match="at 'angle' there is position, velocity, on"):
+        field_view(rows, "joints.angle")
+    for paths in (("joints",), ("joints.velocity", "joints.position")):
+        with pytest.raises(o80.InvalidArgument, match="not numbers of one kind, side by side"):
+            field_view(rows, *paths)
 
 
 def after_other_values(copied: Callable[[], Any]) -> Any:

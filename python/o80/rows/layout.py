@@ -144,6 +144,33 @@ def joined(
     return result
 
 
+def field_view(rows: NDArray[Any], *paths: str) -> NDArray[Any]:
+    """View (..., n) of the numbers of a field of rows (...), such as "extended.joint_positions".
+
+    paths: of one field, or of several that lie side by side.
+
+    Raises InvalidArgument if a field is missing, or if their numbers do not make one array.
+    """
+    runs = joined(run for path in paths for run in runs_of(*_field_at(rows.dtype, path)))
+    if len(runs) != 1:
+        raise InvalidArgument(f"{', '.join(paths)}: not numbers of one kind, side by side in a row")
+    kind, offset, count = runs[0]
+    return rows.getfield(np.dtype((kind, (count,))), offset)
+
+
+def _field_at(dtype: np.dtype[Any], path: str) -> tuple[np.dtype[Any], int]:
+    """The dtype of a field of rows, and where it lies in a row [bytes]."""
+    offset = 0
+    for name in path.split("."):
+        fields = dtype.fields or {}
+        if name not in fields:
+            there = ", ".join(fields) or "nothing"
+            raise InvalidArgument(f"no field '{path}' in a row: at '{name}' there is {there}")
+        dtype, start = fields[name][:2]
+        offset += start
+    return dtype, offset
+
+
 def with_padding(rows: NDArray[Any]) -> NDArray[Any]:
     """A view of rows as items without fields: its copies have the padding of the rows too.
 
