@@ -15,14 +15,15 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
+from o80.loop_options import text_of
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.entry_points import accelerated_environment, vector_environment
-from o80_table_tennis.rig.ball_records import RECORDS
+from o80_table_tennis.rig.ball_records import ball_options
 from o80_table_tennis.settings import RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE, changed_pressures
-from o80_table_tennis.world.arm import MUSCLES
+from o80_table_tennis.world.arm import JOINT_NAMES, MUSCLES
+from o80_table_tennis.world.scene import MODEL
 from o80_table_tennis.world.timing import PERIOD
-from plain_table_tennis import PlainEnvironment
 from sampling import built, rounds, sample, seconds, take_priority
 
 THREADS = 2
@@ -37,17 +38,29 @@ TASK = TaskSettings(factor=COARSE)
 class Plain:
     """As many plants and simulations, stepped by plain calls on two threads."""
 
-    def __init__(self, environments: list[PlainEnvironment], episode: int) -> None:
-        self._library, pressures = environments[0].library, environments[0].pressures
-        self._all = [environment.handle.value for environment in environments]
+    def __init__(self, stack: ExitStack, rig: RigSettings, copies: int, episode: int) -> None:
+        self._library = library = ctypes.CDLL(str(built() / "lib" / "plain_table_tennis.so"))
         self._episode, self._step = episode, 0
         balls = balls_from(None, 0, PERIOD)
-        flights = [balls.flight(number) for number in range(len(self._all))]
-        for environment, flight in zip(environments, flights, strict=True):
-            environment.reset(seed=1, options={"flight": flight})
-        self._flights = np.vstack([flight.states[:1] for flight in flights])
+        flights = [balls.flight(number).states[:1] for number in range(copies)]
+        self._flights = np.vstack(flights)
+        options = {"model": MODEL, "joints": JOINT_NAMES, "timestep": PERIOD, **ball_options(1)}
+        texts = ctypes.c_char_p * len(options)
+        names = texts(*(name.encode() for name in options))
+        values = texts(*(text_of(value).encode() for value in options.values()))
+        library.plain_create.restype = ctypes.c_void_p
+        self._all: list[int] = []
+        for flight in flights:
+            at = ctypes.c_void_p(flight.ctypes.data)
+            size = ctypes.c_size_t(len(options))
+            plain = library.plain_create(rig.preset.encode(), names, values, size, at)
+            if not plain:
+                raise RuntimeError("the plain calls could not be set up")
+            self._all.append(plain)
+            stack.callback(library.plain_destroy, ctypes.c_void_p(plain))
         # those of random actions
-        asked = environments[0].asked
+        with closing(accelerated_environment(rig=rig)) as one:
+            pressures, asked = one.rig.arm.range, one.rig.arm.asked()[0]
         raw = []
         for action in random_actions(episode, MUSCLES):
             asked = changed_pressures(asked, action, factor=TASK.factor)
@@ -105,18 +118,6 @@ def random_actions(*shape: int) -> NDArray[np.float32]:
     return np.random.default_rng(1).uniform(-1, 1, shape).astype(np.float32)
 
 
-def plain_environments(stack: ExitStack, rig: RigSettings, count: int) -> list[PlainEnvironment]:
-    with closing(accelerated_environment(rig=rig)) as one:
-        rows = one.rig.twins[0].frontend.history(1).rows
-        record = rows.dtype[RECORDS[0]][RECORDS[1]].base
-        pressures = one.rig.arm.range
-    library = built() / "lib" / "plain_table_tennis.so"
-    return [
-        stack.enter_context(closing(PlainEnvironment(library, record, pressures, rig.preset)))
-        for _ in range(count)
-    ]
-
-
 def measure(copies: int, preset: str) -> None:
     rig = RigSettings(preset=preset)
     with ExitStack() as stack:
@@ -138,7 +139,7 @@ def measure(copies: int, preset: str) -> None:
         first = played["vector"]
         assert isinstance(first, Played)
         first.play(steps)
-        played["plain"] = Plain(plain_environments(stack, rig, copies), first.episode)
+        played["plain"] = Plain(stack, rig, copies, first.episode)
         for each in played.values():
             each.play(steps // 8)  # everybody warms up
         for _ in range(rounds()):

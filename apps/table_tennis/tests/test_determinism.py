@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from o80.learning import EVERY
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.rig.rig import Rig
@@ -90,15 +91,14 @@ def test_a_restored_rig_runs_again_bit_for_bit(pacing: Pacing) -> None:
 def begin(rig: Rig) -> None:
     """Arm at rest, the balls in free flight: what is imposed is no part of a snapshot."""
     flight = balls_from(None).flight(0)
-    rig.reset(arm_seed=1, twin_seed=1, flights=[[flight] * twin.balls for twin in rig.twins])
+    flights = [[flight] * (1 + rig.settings.extra_balls)]
+    rig.reset(EVERY, arm_seeds=[1], twin_seeds=[1], flights=flights)
 
 
 def run(rig: Rig, actions: NDArray[np.float64]) -> list[NDArray[Any]]:
     """Observed and extended bytes of all rows of arm and twins; iterations go on, they do not."""
     for action in actions:
-        rig.ask(action, delay=1)
-        rig.step_arm()
-        rig.step_twins()
+        rig.step(action[np.newaxis])
     rows = len(actions) * ITERATIONS
     seen: list[NDArray[Any]] = [rig.arm.frontend.history(rows).flat(np.float64)]
     for twin in rig.twins:

@@ -1,11 +1,11 @@
-"""The reasons why an episode of ball play ends, of one or of many."""
+"""The reasons why an episode of ball play ends."""
 
 import numpy as np
 import pytest
 from ball_records import landing_at, stacked_records
 from opened_environment import opened
 
-from o80_table_tennis.rig.ball_records import BallReader, ball_records
+from o80_table_tennis.rig.ball_records import ball_records
 from o80_table_tennis.task.ball_record import BallRecord
 from o80_table_tennis.task.end import End, EndRule, terminated
 from o80_table_tennis.task.outcome import returned
@@ -28,24 +28,15 @@ CASES = [
 ]
 
 
-@pytest.mark.parametrize(("record", "y", "steps", "end"), CASES)
-def test_an_episode_ends_by_what_happens_to_the_ball(
-    record: BallRecord, y: float, steps: int, end: End
-) -> None:
-    assert EndRule().judge(record, y, steps) == end
-    assert bool(EndRule().ended(record, y, steps)) is (end is not End.RUNNING)
-    assert bool(returned(record)) is (end is End.RETURNED)
-
-
-def test_many_episodes_are_judged_as_each_alone() -> None:
+def test_an_episode_ends_by_what_happens_to_the_ball() -> None:
     records = stacked_records([record for record, *_ in CASES])
     y, steps = (np.array([case[place] for case in CASES]) for place in (1, 2))
     ends = np.array([end for *_, end in CASES])
 
     judged = EndRule().judge(records, y, steps)
-    assert judged.dtype == np.int64
-    np.testing.assert_array_equal(judged, ends)
+    assert [End(end) for end in judged] == ends.tolist()
     np.testing.assert_array_equal(EndRule().ended(records, y, steps), ends != End.RUNNING)
+    np.testing.assert_array_equal(returned(records), ends == End.RETURNED)
     np.testing.assert_array_equal(terminated(ends), [End(end).terminated for end in ends])
 
 
@@ -68,10 +59,8 @@ def test_a_net_ball_is_one_that_touched_the_net_before_it_landed(
     records["net"]["iteration"], records["table"]["iteration"] = net_at, landed_at
     records["net"]["position"], records["floor"]["position"] = (1, 2, 3), (4, 5, 6)
 
-    alone = BallReader(records.dtype, 0).read(records)
-    together = ball_records(records)
-    for record in (alone, together.at(0)):
-        assert (record.touched, record.touched_net) == (True, touched_net)
-        assert record.landed == (landed_at >= 0)
-        assert tuple(record.net_position) == (1, 2, 3)
-        assert tuple(record.floor_position) == (4, 5, 6)
+    record = ball_records(records).at(0)
+    assert (record.touched, record.touched_net) == (True, touched_net)
+    assert record.landed == (landed_at >= 0)
+    assert tuple(record.net_position) == (1, 2, 3)
+    assert tuple(record.floor_position) == (4, 5, 6)

@@ -45,7 +45,7 @@ def test_an_action_acts_from_the_iteration_it_is_meant_for(delay: int) -> None:
     with closing(opened(task=task)) as environment:
         environment.reset(seed=1)
         arm = environment.rig.arm
-        k, before = arm.newest, arm.asked
+        k, before = arm.newest, arm.asked()[0]
         environment.step(PUSH)
         asked = arm.frontend.history(since=k + 1, until=k + ITERATIONS).desired
 
@@ -121,6 +121,7 @@ def test_a_missed_ball_costs_how_far_it_was_missed(inline: TableTennisEnvironmen
     assert reward == -info["smallest_distance"] < 0
     assert info["end"] in (End.PASSED, End.FLOOR)
     assert info["end_text"] in ("passed", "floor")
+    assert {type(value) for value in info.values()} == {bool, int, float, str, np.ndarray}
     distances = [info["smallest_distance"] for *_, info in steps]
     assert distances == sorted(distances, reverse=True)
 

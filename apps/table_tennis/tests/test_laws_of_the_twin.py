@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from o80.learning import EVERY
 from o80_mujoco.balls import path
 from o80_table_tennis.balls.sampled_flight import SampledFlight
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
@@ -47,7 +48,7 @@ def flown() -> Iterator[Numbers]:
         spins=np.array([SPIN]),
     )
     with Rig(RigSettings()) as rig:
-        rig.reset(arm_seed=1, twin_seed=1, flights=[[start]])
+        rig.reset(EVERY, arm_seeds=[1], twin_seeds=[1], flights=[[start]])
         twin = rig.twins[0].frontend
         twin.burst(ROWS - 1)
         rows = twin.history(ROWS).observed.balls

@@ -23,29 +23,25 @@ STEPS = 2 * BLOCK + 10
 def state_of(balls: FloatArray, pressures: FloatArray) -> State:
     nothing = np.zeros((*balls.shape[:-1], 8))
     racket = nothing[..., :3]
-    return State(0, nothing, pressures, racket, balls, BallRecord(1.0), racket)
-
-
-def generators(seeds: range) -> list[np.random.Generator]:
-    return [np.random.default_rng(seed) for seed in seeds]
+    return State(
+        np.zeros(len(balls), np.int64), nothing, pressures, racket, balls, BallRecord(1.0), racket
+    )
 
 
 def perceived(
     noise: NoiseSettings, balls: FloatArray, *, seed: int = 0
 ) -> tuple[FloatArray, NDArray[Any], FloatArray]:
     """Observed balls (T, 6), missed (T,) and pressures (T, 8) of one episode."""
-    perception = Perception(noise, 0.01, None)
-    half = np.full(8, 0.5)
-    first = perception.begin(state_of(balls[0], half), generators(range(seed, seed + 1)), ONLY)
-    rows = [(first.ball.copy(), first.missed, first.pressures)]
-    for ball in balls[1:]:
-        each = perception.perceive(state_of(ball, half))
-        rows.append((each.ball.copy(), each.missed, each.pressures))
-    observed, missed, pressures = (np.array(column) for column in zip(*rows, strict=True))
+    perception = Perception(noise, 0.01, 1)
+    half = np.full((1, 8), 0.5)
+    generator, only = np.random.default_rng(seed), np.zeros(1, np.int64)
+    seen = [perception.begin(state_of(balls[:1], half), [generator], only)]
+    seen += [perception.perceive(state_of(ball[None], half)) for ball in balls[1:]]
+    rows = [(each.ball, each.missed, each.pressures) for each in seen]
+    observed, missed, pressures = (np.concatenate(column) for column in zip(*rows, strict=True))
     return observed, missed, pressures
 
 
-ONLY = np.zeros(1, np.int64)
 STANDING = np.tile([0.4, 2.0, 1.0, 0.1, -4.0, 0.5], (STEPS, 1))
 
 
@@ -92,42 +88,6 @@ def test_a_late_ball_is_where_it_was(latency: float) -> None:
         np.testing.assert_allclose(observed[step, 3:], fine.velocities[true], atol=1e-3)
     # before the first step, the ball was on its way
     assert observed[0, 1] == pytest.approx(balls[0, 1] - latency * balls[0, 4], abs=1e-6)
-
-
-def test_one_episode_and_many_observe_the_same_bits() -> None:
-    noise = NoiseSettings(0.01, 0.2, missed_frames=0.2, latency=0.013, pressure=0.02)
-    count, steps, begin_again = 6, 40, 23
-    rng = np.random.default_rng(0)
-    balls, pressures = rng.normal(size=(count, steps, 6)), rng.normal(size=(count, steps, 8))
-    many = Perception(noise, 0.01, count)
-    some = np.array([1, 4])
-
-    found = many.begin(
-        state_of(balls[:, 0], pressures[:, 0]), generators(range(count)), np.arange(count)
-    )
-    seen = [[found.ball], [found.pressures]]
-    for step in range(1, steps):
-        found = many.perceive(state_of(balls[:, step], pressures[:, step]))
-        if step == begin_again:  # some copies have begun a new episode in this step
-            fresh = state_of(balls[some, step], pressures[some, step])
-            begun = many.begin(fresh, generators(range(50, 52)), some)
-            found.ball[some], found.pressures[some] = begun.ball, begun.pressures
-        seen[0].append(found.ball)
-        seen[1].append(found.pressures)
-
-    for copy in range(count):
-        one = Perception(noise, 0.01, None)
-        for step in range(steps):
-            state = state_of(balls[copy, step], pressures[copy, step])
-            if step == 0:
-                row = one.begin(state, generators(range(copy, copy + 1)), ONLY)
-            elif step == begin_again and copy in some:
-                seed = 50 + int(np.flatnonzero(some == copy)[0])
-                row = one.begin(state, generators(range(seed, seed + 1)), ONLY)
-            else:
-                row = one.perceive(state)
-            np.testing.assert_array_equal(row.ball, seen[0][step][copy])
-            np.testing.assert_array_equal(row.pressures, seen[1][step][copy])
 
 
 def played(task: TaskSettings, steps: int = 30) -> list[Any]:

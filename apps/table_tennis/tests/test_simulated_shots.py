@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from o80.learning import EVERY
 from o80_table_tennis.balls import playable
 from o80_table_tennis.balls.launches import (
     NARROW,
@@ -147,7 +148,7 @@ def test_the_twin_flies_a_shot_as_predicted() -> None:
     launch = SimulatedShots(WIDE).launch(11)
     seen = launch.seen(duration=0.8, period=PERIOD)
     with Rig(RigSettings()) as rig:
-        rig.reset(arm_seed=1, twin_seed=1, flights=[[launch.flight(PERIOD)]])
+        rig.reset(EVERY, arm_seeds=[1], twin_seeds=[1], flights=[[launch.flight(PERIOD)]])
         rig.twins[0].frontend.burst(len(seen.positions) - 1)
         flown = rig.twins[0].frontend.history(len(seen.positions)).observed.balls
     np.testing.assert_allclose(flown["position"][:, 0], seen.positions, atol=1e-4)

@@ -8,7 +8,6 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from ball_records import stacked
 from gymnasium.utils.env_checker import check_env
 
 import o80_table_tennis
@@ -24,7 +23,6 @@ from o80_table_tennis.task.task import TASK_MEMBERS, Task
 from o80_table_tennis.world.arm import MUSCLES, PLAYING_POSTURE, racket_pose
 
 STILL = np.zeros(MUSCLES, dtype=np.float32)
-ARRAYS = ("motion", "pressures", "racket", "ball", "goal")
 
 
 @dataclass(frozen=True)
@@ -116,35 +114,6 @@ def test_a_users_own_task_is_paid_in_every_step() -> None:
     assert sum(reward < 0 for reward in rewards) > len(rewards) / 2
     assert "speed" in info
     assert "touched" not in info
-
-
-def snapshot(state: State) -> State:
-    """A copy that the next step leaves alone."""
-    copied = {name: np.array(getattr(state, name)) for name in ARRAYS}
-    return State(steps=state.steps, record=state.record, **copied)
-
-
-@pytest.mark.parametrize("name", TASKS)
-def test_many_states_at_once_give_what_each_gives_alone_bit_for_bit(name: str) -> None:
-    states, policy = [], default_policy()
-    settings = TaskSettings(task=name, factor=COARSE)
-    with closing(TableTennisEnvironment(task=settings)) as environment:
-        for seed in (1, 2):
-            observation, _ = environment.reset(seed=seed)
-            over = False
-            while not over:
-                acts = settings.made().plays_ball
-                action = policy.act(observation) if acts else STILL
-                observation, _, terminated, truncated, _ = environment.step(action)
-                states.append(snapshot(environment._state))
-                over = terminated or truncated
-
-    task, together = settings.made(), stacked(states)
-    for method in (task.observe, task.eventful, task.end, task.reward):
-        np.testing.assert_array_equal(method(together), [method(one) for one in states])
-    ended = np.flatnonzero(task.end(together) != End.RUNNING)
-    assert len(ended) >= 2
-    np.testing.assert_array_equal(task.reward(together.at(ended)), task.reward(together)[ended])
 
 
 class TestReach:

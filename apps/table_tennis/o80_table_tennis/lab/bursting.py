@@ -33,7 +33,7 @@ class LockStepTracking:
     """Tracking in lock-step: simulated cameras look at the ball of a rig's world."""
 
     def __init__(self, rig: Rig, pacing: Pacing, seed: int) -> None:
-        self._world = rig.twins[0].frontend
+        self._world = rig.twin.frontend
         self._stack = ExitStack()
         try:
             eyes = {"ball": self._world.segment, "seed": seed, "history": 4}
@@ -98,8 +98,8 @@ class LockStepTracking:
         self.observations += 1
         if seen.first:
             self.first_seen.append((self._tracked.at - self._began) * 1e-9)
-        if not seen.missed:
-            self.errors.append(float(np.linalg.norm(seen.ball[:3] - state.ball[:3])))
+        if not seen.missed[0]:
+            self.errors.append(float(np.linalg.norm(seen.ball[0, :3] - state.ball[0, :3])))
         return seen
 
 

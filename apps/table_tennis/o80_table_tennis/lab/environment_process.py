@@ -74,7 +74,7 @@ class EnvironmentProcess:
         row["arm_row"], row["world_row"] = rig.row, rig.twin_row
         row["arm_time"] = rig.arm.last_time
         row["late"] = rig.lateness
-        row["true_ball"] = rig.twins[0].ball[:3]
+        row["true_ball"] = rig.twin.ball[0, :3]
         self._tell_observed()
         self.publish()
 

@@ -59,19 +59,22 @@ class TrackedPerception:
         self.at = self._now()
         self._began, self._used, self._seen_yet = self.at, 0, False
         self.ball, self.ball_time = np.array([*WIDE.position, *WIDE.velocity]), 0
-        return Perceived(self.ball, True, state.pressures)
+        return self._perceived(state, seen=False)
 
     def perceive(self, state: State, _which: object = EVERY) -> Perceived:
         """The ball at the time of the arm's last row, if there is a new image of it."""
         self.at, found = self._now(), self._newest()
         if found is None:
             self.ball_time = 0
-            return Perceived(self.ball, True, state.pressures)
+            return self._perceived(state, seen=False)
         self.ball_time, ball = found
         self._used = self.ball_time
         self.ball = flown(ball, (self.at - self.ball_time) * 1e-9)
         first, self._seen_yet = not self._seen_yet, True
-        return Perceived(self.ball, False, state.pressures, first)
+        return self._perceived(state, seen=True, first=first)
+
+    def _perceived(self, state: State, *, seen: bool, first: bool = False) -> Perceived:
+        return Perceived(self.ball[np.newaxis], np.array([not seen]), state.pressures, first)
 
     def _newest(self) -> tuple[int, FloatArray] | None:
         """Time and numbers of a ball that was not used yet."""

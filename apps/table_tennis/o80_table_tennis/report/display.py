@@ -1,65 +1,15 @@
-"""How an environment is shown: `render_mode="rgb_array"` as pictures, `"human"` in the browser."""
+"""How an environment is shown in the browser, with `render_mode="human"`."""
 
 from __future__ import annotations
 
 import sys
 import time
-from typing import Protocol
 
 import o80
 
 from ..rig.rig import Rig
-from ..rig.virtual_balls import VirtualBalls
-from .rendering import Image, Scene
 
 RENDER_MODES = ["human", "rgb_array"]
-
-
-class Display(Protocol):
-    """Shows the newest rows of a rig."""
-
-    def render(self) -> Image | None:
-        """Result of the environment's `render`."""
-        ...
-
-    def after_step(self) -> None:
-        """A step of the environment has ended."""
-        ...
-
-    def close(self) -> None:
-        """May be called twice."""
-        ...
-
-
-def display_of(rig: Rig, virtual: VirtualBalls, *, render_mode: str, camera: str) -> Display:
-    """The display of a render mode."""
-    return Page(rig) if render_mode == "human" else Pictures(rig, virtual, camera=camera)
-
-
-class Pictures:
-    """Draws arm and balls as they were last published. The scene is made with the first picture."""
-
-    def __init__(self, rig: Rig, virtual: VirtualBalls, *, camera: str) -> None:
-        self._twin, self._virtual, self._camera = rig.twins[0], virtual, camera
-        self._balls = 1 + rig.settings.extra_balls
-        self._scene: Scene | None = None
-
-    def render(self) -> Image:
-        """A picture (480, 640, 3)."""
-        if self._scene is None:
-            self._scene = Scene(balls=self._balls)
-        return self._scene.draw(
-            self._twin.joint_positions, self._virtual.positions(), camera=self._camera
-        )
-
-    def after_step(self) -> None:
-        """Nothing: a picture is drawn when it is asked for."""
-
-    def close(self) -> None:
-        """May be called twice."""
-        if self._scene is not None:
-            self._scene.close()
-            self._scene = None
 
 
 class Page:
@@ -83,9 +33,6 @@ class Page:
     def url(self) -> str:
         """Address of the page."""
         return self._view.url
-
-    def render(self) -> None:
-        """Nothing: the page shows every row by itself."""
 
     def after_step(self) -> None:
         """Waits until the step has taken as long as in real time."""

@@ -7,38 +7,21 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-import o80
+from ..rig.rig import Rig
 
 FloatArray = NDArray[np.float64]
 
 
 @dataclass
-class StepCounts:
+class EpisodeCounts:
     """Counts of an environment while it plays."""
 
     episodes: int = 0
-    steps: int = 0
-    exact_steps: int = 0
-    """Steps in which the arm and every twin made exactly five iterations."""
     seconds: float = 0.0
     """In episodes, from the first step to the last, the caller's own time included."""
     seconds_stepping: float = 0.0
     """In steps, the caller's own time left out."""
-    late_actions: int = 0
-    """Actions that came after the iteration for which they were meant."""
     stalled_episodes: int = 0
-    summed_lateness: int = 0
-    """[rows]"""
-    largest_lateness: int = 0
-    """[rows]"""
-
-    def add_step(self, *, exact: bool, lateness: int, late: bool) -> None:
-        """Whether the step was exact, by the numbers of the iterations, and how late it was."""
-        self.steps += 1
-        self.exact_steps += exact
-        self.summed_lateness += lateness
-        self.largest_lateness = max(self.largest_lateness, lateness)
-        self.late_actions += late
 
 
 @dataclass(frozen=True)
@@ -75,8 +58,9 @@ class Statistics:
     """(T - 1,) between the times of neighbouring rows [us]; real time only."""
 
 
-def statistics_of(counts: StepCounts, arm: o80.Frontend, *, step: float) -> Statistics:
-    """From the counts and the history of the arm; a step of the environment lasts `step` [s]."""
+def statistics_of(counts: EpisodeCounts, rig: Rig) -> Statistics:
+    """From the counts of an environment and of its rig, and the history of the arm."""
+    arm, steps = rig.arm.frontend, rig.counts
     rows = arm.history()
     seconds = float(rows.time[-1] - rows.time[0]) * 1e-9
     lateness: FloatArray = np.empty(0)
@@ -86,17 +70,17 @@ def statistics_of(counts: StepCounts, arm: o80.Frontend, *, step: float) -> Stat
         periods = np.asarray(np.diff(rows.time), np.float64) * 1e-3
     return Statistics(
         episodes=counts.episodes,
-        steps=counts.steps,
-        exact_steps=counts.exact_steps,
-        steps_per_second=counts.steps / counts.seconds if counts.seconds > 0 else 0.0,
+        steps=steps.steps,
+        exact_steps=steps.exact_steps,
+        steps_per_second=steps.steps / counts.seconds if counts.seconds > 0 else 0.0,
         bare_steps_per_second=(
-            counts.steps / counts.seconds_stepping if counts.seconds_stepping > 0 else 0.0
+            steps.steps / counts.seconds_stepping if counts.seconds_stepping > 0 else 0.0
         ),
-        step_seconds=step,
-        late_actions=counts.late_actions,
+        step_seconds=rig.settings.step,
+        late_actions=steps.late_actions,
         stalled_episodes=counts.stalled_episodes,
-        mean_lateness=counts.summed_lateness / max(1, counts.steps),
-        largest_lateness=counts.largest_lateness,
+        mean_lateness=steps.summed_lateness / max(1, steps.steps),
+        largest_lateness=steps.largest_lateness,
         arm_iterations=int(rows.iteration[-1]),
         arm_rate=(len(rows) - 1) / seconds if seconds > 0 else 0.0,
         arm_overruns=int(rows.overruns[-1]),

@@ -1,25 +1,30 @@
 """The arm as the environment sees it: eight pressures in, rows of joint angles out.
 
-A step runs thousands of times a second in an accelerated environment: a prepared burst takes the
-pressures from memory and puts the rows there.
+`Arm` is one arm with a frontend, `Arms` are the arms of a vector environment; both show their last
+rows alike. A step runs thousands of times a second in an accelerated environment: a prepared burst
+takes the pressures from memory and puts the rows there.
 """
 
 from __future__ import annotations
 
 import time
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.layout import field_view, with_padding
+from o80.learning import EVERY, Index
 
 from ..world.arm import JOINTS, MUSCLES
 from ..world.timing import ITERATIONS
 from .pressure_range import PressureRange
-from .row_words import words
 
 FloatArray = NDArray[np.float64]
 
+MOTION = ("extended.joint_positions", "extended.joint_velocities")
+"""Fields of a row with the angles [rad] and velocities [rad/s] of the joints, side by side."""
 TIMEOUT = 5.0
 """Longest wait for a row [s]."""
 RETURN_SECONDS = 0.6
@@ -32,17 +37,34 @@ LONGEST_RETURN = 4.0
 """After this the episode begins from wherever the arm stands [s]."""
 
 
-class Arm:
-    """A frontend to the arm, and its last five rows.
+class ArmRows:
+    """The last rows (N,) of N arms.
 
-    Views that each step fills: `q`, `dq` (5, 4) [rad], [rad/s], both as `motion` (4, 5, 2), a joint
-    after the other; of the last row `last_motion` (8,), q then dq, and `last_racket` (3,) [m].
+    Views that each step fills: `last_motion` (N, 8), angles [rad] then velocities [rad/s] of the
+    joints, and `last_racket` (N, 3) [m].
     """
+
+    def __init__(self, last: NDArray[Any], pressures: PressureRange) -> None:
+        self.range = pressures
+        """Range of the raw pressures."""
+        self.last_motion = field_view(last, *MOTION)
+        self.last_racket = field_view(last, "extended.racket_position")
+        self._last_pressures, self._last_asked = last["observed"], last["desired"]
+
+    def read_pressures(self, out: FloatArray) -> None:
+        """Fills in the normalised pressures (N, 8) in the muscles in the last rows."""
+        self.range.normalised(self._last_pressures, out=out)
+
+    def asked(self, copies: Index = EVERY) -> FloatArray:
+        """Normalised pressures (n, 8) asked for in the last rows, a fresh array."""
+        return self.range.normalised(self._last_asked[copies])
+
+
+class Arm(ArmRows):
+    """A frontend to one arm, and its last five rows: `motion` (4, 5, 2) of each joint."""
 
     def __init__(self, frontend: o80.Frontend) -> None:
         self.frontend = frontend
-        self.range = PressureRange.of(frontend)
-        """Range of the raw pressures."""
         self.late = False
         """The last step's pressures were taken later than at their iteration, or not yet."""
         self._sent: o80.Batch | None = None
@@ -50,32 +72,18 @@ class Arm:
         if frontend.bursting:
             self._burst = frontend.prepared_burst(ITERATIONS, mode="overwrite")
             self._rows = self._burst.rows
-            self._pressures: FloatArray = self._burst.targets[0]
+            self._pressures: FloatArray = self._burst.targets
         else:
             self._rows = np.zeros(ITERATIONS, frontend.history(1).rows.dtype)
-            self._pressures = np.zeros(MUSCLES)
+            self._pressures = np.zeros((1, MUSCLES))
         self._at = 0
-        self._view_rows()
+        super().__init__(self._rows[-1:], PressureRange.of(frontend))
+        motion = field_view(self._rows, *MOTION)
+        self.motion = motion.reshape(ITERATIONS, 2, JOINTS).transpose(2, 0, 1)
         self.start_pressures = np.array(frontend.latest().desired)
         self.start_angles = np.array(frontend.latest().extended.joint_positions)
         assert self.start_pressures.shape == (MUSCLES,)
         assert self.start_angles.shape == (JOINTS,)
-
-    def _view_rows(self) -> None:
-        """Names the numbers of the rows."""
-        dtype = self._rows.dtype
-        numbers = self._rows.view(np.float64).reshape(ITERATIONS, -1)
-        self.iterations: NDArray[np.int64] = self._rows["iteration"]
-        q = words(dtype, "extended", "joint_positions")
-        dq = words(dtype, "extended", "joint_velocities")
-        assert q.stop == dq.start, "angles and velocities of the joints lie side by side"
-        self.q, self.dq = numbers[:, q], numbers[:, dq]
-        motion = numbers[:, q.start : dq.stop]
-        self.motion = motion.reshape(ITERATIONS, 2, JOINTS).transpose(2, 0, 1)
-        self.last_motion = motion[-1]
-        self.last_racket = numbers[-1, words(dtype, "extended", "racket_position")]
-        self._last_pressures = numbers[-1, words(dtype, "observed")]
-        self._last_asked = numbers[-1, words(dtype, "desired")]
 
     @property
     def newest(self) -> int:
@@ -87,25 +95,15 @@ class Arm:
         """Time of the last row [ns]."""
         return int(self._rows["time"][-1])
 
-    @property
-    def pressures(self) -> FloatArray:
-        """Normalised pressures (8,) in the muscles in the last row, a fresh array."""
-        return self.range.normalised(self._last_pressures)
-
-    @property
-    def asked(self) -> FloatArray:
-        """Normalised pressures (8,) asked for in the last row, a fresh array."""
-        return self.range.normalised(self._last_asked)
-
     def ask(self, pressures: FloatArray, at: int) -> None:
-        """Asks for normalised pressures (8,) from iteration `at` on, or at once if it has begun.
+        """Asks for normalised pressures (1, 8) from iteration `at` on, or at once if it has begun.
 
         By the clock they are sent now; an arm that bursts gets them with its `step`.
         """
         self.range.raw(pressures, out=self._pressures)
         self._at = at
         if self._burst is None:
-            self.frontend.add_trajectory(self._pressures[np.newaxis], mode="overwrite")
+            self.frontend.add_trajectory(self._pressures, mode="overwrite")
             self._sent = self.frontend.pulse(at=at, late="now")
 
     def step(self, first: int) -> bool:
@@ -147,14 +145,55 @@ class Arm:
     @property
     def is_back(self) -> bool:
         """In the last row that was read the arm stands where it started, and is asked to."""
-        asked = bool(np.array_equal(self._last_asked, self.start_pressures))
-        still = float(np.abs(self.dq[-1]).max()) < SETTLED_SPEED
-        return (
-            asked and still and float(np.abs(self.q[-1] - self.start_angles).max()) < SETTLED_ANGLE
-        )
+        angles, velocities = self.last_motion[0, :JOINTS], self.last_motion[0, JOINTS:]
+        asked = np.array_equal(self._last_asked[0], self.start_pressures)
+        still = np.abs(velocities).max() < SETTLED_SPEED
+        return bool(asked and still and np.abs(angles - self.start_angles).max() < SETTLED_ANGLE)
 
     def read_newest(self) -> int:
         """Reads the last rows; returns the iteration of the newest one."""
         rows = self.frontend.history(ITERATIONS).rows
         self._rows[ITERATIONS - len(rows) :] = rows
-        return int(self.iterations[-1])
+        return int(self._rows["iteration"][-1])
+
+
+class Arms(ArmRows):
+    """A group of N arms, and the last five rows of each."""
+
+    def __init__(self, group: o80.InlineGroup, *, delay: int) -> None:
+        self.group = group
+        self.burst = group.prepared_burst(ITERATIONS, mode="overwrite", delay=delay)
+        """Burst of a step."""
+        self._reset = group.prepared_request("reset", seed=0)
+        self._raw: FloatArray = self.burst.targets[:, 0]
+        last = self.burst.rows[:, -1]
+        self._last, self._reset_rows = with_padding(last), with_padding(self._reset.rows)
+        super().__init__(last, PressureRange.of(group[0]))
+
+    def ask(self, pressures: FloatArray, copies: Index) -> None:
+        """Fills the targets of these arms with normalised pressures (n, 8)."""
+        if isinstance(copies, slice):
+            self.range.raw(pressures, out=self._raw)
+        else:
+            self._raw[copies] = self.range.raw(pressures)
+
+    def gather(self, low: NDArray[np.float32], high: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(N, 16) angles and velocities of the joints, then normalised pressures, within bounds;
+        from now on each step and reset fills them in.
+        """
+        names = [actuator.name for actuator in self.group[0].actuators]
+        paths = [
+            *(f"{field}[{joint}]" for field in MOTION for joint in range(JOINTS)),
+            *(f"observed.{name}" for name in names),
+        ]
+        offsets = [*[0.0] * (2 * JOINTS), *self.range.least.tolist()]
+        scales = [*[1.0] * (2 * JOINTS), *self.range.scale.tolist()]
+        clips = zip(low.tolist(), high.tolist(), strict=True)
+        numbers = map(o80.Gathered, paths, offsets, scales, clips)
+        return self.group.gather(list(numbers)).observations
+
+    def reset(self, copies: NDArray[np.intp], seeds: list[int]) -> None:
+        """These to the start."""
+        self._reset.fields["seed"][copies] = seeds
+        self._reset.run(copies)
+        self._last[copies] = self._reset_rows[copies]

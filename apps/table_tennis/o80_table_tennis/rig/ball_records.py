@@ -5,8 +5,7 @@ No other module knows how the simulator names what happens to a ball.
 
 from __future__ import annotations
 
-import struct
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -22,35 +21,8 @@ from ..world.materials import (
     TABLE_RESTITUTION,
 )
 
-RECORDS = ("extended", "contacts")
-"""Where in a row of the twin the records of its balls are."""
-TOUCHES = ("racket", "count")
-NET_TOUCHES = ("net", "count")
-FLOOR_TOUCHES = ("floor", "count")
-"""Paths inside a record,"""
-LANDED_AT = ("table", "iteration")
-NET_AT = ("net", "iteration")
-"""when the ball touched table and net after the racket, or -1,"""
-LANDING = ("table", "position")
-NET_POSITION = ("net", "position")
-FLOOR_POSITION = ("floor", "position")
-"""where it did,"""
-VELOCITY_AFTER = ("racket", "velocity_after")
-"""of the first contact with the racket,"""
-LARGEST_SPEED = ("racket", "largest_speed")
-SMALLEST_DISTANCE = ("racket", "smallest_distance")
-
-READ = {
-    *(TOUCHES, NET_TOUCHES, FLOOR_TOUCHES, LANDED_AT, NET_AT),
-    *(LANDING, NET_POSITION, FLOOR_POSITION),
-    *(VELOCITY_AFTER, LARGEST_SPEED, SMALLEST_DISTANCE),
-}
 FAR = 1e9
 """[m]"""
-CODES = {"i8": "q", "f8": "d"}
-"""Codes of numbers for `struct`."""
-
-
 SURFACES = {
     "racket": RACKET_RESTITUTION,
     "table": TABLE_RESTITUTION,
@@ -83,69 +55,31 @@ def fly_out_fields(*, every: int, passed_y: float) -> dict[str, Any]:
     return {"every": every, "low": (-FAR, passed_y, -FAR)}
 
 
-class BallReader:
-    """Reads the record of one ball out of the bytes of a row, without NumPy: that is faster.
-
-    `dtype` is that of a record, `offset` where it lies in the row [bytes].
-    """
-
-    def __init__(self, dtype: np.dtype[Any], offset: int) -> None:
-        codes, places, count = "=", {}, 0
-        for path, numbers in _numbers(dtype):
-            if path in READ:
-                places[path] = count
-                size = int(np.prod(numbers.shape))
-                codes += f"{size}{CODES[numbers.base.str[1:]]}"
-                count += size
-            else:
-                codes += f"{numbers.itemsize}x"
-        self._struct = struct.Struct(codes)
-        self._offset = offset
-        assert self._struct.size == dtype.itemsize, "a record with gaps"
-        self._touches, self._net, self._floor = (
-            places[path] for path in (TOUCHES, NET_TOUCHES, FLOOR_TOUCHES)
-        )
-        self._landed, self._net_at = places[LANDED_AT], places[NET_AT]
-        self._landing, self._net_position, self._floor_position = (
-            _vector_at(places[path]) for path in (LANDING, NET_POSITION, FLOOR_POSITION)
-        )
-        self._after = _vector_at(places[VELOCITY_AFTER])
-        self._speed, self._distance = places[LARGEST_SPEED], places[SMALLEST_DISTANCE]
-
-    def read(self, row: Any) -> BallRecord:
-        """Reads what has happened to the ball; `row` is any buffer."""
-        seen = self._struct.unpack_from(row, self._offset)
-        landed, net_at = seen[self._landed], seen[self._net_at]
-        return BallRecord(
-            seen[self._distance],
-            seen[self._touches] > 0,
-            seen[self._after],
-            seen[self._speed],
-            landed >= 0,
-            seen[self._landing],
-            seen[self._net] > 0 and not 0 <= landed < net_at,
-            seen[self._floor] > 0,
-            seen[self._net_position],
-            seen[self._floor_position],
-        )
-
-
 FLAGS = {
-    "touched": (TOUCHES, ">", 0),
-    "landed": (LANDED_AT, ">=", 0),
-    "met_net": (NET_TOUCHES, ">", 0),
-    "touched_floor": (FLOOR_TOUCHES, ">", 0),
+    "touched": ("racket", "count", ">", 0),
+    "landed": ("table", "iteration", ">=", 0),
+    "met_net": ("net", "count", ">", 0),
+    "touched_floor": ("floor", "count", ">", 0),
 }
-"""Flags that a group gathers of the first ball of each row."""
+"""Flags of a ball: a surface and what its record says, compared with a number.
+
+The iteration is that of the first touch after the racket's, or -1.
+"""
+COMPARE = {">": np.greater, ">=": np.greater_equal}
 
 
 def event_flags() -> dict[str, Any]:
-    """The flags of `BallRecords`, for `InlineGroup.gather`."""
-    first = f"{RECORDS[0]}.{RECORDS[1]}[0]"
+    """The flags of the first ball of each row, for `InlineGroup.gather`."""
     return {
-        name: (f"{first}.{'.'.join(path)}", compare, value)
-        for name, (path, compare, value) in FLAGS.items()
+        name: (f"extended.contacts[0].{surface}.{number}", compare, value)
+        for name, (surface, number, compare, value) in FLAGS.items()
     }
+
+
+def records_of(rows: NDArray[Any]) -> NDArray[Any]:
+    """View (..., balls) of the records of the balls in rows (...) of a twin."""
+    records: NDArray[Any] = rows["extended"]["contacts"]
+    return records
 
 
 class BallRecords:
@@ -155,22 +89,22 @@ class BallRecords:
     """
 
     def __init__(self, records: NDArray[Any], flags: Mapping[str, NDArray[np.bool_]]) -> None:
-        at = {path: _values(records, path) for path in READ}
-        self._landed_at, self._net_at = at[LANDED_AT], at[NET_AT]
+        racket, table, net = records["racket"], records["table"], records["net"]
+        self._landed_at, self._net_at = table["iteration"], net["iteration"]
         self._landed, self._met_net = flags["landed"], flags["met_net"]
         self._nobody = np.zeros(len(records), np.bool_)
         self._nobody.flags.writeable = False
         self._record = BallRecord(
-            at[SMALLEST_DISTANCE],
+            racket["smallest_distance"],
             flags["touched"],
-            at[VELOCITY_AFTER],
-            at[LARGEST_SPEED],
+            racket["velocity_after"],
+            racket["largest_speed"],
             flags["landed"],
-            at[LANDING],
+            table["position"],
             self._nobody,
             flags["touched_floor"],
-            at[NET_POSITION],
-            at[FLOOR_POSITION],
+            net["position"],
+            records["floor"]["position"],
         )
 
     def read(self) -> BallRecord:
@@ -186,30 +120,8 @@ class BallRecords:
 
 def ball_records(records: NDArray[Any]) -> BallRecord:
     """Events of N balls, from their records (N,)."""
-    compare = {">": np.greater, ">=": np.greater_equal}
     flags = {
-        name: compare[how](_values(records, path), value)
-        for name, (path, how, value) in FLAGS.items()
+        name: COMPARE[compare](records[surface][number], value)
+        for name, (surface, number, compare, value) in FLAGS.items()
     }
     return BallRecords(records, flags).read()
-
-
-def _values(records: NDArray[Any], path: tuple[str, ...]) -> NDArray[Any]:
-    for name in path:
-        records = records[name]
-    return records
-
-
-def _vector_at(place: int) -> slice:
-    return slice(place, place + 3)
-
-
-def _numbers(
-    dtype: np.dtype[Any], path: tuple[str, ...] = ()
-) -> Iterator[tuple[tuple[str, ...], np.dtype[Any]]]:
-    """Path and type of every number or array of numbers in a record, in order."""
-    if dtype.fields is None:
-        yield path, dtype
-        return
-    for name in dtype.names or ():
-        yield from _numbers(dtype.fields[name][0], (*path, name))

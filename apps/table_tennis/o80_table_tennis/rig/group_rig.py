@@ -10,24 +10,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.learning import Index
 
-from ..balls.sampled_flight import SampledFlight
 from ..settings import RigSettings
 from ..task.observations import BALL_POSITION, PRESSURES, SIZE
-from .arms import Arms, Index
+from .arm import MOTION, Arms
 from .robot_options import arm_options, twin_options
-from .twins import Twins
+from .twin import Flights, Twins
 
 FloatArray = NDArray[np.float64]
+Float32Array = NDArray[np.float32]
 
 LANE_BLOCKS = 2048
 """Blocks of 64 bytes in a lane of a twin: the states of a recorded flight are one batch."""
-MIRRORED = {"position": "extended.joint_positions", "velocity": "extended.joint_velocities"}
+MIRRORED = dict(zip(("position", "velocity"), MOTION, strict=True))
 """Fields of the joints of a twin, each with its path in the rows of the arm."""
 
 
 class GroupRig:
     """N arms, each with the twin that mirrors it; what an inline `Rig` is for one."""
+
+    lateness = 0
+    """Rows that the arms have made since the ones used last."""
 
     def __init__(
         self, copies: int, settings: RigSettings, *, delay: int, threads: int | None = None
@@ -48,8 +52,8 @@ class GroupRig:
                 **twin_options(settings),
             )
             stack.enter_context(twins)
-            self.arms, self.twins = Arms(arms, delay=delay), Twins(twins)
-            self._step = self.arms.burst.then(self.twins.burst, MIRRORED)
+            self.arm, self.twin = Arms(arms, delay=delay), Twins(twins)
+            self._step = self.arm.burst.then(self.twin.burst, MIRRORED)
             self._stack = stack.pop_all()
 
     def reset(
@@ -58,28 +62,27 @@ class GroupRig:
         *,
         arm_seeds: list[int],
         twin_seeds: list[int],
-        flights: Sequence[SampledFlight | None],
+        flights: Sequence[Flights],
     ) -> None:
         """These arms and twins to the start; the balls fly from the next step on."""
-        self.arms.reset(copies, arm_seeds)
-        self.twins.reset(copies, twin_seeds, self.arms.last_motion[copies], flights)
+        self.arm.reset(copies, arm_seeds)
+        self.twin.reset(copies, twin_seeds, self.arm.last_motion[copies], flights)
 
     def step(self, pressures: FloatArray, copies: Index) -> None:
         """These arms are asked for normalised pressures (n, 8); five rows of each."""
-        self.arms.ask(pressures, copies)
+        self.arm.ask(pressures, copies)
         self._step.run(copies)
 
-    def gather(
-        self, low: NDArray[np.float32], high: NDArray[np.float32]
-    ) -> list[NDArray[np.float32]]:
+    def gather(self, low: Float32Array, high: Float32Array) -> list[Float32Array]:
         """Parts (N, ...) of the observation of ball play, within its bounds (22,): C++ fills them
         in in each step and reset.
         """
         arm, ball = slice(0, PRESSURES.stop), slice(BALL_POSITION.start, SIZE)
-        return [
-            self.arms.gather(low[arm], high[arm]),
-            self.twins.gather(low[ball], high[ball]),
-        ]
+        return [self.arm.gather(low[arm], high[arm]), self.twin.gather(low[ball], high[ball])]
+
+    def positions(self, copy: int) -> FloatArray:
+        """(1, 3) of the ball of a copy [m]."""
+        return self.twin.ball[copy, None, :3]
 
     def close(self) -> None:
         """Ends arms and twins; may be called twice."""

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
+from dataclasses import dataclass
 from itertools import count
 from types import TracebackType
 from typing import Any, Self
@@ -13,14 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.learning import EVERY
 
-from ..balls.sampled_flight import SampledFlight
 from ..settings import Pacing, RigSettings
 from ..world.arm import MUSCLES
 from ..world.timing import ITERATIONS
 from .arm import Arm
 from .robot_options import arm_options, twin_options
-from .twin import TIMEOUT, Twin
+from .twin import TIMEOUT, Flights, Twin
 
 FloatArray = NDArray[np.float64]
 
@@ -32,8 +33,25 @@ def unused_name(robot: str) -> str:
     return f"{robot}-{os.getpid()}-{next(NUMBERS)}"
 
 
+@dataclass
+class StepCounts:
+    """Counts of a rig while it is moved."""
+
+    steps: int = 0
+    exact_steps: int = 0
+    """Steps in which the arm and the first twin made exactly five iterations."""
+    late_actions: int = 0
+    """Actions that came after the iteration for which they were meant."""
+    summed_lateness: int = 0
+    """[rows]"""
+    largest_lateness: int = 0
+    """[rows]"""
+
+
 class Rig:
     """One arm and the twins that mirror it, in one of three ways of pacing.
+
+    The task moves it as it moves a `GroupRig` with one copy.
 
     A step is `ask`, `step_arm`, `step_twins`, with k the arm's newest row that was used, `row`: the
     pressures act from iteration k + 1 + delay; the arm makes the rows k + 1 to k + 5; the twins
@@ -42,21 +60,27 @@ class Rig:
     While it is open, move arm and twins only through it. Closing it ends what it started.
     """
 
-    def __init__(self, settings: RigSettings | None = None) -> None:
+    def __init__(self, settings: RigSettings | None = None, *, delay: int = 1) -> None:
+        """delay: iterations from the beginning of a step until its pressures act."""
         self.settings = settings or RigSettings()
         self.row = self.twin_row = 0
         """Iterations of arm and twins that were used last."""
-        self.exact = True
-        """In the last step the arm and the first twin made exactly five iterations."""
+        self.counts = StepCounts()
         self.returns_at_reset = True
         """By the clock `reset` first brings the arm back; False: the caller has done so."""
         self.after_step: Callable[[], None] | None = None
         """Called after each step of 10 ms, with the newest rows of arm and twins."""
+        self._delay = delay
         self._real_time = self.settings.pacing.real_time
         self._stack = ExitStack()
         try:
             self.arm = Arm(self._open_arm())
-            self.twins = [Twin(self._open_twin(twin)) for twin in range(self.settings.twins)]
+            self.twins = [
+                Twin(self._open_twin(twin), extra=self.settings.extra_balls_of(twin))
+                for twin in range(self.settings.twins)
+            ]
+            self.twin = self.twins[0]
+            """The one that holds the ball that is played."""
         except BaseException:
             self._stack.close()
             raise
@@ -77,10 +101,15 @@ class Rig:
         self._stack.close()
 
     def reset(
-        self, *, arm_seed: int, twin_seed: int, flights: Sequence[Sequence[SampledFlight]]
+        self,
+        _copies: object,
+        *,
+        arm_seeds: Sequence[int],
+        twin_seeds: Sequence[int],
+        flights: Sequence[Flights],
     ) -> None:
-        """Arm and twins to the start; the balls of each twin fly from the next step on."""
-        arm = self.arm
+        """Arm and twins to the start; the balls fly from the next step on."""
+        arm, (arm_seed,), (twin_seed,) = self.arm, arm_seeds, twin_seeds
         if not self._real_time:
             arm.reset(arm_seed)
         elif self.returns_at_reset:
@@ -88,10 +117,18 @@ class Rig:
         for twin in self.twins:
             twin.reset(twin_seed)
         self.row = arm.read_newest()
-        for twin, its_flights in zip(self.twins, flights, strict=True):
-            twin.begin(arm.q[-1], arm.dq[-1], its_flights)
+        for twin, its_flights in zip(self.twins, self._shared(*flights), strict=True):
+            twin.begin(arm.last_motion[0], its_flights)
         self._burst_twins(1)
-        self.twin_row = self.twins[0].iteration
+        self.twin_row = self.twin.iteration
+
+    def _shared(self, flights: Flights) -> Iterator[Flights]:
+        """The flights of each twin's balls."""
+        played, extra = list(flights[:1]), list(flights[1:])
+        for twin in self.twins:
+            share = twin.extra.stop - twin.extra.start
+            yield played * twin.extra.start + extra[:share]
+            extra = extra[share:]
 
     def begin(self) -> None:
         """An episode begins now, however long ago the reset was: by the clock the arm moved on."""
@@ -101,29 +138,54 @@ class Rig:
     @property
     def lateness(self) -> int:
         """Rows that the arm has made since the one used last: above 0 only by the clock."""
-        return self.arm.newest - self.row
+        return self.arm.newest - self.row if self._real_time else 0
 
-    def ask(self, pressures: FloatArray, *, delay: int) -> None:
-        """Normalised pressures (8,) for the next step, from its iteration `delay` (from 0) on."""
-        self.arm.ask(pressures, at=self.row + 1 + delay)
+    def step(self, pressures: FloatArray, _copies: object = EVERY) -> None:
+        """The arm is asked for normalised pressures (1, 8); five rows of arm and twins."""
+        self.ask(pressures)
+        exact = self.step_arm()
+        exact = self.step_twins() and exact
+        counts, lateness = self.counts, self.lateness
+        counts.steps += 1
+        counts.exact_steps += exact
+        counts.late_actions += self.arm.late
+        counts.summed_lateness += lateness
+        counts.largest_lateness = max(counts.largest_lateness, lateness)
 
-    def step_arm(self) -> None:
-        """The arm makes the next five rows, or has made them by the clock."""
-        self.exact = self.arm.step(self.row + 1)
+    def ask(self, pressures: FloatArray) -> None:
+        """Normalised pressures (1, 8) for the next step."""
+        self.arm.ask(pressures, at=self.row + 1 + self._delay)
+
+    def step_arm(self) -> bool:
+        """The arm makes the next five rows, or has made them by the clock.
+
+        Returns whether they were exactly these five.
+        """
+        exact = self.arm.step(self.row + 1)
         self.row += ITERATIONS
+        return exact
 
-    def step_twins(self) -> None:
-        """All twins mirror the arm's last rows, at the same time."""
+    def step_twins(self) -> bool:
+        """All twins mirror the arm's last rows, at the same time.
+
+        Returns whether the first one made exactly five rows.
+        """
         if len(self.twins) == 1:
-            self.twins[0].step(self.arm.motion)
+            self.twin.step(self.arm.motion)
         else:
             for twin in self.twins:
                 twin.mirror(self.arm.motion)
             self._burst_twins(ITERATIONS)
-        self.exact = self.exact and self.twins[0].iteration == self.twin_row + ITERATIONS
-        self.twin_row = self.twins[0].iteration
+        exact = self.twin.iteration == self.twin_row + ITERATIONS
+        self.twin_row = self.twin.iteration
         if self.after_step is not None:
             self.after_step()
+        return exact
+
+    def positions(self, _copy: int = 0) -> FloatArray:
+        """(balls, 3) of the played ball and the extra ones [m]."""
+        extra = [twin.all_balls[0, twin.extra] for twin in self.twins]
+        return np.concatenate([self.twin.ball, *extra])[:, :3]
 
     def _burst_twins(self, iterations: int) -> None:
         """All twins run at the same time."""

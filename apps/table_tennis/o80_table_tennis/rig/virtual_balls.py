@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..balls.sampled_flight import SampledFlight
 from ..task.end import End, terminated
 from ..task.observer import Observer, Observing
 from ..task.outcome import returned
@@ -24,14 +23,9 @@ class VirtualBalls:
     """All extra balls, in the order of the twins that hold them."""
 
     def __init__(self, rig: Rig, task: Task, observing: Observing) -> None:
-        self._twins, self._rig, self._task = rig.twins, rig.settings, task
+        self._twins, self._task = rig.twins, task
         self._count = rig.settings.extra_balls
-        self._observer = Observer(task, observing, count=self._count) if self._count else None
-        # the first twin holds the ball that is played; a twin without extra balls mirrors it
-        self._extra = [
-            slice(twin.balls - self._rig.extra_balls_of(number), twin.balls)
-            for number, twin in enumerate(self._twins)
-        ]
+        self._observer = Observer(task, observing, self._count)
 
     def begin(
         self,
@@ -41,8 +35,6 @@ class VirtualBalls:
         generator: np.random.Generator,
     ) -> None:
         """A new episode with these balls; `played` is the state of the played one."""
-        if self._observer is None:
-            return
         self._numbers = np.array(numbers, dtype=np.int64)
         self._ended = np.zeros(self._count, np.bool_)
         self._truncated = np.zeros(self._count, np.bool_)
@@ -57,20 +49,7 @@ class VirtualBalls:
 
     def observe(self, played: State, asked: FloatArray) -> None:
         """Observes all extra balls, once after each step."""
-        if self._observer is not None:
-            self._observations = self._observer.observe(self._state(played), self._shared(asked))
-
-    def share(self, flights: Sequence[SampledFlight]) -> list[list[SampledFlight]]:
-        """The flights of each twin's balls, of all flights, the played one first."""
-        if not flights:
-            return [[] for _ in self._twins]
-        played, left = flights[0], list(flights[1:])
-        shared = []
-        for number, twin in enumerate(self._twins):
-            extra = self._rig.extra_balls_of(number)
-            mine, left = left[:extra], left[extra:]
-            shared.append([played] * (twin.balls - extra) + mine)
-        return shared
+        self._observations = self._observer.observe(self._state(played), self._shared(asked))
 
     def look(self, played: State, *, over: bool) -> dict[str, Any]:
         """`info["virtual"]` of the twins' newest rows; `played` is the state of the played ball.
@@ -92,32 +71,22 @@ class VirtualBalls:
             "balls": self._numbers.copy(),
         }
 
-    def positions(self) -> FloatArray:
-        """(1 + N, 3) of the played ball and the extra ones [m]."""
-        return np.concatenate([self._twins[0].all_balls[:1], *self._balls()])[:, :3]
-
-    def _balls(self) -> list[FloatArray]:
-        pairs = zip(self._twins, self._extra, strict=True)
-        return [twin.all_balls[extra] for twin, extra in pairs]
-
     def _state(self, played: State) -> State:
         """The states of all extra balls: the arm is that of the played one."""
-        pairs = zip(self._twins, self._extra, strict=True)
-        records = np.concatenate([twin.all_records[extra] for twin, extra in pairs])
-
+        records = np.concatenate([twin.all_records[twin.extra] for twin in self._twins])
         return State(
-            np.full(self._count, played.steps),
+            self._shared(np.asarray(played.steps)),
             self._shared(played.motion),
             self._shared(played.pressures),
             self._shared(played.racket),
-            np.concatenate(self._balls()),
+            np.concatenate([twin.all_balls[0, twin.extra] for twin in self._twins]),
             ball_records(records),
             self._shared(played.goal),
         )
 
-    def _shared(self, array: FloatArray) -> FloatArray:
-        """The same for every extra ball, (N, ...)."""
-        return np.broadcast_to(array, (self._count, *array.shape))
+    def _shared(self, array: NDArray[Any]) -> NDArray[Any]:
+        """Array (N, ...) of every extra ball, from that of the played one (1, ...)."""
+        return np.broadcast_to(array, (self._count, *array.shape[1:]))
 
     def _judge(self, state: State, *, over: bool) -> FloatArray:
         """The rewards (N,) that are paid now."""

@@ -1,4 +1,4 @@
-"""Makes the observation `full` of one episode, or of N at once: both get the same bits."""
+"""Makes the observation `full` of N episodes: each gets the bits that it would get alone."""
 
 from __future__ import annotations
 
@@ -33,14 +33,19 @@ def filter_settings(noise: NoiseSettings, interval: float) -> FilterSettings:
 
 
 class FullObserver:
-    """Parts of an observation beyond the state: the latest requests, and the filtered ball.
+    """Observer of N episodes (`count`): beyond the state, the latest requests and a filtered ball.
 
     `interval` is the time from one observation to the next [s], `largest_change` that of an asked
     pressure in that time, normalised.
     """
 
     def __init__(
-        self, full: FullObservation, noise: NoiseSettings, interval: float, largest_change: float
+        self,
+        full: FullObservation,
+        noise: NoiseSettings,
+        interval: float,
+        largest_change: float,
+        count: int,
     ) -> None:
         self._plane, self._interval, self._latency = full.plane, interval, noise.latency
         self._per_change = 1.0 / largest_change
@@ -53,71 +58,6 @@ class FullObserver:
         self._changes, self._newest = slice(begin, end), slice(begin, begin + MUSCLES)
         self._earlier = slice(begin + MUSCLES, end)
         self._later = slice(begin, end - MUSCLES)
-
-    def _remember(self, rows: FloatArray, last: FloatArray, asked: FloatArray) -> None:
-        """The change of the asked pressures (..., 8) is the newest one in rows (..., M)."""
-        rows[..., self._earlier] = rows[..., self._later].copy()
-        rows[..., self._newest] = (asked - last) * self._per_change
-
-    def _fill(self, rows: FloatArray, state: State, asked: FloatArray, seen: Perceived) -> None:
-        """All but the ball."""
-        rows[..., self._motion] = state.motion
-        rows[..., self._pressures] = seen.pressures
-        rows[..., self._asked_at] = asked
-        rows[..., self._racket] = state.racket
-
-
-class OneFullObserver(FullObserver):
-    """Observer of one episode."""
-
-    def __init__(
-        self, full: FullObservation, noise: NoiseSettings, interval: float, largest_change: float
-    ) -> None:
-        super().__init__(full, noise, interval, largest_change)
-        self._filter = ball_filter(filter_settings(noise, interval), 1)
-        self._row, self._last = np.zeros(len(self._centres)), np.zeros(MUSCLES)
-
-    def begin(
-        self, state: State, asked: FloatArray, seen: Perceived, _which: IntArray
-    ) -> FloatArray:
-        """The first observation (M,) of a new episode, scaled."""
-        self._row[self._changes] = 0.0
-        self._last[...] = asked
-        self._filter.begin(seen.ball[None])
-        return self._scaled(state, asked, seen)
-
-    def observe(
-        self, state: State, asked: FloatArray, seen: Perceived, _which: IntArray | slice = EVERY
-    ) -> FloatArray:
-        """The observation (M,) after a step, scaled."""
-        self._remember(self._row, self._last, asked)
-        self._last[...] = asked
-        if seen.first:
-            self._filter.begin(seen.ball[None])
-        else:
-            self._filter.step(seen.ball[None], np.array([seen.missed]))
-        return self._scaled(state, asked, seen)
-
-    def _scaled(self, state: State, asked: FloatArray, seen: Perceived) -> FloatArray:
-        self._fill(self._row, state, asked, seen)
-        self._row[self._time] = state.steps * self._interval
-        self._row[self._time + 1 :] = self._filter.estimates(self._plane)[0]
-        self._row[-1] -= self._latency
-        return (self._row - self._centres) * self._per_scale
-
-
-class ManyFullObserver(FullObserver):
-    """Observer of N episodes."""
-
-    def __init__(
-        self,
-        full: FullObservation,
-        noise: NoiseSettings,
-        interval: float,
-        largest_change: float,
-        count: int,
-    ) -> None:
-        super().__init__(full, noise, interval, largest_change)
         self._filter = ball_filter(filter_settings(noise, interval), count)
         self._every = np.arange(count)
         self._rows = np.zeros((count, len(self._centres)))
@@ -137,9 +77,14 @@ class ManyFullObserver(FullObserver):
     ) -> FloatArray:
         """The observations (n, M) of some episodes after a step, scaled."""
         rows = self._rows[which]
-        self._remember(rows, self._last[which], asked)
+        # the change of the asked pressures is the newest one
+        rows[:, self._earlier] = rows[:, self._later].copy()
+        rows[:, self._newest] = (asked - self._last[which]) * self._per_change
         self._rows[which], self._last[which] = rows, asked
-        self._filter.step(seen.ball, np.asarray(seen.missed), self._every[which])
+        if seen.first:
+            self._filter.begin(seen.ball, self._every[which])
+        else:
+            self._filter.step(seen.ball, np.asarray(seen.missed), self._every[which])
         return self._scaled(rows, state, asked, seen, which)
 
     def _scaled(
@@ -150,9 +95,12 @@ class ManyFullObserver(FullObserver):
         seen: Perceived,
         which: IntArray | slice,
     ) -> FloatArray:
-        self._fill(rows, state, asked, seen)
+        rows[:, self._motion] = state.motion
+        rows[:, self._pressures] = seen.pressures
+        rows[:, self._asked_at] = asked
+        rows[:, self._racket] = state.racket
         time = self._time
-        rows[:, time] = np.asarray(state.steps) * self._interval
+        rows[:, time] = state.steps * self._interval
         rows[:, time + 1 :] = self._filter.estimates(self._plane, self._every[which])
         rows[:, -1] -= self._latency
         return (rows - self._centres) * self._per_scale

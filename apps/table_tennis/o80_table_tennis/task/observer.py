@@ -1,4 +1,4 @@
-"""From the state of an episode, or of N, to what the learner observes: noise, then the numbers.
+"""From the states of N episodes to what the learner observes: noise, then the numbers.
 
 An environment makes one `Observer` from its settings. Noise and filters have a memory: `begin` is
 called for each new episode, `observe` exactly once after each step.
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from .ball_play import ReturnTask
 from .box import Bounded, ObservationBox
 from .full_observation import FullObservation
-from .full_observer import ManyFullObserver, OneFullObserver
+from .full_observer import FullObserver
 from .noise import NO_NOISE, NoiseSettings
 from .perception import Perceived, Perceiving, Perception
 from .state import State
@@ -27,7 +27,6 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 EVERY = slice(None)
-ONLY = np.zeros(1, np.int64)
 
 
 @dataclass(frozen=True)
@@ -44,10 +43,10 @@ class Observing:
 
 
 class Observer:
-    """The observations of one episode (`count` None: no leading dimension), or of N."""
+    """The observations of N episodes (`count`)."""
 
-    def __init__(self, task: Task, observing: Observing, count: int | None = None) -> None:
-        self._task, self._count = task, count
+    def __init__(self, task: Task, observing: Observing, count: int) -> None:
+        self._task = task
         noise, full = observing.noise, observing.full
         self._perception: Perceiving | None = (
             Perception(noise, observing.interval, count) if noise.of_observations else None
@@ -68,14 +67,10 @@ class Observer:
         then `begin` and `observe` need not be called."""
         self.low, self.high = observed.low, observed.high
         """(M,) bounds of an observation."""
-        self._full: OneFullObserver | ManyFullObserver | None = None
+        self._full: FullObserver | None = None
         if full is not None:
-            interval, change = observing.interval, observing.largest_change
-            self._full = (
-                OneFullObserver(full, noise, interval, change)
-                if count is None
-                else ManyFullObserver(full, noise, interval, change, count)
-            )
+            change = observing.largest_change
+            self._full = FullObserver(full, noise, observing.interval, change, count)
 
     def look_through(self, perception: Perceiving) -> None:
         """From the next episode on, ball and pressures are what this one perceives."""
@@ -86,11 +81,11 @@ class Observer:
         state: State,
         asked: FloatArray,
         generators: Sequence[np.random.Generator],
-        which: IntArray = ONLY,
+        which: IntArray,
     ) -> Float32Array:
-        """The first observations of new episodes: of the only one, or of those `which` (n,).
+        """The first observations (n, M) of new episodes `which` (n,).
 
-        `state` and the `asked` pressures (..., 8) are theirs alone, as are the `generators`, of
+        `state` and the `asked` pressures (n, 8) are theirs alone, as are the `generators`, of
         which each is drawn from once if there is any noise.
         """
         seen = (
@@ -105,7 +100,7 @@ class Observer:
     def observe(
         self, state: State, asked: FloatArray, which: IntArray | slice = EVERY
     ) -> Float32Array:
-        """The observations after a step: of the only episode, or of those `which` (n,).
+        """The observations (n, M) after a step of the episodes `which` (n,).
 
         `state` and `asked` are theirs alone.
         """
@@ -139,5 +134,4 @@ class _Bounds:
 
 def exactly(state: State) -> Perceived:
     """Perception without noise."""
-    missed = False if state.ball.ndim == 1 else np.zeros(len(state.ball), np.bool_)
-    return Perceived(state.ball, missed, state.pressures)
+    return Perceived(state.ball, np.zeros(len(state.ball), np.bool_), state.pressures)

@@ -70,19 +70,14 @@ def outcome(record: BallRecord, target: Any) -> dict[str, Any]:
 
     `landing` is where the ball touched the table after the touch, on whichever half; before that,
     landing and distance are infinite. Not NaN: Gymnasium's checks want equal infos to compare
-    equal. Of one ball: Python numbers; arrays may be views, or shared and read-only.
+    equal. The arrays may be views, or shared and read-only.
     """
     landed = record.landed
     if none(landed):
-        shape = np.shape(landed)
-        is_returned, nowhere, apart = _unlanded(shape)
-        if not shape:
-            is_returned, nowhere, apart = False, nowhere.copy(), math.inf
+        is_returned, nowhere, apart = _unlanded(np.shape(landed))
     else:
         nowhere = np.where(np.asarray(landed)[..., np.newaxis], record.landing, np.inf)
         is_returned, apart = returned(record), distance(nowhere, target)
-        if np.ndim(landed) == 0:
-            is_returned, apart = bool(is_returned), float(apart)
     return {
         "touched": record.touched,
         "returned": is_returned,
@@ -102,5 +97,5 @@ def _unlanded(shape: tuple[int, ...]) -> tuple[Any, FloatArray, Any]:
 
 
 def none(flags: Flags) -> bool:
-    """Whether no flag is set; cheap, also for one."""
-    return not (np.count_nonzero(flags) if isinstance(flags, np.ndarray) else flags)
+    """Whether no flag is set; cheap."""
+    return not np.count_nonzero(flags)

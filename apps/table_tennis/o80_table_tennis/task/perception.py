@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,16 +31,16 @@ EVERY = slice(None)
 
 @dataclass(slots=True)
 class Perceived:
-    """Perception of one episode, or of N."""
+    """Perception of N episodes."""
 
     ball: FloatArray
-    """(..., 6) position [m] and velocity [m/s]; where the ball was not seen, the last ones"""
-    missed: Any
-    """(...) whether the ball was not seen"""
+    """(N, 6) position [m] and velocity [m/s]; where the ball was not seen, the last ones"""
+    missed: NDArray[np.bool_]
+    """(N,) whether the ball was not seen"""
     pressures: FloatArray
-    """(..., 8) normalised"""
+    """(N, 8) normalised"""
     first: bool = False
-    """The ball is seen for the first time in this episode: what was said before was a guess."""
+    """The balls are seen for the first time in this episode: what was said before was a guess."""
 
 
 class Perceiving(Protocol):
@@ -58,24 +58,23 @@ class Perceiving(Protocol):
 
 
 class Perception:
-    """The noise of N episodes (`count`), or of one (None).
+    """The noise of N episodes (`count`).
 
     `interval` is the time from one observation to the next [s].
     """
 
-    def __init__(self, noise: NoiseSettings, interval: float, count: int | None) -> None:
-        copies, self._one = count or 1, count is None
+    def __init__(self, noise: NoiseSettings, interval: float, count: int) -> None:
         self._noise, self._interval = noise, interval
         self._sigmas = np.array(
             [noise.ball_position] * 3 + [noise.ball_velocity] * 3 + [noise.pressure] * MUSCLES
         )
-        self._generators: list[np.random.Generator] = [np.random.default_rng(0)] * copies
-        self._normal = np.zeros((copies, BLOCK, BALL + MUSCLES))
-        self._missed = np.zeros((copies, BLOCK), np.bool_)
-        self._at = np.zeros(copies, np.int64)
-        self._every = np.arange(copies)
-        self._last = np.zeros((copies, BALL))
-        self._delay = Delay(noise.latency, interval, copies)
+        self._generators: list[np.random.Generator] = [np.random.default_rng(0)] * count
+        self._normal = np.zeros((count, BLOCK, BALL + MUSCLES))
+        self._missed = np.zeros((count, BLOCK), np.bool_)
+        self._at = np.zeros(count, np.int64)
+        self._every = np.arange(count)
+        self._last = np.zeros((count, BALL))
+        self._delay = Delay(noise.latency, interval, count)
 
     def begin(
         self, state: State, generators: Sequence[np.random.Generator], which: IntArray
@@ -86,44 +85,28 @@ class Perception:
             self._draw(copy)
             self._missed[copy, 0] = False  # an episode begins with a ball that is seen
         self._at[which] = 0
-        balls = state.ball.reshape(-1, BALL)
         if self._delay:
-            self._delay.begin(balls, which)
-        if self._one:
-            return self._look_at_one(state)
-        return self._look(state, balls if not self._delay else self._delay.delayed(which), which)
+            self._delay.begin(state.ball, which)
+        return self._look(state, which)
 
     def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
-        """The next observation of the episode, or of some of the N, which `state` holds."""
+        """The next observations of some of the N, which `state` holds."""
         if self._delay:
             self._delay.add(state.ball, which)
-        if self._one:
-            self._at[0] = next_row = (int(self._at[0]) + 1) % BLOCK
-            if next_row == 0:
-                self._draw(0)
-            return self._look_at_one(state)
         chosen = self._every[which]
         at = (self._at[chosen] + 1) % BLOCK
         self._at[chosen] = at
         for copy in chosen[at == 0].tolist():
             self._draw(copy)
-        ball = self._delay.delayed(chosen) if self._delay else state.ball
-        return self._look(state, ball, chosen)
+        return self._look(state, chosen)
 
-    def _look(self, state: State, ball: FloatArray, which: IntArray) -> Perceived:
+    def _look(self, state: State, which: IntArray) -> Perceived:
         at = self._at[which]
+        ball = self._delay.delayed(which) if self._delay else state.ball
         noise, missed = self._normal[which, at], self._missed[which, at]
         ball = np.where(missed[:, None], self._last[which], ball + noise[:, :BALL])
         self._last[which] = ball
         return Perceived(ball, missed, state.pressures + noise[:, BALL:])
-
-    def _look_at_one(self, state: State) -> Perceived:
-        at = int(self._at[0])
-        noise, missed = self._normal[0, at], bool(self._missed[0, at])
-        if not missed:
-            ball = self._delay.delayed(self._every)[0] if self._delay else state.ball
-            self._last[0] = ball + noise[:BALL]
-        return Perceived(self._last[0], missed, state.pressures + noise[BALL:])
 
     def _draw(self, copy: int) -> None:
         """The noise of the next observations of an episode."""
@@ -154,7 +137,7 @@ class Delay:
         self._past[which] = states
 
     def add(self, balls: FloatArray, which: IntArray | slice) -> None:
-        """The next balls, (6,) or (n, 6)."""
+        """The next balls (n, 6)."""
         self._past[which, 1:] = self._past[which, :-1].copy()
         self._past[which, 0] = balls
 

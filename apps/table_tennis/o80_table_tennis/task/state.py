@@ -49,7 +49,7 @@ class State:
     @property
     def ball_y(self) -> Any:
         """(...) how far the ball is from the arm, towards the opponent [m]."""
-        return self.ball.item(1) if self.ball.ndim == 1 else self.ball[:, 1]
+        return self.ball[..., 1]
 
     def perceived(self, ball: FloatArray, pressures: FloatArray) -> State:
         """The same as it is observed: another ball (..., 6), other pressures (..., 8)."""

@@ -1,8 +1,8 @@
 """The protocol of a task, the part of an environment that can be exchanged.
 
 The environment moves arm and ball; the task defines observation, reward and end of an episode.
-Every method takes the `State` of one episode or of N, and returns as many results, so that a vector
-environment uses the same task. `ball_play` and `reach` are examples.
+Every method takes the `State` of N episodes, and returns as many results: a single environment asks
+for one episode, a vector environment for many. `ball_play` and `reach` are examples.
 """
 
 from __future__ import annotations

@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.learning import EVERY
+
 from ...balls.sources import balls_from
 from ...episode_draw import drawn_episode
 from ...rig.ball_records import ball_records
@@ -79,8 +81,9 @@ class Motions:
             raise ValueError("motions with virtual balls need a task that plays a ball")
         self._count = balls
         self._source = balls_from(task.balls, task.ball_seed, rig.period, task.ball_count)
-        self._observer = Observer(self._task, task.observing(rig.step), count=balls)
-        self._rig = Rig(replace(task.start_of(rig), extra_balls=balls - 1))
+        self._observer = Observer(self._task, task.observing(rig.step), balls)
+        self._pressures = np.zeros((1, MUSCLES))
+        self._rig = Rig(replace(task.start_of(rig), extra_balls=balls - 1), delay=task.delay)
 
     def __enter__(self) -> Motions:
         return self
@@ -127,9 +130,14 @@ class Motions:
         """As the environment begins an episode; returns the numbers of the balls."""
         draw = drawn_episode(self._task, self._source, generator, extra=self._count - 1, options={})
         rig = self._rig
-        rig.reset(arm_seed=draw.arm_seed, twin_seed=draw.twin_seed, flights=[draw.balls.flights])
+        rig.reset(
+            EVERY,
+            arm_seeds=[draw.arm_seed],
+            twin_seeds=[draw.twin_seed],
+            flights=[draw.balls.flights],
+        )
         rig.begin()
-        self._asked = rig.arm.asked
+        self._asked = rig.arm.asked()
         self._goals = np.broadcast_to(draw.goal, (self._count, *draw.goal.shape))
         return draw.balls.numbers
 
@@ -140,29 +148,28 @@ class Motions:
 
     def _step(self, action: Float32Array) -> None:
         """As the environment steps."""
-        rig, settings = self._rig, self.settings
-        for _ in range(settings.repeat):
-            self._asked = changed_pressures(self._asked, action, factor=settings.factor)
-            rig.ask(self._asked, delay=settings.delay)
-            rig.step_arm()
-            rig.step_twins()
+        for _ in range(self.settings.repeat):
+            factor = self.settings.factor
+            self._asked = changed_pressures(self._asked, action[np.newaxis], factor=factor)
+            self._rig.step(self._asked)
 
     def _look(self, steps: int) -> State:
         """The states of all balls."""
-        arm, twin = self._rig.arm, self._rig.twins[0]
+        arm, twin = self._rig.arm, self._rig.twin
+        arm.read_pressures(self._pressures)
         return State(
             np.full(self._count, steps),
             self._shared(arm.last_motion),
-            self._shared(arm.pressures),
+            self._shared(self._pressures),
             self._shared(arm.last_racket),
-            twin.all_balls,
+            twin.all_balls[0],
             ball_records(twin.all_records),
             self._goals,
         )
 
     def _shared(self, array: FloatArray) -> FloatArray:
-        """The same for every ball, (N, ...)."""
-        return np.broadcast_to(array, (self._count, *array.shape))
+        """Array (N, ...) of every ball, from that of the arm (1, ...)."""
+        return np.broadcast_to(array, (self._count, *array.shape[1:]))
 
     def _judge(self, state: State, episodes: _Episodes) -> None:
         """Judges the step that led to this state, for the balls in play."""
