@@ -12,7 +12,7 @@
 namespace o80::test {
 namespace {
 
-Schema robot() {
+Schema checked_robot() {
   Schema schema = plain_robot(2, 2);
   LabelRow label;
   label.name = NameText("open");
@@ -33,7 +33,7 @@ template <class Spoil>
 StatusChange spoilt(RecordHead head, const std::vector<std::byte>& states, Spoil&& spoil,
                     const std::vector<std::uint64_t>& mask = {},
                     const std::vector<std::int64_t>& times = {}, std::uint32_t rows = 1) {
-  Rig rig(robot());
+  Rig rig(checked_robot());
   rig.add(0, direct(), {7.0, 7.0});
   rig.batch.command(head, mask, times, rows, states);
   rig.add(1, direct(), {5.0, 5.0});
@@ -162,7 +162,7 @@ TEST(RecordCheck, TimesThatRunBackwardsAreRefused) {
 
 TEST(RecordCheck, ABatchWhoseHeadIsGarbageIsRejectedWhole) {
   for (int spoil = 0; spoil < 5; ++spoil) {
-    Rig rig(robot());
+    Rig rig(checked_robot());
     for (int i = 0; i < 3; ++i) rig.add(0, direct(), {7.0, 7.0});
     const auto sealed = rig.batch.seal({});
     std::vector<Block> blocks(sealed.begin(), sealed.end());
@@ -187,7 +187,7 @@ TEST(RecordCheck, ABatchWhoseHeadIsGarbageIsRejectedWhole) {
 }
 
 TEST(RecordCheck, ABatchWithFewerRecordsThanBlocksFreesThemAll) {
-  Rig rig(robot());
+  Rig rig(checked_robot());
   for (int i = 0; i < 3; ++i) rig.add(0, direct(), {7.0, 7.0});
   const auto sealed = rig.batch.seal({});
   std::vector<Block> blocks(sealed.begin(), sealed.end());
@@ -204,7 +204,7 @@ TEST(RecordCheck, ABatchWithFewerRecordsThanBlocksFreesThemAll) {
 // record ends once, every block comes back, and desired states stay numbers.
 TEST(RecordCheck, MarksWithoutTextOrWithTooMuchAreRefused) {
   for (const std::uint32_t length : {0U, kMostMarkBytes + 1}) {
-    Rig rig(robot());
+    Rig rig(checked_robot());
     rig.batch.mark(std::string(kMostMarkBytes, 'x'));
     BatchRecord record;
     record.id = 1;
@@ -231,7 +231,7 @@ TEST(RecordCheck, GarbageDoesNoHarm) {
     return std::uniform_int_distribution<std::uint64_t>(low, high)(random);
   };
   for (int round = 0; round < 6000; ++round) {
-    Rig rig(robot(), 256);
+    Rig rig(checked_robot(), 256);
     std::uint64_t sent_blocks = 0;
     for (int pulse = 0; pulse < 3; ++pulse) {
       for (std::uint64_t i = any(0, 6); i > 0; --i) {
