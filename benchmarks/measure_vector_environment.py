@@ -15,7 +15,7 @@ import numpy as np
 from gymnasium.vector import AsyncVectorEnv, AutoresetMode, VectorEnv
 from numpy.typing import NDArray
 
-from o80.loop_options import text_of
+from o80.base.loop_options import text_of
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.entry_points import accelerated_environment, vector_environment
 from o80_table_tennis.rig.ball_records import ball_options

@@ -122,23 +122,22 @@ void Loop::brake() noexcept {
 }
 
 Step Loop::run_granted(std::uint32_t most) noexcept {
-  if (guard_.forked()) return Step::ended;
-  Step step = Step::run;
-  for (std::uint32_t i = 0; i < most && step == Step::run; ++i) {
-    step = view_.finished != 0 ? Step::ended : backend_.try_step();
-    if (step == Step::run && !iterate()) step = Step::ended;
-  }
-  if (step == Step::ended) stop();
-  return step;
-}
-
-Step Loop::replay(Iteration last) noexcept {
-  while (backend_.iteration() <= last) {
-    if (backend_.step() == Step::run && iterate()) continue;
+  if (guard_.forked() || has_ended()) return Step::ended;
+  for (std::uint32_t i = 0; i < most; ++i) {
+    const Step step = view_.finished != 0 ? Step::ended : backend_.try_step();
+    if (step == Step::standing) return step;
+    if (step == Step::run && iterate()) continue;
     stop();
     return Step::ended;
   }
   return Step::run;
+}
+
+Step Loop::replay(Iteration last) noexcept {
+  while (!has_ended() && backend_.iteration() <= last) {
+    if (backend_.step() == Step::ended || !iterate()) stop();
+  }
+  return has_ended() ? Step::ended : Step::run;
 }
 
 bool Loop::iterate() noexcept {
@@ -308,7 +307,7 @@ Served Loop::resume() noexcept {
 }
 
 Ended Loop::stop() noexcept {
-  if (backend_.phase() != Phase::ended) {
+  if (!has_ended()) {
     calls(Verb::stop, [&] {
       robot_->stop();
       return true;

@@ -46,7 +46,7 @@ class Loop final : public RequestServer {
   Step run_granted(std::uint32_t most) noexcept;
   /// Bursting only: as UntypedBackend::begin_direct; run_granted then runs the iterations.
   bool begin_direct(const DirectBurst& burst) noexcept {
-    return view_.finished == 0 && backend_.begin_direct(burst);
+    return !has_ended() && view_.finished == 0 && backend_.begin_direct(burst);
   }
   /// The current row. Between two iterations: the last one.
   const std::byte* row() noexcept { return backend_.observed() - backend_.layout().observed; }
@@ -77,6 +77,7 @@ class Loop final : public RequestServer {
   bool halt() noexcept override;
   Served resume() noexcept override;
 
+  bool has_ended() const noexcept { return backend_.phase() == Phase::ended; }
   bool write() noexcept;
   bool read() noexcept;
   bool pace() noexcept;

@@ -91,7 +91,6 @@ std::int64_t UntypedBackend::Body::real_time() const noexcept {
 /// Commands => desired, in four stages: watch, take, wait, move. A bursting backend waits at most
 /// `at_most` [ns] for a burst.
 Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
-  if (phase == Phase::ended) return Step::ended;
   if (recorded_ != nullptr) return step_recorded();
   if (burst_.is_direct()) return step_direct();
   const std::int64_t give_up =

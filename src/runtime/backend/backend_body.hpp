@@ -167,7 +167,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   }
   inline void take_commands() noexcept;
   bool wait_for_burst(std::int64_t give_up, std::uint32_t& scans) noexcept;
-  void begin_iteration_of_burst(bool first) noexcept;
+  inline void begin_iteration_of_burst(bool first) noexcept;
   void move(Phase under_way) noexcept;
   inline void fill_row(bool fresh) noexcept;
   inline void watch_row(bool fresh) noexcept;

@@ -55,7 +55,6 @@ bool UntypedBackend::Body::is_undisturbed() const noexcept {
 
 /// As a step that takes a batch: first what has happened since the last iteration.
 bool UntypedBackend::Body::begin_direct(const DirectBurst& burst) noexcept {
-  if (phase == Phase::ended) return false;
   watch();
   if (!is_undisturbed() || !controller.has_no_command(burst.targets.actuators)) return false;
   while (!controller.finish_pending()) {

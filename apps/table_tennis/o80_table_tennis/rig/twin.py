@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
-from o80.layout import field_view, with_padding
+from o80.rows.layout import field_view, with_padding
 
 from ..balls.sampled_flight import SampledFlight
 from ..task.ball_record import BallRecord

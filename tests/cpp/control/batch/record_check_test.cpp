@@ -10,7 +10,7 @@
 namespace o80::test {
 namespace {
 
-Schema robot() {
+Schema checked_robot() {
   Schema schema = plain_robot(2, 2);
   LabelRow label;
   label.name = NameText("open");
@@ -31,7 +31,7 @@ template <class Spoil>
 StatusChange spoilt(RecordHead head, const std::vector<std::byte>& states, Spoil&& spoil,
                     const std::vector<std::uint64_t>& mask = {},
                     const std::vector<std::int64_t>& times = {}, std::uint32_t rows = 1) {
-  Rig rig(robot());
+  Rig rig(checked_robot());
   rig.add(0, direct(), {7.0, 7.0});
   rig.batch.command(head, mask, times, rows, states);
   rig.add(1, direct(), {5.0, 5.0});
@@ -160,7 +160,7 @@ TEST(RecordCheck, TimesThatRunBackwardsAreRefused) {
 
 TEST(RecordCheck, ABatchWhoseHeadIsGarbageIsRejectedWhole) {
   for (int spoil = 0; spoil < 5; ++spoil) {
-    Rig rig(robot());
+    Rig rig(checked_robot());
     for (int i = 0; i < 3; ++i) rig.add(0, direct(), {7.0, 7.0});
     const auto sealed = rig.batch.seal({});
     std::vector<Block> blocks(sealed.begin(), sealed.end());
@@ -185,7 +185,7 @@ TEST(RecordCheck, ABatchWhoseHeadIsGarbageIsRejectedWhole) {
 }
 
 TEST(RecordCheck, ABatchWithFewerRecordsThanBlocksFreesThemAll) {
-  Rig rig(robot());
+  Rig rig(checked_robot());
   for (int i = 0; i < 3; ++i) rig.add(0, direct(), {7.0, 7.0});
   const auto sealed = rig.batch.seal({});
   std::vector<Block> blocks(sealed.begin(), sealed.end());
@@ -202,7 +202,7 @@ TEST(RecordCheck, ABatchWithFewerRecordsThanBlocksFreesThemAll) {
 // record ends once, every block comes back, and desired states stay numbers.
 TEST(RecordCheck, MarksWithoutTextOrWithTooMuchAreRefused) {
   for (const std::uint32_t length : {0U, kMostMarkBytes + 1}) {
-    Rig rig(robot());
+    Rig rig(checked_robot());
     rig.batch.mark(std::string(kMostMarkBytes, 'x'));
     BatchRecord record;
     record.id = 1;

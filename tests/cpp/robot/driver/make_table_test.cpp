@@ -60,15 +60,15 @@ struct Model {
 O80_DESCRIBE(Model::Config, joints);
 
 /// A driver of hardware that ticks at a fixed rate.
-struct Ticking : Sensor {
+struct TickingSensor : Sensor {
   static constexpr std::int64_t kPeriod = 2'500'000;  // [ns]
   using Sensor::Sensor;
   void describe(Schema& schema) const { schema.period(kPeriod); }
-  void write(const Desired<Ticking>& desired) { iteration = desired.iteration(); }
-  void read(Reading<Ticking>& reading) { reading.extended.temperature = 20; }
+  void write(const Desired<TickingSensor>& desired) { iteration = desired.iteration(); }
+  void read(Reading<TickingSensor>& reading) { reading.extended.temperature = 20; }
 };
 
-static_assert(Driver<Ticking> && Driver<Puppet> && Driver<Sensor> && Driver<Model>);
+static_assert(Driver<TickingSensor> && Driver<Puppet> && Driver<Sensor> && Driver<Model>);
 
 TEST_F(MakeTableTest, ListsTheOptionsOfTheConfig) {
   const std::vector<Option> options = options_of(table());
@@ -88,12 +88,12 @@ TEST_F(MakeTableTest, DescribesTheDriverAcrossTheTable) {
 
 TEST_F(MakeTableTest, ARobotWithAPeriodOfItsOwnRunsAtItOrIsNotStarted) {
   const auto period_of = [](std::int64_t asked) {
-    return InlineSimulation("ticking", *robot_table<Ticking>("ticking"), {}, asked)
+    return InlineSimulation("ticking", *robot_table<TickingSensor>("ticking"), {}, asked)
         .frontend.period();
   };
-  EXPECT_EQ(period_of(0), Ticking::kPeriod);
-  EXPECT_EQ(period_of(Ticking::kPeriod), Ticking::kPeriod);
-  EXPECT_EQ(period_of(Ticking::kPeriod + 20), Ticking::kPeriod);  // rounded
+  EXPECT_EQ(period_of(0), TickingSensor::kPeriod);
+  EXPECT_EQ(period_of(TickingSensor::kPeriod), TickingSensor::kPeriod);
+  EXPECT_EQ(period_of(TickingSensor::kPeriod + 20), TickingSensor::kPeriod);  // rounded
   EXPECT_THAT(message_of<InvalidArgument>([&] { period_of(1'000'000); }),
               AllOf(HasSubstr("robot 'ticking' runs at 400 Hz (2.5 ms), not at 1000 Hz (1 ms)"),
                     HasSubstr("leave the frequency out")));

@@ -305,7 +305,6 @@ TEST_F(BackendTest, ItsPhaseFollowsStepPublishBrakeAndEnd) {
   EXPECT_EQ(backend.brake(), Step::ended);
   backend.end(BackendState::stopped);
   EXPECT_EQ(backend.phase(), Phase::ended);
-  EXPECT_EQ(backend.try_step(), Step::ended);
 }
 
 TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "memory/segment/owned_segment.hpp"
 #include "memory/segment/queue_word.hpp"
 #include "runtime/backend/schedule.hpp"
 #include "runtime/frontend/link.hpp"
