@@ -55,17 +55,14 @@ if TYPE_CHECKING:
     from o80.backend import StartAfresh as StartAfresh
     from o80.burst_group import BurstGroup as BurstGroup
     from o80.burst_group import burst as burst
-    from o80.chained_burst import ChainedBurst as ChainedBurst
     from o80.first import wait_for_first as wait_for_first
     from o80.frontend import Frontend as Frontend
     from o80.frontend_classes import register_frontend as register_frontend
+    from o80.gather import Gather as Gather
+    from o80.gather import Gathered as Gathered
     from o80.halts import Halt as Halt
     from o80.halts import halt as halt
     from o80.history import History as History
-    from o80.inline_group import Gather as Gather
-    from o80.inline_group import Gathered as Gathered
-    from o80.inline_group import GroupBurst as GroupBurst
-    from o80.inline_group import GroupRequest as GroupRequest
     from o80.inline_group import InlineGroup as InlineGroup
     from o80.installation import prefix as prefix
     from o80.joining.align import Aligned as Aligned
@@ -80,6 +77,8 @@ if TYPE_CHECKING:
     from o80.limits import Limits as Limits
     from o80.playing.playback import Playback as Playback
     from o80.playing.playback import play as play
+    from o80.prepared_burst import GroupBurst as GroupBurst
+    from o80.prepared_burst import GroupRequest as GroupRequest
     from o80.prepared_burst import PreparedBurst as PreparedBurst
     from o80.preview import Preview as Preview
     from o80.provenance import Provenance as Provenance
@@ -110,20 +109,20 @@ else:  # a type checker that read this would accept every name
         "actuator": "Actuator Number",
         "backend": "Backend Running StartAfresh",
         "burst_group": "BurstGroup burst",
-        "chained_burst": "ChainedBurst",
         "first": "wait_for_first",
         "frontend": "Frontend",
         "frontend_classes": "register_frontend",
+        "gather": "Gather Gathered",
         "halts": "Halt halt",
         "history": "History",
-        "inline_group": "Gather Gathered GroupBurst GroupRequest InlineGroup",
+        "inline_group": "InlineGroup",
         "installation": "prefix",
         "joining.align": "Aligned AlignedHistory align",
         "joining.latency": "Latency latency",
         "journal": "Journal JournalCommand JournalEntry",
         "limits": "IntegralBounds Limits",
         "playing.playback": "Playback play",
-        "prepared_burst": "PreparedBurst",
+        "prepared_burst": "GroupBurst GroupRequest PreparedBurst",
         "preview": "Preview",
         "provenance": "Provenance ProvenanceFile",
         "record": "Record",

@@ -3,14 +3,10 @@
 from collections.abc import Sequence
 from typing import Literal, overload
 
-import numpy as np
-
 from o80 import _core
-from o80.enumerations import labelled
 from o80.errors import NotBursting
 from o80.frontend.moving import Moving
-from o80.prepared_burst import PreparedBurst, checked_count
-from o80.trajectory import common_labels, common_type
+from o80.prepared_burst import PreparedBurst
 from o80.words import LateWord, ModeWord, ProfileWord, StartWord
 
 
@@ -93,14 +89,5 @@ class Bursting(Moving):
                 f"'{self.segment}' runs in real time and cannot be burst: start it with bursting"
             )
         chosen, _ = self._chosen(actuators)
-        shape = len(chosen), checked_count(steps, "steps")
-        return PreparedBurst(
-            self,
-            chosen,
-            labelled(
-                np.empty(shape, common_type(chosen, self._layout)),
-                common_labels(chosen, self._layout),
-            ),
-            np.zeros(checked_count(iterations, "iterations"), self._layout.row),
-            pace=(checked_count(each, "each"), mode, profile, start),
-        )
+        options = iterations, steps, each, mode, profile, start, 0
+        return PreparedBurst(self, self._layout, (), chosen, *options)
