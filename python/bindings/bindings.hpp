@@ -11,7 +11,6 @@ void bind_batch(nanobind::module_& module);
 void bind_canceller(nanobind::module_& module);
 void bind_frontend(nanobind::module_& module);
 void bind_control(nanobind::module_& module);
-void bind_prepared_burst(nanobind::module_& module);
 void bind_backend(nanobind::module_& module);
 void bind_inline_group(nanobind::module_& module);
 void bind_robots(nanobind::module_& module);

@@ -1,4 +1,5 @@
-// Copies of a robot that are stepped together (robot/group/inline_group.hpp).
+// Copies of a robot that are stepped together (robot/group/inline_group.hpp), and prepared bursts of them
+// and of single robots.
 
 #include "robot/group/inline_group.hpp"
 
@@ -8,6 +9,7 @@
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <optional>
 #include <tuple>
 #include <utility>
 
@@ -39,43 +41,51 @@ std::span<T> writable_numbers_of(const Bytes& bytes) {
   return {reinterpret_cast<T*>(bytes.writable().data()), bytes.writable().size() / sizeof(T)};
 }
 
-/// A burst that is repeated: its options, and the caller's memory for targets and rows.
-struct GroupPlan {
-  GroupPlan(std::vector<std::uint32_t> actuators, std::uint32_t steps, nb::handle each,
-            nb::handle mode, nb::handle profile, nb::handle start, std::int64_t delay,
-            std::int64_t iterations, nb::handle given, nb::handle filled)
-      : targets(given, PyBUF_WRITABLE), rows(filled, PyBUF_WRITABLE) {
-    plan.actuators = std::move(actuators);
-    plan.steps = steps;
-    plan.command = {.pace = pace_of(nb::none(), nb::none(), nb::none(), each),
-                    .mode = mode_of(mode),
-                    .profile = profile_of(profile),
-                    .start = start_of(start)};
-    plan.iterations = iterations;
-    plan.delay = delay;
-    plan.targets = targets.span();
-    plan.rows = rows.writable();
-  }
+class Group;
 
-  Bytes targets;
-  Bytes rows;
-  o80::InlineGroup::BurstPlan plan;
-};
-
-/// A burst of another group that follows one: the compiled half of o80.ChainedBurst.
-struct GroupChain {
+/// The options of a burst of a robot or of copies, and the caller's memory for its targets and
+/// rows: the compiled half of o80.PreparedBurst and o80.GroupBurst.
+class PreparedBurst {
+ public:
   /// From, to, stride, size: as in o80::InlineGroup::Feed [bytes].
   using Feed = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t>;
 
-  GroupChain(GroupPlan& following, const std::vector<Feed>& given) : plan(following) {
-    for (const auto& [from, to, stride, size] : given) feeds.push_back({from, to, stride, size});
+  PreparedBurst(std::vector<std::uint32_t> actuators, std::uint32_t steps, nb::handle each,
+                nb::handle mode, nb::handle profile, nb::handle start, std::int64_t delay,
+                std::int64_t iterations, nb::handle targets, nb::handle rows)
+      : targets_(std::in_place, targets, PyBUF_WRITABLE),
+        rows_(std::in_place, rows, PyBUF_WRITABLE) {
+    plan_.actuators = std::move(actuators);
+    plan_.steps = steps;
+    plan_.command =
+        command_options(pace_of(nb::none(), nb::none(), nb::none(), each), mode, profile, start);
+    plan_.iterations = iterations;
+    plan_.delay = delay;
+    plan_.targets = targets_->writable();
+    plan_.rows = rows_->writable();
   }
-  o80::InlineGroup::Following in(o80::InlineGroup& group) const {
-    return {&group, &plan.plan, plan.targets.writable(), feeds};
+  /// `first`, whose memory it uses, and a burst of another group that follows it.
+  PreparedBurst(const PreparedBurst& first, const Group& group, const PreparedBurst& following,
+                const std::vector<Feed>& feeds);
+
+  const o80::InlineGroup::BurstPlan& plan() const { return plan_; }
+  /// As the burst of one robot. Returns its last iteration.
+  o80::Iteration run(const Frontend& self, nb::handle timeout, nb::handle at,
+                     nb::handle late) const {
+    const o80::PulseOptions options = pulse_options(at, late);
+    const o80::Timeout patience = timeout_of(timeout);
+    const auto frontend = self.shared();
+    plan_.add_targets(*frontend, plan_.targets);
+    const Waiting waiting;
+    return frontend->burst_rows(plan_.rows, patience, Waiting::keep_waiting, options);
   }
 
-  GroupPlan& plan;
-  std::vector<o80::InlineGroup::Feed> feeds;
+ private:
+  std::optional<Bytes> targets_;
+  std::optional<Bytes> rows_;
+  std::vector<o80::InlineGroup::Feed> feeds_;
+  o80::InlineGroup::Following following_;
+  o80::InlineGroup::BurstPlan plan_;
 };
 
 /// Offset in the row and type of a number, as NumPy names it.
@@ -119,42 +129,12 @@ class Group {
     const Waiting waiting;
     group_->publish_as(copy, name);
   }
-  void burst(const GroupPlan& plan, nb::handle copies, nb::handle timeout) const {
+  void burst(const PreparedBurst& burst, nb::handle copies, nb::handle timeout) const {
     const Bytes chosen(copies);
     const o80::Timeout patience = timeout_of(timeout);
     const auto group = group_;
     const Waiting waiting;
-    group->burst(plan.plan, numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting);
-  }
-  void check_chain(const GroupPlan& plan, const Group& second, const GroupChain& chain) const {
-    group_->check(plan.plan, chain.in(*second.group_));
-  }
-  void burst_chain(const GroupPlan& plan, const Group& second, const GroupChain& chain,
-                   nb::handle copies, nb::handle timeout) const {
-    const Bytes chosen(copies);
-    const o80::Timeout patience = timeout_of(timeout);
-    const auto group = group_;
-    const auto following = second.group_;
-    const o80::InlineGroup::Following then = chain.in(*following);
-    const Waiting waiting;
-    group->burst(plan.plan, numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting, &then);
-  }
-  /// `fields`: a mapping for each copy.
-  void request(const std::string& name, nb::handle copies, const std::vector<nb::object>& fields,
-               nb::handle timeout) const {
-    const Bytes chosen(copies);
-    const o80::Timeout patience = timeout_of(timeout);
-    const auto group = group_;
-    const std::uint32_t index = group->request_index(name);
-    const o80::Schema& schema = group->description().schema;
-    std::vector<std::byte> payloads;
-    for (const nb::object& each : fields) {
-      const StateBytes payload(schema, schema.requests[index].type, each, "request '" + name + "'",
-                               Missing::by_default);
-      payloads.insert(payloads.end(), payload.bytes.begin(), payload.bytes.end());
-    }
-    const Waiting waiting;
-    group->request(index, numbers_of<std::uint32_t>(chosen), payloads, patience, kKeepWaiting);
+    group->burst(burst.plan(), numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting);
   }
   /// The bytes of a request with these fields.
   nb::bytes payload(const std::string& name, const nb::object& fields) const {
@@ -165,9 +145,9 @@ class Group {
     return nb::bytes(payload.bytes.data(), payload.bytes.size());
   }
   std::uint32_t request_index(const std::string& name) const { return group_->request_index(name); }
-  /// `payloads`: one for each of the copies; `rows`: one for each copy of the group.
-  void send_request(std::uint32_t request, nb::handle copies, nb::handle payloads, nb::handle rows,
-                    nb::handle timeout) const {
+  /// `payloads`: one for each of the copies; `rows`: none, or one for each copy of the group.
+  void request(std::uint32_t request, nb::handle copies, nb::handle payloads, nb::handle rows,
+               nb::handle timeout) const {
     const Bytes chosen(copies);
     const Bytes given(payloads);
     const Bytes filled(rows, PyBUF_WRITABLE);
@@ -209,6 +189,17 @@ class Group {
   std::unique_ptr<std::pair<Bytes, Bytes>> gathered_;  // memory that every call writes
 };
 
+PreparedBurst::PreparedBurst(const PreparedBurst& first, const Group& group,
+                             const PreparedBurst& following, const std::vector<Feed>& feeds)
+    : following_{&group.inner(), &following.plan_, {}}, plan_(first.plan_) {
+  if (first.plan_.then != nullptr || following.plan_.then != nullptr) {
+    throw o80::InvalidArgument("a burst that is followed already cannot be part of another chain");
+  }
+  for (const auto& [from, to, stride, size] : feeds) feeds_.push_back({from, to, stride, size});
+  following_.feeds = feeds_;
+  plan_.then = &following_;
+}
+
 std::shared_ptr<o80::Description> description_of(const Group& self) {
   return std::make_shared<o80::Description>(self.inner().description());
 }
@@ -230,17 +221,21 @@ Group start_group(const o80::RobotLibrary& library, std::size_t copies, std::siz
 }  // namespace
 
 void bind_inline_group(nb::module_& m) {
-  nb::class_<GroupPlan> plan(m, "GroupPlan", "The compiled half of o80.GroupBurst.");
-  refuse_to_pickle(plan, "a burst of a group", "its targets and its rows");
-  plan.def(nb::init<std::vector<std::uint32_t>, std::uint32_t, nb::handle, nb::handle, nb::handle,
+  nb::class_<PreparedBurst> burst(m, "PreparedBurst",
+                                  "The compiled half of o80.PreparedBurst and o80.GroupBurst.");
+  refuse_to_pickle(burst, "a prepared burst", "its targets and its rows");
+  burst
+      .def(nb::init<std::vector<std::uint32_t>, std::uint32_t, nb::handle, nb::handle, nb::handle,
                     nb::handle, std::int64_t, std::int64_t, nb::handle, nb::handle>(),
            "actuators"_a, "steps"_a, "each"_a, "mode"_a, "profile"_a, "start"_a, "delay"_a,
-           "iterations"_a, "targets"_a, "rows"_a);
-
-  nb::class_<GroupChain> chain(m, "GroupChain", "The compiled half of o80.ChainedBurst.");
-  refuse_to_pickle(chain, "a burst of two groups", "what each of them sends");
-  chain.def(nb::init<GroupPlan&, const std::vector<GroupChain::Feed>&>(), "following"_a, "feeds"_a,
-            nb::keep_alive<1, 2>());
+           "iterations"_a, "targets"_a, "rows"_a)
+      .def(nb::init<const PreparedBurst&, const Group&, const PreparedBurst&,
+                    const std::vector<PreparedBurst::Feed>&>(),
+           "first"_a, "group"_a, "following"_a, "feeds"_a, nb::keep_alive<1, 2>(),
+           nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
+      .def("run", &PreparedBurst::run, "frontend"_a, "timeout"_a.none(), "at"_a.none(), "late"_a,
+           nb::sig("def run(self, frontend: Frontend, timeout: float | None, at: int | None, "
+                   "late: str) -> int"));
 
   nb::class_<Group> group(m, "InlineGroup", "The compiled half of o80.InlineGroup.");
   refuse_to_pickle(group, "an inline group", "its rows");
@@ -254,15 +249,11 @@ void bind_inline_group(nb::module_& m) {
       .def("attach", &Group::attach, "copy"_a)
       .def("publish", &Group::publish, "copy"_a, "name"_a)
       .def("check",
-           [](const Group& self, const GroupPlan& checked) { self.inner().check(checked.plan); })
-      .def("burst", &Group::burst, "plan"_a, "copies"_a, "timeout"_a.none())
-      .def("check_chain", &Group::check_chain, "plan"_a, "second"_a, "chain"_a)
-      .def("burst_chain", &Group::burst_chain, "plan"_a, "second"_a, "chain"_a, "copies"_a,
-           "timeout"_a.none())
-      .def("request", &Group::request, "name"_a, "copies"_a, "fields"_a, "timeout"_a.none())
+           [](const Group& self, const PreparedBurst& given) { self.inner().check(given.plan()); })
+      .def("burst", &Group::burst, "burst"_a, "copies"_a, "timeout"_a.none())
       .def("payload", &Group::payload, "name"_a, "fields"_a)
       .def("request_index", &Group::request_index, "name"_a)
-      .def("send_request", &Group::send_request, "request"_a, "copies"_a, "payloads"_a, "rows"_a,
+      .def("request", &Group::request, "request"_a, "copies"_a, "payloads"_a, "rows"_a,
            "timeout"_a.none())
       .def("latest", &Group::latest, "copies"_a, "rows"_a)
       .def("gather", &Group::gather, "numbers"_a, "flags"_a, "observations"_a, "raised"_a)

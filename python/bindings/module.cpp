@@ -24,7 +24,6 @@ NB_MODULE(_core, m) {
   bind_canceller(m);
   bind_frontend(m);
   bind_control(m);
-  bind_prepared_burst(m);
   bind_backend(m);
   bind_robots(m);
   bind_inline_group(m);

@@ -8,7 +8,6 @@
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <memory>
 #include <optional>
@@ -23,6 +22,7 @@
 #include "interpreter.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/version.hpp"
+#include "o80/robot/make_table.hpp"
 #include "o80/robot/run.hpp"
 #include "robot/driver/library.hpp"
 #include "robot/loop/robot_provenance.hpp"
@@ -35,9 +35,6 @@ using o80::OptionValue;
 using o80::RequestAnswer;
 
 namespace {
-
-/// Each class needs functions of its own, because a table's functions get no context.
-constexpr std::size_t kMostClasses = 128;
 
 void set_text(char* text, std::size_t size, const std::string& from) {
   const std::size_t length = std::min(from.size(), size - 1);
@@ -68,17 +65,14 @@ Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
   return failed;
 }
 
-/// One class: python/o80/drivers/driver_class.py.
+/// One class: python/o80/drivers/driver_class.py. It is never deleted, because its table lasts as
+/// long as the process.
 struct PythonClass {
   nb::object described;
   std::string name;
   std::string built_with;
   o80::RobotTable table{};
 };
-
-/// The classes of this process. They are never deleted: a table lasts as long as the process.
-std::array<PythonClass*, kMostClasses> classes{};  // guarded by the GIL
-std::size_t class_count = 0;
 
 /// One driver object: python/o80/drivers/adapter.py.
 struct PythonDriver {
@@ -119,10 +113,11 @@ nb::list pairs(const OptionValue* values, std::uint32_t count) {
   return all;
 }
 
-template <std::size_t Place>
-void options(void* context, void (*each)(void*, const o80::OptionRow*)) {
+const nb::object& class_of(void* self) { return static_cast<PythonClass*>(self)->described; }
+
+void options(void* self, void* context, void (*each)(void*, const o80::OptionRow*)) {
   const WithGil locked;
-  for (nb::handle row : classes[Place]->described.attr("options")) {
+  for (nb::handle row : class_of(self).attr("options")) {
     const auto texts = nb::cast<std::vector<std::string>>(row);
     const o80::OptionRow plain{texts[0].c_str(), texts[1].c_str(), texts[2].c_str(),
                                texts[3].c_str(), texts[4].c_str()};
@@ -130,24 +125,17 @@ void options(void* context, void (*each)(void*, const o80::OptionRow*)) {
   }
 }
 
-template <std::size_t Place>
-int accepts(const OptionValue* values, std::uint32_t count, FaultText* fault) {
+int accepts(void* self, const OptionValue* values, std::uint32_t count, FaultText* fault) {
   return guarded<int>(fault, 1, [&] {
-    classes[Place]->described.attr("config")(pairs(values, count));
+    class_of(self).attr("config")(pairs(values, count));
     return 0;
   });
 }
 
-template <std::size_t Place>
-void* create(const OptionValue* values, std::uint32_t count, FaultText* fault) {
+void* create(void* self, const OptionValue* values, std::uint32_t count, FaultText* fault) {
   return guarded<void*>(fault, nullptr, [&]() -> void* {
-    return new PythonDriver(classes[Place]->described.attr("make")(pairs(values, count)));
+    return new PythonDriver(class_of(self).attr("make")(pairs(values, count)));
   });
-}
-
-template <std::size_t... Places>
-constexpr auto makers(std::index_sequence<Places...>) {
-  return std::array{std::make_tuple(&options<Places>, &accepts<Places>, &create<Places>)...};
 }
 
 int describe(void* robot, std::int64_t period, void* context,
@@ -160,31 +148,7 @@ int describe(void* robot, std::int64_t period, void* context,
     schema.head.block = o80::round_up(schema.head.block, 8);
     self.requests = schema.requests.size();
     self.take_buffers();
-    const auto count = [](const auto& of) { return static_cast<std::uint32_t>(of.size()); };
-    const o80::SchemaRows all{&schema.head,
-                              schema.types.data(),
-                              schema.hooks.data(),
-                              schema.fields.data(),
-                              schema.labels.data(),
-                              schema.groups.data(),
-                              schema.actuators.data(),
-                              schema.limits.data(),
-                              schema.integrals.data(),
-                              schema.requests.data(),
-                              schema.defaults.data(),
-                              schema.shown.values.data(),
-                              schema.shown.mjcf.c_str(),
-                              schema.shown.file.c_str(),
-                              count(schema.types),
-                              count(schema.fields),
-                              count(schema.labels),
-                              count(schema.groups),
-                              count(schema.actuators),
-                              count(schema.limits),
-                              count(schema.integrals),
-                              count(schema.requests),
-                              count(schema.defaults),
-                              count(schema.shown.values)};
+    const o80::SchemaRows all = o80::driving::rows_of(schema);
     rows(context, &all);
     return 0;
   });
@@ -312,12 +276,6 @@ void destroy(void* robot) {
 
 /// Makes a table for a class. `described` is kept for ever.
 o80::RobotLibrary library_of(const nb::object& described, const std::string& path) {
-  if (class_count == kMostClasses) {
-    throw o80::DriverError("this process has loaded " + std::to_string(kMostClasses) +
-                           " driver classes already: load each class once, and keep what "
-                           "o80.robots.load returns");
-  }
-  constexpr auto kMakers = makers(std::make_index_sequence<kMostClasses>());
   auto* made = new PythonClass{described,
                                nb::cast<std::string>(described.attr("name")),
                                nb::cast<std::string>(described.attr("built_with")),
@@ -328,7 +286,10 @@ o80::RobotLibrary library_of(const nb::object& described, const std::string& pat
   table.row_sizes = o80::kSchemaRowSizes;
   table.name = made->name.c_str();
   table.built_with = made->built_with.c_str();
-  std::tie(table.options, table.accepts, table.create) = kMakers[class_count];
+  table.self = made;
+  table.options = &options;
+  table.accepts = &accepts;
+  table.create = &create;
   table.describe = &describe;
   table.start = &start;
   if (nb::cast<bool>(described.attr("has_wait"))) {
@@ -342,7 +303,6 @@ o80::RobotLibrary library_of(const nb::object& described, const std::string& pat
   if (nb::cast<bool>(described.attr("has_resume"))) table.resume = &resume;
   table.stop = &stop;
   table.destroy = &destroy;
-  classes[class_count++] = made;
   o80::name_library(table, path, nb::cast<std::string>(described.attr("source")));
   return {nb::cast<std::string>(described.attr("path")), &table};
 }

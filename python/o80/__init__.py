@@ -55,9 +55,8 @@ if TYPE_CHECKING:
     from o80.base.words import Reason as Reason
     from o80.base.words import Start as Start
     from o80.base.words import Status as Status
-    from o80.burst_group import BurstGroup as BurstGroup
-    from o80.burst_group import burst as burst
-    from o80.chained_burst import ChainedBurst as ChainedBurst
+    from o80.groups.burst_group import BurstGroup as BurstGroup
+    from o80.groups.burst_group import burst as burst
     from o80.drivers.backend import Backend as Backend
     from o80.drivers.backend import Running as Running
     from o80.drivers.backend import StartAfresh as StartAfresh
@@ -73,11 +72,9 @@ if TYPE_CHECKING:
     from o80.frontend.segments import clean as clean
     from o80.frontend.segments import segments as segments
     from o80.frontend.stopping import stop as stop
-    from o80.inline_group import Gather as Gather
-    from o80.inline_group import Gathered as Gathered
-    from o80.inline_group import GroupBurst as GroupBurst
-    from o80.inline_group import GroupRequest as GroupRequest
-    from o80.inline_group import InlineGroup as InlineGroup
+    from o80.groups.gather import Gather as Gather
+    from o80.groups.gather import Gathered as Gathered
+    from o80.groups.inline_group import InlineGroup as InlineGroup
     from o80.joining.align import Aligned as Aligned
     from o80.joining.align import AlignedHistory as AlignedHistory
     from o80.joining.align import align as align
@@ -85,7 +82,9 @@ if TYPE_CHECKING:
     from o80.joining.latency import latency as latency
     from o80.playing.playback import Playback as Playback
     from o80.playing.playback import play as play
-    from o80.prepared_burst import PreparedBurst as PreparedBurst
+    from o80.frontend.prepared_burst import GroupBurst as GroupBurst
+    from o80.frontend.prepared_burst import GroupRequest as GroupRequest
+    from o80.frontend.prepared_burst import PreparedBurst as PreparedBurst
     from o80.recording.reader import RecordingFile as RecordingFile
     from o80.recording.reader import open as open
     from o80.recording.recording import Recording as Recording
@@ -110,19 +109,19 @@ else:  # a type checker that read this would accept every name
     _LAZY = {
         "rows.actuators": "Actuator IntegralBounds Limits Number",
         "drivers.backend": "Backend Running StartAfresh",
-        "burst_group": "BurstGroup burst",
-        "chained_burst": "ChainedBurst",
+        "groups.burst_group": "BurstGroup burst",
         "frontend.frontend": "Frontend register_frontend wait_for_first",
         "frontend.reader": "Journal",
         "frontend.results": "Halt Preview RunningRequest halt",
         "rows.history": "History",
-        "inline_group": "Gather Gathered GroupBurst GroupRequest InlineGroup",
+        "groups.gather": "Gather Gathered",
+        "groups.inline_group": "InlineGroup",
         "base.installation": "prefix",
         "joining.align": "Aligned AlignedHistory align",
         "joining.latency": "Latency latency",
         "rows.journal": "JournalCommand JournalEntry",
         "playing.playback": "Playback play",
-        "prepared_burst": "PreparedBurst",
+        "frontend.prepared_burst": "GroupBurst GroupRequest PreparedBurst",
         "rows.provenance": "Provenance ProvenanceFile",
         "rows.record": "Record States",
         "recording.reader": "RecordingFile open",

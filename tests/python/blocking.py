@@ -80,7 +80,7 @@ CALLS = {
 }
 
 # their copies run in the calling thread and threads of its own: nobody else could let them wait
-COMPUTING = {"ChainedBurst.run", "GroupBurst.run", "GroupRequest.run", "InlineGroup.request"}
+COMPUTING = {"GroupBurst.run", "GroupRequest.run", "InlineGroup.request"}
 
 
 def waiting_methods() -> set[str]:

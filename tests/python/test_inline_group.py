@@ -29,75 +29,51 @@ def files() -> list[str]:
 
 
 @pytest.mark.parametrize("each", [1, 3])
-@pytest.mark.parametrize("threads", [1, 2, 4])
-def test_gives_the_rows_of_single_robots_bit_for_bit(threads: int, each: int) -> None:
-    random = np.random.default_rng(3)
-    robot = o80.robots.load("two_joints")
-    with robot.inline(copies=COPIES, threads=threads, gain=30.0) as group:
-        singles = [robot.inline(gain=30.0) for _ in range(COPIES)]
-        burst = group.prepared_burst(6, steps=2, each=each)
-        bursts = [single.prepared_burst(6, steps=2, each=each) for single in singles]
-        for turn in range(20):
-            burst.targets = random.uniform(-2, 2, (COPIES, 2, 2))
-            burst.run()
-            for i, one in enumerate(bursts):
-                one.targets = burst.targets[i]
-                one.run()
-                assert burst.rows[i].tobytes() == one.rows.tobytes()
-            if turn % 5 == 2:
-                some = random.permutation(COPIES)[:3]
-                group.request("reset", copies=some, seed=some)
-                for i in some:
-                    singles[i].request("reset", seed=i)
-                for i, single in enumerate(singles):
-                    assert group.latest()[i].tobytes() == single.history(1).rows[0].tobytes()
-        for single in singles:
-            single.close()
+def test_sends_each_copy_its_targets_and_returns_its_rows(
+    group: o80.InlineGroup, each: int
+) -> None:
+    burst = group.prepared_burst(6, steps=2, each=each)
+    burst.targets = np.random.default_rng(3).uniform(-2, 2, (COPIES, 2, 2))
+    burst.run()
+    for i in range(COPIES):
+        with o80.robots.load("two_joints").inline() as single:
+            one = single.prepared_burst(6, steps=2, each=each)
+            one.targets = burst.targets[i]
+            one.run()
+            assert burst.rows[i].tobytes() == one.rows.tobytes()
 
 
-def test_a_chained_burst_does_what_two_bursts_do_bit_for_bit() -> None:
-    random, robot = np.random.default_rng(5), o80.robots.load("two_joints")
-    with (
-        robot.inline(copies=COPIES, threads=2) as leader,
-        robot.inline(copies=COPIES, threads=leader, gain=30.0) as mirror,
-        robot.inline(copies=COPIES, threads=2) as alone,
-        robot.inline(copies=COPIES, threads=alone, gain=30.0) as beside,
-    ):
-        first = leader.prepared_burst(4, mode="overwrite", delay=1)
+def test_a_burst_is_followed_by_one_whose_targets_are_its_rows(group: o80.InlineGroup) -> None:
+    with o80.robots.load("two_joints").inline(copies=COPIES, threads=group) as mirror:
+        assert mirror.threads == group.threads == 2
+        first = group.prepared_burst(4, mode="overwrite", delay=1)
         second = mirror.prepared_burst(4, steps=4)
-        chain = first.then(second, "observed")
-        assert chain.bursts == (first, second)
-        one = alone.prepared_burst(4, mode="overwrite", delay=1)
-        other = beside.prepared_burst(4, steps=4)
-        for turn in range(20):
-            one.targets = first.targets = random.uniform(-2, 2, (COPIES, 1, 2))
-            some = None if turn % 2 else random.permutation(COPIES)[:3]
-            chain.run(some)
-            one.run(some)
-            where = np.arange(COPIES) if some is None else some
-            other.targets[where] = one.rows["observed"][where]
-            other.run(some)
-            assert first.rows.tobytes() == one.rows.tobytes()
-            assert second.rows.tobytes() == other.rows.tobytes()
+        both = first.then(second, "observed")
+        assert both.rows is second.rows
+        both.targets = np.random.default_rng(5).uniform(-2, 2, (COPIES, 1, 2))
+        both.run([4, 1, 2])
+        assert first.rows["iteration"][:, 0].tolist() == [0, 1, 1, 0, 1]
+        for copy in (1, 2, 4):
+            assert (first.rows["desired"][copy, 1:] == both.targets[copy]).all()
+            assert (second.targets[copy] == first.rows["observed"][copy]).all()
+            assert (second.rows["desired"][copy] == second.targets[copy]).all()
+        both.run()
+        assert mirror.latest()["iteration"].tolist() == [4, 8, 8, 4, 8]
 
 
 def test_a_copy_whose_first_burst_fails_is_not_followed(group: o80.InlineGroup) -> None:
     with o80.robots.load("two_joints").inline(copies=COPIES, threads=group) as mirror:
-        first, second = group.prepared_burst(4), mirror.prepared_burst(4, steps=4)
-        chain = first.then(second, "observed")
-        first.targets[...] = 0.5
+        both = group.prepared_burst(4).then(mirror.prepared_burst(4, steps=4), "observed")
+        both.targets[...] = 0.5
         group[1].halt("a test")
         mirror[3].halt("a test")
         with pytest.raises(o80.CopyFailed) as failed:
-            chain.run()
+            both.run()
         assert sorted(failed.value.errors) == [1, 3]
         assert mirror.latest()["iteration"].tolist() == [4, 0, 4, 0, 4]
-        group[1].resume()
-        mirror[3].resume()
-        chain.run()
 
 
-def test_what_a_chained_burst_cannot_do_is_said_when_it_is_made(group: o80.InlineGroup) -> None:
+def test_what_cannot_follow_a_burst_is_said_when_it_is_made(group: o80.InlineGroup) -> None:
     robot = o80.robots.load("two_joints")
     first = group.prepared_burst(4)
     with (
@@ -117,6 +93,10 @@ def test_what_a_chained_burst_cannot_do_is_said_when_it_is_made(group: o80.Inlin
             first.then(second, "iteration")
         with pytest.raises(o80.InvalidArgument, match="no field of the targets 'position'"):
             first.then(second, {"position": "observed"})
+        both = first.then(second, "observed")
+        for one, other in ((both, second), (first, both)):
+            with pytest.raises(o80.InvalidArgument, match="followed already"):
+                one.then(other, "observed")
 
 
 def test_leaves_no_file_and_names_a_copy_on_request(group: o80.InlineGroup) -> None:
@@ -296,17 +276,6 @@ def test_a_group_that_is_never_closed_is_warned_about_and_stopped() -> None:
     assert files() == []
 
 
-def test_serves_requests_that_take_time(group: o80.InlineGroup) -> None:
-    burst = group.prepared_burst(30)
-    burst.targets = np.full((COPIES, 1, 2), 0.4)
-    burst.run()
-    group.request("home", copies=[0, 3], speed=[2.0, 1.0])
-    home = group.latest()
-    assert np.abs(home["observed"][[0, 3]]).max() < 1e-6
-    assert np.abs(home["observed"][[1, 2, 4]]).min() > 0.1
-    assert home["iteration"][3] > home["iteration"][0] > home["iteration"][1]
-
-
 def test_a_frontend_of_a_copy_may_be_closed(group: o80.InlineGroup) -> None:
     with group[1] as frontend:
         frontend.burst(3)
@@ -393,47 +362,11 @@ def test_a_slice_names_copies(group: o80.InlineGroup) -> None:
     assert [row["iteration"] for row in group.latest()] == [6, 3, 6, 3, 6]
 
 
-def test_delayed_targets_are_taken_within_the_burst() -> None:
-    random = np.random.default_rng(4)
-    robot = o80.robots.load("two_joints")
-    with robot.inline(copies=2) as group, robot.inline() as single:
-        burst = group.prepared_burst(5, mode="overwrite", delay=2)
-        one = single.prepared_burst(5, mode="overwrite")
-        for _ in range(4):
-            burst.targets = random.uniform(-2, 2, (2, 1, 2))
-            burst.run()
-            one.targets = burst.targets[1]
-            one.run(at=single.published + 3)
-            assert burst.rows[1].tobytes() == one.rows.tobytes()
-            assert not (burst.rows["desired"][:, 1] == burst.targets[:, 0]).any()
-            np.testing.assert_array_equal(burst.rows["desired"][:, 2], burst.targets[:, 0])
-        with pytest.raises(o80.InvalidArgument, match="delay of a burst of 5 iterations must be"):
-            group.prepared_burst(5, delay=5)
-
-
-def test_groups_that_share_threads_refuse_to_be_called_at_the_same_time(
-    group: o80.InlineGroup,
-) -> None:
-    with o80.robots.load("two_joints").inline(copies=3, threads=group, history=20_000) as other:
-        long, short = other.prepared_burst(20_000), group.prepared_burst(1)
-        long.targets, short.targets = np.zeros((3, 1, 2)), np.zeros((COPIES, 1, 2))
-        refused: list[o80.Error] = []
-
-        def call() -> None:
-            while not refused:
-                try:
-                    short.run()
-                except o80.Error as error:
-                    refused.append(error)
-
-        caller = threading.Thread(target=call)
-        caller.start()
-        while not refused:
-            try:
-                long.run()
-            except o80.Error as error:
-                refused.append(error)
-        caller.join()
-        assert "shares them with: call one after the other" in str(refused[0])
-        long.run()
-        short.run()
+def test_delayed_targets_are_taken_within_the_burst(group: o80.InlineGroup) -> None:
+    burst = group.prepared_burst(5, mode="overwrite", delay=2)
+    burst.targets = np.linspace(0.1, 1, 2 * COPIES).reshape(COPIES, 1, 2)
+    burst.run()
+    assert (burst.rows["desired"][:, :2] == 0).all()
+    assert (burst.rows["desired"][:, 2:] == burst.targets).all()
+    with pytest.raises(o80.InvalidArgument, match="delay of a burst of 5 iterations must be"):
+        group.prepared_burst(5, delay=5)

@@ -30,16 +30,6 @@ FLOORS = (
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 # the face of the package: what users import or start; nothing inside uses it
 FACE = ("__init__", "difference", "errors", "notebook", "plot", "run_driver", "stub", "testing")
-# files that will stand in a room when there is one kind of prepared burst
-LOOSE = {
-    "burst_group": "frontend",
-    "chained_burst": "groups",
-    "gather": "groups",
-    "group_burst": "groups",
-    "group_request": "groups",
-    "inline_group": "groups",
-    "prepared_burst": "frontend",
-}
 INCLUDE = re.compile(r'^#include "(?:o80/)?(\w+)/', re.MULTILINE)
 CAST = re.compile(r"\bcast<(.*?)>\(")
 CASTER = re.compile(r"std::(string|string_view|vector|optional|pair|tuple|shared_ptr|array)\b")
@@ -128,7 +118,7 @@ IMPORTS = {module: imports_of(file) for module, file in MODULES.items()}
 
 
 def room_of(module: str) -> str:
-    return LOOSE.get(module, module.partition(".")[0])
+    return module.partition(".")[0]
 
 
 def test_the_python_package_has_few_rooms_on_few_floors() -> None:

@@ -22,14 +22,6 @@ def test_it_sends_its_targets_and_fills_its_rows(arm: o80.Frontend) -> None:
     assert burst.rows["desired"].tolist() == [[0.3, 0.5]] * 3
 
 
-def test_its_rows_are_those_of_the_history(arm: o80.Frontend) -> None:
-    burst = arm.prepared_burst(5)
-    burst.targets[...] = 0.25
-    last = burst.run(WAIT)
-
-    np.testing.assert_array_equal(burst.rows, arm.history(since=last - 4, until=last).rows)
-
-
 def test_it_does_what_single_calls_do(segment: str) -> None:
     targets = np.random.default_rng(1).uniform(-1, 1, (20, 2, 2))
     robot = o80.robots.load("two_joints")
@@ -60,14 +52,6 @@ def test_overwriting_drops_what_runs(arm: o80.Frontend) -> None:
     burst.run()
 
     assert burst.rows["desired"][:, 0].tolist() == [0.5, 0.5]
-
-
-def test_targets_may_be_taken_within_the_burst(arm: o80.Frontend) -> None:
-    burst = arm.prepared_burst(4)
-    burst.targets[...] = 0.5
-    burst.run(at=3)
-
-    assert burst.rows["desired"][:, 0].tolist() == [0.0, 0.0, 0.5, 0.5]
 
 
 def test_what_comes_late_is_rejected_or_taken_at_once(arm: o80.Frontend) -> None:
@@ -102,15 +86,6 @@ def test_what_was_not_filled_is_refused(arm: o80.Frontend) -> None:
     assert arm.added == 0
 
 
-def test_the_limits_hold(arm: o80.Frontend) -> None:
-    burst = arm.prepared_burst(1)
-    burst.targets[...] = 4.0
-    with pytest.raises(o80.InvalidArgument, match="outside its limits"):
-        burst.run()
-
-    assert arm.added == 0
-
-
 def test_it_bursts_a_robot_in_another_process(bursting: o80.robots.Process) -> None:
     with bursting.frontend() as arm:
         burst = arm.prepared_burst(5)
@@ -128,16 +103,6 @@ def test_a_backend_by_the_clock_has_none(process: o80.robots.Process) -> None:
 def test_it_has_at_least_one_of_everything(arm: o80.Frontend, wrong: dict[str, int]) -> None:
     with pytest.raises(o80.InvalidArgument, match="at least 1"):
         arm.prepared_burst(**wrong)  # type: ignore[arg-type]
-
-
-def test_its_rows_must_fit_into_the_history(segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with robot.inline(segment, history=20) as arm:
-        burst = arm.prepared_burst(21)
-        burst.targets[...] = 0.5
-        with pytest.raises(o80.InvalidArgument, match="history of 20"):
-            burst.run()
-        arm.forget_added()
 
 
 def test_of_a_closed_frontend_it_says_so(segment: str) -> None:

@@ -12,9 +12,8 @@ from gymnasium.vector import AutoresetMode
 from vector_equality import MODES, beside, both
 
 import o80_table_tennis
-from o80.chained_burst import ChainedBurst
-from o80.group_burst import GroupBurst
 from o80.learning import VectorEnvironment
+from o80.frontend.prepared_burst import GroupBurst
 from o80_table_tennis.balls.simulated_shots import simulated_shot
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.players.policies import default_policy
@@ -182,8 +181,7 @@ def test_waits_for_its_copies_however_long_the_process_stands_still(
 
         return running
 
-    for burst in (GroupBurst, ChainedBurst):
-        monkeypatch.setattr(burst, "run", noted(burst.run))
+    monkeypatch.setattr(GroupBurst, "run", noted(GroupBurst.run))
     with made(2) as vector:
         vector.reset(seed=1)
         vector.step(np.zeros(vector.action_space.shape, np.float32))

@@ -54,6 +54,35 @@ void describe_driver(const D& driver, const char* name, std::int64_t period, Sch
   schema.head.block = round_up(schema.head.block, 8);
 }
 
+/// The rows of a schema, valid as long as it does not change.
+inline SchemaRows rows_of(const Schema& schema) {
+  const auto count = [](const auto& rows) { return static_cast<std::uint32_t>(rows.size()); };
+  return {&schema.head,
+          schema.types.data(),
+          schema.hooks.data(),
+          schema.fields.data(),
+          schema.labels.data(),
+          schema.groups.data(),
+          schema.actuators.data(),
+          schema.limits.data(),
+          schema.integrals.data(),
+          schema.requests.data(),
+          schema.defaults.data(),
+          schema.shown.values.data(),
+          schema.shown.mjcf.c_str(),
+          schema.shown.file.c_str(),
+          count(schema.types),
+          count(schema.fields),
+          count(schema.labels),
+          count(schema.groups),
+          count(schema.actuators),
+          count(schema.limits),
+          count(schema.integrals),
+          count(schema.requests),
+          count(schema.defaults),
+          count(schema.shown.values)};
+}
+
 template <Driver D>
 typename D::Config config_of(const OptionValue* values, std::uint32_t count) {
   typename D::Config config;
@@ -97,20 +126,22 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
     t.row_sizes = kSchemaRowSizes;
     t.name = robot_name;
     t.built_with = built_with.c_str();
-    t.options = [](void* context, void (*each)(void*, const OptionRow*)) {
+    t.options = [](void* /*self*/, void* context, void (*each)(void*, const OptionRow*)) {
       for (const Option& option : options_of<typename D::Config>()) {
         const OptionRow row{option.name.c_str(), option.kind.c_str(), option.default_text.c_str(),
                             option.help.c_str(), option.unit.c_str()};
         each(context, &row);
       }
     };
-    t.accepts = [](const OptionValue* values, std::uint32_t count, FaultText* fault) {
+    t.accepts = [](void* /*self*/, const OptionValue* values, std::uint32_t count,
+                   FaultText* fault) {
       return driving::guarded<int>(fault, 1, [&] {
         static_cast<void>(driving::config_of<D>(values, count));
         return 0;
       });
     };
-    t.create = [](const OptionValue* values, std::uint32_t count, FaultText* fault) -> void* {
+    t.create = [](void* /*self*/, const OptionValue* values, std::uint32_t count,
+                  FaultText* fault) -> void* {
       return driving::guarded<void*>(
           fault, nullptr, [&]() -> void* { return new D(driving::config_of<D>(values, count)); });
     };
@@ -119,33 +150,7 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
       return driving::guarded<int>(fault, 1, [&] {
         Schema schema;
         driving::describe_driver(*static_cast<const D*>(robot), robot_name, period, schema);
-        const auto count = [](const auto& rows_of) {
-          return static_cast<std::uint32_t>(rows_of.size());
-        };
-        const SchemaRows all{&schema.head,
-                             schema.types.data(),
-                             schema.hooks.data(),
-                             schema.fields.data(),
-                             schema.labels.data(),
-                             schema.groups.data(),
-                             schema.actuators.data(),
-                             schema.limits.data(),
-                             schema.integrals.data(),
-                             schema.requests.data(),
-                             schema.defaults.data(),
-                             schema.shown.values.data(),
-                             schema.shown.mjcf.c_str(),
-                             schema.shown.file.c_str(),
-                             count(schema.types),
-                             count(schema.fields),
-                             count(schema.labels),
-                             count(schema.groups),
-                             count(schema.actuators),
-                             count(schema.limits),
-                             count(schema.integrals),
-                             count(schema.requests),
-                             count(schema.defaults),
-                             count(schema.shown.values)};
+        const SchemaRows all = driving::rows_of(schema);
         rows(context, &all);
         return 0;
       });

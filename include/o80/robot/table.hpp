@@ -13,7 +13,7 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kRobotTableVersion = 6;
+inline constexpr std::uint32_t kRobotTableVersion = 7;
 
 /// Reason for the failure of a call.
 struct FaultText {
@@ -109,11 +109,12 @@ struct RobotTable {
   std::uint32_t paces_itself;  // 1: the driver has `wait`, which ends each iteration
   const char* name;
   const char* built_with;  // versions of o80 and of the libraries it links
+  void* self;              // passed to the functions that need no driver yet
 
-  void (*options)(void* context, void (*each)(void* context, const OptionRow* row));
+  void (*options)(void* self, void* context, void (*each)(void* context, const OptionRow* row));
   /// Checks names and values of the options without creating the robot.
-  int (*accepts)(const OptionValue* values, std::uint32_t count, FaultText* fault);
-  void* (*create)(const OptionValue* values, std::uint32_t count, FaultText* fault);
+  int (*accepts)(void* self, const OptionValue* values, std::uint32_t count, FaultText* fault);
+  void* (*create)(void* self, const OptionValue* values, std::uint32_t count, FaultText* fault);
   /// `period`: the period that the user requested [ns]; 0: none.
   int (*describe)(void* robot, std::int64_t period, void* context,
                   void (*rows)(void* context, const SchemaRows* rows), FaultText* fault);

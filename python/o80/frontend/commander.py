@@ -21,9 +21,8 @@ from o80.base.errors import (
 )
 from o80.base.words import LateWord, ModeWord, OnErrorWord, ProfileWord, StartWord, Status
 from o80.frontend.reader import Reader
-from o80.prepared_burst import PreparedBurst, checked_count
-from o80.rows.enumerations import labelled
-from o80.rows.targets import common_labels, common_type, states_of, times_of
+from o80.frontend.prepared_burst import PreparedBurst
+from o80.rows.targets import states_of, times_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike
@@ -425,17 +424,8 @@ class Commander(Reader):
                 f"'{self.segment}' runs in real time and cannot be burst: start it with bursting"
             )
         chosen, _ = self._chosen(actuators)
-        shape = len(chosen), checked_count(steps, "steps")
-        return PreparedBurst(
-            self,
-            chosen,
-            labelled(
-                np.empty(shape, common_type(chosen, self._layout)),
-                common_labels(chosen, self._layout),
-            ),
-            np.zeros(checked_count(iterations, "iterations"), self._layout.row),
-            pace=(checked_count(each, "each"), mode, profile, start),
-        )
+        options = iterations, steps, each, mode, profile, start, 0
+        return PreparedBurst(self, self._layout, (), chosen, *options)
 
     # ------------------------------------------------------------------ control and halts
 

@@ -23,7 +23,7 @@ from o80.robots.process import Process, start_process
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
 
-    from o80.inline_group import InlineGroup
+    from o80.groups.inline_group import InlineGroup
 
 GROUP = "o80.robots"
 
@@ -348,7 +348,7 @@ class Robot:
         texts: builtins.list[tuple[str, str]],
         own: builtins.list[tuple[str, str]],
     ) -> "InlineGroup":
-        from o80.inline_group import InlineGroup
+        from o80.groups.inline_group import InlineGroup
 
         if segment is not None:
             raise InvalidArgument(

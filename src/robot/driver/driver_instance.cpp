@@ -12,7 +12,7 @@ namespace o80 {
 
 std::vector<Option> options_of(const RobotTable& table) {
   std::vector<Option> options;
-  table.options(&options, [](void* context, const OptionRow* row) {
+  table.options(table.self, &options, [](void* context, const OptionRow* row) {
     static_cast<std::vector<Option>*>(context)->push_back(
         {row->name, row->kind, row->default_text, row->help, row->unit});
   });
@@ -51,7 +51,8 @@ std::vector<OptionValue> plain(const OptionValues& options) {
 void check_options(const RobotTable& table, const OptionValues& options) {
   const std::vector<OptionValue> values = plain(options);
   FaultText fault{};
-  if (table.accepts(values.data(), static_cast<std::uint32_t>(values.size()), &fault) != 0) {
+  if (table.accepts(table.self, values.data(), static_cast<std::uint32_t>(values.size()), &fault) !=
+      0) {
     throw InvalidArgument("robot '" + std::string(table.name) + "': " + fault.text);
   }
 }
@@ -74,7 +75,8 @@ DriverInstance::DriverInstance(const RobotTable& table, const OptionValues& opti
   check_options(table, options);
   options_ = effective_options(table, options);
   const std::vector<OptionValue> values = plain(options_);
-  driver_ = table.create(values.data(), static_cast<std::uint32_t>(values.size()), &fault_);
+  driver_ =
+      table.create(table.self, values.data(), static_cast<std::uint32_t>(values.size()), &fault_);
   if (guard.forked()) end_forked_child(table.name, "its constructor");
   if (driver_ == nullptr) {
     throw DriverError("robot '" + std::string(table.name) +

@@ -357,9 +357,11 @@ void InlineGroup::check(const BurstPlan& plan) const {
                           "' do not fit into its history of " + std::to_string(kept) +
                           ": start the group with history=" + std::to_string(iterations));
   }
+  if (plan.then != nullptr) check_following(plan);
 }
 
-void InlineGroup::check(const BurstPlan& plan, const Following& then) const {
+void InlineGroup::check_following(const BurstPlan& plan) const {
+  const Following& then = *plan.then;
   if (then.group == this || then.group->pool_ != pool_ || then.group->copies() != copies()) {
     throw InvalidArgument("the group of '" + then.group->name_ + "' must have as many copies as '" +
                           name_ + "', and share its threads: start it with threads=first_group");
@@ -369,9 +371,8 @@ void InlineGroup::check(const BurstPlan& plan, const Following& then) const {
                           " iterations needs as many steps, got " +
                           std::to_string(then.plan->steps));
   }
-  refuse_size("targets", then.targets.size(), then.plan->targets.size(), "bytes");
   const std::size_t last = then.plan->steps - 1;
-  const std::size_t own = then.targets.size() / copies();
+  const std::size_t own = then.plan->targets.size() / copies();
   for (const Feed& feed : then.feeds) {
     const bool fits = std::size_t{feed.from} + feed.size <= description().layout.size &&
                       feed.to + last * feed.stride + feed.size <= own;
@@ -380,14 +381,24 @@ void InlineGroup::check(const BurstPlan& plan, const Following& then) const {
 }
 
 void InlineGroup::burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen,
-                        Timeout timeout, const KeepWaiting& keep_waiting, const Following* then) {
+                        Timeout timeout, const KeepWaiting& keep_waiting) {
+  const Following* const then = plan.then;
   const bool may_be_direct = this->may_be_direct(plan);
   const bool follows_directly = then != nullptr && then->group->may_be_direct(*then->plan);
   const FollowingCall following(*this, then == nullptr ? nullptr : then->group);
   for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy&) {
     burst_copy(plan, may_be_direct, chosen[place]);
-    if (then != nullptr) follow(plan, *then, follows_directly, chosen[place]);
+    if (then != nullptr) follow(plan, follows_directly, chosen[place]);
   });
+}
+
+void InlineGroup::BurstPlan::add_targets(UntypedFrontend& frontend,
+                                         std::span<const std::byte> own) const {
+  if (is_each_iteration(command.pace)) {
+    frontend.add_set_points(actuators, steps, own, command.mode);
+  } else {
+    frontend.add_trajectories(actuators, steps, own, command);
+  }
 }
 
 void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uint32_t i) {
@@ -397,13 +408,7 @@ void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uin
   const std::span<const std::byte> to = plan.targets.subspan(i * targets, targets);
   const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
   if (!may_be_direct || !burst_directly(copy, plan, to, own)) {
-    if (!plan.actuators.empty()) {
-      if (is_each_iteration(plan.command.pace)) {
-        copy.frontend.add_set_points(plan.actuators, plan.steps, to, plan.command.mode);
-      } else {
-        copy.frontend.add_trajectories(plan.actuators, plan.steps, to, plan.command);
-      }
-    }
+    if (!plan.actuators.empty()) plan.add_targets(copy.frontend, to);
     PulseOptions pulse;
     if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
     copy.frontend.burst_rows(own, {}, go_on_, pulse);
@@ -412,11 +417,11 @@ void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uin
 }
 
 /// Rows of the copy => targets of the copy that follows => its burst.
-void InlineGroup::follow(const BurstPlan& plan, const Following& then, bool may_be_direct,
-                         std::uint32_t i) {
+void InlineGroup::follow(const BurstPlan& plan, bool may_be_direct, std::uint32_t i) {
+  const Following& then = *plan.then;
   const std::size_t size = description().layout.size;
   const std::byte* rows = plan.rows.data() + i * (plan.rows.size() / copies());
-  std::byte* targets = then.targets.data() + i * (then.targets.size() / copies());
+  std::byte* targets = then.plan->targets.data() + i * (then.plan->targets.size() / copies());
   for (const Feed& feed : then.feeds) {
     for (std::size_t step = 0; step < then.plan->steps; ++step) {
       std::byte* to = targets + feed.to + step * feed.stride;

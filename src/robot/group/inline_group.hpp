@@ -58,6 +58,7 @@ class InlineGroup {
     /// `segment` is the begin of the names in messages: "pam[3]".
     BackendOptions backend;
   };
+  struct Following;
   /// What a burst sends and gets, in the caller's memory; the same for every call.
   struct BurstPlan {
     std::vector<std::uint32_t> actuators;  // that get targets; none: a burst without commands
@@ -66,8 +67,12 @@ class InlineGroup {
     std::int64_t iterations = 1;
     std::int64_t delay = 0;  // iterations of a burst before its targets are taken
     /// For each copy the states of its first actuator, then those of its second, and so on.
-    std::span<const std::byte> targets;
-    std::span<std::byte> rows;  // for each copy `iterations` rows
+    std::span<std::byte> targets;
+    std::span<std::byte> rows;        // for each copy `iterations` rows
+    const Following* then = nullptr;  // a burst of another group, in the same call
+
+    /// Adds the targets of one copy to the next batch of its frontend.
+    void add_targets(UntypedFrontend& frontend, std::span<const std::byte> own) const;
   };
   /// A number of the rows of a burst that becomes a target of the burst that follows it: row i
   /// gives target i.
@@ -77,12 +82,10 @@ class InlineGroup {
     std::uint32_t stride = 0;  // from target to target [bytes]
     std::uint32_t size = 0;    // [bytes]
   };
-  /// A burst of another group that follows, copy by copy, in the same call: a simulation that
-  /// mirrors a robot, say.
+  /// A burst of another group that follows, copy by copy: a simulation that mirrors a robot, say.
   struct Following {
-    InlineGroup* group = nullptr;  // as many copies, on the same threads
-    const BurstPlan* plan = nullptr;
-    std::span<std::byte> targets;  // those of the plan
+    InlineGroup* group = nullptr;     // as many copies, on the same threads
+    const BurstPlan* plan = nullptr;  // its own `then` is ignored
     std::span<const Feed> feeds;
   };
   /// Memory for what a RowGather reads of each copy.
@@ -114,16 +117,14 @@ class InlineGroup {
   void publish_as(std::size_t copy, const std::string& name);
 
   /// Throws InvalidArgument if the memory of the plan does not have the size it needs, or if its
-  /// iterations do not fit into the history.
+  /// iterations do not fit into the history, or if the burst that follows does not suit it.
   void check(const BurstPlan& plan) const;
-  /// The same for a burst that follows one of this group. Throws InvalidArgument.
-  void check(const BurstPlan& plan, const Following& then) const;
   /// Sends the targets of the chosen copies and runs their iterations, then those of the same
   /// copies of the group that follows, if any. `chosen`: their numbers, each once. Copies between
   /// two iterations when it throws: CopyFailed; TimeoutError, Cancelled and what `keep_waiting`
   /// throws, after which copies whose turn had not come have run nothing.
   void burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen, Timeout timeout = {},
-             const KeepWaiting& keep_waiting = {}, const Following* then = nullptr);
+             const KeepWaiting& keep_waiting = {});
   /// Sends a request to the chosen copies, with a payload for each, and runs each until its request
   /// has ended. Throws as burst(); a request that is not completed is a failure of its copy.
   /// `rows`: if not empty, a row for each copy of the group, in which those that were chosen get
@@ -160,8 +161,9 @@ class InlineGroup {
   void choose(std::span<const std::uint32_t> chosen);
   [[noreturn]] void throw_failures();
   void throw_unless_completed(std::uint32_t request, const Batch& batch) const;
+  void check_following(const BurstPlan& plan) const;
   void burst_copy(const BurstPlan& plan, bool may_be_direct, std::uint32_t i);
-  void follow(const BurstPlan& plan, const Following& then, bool may_be_direct, std::uint32_t i);
+  void follow(const BurstPlan& plan, bool may_be_direct, std::uint32_t i);
   bool may_be_direct(const BurstPlan& plan) const;
   bool burst_directly(Copy& copy, const BurstPlan& plan, std::span<const std::byte> targets,
                       std::span<std::byte> rows) const;

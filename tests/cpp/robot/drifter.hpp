@@ -117,7 +117,7 @@ class GroupBurst {
     for (std::uint32_t i = 0; i < actuators; ++i) plan.actuators.push_back(i);
     plan.steps = steps;
     plan.iterations = iterations;
-    plan.targets = std::as_bytes(std::span(targets));
+    plan.targets = std::as_writable_bytes(std::span(targets));
     plan.rows = rows;
     for (std::uint32_t i = 0; i < group.copies(); ++i) all.push_back(i);
     group.check(plan);

@@ -91,14 +91,14 @@ TEST_F(InlineGroupTest, IsFollowedByAnotherGroupCopyByCopyInTheSameCall) {
   const RowLayout layout = leader.description().layout;
   std::vector<InlineGroup::Feed> feeds;
   for (std::uint32_t i = 0; i < 2; ++i) feeds.push_back({layout.observed + 8 * i, 32 * i, 8, 8});
-  const auto targets = std::as_writable_bytes(std::span(following.targets));
-  const InlineGroup::Following then{&follower, &following.plan, targets, feeds};
-  leader.check(leading.plan, then);
+  const InlineGroup::Following then{&follower, &following.plan, feeds};
+  leading.plan.then = &then;
+  leader.check(leading.plan);
   for (int turn = 0; turn < 50; ++turn) {
     for (std::size_t i = 0; i < one.targets.size(); ++i) {
       leading.targets[i] = one.targets[i] = static_cast<double>((turn * 7 + i * 3) % 20);
     }
-    leader.burst(leading.plan, leading.all, kPatience, {}, &then);
+    leading.run();
     one.run();
     for (std::size_t copy = 0; copy < 9; ++copy) {
       for (std::size_t step = 0; step < 4; ++step) {
@@ -209,6 +209,26 @@ TEST_F(InlineGroupTest, LeavesTheOthersTheirCallWhenOneThreadUsesIt) {
   EXPECT_THROW(group.request(3, all, dawdle(2), kPatience, nested), Cancelled);
   EXPECT_THAT(said, HasSubstr("call it from one thread at a time"));
   burst.run();
+}
+
+TEST_F(InlineGroupTest, SharesItsThreadsInTurn) {
+  InlineGroup leader(drifter(), {}, group_of(2));
+  InlineGroup::Options sharing = group_of(3);
+  sharing.sharing = &leader;
+  InlineGroup follower(drifter(), {}, sharing);
+  GroupBurst burst(follower, 2, 1, 4);
+  EXPECT_EQ(follower.threads(), 2U);
+  const std::vector<std::uint32_t> all{0, 1};
+  std::string said;
+  const auto nested = [&] {
+    said = message_of<Error>([&] { burst.run(); });
+    return false;
+  };
+  EXPECT_THROW(leader.request(3, all, dawdle(2), kPatience, nested), Cancelled);
+  EXPECT_THAT(said, HasSubstr("shares them with: call one after the other"));
+  leader.close();
+  burst.run();
+  EXPECT_EQ(burst.last_iteration(2), 4);
 }
 
 TEST_F(InlineGroupTest, ServesRequestsWithAPayloadForEachCopy) {
@@ -446,15 +466,16 @@ TEST_F(InlineGroupTest, IsClosedInASignalHandlerOfItsCallWhichDoesNotWaitForItse
   sharing.sharing = &leader;
   InlineGroup follower(robot, {}, sharing);
   GroupBurst leading(leader, 1, 1, 1), following(follower, 1, 1, 1);
-  const auto targets = std::as_writable_bytes(std::span(following.targets));
-  const InlineGroup::Following then{&follower, &following.plan, targets, {}};
+  const InlineGroup::Following then{&follower, &following.plan, {}};
+  leading.plan.then = &then;
 
   expect_close_during(
       [&](const KeepWaiting& handler) {
-        leader.burst(leading.plan, leading.all, kPatience, handler, &then);
+        leader.burst(leading.plan, leading.all, kPatience, handler);
       },
       [&] { follower.close(); });
   EXPECT_THROW(following.run(), Closed);
+  leading.plan.then = nullptr;
   EXPECT_NO_THROW(leading.run());
 
   expect_close_during(

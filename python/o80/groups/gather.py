@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,25 +35,10 @@ class Gathered:
     clip: tuple[float, float] | None = None
 
 
-@dataclass(frozen=True)
-class GatheredNumber:
-    """One number of an observation."""
-
-    column: Column
-    offset: float
-    scale: float
-    low: float
-    high: float
-
-
-@dataclass(frozen=True)
-class EventFlag:
-    """One event flag."""
-
-    name: str
-    column: Column
-    compare: str
-    value: float
+#: Place of a number in a row: offset [bytes], and type as NumPy names it.
+_Place: TypeAlias = tuple[int, str]
+#: Name of a number of an observation; its place, offset, scale, low, high.
+_Number: TypeAlias = tuple[str, tuple[_Place, float, float, float, float]]
 
 
 class Gather:
@@ -65,44 +50,32 @@ class Gather:
     The group overwrites both arrays in every call.
     """
 
-    def __init__(
-        self, copies: int, numbers: Sequence[GatheredNumber], flags: Sequence[EventFlag]
-    ) -> None:
-        self._numbers = numbers
-        self._flags = flags
-        self.observations: NDArray[np.float32] = np.zeros((copies, len(numbers)), np.float32)
-        self.flags: NDArray[np.bool_] = np.zeros((copies, len(flags)), np.bool_)
+    def __init__(self, copies: int, names: list[str], flag_names: list[str]) -> None:
+        self._names, self._flag_names = names, flag_names
+        self.observations: NDArray[np.float32] = np.zeros((copies, len(names)), np.float32)
+        self.flags: NDArray[np.bool_] = np.zeros((copies, len(flag_names)), np.bool_)
 
     @property
     def names(self) -> list[str]:
         """The name of each number of an observation."""
-        return [number.column.name for number in self._numbers]
+        return list(self._names)
 
     @property
     def flag_names(self) -> list[str]:
         """The name of each flag."""
-        return [flag.name for flag in self._flags]
+        return list(self._flag_names)
 
     def __getitem__(self, name: str) -> NDArray[np.bool_]:
         """One flag of all copies: (copies,)."""
         if name not in self.flag_names:
             near = did_you_mean(name, self.flag_names)
             raise KeyError(f"no flag is named '{name}'{near}")
-        return self.flags[:, self.flag_names.index(name)]
-
-    def _arguments(self) -> tuple[Any, ...]:
-        """For C++."""
-        numbers = [
-            (_place(each.column), each.offset, each.scale, each.low, each.high)
-            for each in self._numbers
-        ]
-        flags = [(_place(each.column), each.compare, each.value) for each in self._flags]
-        return numbers, flags, self.observations.view(np.uint8), self.flags.view(np.uint8)
+        return self.flags[:, self._flag_names.index(name)]
 
 
-def numbers_from(wanted: Sequence[str | Gathered], schema: dict[str, Any]) -> list[GatheredNumber]:
+def numbers_from(wanted: Sequence[str | Gathered], schema: dict[str, Any]) -> list[_Number]:
     """The numbers of an observation. Raises InvalidArgument."""
-    found: list[GatheredNumber] = []
+    found: list[_Number] = []
     for each in sequence(wanted, "numbers", "['observed']"):
         gathered = Gathered(each) if isinstance(each, str) else each
         if not isinstance(gathered, Gathered):
@@ -111,7 +84,7 @@ def numbers_from(wanted: Sequence[str | Gathered], schema: dict[str, Any]) -> li
     return found
 
 
-def _numbers_of(gathered: Gathered, schema: dict[str, Any]) -> Iterator[GatheredNumber]:
+def _numbers_of(gathered: Gathered, schema: dict[str, Any]) -> Iterator[_Number]:
     columns = _columns_at(gathered.path, schema)
     try:
         offsets = np.broadcast_to(np.asarray(gathered.offset, np.float64), len(columns))
@@ -125,12 +98,14 @@ def _numbers_of(gathered: Gathered, schema: dict[str, Any]) -> Iterator[Gathered
     if gathered.clip is not None and not low < high:
         raise InvalidArgument(f"clip of '{gathered.path}' must be (low, high), got {gathered.clip}")
     for column, offset, scale in zip(columns, offsets, scales, strict=True):
-        yield GatheredNumber(column, float(offset), float(scale), float(low), float(high))
+        yield column.name, (_place(column), float(offset), float(scale), float(low), float(high))
 
 
-def flags_from(wanted: Mapping[str, str | Comparison], schema: dict[str, Any]) -> list[EventFlag]:
-    """The event flags. Raises InvalidArgument."""
-    flags = []
+def flags_from(
+    wanted: Mapping[str, str | Comparison], schema: dict[str, Any]
+) -> dict[str, tuple[_Place, str, float]]:
+    """For each name of a flag its place, comparison and value. Raises InvalidArgument."""
+    flags = {}
     for name, given in mapping(wanted, "flags", "names to comparisons").items():
         comparison = (given, "!=", 0) if isinstance(given, str) else given
         if not isinstance(comparison, tuple) or len(comparison) != 3:
@@ -144,7 +119,7 @@ def flags_from(wanted: Mapping[str, str | Comparison], schema: dict[str, Any]) -
                 f"flag '{name}' must look at one number, and '{path}' has {len(columns)}: "
                 f"name one, such as '{columns[0].name}'"
             )
-        flags.append(EventFlag(name, columns[0], compare, _value_of(value, columns[0], name)))
+        flags[name] = _place(columns[0]), compare, _value_of(value, columns[0], name)
     return flags
 
 
@@ -177,5 +152,5 @@ def _is_below(name: str, path: str) -> bool:
     return name == path or (name.startswith(path) and name[len(path)] in ".[")
 
 
-def _place(column: Column) -> tuple[int, str]:
+def _place(column: Column) -> _Place:
     return column.offset, column.dtype.str[1:]

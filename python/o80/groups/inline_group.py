@@ -20,22 +20,17 @@ from numpy.typing import NDArray
 import o80._core as _core
 from o80.base import lifecycle
 from o80.base.argument_checks import whole
-from o80.base.errors import InvalidArgument, UsedAfterFork
 from o80.base.lifecycle import Closeable
-from o80.base.words import ModeWord, ProfileWord, StartWord
-from o80.frontend.frontend import Frontend
-from o80.gather import Comparison, Gather, Gathered, flags_from, numbers_from
-from o80.group_burst import GroupBurst, chosen_copies
-from o80.group_request import GroupRequest
-from o80.prepared_burst import checked_count
 from o80.rows.enumerations import labelled
+from o80.base.errors import InvalidArgument, UsedAfterFork
+from o80.frontend.frontend import Frontend
+from o80.groups.gather import Comparison, Gather, Gathered, flags_from, numbers_from
 from o80.rows.layout import Layout, dtype_of_type, labels_of_type
-from o80.rows.targets import common_labels, common_type, state_types
+from o80.frontend.prepared_burst import GroupBurst, GroupRequest, chosen_copies
+from o80.base.words import ModeWord, ProfileWord, StartWord
 
 if TYPE_CHECKING:
-    from o80.group_burst import Copies
-
-__all__ = ["Gather", "Gathered", "GroupBurst", "GroupRequest", "InlineGroup"]
+    from o80.frontend.prepared_burst import Copies
 
 
 class InlineGroup(Closeable):
@@ -118,28 +113,8 @@ class InlineGroup(Closeable):
         """
         self._group.check_usable()
         chosen, _ = self[0]._chosen(actuators)
-        count = checked_count(iterations, "iterations")
-        return GroupBurst(
-            self._group,
-            chosen,
-            self._states(chosen, checked_count(steps, "steps")),
-            np.zeros((self.copies, count), self._layout.row),
-            steps=steps,
-            pace=(checked_count(each, "each"), mode, profile, start, whole(delay, "delay", 0)),
-            everybody=self._all,
-        )
-
-    def _states(self, actuators: list[int], steps: int) -> NDArray[Any]:
-        """Memory for targets: in each copy those of the first actuator, then of the second, ..."""
-        if not actuators or len(set(state_types(actuators, self._layout))) == 1:
-            kind = common_type(actuators, self._layout)
-            states = np.empty((self.copies, len(actuators), steps), kind)
-            known: NDArray[Any] = labelled(states, common_labels(actuators, self._layout))
-            return known
-        kinds = state_types(actuators, self._layout)
-        names = [self._layout.schema["actuators"][actuator]["name"] for actuator in actuators]
-        columns = [(name, kind, (steps,)) for name, kind in zip(names, kinds, strict=True)]
-        return np.empty(self.copies, np.dtype(columns))
+        options = iterations, steps, each, mode, profile, start, whole(delay, "delay", 0)
+        return GroupBurst(self._group, self._all, self._layout, (self.copies,), chosen, *options)
 
     def request(
         self, name: str, /, *, copies: Copies = None, timeout: float | None = None, **fields: Any
@@ -157,7 +132,9 @@ class InlineGroup(Closeable):
         chosen = chosen_copies(copies, self._all)
         spread = {field: self._spread(name, field, fields[field], len(chosen)) for field in fields}
         each = [{field: values[i] for field, values in spread.items()} for i in range(len(chosen))]
-        self._group.request(name, chosen.view(np.uint8), each, timeout)
+        index, given = self._group.request_index(name), chosen.view(np.uint8)
+        payloads = b"".join(self._group.payload(name, fields) for fields in each)
+        self._group.request(index, given, payloads, bytearray(), timeout)
 
     def prepared_request(self, name: str, /, **fields: Any) -> GroupRequest:
         """Prepares a request that is repeated, as the reset of a simulation.
@@ -170,15 +147,10 @@ class InlineGroup(Closeable):
         payload = self._group.payload(name, fields)
         described = next(each for each in self._layout.schema["requests"] if each["name"] == name)
         kind = dtype_of_type(described["type"])
+        given = np.frombuffer(bytearray(payload * self.copies), kind)
+        rows = np.zeros(self.copies, self._layout.row)
         return GroupRequest(
-            self._group,
-            name,
-            labelled(
-                np.frombuffer(bytearray(payload * self.copies), kind),
-                labels_of_type(described["type"]),
-            ),
-            np.zeros(self.copies, self._layout.row),
-            self._all,
+            self._group, name, labelled(given, labels_of_type(described["type"])), rows
         )
 
     def latest(self, copies: Copies = None) -> NDArray[Any]:
@@ -203,12 +175,11 @@ class InlineGroup(Closeable):
         Every burst and request of this group refreshes them for its copies, on the threads of the
         group, before it returns. A later call of `gather` replaces them.
         """
-        gather = Gather(
-            self.copies,
-            numbers_from(numbers, self._layout.schema),
-            flags_from(flags or {}, self._layout.schema),
-        )
-        self._group.gather(*gather._arguments())
+        read = numbers_from(numbers, self._layout.schema)
+        compared = flags_from(flags or {}, self._layout.schema)
+        gather = Gather(self.copies, [name for name, _ in read], list(compared))
+        memory = gather.observations.view(np.uint8), gather.flags.view(np.uint8)
+        self._group.gather([number for _, number in read], list(compared.values()), *memory)
         return gather
 
     def publish(self, copy: int, name: str) -> None:

@@ -1,0 +1,1 @@
+"""Copies of a robot that step together, and bursts of several backends in one call."""
