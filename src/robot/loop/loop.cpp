@@ -1,107 +1,24 @@
+// The whole idea of o80: an iteration of a robot.
+//
+// - step: commands => desired. The backend asks its queues; when bursting it waits for a burst.
+// - write: desired => hardware, by the driver.
+// - pace: in real time only: the end of the period, by the clock or by the robot's own tick.
+// - read: hardware => observed, by the driver.
+// - publish: desired, observed => row. Whoever waits for the row wakes up.
+//
+// Row 0 is published before the first iteration: the robot as it was before any command.
 #include "robot/loop/loop.hpp"
 
 #include <algorithm>
 #include <bit>
+#include <utility>
 
-#include "base/short_text.hpp"
 #include "memory/segment/signal.hpp"
 #include "memory/segment/verb_word.hpp"
-#include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
-#include "o80/robot/plant_requests.hpp"
-#include "robot/loop/robot_provenance.hpp"
 
 namespace o80 {
 
-namespace {
-constexpr std::int64_t kLongestBraking = 1'000'000'000;  // [ns]
-
-/// Index of the request `snapshot` whose first field is the slot; the number of requests if there
-/// is none.
-std::uint32_t snapshot_of(const Schema& schema) {
-  const auto found = std::ranges::find_if(schema.requests, [&](const RequestRow& request) {
-    const TypeRow& type = schema.types[request.type];
-    return request.name.view() == "snapshot" && type.size == sizeof(Snapshot);
-  });
-  return static_cast<std::uint32_t>(found - schema.requests.begin());
-}
-
-BackendOptions with_provenance(BackendOptions options, const DriverInstance& robot) {
-  Provenance provenance = provenance_of(robot.table(), robot.options());
-  provenance.run_options = std::move(options.provenance.run_options);
-  options.provenance = std::move(provenance);
-  return options;
-}
-}  // namespace
-
-Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options,
-           RecordedDecisions* recorded)
-    : robot_(std::move(robot)),
-      backend_(robot_->describe(options.period), with_provenance(options, *robot_), this, recorded),
-      pacer_(backend_.schema().head.period),
-      paced_(!options.bursting && recorded == nullptr),
-      accepts_reading_(options.accept_reading),
-      interrupted_(backend_.layout().mask_words + 1),
-      reports_(backend_.schema().requests.size()),
-      snapshot_(snapshot_of(backend_.schema())) {
-  fault_.reserve(1024);
-  view_.interrupted = interrupted_.data();
-  view_.requests = reports_.data();
-}
-
-Loop::~Loop() {
-  if (!guard_.forked()) {
-    static_cast<void>(stop());
-  } else {
-    // in a forked child the robot and its hardware belong to the parent
-    [[maybe_unused]] DriverInstance* of_the_parent = robot_.release();
-  }
-}
-
-void Loop::start() {
-  const bool started = calls(Verb::start, [&] { return robot_->start(); });
-  if (!started) failed("start");
-  if (!started || !read_first() || !begin()) {
-    const std::string why = fault_;
-    stop();
-    throw DriverError(why);
-  }
-}
-
-/// The reading of row 0. In real time the robot must be where it was a period before, as far as it
-/// can have moved: a sensor that gives one wrong value is read again.
-bool Loop::read_first() {
-  constexpr int kReadings = 6;
-  if (!read()) return false;
-  if (!paced_ || accepts_reading_ || !backend_.watches_readings()) return true;
-  const std::int64_t period = std::min(backend_.schema().head.period, kLongestBraking);
-  backend_.judge_first(false);
-  for (int i = 0; i < kReadings; ++i) {
-    const std::int64_t due = monotonic_now() + period;
-    const bool paces_itself = robot_->table().paces_itself != 0;
-    if (paces_itself && !calls(Verb::wait, [&] { return robot_->wait(due); })) {
-      return failed("wait");
-    }
-    while (!paces_itself && !sleep_until(due)) {
-    }
-    if (!read()) return false;
-    if (backend_.judge_first(true)) return true;
-  }
-  return cannot_begin();
-}
-
-/// Row 0.
-bool Loop::begin() { return backend_.publish() || cannot_begin(); }
-
-bool Loop::cannot_begin() {
-  fault_ = "'";
-  fault_ += robot_->table().name;
-  fault_ += "' cannot begin: ";
-  fault_ += backend_.failure();
-  return false;
-}
-
-// commands => desired => hardware, wait, hardware => observed, the row is published
 Ended Loop::run() noexcept {
   pacer_.begin(monotonic_now());
   while (view_.finished == 0 && backend_.step() == Step::run) {
@@ -109,16 +26,6 @@ Ended Loop::run() noexcept {
   }
   brake();
   return stop();
-}
-
-/// Before an end in order in real time: brakes all actuators, for at most one second. Not after a
-/// failed function of the driver.
-void Loop::brake() noexcept {
-  if (!paced_ || !fault_.empty()) return;
-  const std::int64_t end = monotonic_now() + kLongestBraking;
-  while (monotonic_now() < end && backend_.brake() == Step::run) {
-    if (!iterate()) return;
-  }
 }
 
 Step Loop::run_granted(std::uint32_t most) noexcept {
@@ -141,7 +48,9 @@ Step Loop::replay(Iteration last) noexcept {
 }
 
 bool Loop::iterate() noexcept {
-  if (!write() || (paced_ && !pace()) || !read()) return false;
+  if (!write()) return false;
+  if (paced_ && !pace()) return false;
+  if (!read()) return false;
   backend_.publish();
   return true;
 }
@@ -214,96 +123,20 @@ bool Loop::read_into_view() noexcept {
   const bool reads = calls(Verb::read, [&] { return robot_->read(view_); });
   view_.finished = (reads ? view_.finished : 0) | finished;
   if (!reads) return failed("read");
-  note_halt(view_);
+  if (view_.halted != 0) note_halt(view_);
   reported_ = reported_ || view_.reported != 0;
   if (view_.reported != 0) note_requests(view_);
   return true;
 }
 
-void Loop::note_requests(const ReadingView& view) noexcept {
-  for (std::uint32_t i = 0; i < reports_.size(); ++i) {
-    const RequestReport& report = view.requests[i];
-    if (report.changed == 0) continue;
-    const Served how = DriverInstance::served(report);
-    backend_.end_request(i, how);
-    if (how.kind == Served::Kind::failed) {
-      failed(backend_.schema().requests[i].name.chars.data(), how.why());
-    }
+/// Before an end in order in real time: brakes all actuators, for at most one second. Not after a
+/// failed function of the driver.
+void Loop::brake() noexcept {
+  if (!paced_ || !fault_.empty()) return;
+  const std::int64_t end = monotonic_now() + kLongestBraking;
+  while (monotonic_now() < end && backend_.brake() == Step::run) {
+    if (!iterate()) return;
   }
-}
-
-/// Reports ticks that came so fast that speed limits, which count iterations, no longer hold.
-bool Loop::failed_to_wait() noexcept {
-  const double period = static_cast<double>(backend_.schema().head.period) * 1e-6;
-  const Pacer::FastTicks& fast = pacer_.fast_ticks();
-  ShortText<400> text;
-  text.add("'").add(robot_->table().name).add("' failed in wait: ").add(fast.ticks);
-  text.add(" ticks came in ").add(static_cast<double>(fast.time) * 1e-6);
-  text.add(" ms, where the period of ").add(period).add(" ms says ");
-  text.add(static_cast<double>(fast.ticks) * period);
-  text.add(" ms: give the rate of the robot's ticks (--frequency), or make wait() wait for them");
-  fault_ = text.view();
-  return false;
-}
-
-bool Loop::failed(const char* verb) noexcept { return failed(verb, robot_->fault()); }
-
-bool Loop::failed(const char* verb, std::string_view why) noexcept {
-  fault_ = "'";
-  fault_ += robot_->table().name;
-  fault_ += "' failed in ";
-  fault_ += verb;
-  fault_ += ": ";
-  fault_ += why;
-  return false;
-}
-
-Served Loop::serve(std::uint32_t request, std::span<const std::byte> payload) noexcept {
-  const Served served =
-      calls(Verb::request, [&] { return robot_->request(request, payload.data()); });
-  if (served.kind == Served::Kind::failed) {
-    failed(backend_.schema().requests[request].name.chars.data());
-  }
-  return served;
-}
-
-KeptState Loop::kept_state(std::uint32_t request, std::span<const std::byte> payload) noexcept {
-  if (request != snapshot_ || payload.size() < sizeof(std::uint32_t)) return {};
-  KeptState kept;
-  std::memcpy(&kept.slot, payload.data(), sizeof kept.slot);
-  kept.bytes = robot_->snapshot_bytes(kept.slot);
-  return kept;
-}
-
-bool Loop::read_fresh(FreshReading& reading) noexcept {
-  view_.observed = reading.observed;
-  view_.extended = reading.extended;
-  view_.desired = reading.desired;
-  const bool reads = read_into_view();
-  std::ranges::fill(interrupted_, 0);  // there is nothing to interrupt
-  reading.has_desired = view_.has_desired != 0;
-  if (!reads && reading.may_fail) {
-    unread_ = fault_;
-    fault_.clear();
-    reading.why = unread_;
-  }
-  return reads;
-}
-
-void Loop::note_halt(const ReadingView& view) noexcept {
-  if (view.halted == 0) return;
-  const std::size_t size = strnlen(view.halt_text.text, sizeof view.halt_text.text);
-  backend_.halt(HaltCause::driver, {view.halt_text.text, size});
-}
-
-bool Loop::halt() noexcept {
-  return calls(Verb::halt, [&] { return robot_->halt(); }) || failed("halt");
-}
-
-Served Loop::resume() noexcept {
-  const Served served = calls(Verb::resume, [&] { return robot_->resume(); });
-  if (served.kind == Served::Kind::failed) failed("resume");
-  return served;
 }
 
 Ended Loop::stop() noexcept {

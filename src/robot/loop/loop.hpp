@@ -19,7 +19,8 @@ struct Ended {
   std::string fault;  // empty if in order
 };
 
-/// The loop of a robot and its backend, in real time, bursting and inline.
+/// The loop of a robot and its backend, in real time, bursting and inline: loop.cpp iterates,
+/// loop_start.cpp begins, loop_answers.cpp passes on requests and halts.
 /// See ARCHITECTURE.md, One iteration.
 ///
 /// Writer:   one thread; `ask_to_stop` any thread or signal handler.
@@ -102,6 +103,8 @@ class Loop final : public RequestServer {
   bool failed(const char* verb) noexcept;
   bool failed(const char* verb, std::string_view why) noexcept;
   bool failed_to_wait() noexcept;
+
+  static constexpr std::int64_t kLongestBraking = 1'000'000'000;  // [ns]
 
   std::unique_ptr<DriverInstance> robot_;
   ForkGuard guard_;

@@ -1,0 +1,96 @@
+// What a loop does beside its iterations: requests and halts of the robot, and what its faults say.
+#include <algorithm>
+#include <cstring>
+
+#include "base/short_text.hpp"
+#include "memory/segment/verb_word.hpp"
+#include "robot/loop/loop.hpp"
+
+namespace o80 {
+
+void Loop::note_requests(const ReadingView& view) noexcept {
+  for (std::uint32_t i = 0; i < reports_.size(); ++i) {
+    const RequestReport& report = view.requests[i];
+    if (report.changed == 0) continue;
+    const Served how = DriverInstance::served(report);
+    backend_.end_request(i, how);
+    if (how.kind == Served::Kind::failed) {
+      failed(backend_.schema().requests[i].name.chars.data(), how.why());
+    }
+  }
+}
+
+/// Reports ticks that came so fast that speed limits, which count iterations, no longer hold.
+bool Loop::failed_to_wait() noexcept {
+  const double period = static_cast<double>(backend_.schema().head.period) * 1e-6;
+  const Pacer::FastTicks& fast = pacer_.fast_ticks();
+  ShortText<400> text;
+  text.add("'").add(robot_->table().name).add("' failed in wait: ").add(fast.ticks);
+  text.add(" ticks came in ").add(static_cast<double>(fast.time) * 1e-6);
+  text.add(" ms, where the period of ").add(period).add(" ms says ");
+  text.add(static_cast<double>(fast.ticks) * period);
+  text.add(" ms: give the rate of the robot's ticks (--frequency), or make wait() wait for them");
+  fault_ = text.view();
+  return false;
+}
+
+bool Loop::failed(const char* verb) noexcept { return failed(verb, robot_->fault()); }
+
+bool Loop::failed(const char* verb, std::string_view why) noexcept {
+  fault_ = "'";
+  fault_ += robot_->table().name;
+  fault_ += "' failed in ";
+  fault_ += verb;
+  fault_ += ": ";
+  fault_ += why;
+  return false;
+}
+
+Served Loop::serve(std::uint32_t request, std::span<const std::byte> payload) noexcept {
+  const Served served =
+      calls(Verb::request, [&] { return robot_->request(request, payload.data()); });
+  if (served.kind == Served::Kind::failed) {
+    failed(backend_.schema().requests[request].name.chars.data());
+  }
+  return served;
+}
+
+KeptState Loop::kept_state(std::uint32_t request, std::span<const std::byte> payload) noexcept {
+  if (request != snapshot_ || payload.size() < sizeof(std::uint32_t)) return {};
+  KeptState kept;
+  std::memcpy(&kept.slot, payload.data(), sizeof kept.slot);
+  kept.bytes = robot_->snapshot_bytes(kept.slot);
+  return kept;
+}
+
+bool Loop::read_fresh(FreshReading& reading) noexcept {
+  view_.observed = reading.observed;
+  view_.extended = reading.extended;
+  view_.desired = reading.desired;
+  const bool reads = read_into_view();
+  std::ranges::fill(interrupted_, 0);  // there is nothing to interrupt
+  reading.has_desired = view_.has_desired != 0;
+  if (!reads && reading.may_fail) {
+    unread_ = fault_;
+    fault_.clear();
+    reading.why = unread_;
+  }
+  return reads;
+}
+
+void Loop::note_halt(const ReadingView& view) noexcept {
+  const std::size_t size = strnlen(view.halt_text.text, sizeof view.halt_text.text);
+  backend_.halt(HaltCause::driver, {view.halt_text.text, size});
+}
+
+bool Loop::halt() noexcept {
+  return calls(Verb::halt, [&] { return robot_->halt(); }) || failed("halt");
+}
+
+Served Loop::resume() noexcept {
+  const Served served = calls(Verb::resume, [&] { return robot_->resume(); });
+  if (served.kind == Served::Kind::failed) failed("resume");
+  return served;
+}
+
+}  // namespace o80
