@@ -79,7 +79,8 @@ enum class Step : std::uint8_t {
   ended      // the backend must end: see stop_asked() and failure()
 };
 
-/// Phase of a backend: its place between start and end. See ARCHITECTURE.md, The state of a backend.
+/// Phase of a backend: its place between start and end. See ARCHITECTURE.md, The state of a
+/// backend.
 enum class Phase : std::uint8_t {
   starting,    // row 0 is not published yet
   ready,       // between two iterations
