@@ -1,5 +1,5 @@
-// Copies of a robot that are stepped together (robot/group/inline_group.hpp), and prepared bursts of them
-// and of single robots.
+// Copies of a robot that are stepped together (robot/group/inline_group.hpp), and prepared bursts
+// of them and of single robots.
 
 #include "robot/group/inline_group.hpp"
 

@@ -55,14 +55,15 @@ if TYPE_CHECKING:
     from o80.base.words import Reason as Reason
     from o80.base.words import Start as Start
     from o80.base.words import Status as Status
-    from o80.groups.burst_group import BurstGroup as BurstGroup
-    from o80.groups.burst_group import burst as burst
     from o80.drivers.backend import Backend as Backend
     from o80.drivers.backend import Running as Running
     from o80.drivers.backend import StartAfresh as StartAfresh
     from o80.frontend.frontend import Frontend as Frontend
     from o80.frontend.frontend import register_frontend as register_frontend
     from o80.frontend.frontend import wait_for_first as wait_for_first
+    from o80.frontend.prepared_burst import GroupBurst as GroupBurst
+    from o80.frontend.prepared_burst import GroupRequest as GroupRequest
+    from o80.frontend.prepared_burst import PreparedBurst as PreparedBurst
     from o80.frontend.reader import Journal as Journal
     from o80.frontend.results import Halt as Halt
     from o80.frontend.results import Preview as Preview
@@ -72,6 +73,8 @@ if TYPE_CHECKING:
     from o80.frontend.segments import clean as clean
     from o80.frontend.segments import segments as segments
     from o80.frontend.stopping import stop as stop
+    from o80.groups.burst_group import BurstGroup as BurstGroup
+    from o80.groups.burst_group import burst as burst
     from o80.groups.gather import Gather as Gather
     from o80.groups.gather import Gathered as Gathered
     from o80.groups.inline_group import InlineGroup as InlineGroup
@@ -82,9 +85,6 @@ if TYPE_CHECKING:
     from o80.joining.latency import latency as latency
     from o80.playing.playback import Playback as Playback
     from o80.playing.playback import play as play
-    from o80.frontend.prepared_burst import GroupBurst as GroupBurst
-    from o80.frontend.prepared_burst import GroupRequest as GroupRequest
-    from o80.frontend.prepared_burst import PreparedBurst as PreparedBurst
     from o80.recording.reader import RecordingFile as RecordingFile
     from o80.recording.reader import open as open
     from o80.recording.recording import Recording as Recording

@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 
 from o80.base.extras import needed
 from o80.errors import InvalidArgument
-from o80.base.extras import needed
 from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]

@@ -20,8 +20,8 @@ from o80.base.errors import (
     TimeoutError,
 )
 from o80.base.words import LateWord, ModeWord, OnErrorWord, ProfileWord, StartWord, Status
-from o80.frontend.reader import Reader
 from o80.frontend.prepared_burst import PreparedBurst
+from o80.frontend.reader import Reader
 from o80.rows.targets import states_of, times_of
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ from numpy.typing import ArrayLike, NDArray
 
 import o80._core as _core
 from o80.base.argument_checks import whole
-from o80.rows.enumerations import labelled, numbers_of
 from o80.base.errors import InvalidArgument
+from o80.base.words import LateWord, ModeWord, ProfileWord, StartWord
+from o80.rows.enumerations import labelled, numbers_of
 from o80.rows.layout import Layout
 from o80.rows.targets import common_labels, common_type, state_types, states_from
-from o80.base.words import LateWord, ModeWord, ProfileWord, StartWord
 
 #: Numbers of copies, each once, a slice, or a mask with a bool for each copy; None: all of them.
 Copies = ArrayLike | slice | None

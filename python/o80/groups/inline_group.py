@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 import o80._core as _core
 from o80.base import lifecycle
 from o80.base.argument_checks import whole
-from o80.base.lifecycle import Closeable
-from o80.rows.enumerations import labelled
 from o80.base.errors import InvalidArgument, UsedAfterFork
-from o80.frontend.frontend import Frontend
-from o80.groups.gather import Comparison, Gather, Gathered, flags_from, numbers_from
-from o80.rows.layout import Layout, dtype_of_type, labels_of_type
-from o80.frontend.prepared_burst import GroupBurst, GroupRequest, chosen_copies
+from o80.base.lifecycle import Closeable
 from o80.base.words import ModeWord, ProfileWord, StartWord
+from o80.frontend.frontend import Frontend
+from o80.frontend.prepared_burst import GroupBurst, GroupRequest, chosen_copies
+from o80.groups.gather import Comparison, Gather, Gathered, flags_from, numbers_from
+from o80.rows.enumerations import labelled
+from o80.rows.layout import Layout, dtype_of_type, labels_of_type
 
 if TYPE_CHECKING:
     from o80.frontend.prepared_burst import Copies

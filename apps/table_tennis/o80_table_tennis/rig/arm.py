@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
-from o80.rows.layout import field_view, with_padding
 from o80.learning import EVERY, Index
+from o80.rows.layout import field_view, with_padding
 
 from ..world.arm import JOINTS, MUSCLES
 from ..world.timing import ITERATIONS
