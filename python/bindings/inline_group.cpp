@@ -137,10 +137,10 @@ class Group {
     group->burst(burst.plan(), numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting);
   }
   /// The bytes of a request with these fields.
-  nb::bytes payload(const std::string& name, const nb::object& fields) const {
+  nb::bytes payload(std::uint32_t request, const nb::object& fields) const {
     const o80::Schema& schema = group_->description().schema;
-    const std::uint32_t index = group_->request_index(name);
-    const StateBytes payload(schema, schema.requests[index].type, fields, "request '" + name + "'",
+    const o80::RequestRow& row = schema.requests[request];
+    const StateBytes payload(schema, row.type, fields, "request '" + row.name.str() + "'",
                              Missing::by_default);
     return nb::bytes(payload.bytes.data(), payload.bytes.size());
   }
@@ -251,7 +251,7 @@ void bind_inline_group(nb::module_& m) {
       .def("check",
            [](const Group& self, const PreparedBurst& given) { self.inner().check(given.plan()); })
       .def("burst", &Group::burst, "burst"_a, "copies"_a, "timeout"_a.none())
-      .def("payload", &Group::payload, "name"_a, "fields"_a)
+      .def("payload", &Group::payload, "request"_a, "fields"_a)
       .def("request_index", &Group::request_index, "name"_a)
       .def("request", &Group::request, "request"_a, "copies"_a, "payloads"_a, "rows"_a,
            "timeout"_a.none())
