@@ -132,7 +132,7 @@ class InlineGroup(Closeable):
         spread = {field: self._spread(name, field, fields[field], len(chosen)) for field in fields}
         each = [{field: values[i] for field, values in spread.items()} for i in range(len(chosen))]
         index, given = self._group.request_index(name), chosen.view(np.uint8)
-        payloads = b"".join(self._group.payload(index, fields) for fields in each)
+        payloads = self._group.payloads(index, each)
         self._group.request(index, given, payloads, bytearray(), timeout)
 
     def prepared_request(self, name: str, /, **fields: Any) -> GroupRequest:
@@ -144,7 +144,7 @@ class InlineGroup(Closeable):
         Raises InvalidArgument.
         """
         index = self._group.request_index(name)
-        payload = self._group.payload(index, fields)
+        payload = self._group.payloads(index, [fields])
         described = self._layout.schema["requests"][index]
         kind = dtype_of_type(described["type"])
         given = np.frombuffer(bytearray(payload * self.copies), kind)
