@@ -136,13 +136,17 @@ class Group {
     const Waiting waiting;
     group->burst(burst.plan(), numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting);
   }
-  /// The bytes of a request with these fields.
-  nb::bytes payload(const std::string& name, const nb::object& fields) const {
+  /// The bytes of requests with these fields, one after the other. `each`: a mapping for each.
+  nb::bytes payloads(std::uint32_t request, const std::vector<nb::object>& each) const {
     const o80::Schema& schema = group_->description().schema;
-    const std::uint32_t index = group_->request_index(name);
-    const StateBytes payload(schema, schema.requests[index].type, fields, "request '" + name + "'",
-                             Missing::by_default);
-    return nb::bytes(payload.bytes.data(), payload.bytes.size());
+    const o80::RequestRow& row = schema.requests[request];
+    const std::string what = "request '" + row.name.str() + "'";
+    std::vector<std::byte> all;
+    for (const nb::object& fields : each) {
+      const StateBytes payload(schema, row.type, fields, what, Missing::by_default);
+      all.insert(all.end(), payload.bytes.begin(), payload.bytes.end());
+    }
+    return nb::bytes(all.data(), all.size());
   }
   std::uint32_t request_index(const std::string& name) const { return group_->request_index(name); }
   /// `payloads`: one for each of the copies; `rows`: none, or one for each copy of the group.
@@ -251,7 +255,7 @@ void bind_inline_group(nb::module_& m) {
       .def("check",
            [](const Group& self, const PreparedBurst& given) { self.inner().check(given.plan()); })
       .def("burst", &Group::burst, "burst"_a, "copies"_a, "timeout"_a.none())
-      .def("payload", &Group::payload, "name"_a, "fields"_a)
+      .def("payloads", &Group::payloads, "request"_a, "each"_a)
       .def("request_index", &Group::request_index, "name"_a)
       .def("request", &Group::request, "request"_a, "copies"_a, "payloads"_a, "rows"_a,
            "timeout"_a.none())

@@ -173,11 +173,11 @@ class GroupRequest:
     """
 
     def __init__(
-        self, group: _core.InlineGroup, name: str, fields: NDArray[Any], rows: NDArray[Any]
+        self, group: _core.InlineGroup, request: int, fields: NDArray[Any], rows: NDArray[Any]
     ) -> None:
-        self._group, self._request = group, group.request_index(name)
+        self._group, self._request = group, request
         self._everybody = np.arange(len(rows), dtype=np.uint32)
-        self._fields, self._rows = fields, rows
+        self._fields, self._rows, self._bytes = fields, rows, rows.view(np.uint8)
 
     @property
     def fields(self) -> NDArray[Any]:
@@ -198,8 +198,8 @@ class GroupRequest:
         Raises as `InlineGroup.request`.
         """
         chosen = chosen_copies(copies, self._everybody)
-        payloads, rows = self._fields[chosen].view(np.uint8), self._rows.view(np.uint8)
-        self._group.request(self._request, chosen.view(np.uint8), payloads, rows, timeout)
+        payloads = self._fields[chosen].view(np.uint8)
+        self._group.request(self._request, chosen.view(np.uint8), payloads, self._bytes, timeout)
 
 
 def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.uint32]:

@@ -133,7 +133,7 @@ class InlineGroup(Closeable):
         spread = {field: self._spread(name, field, fields[field], len(chosen)) for field in fields}
         each = [{field: values[i] for field, values in spread.items()} for i in range(len(chosen))]
         index, given = self._group.request_index(name), chosen.view(np.uint8)
-        payloads = b"".join(self._group.payload(name, fields) for fields in each)
+        payloads = self._group.payloads(index, each)
         self._group.request(index, given, payloads, bytearray(), timeout)
 
     def prepared_request(self, name: str, /, **fields: Any) -> GroupRequest:
@@ -144,13 +144,14 @@ class InlineGroup(Closeable):
 
         Raises InvalidArgument.
         """
-        payload = self._group.payload(name, fields)
-        described = next(each for each in self._layout.schema["requests"] if each["name"] == name)
+        index = self._group.request_index(name)
+        payload = self._group.payloads(index, [fields])
+        described = self._layout.schema["requests"][index]
         kind = dtype_of_type(described["type"])
         given = np.frombuffer(bytearray(payload * self.copies), kind)
         rows = np.zeros(self.copies, self._layout.row)
         return GroupRequest(
-            self._group, name, labelled(given, labels_of_type(described["type"])), rows
+            self._group, index, labelled(given, labels_of_type(described["type"])), rows
         )
 
     def latest(self, copies: Copies = None) -> NDArray[Any]:
