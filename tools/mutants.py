@@ -16,7 +16,7 @@ import os
 import random
 import re
 import subprocess
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import NamedTuple
 
@@ -122,8 +122,10 @@ def in_python(file: str, source: str) -> Iterator[Mutant]:
                 yield mutant(node, ast.BoolOp(other_op, values), function)
             case ast.If(test) | ast.While(test) | ast.IfExp(test):
                 yield mutant(test, ast.UnaryOp(ast.Not(), test), function)
-            case ast.Constant(bool() | 0 | 1 as value):
-                yield mutant(node, ast.Constant(type(value)(not value)), function)
+            case ast.Constant(bool() as value):
+                yield mutant(node, ast.Constant(not value), function)
+            case ast.Constant(0 | 1 as value):
+                yield mutant(node, ast.Constant(0 if value == 1 else 1), function)
             case ast.Return(ast.expr() as value) if not isinstance(value, ast.Constant):
                 yield mutant(value, ast.Constant(None), function)
             case ast.Expr(ast.Call()) | ast.AugAssign():
@@ -136,9 +138,11 @@ def in_python(file: str, source: str) -> Iterator[Mutant]:
             return
         if function:
             yield from of(node, function)
-        is_function = isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
-        for child in node.body if is_function else ast.iter_child_nodes(node):
-            yield from below(child, node.name if is_function else function)
+        inside: Iterable[ast.AST] = ast.iter_child_nodes(node)
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            inside, function = node.body, node.name
+        for child in inside:
+            yield from below(child, function)
 
     yield from below(ast.parse(source), "")
 

@@ -1,6 +1,6 @@
 """Conversion of a robot's rows to NumPy arrays."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -162,7 +162,7 @@ def _field_at(dtype: np.dtype[Any], path: str) -> tuple[np.dtype[Any], int]:
     """The dtype of a field of rows, and where it lies in a row [bytes]."""
     offset = 0
     for name in path.split("."):
-        fields = dtype.fields or {}
+        fields: Mapping[str, Any] = dtype.fields or {}
         if name not in fields:
             there = ", ".join(fields) or "nothing"
             raise InvalidArgument(f"no field '{path}' in a row: at '{name}' there is {there}")
