@@ -17,6 +17,7 @@
 #include "memory/segment/segment_draft.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
+#include "o80/memory/segment_list.hpp"
 
 namespace o80 {
 namespace {

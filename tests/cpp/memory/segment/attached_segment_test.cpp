@@ -12,6 +12,7 @@
 #include "memory/file_bytes.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
+#include "o80/memory/segment_list.hpp"
 
 namespace o80 {
 namespace {

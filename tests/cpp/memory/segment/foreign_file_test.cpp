@@ -16,6 +16,7 @@
 #include "memory/ring/history.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
+#include "o80/memory/segment_list.hpp"
 
 namespace o80 {
 namespace {

@@ -14,6 +14,7 @@
 #include "memory/child_process.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
+#include "o80/memory/segment_list.hpp"
 
 namespace o80 {
 namespace {
