@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from itertools import cycle
 from typing import Any
 
 import gymnasium
@@ -64,8 +65,7 @@ def assert_equals_single_ones(mode: Any, policy: Any, *, steps: int, **settings:
         return beside(vector, single, chosen, steps=steps, seed=5)
 
 
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("task", TASKS)
+@pytest.mark.parametrize(("mode", "task"), zip(cycle(MODES), TASKS))
 def test_equals_single_environments_under_random_actions(mode: AutoresetMode, task: str) -> None:
     settings = TASKS[task]
     ends = assert_equals_single_ones(
@@ -101,13 +101,16 @@ class Scripted:
         return actions
 
 
-@pytest.mark.parametrize("fly_out", [False, True])
-@pytest.mark.parametrize("mode", MODES)
+@pytest.mark.parametrize(("mode", "fly_out"), zip(MODES, cycle((False, True))))
 def test_equals_single_environments_when_balls_are_returned(
     mode: AutoresetMode, fly_out: bool
 ) -> None:
     task = TaskSettings(factor=COARSE, fly_out=fly_out)
     assert assert_equals_single_ones(mode, Scripted(), steps=200, task=task) >= COPIES
+
+
+def test_the_scripted_policy_returns_balls() -> None:
+    task = TaskSettings(factor=COARSE)
     with made(mode=AutoresetMode.SAME_STEP, task=task) as vector:
         seen, _ = vector.reset(seed=5)
         policy, returned = Scripted(), 0
