@@ -13,6 +13,7 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 from alarm import alarm_in
@@ -21,6 +22,8 @@ from interrupting import at_every_moment
 
 import o80
 from o80.base.child_process import start_child
+from o80.recording.locked_file import LockedFile
+from o80.robots.process import Process
 
 WAIT = 60.0  # [s] longer than any wait should take
 
@@ -417,6 +420,11 @@ def test_a_child_that_is_lost_ends() -> None:
         assert select.select([end], [], [], WAIT)[0]
     finally:
         os.close(end)
+
+
+@pytest.mark.parametrize("kind", [o80.InlineGroup, o80.Recording, Process, LockedFile])
+def test_what_was_interrupted_before_it_had_anything_is_dropped(kind: Any) -> None:
+    kind.__del__(kind.__new__(kind))
 
 
 @pytest.mark.filterwarnings(

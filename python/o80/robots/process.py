@@ -37,11 +37,13 @@ class Process:
     ResourceWarning. May be used from several threads; a forked child may call only `frontend`.
     """
 
+    _owner = 0  # an interrupt may come before it is set
+
     def __init__(self, popen: subprocess.Popen[bytes], segment: str, output: IO[bytes]) -> None:
         self._popen = popen
         self._output = output
-        self._owner = os.getpid()
         self.segment = segment  #: name of its segment
+        self._owner = os.getpid()
         lifecycle.close_later(self)
 
     @property
@@ -115,6 +117,8 @@ class Process:
             self.stop()
 
     def __del__(self) -> None:
+        if self._owner == 0:
+            return
         if self._owner == os.getpid() and self.alive:
             warnings.warn(
                 f"the robot of '{self.segment}' was never stopped", ResourceWarning, stacklevel=2
