@@ -65,7 +65,7 @@ def assert_equals_single_ones(mode: Any, policy: Any, *, steps: int, **settings:
         return beside(vector, single, chosen, steps=steps, seed=5)
 
 
-@pytest.mark.parametrize(("mode", "task"), zip(cycle(MODES), TASKS))
+@pytest.mark.parametrize(("mode", "task"), [*zip(cycle(MODES), TASKS)])
 def test_equals_single_environments_under_random_actions(mode: AutoresetMode, task: str) -> None:
     settings = TASKS[task]
     ends = assert_equals_single_ones(
@@ -101,7 +101,7 @@ class Scripted:
         return actions
 
 
-@pytest.mark.parametrize(("mode", "fly_out"), zip(MODES, cycle((False, True))))
+@pytest.mark.parametrize(("mode", "fly_out"), [*zip(MODES, cycle((False, True)))])
 def test_equals_single_environments_when_balls_are_returned(
     mode: AutoresetMode, fly_out: bool
 ) -> None:
