@@ -93,6 +93,8 @@ def test_what_cannot_follow_a_burst_is_said_when_it_is_made(group: o80.InlineGro
             first.then(second, "iteration")
         with pytest.raises(o80.InvalidArgument, match="no field of the targets 'position'"):
             first.then(second, {"position": "observed"})
+        with pytest.raises(o80.InvalidArgument, match="numbers must be a mapping from fields to"):
+            first.then(second, 5)  # type: ignore[arg-type]
         both = first.then(second, "observed")
         for one, other in ((both, second), (first, both)):
             with pytest.raises(o80.InvalidArgument, match="followed already"):

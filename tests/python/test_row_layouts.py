@@ -125,7 +125,7 @@ def test_a_view_of_fields_side_by_side_holds_their_numbers() -> None:
     rows["joints"]["velocity"][1, -1] = [1.0, 2.0, 3.0]
     assert view.tolist() == [[0.0] * 6, [0.0, 0.0, 0.0, 1.0, 2.0, 3.0]]
     assert field_view(rows, "iteration").shape == (2, 4, 1)
-    with pytest.raises(o80.InvalidArgument, match="at 'angle' there is position, velocity, on"):
+    with pytest.raises(o80.InvalidArgument, match="'angle' is none of position, velocity, on"):
         field_view(rows, "joints.angle")
     for paths in (("joints",), ("joints.velocity", "joints.position")):
         with pytest.raises(o80.InvalidArgument, match="not numbers of one kind, side by side"):

@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import o80._core as _core
-from o80.base.argument_checks import whole
+from o80.base.argument_checks import mapping, whole
 from o80.base.errors import InvalidArgument
 from o80.base.words import LateWord, ModeWord, ProfileWord, StartWord
 from o80.rows.enumerations import labelled, numbers_of
-from o80.rows.layout import Layout
+from o80.rows.layout import Layout, field_at
 from o80.rows.targets import common_labels, common_type, state_types, states_from
 
 #: Numbers of copies, each once, a slice, or a mask with a bool for each copy; None: all of them.
@@ -260,9 +260,9 @@ def _feeds(
                 f"targets of several numbers need a path for each: {', '.join(state.fields)}"
             )
         numbers = {"": numbers}
-    for field, path in numbers.items():
-        wanted, to = (state, 0) if field == "" else _at(state, field, "field of the targets")
-        found, at = _at(rows, path, "path in a row")
+    for field, path in mapping(numbers, "numbers", "fields to paths").items():
+        wanted, to = (state, 0) if field == "" else field_at(state, field, "field of the targets")
+        found, at = field_at(rows, path)
         if found.base != wanted or found.shape != (actuators,):
             raise InvalidArgument(
                 f"'{path}' must have a {wanted} for each of {actuators} actuators, "
@@ -271,15 +271,3 @@ def _feeds(
         for actuator in range(actuators):
             place = actuator * steps * state.itemsize + to
             yield at + actuator * wanted.itemsize, place, state.itemsize, wanted.itemsize
-
-
-def _at(dtype: np.dtype[Any], path: str, what: str) -> tuple[np.dtype[Any], int]:
-    """Type and offset of a field below others, named with dots."""
-    offset = 0
-    for name in path.split("."):
-        if dtype.fields is None or name not in dtype.fields:
-            known = ", ".join(list(dtype.fields or ())[:5])
-            raise InvalidArgument(f"there is no {what} '{path}': '{name}' is none of {known}")
-        dtype, begin = dtype.fields[name][:2]
-        offset += begin
-    return dtype, offset

@@ -151,23 +151,28 @@ def field_view(rows: NDArray[Any], *paths: str) -> NDArray[Any]:
 
     Raises InvalidArgument if a field is missing, or if their numbers do not make one array.
     """
-    runs = joined(run for path in paths for run in runs_of(*_field_at(rows.dtype, path)))
+    runs = joined(run for path in paths for run in runs_of(*field_at(rows.dtype, path)))
     if len(runs) != 1:
         raise InvalidArgument(f"{', '.join(paths)}: not numbers of one kind, side by side in a row")
     kind, offset, count = runs[0]
     return rows.getfield(np.dtype((kind, (count,))), offset)
 
 
-def _field_at(dtype: np.dtype[Any], path: str) -> tuple[np.dtype[Any], int]:
-    """The dtype of a field of rows, and where it lies in a row [bytes]."""
+def field_at(
+    dtype: np.dtype[Any], path: str, what: str = "path in a row"
+) -> tuple[np.dtype[Any], int]:
+    """The dtype and offset [bytes] of a field below others, named with dots.
+
+    Raises InvalidArgument: there is no `what` of that name.
+    """
     offset = 0
     for name in path.split("."):
         fields: Mapping[str, Any] = dtype.fields or {}
         if name not in fields:
-            there = ", ".join(fields) or "nothing"
-            raise InvalidArgument(f"no field '{path}' in a row: at '{name}' there is {there}")
-        dtype, start = fields[name][:2]
-        offset += start
+            known = ", ".join([*fields][:5]) or "no fields"
+            raise InvalidArgument(f"there is no {what} '{path}': '{name}' is none of {known}")
+        dtype, begin = fields[name][:2]
+        offset += begin
     return dtype, offset
 
 
