@@ -110,7 +110,7 @@ def test_no_ball_is_marked() -> None:
 
 
 def test_a_message_that_was_held_up_is_not_used() -> None:
-    track = ServerTrack(most_age=0.1)
+    track = ServerTrack(max_age=0.1)
     for frame in range(100):
         at = frame * SECOND // 180
         track.take(Message(OFFSET + at, np.zeros(3)).encoded(), SECOND + at)

@@ -22,7 +22,7 @@ class Reach(GroupTask):
             seen=group.gather(["observed"]),
             observation_space=Box(-3, 3, (4,), np.float32),
             action_space=Box(-1, 1, (2,), np.float32),
-            most_steps=50,
+            max_steps=50,
         )
         self.goals = np.zeros((copies, 2))
 

@@ -33,7 +33,7 @@ class Balance(GroupTask):
             ),
             observation_space=Box(-np.inf, np.inf, (4,), np.float32),
             action_space=Box(-20, 20, (1,), np.float32),
-            most_steps=200,
+            max_steps=200,
         )
 
     def begin(self, copies: Any, generators: Sequence[np.random.Generator], options: Any) -> None:

@@ -110,7 +110,7 @@ class UdpArm {
  private:
   static constexpr std::int64_t kStartTimeout = 2'000'000'000;  // [ns]
   static constexpr std::int64_t kConnectAgain = 50'000'000;     // [ns]
-  static constexpr int kMostAtOnce = 1000;                      // packets
+  static constexpr int kMaxAtOnce = 1000;                      // packets
 
   std::string place() const { return config_.address + ":" + std::to_string(config_.port); }
 
@@ -125,7 +125,7 @@ class UdpArm {
   bool take_arrived(std::int64_t due) noexcept {
     bool in_time = false;
     State packet;
-    for (int i = 0; i < kMostAtOnce; ++i) {
+    for (int i = 0; i < kMaxAtOnce; ++i) {
       const UdpSocket::Received received = socket_.receive(packet);
       if (received == UdpSocket::Received::nothing) break;
       if (received == UdpSocket::Received::garbage || packet.session == former_session_) continue;

@@ -51,13 +51,13 @@ template <class T>
 void write_integer(nb::handle value, std::byte* to, const std::string& what) {
   const nb::object whole = whole_number(value);
   if (!whole.is_valid()) refuse(what, "an integer", value);
-  constexpr auto kLeast = std::numeric_limits<T>::min();
-  constexpr auto kMost = std::numeric_limits<T>::max();
+  constexpr auto kMin = std::numeric_limits<T>::min();
+  constexpr auto kMax = std::numeric_limits<T>::max();
   T number{};
   if (!nb::try_cast<T>(whole, number)) {
     PyErr_Clear();
-    throw InvalidArgument(what + " must be " + std::to_string(kLeast) + " to " +
-                          std::to_string(kMost) + ", got " + text_of(value));
+    throw InvalidArgument(what + " must be " + std::to_string(kMin) + " to " +
+                          std::to_string(kMax) + ", got " + text_of(value));
   }
   store(to, number);
 }

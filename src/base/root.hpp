@@ -15,9 +15,9 @@ double root(Function&& function, double low, double high, double tolerance) noex
   if (at_low >= 0.0) return low;
   double at_high = function(high);
   if (at_high <= 0.0) return high;
-  constexpr int kMost = 60;
+  constexpr int kMax = 60;
   int side = 0;
-  for (int i = 0; i < kMost; ++i) {
+  for (int i = 0; i < kMax; ++i) {
     const double width = high - low;
     if (!(width > 1e-15 * std::abs(high))) break;
     double tried = i % 8 == 7 ? low + width / 2.0 : high - at_high * width / (at_high - at_low);

@@ -13,11 +13,11 @@ namespace o80 {
 namespace {
 
 constexpr std::uint64_t kMagic = 0x616D656863533038;  // "80Schema"
-constexpr std::uint32_t kMostRows = 1U << 20;
-constexpr std::uint32_t kMostActuators =
+constexpr std::uint32_t kMaxRows = 1U << 20;
+constexpr std::uint32_t kMaxActuators =
     0xFFFF;  // a record has 16 bits for an actuator; one value means all
 constexpr std::uint32_t kLargestType = 1U << 28;
-constexpr std::uint32_t kMostNested = 16;
+constexpr std::uint32_t kMaxNested = 16;
 
 struct TableHead {
   std::uint64_t magic = kMagic;
@@ -173,7 +173,7 @@ std::vector<std::uint64_t> check_types(const Schema& schema) {
       if (count > kLargestType) refuse(name + "has too many numbers");
       if (nested) depth = std::max(depth, depths[field.type] + 1);
     }
-    if (depth > kMostNested) refuse(name + "is nested too deeply");
+    if (depth > kMaxNested) refuse(name + "is nested too deeply");
     numbers.push_back(count);
     depths.push_back(depth);
   }
@@ -230,7 +230,7 @@ void check_limit(const ActuatorRow& actuator, const FieldRow& field, const Limit
 }
 
 void check_actuators(const Schema& schema, const std::vector<std::uint64_t>& numbers) {
-  if (schema.actuators.size() >= kMostActuators) refuse("too many actuators");
+  if (schema.actuators.size() >= kMaxActuators) refuse("too many actuators");
   std::set<std::string_view> names;
   for (const ActuatorRow& actuator : schema.actuators) {
     const std::string name = "actuator '" + actuator.name.str() + "' ";
@@ -334,7 +334,7 @@ void check_groups(const Schema& schema) {
 void check_shown(const Schema& schema) {
   const ShownModel& shown = schema.shown;
   if (shown.mjcf.size() > ShownModel::kLargest || shown.file.size() > ShownModel::kLargest ||
-      shown.values.size() > kMostRows) {
+      shown.values.size() > kMaxRows) {
     refuse("the model that shows the robot is too large");
   }
   if (!is_utf8(shown.mjcf) || !is_utf8(shown.file)) refuse("the model is not valid UTF-8");
@@ -371,7 +371,7 @@ std::vector<IntegralRow> integrals_from(std::span<const std::byte> bytes) {
   std::memcpy(&head, bytes.data(), sizeof head);
   if (head.magic != known.magic) return rows;
   bytes = bytes.subspan(sizeof head);
-  if (head.row_size != known.row_size || head.rows > kMostRows ||
+  if (head.row_size != known.row_size || head.rows > kMaxRows ||
       bytes.size() < head.rows * sizeof(IntegralRow)) {
     refuse("integral bounds of another size");
   }
@@ -388,7 +388,7 @@ ShownModel shown_from(std::span<const std::byte> bytes) {
   if (bytes.size() < sizeof head) return shown;
   std::memcpy(&head, bytes.data(), sizeof head);
   if (head.magic != known.magic) return shown;
-  if (head.row_size != known.row_size || head.rows > kMostRows) refuse("a model of another size");
+  if (head.row_size != known.row_size || head.rows > kMaxRows) refuse("a model of another size");
   bytes = bytes.subspan(sizeof head);
   const std::size_t rows = head.rows * sizeof(ShownRow);
   if (bytes.size() < rows + head.file + head.mjcf) refuse("the model is cut off");
@@ -428,7 +428,7 @@ void check(const Schema& schema) {
   check_integrals(schema);
   check_groups(schema);
   check_shown(schema);
-  if (schema.requests.size() >= kMostActuators) refuse("too many requests");
+  if (schema.requests.size() >= kMaxActuators) refuse("too many requests");
   std::set<std::string_view> names;
   for (const RequestRow& request : schema.requests) {
     check_text(request.name, "a request's name");
@@ -493,7 +493,7 @@ Schema schema_from_bytes(std::span<const std::byte> bytes) {
   std::size_t at = sizeof head + sizeof schema.head;
   each_table(schema, [&]<class Row>(int i, std::vector<Row>& rows) {
     if (head.sizes[i] != sizeof(Row)) throw foreign("entries of another size");
-    if (head.counts[i] > kMostRows) throw foreign("too many entries");
+    if (head.counts[i] > kMaxRows) throw foreign("too many entries");
     const std::size_t count = head.counts[i] * sizeof(Row);
     if (count > bytes.size() - at) throw foreign("too short");
     rows.resize(head.counts[i]);

@@ -18,7 +18,7 @@ class Reach(GroupTask):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
 
-    def __init__(self, copies: int = 1, threads: int | None = None, most_steps: int = 9) -> None:
+    def __init__(self, copies: int = 1, threads: int | None = None, max_steps: int = 9) -> None:
         group = o80.robots.load("two_joints").inline(copies=copies, threads=threads, gain=60.0)
         super().__init__(
             group,
@@ -29,7 +29,7 @@ class Reach(GroupTask):
             ),
             observation_space=Box(-9, 9, (6,), np.float32),
             action_space=Box(-1, 1, (4,), np.float32),
-            most_steps=most_steps,
+            max_steps=max_steps,
         )
         self.goals = np.zeros((copies, 2))
         self.generators: list[Any] = [None] * copies
@@ -76,7 +76,7 @@ class Goal(Reach):
     """The same with a dict of observations, discrete actions and no flags."""
 
     def __init__(self, copies: int = 1, threads: int | None = None) -> None:
-        super().__init__(copies, threads, most_steps=5)
+        super().__init__(copies, threads, max_steps=5)
         self.observation_space = spaces.Dict(
             {"seen": Box(-9, 9, (4,), np.float32), "goal": Box(-9, 9, (2,), np.float64)}
         )

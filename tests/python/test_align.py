@@ -69,7 +69,7 @@ def test_each_time_gets_the_row_that_a_plain_search_finds(
     ways: list[tuple[HowWord, Search]] = [("before", row_before), ("nearest", nearest_row)]
     for how, search in ways:
         joined = o80.align(
-            {"device": history}, at=np.array(at, np.int64), how=how, most_age=most * 1e-9
+            {"device": history}, at=np.array(at, np.int64), how=how, max_age=most * 1e-9
         )
         got = joined["device"]
         for place, time in enumerate(at):
@@ -203,8 +203,8 @@ def test_joined_rows_can_be_pickled_and_sliced(segment: str) -> None:
         ({"at": [0.5]}, "at must be whole nanoseconds"),
         ({"by": "a", "how": "after"}, "how must be one of before, nearest, linear"),
         ({"by": "a", "how": {"b": "before"}}, "how: there is no 'b'"),
-        ({"by": "a", "most_age": -1.0}, "most_age must be at least 0"),
-        ({"by": "a", "most_age": float("nan")}, "most_age must be at least 0"),
+        ({"by": "a", "max_age": -1.0}, "max_age must be at least 0"),
+        ({"by": "a", "max_age": float("nan")}, "max_age must be at least 0"),
         ({"by": "a", "offsets": {"b": 1}}, "offsets: there is no 'b'"),
     ],
 )

@@ -167,7 +167,7 @@ def test_what_judge_returns_is_checked() -> None:
         def judge(self, copies: Any) -> Any:
             return np.zeros(len(copies))
 
-    with Environment(Wrong(most_steps=1)) as environment:
+    with Environment(Wrong(max_steps=1)) as environment:
         environment.reset(seed=1)
         with pytest.raises(o80.InvalidArgument, match=r"Wrong\.judge must return an .*Outcome"):
             environment.step(np.zeros(4, np.float32))
@@ -176,7 +176,7 @@ def test_what_judge_returns_is_checked() -> None:
 def test_gymnasium_makes_a_registered_task() -> None:
     register("o80-test/Reach-v0", Reach)
     try:
-        with gymnasium.make("o80-test/Reach-v0", most_steps=3) as single:
+        with gymnasium.make("o80-test/Reach-v0", max_steps=3) as single:
             single.reset(seed=1)
             assert [single.step(np.zeros(4, np.float32))[3] for _ in range(3)] == [0, 0, 1]
         vector = gymnasium.make_vec("o80-test/Reach-v0", num_envs=3, autoreset_mode="SameStep")

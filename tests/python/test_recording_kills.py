@@ -13,7 +13,7 @@ from o80.recording.reader import RecordingFile
 from o80.recording.recorder import Recorder
 
 KILLS = int(os.environ.get("O80_RECORDER_KILLS", "200"))
-MOST_CHUNKS = 4  # of a recorder before it is killed
+MAX_CHUNKS = 4  # of a recorder before it is killed
 
 
 def record_for_ever(path: Path, name: str, split: str | None, progress: int) -> None:
@@ -35,7 +35,7 @@ def kill_a_recorder(path: Path, name: str, split: str | None, chance: random.Ran
         finally:
             os._exit(1)
     os.close(write)
-    for _ in range(chance.randint(0, MOST_CHUNKS)):
+    for _ in range(chance.randint(0, MAX_CHUNKS)):
         os.read(read, 1)
     for _ in range(chance.randint(0, 20_000)):  # somewhere in the next step
         pass

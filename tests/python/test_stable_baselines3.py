@@ -59,7 +59,7 @@ def test_does_what_a_dummy_vec_env_of_monitored_environments_does(task: type[Rea
 
 @pytest.mark.check
 def test_gives_infos_of_ended_episodes_only_if_told_so() -> None:
-    copies = adapted(Reach(COPIES, most_steps=3), infos="ends")
+    copies = adapted(Reach(COPIES, max_steps=3), infos="ends")
     copies.seed(1)
     copies.reset()
     still = np.zeros((COPIES, 4), np.float32)
@@ -80,13 +80,13 @@ def test_options_attributes_methods_and_pictures_are_those_of_the_task() -> None
     assert (task.goals == [0.5, 0.25]).all()
     copies.reset()
     assert (task.goals != [0.5, 0.25]).all(), "options hold for one reset"
-    assert copies.get_attr("most_steps", indices=[0, 2]) == [9, 9]
-    copies.set_attr("most_steps", 5)
-    assert task.most_steps == 5
+    assert copies.get_attr("max_steps", indices=[0, 2]) == [9, 9]
+    copies.set_attr("max_steps", 5)
+    assert task.max_steps == 5
     assert [len(rows) for rows in copies.env_method("flagged")] == [COPIES] * COPIES
     assert copies.render().shape[2] == 3
-    with pytest.raises(o80.InvalidArgument, match="all copies share 'most_steps'"):
-        copies.set_attr("most_steps", 5, indices=[1])
+    with pytest.raises(o80.InvalidArgument, match="all copies share 'max_steps'"):
+        copies.set_attr("max_steps", 5, indices=[1])
     copies.set_options([{"goal": (0.5, 0.25)}, {}, {}, {}])
     with pytest.raises(o80.InvalidArgument, match="the same options"):
         copies.reset()
@@ -118,7 +118,7 @@ def test_ppo_learns_on_copies() -> None:
             apart = np.abs(2 * self.seen.observations[copies, :2] - self.goals[copies])
             return o80.learning.Outcome(reward=-apart.max(axis=1))
 
-    copies = adapted(Near(16, most_steps=16))
+    copies = adapted(Near(16, max_steps=16))
     threads = torch.get_num_threads()
     torch.set_num_threads(1)
     try:

@@ -126,7 +126,7 @@ def test_all_halts_arrive_among_strangers_the_oldest_of_which_are_closed(
     serve: Serve, arm: o80.Frontend
 ) -> None:
     budget = 100
-    server = serve(MOST_STRANGERS=budget, MOST_HOLDERS=50)
+    server = serve(MAX_STRANGERS=budget, MAX_HOLDERS=50)
     halts: list[int] = []
     attackers: list[socket.socket] = []
     with holders(server, 20) as kept, strangers(server.port, 400) as attack:
@@ -145,7 +145,7 @@ def test_all_halts_arrive_among_strangers_the_oldest_of_which_are_closed(
 
 
 def test_a_holder_too_many_costs_the_one_whose_last_request_is_the_oldest(serve: Serve) -> None:
-    server = serve(MOST_HOLDERS=5)
+    server = serve(MAX_HOLDERS=5)
     with holders(server, 8) as kept:
         for each in kept[:5]:
             each.ask("/look")
@@ -159,7 +159,7 @@ def test_a_holder_too_many_costs_the_one_whose_last_request_is_the_oldest(serve:
 def test_holders_that_stall_in_a_body_do_not_keep_a_halt_out(
     serve: Serve, arm: o80.Frontend
 ) -> None:
-    server = serve(MOST_HOLDERS=5)
+    server = serve(MAX_HOLDERS=5)
     head = (
         f"POST /look HTTP/1.1\r\nHost: 127.0.0.1:{server.port}\r\n"
         f"Authorization: Bearer {server.token}\r\nContent-Length: 9\r\n\r\n{{"

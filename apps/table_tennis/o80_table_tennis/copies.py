@@ -144,7 +144,7 @@ class TableTennisCopies(Task):
         Nothing if the arm has moved on too far for the twin to follow: the episode is given up.
         """
         settings, rig = self.settings, self.rig
-        self._stalled = rig.lateness > settings.most_late
+        self._stalled = rig.lateness > settings.max_late
         if self._stalled:
             return
         asked = self.asked[copies]

@@ -142,11 +142,11 @@ class TaskSettings:
     fly_out: bool = False
     """After the first touch nobody is asked any more: in the same step the ball flies to its end,
     and the episode ends. A second touch of the racket then does not happen."""
-    most_late: int = 20
+    max_late: int = 20
     """Rows of lateness above which an episode is given up as stalled, real time."""
 
     def __post_init__(self) -> None:
-        for name in ("delay", "ball_seed", "most_late"):
+        for name in ("delay", "ball_seed", "max_late"):
             whole(getattr(self, name), name, 0)
         whole(self.repeat, "repeat", 1)
         if self.ball_count is not None:
@@ -201,6 +201,6 @@ TASKS: Mapping[str, Callable[[TaskSettings], Task]] = {
     "return": lambda s: ReturnTask(s.bounds, s.end, reward_rule(s.reward)),
     "smash": lambda s: SmashTask(s.bounds, s.end, reward_rule(s.reward)),
     "hit": lambda s: HitTask(s.bounds, s.end, reward_rule(s.reward)),
-    "reach": lambda s: ReachTask(most_steps=s.end.most_steps),
+    "reach": lambda s: ReachTask(max_steps=s.end.max_steps),
 }
 """The tasks with a name."""

@@ -34,7 +34,7 @@ BOUNDS = np.array([[0.2, 0.0, 0.2], [3.0, 3.0, 0.6]])
 """Bounds of lift coefficient, lift saturation and grip. With more saturation a turn would say
 little about the spin."""
 STARTS = [(lift, saturation, 0.43) for lift in (0.5, 1.0, 1.5) for saturation in (0.5, 2.7)]
-MOST_ROUNDS = 60
+MAX_ROUNDS = 60
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +126,7 @@ def _least_squares(
 ) -> tuple[FloatArray, float]:
     """Levenberg and Marquardt's search within the bounds, and the sum of squares at its end."""
     damping, error = 1e-2, misses(numbers)
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         slopes = np.column_stack([(misses(numbers + 1e-5 * e) - error) / 1e-5 for e in np.eye(3)])
         for _ in range(8):
             matrix = slopes.T @ slopes + damping * np.eye(3)

@@ -34,7 +34,7 @@ SCALES = {
     "control.settling": 0.003,
 }
 """The parameters that are searched, and the scale of the first steps."""
-MOST_BALLS = 80
+MAX_BALLS = 80
 """The played shots are spread evenly over so many numbers: there is no end of simulated ones."""
 GROWTH = 1.3
 """Growth of the steps after a success; four failures undo it."""
@@ -123,7 +123,7 @@ def main(
         )
 
     path = None if balls is None else str(balls)
-    available = min(len(balls_from(path)), MOST_BALLS)
+    available = min(len(balls_from(path)), MAX_BALLS)
     numbers = [available * number // episodes for number in range(episodes)]
     # by the published reward, with which the numbers of the file were found
     task = TaskSettings(balls=path, factor=HittingSettings().factor, reward="published")

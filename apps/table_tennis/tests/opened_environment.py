@@ -13,7 +13,7 @@ from o80_table_tennis.world.arm import MUSCLES
 STILL = np.zeros(MUSCLES, dtype=np.float32)
 PUSH = np.array([1, -1, 0, 0, 0, 0, 0, 0], dtype=np.float32)
 ALL_MODES = list(Pacing)
-PATIENT = TaskSettings(factor=COARSE, most_late=1_000_000)  # however slow the machine is
+PATIENT = TaskSettings(factor=COARSE, max_late=1_000_000)  # however slow the machine is
 WAITING = 10.0  # [s]
 
 

@@ -114,7 +114,7 @@ def test_an_arm_of_another_frequency_is_refused() -> None:
         (TaskSettings, {"factor": "fine"}, "factor must be a positive number, got 'fine'"),
         (TaskSettings, {"delay": 1.5}, "delay must be a whole number, got 1.5"),
         (TaskSettings, {"ball_seed": -1}, "ball_seed must be at least 0, got -1"),
-        (TaskSettings, {"most_late": -3}, "most_late must be at least 0, got -3"),
+        (TaskSettings, {"max_late": -3}, "max_late must be at least 0, got -3"),
         (TaskSettings, {"task": ReachTask}, r"task must be an object: write ReachTask\(\)"),
         (TaskSettings, {"task": "retrun"}, "there are: return, smash, hit, reach"),
     ],

@@ -127,7 +127,7 @@ def test_a_missed_ball_costs_how_far_it_was_missed(inline: TableTennisEnvironmen
 
 
 def test_an_episode_out_of_steps_is_truncated_and_paid_nothing() -> None:
-    task = TaskSettings(end=EndRule(most_steps=12))
+    task = TaskSettings(end=EndRule(max_steps=12))
     with closing(opened(task=task)) as environment:
         environment.reset(seed=1)
         steps = played_out(environment)

@@ -22,7 +22,7 @@ PATIENT = 1_000_000
 
 
 def flying_out(**settings: Any) -> TaskSettings:
-    return TaskSettings(factor=COARSE, most_late=PATIENT, fly_out=True, **settings)
+    return TaskSettings(factor=COARSE, max_late=PATIENT, fly_out=True, **settings)
 
 
 def played(

@@ -20,7 +20,7 @@ def move_on(environment: TableTennisEnvironment, rows: int) -> None:
 
 
 def test_a_caller_who_pauses_too_long_loses_the_episode() -> None:
-    task = TaskSettings(most_late=200)
+    task = TaskSettings(max_late=200)
     with closing(opened(Pacing.REAL_TIME, task=task)) as environment:
         environment.reset(seed=1)
         move_on(environment, 300)  # before the first step there is all the time in the world

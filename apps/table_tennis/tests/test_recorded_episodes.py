@@ -171,7 +171,7 @@ def test_what_a_killed_program_recorded_is_there_and_is_continued(tmp_path: Path
 
 def test_a_stalled_episode_is_recorded_as_such(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    task = TaskSettings(most_late=200)
+    task = TaskSettings(max_late=200)
     with opened(Pacing.REAL_TIME, task=task, record=path) as environment:
         environment.reset(seed=1)
         environment.step(STILL)

@@ -118,7 +118,7 @@ def test_a_users_own_task_is_paid_in_every_step() -> None:
 
 class TestReach:
     def test_each_step_costs_the_distance_from_the_goal(self) -> None:
-        settings = TaskSettings(task="reach", end=EndRule(most_steps=20))
+        settings = TaskSettings(task="reach", end=EndRule(max_steps=20))
         with closing(TableTennisEnvironment(task=settings)) as environment:
             observation, info = environment.reset(seed=2)
             np.testing.assert_allclose(observation[19:22], info["goal"], rtol=1e-6)

@@ -26,7 +26,7 @@ from o80_table_tennis.task.observations import BALL_POSITION
 from o80_table_tennis.world.arm import MUSCLES
 
 COPIES = 4
-SHORT = EndRule(most_steps=40)
+SHORT = EndRule(max_steps=40)
 RIGS = {
     "standard": RigSettings(start_noise=0.02),
     "identified": RigSettings(preset="identified"),

@@ -27,7 +27,7 @@ def played(task: TaskSettings, *, seed: int, balls: int = BALLS) -> Motion:
 
 def repeated(motion: Motion, task: TaskSettings) -> Motion:
     """A motion of the same actions, whatever is observed."""
-    actions = iter([*motion.actions, *[STILL] * task.end.most_steps])
+    actions = iter([*motion.actions, *[STILL] * task.end.max_steps])
     with Motions(BALLS, rig=RIG, task=task) as motions:
         return motions.play(lambda _: next(actions), np.random.default_rng(3))
 

@@ -24,7 +24,7 @@ from o80_devices.ball_launcher.link import Link
 from o80_devices.ball_launcher.messages import NAMES, Kind, Request, State
 
 POLL = 0.005  # [s]
-LEAST_WAIT = 1e-3 * DELIVERED_WITHIN  # for a reply [s]
+MIN_WAIT = 1e-3 * DELIVERED_WITHIN  # for a reply [s]
 
 
 @dataclass
@@ -75,9 +75,9 @@ class BallLauncher:
                     f"{name} must be positive [s], got {getattr(config, name):g}"
                 )
         for name in ("state_timeout", "launch_timeout"):
-            if getattr(config, name) < LEAST_WAIT:
+            if getattr(config, name) < MIN_WAIT:
                 raise o80.InvalidArgument(
-                    f"{name} must be at least {LEAST_WAIT:g} s, because the kernel may deliver a "
+                    f"{name} must be at least {MIN_WAIT:g} s, because the kernel may deliver a "
                     f"request so late, got {getattr(config, name):g}"
                 )
         if config.heartbeat_timeout != 0.0 and not 0.01 <= config.heartbeat_timeout <= 60.0:

@@ -73,7 +73,7 @@ SLOPE_SHARE = 0.05
 """Change of a number for a difference, as a share of its scale."""
 CLOSE_ENOUGH = 1e-3
 """The search ends when no number moves by more than this share of its scale."""
-MOST_ROUNDS = 30
+MAX_ROUNDS = 30
 
 
 def fitted(shots: Sequence[Shot], start: LaunchModel = START) -> LaunchModel:
@@ -133,7 +133,7 @@ def _solved(missed: Callable[[FloatArray], FloatArray], scales: FloatArray) -> F
     numbers = np.zeros(len(scales))
     misses = missed(numbers)
     damping = 1.0
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         changed = (numbers + SLOPE_SHARE * scales * row for row in np.eye(len(scales)))
         slopes = [(missed(each) - misses) / SLOPE_SHARE for each in changed]
         matrix = np.stack(slopes, axis=1)

@@ -17,7 +17,7 @@ from o80_devices.ball_tracking.tracker import Tracker, TrackerOptions
 from o80_devices.cameras.image_source import ImageSource
 from o80_devices.cameras.rig import Rig, four_cameras
 
-MOST_AHEAD = 4  # periods by which images may come before they are due, in all
+MAX_AHEAD = 4  # periods by which images may come before they are due, in all
 
 
 class BallTracker:
@@ -63,7 +63,7 @@ class BallTracker:
         # cameras that make up for lost time would drive the loop ahead of its clock, which is a
         # fault: it then waits for its own clock, and takes the newest images
         self._ahead = max(0, self._ahead + due - now)
-        if self._ahead > MOST_AHEAD * self._period and due > now:
+        if self._ahead > MAX_AHEAD * self._period and due > now:
             time.sleep((due - now) * 1e-9)
             self._ahead -= due - now
 

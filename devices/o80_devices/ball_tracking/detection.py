@@ -24,7 +24,7 @@ AROUND = 24
 """Half the side of a region, besides what the ball's size and uncertainty ask for [px]."""
 LARGEST = 120
 """Most that half a side grows to [px]."""
-MOST_PLACES = 3
+MAX_PLACES = 3
 """Places in an image that are looked at again."""
 
 
@@ -55,7 +55,7 @@ class Detector:
             self._check(index, image)
             regions = self._regions(index, image, expected, spread, searching == index)
             blobs = self._blobs(image, regions)
-            self._places[index] = [(blob[1], blob[2]) for blob in blobs[:MOST_PLACES]]
+            self._places[index] = [(blob[1], blob[2]) for blob in blobs[:MAX_PLACES]]
             found += [(index, *blob[1:]) for blob in blobs]
         return np.array(found, dtype=float).reshape(-1, 4)
 
@@ -84,14 +84,14 @@ class Detector:
             return [_square(x, y, min(half, LARGEST))]
         places = self._places[index]
         if searches:
-            coarse = self._finder.find(image, step=STEP, least_area=1.0)
-            places = [(x, y) for x, y, *_ in coarse[:MOST_PLACES]] + places
+            coarse = self._finder.find(image, step=STEP, min_area=1.0)
+            places = [(x, y) for x, y, *_ in coarse[:MAX_PLACES]] + places
         # a place once, though the search and the image before found it
         kept: list[tuple[float, float]] = []
         for x, y in places:
             if all(abs(x - a) + abs(y - b) > AROUND for a, b in kept):
                 kept.append((x, y))
-        return [_square(x, y, 2 * AROUND) for x, y in kept[:MOST_PLACES]]
+        return [_square(x, y, 2 * AROUND) for x, y in kept[:MAX_PLACES]]
 
     def _blobs(
         self, image: Image, regions: list[tuple[int, int, int, int]]

@@ -43,7 +43,7 @@ class ServerReason(IntEnum):
     unexpected = 4
     """The place does not continue the flight; once more, and it is a hit or another ball."""
     late = 5
-    """The message is older than `most_age`."""
+    """The message is older than `max_age`."""
     invalid = 6
     """The message could not be understood."""
 
@@ -131,14 +131,14 @@ class ServerTrack:
         noise: float = 0.003,
         latency: float = 0.0,
         timeout: float = 0.05,
-        most_age: float = 0.1,
+        max_age: float = 0.1,
         forget: float = 0.3,
     ) -> None:
         """noise: standard deviation of a place [m]. Others in [s]."""
         self._place = place
         self._covariance = noise**2 * np.eye(3)
         self._clock = ClockMap(latency=latency)
-        self._timeout, self._most_age = round(timeout * SECOND), round(most_age * SECOND)
+        self._timeout, self._max_age = round(timeout * SECOND), round(max_age * SECOND)
         self._flight = FlightTrack(four_cameras().law(), forget)
         self._newest: int | None = None  # arrival [ns]
 
@@ -158,7 +158,7 @@ class ServerTrack:
         if capture is None:  # repeated or overtaken
             return self.silent(now)
         self._newest = now
-        if now - capture.time > self._most_age:
+        if now - capture.time > self._max_age:
             return self._without(ServerReason.late, capture, message)
         if message.place is None:
             return self._without(ServerReason.not_seen, capture, message)

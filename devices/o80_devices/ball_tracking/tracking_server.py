@@ -29,7 +29,7 @@ class Options:
     noise: float = option(0.003, "standard deviation of a place", "m")
     latency: float = option(0.0, "from the image to the earliest arrival of its message", "s")
     timeout: float = option(0.05, "without a message, after which the server is silent", "s")
-    most_age: float = option(0.1, "older messages are not used", "s")
+    max_age: float = option(0.1, "older messages are not used", "s")
     forget: float = option(0.3, "a ball not seen for so long is another one", "s")
 
 
@@ -63,7 +63,7 @@ class TrackingServer:
     }
 
     def __init__(self, config: Options) -> None:
-        for name in ("noise", "timeout", "most_age", "forget"):
+        for name in ("noise", "timeout", "max_age", "forget"):
             if not 0.0 < getattr(config, name) < 1e6:
                 raise o80.InvalidArgument(f"{name} must be positive, got {getattr(config, name):g}")
         if not 0.0 <= config.latency < 1e6:
@@ -79,7 +79,7 @@ class TrackingServer:
             noise=config.noise,
             latency=config.latency,
             timeout=config.timeout,
-            most_age=config.most_age,
+            max_age=config.max_age,
             forget=config.forget,
         )
         self._socket: Any = None

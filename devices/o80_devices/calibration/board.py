@@ -17,11 +17,11 @@ from o80_devices.cameras.rig import RigCamera
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.uint8]
 PURPOSE = "the calibration of cameras"
-LEAST_PICTURES = 8
+MIN_PICTURES = 8
 """Pictures in which the board is found, for one lens."""
 LARGEST_UNCERTAINTY = 0.02
 """Largest uncertainty of a focal length, as a share of it."""
-LEAST_TILT = 0.1
+MIN_TILT = 0.1
 """Root mean square of the angles between boards and images [rad]; boards that all face the camera
 do not tell a long lens from a near board."""
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm")
@@ -83,7 +83,7 @@ def lens_of(
     )
     focal = (float(matrix[0, 0]), float(matrix[1, 1]))
     uncertain = float(np.max(np.ravel(deviations)[:2] / focal))
-    if not (uncertain < LARGEST_UNCERTAINTY and _tilt(turns) > LEAST_TILT):
+    if not (uncertain < LARGEST_UNCERTAINTY and _tilt(turns) > MIN_TILT):
         raise InvalidArgument(
             f"the pictures of {name} do not determine its focal length: the board is tilted by "
             f"{np.degrees(_tilt(turns)):.0f} degrees on average. Tilt it by 20 to 40 degrees to "

@@ -16,7 +16,7 @@ from o80_devices.calibration.board import PURPOSE
 from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]
-LEAST_SHARED = 20
+MIN_SHARED = 20
 """Moments in which two cameras must see the waved ball together."""
 
 
@@ -59,10 +59,10 @@ def first_places(lenses: Sequence[RigCamera], waved: FloatArray) -> list[RigCame
 
 
 def _enough(lenses: Sequence[RigCamera], a: int, b: int, count: int) -> None:
-    if count < LEAST_SHARED:
+    if count < MIN_SHARED:
         raise InvalidArgument(
             f"{lenses[a].name} and {lenses[b].name} see the ball together in {count} moments, "
-            f"{LEAST_SHARED} are needed: wave it where both see it"
+            f"{MIN_SHARED} are needed: wave it where both see it"
         )
 
 

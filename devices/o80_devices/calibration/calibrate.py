@@ -75,7 +75,7 @@ def live_lenses(given: argparse.Namespace, board: boards.Board) -> list[lenses.L
             "give a folder of pictures, or --segment and --names (of its cameras, in their order)"
         )
     cameras = [RigCamera(name, given.size, (1.0, 1.0), (0.0, 0.0)) for name in names]
-    count = max(given.pictures, lenses.LEAST_FOUND)
+    count = max(given.pictures, lenses.MIN_FOUND)
     source = source_of(given.segment, cameras)
     try:
         found = lenses.boards_from_segments(source, cameras, board, count, say=progress)

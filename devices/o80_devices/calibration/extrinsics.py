@@ -20,7 +20,7 @@ from o80_devices.calibration.world_frame import in_world
 from o80_devices.cameras.rig import RigCamera
 
 FloatArray = NDArray[np.float64]
-LEAST_DEPTH = 0.02
+MIN_DEPTH = 0.02
 """Extent of the waved ball's places in their thinnest direction, as a share of the widest."""
 
 
@@ -68,7 +68,7 @@ def _check_depth(cameras: Sequence[RigCamera], waved: FloatArray) -> None:
     points = triangulated(cameras, waved)
     points = points[np.isfinite(points).all(1)]
     extents = np.linalg.svd(points - points.mean(0), compute_uv=False) if len(points) > 3 else None
-    if extents is None or not extents[2] > LEAST_DEPTH * extents[0]:
+    if extents is None or not extents[2] > MIN_DEPTH * extents[0]:
         raise InvalidArgument(
             "the ball was waved in a plane, which does not determine the places of the cameras: "
             "wave it in all three directions"

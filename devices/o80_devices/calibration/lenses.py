@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from o80.errors import InvalidArgument, TimeoutError
 from o80_devices.calibration.board import (
-    LEAST_PICTURES,
+    MIN_PICTURES,
     Board,
     board_reprojection,
     lens_of,
@@ -27,7 +27,7 @@ FORMAT = "o80-ball-lenses-1"
 FloatArray = NDArray[np.float64]
 EVERY = 4
 """Every fourth picture is held out."""
-LEAST_FOUND = 11
+MIN_FOUND = 11
 """Pictures in which the board is found: 8 to fit, and those that are held out."""
 NEW_PLACE = 0.015
 """How far the corners have moved, as a share of the image, when a picture is counted again."""
@@ -50,11 +50,11 @@ def lens_from_boards(
     name: str, size: tuple[int, int], boards: Sequence[FloatArray], board: Board, of: int
 ) -> Lens:
     """of: pictures that were looked at. Raises InvalidArgument."""
-    if len(boards) < LEAST_FOUND:
+    if len(boards) < MIN_FOUND:
         columns, rows = board.inner_corners
         raise InvalidArgument(
             f"the board of {columns} x {rows} inner corners was found in {len(boards)} of {of} "
-            f"pictures of {name}: {LEAST_FOUND} are needed ({LEAST_PICTURES} to fit the lens, "
+            f"pictures of {name}: {MIN_FOUND} are needed ({MIN_PICTURES} to fit the lens, "
             "the others to test it). Count the inner corners, show the whole board, avoid blur"
         )
     fit = [each for i, each in enumerate(boards) if i % EVERY != EVERY - 1]

@@ -23,7 +23,7 @@ NEW_PLACE = 6.0
 """How far the ball has moved in some image when it is counted again [px]."""
 SECOND_BEST = 0.5
 """A blob of this share of the largest one makes an image ambiguous; it does not count."""
-LEAST_SPAN = 0.15
+MIN_SPAN = 0.15
 """Share of the width and of the height of an image that the ball must cross."""
 EVERY = 4
 """Every fourth moment is held out."""
@@ -85,10 +85,10 @@ def check_motion(lenses: Sequence[RigCamera], waved: FloatArray) -> None:
             )
         low, high = np.percentile(seen, [2, 98], axis=0)
         for name, share in zip(("width", "height"), (high - low) / lens.size, strict=True):
-            if share < LEAST_SPAN:
+            if share < MIN_SPAN:
                 raise InvalidArgument(
                     f"the ball crossed {100 * share:.0f} % of the {name} of the image of "
-                    f"{lens.name}, {100 * LEAST_SPAN:.0f} % are needed: wave it through the whole "
+                    f"{lens.name}, {100 * MIN_SPAN:.0f} % are needed: wave it through the whole "
                     "space over the table, in all three directions"
                 )
 

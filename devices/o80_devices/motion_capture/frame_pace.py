@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-MOST_AHEAD = 3.0  # periods; the loop allows ten, see docs/drivers.md
+MAX_AHEAD = 3.0  # periods; the loop allows ten, see docs/drivers.md
 
 
 class FramePace:
@@ -20,7 +20,7 @@ class FramePace:
 
     def times(self, due: int) -> tuple[int, int]:
         """The earliest and the latest time of the next return [ns]."""
-        spare = round(MOST_AHEAD * self.period) - self._ahead
+        spare = round(MAX_AHEAD * self.period) - self._ahead
         earliest = due - max(0, min(self.period, spare))
         # after a missed frame: on time, so that iterations keep their places
         return earliest, due if self._missed else due + self.period // 4

@@ -13,7 +13,7 @@ from o80_devices.motion_capture.frame import Frame
 from o80_devices.motion_capture.sensor import SECOND, Reason
 from o80_devices.trouble import Trouble
 
-MOST_WAITING = 4  # frames; older ones are dropped, because their time is over
+MAX_WAITING = 4  # frames; older ones are dropped, because their time is over
 WAIT = 0.05  # for a frame, before the thread looks whether it is to stop [s]
 SILENCE = 1.0  # of a connection that is then given up: a pulled cable does not close it [s]
 RETRY = 0.2  # after a failure [s]; twice as long after each further one without a frame
@@ -47,7 +47,7 @@ class FrameStream:
         device: as the user knows it. longest_retry: to which the time between attempts grows [s].
         """
         self._connect = connect
-        self._frames: deque[Frame] = deque(maxlen=MOST_WAITING)
+        self._frames: deque[Frame] = deque(maxlen=MAX_WAITING)
         self._arrived = Condition()
         self._stopping = Event()
         self._thread: Thread | None = None

@@ -13,7 +13,7 @@ from o80_devices.motion_capture.frame import Frame
 from o80_devices.motion_capture.recorded_frames import RecordedFrames, load
 from o80_devices.motion_capture.sensor import SECOND, Reason, Sensor, SensorConfig
 
-MOST_WAITING = 4  # frames
+MAX_WAITING = 4  # frames
 
 
 class PlayedFrames:
@@ -58,7 +58,7 @@ class PlayedFrames:
             self._begin += frames[-1].arrival - frames[0].arrival + round(self.tick)
             self._next = 0
             self._round += frames[-1].number - frames[0].number + 1
-        late = now - round(MOST_WAITING * self.tick)
+        late = now - round(MAX_WAITING * self.tick)
         while self._next + 1 < len(frames) and self._arrival(self._next + 1) < late:
             self._next += 1  # a buffer of the network would have dropped it
         if self._next == len(frames) or self._arrival(self._next) > now:

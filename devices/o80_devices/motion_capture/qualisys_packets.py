@@ -30,8 +30,8 @@ BODIES = struct.Struct("<Ihh")  # number, rates of dropped and out of sync frame
 # position [mm], rotation, residual [mm]. The rotation comes column by column: public clients map
 # it to a column-major matrix (qualisys_cpp_sdk's array of nine into an Eigen::Matrix3f)
 BODY = struct.Struct("<3f9ff")
-MOST_COMPONENTS = 64
-MOST_BODIES = 1000
+MAX_COMPONENTS = 64
+MAX_BODIES = 1000
 NOT_ORTHOGONAL = 1e-2  # how far a rotation times its transpose may be from one
 SIX_D_WITH_RESIDUAL = 11
 
@@ -116,7 +116,7 @@ def parsed_data(content: bytes) -> tuple[int, int, list[Subject]]:
     """Time stamp [us], frame number and the bodies of a data packet. Raises ValueError."""
     try:
         stamp, number, components = DATA.unpack_from(content)
-        if components > MOST_COMPONENTS:
+        if components > MAX_COMPONENTS:
             raise ValueError(f"a data packet of {components} components is damaged")
         place = DATA.size
         for _ in range(components):
@@ -131,7 +131,7 @@ def parsed_data(content: bytes) -> tuple[int, int, list[Subject]]:
 
 def _bodies(content: bytes, place: int) -> list[Subject]:
     count, _, _ = BODIES.unpack_from(content, place)
-    if count > MOST_BODIES:
+    if count > MAX_BODIES:
         raise ValueError(f"a frame of {count} bodies is damaged")
     place += BODIES.size
     bodies = []

@@ -13,8 +13,8 @@ COUNT = struct.Struct("<Q")
 HEADER = struct.Struct("<iiddqQ")  # format, number, rate, latency, time stamp, subjects
 VALUES = struct.Struct("<?8d")  # visible; quaternion x y z w, position; quality
 FORMAT = 4
-MOST_SUBJECTS = 10_000
-LEAST_RATE, MOST_RATE = 1e-3, 1e6  # [Hz]; others are noise
+MAX_SUBJECTS = 10_000
+MIN_RATE, MAX_RATE = 1e-3, 1e6  # [Hz]; others are noise
 
 
 @dataclass(frozen=True)
@@ -46,14 +46,14 @@ def load(file: Path) -> RecordedFrames:
             f"{file} is no recording of motion capture, or is cut after frame {len(frames)}: "
             f"{error}"
         ) from error
-    if not frames or not LEAST_RATE < rate < MOST_RATE:
+    if not frames or not MIN_RATE < rate < MAX_RATE:
         raise InvalidArgument(f"{file} holds no frame with a rate")
     return RecordedFrames(frames, rate)
 
 
 def _frame(content: bytes, place: int) -> tuple[Frame, float, int]:
     version, number, rate, latency, stamp, subjects = HEADER.unpack_from(content, place)
-    if version != FORMAT or subjects > MOST_SUBJECTS:
+    if version != FORMAT or subjects > MAX_SUBJECTS:
         raise ValueError(f"format {version} with {subjects} subjects, expected format {FORMAT}")
     place += HEADER.size
     found = {}

@@ -15,8 +15,8 @@ std::uint8_t probability(const ColourTable& table, const std::uint8_t* pixel) no
 void keep_largest(Blobs& blobs, const Blob& blob) noexcept {
   int place = blobs.count;
   while (place > 0 && blobs.list[static_cast<std::size_t>(place - 1)].weight < blob.weight) --place;
-  if (place == kMostBlobs) return;
-  blobs.count = std::min(blobs.count + 1, kMostBlobs);
+  if (place == kMaxBlobs) return;
+  blobs.count = std::min(blobs.count + 1, kMaxBlobs);
   for (int i = blobs.count - 1; i > place; --i) {
     blobs.list[static_cast<std::size_t>(i)] = blobs.list[static_cast<std::size_t>(i - 1)];
   }
@@ -107,7 +107,7 @@ Blobs BlobFinder::find(const Image& image, Region region, const BlobRule& rule) 
   Blobs found;
   for (const Sum& sum : sums) {
     const double area = sum.pixels * per_pixel;
-    if (sum.pixels == 0 || area < rule.least_area || area > rule.most_area) continue;
+    if (sum.pixels == 0 || area < rule.min_area || area > rule.max_area) continue;
     const Region bounds{region.left + sum.left * rule.step, region.top + sum.top * rule.step,
                         region.left + sum.right * rule.step, region.top + sum.bottom * rule.step};
     const bool cut = bounds.left <= region.left || bounds.top <= region.top ||

@@ -32,10 +32,10 @@ struct Blob {
   Region bounds;
 };
 
-inline constexpr int kMostBlobs = 8;
+inline constexpr int kMaxBlobs = 8;
 
 struct Blobs {
-  std::array<Blob, kMostBlobs> list;
+  std::array<Blob, kMaxBlobs> list;
   int count = 0;
 };
 
@@ -43,8 +43,8 @@ struct Blobs {
 struct BlobRule {
   int step = 1;           // look at every step-th pixel of every step-th row
   int threshold = 96;     // least probability of a pixel, of 255
-  double least_area = 6;  // [px^2]
-  double most_area = 1e9;
+  double min_area = 6;  // [px^2]
+  double max_area = 1e9;
 };
 
 /// Finds the blobs of ball colour in a region, the largest first. The memory that it needs is kept

@@ -68,8 +68,8 @@ std::optional<Vector> Camera::direction(const Pixel& pixel) const noexcept {
   const double y_seen = (pixel.y - centre[1]) / focal[1];
   double x = x_seen;
   double y = y_seen;
-  constexpr int kMostSteps = 20;
-  for (int i = 0; i < kMostSteps; ++i) {  // Newton's rule
+  constexpr int kMaxSteps = 20;
+  for (int i = 0; i < kMaxSteps; ++i) {  // Newton's rule
     const Distorted lens = distorted(distortion, x, y);
     const double dx = lens.x - x_seen;
     const double dy = lens.y - y_seen;

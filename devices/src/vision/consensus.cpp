@@ -10,7 +10,7 @@ namespace {
 
 /// The sightings that agree, one a camera.
 struct Chosen {
-  std::array<const Sighting*, kMostCameras> sightings;
+  std::array<const Sighting*, kMaxCameras> sightings;
   std::size_t count = 0;
 };
 
@@ -83,8 +83,8 @@ class Search {
 
   /// The nearest sighting of each camera, of those within a distance of where it sees the point.
   Chosen near(const Vector& point, double tolerance) const noexcept {
-    std::array<const Sighting*, kMostCameras> nearest{};
-    std::array<double, kMostCameras> distance{};
+    std::array<const Sighting*, kMaxCameras> nearest{};
+    std::array<double, kMaxCameras> distance{};
     for (const Sighting& each : sightings_) {
       const std::optional<Projection> seen = camera_of(each).project(point);
       if (!seen || !has_size(each, seen->depth)) continue;
@@ -148,8 +148,8 @@ class Search {
   std::span<const Camera> cameras_;
   std::span<const Sighting> sightings_;
   const ConsensusRule& rule_;
-  std::array<std::optional<Vector>, kMostSightings> directions_;
-  std::array<Vector, kMostCameras> places_;
+  std::array<std::optional<Vector>, kMaxSightings> directions_;
+  std::array<Vector, kMaxCameras> places_;
 };
 
 }  // namespace

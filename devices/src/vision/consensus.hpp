@@ -34,8 +34,8 @@ struct Located {
   double residual = 0;        // root mean square of the distances in the images [px]
 };
 
-inline constexpr std::size_t kMostCameras = 16;
-inline constexpr std::size_t kMostSightings = 128;
+inline constexpr std::size_t kMaxCameras = 16;
+inline constexpr std::size_t kMaxSightings = 128;
 
 /// The point that the most cameras agree on, by the largest consistent subset of sightings: every
 /// pair of cameras proposes a point, every other camera joins with the sighting nearest to it. Of

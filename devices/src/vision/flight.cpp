@@ -81,8 +81,8 @@ double time_of_touch(const Ball& ball, const FlightLaw& law, double step) noexce
 }  // namespace
 
 Ball advanced(const Ball& ball, const FlightLaw& law, double duration, int& bounces) noexcept {
-  constexpr int kMostSteps = 200;
-  const int steps = std::clamp(static_cast<int>(std::ceil(duration / kLongestStep)), 1, kMostSteps);
+  constexpr int kMaxSteps = 200;
+  const int steps = std::clamp(static_cast<int>(std::ceil(duration / kLongestStep)), 1, kMaxSteps);
   const double step = duration / steps;
   Ball now = ball;
   for (int i = 0; i < steps; ++i) {

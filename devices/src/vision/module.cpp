@@ -114,7 +114,7 @@ BlobFinder blob_finder(const Table& table) {
 }
 
 Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<int, 4>> region,
-             int step, int threshold, double least_area, double most_area) {
+             int step, int threshold, double min_area, double max_area) {
   constexpr std::size_t kLargest = 1 << 14;
   if (image.shape(0) > kLargest || image.shape(1) > kLargest) {
     throw nb::value_error("an image may have at most 16384 rows and columns");
@@ -128,7 +128,7 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
   Blobs blobs;
   {
     const nb::gil_scoped_release released;
-    blobs = finder.find(seen, where, {step, threshold, least_area, most_area});
+    blobs = finder.find(seen, where, {step, threshold, min_area, max_area});
   }
   double* values = nullptr;
   Doubles made = array({static_cast<std::size_t>(blobs.count), 5}, values);
@@ -146,9 +146,9 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
 std::optional<std::tuple<Doubles, Doubles, std::uint64_t, double>> locate_ball(
     const std::vector<Camera>& cameras, const Sightings& sightings, double tolerance, double noise,
     double radius, double size_factor, int least, const std::optional<Place>& expected) {
-  if (cameras.size() > kMostCameras) throw nb::value_error("at most 16 cameras");
+  if (cameras.size() > kMaxCameras) throw nb::value_error("at most 16 cameras");
   std::vector<Sighting> list;
-  for (std::size_t i = 0; i < std::min(sightings.shape(0), kMostSightings); ++i) {
+  for (std::size_t i = 0; i < std::min(sightings.shape(0), kMaxSightings); ++i) {
     const double camera = sightings(i, 0);
     if (!(camera >= 0) || !(camera < static_cast<double>(cameras.size()))) {
       throw nb::value_error("a sighting names a camera that is not in the list");
@@ -266,7 +266,7 @@ NB_MODULE(_vision, module) {
           [](BlobFinder* self, const Table& table) { new (self) BlobFinder(blob_finder(table)); },
           "table"_a, "table: (32768,) probabilities, 0 to 255, by 5 bits of red, green, blue.")
       .def("find", &find, "image"_a, "region"_a = nb::none(), "step"_a = 1, "threshold"_a = 96,
-           "least_area"_a = 6.0, "most_area"_a = 1e9,
+           "min_area"_a = 6.0, "max_area"_a = 1e9,
            "(n, 5): x, y [px], area [px^2], weight, 1 if the region cuts it; the largest first.");
   module.def("locate", &locate_ball, "cameras"_a, "sightings"_a, "tolerance"_a = 3.0,
              "noise"_a = 0.3, "radius"_a = 0.02, "size_factor"_a = 4.0, "least"_a = 2,

@@ -63,7 +63,7 @@ TEST(BlobFinder, ACoarseSearchFindsEveryDiscWiderThanItsDiagonal) {
   for (int shift = 0; shift < 16; ++shift) {
     Picture picture;
     picture.disc(50 + shift % 4, 60 + shift / 4, 3.0);
-    EXPECT_THAT(finder.find(picture.image(), kWhole, {.step = 4, .least_area = 1}).count, Ge(1));
+    EXPECT_THAT(finder.find(picture.image(), kWhole, {.step = 4, .min_area = 1}).count, Ge(1));
   }
 }
 
@@ -73,9 +73,9 @@ TEST(BlobFinder, ListsTheLargestFirstAndNoMoreThanItHasRoomFor) {
   for (int i = 0; i < 12; ++i) picture.disc(10 + 12 * i, 50, 1.5 + 0.3 * i);
   const Blobs blobs = finder.find(picture.image(), kWhole, {});
 
-  ASSERT_EQ(blobs.count, kMostBlobs);
+  ASSERT_EQ(blobs.count, kMaxBlobs);
   EXPECT_THAT(blobs.list[0].centre.x, DoubleNear(142, 0.1));
-  for (std::size_t i = 1; i < kMostBlobs; ++i) {
+  for (std::size_t i = 1; i < kMaxBlobs; ++i) {
     EXPECT_LT(blobs.list[i].weight, blobs.list[i - 1].weight);
   }
 }

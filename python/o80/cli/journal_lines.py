@@ -18,7 +18,7 @@ from o80.rows.journal import JournalCommand, JournalEntry
 
 _LOOK = 0.05  # between two looks for new entries [s]
 _BEFORE = 10  # entries of a living backend that are printed at the start
-_MOST_NUMBERS = 8  # of a target
+_MAX_NUMBERS = 8  # of a target
 
 
 def follow(frontend: Frontend, count: int, as_json: bool, timeout: float | None) -> None:
@@ -202,7 +202,7 @@ def _target(target: Any) -> str:
     if isinstance(target, dict):
         return "{" + ", ".join(f"{name}: {_target(value)}" for name, value in target.items()) + "}"
     if isinstance(target, np.ndarray):
-        if target.size > _MOST_NUMBERS:
+        if target.size > _MAX_NUMBERS:
             return f"{len(target)} waypoints, the last {target[-1]}"
         return str(target.tolist())
     return f"{target:g}" if isinstance(target, float) else str(target)

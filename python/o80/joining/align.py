@@ -78,7 +78,7 @@ def align(
     period: float | None = None,
     at: ArrayLike | None = None,
     how: HowWord | Mapping[str, HowWord] = "before",
-    most_age: float | Mapping[str, float] | None = None,
+    max_age: float | Mapping[str, float] | None = None,
     seconds: float | None = None,
     offsets: Mapping[str, int] | None = None,
 ) -> Aligned:
@@ -92,7 +92,7 @@ def align(
     how: "before": the newest row at or before the time, which a program that ran then had;
         "nearest"; or "linear": floats are interpolated between two rows (each number by itself:
         not for quaternions), other numbers are those of the older one. May differ by source.
-    most_age: rows further away from the time than this count as missing [s].
+    max_age: rows further away from the time than this count as missing [s].
     seconds: only the last seconds of each source.
     offsets: added to the times of sources, for clocks that have nothing in common [ns].
 
@@ -109,7 +109,7 @@ def align(
         raise InvalidArgument("there is nothing to align: give at least one source")
     times = _times(found, by, period, at)
     ways = _each(found, how, "how")
-    ages = _each(found, most_age, "most_age")
+    ages = _each(found, max_age, "max_age")
     return Aligned(
         times,
         {
@@ -155,17 +155,17 @@ def _times(
 
 
 def _aligned(
-    name: str, source: Timed, times: NDArray[np.int64], how: str, most_age: float | None
+    name: str, source: Timed, times: NDArray[np.int64], how: str, max_age: float | None
 ) -> AlignedHistory:
     if how not in HOW:
         raise InvalidArgument(f"how must be one of {', '.join(HOW)}, got {how!r} for {name}")
-    if most_age is not None and not most_age >= 0:
-        raise InvalidArgument(f"most_age must be at least 0 s, got {most_age!r} for {name}")
+    if max_age is not None and not max_age >= 0:
+        raise InvalidArgument(f"max_age must be at least 0 s, got {max_age!r} for {name}")
     picked = HOW[how](source, times)
     found = picked.age != NOWHERE
     age = np.where(found, picked.age * NANOSECOND, np.nan)
-    if most_age is not None:
-        found &= np.abs(age) <= most_age
+    if max_age is not None:
+        found &= np.abs(age) <= max_age
     rows = np.ascontiguousarray(picked.rows)
     blanked(source.history, rows, ~found)
     return AlignedHistory(source.history._decoder, rows, age, found)

@@ -24,8 +24,8 @@ if TYPE_CHECKING:
 FloatArray = NDArray[np.float64]
 
 BLOCKS = 10  # of the jackknife
-LEAST_ROWS = 50
-LEAST_CORRELATION = 0.5
+MIN_ROWS = 50
+MIN_CORRELATION = 0.5
 
 
 @dataclass(frozen=True)
@@ -73,7 +73,7 @@ def latency(
     lags = int(most / (step * NANOSECOND))
     x = _sampled(one, one_signal, grid)
     y = _sampled(other, other_signal, grid)
-    if len(grid) < 2 * lags + LEAST_ROWS:
+    if len(grid) < 2 * lags + MIN_ROWS:
         raise InvalidArgument(
             f"both sources have rows for {len(grid) * step * NANOSECOND:.3g} s only, too little "
             f"for delays up to {most:g} s: record longer, or give a smaller most"
@@ -86,9 +86,9 @@ def _grid(one: Timed, other: Timed, most: float) -> tuple[int, NDArray[np.int64]
     if not 0 < most < 1e6:
         raise InvalidArgument(f"most must be a positive number of seconds, got {most!r}")
     for name, source in (("first", one), ("second", other)):
-        if len(source.times) < LEAST_ROWS:
+        if len(source.times) < MIN_ROWS:
             raise InvalidArgument(
-                f"the {name} source has {len(source.times)} rows, at least {LEAST_ROWS} are needed"
+                f"the {name} source has {len(source.times)} rows, at least {MIN_ROWS} are needed"
             )
     step = int(min(np.median(np.diff(source.times)) for source in (one, other)))
     begin = max(int(one.times[0]), int(other.times[0]))
@@ -110,7 +110,7 @@ def _sampled(source: Timed, signal: Signal, grid: NDArray[np.int64]) -> FloatArr
         values = values_of(history, _column(history, signal)).astype(np.float64)
     values = values[source.rows]
     whole = np.isfinite(values)
-    if whole.sum() < LEAST_ROWS:
+    if whole.sum() < MIN_ROWS:
         raise InvalidArgument(f"the signal has only {whole.sum()} numbers that are finite")
     begin = source.times[0]
     sampled: FloatArray = np.interp(grid - begin, source.times[whole] - begin, values[whole])
@@ -152,7 +152,7 @@ def _estimate(x: FloatArray, y: FloatArray, lags: int, period: float) -> Latency
             )
     total = moments.sum(axis=0)
     correlation, best = _peak(total)
-    if correlation < LEAST_CORRELATION or abs(best - lags) > lags - 1:
+    if correlation < MIN_CORRELATION or abs(best - lags) > lags - 1:
         raise Error(
             "the two signals show no common motion within the longest delay (correlation "
             f"{correlation:.2f}): move more, compare other fields, or give a larger most"

@@ -16,9 +16,9 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MOST_PANELS = 24
+MAX_PANELS = 24
 PANEL = (9.0, 1.9)  # width and height [inch]
-MOST_OF_MARK = 36  # characters that fit in a panel
+MAX_OF_MARK = 36  # characters that fit in a panel
 PARTS = ("desired", "observed", "extended")
 END_STYLES = {"COMPLETED": ("|", "tab:green"), "OVERWRITTEN": ("|", "tab:purple")}
 STYLES = {"desired": "--", "observed": "-", "extended": "-"}
@@ -66,9 +66,9 @@ def plot(
             "there is nothing to plot: the robot has no actuators. Name sensor values in fields, "
             "for example extended"
         )
-    if len(panels) > MOST_PANELS:
+    if len(panels) > MAX_PANELS:
         raise InvalidArgument(
-            f"{len(panels)} panels are too many for a picture (at most {MOST_PANELS}): name fields"
+            f"{len(panels)} panels are too many for a picture (at most {MAX_PANELS}): name fields"
         )
     figure = _figure(len(panels), window)
     axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
@@ -193,7 +193,7 @@ def _draw_marks(
             ax.axvline(at, color="tab:olive", linewidth=1.0)
             place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
             # a mark holds any text: none of it is a formula
-            short = text if len(text) <= MOST_OF_MARK else text[: MOST_OF_MARK - 1] + "\u2026"
+            short = text if len(text) <= MAX_OF_MARK else text[: MAX_OF_MARK - 1] + "\u2026"
             ax.text(at, 0.98, short, transform=_shares(ax), parse_math=False, **place)
 
 

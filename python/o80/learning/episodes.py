@@ -85,8 +85,8 @@ def no_step(task: Task) -> Stepped:
 def _to_be_judged(task: Task, copies: Index) -> tuple[NDArray[np.intp], NDArray[np.bool_] | None]:
     """Numbers of the copies to be judged, and which of all are out of steps (None: no limit)."""
     flagged, late = task.flagged(), None
-    if task.most_steps is not None:
-        late = task.steps >= task.most_steps
+    if task.max_steps is not None:
+        late = task.steps >= task.max_steps
         flagged = flagged | late
     if not isinstance(copies, slice):
         stepped = np.zeros(task.copies, np.bool_)

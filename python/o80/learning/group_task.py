@@ -33,18 +33,18 @@ class GroupTask(Task):
         seen: Gather,
         observation_space: Space[Any],
         action_space: Space[Any],
-        most_steps: int | None = None,
+        max_steps: int | None = None,
     ) -> None:
         """burst: of a step, from `group.prepared_burst`.
 
         seen: observations and flags, from `group.gather`.
-        most_steps: steps after which an episode is truncated (None: no limit).
+        max_steps: steps after which an episode is truncated (None: no limit).
         """
         super().__init__(
             group.copies,
             observation_space=observation_space,
             action_space=action_space,
-            most_steps=most_steps,
+            max_steps=max_steps,
         )
         self.group, self.burst, self.seen = group, burst, seen
         self._has_flags = seen.flags.shape[1] > 0

@@ -55,11 +55,11 @@ class Task(ABC):
         *,
         observation_space: Space[Any],
         action_space: Space[Any],
-        most_steps: int | None = None,
+        max_steps: int | None = None,
     ) -> None:
         """observation_space, action_space: of one copy.
 
-        most_steps: steps after which an episode is truncated (None: no limit).
+        max_steps: steps after which an episode is truncated (None: no limit).
         """
         self.copies = whole(copies, "copies", 1)
         for name, space in (
@@ -70,7 +70,7 @@ class Task(ABC):
                 raise InvalidArgument(f"{name} must be a space of Gymnasium, got {space!r}")
         self.observation_space = observation_space
         self.action_space = action_space
-        self.most_steps = None if most_steps is None else whole(most_steps, "most_steps", 1)
+        self.max_steps = None if max_steps is None else whole(max_steps, "max_steps", 1)
         self.steps: NDArray[np.int64] = np.zeros(self.copies, np.int64)
         """(copies,) steps of each episode so far; counted by the environment."""
 
@@ -104,7 +104,7 @@ class Task(ABC):
 
     @abstractmethod
     def judge(self, copies: NDArray[np.intp]) -> Outcome:
-        """Judges the step of these copies, which are flagged or at the end of `most_steps`."""
+        """Judges the step of these copies, which are flagged or at the end of `max_steps`."""
 
     def info(self, copies: Index) -> Mapping[str, Any]:
         """Entries of Gymnasium's info in every step and reset: arrays (n, ...), or mappings."""

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from o80.recording.recorded_epoch import RecordedEpoch
 
-MOST_ROWS = 256  # of a part: what is published by one call
+MAX_ROWS = 256  # of a part: what is published by one call
 SAME_CLOCK = 500_000_000  # clocks whose offsets differ by less are one clock [ns]
 
 
@@ -55,8 +55,8 @@ class Track:
         """The rows from `begin` to `end` [ns], on the wall clock, in small parts."""
         for run, (epoch, offset) in enumerate(zip(self.epochs, self.offsets, strict=True)):
             for history in epoch.blocks(from_time=begin - offset, to_time=end - offset):
-                for first in range(0, len(history), MOST_ROWS):
-                    rows = history.rows[first : first + MOST_ROWS]
+                for first in range(0, len(history), MAX_ROWS):
+                    rows = history.rows[first : first + MAX_ROWS]
                     yield Part(run, rows, rows["time"] + offset)
 
 

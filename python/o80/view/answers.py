@@ -19,7 +19,7 @@ from o80.view.source_list import SourceList
 
 LONGEST_WINDOW = 60.0  # [s]
 LONGEST_REASON = 80  # of a halt
-MOST_MARKS = 50  # in a chart
+MAX_MARKS = 50  # in a chart
 
 
 class Answers:
@@ -169,7 +169,7 @@ def _marks_in(rows: History, marks: Sequence[tuple[str, int]], begin: int) -> li
         [(int(rows.time[np.searchsorted(iterations, iteration)]) - begin) * 1e-9, text]
         for text, iteration in marks
         if len(rows) and iterations[0] <= iteration <= iterations[-1]
-    ][-MOST_MARKS:]
+    ][-MAX_MARKS:]
 
 
 def _bytes_of(row: Any) -> bytes:

@@ -11,7 +11,7 @@ from o80.rows.history import History, values_of
 from o80.view.base64_arrays import packed
 
 POINTS = 400  # of a curve
-MOST_PANELS = 12
+MAX_PANELS = 12
 FIRST_PANELS = 3  # shown before the user chooses
 
 
@@ -53,7 +53,7 @@ class Panels:
         if not len(starts):
             return found
         seconds = packed((rows.time[starts] - begin) * 1e-9)
-        for panel in panels[:MOST_PANELS]:
+        for panel in panels[:MAX_PANELS]:
             columns = self.columns.get(panel)
             if columns is None:
                 continue
@@ -70,7 +70,7 @@ class Panels:
                 part: _text(value_of(row, column), column)
                 for part, column in self.columns[panel].items()
             }
-            for panel in panels[:MOST_PANELS]
+            for panel in panels[:MAX_PANELS]
             if panel in self.columns
         }
 

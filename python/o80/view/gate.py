@@ -21,8 +21,8 @@ from collections.abc import Callable
 from o80.view.head import LARGEST_HEAD, LARGEST_REQUEST, Head, Refused, take_head
 from o80.view.reply import Reply
 
-MOST_STRANGERS = 1024
-MOST_HOLDERS = 100
+MAX_STRANGERS = 1024
+MAX_HOLDERS = 100
 ACCEPTED_AT_ONCE = 16  # in a round
 READ_AT_ONCE = 8  # strangers, in a round
 
@@ -56,9 +56,9 @@ class Gate:
         self._reply = reply
         # half of the descriptors are left to the answers, which open segments and files
         limit = resource.getrlimit(resource.RLIMIT_NOFILE)[0]
-        share = limit // 4 if limit >= 0 else MOST_STRANGERS
-        self._most_strangers = min(MOST_STRANGERS, share)
-        self._most_holders = min(MOST_HOLDERS, share)
+        share = limit // 4 if limit >= 0 else MAX_STRANGERS
+        self._most_strangers = min(MAX_STRANGERS, share)
+        self._most_holders = min(MAX_HOLDERS, share)
         # the oldest first; a holder is as old as its last request
         self._strangers: dict[_Connection, None] = {}
         self._holders: dict[_Connection, None] = {}

@@ -16,7 +16,7 @@ from o80.view.source import NothingToShow, Source
 
 GUARD_ROWS = 16  # the oldest rows may be overwritten while they are read
 JOURNAL_BYTES = 1 << 20  # that are read at once
-MOST_MARKS = 1000  # the newest ones
+MAX_MARKS = 1000  # the newest ones
 
 
 class LiveSource(Source):
@@ -100,7 +100,7 @@ class LiveSource(Source):
             while journal is not None and journal.exists and more:
                 *_, more, found = journal.read(JOURNAL_BYTES)
                 self._marks += found
-            del self._marks[:-MOST_MARKS]
+            del self._marks[:-MAX_MARKS]
             return list(self._marks)
 
     def state(self) -> dict[str, Any]:

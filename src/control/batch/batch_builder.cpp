@@ -73,8 +73,8 @@ void BatchBuilder::add_command(const Member& member, RecordKind kind,
 }
 
 std::uint32_t BatchBuilder::mark(std::string_view text) {
-  if (text.empty() || text.size() > kMostMarkBytes) {
-    throw InvalidArgument("a mark has 1 to " + std::to_string(kMostMarkBytes) +
+  if (text.empty() || text.size() > kMaxMarkBytes) {
+    throw InvalidArgument("a mark has 1 to " + std::to_string(kMaxMarkBytes) +
                           " bytes of text, got " + std::to_string(text.size()));
   }
   return add(head_of(RecordKind::mark), std::as_bytes(std::span(text)));
@@ -86,7 +86,7 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   written.records = records_;
   written.blocks = static_cast<std::uint32_t>(blocks_.size());
   const bool is_express = !has_commands() && requests() == 0 && of(RecordKind::mark) == 0 &&
-                          records_ > 0 && records_ <= kMostExpressRecords && batch.at == kNow &&
+                          records_ > 0 && records_ <= kMaxExpressRecords && batch.at == kNow &&
                           batch.burst == 0 && (batch.flags & kBurstUntilEnded) == 0;
   if (is_express) written.flags |= kExpress;
   std::memcpy(blocks_.front().bytes.data(), &written, sizeof written);

@@ -57,7 +57,7 @@ class BatchBuilder {
     return add(head_of(RecordKind::resume, 0, accept_reading ? 1 : 0, number));
   }
 
-  /// A note for the journal: 1 to kMostMarkBytes bytes in UTF-8. Throws InvalidArgument.
+  /// A note for the journal: 1 to kMaxMarkBytes bytes in UTF-8. Throws InvalidArgument.
   std::uint32_t mark(std::string_view text);
 
   /// Completes the batch. `batch` has id, ticket, at, late_now, burst and flags. A batch of few

@@ -193,8 +193,8 @@ struct BatchPlanner::Lane : Batch {
     using enum RecordKind;
     const bool is_request = head.kind == request || head.kind == resume;
     const bool is_order = head.kind == take_control || head.kind == release_control;
-    return (is_request && plan.effort.requests >= kMostRequests) ||
-           (is_order && ++control_orders > kMostControlOrders);
+    return (is_request && plan.effort.requests >= kMaxRequests) ||
+           (is_order && ++control_orders > kMaxControlOrders);
   }
 
   /// True if a member has the options of its group, and an actuator that no other member has.

@@ -43,7 +43,7 @@ constexpr bool is_known(RecordKind kind) noexcept {
 }
 
 /// Longest pace [iterations]: a status stores 48 bits of an iteration.
-inline constexpr std::int64_t kMostIterations = std::int64_t{1} << 47;
+inline constexpr std::int64_t kMaxIterations = std::int64_t{1} << 47;
 /// The longest duration [ns].
 inline constexpr std::int64_t kLongestDuration = std::int64_t{1} << 61;
 
@@ -90,12 +90,12 @@ inline constexpr std::uint16_t kBurstUntilEnded = 1;
 inline constexpr std::uint16_t kExpress = 2;
 
 // limits of one batch: `pulse` refuses more, and the backend rejects the records beyond them
-inline constexpr std::uint32_t kMostRequests = 8;
-inline constexpr std::uint32_t kMostControlOrders = 8;
+inline constexpr std::uint32_t kMaxRequests = 8;
+inline constexpr std::uint32_t kMaxControlOrders = 8;
 /// Longest text of a mark [bytes].
-inline constexpr std::uint32_t kMostMarkBytes = 1024 - sizeof(RecordHead);
+inline constexpr std::uint32_t kMaxMarkBytes = 1024 - sizeof(RecordHead);
 /// Most records of an express batch.
-inline constexpr std::uint32_t kMostExpressRecords = 32;
+inline constexpr std::uint32_t kMaxExpressRecords = 32;
 
 /// The first block of a batch.
 ///

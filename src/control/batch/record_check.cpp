@@ -13,9 +13,9 @@ bool sane_pace(const RecordHead& head) noexcept {
     case Pace::speed:
       return std::isfinite(head.speed) && head.speed > 0.0;
     case Pace::until:
-      return head.rows == 1 && head.amount <= kMostIterations;
+      return head.rows == 1 && head.amount <= kMaxIterations;
     case Pace::iterations:
-      return head.amount >= 0 && head.amount <= kMostIterations;
+      return head.amount >= 0 && head.amount <= kMaxIterations;
     default:
       return (head.pace == Pace::duration && head.rows > 1) ||
              (head.amount >= 0 && head.amount <= kLongestDuration);
@@ -61,7 +61,7 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
     case RecordKind::resume:
       return verdict(head.payload_bytes == 0 && head.accepts <= 1);
     case RecordKind::mark:
-      return verdict(head.payload_bytes > 0 && head.payload_bytes <= kMostMarkBytes);
+      return verdict(head.payload_bytes > 0 && head.payload_bytes <= kMaxMarkBytes);
     default:
       return Verdict::invalid;
   }

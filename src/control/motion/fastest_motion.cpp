@@ -15,7 +15,7 @@ constexpr double kTimeRounding = 1e-12;
 constexpr double kRootForTime = 1e-6;
 constexpr double kExact = 1e-16;
 constexpr double kBracket = 1e-3;
-constexpr int kMostCorrections = 8;
+constexpr int kMaxCorrections = 8;
 constexpr double kMissed = 1e-9;  // beyond rounding; a share of the distance and of a step
 
 }  // namespace
@@ -138,7 +138,7 @@ void FastestMotion::stretch(std::int64_t iterations) noexcept {
   nearer_ = {};
   cruises_ = true;
   settle();
-  for (int i = 0; i < kMostCorrections && (iterations_ != iterations || !exact); ++i) {
+  for (int i = 0; i < kMaxCorrections && (iterations_ != iterations || !exact); ++i) {
     exact = true;
     before_ += iterations - iterations_;
     if (before_ < 0) break;

@@ -10,8 +10,8 @@ namespace {
 constexpr double kPlanRounding = 1e-9;
 // numbers of iterations that the search for the fewest of a smooth motion tries
 constexpr double kStride = 1.15;
-constexpr int kMostStrides = 8;
-constexpr int kMostHalvings = 10;
+constexpr int kMaxStrides = 8;
+constexpr int kMaxHalvings = 10;
 
 /// The fraction `share` between `from` and `to`, never outside, despite rounding and overflow.
 double between(double from, double to, double share) noexcept {
@@ -74,7 +74,7 @@ std::int64_t NumberPlan::fewest_smooth(std::int64_t least) noexcept {
   std::int64_t few = 0;
   std::int64_t enough = std::max<std::int64_t>(1, least - 3);
   for (int i = 0; !smooth(enough); ++i) {
-    if (i == kMostStrides) return least;
+    if (i == kMaxStrides) return least;
     few = enough;
     enough = static_cast<std::int64_t>(std::ceil(static_cast<double>(enough) * kStride));
   }
@@ -124,7 +124,7 @@ bool NumberPlan::smooth(std::int64_t iterations) noexcept {
 /// most that stay inside, and then goes to the target.
 bool NumberPlan::stop_then_smooth(std::int64_t iterations) noexcept {
   stop_ = iterations / 2;
-  for (int i = 0; i < kMostHalvings && stop_ > 0; ++i, stop_ /= 2) {
+  for (int i = 0; i < kMaxHalvings && stop_ > 0; ++i, stop_ /= 2) {
     const auto r = static_cast<double>(stop_);
     const double rest =
         task_.from.position + r * task_.from.speed / 2.0 + r * r * task_.from.acceleration / 12.0;

@@ -8,7 +8,7 @@ namespace o80 {
 namespace {
 
 // longest motion; keeps sums of squares within the range of a double
-constexpr double kMostSteps = 1e12;
+constexpr double kMaxSteps = 1e12;
 // a limit may be exceeded by rounding; rounding must not add an iteration
 constexpr double kChangeRounding = 1e-12;
 
@@ -27,7 +27,7 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
   const double size = std::abs(change);
   if (!std::isfinite(acceleration_)) acceleration_ = size;
   const double steps =
-      std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMostSteps);
+      std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMaxSteps);
   steps_ = static_cast<std::int64_t>(std::max(steps, 1.0));
   shorter_ = steps_ - 1;
   const auto n = static_cast<double>(shorter_);
@@ -97,12 +97,12 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
   const double enough = change + kChangeRounding * std::max(std::abs(change), std::abs(start_));
   double low = fewest;  // steps that are too few
   Sums other = straight;
-  steps = std::clamp(std::floor(steps), fewest + 1.0, kMostSteps);
+  steps = std::clamp(std::floor(steps), fewest + 1.0, kMaxSteps);
   Sums own = sums(steps);
-  for (double stride = 1.0; own.change > enough && steps < kMostSteps; stride *= 2.0) {
+  for (double stride = 1.0; own.change > enough && steps < kMaxSteps; stride *= 2.0) {
     low = steps;
     other = own;
-    steps = std::min(steps + stride, kMostSteps);
+    steps = std::min(steps + stride, kMaxSteps);
     own = sums(steps);
   }
   bool first = true;  // try one step less first: the estimate is seldom off by more than one

@@ -11,7 +11,7 @@ namespace o80 {
 namespace {
 
 // most waypoints of a trajectory that are skipped in one iteration, because they end before it
-constexpr int kMostPassed = 256;
+constexpr int kMaxPassed = 256;
 
 }  // namespace
 
@@ -297,7 +297,7 @@ std::int64_t ActuatorQueue::row_of_own_time() noexcept {
     return end - std::exchange(time_, end);
   };
   std::int64_t duration = next();
-  for (int i = 0; i < kMostPassed && rows_left_ > 0 && carry_.pass(duration); ++i) {
+  for (int i = 0; i < kMaxPassed && rows_left_ > 0 && carry_.pass(duration); ++i) {
     read_row();
     duration = next();
   }

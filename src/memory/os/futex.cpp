@@ -42,7 +42,7 @@ constexpr std::uint32_t kFourBytes = 0x02;  // and shared with other processes
 
 bool futex_wait_any(std::span<const FutexWord> words, std::int64_t at_most) noexcept {
   if (at_most <= 0) return true;
-  std::array<Waiter, kMostFutexWords> waiters{};
+  std::array<Waiter, kMaxFutexWords> waiters{};
   const std::size_t count = std::min(words.size(), waiters.size());
   for (std::size_t i = 0; i < count; ++i) {
     waiters[i] = {.value = words[i].expected,

@@ -18,9 +18,9 @@ struct FutexWord {
   std::uint32_t expected;
 };
 
-inline constexpr std::size_t kMostFutexWords = 128;  // of one wait, says the kernel
+inline constexpr std::size_t kMaxFutexWords = 128;  // of one wait, says the kernel
 
-/// Sleeps while each of up to kMostFutexWords words is as expected, at most `at_most` [ns]; false
+/// Sleeps while each of up to kMaxFutexWords words is as expected, at most `at_most` [ns]; false
 /// at once if the kernel cannot do that (before Linux 5.16, or forbidden in a container).
 bool futex_wait_any(std::span<const FutexWord> words, std::int64_t at_most) noexcept;
 

@@ -38,7 +38,7 @@ class Sleep {
     views_.clear();
     bool all = true;
     for (const RowOf& wanted : rows_) {
-      if (wanted.segment->access() != Access::read_write || words_.size() == kMostFutexWords) {
+      if (wanted.segment->access() != Access::read_write || words_.size() == kMaxFutexWords) {
         all = false;
         continue;
       }

@@ -52,10 +52,10 @@ void HistoryWriter::skip_to(Iteration k) noexcept {
 }
 
 void HistoryWriter::expect(Iteration k) const noexcept {
-  constexpr std::size_t kMost = 512;  // further lines are prefetched by the processor
+  constexpr std::size_t kMax = 512;  // further lines are prefetched by the processor
   prefetch_to_write(&counters_->begun);
   const std::byte* slot = slots_begin_ + static_cast<std::uint64_t>(k) % slots_ * row_bytes_;
-  const std::size_t bytes = std::min(row_bytes_, kMost);
+  const std::size_t bytes = std::min(row_bytes_, kMax);
   for (std::size_t at = 0; at < bytes; at += kLineBytes) prefetch_to_write(slot + at);
   prefetch_to_write(slot + bytes - 1);
 }

@@ -29,7 +29,7 @@ JournalWriter::JournalWriter(const SegmentView& view) noexcept
       ring_(view.journal()),
       bytes_(view.shape.journal_bytes),
       sector_shift_(bytes_ == 0 ? 0 : std::countr_zero(bytes_ / kJournalSectors)),
-      most_(bytes_ == 0 ? 0 : std::min<std::uint64_t>(kMostJournalPayload, bytes_ / 4)) {}
+      most_(bytes_ == 0 ? 0 : std::min<std::uint64_t>(kMaxJournalPayload, bytes_ / 4)) {}
 
 void JournalWriter::write(const JournalHead& head, const void* payload,
                           std::size_t bytes) noexcept {

@@ -54,7 +54,7 @@ static_assert(offsetof(JournalHead, lane) == 3 && offsetof(JournalHead, what) ==
 static_assert(sizeof(JournalHead) == 32 && std::is_trivially_copyable_v<JournalHead>);
 
 /// Largest payload of an entry [bytes].
-inline constexpr std::size_t kMostJournalPayload = 0xFFFF * 8 - sizeof(JournalHead);
+inline constexpr std::size_t kMaxJournalPayload = 0xFFFF * 8 - sizeof(JournalHead);
 
 /// Appends entries to the journal. Without a journal in the segment every call does nothing.
 ///
@@ -72,7 +72,7 @@ class JournalWriter {
   /// True if an entry may have so large a payload.
   bool fits(std::size_t payload) const noexcept { return payload <= most_; }
   /// Appends an entry; sets `number` and `words` of its head. `bytes`: a multiple of 8. A payload
-  /// larger than kMostJournalPayload or a quarter of the ring is left out.
+  /// larger than kMaxJournalPayload or a quarter of the ring is left out.
   void write(const JournalHead& head, const void* payload = nullptr,
              std::size_t bytes = 0) noexcept;
 

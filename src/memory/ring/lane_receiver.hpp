@@ -73,7 +73,7 @@ class LaneReceiver {
   void set_message(std::uint64_t id, std::string_view text) noexcept;
   /// True if a batch may have this id: ids grow by limited steps. Otherwise one owner could use up
   /// the ids, so that the statuses of later owners were unreadable.
-  bool expects(std::uint64_t id) const noexcept { return id - ids_ <= kMostSkippedIds; }
+  bool expects(std::uint64_t id) const noexcept { return id - ids_ <= kMaxSkippedIds; }
   /// A batch was staged whose ids end before `ids_end`; the next owner of the lane continues there.
   void note_ids(std::uint64_t ids_end) noexcept;
   /// The burst of the batch `id` has ended with this row. Calls flag().

@@ -59,7 +59,7 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
   // continue its ids too, unless its `next_id` is impossible
   const std::uint64_t taken =
       std::max<std::uint64_t>(1, feedback_->ids.load(std::memory_order_relaxed));
-  if (page_->next_id.load(std::memory_order_relaxed) - taken > kMostSkippedIds / 2)
+  if (page_->next_id.load(std::memory_order_relaxed) - taken > kMaxSkippedIds / 2)
     page_->next_id.store(taken, std::memory_order_relaxed);
   next_id_ = page_->next_id.load(std::memory_order_relaxed);
   store_text(page_->owner, std::size(page_->owner), own_process());
@@ -76,7 +76,7 @@ void LaneSender::count_in() {
   const std::uint64_t met = feedback_->incarnation.load(std::memory_order_relaxed);
   std::uint64_t last =
       possible_incarnation(page_->incarnation.load(std::memory_order_relaxed), met);
-  if (last - met == kMostUnmetOwners) last = met;  // last + 1 would be impossible
+  if (last - met == kMaxUnmetOwners) last = met;  // last + 1 would be impossible
   incarnation_ = last + 1;
 
   const std::uint64_t closed = page_->closed.load(std::memory_order_relaxed);

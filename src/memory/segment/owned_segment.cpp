@@ -27,7 +27,7 @@ std::uint64_t journal_bytes_of(const SegmentSpec& spec) {
   if (spec.journal_bytes == 0) return 0;
   if (spec.journal_bytes > (1ULL << 40))
     throw InvalidArgument("segment '" + spec.name + "': the journal must be at most 1 TiB");
-  return std::bit_ceil(std::max(spec.journal_bytes, kLeastJournal));
+  return std::bit_ceil(std::max(spec.journal_bytes, kMinJournal));
 }
 
 SegmentShape shape_of(const SegmentSpec& spec) {
@@ -92,7 +92,7 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
         std::to_string(spec.row_bytes) + " bytes and " + std::to_string(spec.lanes) +
         " lanes. A row must be a multiple of 8 bytes, a segment must be below 64 TiB, and there "
         "must be at most " +
-        std::to_string(kMostLanes) + " lanes.");
+        std::to_string(kMaxLanes) + " lanes.");
   if (!spec.anonymous) {
     refuse_if_taken(spec.name);
     sweep_orphans();

@@ -32,9 +32,9 @@ class QueueWord {
   /// than half of the work, if there is one.
   void spent(std::uint32_t lane, std::uint32_t work) noexcept {
     if (lane == lane_) {
-      weight_ = std::min(weight_ + work, kMostWeight);
+      weight_ = std::min(weight_ + work, kMaxWeight);
     } else if (work > weight_) {
-      weight_ = std::min(work - weight_, kMostWeight);
+      weight_ = std::min(work - weight_, kMaxWeight);
       lane_ = lane;
     } else {
       weight_ -= work;
@@ -52,7 +52,7 @@ class QueueWord {
   }
 
  private:
-  static constexpr std::uint32_t kMostWeight = 1U << 14;  // some iterations of work
+  static constexpr std::uint32_t kMaxWeight = 1U << 14;  // some iterations of work
   static constexpr std::uint64_t kBursts = 0x8000;
   static constexpr std::uint64_t kLane = 0x7fff;
   friend std::optional<QueueHolder> queue_holder(const SegmentView& view) noexcept;

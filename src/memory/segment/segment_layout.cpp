@@ -17,10 +17,10 @@ bool SegmentOffsets::compute(const SegmentShape& shape, SegmentOffsets& offsets)
   if (shape.row_bytes == 0 || shape.row_bytes % 8 != 0 || shape.row_bytes > (1ULL << 32))
     return false;
   if (shape.slots < 2 || shape.slots > kLargestSegment / shape.row_bytes) return false;
-  if (shape.lanes > kMostLanes) return false;
+  if (shape.lanes > kMaxLanes) return false;
   if (!std::has_single_bit(shape.lane_blocks) || shape.lane_blocks > (1U << 24)) return false;
   if (shape.journal_bytes != 0 &&
-      (!std::has_single_bit(shape.journal_bytes) || shape.journal_bytes < kLeastJournal ||
+      (!std::has_single_bit(shape.journal_bytes) || shape.journal_bytes < kMinJournal ||
        shape.journal_bytes > (1ULL << 40)))
     return false;
 

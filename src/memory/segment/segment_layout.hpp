@@ -36,13 +36,13 @@ inline constexpr std::size_t kMessages = 64;        // status texts kept for eac
 inline constexpr std::size_t kBurstsKept = 256;     // burst results kept for each lane
 inline constexpr std::size_t kCancelsKept = 7;      // cancelled bursts kept for each lane
 inline constexpr std::size_t kHaltsKept = 8;        // halts whose reasons are kept
-inline constexpr std::size_t kMostRunning = 8;      // requests that run at the same time
+inline constexpr std::size_t kMaxRunning = 8;      // requests that run at the same time
 inline constexpr std::size_t kJournalSectors = 64;  // parts of the journal with a mark each
-inline constexpr std::uint32_t kMostLanes = 256;    // a status has 8 bits for a lane
+inline constexpr std::uint32_t kMaxLanes = 256;    // a status has 8 bits for a lane
 /// Most ids that the owners of a lane may skip between two batches; a larger jump is invalid.
-inline constexpr std::uint64_t kMostSkippedIds = 1ULL << 28;
+inline constexpr std::uint64_t kMaxSkippedIds = 1ULL << 28;
 /// Most owners that a lane may have between two loads of `incarnation` by the backend.
-inline constexpr std::uint64_t kMostUnmetOwners = 1ULL << 20;
+inline constexpr std::uint64_t kMaxUnmetOwners = 1ULL << 20;
 
 /// The numbers that determine all offsets in both files.
 struct SegmentShape {
@@ -53,9 +53,9 @@ struct SegmentShape {
   std::uint64_t slots;      // length of the history + 1
   std::uint32_t lanes;
   std::uint32_t lane_blocks;    // power of two
-  std::uint64_t journal_bytes;  // power of two, at least kLeastJournal; 0: no journal
+  std::uint64_t journal_bytes;  // power of two, at least kMinJournal; 0: no journal
 };
-inline constexpr std::uint64_t kLeastJournal = 4096;  // [bytes]
+inline constexpr std::uint64_t kMinJournal = 4096;  // [bytes]
 
 /// Flag of a segment: its rows come from a recording (runtime/replay/played_segment.hpp).
 inline constexpr std::uint32_t kPlayed = 1;
@@ -120,13 +120,13 @@ struct Counters {
   std::atomic<std::int64_t> slow_since;  // time of that change [ns]
   std::atomic<std::uint64_t> queue;      // the holder of the queue: memory/segment/queue_word.hpp
   HaltSlot halt;                         // the halt in force
-  RunningSlot running[kMostRunning];
+  RunningSlot running[kMaxRunning];
   JournalCounters journal;
 };
 static_assert(sizeof(HaltSlot) == 6 * kLineBytes);
 static_assert(sizeof(RunningSlot) == 6 * kLineBytes);
 static_assert(sizeof(Counters) == 3 * kLineBytes + 1024 + sizeof(HaltSlot) +
-                                      kMostRunning * sizeof(RunningSlot) + sizeof(JournalCounters));
+                                      kMaxRunning * sizeof(RunningSlot) + sizeof(JournalCounters));
 
 struct CommandsHeader {
   std::uint64_t magic;
@@ -209,11 +209,11 @@ static_assert(sizeof(LaneFeedback) == 2 * kLineBytes + kBurstsKept * 16 + kMessa
 static_assert(std::atomic<std::uint64_t>::is_always_lock_free &&
               std::atomic<std::uint32_t>::is_always_lock_free);
 
-/// The incarnation that an owner has written, if it is plausible: at most kMostUnmetOwners above
+/// The incarnation that an owner has written, if it is plausible: at most kMaxUnmetOwners above
 /// `met`, the last one that the backend has seen. Else `met`. So no owner can exhaust or decrease
 /// the count for later owners.
 constexpr std::uint64_t possible_incarnation(std::uint64_t written, std::uint64_t met) noexcept {
-  return written - met <= kMostUnmetOwners ? written : met;
+  return written - met <= kMaxUnmetOwners ? written : met;
 }
 
 /// Offsets of the parts, computed from the shape: no offset is read from a file.

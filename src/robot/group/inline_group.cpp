@@ -20,7 +20,7 @@ namespace {
 /// Files of a copy: three of its backend, three of its frontend, three of another frontend.
 constexpr std::size_t kDescriptorsPerCopy = 9;
 constexpr std::int64_t kClosePoll = 1'000'000;  // [ns]
-constexpr std::size_t kMostNamed = 3;           // failed copies in the text of an error
+constexpr std::size_t kMaxNamed = 3;           // failed copies in the text of an error
 
 /// The group whose call this thread works for.
 thread_local const InlineGroup* working_for = nullptr;
@@ -49,11 +49,11 @@ std::string text_of(const std::string& group, const std::vector<CopyFailed::Fail
                      "' failed: " + text_of(failures.front().error);
   if (failures.size() == 1) return text;
   text += ". So did ";
-  for (std::size_t i = 1; i < failures.size() && i < kMostNamed; ++i) {
+  for (std::size_t i = 1; i < failures.size() && i < kMaxNamed; ++i) {
     text += (i == 1 ? "copy " : ", copy ") + std::to_string(failures[i].copy);
   }
-  if (failures.size() > kMostNamed) {
-    text += " and " + std::to_string(failures.size() - kMostNamed) + " more";
+  if (failures.size() > kMaxNamed) {
+    text += " and " + std::to_string(failures.size() - kMaxNamed) + " more";
   }
   return text;
 }

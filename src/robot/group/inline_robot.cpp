@@ -15,7 +15,7 @@ namespace o80 {
 
 namespace {
 
-constexpr std::uint32_t kMostAtOnce = 64;          // iterations between looks at the clock
+constexpr std::uint32_t kMaxAtOnce = 64;          // iterations between looks at the clock
 constexpr std::int64_t kLongAtOnce = kSlice / 10;  // [ns] longest time between these looks
 
 BackendOptions bursting(BackendOptions options) {
@@ -56,7 +56,7 @@ class InlineRobot::Turn {
 InlineRobot::InlineRobot(std::unique_ptr<DriverInstance> robot, BackendOptions options,
                          KeepWaiting keep_waiting)
     : keep_waiting_(std::move(keep_waiting)),
-      at_once_(keep_waiting_ ? 1 : kMostAtOnce),
+      at_once_(keep_waiting_ ? 1 : kMaxAtOnce),
       loop_(std::move(robot), bursting(std::move(options))) {
   loop_.start();
 }
@@ -112,7 +112,7 @@ void InlineRobot::look_around() {
   if (!keep_waiting_) return;
   const std::int64_t now = monotonic_now();
   const std::int64_t took = now - std::exchange(looked_at_, now);
-  at_once_ = took > kLongAtOnce ? std::max(1U, at_once_ / 2) : std::min(kMostAtOnce, at_once_ * 2);
+  at_once_ = took > kLongAtOnce ? std::max(1U, at_once_ / 2) : std::min(kMaxAtOnce, at_once_ * 2);
   if (now < look_at_) return;
   look_at_ = now + kSlice;
   try {

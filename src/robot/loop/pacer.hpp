@@ -30,9 +30,9 @@ class Pacer {
   const Timing& tick(std::int64_t now) noexcept;
   /// The last tick brought no reading: counts an overrun, unless this period has one already.
   const Timing& missed() noexcept;
-  /// True if ticks are more than kMostPeriodsAhead periods ahead of the clock. Speed limits, which
+  /// True if ticks are more than kMaxPeriodsAhead periods ahead of the clock. Speed limits, which
   /// are applied per iteration, then no longer hold.
-  bool runs_ahead() const noexcept { return ahead_ > kMostPeriodsAhead * period_; }
+  bool runs_ahead() const noexcept { return ahead_ > kMaxPeriodsAhead * period_; }
   /// The ticks since the ticks were last in time with the clock.
   struct FastTicks {
     std::int64_t ticks = 0;
@@ -42,7 +42,7 @@ class Pacer {
 
  private:
   /// After a gap, late ticks may arrive together; more than this many are too fast.
-  static constexpr std::int64_t kMostPeriodsAhead = 10;
+  static constexpr std::int64_t kMaxPeriodsAhead = 10;
   /// The robot's clock may always be faster than this one by 1 part in 50.
   static constexpr std::int64_t kClockTolerance = 50;
 

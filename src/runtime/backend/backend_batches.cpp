@@ -141,7 +141,7 @@ void UntypedBackend::Body::take_express() noexcept {
     for (const std::uint32_t lane : express_lanes_) {
       on_owner_death(lane, lanes[lane].dead_predecessor());
       const std::optional<StagedBatch> batch = staging.express(lane);
-      work += kMostExpressRecords;
+      work += kMaxExpressRecords;
       if (!batch) continue;
       work += controller.effort(batch->batch).work;
       accept(*batch);

@@ -26,7 +26,7 @@ constexpr std::uint64_t kDefaultHistoryRows = 100'000;
 constexpr std::int64_t kDefaultPeriod = 1'000'000;  // [ns]
 constexpr std::int64_t kPeriodRounding = 100'000;
 /// Least journal of a backend [bytes]: a quarter holds the blocks that one iteration copies.
-constexpr std::uint64_t kLeastBackendJournal = 8 * kWorkPerIteration * kBlockBytes;
+constexpr std::uint64_t kMinBackendJournal = 8 * kWorkPerIteration * kBlockBytes;
 
 std::string rate_text(std::int64_t period) {
   std::ostringstream text;
@@ -63,9 +63,9 @@ std::uint64_t journal_bytes_of(const BackendOptions& options) {
   if (options.journal == 0) return 0;
   if (options.journal < 0) {
     const std::uint64_t lane = std::uint64_t{std::bit_ceil(options.lane_blocks)} * kBlockBytes;
-    return std::max(2 * lane, kLeastBackendJournal);
+    return std::max(2 * lane, kMinBackendJournal);
   }
-  return std::bit_ceil(std::max(static_cast<std::uint64_t>(options.journal), kLeastBackendJournal));
+  return std::bit_ceil(std::max(static_cast<std::uint64_t>(options.journal), kMinBackendJournal));
 }
 
 /// The options with the values that take the place of the defaults.
@@ -169,11 +169,11 @@ OwnedSegment segment_of(const Schema& schema, const Provenance& provenance,
 
 std::int64_t longest_gap(const Schema& schema, const BackendOptions& options) {
   constexpr std::int64_t kPeriods = 20;
-  constexpr std::int64_t kLeast = 100'000'000;
+  constexpr std::int64_t kMin = 100'000'000;
   if (options.bursting) return 0;
   if (options.gap >= 0) return options.gap;
   const bool moves = schema.head.of_the_world != 0 && !schema.actuators.empty();
-  const std::int64_t least = moves ? std::max(kPeriods * schema.head.period, kLeast) : 0;
+  const std::int64_t least = moves ? std::max(kPeriods * schema.head.period, kMin) : 0;
   const std::int64_t own = schema.head.gap * std::int64_t{1000};
   return own > 0 && (least == 0 || own < least) ? own : least;
 }

@@ -15,7 +15,7 @@
 namespace o80 {
 
 /// The requests that the driver answered with `running` and has not ended: at most one of a kind
-/// and kMostRunning in all. The segment shows their progress.
+/// and kMaxRunning in all. The segment shows their progress.
 ///
 /// Writer:   the backend's thread.
 /// Realtime: everything but construction.
@@ -30,7 +30,7 @@ class RunningRequests {
 
   RunningRequests(const Schema& schema, const SegmentView& view) : schema_(schema), view_(view) {}
 
-  /// False if a request of the same kind runs, or kMostRunning run; `why` gets the reason.
+  /// False if a request of the same kind runs, or kMaxRunning run; `why` gets the reason.
   bool may_begin(std::uint32_t request, ShortText<248>& why) const noexcept;
   void begin(std::uint32_t request, std::uint32_t lane, std::uint64_t id, BlockIndex record,
              Iteration now, std::string_view progress) noexcept;
@@ -73,7 +73,7 @@ class RunningRequests {
 
   const Schema& schema_;
   SegmentView view_;
-  std::array<Entry, kMostRunning> entries_;
+  std::array<Entry, kMaxRunning> entries_;
   std::uint32_t count_ = 0;  // that run
   std::uint64_t writes_ = 0;
 };

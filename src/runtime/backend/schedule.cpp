@@ -12,25 +12,25 @@ bool later(const StagedBatch& a, const StagedBatch& b) noexcept {
 }  // namespace
 
 Schedule::Schedule(std::uint32_t lanes)
-    : iterations_(std::size_t{lanes} * kMostScheduled), counts_(lanes) {
+    : iterations_(std::size_t{lanes} * kMaxScheduled), counts_(lanes) {
   heap_.reserve(iterations_.size());
   aside_.reserve(2 * iterations_.size());
 }
 
 bool Schedule::has_room(std::uint32_t lane, Iteration at) const noexcept {
-  if (counts_[lane] >= kMostScheduled) return false;
-  return std::ranges::count(of(lane), at) < std::ptrdiff_t{kMostScheduledAt};
+  if (counts_[lane] >= kMaxScheduled) return false;
+  return std::ranges::count(of(lane), at) < std::ptrdiff_t{kMaxScheduledAt};
 }
 
 void Schedule::add(const StagedBatch& batch) noexcept {
-  iterations_[std::size_t{batch.lane} * kMostScheduled + counts_[batch.lane]++] = batch.at;
+  iterations_[std::size_t{batch.lane} * kMaxScheduled + counts_[batch.lane]++] = batch.at;
   heap_.push_back(batch);
   std::push_heap(heap_.begin(), heap_.end(), later);
 }
 
 void Schedule::drop_next() noexcept {
   const std::uint32_t lane = next().lane;
-  Iteration* const first = iterations_.data() + std::size_t{lane} * kMostScheduled;
+  Iteration* const first = iterations_.data() + std::size_t{lane} * kMaxScheduled;
   *std::find(first, first + counts_[lane] - 1, next().at) = first[counts_[lane] - 1];
   --counts_[lane];
   std::pop_heap(heap_.begin(), heap_.end(), later);

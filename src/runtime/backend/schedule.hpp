@@ -9,8 +9,8 @@
 namespace o80 {
 
 // most batches of one lane that may wait for later iterations; `pulse` refuses more
-inline constexpr std::uint32_t kMostScheduled = 256;
-inline constexpr std::uint32_t kMostScheduledAt = 16;  // for the same iteration
+inline constexpr std::uint32_t kMaxScheduled = 256;
+inline constexpr std::uint32_t kMaxScheduledAt = 16;  // for the same iteration
 
 /// Batches sent for a later iteration, ordered by iteration and ticket.
 ///
@@ -38,7 +38,7 @@ class Schedule {
 
  private:
   std::span<const Iteration> of(std::uint32_t lane) const noexcept {
-    return {iterations_.data() + std::size_t{lane} * kMostScheduled, counts_[lane]};
+    return {iterations_.data() + std::size_t{lane} * kMaxScheduled, counts_[lane]};
   }
 
   std::vector<StagedBatch> heap_;

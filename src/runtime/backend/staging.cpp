@@ -127,11 +127,11 @@ bool Staging::next_is_express(std::uint32_t lane) const noexcept {
   const std::uint64_t first = lanes_[lane].peek_word(offsetof(BatchRecord, kind));
   const auto blocks =
       static_cast<std::uint32_t>(lanes_[lane].peek_word(offsetof(BatchRecord, blocks)));
-  return (first >> 16 & kExpress) != 0 && blocks <= 1 + kMostExpressRecords;
+  return (first >> 16 & kExpress) != 0 && blocks <= 1 + kMaxExpressRecords;
 }
 
 std::optional<StagedBatch> Staging::express(std::uint32_t lane) noexcept {
-  std::uint32_t budget = 4 * (1 + kMostExpressRecords);  // enough for any express batch
+  std::uint32_t budget = 4 * (1 + kMaxExpressRecords);  // enough for any express batch
   if (!begin(lane, budget) || !copy_and_check(lane, budget) || !stages_[lane].copying) {
     return std::nullopt;
   }

@@ -17,7 +17,7 @@ inline constexpr std::uint32_t kWorkPerIteration = 1024;
 /// Realtime: yes.
 struct WorkShare {
   std::uint32_t work = kWorkPerIteration;
-  std::uint32_t requests = kMostRequests;
+  std::uint32_t requests = kMaxRequests;
 
   /// One batch may exceed the work; none may exceed the number of requests.
   bool affords(const Effort& effort) const noexcept {

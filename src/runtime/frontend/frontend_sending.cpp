@@ -44,12 +44,12 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
       return;
     case Pace::iterations:
       if (pace.amount < 1) refuse("of iterations must be at least 1");
-      if (pace.amount > kMostIterations) refuse("is too many iterations");
+      if (pace.amount > kMaxIterations) refuse("is too many iterations");
       return;
     case Pace::until:
       if (rows > 1) refuse("'until' suits one target; give a trajectory iterations or times");
       if (pace.amount < 0) refuse("'until' is a negative iteration");
-      if (pace.amount > kMostIterations) refuse("'until' lies too far");
+      if (pace.amount > kMaxIterations) refuse("'until' lies too far");
   }
 }
 
@@ -357,8 +357,8 @@ void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
                           ": send them in several pulses. Nothing was sent, all stays added "
                           "(forget_added() drops it)");
   };
-  refuse(builder.requests(), kMostRequests, "requests");
-  refuse(builder.control_orders(), kMostControlOrders, "orders to take or release control");
+  refuse(builder.requests(), kMaxRequests, "requests");
+  refuse(builder.control_orders(), kMaxControlOrders, "orders to take or release control");
 
   const std::uint64_t journal = link_->segment.view().shape.journal_bytes;
   const std::uint64_t bytes = builder.blocks() * kBlockBytes;
@@ -385,8 +385,8 @@ void UntypedFrontend::refuse_if_too_many_wait(Iteration at, const LaneSender& la
                    "pulse again later");
   };
   const auto same = std::ranges::count(link_->scheduled, at, &Link::Scheduled::at);
-  refuse(static_cast<std::size_t>(same), kMostScheduledAt, "iteration " + std::to_string(at));
-  refuse(link_->scheduled.size(), kMostScheduled, "later iterations");
+  refuse(static_cast<std::size_t>(same), kMaxScheduledAt, "iteration " + std::to_string(at));
+  refuse(link_->scheduled.size(), kMaxScheduled, "later iterations");
 }
 
 /// Refuses a batch that does not fit into the lane. Checked before ids are drawn: ids that are

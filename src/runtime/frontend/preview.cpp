@@ -14,7 +14,7 @@ namespace o80 {
 namespace {
 
 /// Longest motion that is previewed, because its rows are kept in memory [iterations].
-constexpr std::size_t kMostPreviewed = 1'000'000;
+constexpr std::size_t kMaxPreviewed = 1'000'000;
 
 /// What a controller with a single command needs around it.
 class Surroundings final : public StatusSink, public BatchHandler {
@@ -91,7 +91,7 @@ void settle(const Description& robot, Rows& rows) {
 }
 
 [[noreturn]] void throw_too_long() {
-  throw InvalidArgument("the command takes more than " + std::to_string(kMostPreviewed) +
+  throw InvalidArgument("the command takes more than " + std::to_string(kMaxPreviewed) +
                         " iterations, the most that a preview has rows for");
 }
 
@@ -147,7 +147,7 @@ Preview UntypedFrontend::preview_after(const Rows& rows, std::span<const std::ui
   const StatusChange& end = around.end();
   std::vector<std::byte>& bytes = preview.rows.bytes;
   for (Iteration now = preview.rows.first; !is_end(end.status); ++now) {
-    if (preview.rows.count++ == kMostPreviewed) throw_too_long();
+    if (preview.rows.count++ == kMaxPreviewed) throw_too_long();
     // a robot that is where it was asked to be
     controller.step(now, bytes.empty() ? observed : bytes.data() + bytes.size() - layout().block);
     bytes.insert(bytes.end(), controller.desired(), controller.desired() + layout().block);

@@ -76,9 +76,9 @@ void DecisionJournal::decided(const StagedBatch& sent, const StatusChange& chang
 void DecisionJournal::statuses(std::uint32_t lane, JournalStatusRun run) noexcept {
   if (!writer_.is_on()) return;
   while (run.count > 0) {
-    if (statuses_ == kMostStatuses || status_lane_ != lane) flush();
+    if (statuses_ == kMaxStatuses || status_lane_ != lane) flush();
     status_lane_ = lane;
-    const std::uint64_t count = std::min<std::uint64_t>(run.count, kMostStatuses - statuses_);
+    const std::uint64_t count = std::min<std::uint64_t>(run.count, kMaxStatuses - statuses_);
     JournalStatusRun* const last = statuses_ > 0 ? &runs_[runs_used_ - 1] : nullptr;
     if (last != nullptr && run.first_id == last->first_id + last->count && run.word == last->word) {
       last->count += count;

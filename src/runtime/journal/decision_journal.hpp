@@ -43,7 +43,7 @@ struct JournalStatusRun {
 };
 static_assert(sizeof(JournalStatusRun) == 24);
 /// Most statuses of an entry.
-inline constexpr std::uint32_t kMostStatuses = 64;
+inline constexpr std::uint32_t kMaxStatuses = 64;
 
 /// Payload of `burst`.
 struct JournalBurst {
@@ -178,7 +178,7 @@ class DecisionJournal {
   SegmentView view_;
   std::vector<Named> named_;  // one for each lane
   // the next entry of statuses
-  std::array<JournalStatusRun, kMostStatuses> runs_;
+  std::array<JournalStatusRun, kMaxStatuses> runs_;
   std::uint32_t runs_used_ = 0;
   std::uint32_t statuses_ = 0;
   std::uint32_t status_lane_ = 0;

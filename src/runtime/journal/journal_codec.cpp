@@ -122,7 +122,7 @@ std::size_t decode_entry(std::span<const std::byte> bytes, JournalItem& item) {
   if (get.failed()) return 0;
   if (!decode_payload(get, item) || get.left() > 0) return 0;
   pad(item.payload, 8);
-  if (item.payload.size() > kMostJournalPayload) return 0;
+  if (item.payload.size() > kMaxJournalPayload) return 0;
   item.head.words = static_cast<std::uint16_t>((sizeof item.head + item.payload.size()) / 8);
   return length;
 }

@@ -13,7 +13,7 @@ namespace o80 {
 
 namespace {
 
-constexpr std::size_t kMostNames = 4096;  // of owners; more are a damaged journal
+constexpr std::size_t kMaxNames = 4096;  // of owners; more are a damaged journal
 
 /// A plain struct from the payload of an entry; zeros if the payload has another size.
 template <class Payload>
@@ -45,8 +45,8 @@ std::int64_t burst_of(const std::vector<std::byte>& blocks) {
 }  // namespace
 
 JournalDecoder::JournalDecoder(std::shared_ptr<const Description> description,
-                               std::uint64_t most_kept)
-    : description_(std::move(description)), most_kept_(most_kept) {}
+                               std::uint64_t max_kept)
+    : description_(std::move(description)), max_kept_(max_kept) {}
 
 void JournalDecoder::start_at(std::uint64_t number) {
   batches_.clear();
@@ -102,7 +102,7 @@ bool JournalDecoder::next(JournalEntry& entry) {
 /// The statuses in item_. The number in its head is not trusted.
 void JournalDecoder::keep_statuses() {
   statuses_.clear();
-  const std::size_t most = std::min(item_.head.what, kMostStatuses);
+  const std::size_t most = std::min(item_.head.what, kMaxStatuses);
   JournalStatusRun run;
   for (std::size_t at = 0; at + sizeof run <= item_.payload.size(); at += sizeof run) {
     std::memcpy(&run, item_.payload.data() + at, sizeof run);
@@ -140,7 +140,7 @@ void JournalDecoder::keep_blocks() {
   blocks.insert(blocks.end(), item_.payload.begin(), item_.payload.end());
   kept_bytes_ += item_.payload.size();
   // a damaged journal may never decide on its batches
-  while (kept_bytes_ > most_kept_ && !batches_.empty()) drop(batches_.begin());
+  while (kept_bytes_ > max_kept_ && !batches_.empty()) drop(batches_.begin());
 }
 
 void JournalDecoder::drop(Batches::iterator batch) {
@@ -150,7 +150,7 @@ void JournalDecoder::drop(Batches::iterator batch) {
 }
 
 void JournalDecoder::keep_name() {
-  if (names_.size() >= kMostNames) names_.clear();
+  if (names_.size() >= kMaxNames) names_.clear();
   const auto name = unpacked<std::array<char, sizeof(JournalOwner)>>(item_);
   names_[{item_.head.lane, item_.head.id}] = clean_text(name.data(), name.size());
 }

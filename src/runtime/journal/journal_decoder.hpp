@@ -20,9 +20,9 @@ namespace o80 {
 /// invalid is left out.
 class JournalDecoder {
  public:
-  /// `most_kept`: bytes of batches without a decision that are kept; the oldest are dropped.
+  /// `max_kept`: bytes of batches without a decision that are kept; the oldest are dropped.
   explicit JournalDecoder(std::shared_ptr<const Description> description,
-                          std::uint64_t most_kept = ~std::uint64_t{0});
+                          std::uint64_t max_kept = ~std::uint64_t{0});
 
   /// Also returns the entries `at_rest`.
   void show_rests() noexcept { shows_rests_ = true; }
@@ -61,7 +61,7 @@ class JournalDecoder {
   void name(JournalEntry& entry, std::uint64_t owner) const;
 
   std::shared_ptr<const Description> description_;
-  std::uint64_t most_kept_;
+  std::uint64_t max_kept_;
   JournalItem item_;
   std::size_t entries_ = 0;  // in item_: one, or its statuses
   std::vector<OneStatus> statuses_;

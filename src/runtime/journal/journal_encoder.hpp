@@ -134,7 +134,7 @@ void JournalEncoder<Layout>::put_record(LittleEndianWriter& put, Open& open, std
   if (begins) {
     open.left = record.payload_bytes;
     open.in_mark = static_cast<std::uint16_t>(record.kind) == journal_format::kMark &&
-                   open.left > 0 && open.left <= kMostMarkBytes;
+                   open.left > 0 && open.left <= kMaxMarkBytes;
     open.text.clear();
   }
   const std::uint64_t here = std::min<std::uint64_t>(open.left, blocks.size() - head);

@@ -11,7 +11,7 @@ namespace o80 {
 namespace {
 
 constexpr std::uint64_t kProvenanceMagic = 0x6E65'766F'7250'3038;  // "80Proven"
-constexpr std::uint32_t kMostOfAKind = 4096;                       // options or files
+constexpr std::uint32_t kMaxOfAKind = 4096;                       // options or files
 
 /// Visits all parts in the order in which they stand in the bytes.
 template <class ProvenanceLike, class Visit>
@@ -89,7 +89,7 @@ class Reader {
   void operator()(std::vector<Each>& all) {
     std::uint32_t count = 0;
     take(&count, sizeof count);
-    if (count > kMostOfAKind) fail();
+    if (count > kMaxOfAKind) fail();
     for (std::uint32_t i = 0; i < count; ++i) (*this)(all.emplace_back());
   }
   bool is_at_end() const { return bytes_.empty(); }
@@ -112,8 +112,8 @@ class Reader {
 std::vector<std::byte> to_bytes(const Provenance& provenance) {
   for (const std::size_t count :
        {provenance.options.size(), provenance.run_options.size(), provenance.files.size()}) {
-    if (count > kMostOfAKind)
-      throw InvalidArgument("a robot can have at most " + std::to_string(kMostOfAKind) +
+    if (count > kMaxOfAKind)
+      throw InvalidArgument("a robot can have at most " + std::to_string(kMaxOfAKind) +
                             " options, got " + std::to_string(count));
   }
   Writer write;

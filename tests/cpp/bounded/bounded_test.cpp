@@ -18,7 +18,7 @@ namespace {
 constexpr std::uint32_t kLane = 16'384;  // blocks
 constexpr std::uint32_t kBudget = 1024;  // blocks, and statuses told, in an iteration
 /// Of that, and a little for batches, the queues' ends and what runs.
-constexpr std::uint32_t kMost = 2 * kBudget + 64;
+constexpr std::uint32_t kMax = 2 * kBudget + 64;
 
 /// A robot of four joints with two full lanes of work.
 class BoundedTest : public ::testing::Test {
@@ -34,7 +34,7 @@ class BoundedTest : public ::testing::Test {
   void expect_a_share(const std::string& what) {
     const std::uint32_t seen = next_iteration();
     most = std::max(most, seen);
-    EXPECT_LE(seen, kMost) << what;
+    EXPECT_LE(seen, kMax) << what;
   }
   /// Iterates until nothing dropped is left to be told.
   void settle(const std::string& what) {

@@ -182,13 +182,13 @@ void fill(Sender& to, const Mix& mix, std::uint32_t actuators, std::mt19937& ran
   bool sent = true;
   while (sent) {
     const std::uint32_t records = 1 + random() % mix.records;
-    const std::uint32_t most_members = std::min(mix.members, actuators);
-    for (std::uint32_t i = 0; i < records && to.batch.blocks() + 2 + most_members < to.blocks();
+    const std::uint32_t max_members = std::min(mix.members, actuators);
+    for (std::uint32_t i = 0; i < records && to.batch.blocks() + 2 + max_members < to.blocks();
          ++i) {
       const std::uint32_t actuator = random() % actuators;
       const auto group = [&](Mode mode) {
         const bool with_speed = random() % 2 == 0;
-        to.group(actuator, 1 + random() % most_members, actuators, mode,
+        to.group(actuator, 1 + random() % max_members, actuators, mode,
                  with_speed ? Pace::speed : Pace::iterations, 1 + random() % 1000);
       };
       switch (kind(random)) {
@@ -208,7 +208,7 @@ void fill(Sender& to, const Mix& mix, std::uint32_t actuators, std::mt19937& ran
           group(Mode::overwrite);
           break;
         case Mix::group_late:
-          to.group(actuator, 1 + random() % most_members, actuators, Mode::queue, Pace::until, 0);
+          to.group(actuator, 1 + random() % max_members, actuators, Mode::queue, Pace::until, 0);
           break;
         case Mix::purge_all:
           to.batch.purge(kEveryActuator);

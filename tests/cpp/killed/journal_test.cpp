@@ -29,7 +29,7 @@ class KilledJournalTest : public SegmentTest, public ::testing::WithParamInterfa
     const pid_t child = fork();
     if (child == 0) {
       SegmentSpec spec = small_spec();
-      spec.journal_bytes = kLeastJournal;
+      spec.journal_bytes = kMinJournal;
       const OwnedSegment segment = running_segment(spec);
       JournalWriter writer(segment.view());
       crash_plan().label = label;

@@ -61,9 +61,9 @@ void store_as(Kind kind, double value, std::byte* at) {
       std::memcpy(at, &value, sizeof value);
       return;
     case Kind::float32: {
-      constexpr double kMost = std::numeric_limits<float>::max();
+      constexpr double kMax = std::numeric_limits<float>::max();
       const auto narrow = static_cast<float>(
-          std::isfinite(value) ? std::fmin(std::fmax(value, -kMost), kMost) : value);
+          std::isfinite(value) ? std::fmin(std::fmax(value, -kMax), kMax) : value);
       std::memcpy(at, &narrow, sizeof narrow);
       return;
     }

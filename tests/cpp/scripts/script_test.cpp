@@ -14,7 +14,7 @@ namespace o80::test {
 namespace {
 
 constexpr std::uint64_t kScriptsOfEachRun = 1000;
-constexpr std::size_t kMostShown = 6;
+constexpr std::size_t kMaxShown = 6;
 
 std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
   const char* text = std::getenv(name);
@@ -30,7 +30,7 @@ TEST(Script, KeepsEveryPromise) {
     const Script script = random_script(seed);
     const auto failure = play(script);
     if (!failure) continue;
-    if (failures[failure->property]++ > 0 || failures.size() > kMostShown) continue;
+    if (failures[failure->property]++ > 0 || failures.size() > kMaxShown) continue;
     const Script shortest = shrunk(script, [&](const Script& shorter) {
       const auto found = play(shorter);
       return found && found->property == failure->property;

@@ -129,7 +129,7 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
         seam += number.second * number.second / (2.0L * jerk) + std::fabs(number.second);
       }
       // no pace reaches further than this
-      const long double slowest = (span.high - span.low) / kMostIterations;
+      const long double slowest = (span.high - span.low) / kMaxIterations;
       number.fastest = std::max<long double>({step.head.speed * kPeriod, seam, slowest});
     }
   }

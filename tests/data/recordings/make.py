@@ -24,7 +24,7 @@ from o80.recording.recorder import Recorder
 
 HERE = Path(__file__).parent
 SEGMENT, BENCH = "joints", "bench"
-MOST_NUMBERS = 16
+MAX_NUMBERS = 16
 
 # ---------------------------------------------------------------------------- what is played
 
@@ -237,7 +237,7 @@ def journal_facts(value: Any) -> Any:
         return {name: journal_facts(each) for name, each in value.items()}
     if isinstance(value, tuple):
         return [journal_facts(each) for each in value]
-    if isinstance(value, np.ndarray) and value.size > MOST_NUMBERS:
+    if isinstance(value, np.ndarray) and value.size > MAX_NUMBERS:
         return [str(value.dtype), list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 

@@ -171,7 +171,7 @@ class Ledger:
         at = self.actor.at
         batches = self.actor.read("batches", "<I")
         commands = self.actor.read("commands", "<I")
-        return batches + 4 < at["most_batches"] and commands + 16 < at["most_commands"]
+        return batches + 4 < at["max_batches"] and commands + 16 < at["max_commands"]
 
     def command(self, bits: int, actuator: int) -> None:
         actor = self.actor

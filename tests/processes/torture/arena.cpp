@@ -152,7 +152,7 @@ void Arena::work(std::int64_t now) {
   const auto phase = static_cast<Phase>(round_->phase.load());
   if (phase == Phase::act) {
     strike(now);
-    const bool used_up = actors_ + 16 > kMostActors || round_->generations + 4 > kMostGenerations;
+    const bool used_up = actors_ + 16 > kMaxActors || round_->generations + 4 > kMaxGenerations;
     if (now < phase_ends_ && !used_up) return watch_for_hangs(now);
     to_start_.clear();
     return begin_phase(Phase::settle, now);
@@ -206,7 +206,7 @@ void Arena::finish() {
     tally_.orphans += slot.orphans;
   }
   const auto collect = [](const Samples& samples, std::vector<std::int64_t>& into) {
-    const std::uint32_t count = std::min(samples.count.load(), kMostSamples);
+    const std::uint32_t count = std::min(samples.count.load(), kMaxSamples);
     into.insert(into.end(), samples.values.begin(), samples.values.begin() + count);
   };
   collect(round_->noticed, tally_.noticed);

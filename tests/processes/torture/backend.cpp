@@ -56,7 +56,7 @@ class Machine final : private o80::RequestServer {
   }
 
   o80::UntypedBackend& backend() { return backend_; }
-  bool is_full() const { return life_.rows.load() + 16 >= kMostRows; }
+  bool is_full() const { return life_.rows.load() + 16 >= kMaxRows; }
 
   o80::Step step() {
     stepped_at_ = o80::monotonic_now();
@@ -113,7 +113,7 @@ class Machine final : private o80::RequestServer {
     const auto mark = o80::unpack<Mark>(payload.data());
     if (request == 0 && is_refused(mark.id)) return o80::Served::rejected("a seventh one");
     const std::uint32_t place = life_.served;
-    if (place < kMostServed) {
+    if (place < kMaxServed) {
       life_.requests[place] = {mark.id, backend_.iteration()};
       life_.served = place + 1;
     }
@@ -122,7 +122,7 @@ class Machine final : private o80::RequestServer {
   o80::Served resume() noexcept override {
     const bool granted = !chance_.percent(15);
     const std::uint32_t place = life_.resumed;
-    if (place < kMostResumes) {
+    if (place < kMaxResumes) {
       life_.resumes[place] = {backend_.halted().number, backend_.iteration(), granted ? 1U : 0U};
       life_.resumed = place + 1;
     }

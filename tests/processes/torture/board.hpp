@@ -12,15 +12,15 @@
 
 namespace torture {
 
-inline constexpr std::uint32_t kMostActors = 384;  // started in a round
-inline constexpr std::uint32_t kMostGenerations = 96;
-inline constexpr std::uint32_t kMostRows = 1U << 13;  // of a generation
-inline constexpr std::uint32_t kMostServed = 4096;
-inline constexpr std::uint32_t kMostBatches = 1024;  // of an actor
-inline constexpr std::uint32_t kMostCommands = 4096;
-inline constexpr std::uint32_t kMostSamples = 4096;
-inline constexpr std::uint32_t kMostHalts = 512;    // asked for by an actor
-inline constexpr std::uint32_t kMostResumes = 512;  // of an actor, of a generation
+inline constexpr std::uint32_t kMaxActors = 384;  // started in a round
+inline constexpr std::uint32_t kMaxGenerations = 96;
+inline constexpr std::uint32_t kMaxRows = 1U << 13;  // of a generation
+inline constexpr std::uint32_t kMaxServed = 4096;
+inline constexpr std::uint32_t kMaxBatches = 1024;  // of an actor
+inline constexpr std::uint32_t kMaxCommands = 4096;
+inline constexpr std::uint32_t kMaxSamples = 4096;
+inline constexpr std::uint32_t kMaxHalts = 512;    // asked for by an actor
+inline constexpr std::uint32_t kMaxResumes = 512;  // of an actor, of a generation
 
 enum class Phase : std::uint32_t { act, settle, audit, end };
 
@@ -112,10 +112,10 @@ struct Generation {
   std::atomic<std::int64_t> steps;  // the iteration whose step was begun last
   std::atomic<std::uint32_t> served;
   std::array<std::atomic<std::uint32_t>, 16> lane_owners;  // actor + 1
-  std::array<ServedRequest, kMostServed> requests;
+  std::array<ServedRequest, kMaxServed> requests;
   std::atomic<std::uint32_t> resumed;
-  std::array<ServedResume, kMostResumes> resumes;
-  std::array<JournalRow, kMostRows> journal;
+  std::array<ServedResume, kMaxResumes> resumes;
+  std::array<JournalRow, kMaxRows> journal;
 };
 
 inline constexpr std::uint32_t kNoLane = 0xFFFFFFFF;
@@ -209,14 +209,14 @@ struct Slot {
   std::atomic<std::uint64_t> orphans;
   std::atomic<std::uint32_t> batches;
   std::atomic<std::uint32_t> commands;
-  std::array<SentBatch, kMostBatches> sent_batches;
-  std::array<SentCommand, kMostCommands> sent_commands;
+  std::array<SentBatch, kMaxBatches> sent_batches;
+  std::array<SentCommand, kMaxCommands> sent_commands;
   std::atomic<std::uint32_t> halts;
   std::atomic<std::uint32_t> resumes;
   std::atomic<std::uint32_t> bursts_halted;
   std::atomic<std::uint32_t> halted_in_control;
-  std::array<AskedHalt, kMostHalts> asked_halts;
-  std::array<AskedResume, kMostResumes> asked_resumes;
+  std::array<AskedHalt, kMaxHalts> asked_halts;
+  std::array<AskedResume, kMaxResumes> asked_resumes;
 
   void stops(std::int64_t now) { stopped.fetch_sub(now); }
   void goes_on(std::int64_t now) { stopped.fetch_add(now); }
@@ -231,10 +231,10 @@ struct Slot {
 /// Times [ns] that many processes add to.
 struct Samples {
   std::atomic<std::uint32_t> count;
-  std::array<std::int64_t, kMostSamples> values;
+  std::array<std::int64_t, kMaxSamples> values;
   void add(std::int64_t value) {
     const std::uint32_t place = count.fetch_add(1);
-    if (place < kMostSamples) values[place] = value;
+    if (place < kMaxSamples) values[place] = value;
   }
 };
 
@@ -246,8 +246,8 @@ struct Round {
   Samples noticed;                   // kill => a waiting frontend raises
   Samples recovered;  // kill => first row of the next backend seen by another process
   std::atomic<std::uint32_t> generations;
-  std::array<Generation, kMostGenerations> lives;
-  std::array<Slot, kMostActors> slots;
+  std::array<Generation, kMaxGenerations> lives;
+  std::array<Slot, kMaxActors> slots;
 };
 
 }  // namespace torture

@@ -21,7 +21,7 @@ class Commander {
  public:
   explicit Commander(Actor& actor)
       : actor_(actor),
-        most_open_(static_cast<std::size_t>(actor.chance.between(1, 60))),
+        max_open_(static_cast<std::size_t>(actor.chance.between(1, 60))),
         orphans_(actor.chance.percent(15)),
         keen_(actor.chance.percent(30)) {}
 
@@ -35,7 +35,7 @@ class Commander {
  private:
   void command(Sender& sender) {
     call_began_ = o80::monotonic_now();
-    if (sender.open_commands() < most_open_) {
+    if (sender.open_commands() < max_open_) {
       sender.add_some();
       const bool sent = sender.pulse(when(sender));
       // the more so when a lane is full
@@ -45,7 +45,7 @@ class Commander {
     if (orphans_ && actor_.chance.below(50) == 0) leave_an_orphan(sender);
     if (sender.open() > 0 && actor_.chance.percent(40)) wait(sender);
     sender.settle();
-    if (sender.open_commands() >= most_open_ && sender.open() > 0) wait(sender);
+    if (sender.open_commands() >= max_open_ && sender.open() > 0) wait(sender);
     if (!keen_) actor_.pause(actor_.chance.between(0, 3) * kMillisecond);
   }
 
@@ -102,7 +102,7 @@ class Commander {
   }
 
   Actor& actor_;
-  std::size_t most_open_;
+  std::size_t max_open_;
   bool orphans_;
   bool keen_;
   std::int64_t call_began_ = 0;

@@ -21,13 +21,13 @@ class Halter {
       if (!frontend) continue;
       Generation& life = actor_.life_of(*frontend);
       try {
-        while (actor_.acting() && actor_.slot.halts + 8 < kMostHalts) halt_now_and_then(*frontend);
+        while (actor_.acting() && actor_.slot.halts + 8 < kMaxHalts) halt_now_and_then(*frontend);
       } catch (const o80::BackendGone& error) {
         actor_.judge_gone(life, error, call_began_);
       }
       frontend->close();
       actor_.slot.commanding = 0;
-      if (actor_.slot.halts + 8 >= kMostHalts) return;
+      if (actor_.slot.halts + 8 >= kMaxHalts) return;
     }
   }
 

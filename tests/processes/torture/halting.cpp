@@ -8,7 +8,7 @@ namespace {
 
 AskedHalt* note_halt(Actor& actor, std::uint32_t generation) {
   const std::uint32_t place = actor.slot.halts;
-  if (place >= kMostHalts) return nullptr;
+  if (place >= kMaxHalts) return nullptr;
   AskedHalt& entry = actor.slot.asked_halts[place];
   entry.generation = generation;
   entry.began_at = o80::monotonic_now();
@@ -60,7 +60,7 @@ void halt_by_name(Actor& actor) {
 void resume(Actor& actor, o80::UntypedFrontend& frontend, std::int64_t& call_began) {
   const auto halt = frontend.halted();
   const std::uint32_t place = actor.slot.resumes;
-  if (!halt || place >= kMostResumes) return;
+  if (!halt || place >= kMaxResumes) return;
   AskedResume& entry = actor.slot.asked_resumes[place];
   entry.generation = number_of(actor, frontend);
   entry.number = halt->number;

@@ -28,7 +28,7 @@ struct Done {
 class Deeds {
  public:
   explicit Deeds(const Generation& life) {
-    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMostRows);
+    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMaxRows);
     for (std::int64_t k = 0; k < rows; ++k) {
       const JournalRow& row = life.journal[static_cast<std::size_t>(k)];
       for (std::uint32_t i = 0; i < kActuators; ++i)
@@ -236,7 +236,7 @@ class Judge {
   static std::string around(const Generation& life, const Done& done) {
     std::string text;
     const std::int64_t last =
-        std::min<std::int64_t>({life.rows - 1, kMostRows - 1, done.iteration + 2});
+        std::min<std::int64_t>({life.rows - 1, kMaxRows - 1, done.iteration + 2});
     for (std::int64_t k = std::max<std::int64_t>(0, done.iteration - 4); k <= last; ++k) {
       const JournalRow& row = life.journal[static_cast<std::size_t>(k)];
       char line[80];
@@ -359,7 +359,7 @@ class Judge {
     const bool killed = slot.doomed_at != 0 && slot.commanding != 0;
     if (killed && sent.attachment > slot.closed) seen_at = slot.doomed_at;
     const Generation& life = round_.lives[sent.generation];
-    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMostRows);
+    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMaxRows);
     std::int64_t last = -1;
     while (last + 1 < rows && life.journal[static_cast<std::size_t>(last + 1)].at < seen_at) ++last;
     return last;
@@ -411,7 +411,7 @@ class Judge {
 
   /// Whatever quintics overshoot, no desired state does.
   void judge_limits(const Generation& life) {
-    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMostRows);
+    const std::int64_t rows = std::min<std::int64_t>(life.rows, kMaxRows);
     for (std::int64_t k = 0; k < rows; ++k)
       for (const double desired : life.journal[static_cast<std::size_t>(k)].desired)
         if (!(desired >= kLowest && desired <= kHighest))

@@ -28,8 +28,8 @@ class HaltedLife {
       : round_(round),
         life_(life),
         number_(static_cast<std::uint32_t>(&life - round.lives.data())),
-        rows_(std::min<std::int64_t>(life.rows, kMostRows)),
-        resumes_(std::min(life.resumed.load(), kMostResumes)) {}
+        rows_(std::min<std::int64_t>(life.rows, kMaxRows)),
+        resumes_(std::min(life.resumed.load(), kMaxResumes)) {}
 
   void judge(std::vector<Failure>& failures) {
     failures_ = &failures;

@@ -69,8 +69,8 @@ void Nursery::order(const Round& round, const Slot& slot, const std::string& dir
   number("command_stride", sizeof(SentCommand));
   number("told", offsetof(SentCommand, told));
   number("told_at", offsetof(SentCommand, told_at));
-  number("most_batches", kMostBatches);
-  number("most_commands", kMostCommands);
+  number("max_batches", kMaxBatches);
+  number("max_commands", kMaxCommands);
   const std::string line =
       "{\"board\": \"" + directory + "/board\", \"directory\": \"" + directory +
       "/segments\", \"segment\": \"" + segment_name(slot.segment) + "\", \"role\": \"" +

@@ -27,7 +27,7 @@ Sender::Sender(Actor& actor, o80::UntypedFrontend frontend)
 Sender::~Sender() = default;
 
 bool Sender::has_room() const {
-  return actor_.slot.batches + 4 < kMostBatches && actor_.slot.commands + 64 < kMostCommands;
+  return actor_.slot.batches + 4 < kMaxBatches && actor_.slot.commands + 64 < kMaxCommands;
 }
 
 // ------------------------------------------------------------------------------ adding

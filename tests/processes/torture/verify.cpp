@@ -15,7 +15,7 @@ Sensors Verifier::verify(const std::byte* row, o80::Iteration k) {
                 static_cast<long>(k), what);
   };
   if (k >= 0 && head.iteration != k) wrong("it is another one");
-  if (head.iteration < 0 || head.iteration >= kMostRows) wrong("there can be no such row");
+  if (head.iteration < 0 || head.iteration >= kMaxRows) wrong("there can be no such row");
   if (found.generation != number) wrong("it is of another backend");
   const Sensors expected =
       sensors_of(number, head.iteration, found.chain, o80::unpack<States>(row + layout_.desired),

@@ -21,7 +21,7 @@
 namespace o80::fuzz {
 namespace {
 
-constexpr std::uint64_t kRing = kLeastJournal;
+constexpr std::uint64_t kRing = kMinJournal;
 
 /// A mapped segment file in private memory.
 class File {
@@ -95,7 +95,7 @@ void decode(const std::shared_ptr<const Description>& description,
     } catch (const InvalidArgument&) {
     }
     // the shortest entry of statuses has one run; in version 0 it has 56 bytes, later more
-    if (entries.size() > recorded.size() * kMostStatuses / 48) std::abort();
+    if (entries.size() > recorded.size() * kMaxStatuses / 48) std::abort();
   }
 }
 

@@ -32,7 +32,7 @@
 namespace o80::fuzz {
 namespace {
 
-constexpr std::size_t kMostBytes = 1U << 20;  // of a file
+constexpr std::size_t kMaxBytes = 1U << 20;  // of a file
 
 /// The segment file and the commanders' file.
 using Files = std::array<std::vector<char>, 2>;
@@ -106,7 +106,7 @@ Files lie(const Original& original, Bytes& bytes) {
     std::vector<char>& file = files[which];
     switch (what & 7) {
       case 0:
-        file.resize(std::min<std::size_t>(bytes.number<std::uint32_t>(), kMostBytes));
+        file.resize(std::min<std::size_t>(bytes.number<std::uint32_t>(), kMaxBytes));
         break;
       case 1:
         file.resize(begin + bytes.below(16));

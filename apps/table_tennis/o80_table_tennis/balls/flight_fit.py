@@ -46,7 +46,7 @@ SLOPE_SHARE = 1e-3
 """Change of an unknown for a difference, as a share of its scale."""
 CLOSE_ENOUGH = 1e-3
 """The search ends when no unknown moves by more than this share of its scale."""
-MOST_ROUNDS = 12
+MAX_ROUNDS = 12
 SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.1 * AERODYNAMICS.drag] + [0.1] * 3)
 """Typical sizes of the ten unknowns, for differences and damping."""
 BELIEFS = np.array([0.0] * 6 + [1 / (DRAG_BELIEF * AERODYNAMICS.drag)] + [1 / TURN_BELIEF] * 3)
@@ -242,7 +242,7 @@ def fit_segment(
     noise[len(stamps) :] = ANCHOR_NOISE
     centre = np.concatenate([np.zeros(6), [AERODYNAMICS.drag], expected_turn])
 
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         flown, slopes = sloped(unknowns, times)
         misses = points - flown
 

@@ -38,7 +38,7 @@ CLOSE = 0.0025
 """Rows this near to a flight, on average, leave no doubt about their frames [m]."""
 CLEAR_GAIN = 0.1
 """A frame is added or taken away if the squared distances fall by more than this share."""
-MOST_ROUNDS = 30
+MAX_ROUNDS = 30
 NEAR_BOUNCE = 3
 """Rows next to a bounce whose recorded velocities are not used."""
 LONGEST_GAP = 8
@@ -107,7 +107,7 @@ def _settle(times: FloatArray, positions: FloatArray, period: float) -> _Count:
     """Frames near `times` (n,) [s] that agree with the flight fitted to them."""
     frames = np.zeros(0, dtype=np.int64)
     flight: Flight | None = None
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         flight = fit_segment(times, positions, start=flight)
         # delay of each row on the flight relative to its stamp => its frame
         flown, speed = flight.at(times)

@@ -29,7 +29,7 @@ SPIN_ERROR = 30.0
 """Expected error of each number of the spin before the first bounce [rad/s]."""
 SHARE_ERROR = 0.3
 """Expected error of a spin after a bounce, as a share of it; its axis is that of the law."""
-MOST_ERRORS = 2.5
+MAX_ERRORS = 2.5
 """A spin is at most so many expected errors away: where lift saturates, flights say little."""
 SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.3] * 3)
 """Typical changes of position [m], velocity [m/s] and spin [expected errors], for differences."""
@@ -37,7 +37,7 @@ SLOPE_SHARE = 1e-3
 """Change of an unknown for a difference, as a share of its scale."""
 CLOSE_ENOUGH = 1e-4
 """The search ends when no unknown moves by more than this share of its scale."""
-MOST_ROUNDS = 12
+MAX_ROUNDS = 12
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,7 +150,7 @@ def _fitted(
         """(9, B)"""
         return np.concatenate([tried[:6], start.spin[:, None] + spin_errors.T @ tried[6:]])
 
-    for _ in range(MOST_ROUNDS):
+    for _ in range(MAX_ROUNDS):
         # the flight as it is and others with one unknown changed
         change = SLOPE_SHARE * scales
         tried = unknowns[:, None] + np.column_stack([np.zeros(count), np.diag(change)])
@@ -171,7 +171,7 @@ def _fitted(
         step = np.linalg.lstsq(matrix * scales, right, rcond=1e-10)[0]
         step[6:] = np.clip(step[6:], -1.0, 1.0)  # the slopes of a spin hold nearby only
         unknowns = unknowns + scales * step
-        unknowns[6:] = np.clip(unknowns[6:], -MOST_ERRORS, MOST_ERRORS)
+        unknowns[6:] = np.clip(unknowns[6:], -MAX_ERRORS, MAX_ERRORS)
         if np.abs(step).max() < CLOSE_ENOUGH:
             break
     found = states(unknowns[:, None])[:, 0]

@@ -21,7 +21,7 @@ DISTRIBUTIONS: dict[str, LaunchDistribution] = {
 """By the names that `TaskSettings.balls` takes."""
 NUMBERS = 2**31
 """How many shots there are of a distribution and a seed."""
-MOST_DRAWS = 1000
+MAX_DRAWS = 1000
 
 
 def drawn_launch(rng: np.random.Generator, distribution: LaunchDistribution = NARROW) -> Launch:
@@ -29,12 +29,12 @@ def drawn_launch(rng: np.random.Generator, distribution: LaunchDistribution = NA
 
     Raises ValueError if the distribution hardly has any.
     """
-    for _ in range(MOST_DRAWS):
+    for _ in range(MAX_DRAWS):
         launch = distribution.draw(rng)
         if (why_not := verdict(launch)) is Verdict.PLAYABLE:
             return launch
     raise ValueError(
-        f"none of {MOST_DRAWS} shots of {distribution} can be played (the last one: "
+        f"none of {MAX_DRAWS} shots of {distribution} can be played (the last one: "
         f"{why_not.value}); choose other means"
     )
 

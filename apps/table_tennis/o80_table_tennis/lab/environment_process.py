@@ -181,7 +181,7 @@ class EnvironmentProcess:
     def _idle(self, environment: TableTennisEnvironment) -> None:
         """A step in which nothing is asked."""
         rig = environment.rig
-        if rig.lateness > self._settings.most_late:
+        if rig.lateness > self._settings.max_late:
             rig.begin()
         rig.step_arm()
         rig.step_twins()

@@ -60,7 +60,7 @@ class LabSettings:
     folder: Path = Path("build/lab")
     fifo: bool = True
     """Ask for real-time scheduling of the arm and of the motion capture."""
-    most_late: int = 20
+    max_late: int = 20
     """Rows of the arm by which the environment may lag behind between two balls."""
     parts: tuple[str, ...] = NINE
     """Parts that are started."""

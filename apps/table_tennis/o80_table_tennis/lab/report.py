@@ -36,7 +36,7 @@ REPORT = "report.json"
 BURSTING = "bursting"
 """Its entry about the lab in lock-step, see `comparison`."""
 
-MOST_MISSED = {ARM: 0.1} | dict.fromkeys((CAMERAS, TRACKER, MOTION_CAPTURE, ENVIRONMENT), 1.0)
+MAX_MISSED = {ARM: 0.1} | dict.fromkeys((CAMERAS, TRACKER, MOTION_CAPTURE, ENVIRONMENT), 1.0)
 """Periods that may be missed on a quiet machine [%]."""
 SETTLING = 1.0
 """Left out at the beginning, while processes still start [s]."""
@@ -256,7 +256,7 @@ def _launcher(rows: _Rows) -> dict[str, int]:
 def _wanted(processes: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     """Targets of a quiet machine, and whether this run has reached them."""
     wanted: dict[str, Any] = {}
-    for name, most in MOST_MISSED.items():
+    for name, most in MAX_MISSED.items():
         if name in processes:
             missed = processes[name]["missed_percent"]
             wanted[f"{name}: missed periods [%]"] = {

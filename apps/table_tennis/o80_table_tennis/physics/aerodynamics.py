@@ -78,10 +78,10 @@ class Aerodynamics:
         """The spins (T, 3) [rad/s] with which a ball at `speeds` (T,) turns by `turn` (3,) [1/s].
 
         A turn near the largest that saturation allows says little about the spin: it gives at most
-        `MOST_SATURATED` times the spin that it would have without saturation.
+        `MAX_SATURATED` times the spin that it would have without saturation.
         """
         lost = self.lift_saturation * self.radius * float(np.linalg.norm(turn)) / self.magnus
-        share = np.maximum(1.0 - lost / np.maximum(speeds, 1e-9), 1.0 / MOST_SATURATED)
+        share = np.maximum(1.0 - lost / np.maximum(speeds, 1e-9), 1.0 / MAX_SATURATED)
         spins: NDArray[np.float64] = turn / (self.magnus * share[:, None])
         return spins
 
@@ -97,5 +97,5 @@ def _air(numbers: Aerodynamics) -> Air:
     )
 
 
-MOST_SATURATED = 10.0
+MAX_SATURATED = 10.0
 AERODYNAMICS = Aerodynamics()

@@ -15,7 +15,7 @@ from .outcome import beyond_net, on_top
 IntArray = NDArray[np.int64]
 
 
-MOST_STEPS = 300
+MAX_STEPS = 300
 
 
 class End(IntEnum):
@@ -77,7 +77,7 @@ class EndRule:
 
     passed_y: float = -0.8
     """A ball nearer to the wall behind the arm than this has passed it [m]."""
-    most_steps: int = MOST_STEPS
+    max_steps: int = MAX_STEPS
     """Steps of the environment after which an episode is truncated."""
 
     def ended(self, record: BallRecord, y: Numbers, steps: int | IntArray) -> Any:
@@ -89,14 +89,14 @@ class EndRule:
             record.landed
             | record.touched_net
             | record.touched_floor
-            | (steps >= self.most_steps)
+            | (steps >= self.max_steps)
             | (y < self.passed_y)
         )
 
     def judge(self, record: BallRecord, y: Numbers, steps: int | IntArray) -> IntArray:
         """(...) the first reason that holds, as numbers of `End`."""
         # the first reasons last: they replace the others
-        ends = np.where(steps >= self.most_steps, _OUT_OF_STEPS, _RUNNING)
+        ends = np.where(steps >= self.max_steps, _OUT_OF_STEPS, _RUNNING)
         ends = np.where(y < self.passed_y, _PASSED, ends)
         ends = np.where(record.touched_floor, _FLOOR, ends)
         if np.count_nonzero(record.landed):

@@ -17,9 +17,9 @@ FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int64]
 
 EVERY = slice(None)
-LEAST_POSITION_NOISE = 0.0005
+MIN_POSITION_NOISE = 0.0005
 """With less noise the filter still expects so much: the laws are not quite exact [m]."""
-LEAST_VELOCITY_NOISE = 0.02
+MIN_VELOCITY_NOISE = 0.02
 """[m/s]"""
 
 
@@ -27,8 +27,8 @@ def filter_settings(noise: NoiseSettings, interval: float) -> FilterSettings:
     """Filter settings for a ball that is seen with this noise, every `interval` [s]."""
     return FilterSettings(
         step=interval,
-        position=max(noise.ball_position, LEAST_POSITION_NOISE),
-        velocity=max(noise.ball_velocity, LEAST_VELOCITY_NOISE),
+        position=max(noise.ball_position, MIN_POSITION_NOISE),
+        velocity=max(noise.ball_velocity, MIN_VELOCITY_NOISE),
     )
 
 

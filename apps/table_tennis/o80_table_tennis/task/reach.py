@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..world.arm import JOINT_LIMIT, JOINTS, PLAYING_POSTURE, racket_pose
-from .end import MOST_STEPS, End
+from .end import MAX_STEPS, End
 from .observations import JOINT_POSITION_BOUND, JOINT_VELOCITY_BOUND
 from .state import State
 
@@ -31,7 +31,7 @@ class ReachTask:
     """It counts as moving if a joint is faster than this [rad/s]."""
     spread: float = 0.4
     """Largest difference of a drawn posture from the start, on each joint [rad]."""
-    most_steps: int = MOST_STEPS
+    max_steps: int = MAX_STEPS
     """Steps of the environment after which an episode is truncated."""
     joint_velocity: float = JOINT_VELOCITY_BOUND
     """Bound of the observation, either way [rad/s]."""
@@ -75,7 +75,7 @@ class ReachTask:
         """(...) the goal is reached, or the steps are over."""
         slow = np.abs(state.joint_velocities).max(axis=-1) <= self.resting_speed
         reached = (self._distance(state) <= self.tolerance) & slow
-        over = np.where(np.asarray(state.steps) >= self.most_steps, End.OUT_OF_STEPS, End.RUNNING)
+        over = np.where(np.asarray(state.steps) >= self.max_steps, End.OUT_OF_STEPS, End.RUNNING)
         return np.where(reached, End.GOAL, over).astype(np.int64)
 
     def reward(self, state: State) -> FloatArray:

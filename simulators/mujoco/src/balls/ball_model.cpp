@@ -29,8 +29,8 @@ void check_numbers(const BallOptions& options) {
     if (std::isfinite(number)) continue;
     throw DriverError("spin must be three finite numbers, got " + std::to_string(number));
   }
-  if (options.extra_balls > kMostExtraBalls) {
-    throw DriverError("extra_balls must be at most " + std::to_string(kMostExtraBalls) + ", got " +
+  if (options.extra_balls > kMaxExtraBalls) {
+    throw DriverError("extra_balls must be at most " + std::to_string(kMaxExtraBalls) + ", got " +
                       std::to_string(options.extra_balls));
   }
 }

@@ -33,7 +33,7 @@ struct SurfacePlace {
   bool watched;
 };
 
-inline constexpr std::uint32_t kMostExtraBalls = 1000;
+inline constexpr std::uint32_t kMaxExtraBalls = 1000;
 
 /// True if the options name balls. Throws DriverError if they name surfaces only, or if a number is
 /// out of its range.

@@ -35,9 +35,9 @@ Served fly_out(Balls* balls, const FlyOut& request) noexcept {
   if (request.ball < 1 || request.ball > balls->size()) {
     return rejected("ball must be from 1 to %zu, got %u", balls->size(), request.ball);
   }
-  if (request.every < 1 || request.most < 1 || request.most > kMostFlownOut) {
+  if (request.every < 1 || request.most < 1 || request.most > kMaxFlownOut) {
     return rejected("every must be at least 1, got %u, and most from 1 to %u, got %u",
-                    request.every, kMostFlownOut, request.most);
+                    request.every, kMaxFlownOut, request.most);
   }
   if (balls->imposed(request.ball - 1)) {
     return rejected("a command moved ball %u in the last iteration: wait for its end, or purge it",

@@ -9,7 +9,7 @@
 
 namespace o80::mujoco {
 
-inline constexpr int kMostBounces = 8;  // in one step
+inline constexpr int kMaxBounces = 8;  // in one step
 
 /// Flies a ball from the share `begin` of a step [s] to its end, with all bounces on the way.
 /// `bounced_off(contact, before, after)` is told of each bounce, `passed(surface, gap)` of the
@@ -17,7 +17,7 @@ inline constexpr int kMostBounces = 8;  // in one step
 template <class BouncedOff, class Passed>
 Ball flown_among(std::span<const Surface> surfaces, Ball ball, const Air& air, const Sphere& sphere,
                  double step, double begin, BouncedOff&& bounced_off, Passed&& passed) noexcept {
-  for (int n = 0; n < kMostBounces && begin < 1; ++n) {
+  for (int n = 0; n < kMaxBounces && begin < 1; ++n) {
     const Ball end = flown(ball, air, (1 - begin) * step);
     const Path path{ball.position, end.position, ball.velocity, end.velocity, begin};
     const std::optional<Contact> contact = first_contact(surfaces, path, sphere.radius, passed);

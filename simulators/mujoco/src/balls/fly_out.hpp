@@ -26,7 +26,7 @@ O80_DESCRIBE(FlyOut, (ball, "which, counted from 1; no command may move it"),
              (low, "the ball is outside below one of these [m]"),
              (high, "the ball is outside above one of these [m]"));
 
-inline constexpr std::uint32_t kMostFlownOut = 100'000;  // iterations, so that the work is bounded
+inline constexpr std::uint32_t kMaxFlownOut = 100'000;  // iterations, so that the work is bounded
 
 /// True outside the box of a request.
 inline bool outside(const FlyOut& request, const Vector& position) noexcept {

@@ -41,7 +41,7 @@ struct Swept {
 
 inline constexpr double kTouching = 1e-9;     // a smaller gap is a contact [m]
 inline constexpr double kFinestStep = 1e-4;   // of a sweep: a graze within it is 60 nm deep [m]
-inline constexpr int kMostSweepSteps = 4096;  // a path of 40 cm within kFinestStep of a surface
+inline constexpr int kMaxSweepSteps = 4096;  // a path of 40 cm within kFinestStep of a surface
 
 /// One ball that passes one surface in a step.
 class Sweep {
@@ -99,7 +99,7 @@ inline Swept Sweep::run() const noexcept {
   };
   double share = path_.begin;
   double open = -1;  // the last share with an open gap
-  for (int step = 0; step < kMostSweepSteps; ++step) {
+  for (int step = 0; step < kMaxSweepSteps; ++step) {
     Near here = look(share);
     const double now = gap(here);
     if (now > kTouching) {

@@ -13,7 +13,7 @@ constexpr double kNear = 0.1;         // a ball that rises below this height has
 constexpr double kUnexplained = 2.0;  // a velocity farther off begins a new flight [m/s]
 constexpr double kSlowest = 0.5;      // that comes nearer and has a crossing [m/s]
 constexpr double kLongest = 2.0;      // flight that is predicted, however wrong an estimate is [s]
-constexpr double kMostLate = 0.3;     // correction of a predicted time, and longest way back [s]
+constexpr double kMaxLate = 0.3;     // correction of a predicted time, and longest way back [s]
 constexpr int kPieces = 4;            // in which a long flight is computed
 constexpr double kTiny = 1e-9;
 
@@ -120,7 +120,7 @@ Ball BallFilter::after_touch(const Ball& ball, double& time) const noexcept {
   const double above = touching.position.z - height;
   const double speed = std::max(-touching.velocity.z, kSlowest);
   const double root = std::sqrt(std::max(speed * speed - 2 * air.gravity.z * above, 0.0));
-  const double late = std::clamp(2 * above / (speed + root), -kMostLate, kMostLate);
+  const double late = std::clamp(2 * above / (speed + root), -kMaxLate, kMaxLate);
   touching = flown(touching, air, late);
   touching.position.z = height;
   time += late;
@@ -139,10 +139,10 @@ Crossing BallFilter::crossing(std::size_t number, double plane) const noexcept {
   const double speed = std::max(-ball.velocity.y, kSlowest);
   const double slowing = acceleration(air, ball.velocity, ball.spin).y;
   const double root = std::sqrt(std::max(speed * speed - 2 * slowing * way, 0.0));
-  const double time = std::clamp(2 * way / (speed + root), -kMostLate, kLongest);
+  const double time = std::clamp(2 * way / (speed + root), -kMaxLate, kLongest);
   Ball there = flown_far(ball, air, time);
   const double late = std::clamp((there.position.y - plane) / std::max(-there.velocity.y, kSlowest),
-                                 -kMostLate, kMostLate);
+                                 -kMaxLate, kMaxLate);
   there = flown(there, air, late);
   const Vector& velocity = there.velocity;
   const Crossing found{there.position.x, there.position.z, velocity.x,

@@ -17,7 +17,7 @@ struct Node {
   bool bounced = false;  // the ball has just left the platform
 };
 
-inline constexpr std::size_t kMostNodes = 1'000'000;
+inline constexpr std::size_t kMaxNodes = 1'000'000;
 inline constexpr double kShortestStep = 1e-9;  // a shorter rest of a flight is left out [s]
 inline constexpr double kShortestRise = 0.05;  // [s^2/m]: a rising ball is above where it started
                                                // for at least this times its velocity
@@ -40,7 +40,7 @@ inline std::optional<double> touch_within(const Ball& ball, const Air& air,
 }
 
 /// The flight of a ball in steps [s], with its bounces if there is a platform; the last node is at
-/// `duration` [s]. Throws std::length_error for more than `kMostNodes`.
+/// `duration` [s]. Throws std::length_error for more than `kMaxNodes`.
 inline std::vector<Node> predicted_flight(Ball ball, const Air& air, const Platform* platform,
                                           double duration, double step) {
   std::vector<Node> nodes{{0, ball, false}};
@@ -51,7 +51,7 @@ inline std::vector<Node> predicted_flight(Ball ball, const Air& air, const Platf
     ball = flown(ball, air, touch.value_or(longest));
     now += touch.value_or(longest);
     nodes.push_back({now, ball, false});
-    if (nodes.size() >= kMostNodes) {
+    if (nodes.size() >= kMaxNodes) {
       throw std::length_error("the flight has more than a million steps and bounces");
     }
     if (!touch) continue;

@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::size_t kNumbers = 9;       // of a ball: position, velocity, spin
 constexpr std::size_t kNodeNumbers = 11;  // time, ball, bounced
-constexpr double kMostSteps = 1e6;        // of one call
+constexpr double kMaxSteps = 1e6;        // of one call
 
 using Doubles = nb::ndarray<nb::numpy, double>;
 template <int Columns>
@@ -111,7 +111,7 @@ Doubles accelerations(const Rows<kNumbers>& balls, const Air& air) {
 
 Doubles path(const Rows<kNumbers>& balls, double step, std::int64_t count, const Air& air,
              const std::optional<Numbers>& drags) {
-  if (count < 0 || static_cast<double>(count) > kMostSteps) {
+  if (count < 0 || static_cast<double>(count) > kMaxSteps) {
     throw nb::value_error("count must be from 0 to 1000000");
   }
   finite(step, "step");
@@ -135,7 +135,7 @@ Doubles path(const Rows<kNumbers>& balls, double step, std::int64_t count, const
 Doubles predicted(const Numbers& ball, const Air& air, const Platform* platform, double duration,
                   double step) {
   if (ball.shape(0) != kNumbers) throw nb::value_error("a ball is 9 numbers");
-  if (!(step > 0) || !(duration >= 0) || duration > kMostSteps * step) {
+  if (!(step > 0) || !(duration >= 0) || duration > kMaxSteps * step) {
     throw nb::value_error("step and duration must be positive, with at most 1000000 steps");
   }
   const std::vector<Node> nodes =

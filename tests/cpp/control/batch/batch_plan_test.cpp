@@ -81,8 +81,8 @@ TEST(BatchPlan, ABatchIsTakenAsIfItsRecordsWereTakenOneAfterTheOther) {
         record(whole);
         record(single);
         ids.push_back(record_id(single.pulse(lane), 0));
-        if (whole.batch.requests() == kMostRequests ||
-            whole.batch.control_orders() == kMostControlOrders) {
+        if (whole.batch.requests() == kMaxRequests ||
+            whole.batch.control_orders() == kMaxControlOrders) {
           break;
         }
       }
@@ -139,14 +139,14 @@ TEST(BatchPlan, TakingThousandsOfOverwritesAndPurgesCostsNoMoreThanTheirActuator
 
 TEST(BatchPlan, RejectsTheRequestsAndControlOrdersBeyondTheMost) {
   Rig rig(robot());
-  for (std::uint32_t i = 0; i < kMostRequests + 2; ++i) rig.batch.request(0, {});
-  for (std::uint32_t i = 0; i < kMostControlOrders + 2; ++i) rig.batch.release_control();
+  for (std::uint32_t i = 0; i < kMaxRequests + 2; ++i) rig.batch.request(0, {});
+  for (std::uint32_t i = 0; i < kMaxControlOrders + 2; ++i) rig.batch.release_control();
   const CommandId batch = rig.pulse();
   rig.step();
-  EXPECT_EQ(rig.requests.size(), kMostRequests);
-  EXPECT_EQ(rig.controls.size(), kMostControlOrders);
-  EXPECT_EQ(rig.witness.status(record_id(batch, kMostRequests - 1)), Status::completed);
-  EXPECT_EQ(rig.witness.last(record_id(batch, kMostRequests)).reason, Reason::invalid);
+  EXPECT_EQ(rig.requests.size(), kMaxRequests);
+  EXPECT_EQ(rig.controls.size(), kMaxControlOrders);
+  EXPECT_EQ(rig.witness.status(record_id(batch, kMaxRequests - 1)), Status::completed);
+  EXPECT_EQ(rig.witness.last(record_id(batch, kMaxRequests)).reason, Reason::invalid);
   EXPECT_TRUE(rig.all_blocks_back());
 }
 
@@ -188,14 +188,14 @@ TEST(BatchPlan, AMarkIsCompletedAtOnceWhateverItsLength) {
   rig.add(0, over(3), {1.0});
   const CommandId moving = rig.pulse();
   for (const std::size_t length :
-       {std::size_t{1}, std::size_t{16}, std::size_t{17}, std::size_t{kMostMarkBytes}}) {
+       {std::size_t{1}, std::size_t{16}, std::size_t{17}, std::size_t{kMaxMarkBytes}}) {
     rig.batch.mark(std::string(length, 'x'));
     const CommandId batch = rig.pulse();
     rig.step();
     EXPECT_EQ(rig.witness.status(record_id(batch, 0)), Status::completed) << length;
   }
   EXPECT_THROW(rig.batch.mark(""), InvalidArgument);
-  EXPECT_THROW(rig.batch.mark(std::string(kMostMarkBytes + 1, 'x')), InvalidArgument);
+  EXPECT_THROW(rig.batch.mark(std::string(kMaxMarkBytes + 1, 'x')), InvalidArgument);
   rig.run(4);
   EXPECT_EQ(rig.witness.status(record_id(moving, 0)), Status::completed);
   EXPECT_TRUE(rig.all_blocks_back());

@@ -97,15 +97,15 @@ TEST(RecordCheck, SizesThatDoNotFitAreRefused) {
 }
 
 TEST(RecordCheck, PacesThatNoOneCanKeepAreRefused) {
-  constexpr auto kLeast = std::numeric_limits<std::int64_t>::min();
-  constexpr auto kMost = std::numeric_limits<std::int64_t>::max();
-  for (const std::int64_t amount : {kLeast, std::int64_t{-1}, kMost}) {
+  constexpr auto kMin = std::numeric_limits<std::int64_t>::min();
+  constexpr auto kMax = std::numeric_limits<std::int64_t>::max();
+  for (const std::int64_t amount : {kMin, std::int64_t{-1}, kMax}) {
     EXPECT_TRUE(refused(over(1), [&](RecordHead& h, double*) { h.amount = amount; }));
     EXPECT_TRUE(refused(during(1), [&](RecordHead& h, double*) { h.amount = amount; }));
   }
-  EXPECT_TRUE(refused(until(1), [&](RecordHead& h, double*) { h.amount = kMost; }));
+  EXPECT_TRUE(refused(until(1), [&](RecordHead& h, double*) { h.amount = kMax; }));
   EXPECT_EQ(spoilt(until(1), bytes_of<double>({1.0, 2.0}),
-                   [&](RecordHead& h, double*) { h.amount = kLeast; })
+                   [&](RecordHead& h, double*) { h.amount = kMin; })
                 .reason,
             Reason::late);
   for (const double speed : {0.0, -1.0, std::nan(""), HUGE_VAL, -HUGE_VAL}) {
@@ -201,9 +201,9 @@ TEST(RecordCheck, ABatchWithFewerRecordsThanBlocksFreesThemAll) {
 // Batches that were proper before bytes of theirs were changed at random: whatever they are, every
 // record ends once, every block comes back, and desired states stay numbers.
 TEST(RecordCheck, MarksWithoutTextOrWithTooMuchAreRefused) {
-  for (const std::uint32_t length : {0U, kMostMarkBytes + 1}) {
+  for (const std::uint32_t length : {0U, kMaxMarkBytes + 1}) {
     Rig rig(checked_robot());
-    rig.batch.mark(std::string(kMostMarkBytes, 'x'));
+    rig.batch.mark(std::string(kMaxMarkBytes, 'x'));
     BatchRecord record;
     record.id = 1;
     const auto sealed = rig.batch.seal(record);

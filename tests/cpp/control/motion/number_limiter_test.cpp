@@ -85,10 +85,10 @@ TEST_F(NumberLimiterTest, WithoutAnAccelerationLimitMovesBitForBitAsWithAnEnormo
 
 TEST_F(NumberLimiterTest, WithoutAnyLimitMovesBitForBitAsWithEnormousBounds) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  constexpr double kMost = std::numeric_limits<double>::max();
+  constexpr double kMax = std::numeric_limits<double>::max();
   int stops = 0;
   for (int round = 0; round < 2000; ++round) {
-    NumberLimiter limiter(-kMost, kMost, {kNone, kNone, kNone});
+    NumberLimiter limiter(-kMax, kMax, {kNone, kNone, kNone});
     NumberLimiter general(-1e307, 1e307, {kNone, kNone, kNone});
     const double start = real(-2, 2);
     limiter.restart(start);
@@ -111,10 +111,10 @@ TEST_F(NumberLimiterTest, WithoutAnyLimitMovesBitForBitAsWithEnormousBounds) {
 
 TEST_F(NumberLimiterTest, WithoutAnyLimitGoesWithinTheRangeOfADouble) {
   constexpr double kNone = std::numeric_limits<double>::infinity();
-  constexpr double kMost = std::numeric_limits<double>::max();
-  NumberLimiter limiter(-kMost, kMost, {kNone, kNone, kNone});
-  limiter.restart(-kMost);
-  for (int i = 0; i < 3; ++i) limiter.follow(kMost);
+  constexpr double kMax = std::numeric_limits<double>::max();
+  NumberLimiter limiter(-kMax, kMax, {kNone, kNone, kNone});
+  limiter.restart(-kMax);
+  for (int i = 0; i < 3; ++i) limiter.follow(kMax);
   EXPECT_TRUE(std::isfinite(limiter.position()));
 }
 

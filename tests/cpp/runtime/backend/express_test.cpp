@@ -220,12 +220,12 @@ TEST_F(ExpressTest, WhoMayCommandIsDecidedWhenABatchActs) {
 TEST_F(ExpressTest, MoreRequestsOrOrdersThanABatchMayHaveAreRefused) {
   station.start();
   UntypedFrontend one("pair");
-  for (std::uint32_t i = 0; i < kMostRequests + 1; ++i) add_request<Snapshot>(one);
+  for (std::uint32_t i = 0; i < kMaxRequests + 1; ++i) add_request<Snapshot>(one);
   EXPECT_THAT(message_of<InvalidArgument>([&] { one.pulse(); }),
               AllOf(HasSubstr("may have 8 requests, this one has 9"), HasSubstr("several pulses")));
-  EXPECT_EQ(one.added(), kMostRequests + 1) << "nothing was sent";
+  EXPECT_EQ(one.added(), kMaxRequests + 1) << "nothing was sent";
   one.forget_added();
-  for (std::uint32_t i = 0; i < kMostControlOrders + 1; ++i) one.add_take_control();
+  for (std::uint32_t i = 0; i < kMaxControlOrders + 1; ++i) one.add_take_control();
   EXPECT_THAT(message_of<InvalidArgument>([&] { one.pulse(); }), HasSubstr("control"));
 }
 
@@ -237,11 +237,11 @@ TEST_F(ExpressTest, MoreBatchesThanMayWaitForLaterIterationsAreRefused) {
     return one.pulse({.at = at});
   };
   std::vector<Batch> batches;
-  for (std::uint32_t i = 0; i < kMostScheduledAt; ++i) batches.push_back(pulse_at(900));
+  for (std::uint32_t i = 0; i < kMaxScheduledAt; ++i) batches.push_back(pulse_at(900));
   EXPECT_THAT(message_of<LaneFull>([&] { pulse_at(900); }),
               AllOf(HasSubstr("16 batches"), HasSubstr("iteration 900"), HasSubstr("one batch")));
   one.forget_added();
-  for (std::uint32_t i = kMostScheduledAt; i < kMostScheduled; ++i) {
+  for (std::uint32_t i = kMaxScheduledAt; i < kMaxScheduled; ++i) {
     batches.push_back(pulse_at(901 + i / 2));
   }
   EXPECT_THAT(message_of<LaneFull>([&] { pulse_at(2000); }), HasSubstr("256 batches"));
@@ -256,7 +256,7 @@ TEST_F(ExpressTest, ABackendRejectsWhatASenderPutsIntoItsScheduleBeyondThat) {
   station.start();
   Liar liar;
   std::vector<CommandId> ids;
-  for (std::uint32_t i = 0; i < kMostScheduledAt + 1; ++i) {
+  for (std::uint32_t i = 0; i < kMaxScheduledAt + 1; ++i) {
     BatchBuilder batch;
     batch.purge(0);
     const CommandId id = liar.sender().next_id();
@@ -276,7 +276,7 @@ TEST_F(ExpressTest, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayBe) {
   UntypedFrontend one("pair");
   const auto flood_at = [&](UntypedFrontend& frontend, PulseOptions::Late late) {
     std::vector<Batch> batches;
-    for (std::uint32_t i = 0; i < kMostScheduledAt; ++i) {
+    for (std::uint32_t i = 0; i < kMaxScheduledAt; ++i) {
       for (std::uint32_t request = 0; request < 4; ++request) add_request<Snapshot>(frontend);
       batches.push_back(frontend.pulse({.at = 20, .late = late}));
     }

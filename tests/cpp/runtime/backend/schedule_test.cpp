@@ -33,7 +33,7 @@ TEST(Schedule, GivesTheEarliestFirstAndThoseOfOneIterationInTheOrderOfTheirPulse
 
 TEST(Schedule, SetsAsideWhatASilentSenderHasThereAndKeepsTheOthersInOrder) {
   Schedule schedule(2);
-  constexpr std::uint32_t kEach = kMostScheduled;
+  constexpr std::uint32_t kEach = kMaxScheduled;
   for (std::uint32_t i = 0; i < kEach; ++i) {
     const auto at = static_cast<Iteration>(i * 7919 % kEach);
     for (const std::uint32_t lane : {0U, 1U}) {

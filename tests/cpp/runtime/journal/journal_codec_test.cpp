@@ -119,7 +119,7 @@ class Draw {
         break;
       }
       case JournalKind::statuses:
-        item.head.what = static_cast<std::uint32_t>(1 + below(kMostStatuses));
+        item.head.what = static_cast<std::uint32_t>(1 + below(kMaxStatuses));
         for (std::uint64_t i = 1 + below(5); i > 0; --i)
           append(item.payload, JournalStatusRun{number(), below(9), number()});
         break;
@@ -235,7 +235,7 @@ TEST(JournalCodecTest, FindsTheTextsOfMarksHoweverTheirBlocksAreRead) {
     const std::vector<JournalItem> items = Draw(seed).journal(100);
     std::vector<std::string> sent;
     for (const auto& [kind, text] : records_in(items))
-      if (kind == RecordKind::mark && !text.empty() && text.size() <= kMostMarkBytes)
+      if (kind == RecordKind::mark && !text.empty() && text.size() <= kMaxMarkBytes)
         sent.push_back(text);
     JournalFileEncoder encoder;
     std::vector<std::byte> bytes;

@@ -57,7 +57,7 @@ class Segment {
                   .slots = slots,
                   .lanes = lanes,
                   .lane_blocks = lane_blocks,
-                  .journal_bytes = journal_bytes > 0 ? o80::kLeastJournal : 0};
+                  .journal_bytes = journal_bytes > 0 ? o80::kMinJournal : 0};
     if (!o80::SegmentOffsets::compute(view.shape, view.offsets)) std::abort();
     static std::byte* memory =
         static_cast<std::byte*>(std::aligned_alloc(4096, view.offsets.file_bytes));

@@ -48,7 +48,7 @@ bool before_purge[BATCHES + 1];
 bool after_purge[BATCHES + 1];
 byte waited = 0;                          // iterations begun since the purge's commit
 
-#define MOST_WAITED BLOCKS                // for the command before it in its own lane
+#define MAX_WAITED BLOCKS                // for the command before it in its own lane
 #define BLOCKS_OF(b) (b == PURGE -> 1 : BLOCKS)
 #define IS_BEGUN(b) (left[b] < BLOCKS_OF(b))
 
@@ -182,7 +182,7 @@ proctype Backend() {
        if :: oldest[3] == PURGE && purge_taken -> oldest[3] = PURGE + 1 :: else fi;
        // the iteration: what is in a queue acts
        for (k : 1 .. BATCHES) { assert(!(queued[k] && purge_taken && before_purge[k])) }
-       assert(purge_taken || waited <= MOST_WAITED);
+       assert(purge_taken || waited <= MAX_WAITED);
        assert(!over[4] || queued[4]);
        k = 0; b = 0; lane = 0; picked = 0; budget = 0
      }

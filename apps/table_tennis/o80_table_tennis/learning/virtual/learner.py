@@ -19,7 +19,7 @@ from .settings import SacSettings
 
 CLIP = 10.0
 """Scaled observations lie within plus or minus this."""
-LEAST_SPREAD = 1e-3
+MIN_SPREAD = 1e-3
 """Smallest spread by which a number of an observation is divided: some hardly change."""
 
 
@@ -33,7 +33,7 @@ class Learner:
     def __init__(self, settings: SacSettings, first: list[Motion], *, seed: int) -> None:
         seen = np.concatenate([motion.observations[:, 0] for motion in first])
         self._mean = seen.mean(axis=0)
-        self._scale = 1.0 / np.maximum(seen.std(axis=0), LEAST_SPREAD)
+        self._scale = 1.0 / np.maximum(seen.std(axis=0), MIN_SPREAD)
         box = spaces.Box(-CLIP, CLIP, self._mean.shape, np.float32)
         self._settings = settings
         self._sac = FastSac(
