@@ -54,13 +54,13 @@ def measure(rows: Sequence[Row], rounds: int, built: Path, console: Console) -> 
 
 
 def main() -> int:
-    asked = arguments()
-    rounds = asked.rounds or (ROUNDS_QUICK if asked.quick else ROUNDS)
+    requested = arguments()
+    rounds = requested.rounds or (ROUNDS_QUICK if requested.quick else ROUNDS)
     console = Console()
     if not console.is_terminal:
         console = Console(width=150)
-    chosen = [row for row in ROWS if row.name in asked.rows]
-    results = measure(chosen, rounds, asked.built.resolve(), console)
+    chosen = [row for row in ROWS if row.name in requested.rows]
+    results = measure(chosen, rounds, requested.built.resolve(), console)
     print_table(results, console)
     path = ROOT / "build" / "bench" / "results.json"
     write(results, path)

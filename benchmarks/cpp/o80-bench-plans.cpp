@@ -38,11 +38,11 @@ struct Joint {
 constexpr Joint kJoints[] = {{2.0, 15.0, 500.0, 500.0}, {2.6, 10.0, 5000.0, 1000.0}};
 
 std::int64_t start(NumberMotion& motion, double target, std::int64_t least = 0) {
-  Asked asked;
-  asked.target = target;
-  asked.iterations = least;
+  Requested requested;
+  requested.target = target;
+  requested.iterations = least;
   motion.begin();
-  const std::int64_t iterations = motion.propose(asked);
+  const std::int64_t iterations = motion.propose(requested);
   motion.settle(iterations);
   return iterations;
 }
@@ -53,7 +53,7 @@ struct Start {
   double first = 0.0;    // target of the other one
   std::int64_t cut = 0;  // the iteration; 0: from rest
   double target = 0.0;
-  std::int64_t asked = 0;
+  std::int64_t requested = 0;
 
   NumberMotion before() const {
     NumberMotion motion = joint.at_rest();
@@ -79,7 +79,7 @@ class Draw {
     Start one = moving();
     NumberMotion motion = one.before();
     const std::int64_t fewest = start(motion, one.target);
-    one.asked = fewest + 1 + some_of(fewest);
+    one.requested = fewest + 1 + some_of(fewest);
     return one;
   }
 
@@ -104,7 +104,7 @@ void measure_starts(const std::string& name, const std::vector<Start>& starts) {
   std::vector<double> times;
   for (const Start& each : starts) {
     NumberMotion motion = each.before();
-    times.push_back(nanoseconds([&] { start(motion, each.target, each.asked); }) / 1e3);
+    times.push_back(nanoseconds([&] { start(motion, each.target, each.requested); }) / 1e3);
   }
   std::sort(times.begin(), times.end());
   sample(name.c_str(), "us", times[times.size() / 2]);
@@ -116,7 +116,7 @@ void measure_iterations(const std::vector<Start>& starts) {
   std::vector<double> times;
   for (const Start& each : starts) {
     NumberMotion motion = each.before();
-    const std::int64_t iterations = start(motion, each.target, each.asked);
+    const std::int64_t iterations = start(motion, each.target, each.requested);
     const double time = nanoseconds([&] {
       for (std::int64_t i = 0; i < iterations; ++i) motion.step(-kInfinity, kInfinity);
     });

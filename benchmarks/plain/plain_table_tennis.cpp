@@ -26,7 +26,7 @@ class Plain {
   void reset(std::uint64_t seed, const o80::mujoco::BallState& start) {
     arm_.reset(seed);
     twin_.reset();
-    asked_ = arm_.state().commanded;
+    requested_ = arm_.state().commanded;
     o80::mujoco::BallTarget& ball = twin_.balls()->targets()[0];
     ball.imposed = true;
     ball.state = start;
@@ -38,10 +38,10 @@ class Plain {
     for (int i = 0; i < kIterations; ++i) {
       if (i == delay) {
         for (std::size_t m = 0; m < 8; ++m) {
-          asked_[m] = static_cast<std::int32_t>(std::lround(pressures[m]));
+          requested_[m] = static_cast<std::int32_t>(std::lround(pressures[m]));
         }
       }
-      arm_.advance(asked_);
+      arm_.advance(requested_);
       mirror();
     }
   }
@@ -55,7 +55,7 @@ class Plain {
 
   o80::pam::Plant arm_;
   o80::mujoco::Simulation twin_;
-  o80::pam::Pressures asked_{};
+  o80::pam::Pressures requested_{};
 };
 
 }  // namespace

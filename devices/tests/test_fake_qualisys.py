@@ -24,7 +24,7 @@ def server() -> Iterator[FakeQualisys]:
         yield served
 
 
-def asked(server: FakeQualisys, question: Callable[[Any], Awaitable[Found]]) -> Found:
+def requested(server: FakeQualisys, question: Callable[[Any], Awaitable[Found]]) -> Found:
     """The answer that a connection of the vendor's client gets."""
 
     async def ask() -> Found:
@@ -52,7 +52,7 @@ def test_a_pose_is_the_same_in_every_form(
     server: FakeQualisys, component: str, rotation: tuple[float, ...], residual: tuple[float, ...]
 ) -> None:
     reader = {"6d": "get_6d", "6dres": "get_6d_residual", "6deuler": "get_6d_euler"}
-    frame = asked(server, lambda client: client.get_current_frame([component, "3dnolabels"]))
+    frame = requested(server, lambda client: client.get_current_frame([component, "3dnolabels"]))
     header, (body,) = getattr(frame, reader.get(component, "get_6d_euler_residual"))()
     assert header.body_count == 1
     position, turned, *rest = body
@@ -62,7 +62,7 @@ def test_a_pose_is_the_same_in_every_form(
     assert frame.get_3d_markers_no_label()[1] == []
 
     server.faults.hidden = {"racket"}
-    frame = asked(server, lambda client: client.get_current_frame([component]))
+    frame = requested(server, lambda client: client.get_current_frame([component]))
     (place,) = frame.components.values()
     numbers = struct.unpack_from(f"<{3 + len(rotation) + len(residual)}f", frame.data, place + 8)
     assert all(map(math.isnan, numbers))
@@ -100,7 +100,7 @@ def test_frames_are_streamed_until_they_are_stopped(
                 pass
         other.disconnect()
 
-    packets = asked(server, streamed)
+    packets = requested(server, streamed)
     for packet in packets:
         assert packet.framenumber % step == 0
         assert packet.timestamp == packet.framenumber * 5000
@@ -108,11 +108,11 @@ def test_frames_are_streamed_until_they_are_stopped(
 
 
 def test_state_version_and_settings_are_told(server: FakeQualisys) -> None:
-    assert asked(server, lambda client: client.get_state()) == qtm_rt.QRTEvent.EventConnected
-    assert asked(server, lambda client: client.qtm_version()).startswith(b"QTM Version is")
-    order = asked(server, lambda client: client.byte_order())
+    assert requested(server, lambda client: client.get_state()) == qtm_rt.QRTEvent.EventConnected
+    assert requested(server, lambda client: client.qtm_version()).startswith(b"QTM Version is")
+    order = requested(server, lambda client: client.byte_order())
     assert order == b"Byte order is little endian"
-    settings = asked(server, lambda client: client.get_parameters(["6d"]))
+    settings = requested(server, lambda client: client.get_parameters(["6d"]))
     assert b"<Name>racket</Name>" in settings
 
 
@@ -128,9 +128,9 @@ def test_a_command_that_controls_is_answered(
     server: FakeQualisys, command: str, arguments: list[Any]
 ) -> None:
     """The client raises an exception for an answer that it does not expect."""
-    asked(server, lambda client: getattr(client, command)(*arguments))
+    requested(server, lambda client: getattr(client, command)(*arguments))
 
 
 def test_what_is_not_served_is_an_error(server: FakeQualisys) -> None:
     with pytest.raises(qtm_rt.QRTCommandException, match="Parse error"):
-        asked(server, lambda client: client.get_current_frame(["analog"]))
+        requested(server, lambda client: client.get_current_frame(["analog"]))

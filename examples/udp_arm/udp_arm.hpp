@@ -110,7 +110,7 @@ class UdpArm {
  private:
   static constexpr std::int64_t kStartTimeout = 2'000'000'000;  // [ns]
   static constexpr std::int64_t kConnectAgain = 50'000'000;     // [ns]
-  static constexpr int kMaxAtOnce = 1000;                      // packets
+  static constexpr int kMaxAtOnce = 1000;                       // packets
 
   std::string place() const { return config_.address + ":" + std::to_string(config_.port); }
 

@@ -62,7 +62,7 @@ class Joint:
     def __init__(self, config: Config) -> None:
         self.config = config
         self.place = np.zeros(2)
-        self.asked = np.zeros(2)
+        self.requested = np.zeros(2)
         self.halts = self.resumes = 0
         self.homing = -1
         self._may_fail("__init__")
@@ -77,8 +77,8 @@ class Joint:
     def write(self, desired: Desired) -> None:
         if desired.iteration >= 3:
             self._may_fail("write")
-        self.asked = np.array(desired.states)
-        self.place += self.config.gain * (self.asked - self.place)
+        self.requested = np.array(desired.states)
+        self.place += self.config.gain * (self.requested - self.place)
 
     def read(self, reading: Reading) -> None:
         if reading.iteration >= 3:

@@ -109,7 +109,7 @@ def test_every_reader_and_writer_knows_the_labels(
     labels: dict[str, int] = data.draw(drawn("i8"))
     words = st.sampled_from([*labels])
     published = data.draw(st.lists(st.tuples(words, words, words), min_size=3, max_size=3))
-    commanded, asked = data.draw(words), data.draw(words)
+    commanded, requested = data.draw(words), data.draw(words)
     kind = IntEnum("Gear", labels)  # type: ignore[misc]
     groups = {"gear": kind, "arms": ({"x": float, "mode": kind}, 2)}
     folder = tmp_path_factory.mktemp("words")
@@ -128,7 +128,7 @@ def test_every_reader_and_writer_knows_the_labels(
             assert [*frontend.enums["mode"].__members__] == [*labels]
             frontend.add_command("gear", commanded)
             frontend.add_command("arms_1", {"mode": labels[commanded]})
-            frontend.add_request("go", to=asked)
+            frontend.add_request("go", to=requested)
             for row in published[1:]:
                 frontend.burst(1, wait=False)
                 desired = backend.step()
@@ -137,7 +137,7 @@ def test_every_reader_and_writer_knows_the_labels(
                 knows_its_labels(desired.arms[1]["mode"], commanded, labels)
                 publish(*row)
             (fields,) = heard
-            knows_its_labels(fields.to, asked, labels)
+            knows_its_labels(fields.to, requested, labels)
             latest, history = frontend.latest(), frontend.history()
             sent = [c for entry in frontend.journal() for c in entry.commands]
     o80.clean(name)
@@ -158,7 +158,7 @@ def test_every_reader_and_writer_knows_the_labels(
         columns_know(many.observed.arms[:, 1]["mode"], [row[0] for row in published], labels)
     knows_its_labels(sent[0].targets[0], commanded, labels)
     knows_its_labels(sent[1].targets[0]["mode"], commanded, labels)
-    knows_its_labels(sent[2].fields["to"], asked, labels)  # type: ignore[index]
+    knows_its_labels(sent[2].fields["to"], requested, labels)  # type: ignore[index]
     exports_keep(history, "extended.status", [row[2] for row in published], labels, folder)
 
 

@@ -20,7 +20,7 @@ Look = Callable[..., dict[str, Any]]
 def looks_at(*names: str, control: bool = False) -> Look:
     """Asks as a page does."""
     answers = Answers(SourceList(names), control=control)
-    return lambda **asked: answers.look(asked)
+    return lambda **requested: answers.look(requested)
 
 
 def numbers(text: str) -> Any:
@@ -164,11 +164,13 @@ def test_a_robot_that_dies_is_read_on_and_its_successor_is_shown_anew(segment: s
         assert answer["iteration"] == 0
 
 
-def wait_for(look: Look, ready: Callable[[dict[str, Any]], bool], **asked: Any) -> dict[str, Any]:
+def wait_for(
+    look: Look, ready: Callable[[dict[str, Any]], bool], **requested: Any
+) -> dict[str, Any]:
     """Looks until the list of segments was read anew."""
     give_up = time.monotonic() + 60
     while time.monotonic() < give_up:
-        answer = look(**asked)
+        answer = look(**requested)
         if ready(answer):
             return answer
     raise AssertionError("it was never shown")

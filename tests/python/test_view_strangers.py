@@ -47,9 +47,9 @@ class Holder:
         self.kept.connect()
         self.kept.auto_open = False  # a connection that was closed is an error
 
-    def ask(self, path: str, **asked: Any) -> Any:
+    def ask(self, path: str, **requested: Any) -> Any:
         headers = {"Authorization": f"Bearer {self._token}"}
-        self.kept.request("POST", path, json.dumps(asked), headers)
+        self.kept.request("POST", path, json.dumps(requested), headers)
         answer = self.kept.getresponse()
         text = answer.read()
         assert answer.status == 200, text

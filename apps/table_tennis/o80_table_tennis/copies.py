@@ -89,7 +89,7 @@ class TableTennisCopies(Task):
             if self.observer.is_ball_play:
                 self._gathered = group.gather(self.observer.low, self.observer.high)
             self.rig = group
-        self.asked = self.rig.arm.asked()
+        self.commanded = self.rig.arm.commanded()
         """(copies, 8) normalised pressures asked for last."""
         self._ends = np.zeros(self.copies, np.int64)
         self.state = State(
@@ -129,13 +129,13 @@ class TableTennisCopies(Task):
             twin_seeds=[draw.twin_seed for draw in draws],
             flights=[draw.balls.flights for draw in draws],
         )
-        self.asked[copies] = self.rig.arm.asked(copies)
+        self.commanded[copies] = self.rig.arm.commanded(copies)
         self.state.goal[copies] = [draw.goal for draw in draws]
         self._ends[copies] = End.RUNNING
         self._look()
         if not self._gathered:
-            state, asked = self.state.at(copies), self.asked[copies]
-            self._observations[copies] = self.observer.begin(state, asked, generators, copies)
+            state, commanded = self.state.at(copies), self.commanded[copies]
+            self._observations[copies] = self.observer.begin(state, commanded, generators, copies)
         self._unobserved = self._stalled = False
 
     def step(self, actions: Any, copies: Index) -> None:
@@ -147,11 +147,11 @@ class TableTennisCopies(Task):
         self._stalled = rig.lateness > settings.max_late
         if self._stalled:
             return
-        asked = self.asked[copies]
+        commanded = self.commanded[copies]
         for _ in range(settings.repeat):
-            asked = changed_pressures(asked, actions, factor=settings.factor)
-            rig.step(asked, copies)
-        self.asked[copies] = asked
+            commanded = changed_pressures(commanded, actions, factor=settings.factor)
+            rig.step(commanded, copies)
+        self.commanded[copies] = commanded
         self._ends[copies], self._some_ended = End.RUNNING, False
         self._look()
         if settings.fly_out and np.count_nonzero(self.state.record.touched):
@@ -200,8 +200,8 @@ class TableTennisCopies(Task):
                 return np.concatenate(self._gathered, axis=1)
             return np.concatenate([part[copies] for part in self._gathered], axis=1)
         if self._unobserved:
-            state, asked = self._of(copies), self.asked[copies]
-            self._observations[copies] = self.observer.observe(state, asked, copies)
+            state, commanded = self._of(copies), self.commanded[copies]
+            self._observations[copies] = self.observer.observe(state, commanded, copies)
             self._unobserved = False
         return self._observations[copies]
 

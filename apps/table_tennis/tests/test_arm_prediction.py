@@ -59,7 +59,7 @@ def test_the_motion_of_the_dead_time_is_predicted_from_the_actions_in_flight() -
             elif step % 4 == 0:
                 action = -action
             seen, *_ = environment.step(action)
-            predictor.ask(environment.rig.arm.asked()[0])
+            predictor.ask(environment.rig.arm.commanded()[0])
 
     for joint, ahead in enumerate(dead_steps):
         errors, moved, continued = [], [], []

@@ -45,14 +45,14 @@ def test_an_action_acts_from_the_iteration_it_is_meant_for(delay: int) -> None:
     with closing(opened(task=task)) as environment:
         environment.reset(seed=1)
         arm = environment.rig.arm
-        k, before = arm.newest, arm.asked()[0]
+        k, before = arm.newest, arm.commanded()[0]
         environment.step(PUSH)
-        asked = arm.frontend.history(since=k + 1, until=k + ITERATIONS).desired
+        commanded = arm.frontend.history(since=k + 1, until=k + ITERATIONS).desired
 
         start = np.array(arm.start_pressures)
         wanted = arm.range.raw(changed_pressures(before, PUSH, factor=COARSE))
-        np.testing.assert_array_equal(asked[:delay], np.tile(start, (delay, 1)))
-        np.testing.assert_array_equal(asked[delay:], np.tile(wanted, (ITERATIONS - delay, 1)))
+        np.testing.assert_array_equal(commanded[:delay], np.tile(start, (delay, 1)))
+        np.testing.assert_array_equal(commanded[delay:], np.tile(wanted, (ITERATIONS - delay, 1)))
 
 
 @pytest.mark.parametrize("pacing", [Pacing.INLINE, Pacing.PROCESSES])

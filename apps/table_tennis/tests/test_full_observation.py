@@ -42,10 +42,10 @@ def test_it_holds_the_arm_the_pressures_and_what_was_asked() -> None:
         observation, _ = environment.reset(seed=2)
         assert observation.shape == (73,)
         assert not part(observation, "changes").any()
-        asked = [part(observation, "asked")]
+        commanded = [part(observation, "asked")]
         for action in actions:
             observation, *_ = environment.step(action)
-            asked.append(part(observation, "asked"))
+            commanded.append(part(observation, "asked"))
         row = environment.rig.arm.frontend.latest()
         arm = environment.rig.arm
     positions = row.extended.joint_positions
@@ -56,9 +56,9 @@ def test_it_holds_the_arm_the_pressures_and_what_was_asked() -> None:
     assert part(observation, "time") == pytest.approx(0.12)
     # the newest change first; tanh is nearly straight, but for pressures at their limits
     changes = part(observation, "changes").reshape(4, 8)
-    inside = np.diff(asked, axis=0)[::-1][:4]
+    inside = np.diff(commanded, axis=0)[::-1][:4]
     np.testing.assert_allclose(changes, inside / (0.5 * np.tanh(0.5)), atol=1e-5)
-    free = np.all([(each > 0.01) & (each < 0.99) for each in asked[-5:]], axis=0)
+    free = np.all([(each > 0.01) & (each < 0.99) for each in commanded[-5:]], axis=0)
     assert free.any()
     np.testing.assert_allclose(changes[:, free], actions[::-1][:4][:, free], atol=0.05)
 

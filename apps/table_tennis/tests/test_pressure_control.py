@@ -35,8 +35,8 @@ def test_a_slack_muscle_leaves_the_torque_to_the_other() -> None:
 
 def test_asking_undoes_the_lag() -> None:
     lag, now, wanted = PressureLag(), np.full(8, 0.4), np.linspace(0.3, 0.5, 8)
-    asked = lag.asking(now, wanted, 0.014)
-    assert lag.after(now, asked, 0.014) == pytest.approx(wanted)
+    commanded = lag.asking(now, wanted, 0.014)
+    assert lag.after(now, commanded, 0.014) == pytest.approx(wanted)
 
 
 @pytest.mark.parametrize("factor", [COARSE, FINE])
@@ -51,7 +51,7 @@ def test_actions_lead_to_the_wanted_pressures(factor: float) -> None:
         assert np.all(np.abs(action) <= 1.0)
         taken = action.astype(np.float64)
         pressures = changed_pressures(pressures, taken, factor=factor)
-        assert actions.asked == pytest.approx(pressures)
+        assert actions.commanded == pytest.approx(pressures)
     assert pressures == pytest.approx(np.clip(wanted, 0.0, 1.0), abs=1e-6)
 
 
@@ -59,13 +59,15 @@ def test_the_lag_is_that_of_the_arm() -> None:
     with o80.robots.load("pam").inline("pressure-lag-test") as arm:
         pressures = PressureRange.of(arm)
         start = pressures.normalised(np.array(arm.latest().observed))
-        asked = np.linspace(0.2, 0.9, 8)
-        arm.add_command(None, pressures.raw(asked))
+        commanded = np.linspace(0.2, 0.9, 8)
+        arm.add_command(None, pressures.raw(commanded))
         arm.pulse()
         for row in (1, 2, 7):
             seen = pressures.normalised(np.array(arm.burst(row).observed))
             elapsed = float(arm.latest().iteration) * PERIOD
-            wanted = PressureLag().after(start, pressures.normalised(pressures.raw(asked)), elapsed)
+            wanted = PressureLag().after(
+                start, pressures.normalised(pressures.raw(commanded)), elapsed
+            )
             assert seen == pytest.approx(wanted, abs=1e-9)
 
 

@@ -80,7 +80,7 @@ class Launcher:
         self._confirmed: State | None = None
         self._to_confirm = CONFIRMATIONS
         self._connected = self._began_unknown = False
-        self._asked = False
+        self._requested = False
         self._frozen: State | None = None  # the wanted state when the launch was asked for
         self._retry_at = self._unknown_until = 0
         self._refused: State | None = None
@@ -121,7 +121,7 @@ class Launcher:
     def ask(self, now: int) -> None:
         """Asks for a launch. Raises RequestRejected if a launch is impossible now."""
         status = self.status(now)
-        if self._asked or status is Status.launching:
+        if self._requested or status is Status.launching:
             raise RequestRejected("a launch is under way: wait until it has ended")
         if status is Status.disconnected:
             raise RequestRejected("the launcher is not connected: see that it runs at the address")
@@ -132,12 +132,12 @@ class Launcher:
             )
         if status is Status.refused:
             raise RequestRejected("the launcher has refused the desired state: change it")
-        self._asked, self._frozen, self._end = True, None, None
+        self._requested, self._frozen, self._end = True, None, None
 
     def cancel(self) -> None:
         """Cancels a launch that was not sent yet; a launch that was sent goes on."""
-        if self._asked and not self._is_launching():
-            self._asked = False
+        if self._requested and not self._is_launching():
+            self._requested = False
 
     def ended(self) -> tuple[LastLaunch, str] | None:
         """How the launch that was asked for ended, once."""
@@ -148,7 +148,7 @@ class Launcher:
         return self._exchange is not None and self._kind is Kind.LAUNCH_BALL
 
     def _end_launch(self, how: LastLaunch, why: str = "") -> None:
-        self._asked, self._end = False, (how, why)
+        self._requested, self._end = False, (how, why)
         self.last_launch = how
         self.counts[how] += 1
 
@@ -186,11 +186,11 @@ class Launcher:
 
     def _begin(self, now: int, wanted: State) -> None:
         if not self._connected:
-            if self._asked:
+            if self._requested:
                 why = "the launcher was disconnected before the launch was sent"
                 self._end_launch(LastLaunch.not_sent, why)
             return
-        if self._asked:
+        if self._requested:
             self._frozen = wanted = self._frozen or wanted
         if self._refused is not None and self._refused != wanted:
             self._refused, self._retry_at = None, now
@@ -199,7 +199,7 @@ class Launcher:
             if now >= self._retry_at:
                 self._sending = wanted
                 self._send(Kind.SET_STATE, now)
-        elif self._asked and not unknown:
+        elif self._requested and not unknown:
             self._send(Kind.LAUNCH_BALL, now)
 
     def _send(self, kind: Kind, now: int) -> None:
@@ -220,7 +220,7 @@ class Launcher:
         self._to_confirm = CONFIRMATIONS if unanswered else max(1, self._to_confirm)
         self._refused = self._sending if outcome is Outcome.refused else None
         self._retry_at = now + self._timing.retry
-        if self._asked:
+        if self._requested:
             why = f"nothing was launched: the launcher's state was {outcome.value}"
             self._end_launch(LastLaunch.not_sent, why)
 

@@ -168,16 +168,18 @@ class FakeQualisys:
 
     def _stream(self, connected: socket.socket, words: list[str]) -> Stream | None:
         """The stream that `streamframes` asks for; None to stop, or if it is not understood."""
-        asked = re.fullmatch(
+        requested = re.fullmatch(
             r"(allframes|frequency:(\d+)|frequencydivisor:(\d+))( udp:(\d+))?(.*)", " ".join(words)
         )
-        if asked is None or not set(asked[6].split()) <= set(COMPONENTS):
+        if requested is None or not set(requested[6].split()) <= set(COMPONENTS):
             return None
-        every = max(1, round(self.frequency / int(asked[2])) if asked[2] else int(asked[3] or 1))
-        components = asked[6].split()
-        if not asked[5]:
+        every = max(
+            1, round(self.frequency / int(requested[2])) if requested[2] else int(requested[3] or 1)
+        )
+        components = requested[6].split()
+        if not requested[5]:
             return Stream(connected.sendall, components, every)
-        there = connected.getpeername()[0], int(asked[5])
+        there = connected.getpeername()[0], int(requested[5])
         return Stream(lambda content: self._datagrams.sendto(content, there), components, every)
 
     def _answer(

@@ -41,8 +41,8 @@ struct Blobs {
 
 /// What is a blob.
 struct BlobRule {
-  int step = 1;           // look at every step-th pixel of every step-th row
-  int threshold = 96;     // least probability of a pixel, of 255
+  int step = 1;         // look at every step-th pixel of every step-th row
+  int threshold = 96;   // least probability of a pixel, of 255
   double min_area = 6;  // [px^2]
   double max_area = 1e9;
 };

@@ -269,11 +269,11 @@ class UntypedFrontend {
   void wait_for_rest(std::uint64_t number, const Deadline& deadline,
                      const KeepWaiting& keep_waiting);
   /// Whether somebody will ask for the statuses of a batch.
-  enum class Asked : std::uint8_t { yes, no };
-  Sent send(BatchBuilder& builder, const BatchRecord& record, Asked asked = Asked::yes);
+  enum class Requested : std::uint8_t { yes, no };
+  Sent send(BatchBuilder& builder, const BatchRecord& record, Requested requested = Requested::yes);
   static BatchRecord batch_of(const PulseOptions& options);
   Sent send_burst(BatchBuilder& builder, std::int64_t iterations, const PulseOptions& options,
-                  Asked asked);
+                  Requested requested);
   UntypedObservation burst(BatchBuilder& builder, std::int64_t iterations, Timeout timeout,
                            const KeepWaiting& keep_waiting, const PulseOptions& options);
   std::uint32_t add_commands_to(BatchBuilder& builder, std::span<const std::uint32_t> actuators,

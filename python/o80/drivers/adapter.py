@@ -46,9 +46,9 @@ class Adapter:
         self._name = name
         self.period = 0
 
-    def describe(self, asked: int) -> _core.SchemaBuilder:
+    def describe(self, requested: int) -> _core.SchemaBuilder:
         """The schema of the driver. asked: period that the user gave [ns]; 0: none."""
-        self.period = self._period(asked)
+        self.period = self._period(requested)
         writer = SchemaWriter(self._name, mapping(self._told("units"), "units", "fields to units"))
         writer.add_actuators(self._told("actuators", ()), self._told("dtype", float))
         if (extended := self._told("extended")) is not None:
@@ -77,16 +77,16 @@ class Adapter:
     def _told(self, name: str, otherwise: Any = None) -> Any:
         return getattr(self._driver, name, otherwise)
 
-    def _period(self, asked: int) -> int:
+    def _period(self, requested: int) -> int:
         own = self._told("frequency")
         if own is None:
-            return asked
+            return requested
         if not isinstance(own, (int, float)) or not 0 < own <= 1e9:
             raise InvalidArgument(f"frequency must be a positive number, got {own!r}")
         period = round(1.0 / own / NANOSECOND)
-        if asked not in (0, period):
+        if requested not in (0, period):
             raise InvalidArgument(
-                f"the driver runs at {own:g} Hz, but {1 / (asked * NANOSECOND):g} Hz was "
+                f"the driver runs at {own:g} Hz, but {1 / (requested * NANOSECOND):g} Hz was "
                 f"requested: leave the frequency out, or set it to {own:g}"
             )
         return period

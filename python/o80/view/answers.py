@@ -31,7 +31,7 @@ class Answers:
         self._shown: dict[str, _Shown] = {}
         self._lock = threading.Lock()
 
-    def look(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def look(self, query: dict[str, Any]) -> dict[str, Any]:
         """The list of segments, and what is asked about one of them at one time."""
         sources = self._sources.now()
         answer: dict[str, Any] = {
@@ -39,20 +39,20 @@ class Answers:
             "list": [source.state() for source in sources],
             "waiting": self._sources.waiting,
         }
-        chosen = _chosen(sources, asked.get("source"))
+        chosen = _chosen(sources, query.get("source"))
         if chosen is not None:
             answer["source"] = chosen.label
             try:
-                answer |= self._row(chosen, asked)
+                answer |= self._row(chosen, query)
             except NothingToShow as error:
                 answer["problem"] = str(error)
         return answer
 
-    def _row(self, source: Source, asked: dict[str, Any]) -> dict[str, Any]:
+    def _row(self, source: Source, query: dict[str, Any]) -> dict[str, Any]:
         shown = self._shown_of(source)
         first, last = source.extent()
-        at = _time_asked(source, asked)
-        if at is None and not source.live and asked.get("key") != source.key:
+        at = _time_query(source, query)
+        if at is None and not source.live and query.get("key") != source.key:
             at = first  # a page begins at the begin of a recording
         row = source.row(at)
         answer: dict[str, Any] = {
@@ -66,15 +66,15 @@ class Answers:
             "halted": bool(row.halted),
             "overruns": row.overruns,
         }
-        if asked.get("key") != source.key:
+        if query.get("key") != source.key:
             answer["new"] = shown.introduction(source)
         if shown.scene is not None:
             answer |= shown.scene.poses(_bytes_of(row), row.active)
-        panels = asked.get("panels")
+        panels = query.get("panels")
         panels = shown.panels.first if not isinstance(panels, list) else [str(p) for p in panels]
         answer["values"] = shown.panels.values(row, panels)
-        if asked.get("curves"):
-            answer["curves"] = shown.curves(source, panels, _window(asked), at)
+        if query.get("curves"):
+            answer["curves"] = shown.curves(source, panels, _window(query), at)
         return answer
 
     def _shown_of(self, source: Source) -> "_Shown":
@@ -85,30 +85,30 @@ class Answers:
                 shown = self._shown[source.label] = _Shown(source, schema)
             return shown
 
-    def halt(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def halt(self, query: dict[str, Any]) -> dict[str, Any]:
         """Halts a live segment."""
-        source = self._live(asked)
-        reason = str(asked.get("reason", ""))[:LONGEST_REASON] or "from o80 view"
+        source = self._live(query)
+        reason = str(query.get("reason", ""))[:LONGEST_REASON] or "from o80 view"
         return {"halt": halt_backend(source.name, reason)}
 
-    def resume(self, asked: dict[str, Any]) -> dict[str, Any]:
+    def resume(self, query: dict[str, Any]) -> dict[str, Any]:
         """Clears a halt; only with --control."""
-        source = self._live(asked)
+        source = self._live(query)
         if not self._control:
             raise ReadOnly(
                 f"this view does not control: start it with --control, or use "
                 f"`o80 resume {source.name}`"
             )
         with Frontend(source.name, 1.0) as frontend:
-            frontend.resume(int(asked["number"]), timeout=5.0)
+            frontend.resume(int(query["number"]), timeout=5.0)
         return {}
 
-    def _live(self, asked: dict[str, Any]) -> Source:
+    def _live(self, query: dict[str, Any]) -> Source:
         """The view halts and resumes nothing that it does not show."""
         for source in self._sources.now():
-            if source.live and source.name == asked.get("segment"):
+            if source.live and source.name == query.get("segment"):
                 return source
-        raise InvalidArgument(f"this view does not show a segment {asked.get('segment')!r}")
+        raise InvalidArgument(f"this view does not show a segment {query.get('segment')!r}")
 
 
 class _Shown:
@@ -193,8 +193,8 @@ def _has_model(source: Source) -> bool:
         return False
 
 
-def _time_asked(source: Source, asked: dict[str, Any]) -> int | None:
-    at = asked.get("at")
+def _time_query(source: Source, query: dict[str, Any]) -> int | None:
+    at = query.get("at")
     if at is None:
         return None
     seconds = float(at)
@@ -203,8 +203,8 @@ def _time_asked(source: Source, asked: dict[str, Any]) -> int | None:
     return source.nanoseconds(seconds)
 
 
-def _window(asked: dict[str, Any]) -> float:
-    window = float(asked.get("window", 5.0))
+def _window(query: dict[str, Any]) -> float:
+    window = float(query.get("window", 5.0))
     if not 0.0 < window <= LONGEST_WINDOW:
         raise ValueError(f"window must be positive and at most {LONGEST_WINDOW:g} s, got {window}")
     return window
@@ -223,16 +223,16 @@ class AnswerCache:
         self._answers: dict[Hashable, tuple[float, Any]] = {}
         self._lock = threading.Lock()
 
-    def get(self, asked: Hashable, work: Callable[[], Any]) -> Any:
+    def get(self, query: Hashable, work: Callable[[], Any]) -> Any:
         """The answer of `work`, or the one that another page has just got."""
         with self._lock:
             begin = time.monotonic()
-            until, answer = self._answers.get(asked, (0.0, None))
+            until, answer = self._answers.get(query, (0.0, None))
             if begin < until:
                 return answer
             answer = work()
             end = time.monotonic()
             if len(self._answers) >= MOST:
                 self._answers = {key: kept for key, kept in self._answers.items() if kept[0] > end}
-            self._answers[asked] = end + max(SHARED_FOR, LOAD * (end - begin)), answer
+            self._answers[query] = end + max(SHARED_FOR, LOAD * (end - begin)), answer
             return answer

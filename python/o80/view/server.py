@@ -64,13 +64,13 @@ class PageServer:
         answer = self._answers.get(head.path)
         if answer is None:
             return Reply(404, b"unknown request")
-        asked = None
+        query = None
         with contextlib.suppress(ValueError, RecursionError):
-            asked = json.loads(body)
-        if not isinstance(asked, dict):
+            query = json.loads(body)
+        if not isinstance(query, dict):
             return Reply(400, b"the request must be a JSON object")
         try:
-            return Reply.json(200, answer(asked))
+            return Reply.json(200, answer(query))
         except Error as error:
             return Reply.json(409, {"error": str(error)})
         except (TypeError, ValueError, KeyError, OverflowError) as error:

@@ -101,23 +101,24 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
     const bool is_smooth = course.profile == Profile::minimum_jerk;
     longest = iterations_of(is_smooth ? kPeakFromRest * distance : distance, course.cruise);
   }
-  asked_by_speed_ = longest;
+  requested_by_speed_ = longest;
   for (Number& each : numbers_) {
     if (!each.is_commanded) continue;
-    Asked asked = course;
-    asked.target = layout_.number(each.number, target());
+    Requested requested = course;
+    requested.target = layout_.number(each.number, target());
     const bool at_published = observed != nullptr || !each.is_limited || !(first_row || !is_row_);
-    asked.line_start = at_published ? layout_.number(each.number, from()) : each.motion.position();
+    requested.line_start =
+        at_published ? layout_.number(each.number, from()) : each.motion.position();
     if (is_row_) {
       follows_rows_ = follows_rows_ || each.motion.has_rates();
-      each.motion.line(asked.line_start, asked.target);
+      each.motion.line(requested.line_start, requested.target);
       continue;
     }
     if (!first_row) each.motion.begin();
-    if (observed != nullptr) asked.start = asked.line_start;
-    if (each.number != course.first) asked.cruise = kUnlimited;
-    const std::int64_t fewest = each.motion.propose(asked);
-    if (each.number == course.first) asked_by_speed_ = fewest;
+    if (observed != nullptr) requested.start = requested.line_start;
+    if (each.number != course.first) requested.cruise = kUnlimited;
+    const std::int64_t fewest = each.motion.propose(requested);
+    if (each.number == course.first) requested_by_speed_ = fewest;
     if (fewest <= longest) continue;
     longest = fewest;
     slowest_ = {each.motion.plan().slowest(), each.number};

@@ -33,7 +33,7 @@ class Motion {
   Motion(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout);
 
   /// How a command gets to its target, or to the next row of a trajectory.
-  struct Course : Asked {
+  struct Course : Requested {
     std::uint32_t first = 0;  // the number that the cruising speed is for
     bool is_row = false;      // of a trajectory in straight lines: it has `iterations`
   };
@@ -57,7 +57,7 @@ class Motion {
   /// Proposes the number of iterations to the target, from `desired` or from the last target.
   std::int64_t propose(const Course& course, const std::byte* desired) noexcept;
   /// The part of it that the cruising speed needs.
-  std::int64_t asked_by_speed() const noexcept { return asked_by_speed_; }
+  std::int64_t requested_by_speed() const noexcept { return requested_by_speed_; }
   /// Then plans for so many iterations, at least those.
   void settle(Iteration first, std::int64_t iterations) noexcept {
     first_ = first;
@@ -219,7 +219,7 @@ class Motion {
   bool is_row_ = false;
   bool begun_ = false;  // the next row begins a command
   bool follows_rows_ = false;
-  std::int64_t asked_by_speed_ = 1;
+  std::int64_t requested_by_speed_ = 1;
   Limited slowest_;
 };
 

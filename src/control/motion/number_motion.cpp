@@ -5,10 +5,10 @@
 
 namespace o80 {
 
-std::int64_t NumberMotion::plan_for(const Asked& asked) noexcept {
-  PlanTask task{asked, asked.start ? Moment{*asked.start} : guard_.moment(), guard_.stop(),
-                guard_.rates(), asked.start || guard_.stays()};
-  task.span.include(asked.target);
+std::int64_t NumberMotion::plan_for(const Requested& requested) noexcept {
+  PlanTask task{requested, requested.start ? Moment{*requested.start} : guard_.moment(),
+                guard_.stop(), guard_.rates(), requested.start || guard_.stays()};
+  task.span.include(requested.target);
   task.span.include(task.from.position);
   guard_.begin(task.span);
   if (!accelerates()) task.span.include(former_target_);
@@ -16,9 +16,9 @@ std::int64_t NumberMotion::plan_for(const Asked& asked) noexcept {
   planned_ = true;
   // without limits it jumps to where it starts, which is no speed
   const double from = task.from.position;
-  jumps_ = asked.start && !has_rates() && guard_.admits(from);
+  jumps_ = requested.start && !has_rates() && guard_.admits(from);
   const bool starts_elsewhere =
-      asked.start && !jumps_ && (from != guard_.position() || !guard_.at_rest());
+      requested.start && !jumps_ && (from != guard_.position() || !guard_.at_rest());
   follows_ = leaves_ || starts_elsewhere || !guard_.admits(guard_.position());
   return plan_.propose(task);
 }
@@ -28,9 +28,9 @@ void NumberMotion::settle(std::int64_t iterations) noexcept {
     if (iterations == 1) {
       planned_ = true;
       follows_ = !guard_.admits(guard_.position());
-      return plan_.line(asked_.target, asked_.target);
+      return plan_.line(requested_.target, requested_.target);
     }
-    plan_for(asked_);
+    plan_for(requested_);
   }
   if (jumps_) guard_.restart(plan_.task().from.position);
   plan_.settle(iterations);

@@ -62,12 +62,12 @@ class NumberMotion {
   }
 
   /// Proposes a number of iterations for a plan to rest at the target.
-  std::int64_t propose(const Asked& asked) noexcept {
+  std::int64_t propose(const Requested& requested) noexcept {
     // mostly nothing limits a set-point: it needs no plan
-    jumps_at_once_ =
-        !has_rates() && asked.iterations <= 1 && !asked.start && !std::isfinite(asked.cruise);
-    if (!jumps_at_once_) return plan_for(asked);
-    asked_ = asked;
+    jumps_at_once_ = !has_rates() && requested.iterations <= 1 && !requested.start &&
+                     !std::isfinite(requested.cruise);
+    if (!jumps_at_once_) return plan_for(requested);
+    requested_ = requested;
     return 1;
   }
   /// Then plans it for `iterations`, at least those.
@@ -141,7 +141,7 @@ class NumberMotion {
   template <class Move>
   Limit move(Move&& move) noexcept;
   Limit hold_back() noexcept;
-  std::int64_t plan_for(const Asked& asked) noexcept;
+  std::int64_t plan_for(const Requested& requested) noexcept;
 
   NumberLimiter guard_;
   std::optional<double> rest_;
@@ -150,7 +150,7 @@ class NumberMotion {
   bool follows_ = false;  // `plan_` may break limits
   bool held_ = false;
   bool jumps_at_once_ = false;  // propose() needed no plan
-  Asked asked_;                 // then
+  Requested requested_;         // then
   bool jumps_ = false;          // the plan begins at its start
   // goes on with the former plan, until a stop would stay inside the bounds
   bool leaves_ = false;

@@ -37,16 +37,16 @@ std::int64_t iterations_of(double distance, double speed) noexcept {
 std::int64_t NumberPlan::propose(const PlanTask& task) noexcept {
   task_ = task;
   has_fastest_ = false;
-  const std::int64_t asked = task.iterations;
+  const std::int64_t requested = task.iterations;
   const bool is_smooth = task.profile == Profile::minimum_jerk;
-  if (asked > 0 && is_smooth && std::isfinite(task.rates.acceleration) && smooth(asked)) {
-    return asked;
+  if (requested > 0 && is_smooth && std::isfinite(task.rates.acceleration) && smooth(requested)) {
+    return requested;
   }
   std::int64_t least = fewest();
   if (is_smooth && std::isfinite(task.cruise) && least <= kLongestPlan) {
     least = fewest_smooth(least);
   }
-  return std::max(asked, least);
+  return std::max(requested, least);
 }
 
 /// The fewest iterations of a motion at full speed, or at the cruising speed asked for.

@@ -39,7 +39,7 @@ inline constexpr std::int64_t kLongestPlan = std::int64_t{1} << 31;
 std::int64_t iterations_of(double distance, double speed) noexcept;
 
 /// How a command asks for the target of one number.
-struct Asked {
+struct Requested {
   double target = 0.0;
   double line_start = 0.0;      // where a straight line begins
   std::optional<double> start;  // a place to start from at rest, instead of its own
@@ -49,7 +49,7 @@ struct Asked {
 };
 
 /// What a plan is for: one number, from its present motion to rest at a target.
-struct PlanTask : Asked {
+struct PlanTask : Requested {
   Moment from;
   // where a smooth motion stays: position, target, and shortest stop (without a limit of
   // acceleration: former target)

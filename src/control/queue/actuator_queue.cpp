@@ -118,7 +118,8 @@ void ActuatorQueue::end_running(Iteration iteration) noexcept {
   if (late_ > 0) carry_.reset();
   holder_ = ledger_->lane_of(record);
   Outcome outcome;
-  if (late_ > 0 && asked_ > 0) outcome = {outcome.status, Reason::limits, reason_.packed(), late_};
+  if (late_ > 0 && requested_ > 0)
+    outcome = {outcome.status, Reason::limits, reason_.packed(), late_};
   ledger_->end(record, outcome, iteration);
 }
 
@@ -200,8 +201,8 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
   } else {
     plan_row(iteration);
   }
-  const bool is_asked = pace_ != Pace::speed && row_iterations_ <= asked_;
-  if (row_iterations_ > kLongestPlan && !is_asked) {
+  const bool is_requested = pace_ != Pace::speed && row_iterations_ <= requested_;
+  if (row_iterations_ > kLongestPlan && !is_requested) {
     queue_.pop();
     end_motion();
     ledger_->end(record_, {Status::rejected, Reason::invalid, Limited{Limit::speed, 0}.packed()},
@@ -215,9 +216,9 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
   } else {
     motion_.settle(iteration, row_iterations_);
   }
-  if (asked_ > 0 && row_iterations_ > asked_) {
+  if (requested_ > 0 && row_iterations_ > requested_) {
     if (late_ == 0) reason_ = motion_.slowest();
-    late_ += row_iterations_ - asked_;
+    late_ += row_iterations_ - requested_;
     carry_.reset();
   }
   if (!std::exchange(begun_, true)) {
@@ -242,7 +243,7 @@ void ActuatorQueue::plan_row(Iteration iteration) noexcept {
   if (keeps_plan_) {
     rows_.read(scratch(), layout_->size());
     --rows_left_;
-    asked_ = 0;
+    requested_ = 0;
     row_iterations_ = std::max<std::int64_t>(1, motion_.last() - iteration + 1);
     return;
   }
@@ -251,9 +252,9 @@ void ActuatorQueue::plan_row(Iteration iteration) noexcept {
   const Motion::Course next = course(head, iteration);
   const bool is_as_sent = head.profile == Profile::as_sent;
   row_iterations_ = is_as_sent ? 1 : motion_.propose(next, desired_);
-  asked_ = next.iterations;
+  requested_ = next.iterations;
   // of several actuators, others may be slower
-  if (head.pace == Pace::speed && !is_member(head)) asked_ = motion_.asked_by_speed();
+  if (head.pace == Pace::speed && !is_member(head)) requested_ = motion_.requested_by_speed();
 }
 
 Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration) noexcept {

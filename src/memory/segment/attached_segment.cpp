@@ -221,7 +221,7 @@ AttachedSegment& AttachedSegment::operator=(AttachedSegment&& other) noexcept {
   commands_mapping_ = std::move(other.commands_mapping_);
   view_ = other.view_;
   guard_ = other.guard_;
-  asked_.store(0, std::memory_order_relaxed);
+  queried_.store(0, std::memory_order_relaxed);
   over_.store(other.over_.load(std::memory_order_relaxed), std::memory_order_relaxed);
   return *this;
 }
@@ -237,8 +237,8 @@ std::span<const std::byte> AttachedSegment::provenance() const noexcept {
 Life AttachedSegment::life() const noexcept {
   // only observers query the segment file: they can place many read locks on it, which would slow
   // the query of a commander
-  const int asked = access_ == Access::read_write ? commands_descriptor() : descriptor();
-  const Life now = judge_life(asked, view_.counters().state);
+  const int held = access_ == Access::read_write ? commands_descriptor() : descriptor();
+  const Life now = judge_life(held, view_.counters().state);
   if (is_over(now)) {
     over_.store(static_cast<std::uint32_t>(now), std::memory_order_relaxed);
     return now;
@@ -293,12 +293,12 @@ void AttachedSegment::throw_gone(Life life) const {
 
 void AttachedSegment::throw_if_known_gone() const {
   const std::int64_t now = monotonic_roughly_now();
-  const bool fresh = now - asked_.load(std::memory_order_relaxed) < kKnownFor;
+  const bool fresh = now - queried_.load(std::memory_order_relaxed) < kKnownFor;
   const bool ended =
       has_ended() || is_over(static_cast<Life>(over_.load(std::memory_order_relaxed)));
   if (fresh && !ended) return check_process();
   throw_if_gone();
-  asked_.store(now, std::memory_order_relaxed);
+  queried_.store(now, std::memory_order_relaxed);
 }
 
 void AttachedSegment::check_process() const {

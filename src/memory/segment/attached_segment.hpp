@@ -106,7 +106,7 @@ class AttachedSegment {
   Mapping commands_mapping_;
   SegmentView view_;
   ForkGuard guard_;
-  mutable std::atomic<std::int64_t> asked_{0};  // time of the last query of the lock [ns]
+  mutable std::atomic<std::int64_t> queried_{0};  // time of the last query of the lock [ns]
 };
 
 }  // namespace o80

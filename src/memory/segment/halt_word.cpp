@@ -73,10 +73,10 @@ void put_halt(const SegmentView& view, std::uint64_t number, HaltCause cause, st
 
 HaltLatch::HaltLatch(const SegmentView& view) noexcept : view_(view) {}
 
-void HaltLatch::latch(std::uint64_t asked) noexcept {
-  seen_ = asked;
+void HaltLatch::latch(std::uint64_t requested) noexcept {
+  seen_ = requested;
   halt_ = Halt{};
-  halt_.number = std::max<std::uint64_t>(asked, 1);
+  halt_.number = std::max<std::uint64_t>(requested, 1);
 }
 
 bool HaltLatch::show(Iteration iteration) noexcept {
@@ -110,14 +110,14 @@ std::optional<Halt> shown_halt(const SegmentView& view) noexcept {
   return halt;
 }
 
-std::optional<Halt> asked_halt(const SegmentView& view) noexcept {
-  const std::uint64_t asked = view.bell().halts.load(std::memory_order_seq_cst);  // sync halts
+std::optional<Halt> requested_halt(const SegmentView& view) noexcept {
+  const std::uint64_t requested = view.bell().halts.load(std::memory_order_seq_cst);  // sync halts
   const std::optional<Halt> shown = shown_halt(view);
-  if (shown && shown->number == asked) return shown;
-  if (asked == view.counters().cleared.load(std::memory_order_acquire))
+  if (shown && shown->number == requested) return shown;
+  if (requested == view.counters().cleared.load(std::memory_order_acquire))
     return shown;  // sync cleared
   Halt halt;
-  halt.number = std::max<std::uint64_t>(asked, 1);
+  halt.number = std::max<std::uint64_t>(requested, 1);
   read_halt(view.bell().reasons[halt.number % kHaltsKept], halt.number, halt);
   return halt;
 }

@@ -41,9 +41,10 @@ class HaltLatch {
 
   /// True if a halt was requested since the last call; it is in force from now on.
   bool look() noexcept {
-    const std::uint64_t asked = view_.bell().halts.load(std::memory_order_seq_cst);  // sync halts
-    if (asked == seen_) return false;
-    latch(asked);
+    const std::uint64_t requested =
+        view_.bell().halts.load(std::memory_order_seq_cst);  // sync halts
+    if (requested == seen_) return false;
+    latch(requested);
     return true;
   }
   /// The halt in force; its number is 0 if there is none.
@@ -56,7 +57,7 @@ class HaltLatch {
   bool clear() noexcept;
 
  private:
-  void latch(std::uint64_t asked) noexcept;
+  void latch(std::uint64_t requested) noexcept;
 
   SegmentView view_;
   std::uint64_t seen_ = 0;  // the counter at the last look()
@@ -69,6 +70,6 @@ std::optional<Halt> shown_halt(const SegmentView& view) noexcept;
 
 /// The newest requested halt; its `iteration` is -1 until it is in force. Needs a mapping of the
 /// bell.
-std::optional<Halt> asked_halt(const SegmentView& view) noexcept;
+std::optional<Halt> requested_halt(const SegmentView& view) noexcept;
 
 }  // namespace o80

@@ -36,9 +36,9 @@ inline constexpr std::size_t kMessages = 64;        // status texts kept for eac
 inline constexpr std::size_t kBurstsKept = 256;     // burst results kept for each lane
 inline constexpr std::size_t kCancelsKept = 7;      // cancelled bursts kept for each lane
 inline constexpr std::size_t kHaltsKept = 8;        // halts whose reasons are kept
-inline constexpr std::size_t kMaxRunning = 8;      // requests that run at the same time
+inline constexpr std::size_t kMaxRunning = 8;       // requests that run at the same time
 inline constexpr std::size_t kJournalSectors = 64;  // parts of the journal with a mark each
-inline constexpr std::uint32_t kMaxLanes = 256;    // a status has 8 bits for a lane
+inline constexpr std::uint32_t kMaxLanes = 256;     // a status has 8 bits for a lane
 /// Most ids that the owners of a lane may skip between two batches; a larger jump is invalid.
 inline constexpr std::uint64_t kMaxSkippedIds = 1ULL << 28;
 /// Most owners that a lane may have between two loads of `incarnation` by the backend.

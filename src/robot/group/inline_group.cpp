@@ -20,7 +20,7 @@ namespace {
 /// Files of a copy: three of its backend, three of its frontend, three of another frontend.
 constexpr std::size_t kDescriptorsPerCopy = 9;
 constexpr std::int64_t kClosePoll = 1'000'000;  // [ns]
-constexpr std::size_t kMaxNamed = 3;           // failed copies in the text of an error
+constexpr std::size_t kMaxNamed = 3;            // failed copies in the text of an error
 
 /// The group whose call this thread works for.
 thread_local const InlineGroup* working_for = nullptr;
@@ -256,7 +256,7 @@ void InlineGroup::look_around() noexcept {
   try {
     cancelled = *ask_ && !(*ask_)();
   } catch (...) {
-    asked_ = std::current_exception();
+    requested_ = std::current_exception();
     cancelled = true;
   }
   timed_out_ = !cancelled && deadline_.over();
@@ -316,8 +316,8 @@ void InlineGroup::throw_failures() {
   failed_ = false;
   const bool cancelled = cancelled_.exchange(false);
   const bool timed_out = std::exchange(timed_out_, false);
-  if (const std::exception_ptr asked = std::exchange(asked_, nullptr)) {
-    std::rethrow_exception(asked);
+  if (const std::exception_ptr requested = std::exchange(requested_, nullptr)) {
+    std::rethrow_exception(requested);
   }
   check_usable();  // closed during the call
   if (timed_out) {

@@ -182,7 +182,7 @@ class InlineGroup {
   std::atomic<bool> cancelled_{false};
   std::thread::id caller_;
   const KeepWaiting* ask_ = nullptr;
-  std::exception_ptr asked_;  // what it threw
+  std::exception_ptr requested_;  // what it threw
   Deadline deadline_{Timeout()};
   bool timed_out_ = false;
   std::int64_t ask_at_ = 0;          // time of the next question [ns]

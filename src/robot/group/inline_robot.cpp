@@ -15,7 +15,7 @@ namespace o80 {
 
 namespace {
 
-constexpr std::uint32_t kMaxAtOnce = 64;          // iterations between looks at the clock
+constexpr std::uint32_t kMaxAtOnce = 64;           // iterations between looks at the clock
 constexpr std::int64_t kLongAtOnce = kSlice / 10;  // [ns] longest time between these looks
 
 BackendOptions bursting(BackendOptions options) {

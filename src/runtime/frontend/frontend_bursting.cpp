@@ -76,15 +76,15 @@ void UntypedFrontend::refuse_burst(std::int64_t iterations) const {
 }
 
 Sent UntypedFrontend::send_burst(BatchBuilder& builder, std::int64_t iterations,
-                                 const PulseOptions& options, Asked asked) {
+                                 const PulseOptions& options, Requested requested) {
   refuse_burst(iterations);
   BatchRecord record = batch_of(options);
   record.burst = iterations;
-  return send(builder, record, asked);
+  return send(builder, record, requested);
 }
 
 Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
-  return {link_, Batch(link_, send_burst(link_->builder, iterations, options, Asked::yes))};
+  return {link_, Batch(link_, send_burst(link_->builder, iterations, options, Requested::yes))};
 }
 
 UntypedObservation UntypedFrontend::burst(std::int64_t iterations, Timeout timeout,
@@ -97,7 +97,7 @@ UntypedObservation UntypedFrontend::burst(BatchBuilder& builder, std::int64_t it
                                           Timeout timeout, const KeepWaiting& keep_waiting,
                                           const PulseOptions& options) {
   // start_burst(iterations).wait(timeout, keep_waiting) without the allocations of a Burst
-  const Sent sent = send_burst(builder, iterations, options, Asked::no);
+  const Sent sent = send_burst(builder, iterations, options, Requested::no);
   CancelUnlessDone rest(sent.lane.get(), sent.id);
   UntypedObservation observation(link_->description);  // made while the backend works
   const Iteration row =
@@ -119,7 +119,7 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
                           std::to_string(link_->history.rows()));
   }
   const Sent sent =
-      send_burst(link_->builder, static_cast<std::int64_t>(count), options, Asked::no);
+      send_burst(link_->builder, static_cast<std::int64_t>(count), options, Requested::no);
   CancelUnlessDone rest(sent.lane.get(), sent.id);
   const Iteration last =
       wait_for_burst(*link_, *sent.lane, sent.id, timeout, keep_waiting, sent.events_before_send);

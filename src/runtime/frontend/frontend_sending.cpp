@@ -423,7 +423,7 @@ CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stay
 }
 
 /// Seals a batch, sends it, and lets an inline robot take it.
-Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted, Asked asked) {
+Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted, Requested requested) {
   Sent sent;
   std::shared_ptr<InlineRunner> runner;
   {
@@ -442,7 +442,7 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted, Ask
     sent.events_before_send = lane->events();
     record.id = draw_ids(*lane, std::uint64_t{records} + 2, does_stay(builder, wanted));
     const std::span<const Block> blocks = builder.seal(record);
-    link_->sent_commands.note(blocks, asked == Asked::yes ? &sent.commands : nullptr);
+    link_->sent_commands.note(blocks, requested == Requested::yes ? &sent.commands : nullptr);
     lane->send(std::as_bytes(blocks), offsetof(BatchRecord, ticket));
     builder.clear();
     if (records > 0) link_->ids.sent(record.id, std::uint64_t{records} + 2);

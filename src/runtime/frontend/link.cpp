@@ -93,7 +93,7 @@ bool Link::has_replaced(CommandId id, Iteration iteration,
 
 std::optional<Halt> Link::halt() const {
   const bool maps_bell = segment.access() == Access::read_write;
-  return maps_bell ? asked_halt(segment.view()) : shown_halt(segment.view());
+  return maps_bell ? requested_halt(segment.view()) : shown_halt(segment.view());
 }
 
 std::string Link::halt_text(Iteration iteration) const {

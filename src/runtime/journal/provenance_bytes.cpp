@@ -11,7 +11,7 @@ namespace o80 {
 namespace {
 
 constexpr std::uint64_t kProvenanceMagic = 0x6E65'766F'7250'3038;  // "80Proven"
-constexpr std::uint32_t kMaxOfAKind = 4096;                       // options or files
+constexpr std::uint32_t kMaxOfAKind = 4096;                        // options or files
 
 /// Visits all parts in the order in which they stand in the bytes.
 template <class ProvenanceLike, class Visit>

@@ -135,25 +135,25 @@ void RecordedDecisions::interrupt(Iteration iteration, std::uint16_t actuator,
 }
 
 void RecordedDecisions::ask_to_halt(HaltCause cause, std::string_view text) {
-  asked_.push_back({cause, std::string(text)});
+  requested_.push_back({cause, std::string(text)});
 }
 
 void RecordedDecisions::compare_halt(const JournalEntry& halt) {
-  const auto same = [&](const AskedHalt& asked) {
-    return asked.cause == halt.cause && asked.text == halt.text;
+  const auto same = [&](const RequestedHalt& requested) {
+    return requested.cause == halt.cause && requested.text == halt.text;
   };
   const bool repeats = is_repeated(halt.cause) && (has_driver() || halt.cause != HaltCause::driver);
-  if (repeats && std::ranges::none_of(asked_, same)) {
+  if (repeats && std::ranges::none_of(requested_, same)) {
     note(halt.iteration, "halt", halt_text(halt.cause, halt.text),
-         asked_.empty() ? "none" : halt_text(asked_[0].cause, asked_[0].text));
+         requested_.empty() ? "none" : halt_text(requested_[0].cause, requested_[0].text));
   }
-  asked_.clear();
+  requested_.clear();
 }
 
 void RecordedDecisions::end_decisions(Iteration iteration) {
-  if (asked_.empty()) return;
-  note(iteration, "halt", "none", halt_text(asked_[0].cause, asked_[0].text));
-  asked_.clear();
+  if (requested_.empty()) return;
+  note(iteration, "halt", "none", halt_text(requested_[0].cause, requested_[0].text));
+  requested_.clear();
 }
 
 void RecordedDecisions::not_repeated(const JournalEntry& entry) {

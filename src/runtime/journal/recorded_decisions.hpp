@@ -80,7 +80,7 @@ class RecordedDecisions {
   const std::optional<DecisionMismatch>& mismatch() const noexcept { return mismatch_; }
 
  private:
-  struct AskedHalt {
+  struct RequestedHalt {
     HaltCause cause;
     std::string text;
   };
@@ -98,7 +98,7 @@ class RecordedDecisions {
   std::deque<JournalEntry> entries_;
   Iteration first_time_ = 0;
   std::vector<std::int64_t> times_;
-  std::vector<AskedHalt> asked_;
+  std::vector<RequestedHalt> requested_;
   std::optional<DecisionMismatch> mismatch_;
 };
 

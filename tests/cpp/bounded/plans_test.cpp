@@ -52,16 +52,16 @@ class PlansTest : public testing::Test {
     const double bound = one_in(3) ? magnitude(-2, 2) : kNoLimit;
     return number_at(real(-1, 1) * std::min(bound, 1.0), bound, rates);
   }
-  Asked any_target(const NumberMotion& number) {
+  Requested any_target(const NumberMotion& number) {
     const double far = one_in(20) ? magnitude(4, 300) : magnitude(-8, 3);
     const double near = number.guard().moment().speed * real(0, 20);  // about where it can stop
-    Asked asked;
-    asked.target = number.position() + (one_in(4) ? near : real(-1, 1) * far);
-    if (one_in(3)) asked.profile = Profile::minimum_jerk;
-    if (one_in(3)) asked.cruise = number.guard().rates().speed * magnitude(-3, 0.2);
-    if (one_in(3)) asked.iterations = static_cast<std::int64_t>(magnitude(0, 9));
-    if (one_in(10)) asked.start = real(-1, 1);
-    return asked;
+    Requested requested;
+    requested.target = number.position() + (one_in(4) ? near : real(-1, 1) * far);
+    if (one_in(3)) requested.profile = Profile::minimum_jerk;
+    if (one_in(3)) requested.cruise = number.guard().rates().speed * magnitude(-3, 0.2);
+    if (one_in(3)) requested.iterations = static_cast<std::int64_t>(magnitude(0, 9));
+    if (one_in(10)) requested.start = real(-1, 1);
+    return requested;
   }
   std::int64_t some_of(std::int64_t iterations) {
     return static_cast<std::int64_t>(real(0, 1) * static_cast<double>(iterations));
@@ -122,11 +122,11 @@ TEST_F(PlansTest, OfAnArmUsuallyNeedFewChangesOfSpeed) {
   for (int round = 0; round < 3'000; ++round) {
     NumberMotion number = number_at(0.0, kNoLimit, arm);
     const auto start = [&](std::int64_t more) {
-      Asked asked;
-      asked.target = number.position() + real(-1, 1);
+      Requested requested;
+      requested.target = number.position() + real(-1, 1);
       work_since_last_asked();
       number.begin();
-      const std::int64_t iterations = number.propose(asked) + more;
+      const std::int64_t iterations = number.propose(requested) + more;
       number.settle(iterations);
       return iterations;
     };

@@ -39,7 +39,7 @@ struct Bare {
 };
 O80_DESCRIBE(Bare, stiffness, damping);
 
-struct Asked {
+struct Requested {
   using Actuators = std::array<double, 1>;
   using Requests = o80::Requests<Home, Mixed, Bare>;
 };
@@ -68,7 +68,7 @@ class DefaultsTest : public testing::Test {
   const TypeRow& type(std::uint32_t request) const {
     return schema_.types.at(schema_.requests.at(request).type);
   }
-  Schema schema_ = described::schema_of<described::Asked>();
+  Schema schema_ = described::schema_of<described::Requested>();
 };
 
 TEST_F(DefaultsTest, StandInTheSchema) {

@@ -165,9 +165,9 @@ struct SentCommand {
 };
 
 /// A halt that an actor asked for.
-struct AskedHalt {
-  std::atomic<std::uint32_t> asked;  // Sent
-  std::uint32_t generation;          // kNoGeneration: by name, of whatever bore it
+struct RequestedHalt {
+  std::atomic<std::uint32_t> requested;  // Sent
+  std::uint32_t generation;              // kNoGeneration: by name, of whatever bore it
   std::uint64_t number;
   std::int64_t began_at;     // [ns]
   std::int64_t returned_at;  // [ns]
@@ -215,8 +215,8 @@ struct Slot {
   std::atomic<std::uint32_t> resumes;
   std::atomic<std::uint32_t> bursts_halted;
   std::atomic<std::uint32_t> halted_in_control;
-  std::array<AskedHalt, kMaxHalts> asked_halts;
-  std::array<AskedResume, kMaxResumes> asked_resumes;
+  std::array<RequestedHalt, kMaxHalts> requested_halts;
+  std::array<AskedResume, kMaxResumes> requested_resumes;
 
   void stops(std::int64_t now) { stopped.fetch_sub(now); }
   void goes_on(std::int64_t now) { stopped.fetch_add(now); }

@@ -6,21 +6,21 @@ namespace torture {
 
 namespace {
 
-AskedHalt* note_halt(Actor& actor, std::uint32_t generation) {
+RequestedHalt* note_halt(Actor& actor, std::uint32_t generation) {
   const std::uint32_t place = actor.slot.halts;
   if (place >= kMaxHalts) return nullptr;
-  AskedHalt& entry = actor.slot.asked_halts[place];
+  RequestedHalt& entry = actor.slot.requested_halts[place];
   entry.generation = generation;
   entry.began_at = o80::monotonic_now();
-  entry.asked = static_cast<std::uint32_t>(Sent::under_way);
+  entry.requested = static_cast<std::uint32_t>(Sent::under_way);
   actor.slot.halts = place + 1;
   return &entry;
 }
 
-void answered(AskedHalt& entry, std::uint64_t number) {
+void answered(RequestedHalt& entry, std::uint64_t number) {
   entry.number = number;
   entry.returned_at = o80::monotonic_now();
-  entry.asked = static_cast<std::uint32_t>(Sent::sent);
+  entry.requested = static_cast<std::uint32_t>(Sent::sent);
 }
 
 std::uint32_t number_of(Actor& actor, const o80::UntypedFrontend& frontend) {
@@ -30,19 +30,19 @@ std::uint32_t number_of(Actor& actor, const o80::UntypedFrontend& frontend) {
 }  // namespace
 
 void halt(Actor& actor, o80::UntypedFrontend& frontend) {
-  AskedHalt* entry = note_halt(actor, number_of(actor, frontend));
+  RequestedHalt* entry = note_halt(actor, number_of(actor, frontend));
   if (entry == nullptr) return;
   try {
     answered(*entry, actor.timed("halt", std::chrono::nanoseconds(0),
                                  [&] { return frontend.halt("the ball is on the floor"); }));
   } catch (const o80::BackendGone&) {
-    entry->asked = static_cast<std::uint32_t>(Sent::refused);
+    entry->requested = static_cast<std::uint32_t>(Sent::refused);
     throw;
   }
 }
 
 void halt_by_name(Actor& actor) {
-  AskedHalt* entry = note_halt(actor, kNoGeneration);
+  RequestedHalt* entry = note_halt(actor, kNoGeneration);
   if (entry == nullptr) return;
   const auto timeout = actor.some_timeout();
   try {
@@ -51,9 +51,9 @@ void halt_by_name(Actor& actor) {
     }));
   } catch (const o80::TimeoutError&) {
     // nobody is there yet
-    entry->asked = static_cast<std::uint32_t>(Sent::refused);
+    entry->requested = static_cast<std::uint32_t>(Sent::refused);
   } catch (const o80::BackendGone&) {
-    entry->asked = static_cast<std::uint32_t>(Sent::refused);
+    entry->requested = static_cast<std::uint32_t>(Sent::refused);
   }
 }
 
@@ -61,7 +61,7 @@ void resume(Actor& actor, o80::UntypedFrontend& frontend, std::int64_t& call_beg
   const auto halt = frontend.halted();
   const std::uint32_t place = actor.slot.resumes;
   if (!halt || place >= kMaxResumes) return;
-  AskedResume& entry = actor.slot.asked_resumes[place];
+  AskedResume& entry = actor.slot.requested_resumes[place];
   entry.generation = number_of(actor, frontend);
   entry.number = halt->number;
   const bool guesses = actor.chance.percent(10);

@@ -20,7 +20,7 @@ void judge_halts(const Round& round, std::vector<Failure>& failures);
 
 /// What was asked for and what came of it.
 struct HaltCount {
-  std::uint64_t asked = 0;        // and answered
+  std::uint64_t requested = 0;    // and answered
   std::uint64_t interrupted = 0;  // their asker was killed in the middle
   std::uint64_t controlled = 0;   // asked for by who has taken control
   std::uint64_t begun = 0;        // seen by a driver

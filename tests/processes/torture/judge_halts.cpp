@@ -64,7 +64,8 @@ class HaltedLife {
   /// Some halt was asked for, answered, and not resumed.
   bool may_act() const {
     std::uint64_t last = rows_ == 0 ? 0 : row(rows_ - 1).halted;
-    for_each_asked([&](const AskedHalt& asked) { last = std::max(last, asked.number); });
+    for_each_asked(
+        [&](const RequestedHalt& requested) { last = std::max(last, requested.number); });
     return last != 0 && !may_be_cleared(last, rows_);
   }
   bool is_resumed(std::int64_t k) const {
@@ -147,20 +148,20 @@ class HaltedLife {
   void for_each_asked(Visit&& visit) const {
     for (const Slot& slot : round_.slots)
       for (std::uint32_t i = 0; i < slot.halts; ++i) {
-        const AskedHalt& asked = slot.asked_halts[i];
-        if (asked.generation == number_ && is_sent(asked.asked)) visit(asked);
+        const RequestedHalt& requested = slot.requested_halts[i];
+        if (requested.generation == number_ && is_sent(requested.requested)) visit(requested);
       }
   }
 
   /// What was answered acts in the first iteration begun after the answer.
   void judge_asked() {
     std::set<std::uint64_t> numbers;
-    for_each_asked([&](const AskedHalt& asked) {
-      const std::string name = "halt " + std::to_string(asked.number);
-      if (asked.number == 0 || !numbers.insert(asked.number).second)
+    for_each_asked([&](const RequestedHalt& requested) {
+      const std::string name = "halt " + std::to_string(requested.number);
+      if (requested.number == 0 || !numbers.insert(requested.number).second)
         return fail(name + " was asked for twice");
-      const std::int64_t k = first_begun(asked.returned_at);
-      if (k < rows_ && row(k).halted < asked.number && !may_be_cleared(asked.number, k))
+      const std::int64_t k = first_begun(requested.returned_at);
+      if (k < rows_ && row(k).halted < requested.number && !may_be_cleared(requested.number, k))
         fail(name + " does not act in row " + text_of(k) + ", begun after it; there acts " +
              std::to_string(row(k).halted));
     });
@@ -168,15 +169,15 @@ class HaltedLife {
 
   /// Only the number that acted clears it.
   void judge_resumed() {
-    std::set<std::uint64_t> asked;
+    std::set<std::uint64_t> requested;
     std::set<std::uint64_t> granted;
     for (std::uint32_t i = 0; i < resumes_; ++i)
       if (life_.resumes[i].granted != 0) granted.insert(life_.resumes[i].number);
     for (const Slot& slot : round_.slots)
       for (std::uint32_t i = 0; i < slot.resumes; ++i) {
-        const AskedResume& resume = slot.asked_resumes[i];
+        const AskedResume& resume = slot.requested_resumes[i];
         if (resume.generation != number_) continue;
-        asked.insert(resume.number);
+        requested.insert(resume.number);
         if (resume.resumed != static_cast<std::uint32_t>(Resumed::done) || resume.returned_at == 0)
           continue;
         const std::int64_t k = first_begun(resume.returned_at);
@@ -185,16 +186,16 @@ class HaltedLife {
                std::to_string(row(k).halted) + " acts in row " + text_of(k) + ", begun after it");
       }
     for (const std::uint64_t number : granted)
-      if (!asked.contains(number))
+      if (!requested.contains(number))
         fail("halt " + std::to_string(number) + " was resumed, and nobody asked for that");
   }
 
   /// What was sent before a halt was asked for does not act after it has begun.
   void judge_commands() {
     std::vector<std::pair<std::int64_t, std::int64_t>> begun;  // asked at [ns] => row
-    for_each_asked([&](const AskedHalt& asked) {
-      const std::int64_t first = first_halted(asked.number);
-      if (first >= 0) begun.emplace_back(asked.began_at, first);
+    for_each_asked([&](const RequestedHalt& requested) {
+      const std::int64_t first = first_halted(requested.number);
+      if (first >= 0) begun.emplace_back(requested.began_at, first);
     });
     std::sort(begun.begin(), begun.end());
     // of all that were asked for then or later, the first row
@@ -285,7 +286,7 @@ void judge_halts(const Round& round, std::vector<Failure>& failures) {
 }
 
 HaltCount& HaltCount::operator+=(const HaltCount& more) {
-  asked += more.asked;
+  requested += more.requested;
   interrupted += more.interrupted;
   controlled += more.controlled;
   begun += more.begun;
@@ -301,13 +302,13 @@ HaltCount halts_of(const Round& round) {
   HaltCount count;
   for (const Slot& slot : round.slots) {
     for (std::uint32_t i = 0; i < slot.halts; ++i) {
-      const std::uint32_t asked = slot.asked_halts[i].asked;
-      count.asked += is_sent(asked) ? 1 : 0;
-      count.interrupted += asked == static_cast<std::uint32_t>(Sent::under_way) ? 1 : 0;
+      const std::uint32_t requested = slot.requested_halts[i].requested;
+      count.requested += is_sent(requested) ? 1 : 0;
+      count.interrupted += requested == static_cast<std::uint32_t>(Sent::under_way) ? 1 : 0;
     }
     for (std::uint32_t i = 0; i < slot.resumes; ++i)
       count.resumed +=
-          slot.asked_resumes[i].resumed == static_cast<std::uint32_t>(Resumed::done) ? 1 : 0;
+          slot.requested_resumes[i].resumed == static_cast<std::uint32_t>(Resumed::done) ? 1 : 0;
     for (std::uint32_t i = 0; i < slot.commands; ++i) {
       const SentCommand& command = slot.sent_commands[i];
       const bool told = static_cast<Status>(command.told) == Status::halted;

@@ -90,7 +90,7 @@ class Campaign {
   }
 
   bool is_done() const {
-    return tally_.kills >= options_.kills && tally_.halts.asked >= options_.halts;
+    return tally_.kills >= options_.kills && tally_.halts.requested >= options_.halts;
   }
 
   bool late(std::int64_t now) const {
@@ -148,7 +148,7 @@ class Campaign {
         "meanwhile; %lu seen by drivers, %lu of these in motion\n"
         "%lu commands and %lu bursts ended by them, %lu resumes, %lu successors of the killed "
         "started halted\n",
-        number(halts.asked), number(halts.controlled), number(halts.interrupted),
+        number(halts.requested), number(halts.controlled), number(halts.interrupted),
         number(halts.begun), number(halts.moving), number(halts.commands), number(halts.bursts),
         number(halts.resumed), number(halts.inherited));
     std::printf("longest phase of a round: act %.1f s, settle %.1f s, audit %.1f s\n",
@@ -165,11 +165,11 @@ class Campaign {
     const bool late_and_short = !is_done() && failures() == 0 && interrupted == 0;
     if (late_and_short)
       std::printf("only %lu of %lu kills and %lu of %lu halts in %ld s\n", number(tally_.kills),
-                  number(options_.kills), number(halts.asked), number(options_.halts),
+                  number(options_.kills), number(halts.requested), number(options_.halts),
                   static_cast<long>(options_.seconds));
     std::printf("seed %lu, %.0f s\n%lu kills, %lu halts, %lu failures\n", number(options_.seed),
                 static_cast<double>(o80::monotonic_now() - began_) / 1e9, number(tally_.kills),
-                number(halts.asked), number(failures()));
+                number(halts.requested), number(failures()));
     return failures() == 0 && !late_and_short && interrupted == 0 ? 0 : 1;
   }
 

@@ -88,8 +88,7 @@ void serve_every_backend(Actor& actor, const std::int64_t& call_began, Serve&& s
       sender.settle_all();
       sender.close();
     }
-    if (actor.slot.batches + 8 >= kMaxBatches || actor.slot.commands + 128 >= kMaxCommands)
-      return;
+    if (actor.slot.batches + 8 >= kMaxBatches || actor.slot.commands + 128 >= kMaxCommands) return;
   }
 }
 

@@ -15,16 +15,16 @@ SOURCES = {
 """Figures of the report, with the processes whose rows they are computed from."""
 
 
-def not_played(balls: Mapping[str, int], asked: int) -> list[str]:
+def not_played(balls: Mapping[str, int], requested: int) -> list[str]:
     """A sentence if fewer balls were played than asked for (0: no number), or some were given up.
 
     balls: as the report counts them; empty: the environment left no rows.
     """
     played, given_up = balls.get("played", 0), balls.get("given_up", 0)
-    if played >= asked and not given_up:
+    if played >= requested and not given_up:
         return []
     failed = balls.get("launches_failed", 0)
-    of = f"{played} of {asked}" if asked else f"{played}"
+    of = f"{played} of {requested}" if requested else f"{played}"
     return [
         f"balls: {of} were played; {given_up} were given up because the arm or the world ended or "
         f"stood, {failed} launches failed"

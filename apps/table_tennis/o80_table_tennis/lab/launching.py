@@ -20,7 +20,7 @@ class Launching:
         self._launches = Watched(settings.segment(LAUNCHES))
         self._random = np.random.default_rng(settings.seed)
         self._batch: o80.Batch | None = None
-        self._asked = False
+        self._requested = False
         self.number = 0
         """Number of the last launch that was found."""
         self.failed = False

@@ -197,8 +197,8 @@ def _cells(part: Part, loop: Loop | None, *, running: bool) -> tuple[str, ...]:
     if loop is None:
         return (part.name, "", "", "", "", state)
     rate = "bursts" if loop.rate is None else f"{loop.rate:.1f}"
-    asked = "" if part.rate is None else f"{part.rate:g}"
-    return (part.name, rate, asked, f"{loop.missed_percent:.2f} %", loop.scheduling, state)
+    requested = "" if part.rate is None else f"{part.rate:g}"
+    return (part.name, rate, requested, f"{loop.missed_percent:.2f} %", loop.scheduling, state)
 
 
 def title_of(row: o80.Record | None) -> str:

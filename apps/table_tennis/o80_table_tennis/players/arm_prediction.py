@@ -52,16 +52,16 @@ class ArmPredictor:
         self._dead_time, self._begin = dead_time, begin
         self.longest = max(dead_time)
         """[s]"""
-        self._asked: deque[FloatArray] = deque(maxlen=2 + math.ceil(self.longest / STEP))
+        self._commanded: deque[FloatArray] = deque(maxlen=2 + math.ceil(self.longest / STEP))
 
-    def start(self, asked: FloatArray) -> None:
+    def start(self, commanded: FloatArray) -> None:
         """The pressures (8,) that an arm at rest was asked for until now."""
-        self._asked.clear()
-        self._asked.append(asked)
+        self._commanded.clear()
+        self._commanded.append(commanded)
 
-    def ask(self, asked: FloatArray) -> None:
+    def ask(self, commanded: FloatArray) -> None:
         """These are asked for in the step that begins now."""
-        self._asked.append(asked)
+        self._commanded.append(commanded)
 
     def predict(self, now: ArmState) -> ArmState:
         """The state of each joint when what is asked for now begins to act on it."""
@@ -91,9 +91,9 @@ class ArmPredictor:
         for joint, dead_time in enumerate(self._dead_time):
             # steps back from the newest: it is asked for from begin - STEP on
             back = math.floor((dead_time + self._begin - time) / STEP)
-            index = max(len(self._asked) - 1 - max(back, 0), 0)
+            index = max(len(self._commanded) - 1 - max(back, 0), 0)
             part = slice(2 * joint, 2 * joint + 2)
-            targets[part] = self._asked[index][part]
+            targets[part] = self._commanded[index][part]
         return targets
 
 

@@ -141,7 +141,7 @@ class HittingPolicy:
         row = observation.astype(np.float64)
         if self._swing is None:
             self._actions.start(row[PRESSURES])
-            self._predictor.start(self._actions.asked)
+            self._predictor.start(self._actions.commanded)
             self._swing = Swing.resting_at(row[JOINT_POSITIONS])
             self._planned.clear()
 
@@ -150,7 +150,7 @@ class HittingPolicy:
         self._planned.append(self._swing)
         seen = ArmState(row[JOINT_POSITIONS], row[JOINT_VELOCITIES], row[PRESSURES])
         action = self._drive(self._predictor.predict(seen))
-        self._predictor.ask(self._actions.asked)
+        self._predictor.ask(self._actions.commanded)
         return action
 
     def _plan(self, position: FloatArray, velocity: FloatArray, swing: Swing) -> Swing:
@@ -225,7 +225,7 @@ class HittingPolicy:
         self._lacking += STEP * np.array(control.learning) * (start.q - q)
         torque += self._lacking
         in_muscles = s.muscles.pressures(torque, wanted.q, control.mean_pressure).ravel()
-        begin = s.lag.after(pressures, self._actions.asked, control.begin)
+        begin = s.lag.after(pressures, self._actions.commanded, control.begin)
         return self._actions.towards(s.lag.asking(begin, in_muscles, control.settling))
 
 

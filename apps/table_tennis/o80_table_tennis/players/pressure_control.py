@@ -87,9 +87,9 @@ class PressureLag:
     times: tuple[float, ...] = (0.016, 0.016, 0.044, 0.044, 0.044, 0.044, 0.044, 0.044)
     """(8,) of a first-order lag [s]"""
 
-    def after(self, pressures: FloatArray, asked: FloatArray, duration: float) -> FloatArray:
+    def after(self, pressures: FloatArray, commanded: FloatArray, duration: float) -> FloatArray:
         """Pressures (8,) in the muscles after `duration` [s] of `asked` (8,)."""
-        return asked + (pressures - asked) * np.exp(-duration / np.array(self.times))
+        return commanded + (pressures - commanded) * np.exp(-duration / np.array(self.times))
 
     def asking(self, pressures: FloatArray, wanted: FloatArray, duration: float) -> FloatArray:
         """Pressures to ask for (8,) to have `wanted` (8,) in the muscles after `duration` [s]."""
@@ -101,17 +101,17 @@ class PressureActions:
 
     def __init__(self, *, factor: float = COARSE) -> None:
         self._factor = factor
-        self.asked = np.full(MUSCLES, 0.5)
+        self.commanded = np.full(MUSCLES, 0.5)
 
     def start(self, pressures: FloatArray) -> None:
         """A new episode: the arm rests, the pressures in its muscles (8,) are those asked for."""
-        self.asked = np.clip(pressures, 0.0, 1.0)
+        self.commanded = np.clip(pressures, 0.0, 1.0)
 
     def towards(self, wanted: FloatArray) -> NDArray[np.float32]:
         """The action (8,) in [-1, 1] that brings the asked pressures nearest to `wanted` (8,)."""
-        delta = np.clip(np.clip(wanted, 0.0, 1.0) - self.asked, -0.49, 0.49)
+        delta = np.clip(np.clip(wanted, 0.0, 1.0) - self.commanded, -0.49, 0.49)
         wished = 2.0 * np.arctanh(2.0 * delta) / self._factor
         action: NDArray[np.float32] = np.clip(wished, -1.0, 1.0).astype(np.float32)
         taken = action.astype(np.float64)
-        self.asked = changed_pressures(self.asked, taken, factor=self._factor)
+        self.commanded = changed_pressures(self.commanded, taken, factor=self._factor)
         return action

@@ -49,15 +49,15 @@ class ArmRows:
         """Range of the raw pressures."""
         self.last_motion = field_view(last, *MOTION)
         self.last_racket = field_view(last, "extended.racket_position")
-        self._last_pressures, self._last_asked = last["observed"], last["desired"]
+        self._last_pressures, self._last_commanded = last["observed"], last["desired"]
 
     def read_pressures(self, out: FloatArray) -> None:
         """Fills in the normalised pressures (N, 8) in the muscles in the last rows."""
         self.range.normalised(self._last_pressures, out=out)
 
-    def asked(self, copies: Index = EVERY) -> FloatArray:
+    def commanded(self, copies: Index = EVERY) -> FloatArray:
         """Normalised pressures (n, 8) asked for in the last rows, a fresh array."""
-        return self.range.normalised(self._last_asked[copies])
+        return self.range.normalised(self._last_commanded[copies])
 
 
 class Arm(ArmRows):
@@ -146,9 +146,11 @@ class Arm(ArmRows):
     def is_back(self) -> bool:
         """In the last row that was read the arm stands where it started, and is asked to."""
         angles, velocities = self.last_motion[0, :JOINTS], self.last_motion[0, JOINTS:]
-        asked = np.array_equal(self._last_asked[0], self.start_pressures)
+        commanded = np.array_equal(self._last_commanded[0], self.start_pressures)
         still = np.abs(velocities).max() < SETTLED_SPEED
-        return bool(asked and still and np.abs(angles - self.start_angles).max() < SETTLED_ANGLE)
+        return bool(
+            commanded and still and np.abs(angles - self.start_angles).max() < SETTLED_ANGLE
+        )
 
     def read_newest(self) -> int:
         """Reads the last rows; returns the iteration of the newest one."""

@@ -31,7 +31,7 @@ class VirtualBalls:
         self,
         numbers: Sequence[int],
         played: State,
-        asked: FloatArray,
+        commanded: FloatArray,
         generator: np.random.Generator,
     ) -> None:
         """A new episode with these balls; `played` is the state of the played one."""
@@ -42,14 +42,14 @@ class VirtualBalls:
         self._returned = np.zeros(self._count, np.bool_)
         self._observations = self._observer.begin(
             self._state(played),
-            self._shared(asked),
+            self._shared(commanded),
             [generator] * self._count,
             np.arange(self._count),
         )
 
-    def observe(self, played: State, asked: FloatArray) -> None:
+    def observe(self, played: State, commanded: FloatArray) -> None:
         """Observes all extra balls, once after each step."""
-        self._observations = self._observer.observe(self._state(played), self._shared(asked))
+        self._observations = self._observer.observe(self._state(played), self._shared(commanded))
 
     def look(self, played: State, *, over: bool) -> dict[str, Any]:
         """`info["virtual"]` of the twins' newest rows; `played` is the state of the played ball.

@@ -79,7 +79,7 @@ class Observer:
     def begin(
         self,
         state: State,
-        asked: FloatArray,
+        commanded: FloatArray,
         generators: Sequence[np.random.Generator],
         which: IntArray,
     ) -> Float32Array:
@@ -95,10 +95,10 @@ class Observer:
         )
         if self._full is None:
             return self._of_task(state, seen)
-        return self._box.clip(self._full.begin(state, asked, seen, which))
+        return self._box.clip(self._full.begin(state, commanded, seen, which))
 
     def observe(
-        self, state: State, asked: FloatArray, which: IntArray | slice = EVERY
+        self, state: State, commanded: FloatArray, which: IntArray | slice = EVERY
     ) -> Float32Array:
         """The observations (n, M) after a step of the episodes `which` (n,).
 
@@ -111,7 +111,7 @@ class Observer:
         )
         if self._full is None:
             return self._of_task(state, seen)
-        return self._box.clip(self._full.observe(state, asked, seen, which))
+        return self._box.clip(self._full.observe(state, commanded, seen, which))
 
     def _of_task(self, state: State, seen: Perceived) -> Float32Array:
         return self._box.clip(self._task.observe(state.perceived(seen.ball, seen.pressures)))

@@ -61,15 +61,16 @@ PamDriver::PamDriver(const Config& config)
 }
 
 void PamDriver::describe(Schema& schema) const {
-  const std::int64_t asked = schema.asked_period();
-  if (asked != 0 && asked != period_) {
+  const std::int64_t requested = schema.asked_period();
+  if (requested != 0 && requested != period_) {
     const double frequency = 1e9 / static_cast<double>(period_);
     std::array<char, 240> text{};
     std::snprintf(text.data(), text.size(),
                   "an iteration of the arm lasts %g s (%g Hz), but %g Hz was requested. Leave the "
                   "frequency out, set it to %g, or give the arm period=%g",
-                  static_cast<double>(period_) * 1e-9, frequency, 1e9 / static_cast<double>(asked),
-                  frequency, static_cast<double>(asked) * 1e-9);
+                  static_cast<double>(period_) * 1e-9, frequency,
+                  1e9 / static_cast<double>(requested), frequency,
+                  static_cast<double>(requested) * 1e-9);
     throw DriverError(text.data());
   }
   schema.period(period_);
@@ -96,9 +97,9 @@ void PamDriver::begin() noexcept {
 
 void PamDriver::write(const Desired<PamDriver>& desired) {
   now_.desired = desired.states;
-  Pressures asked{};
-  for (std::size_t m = 0; m < kMuscles; ++m) asked[m] = rounded(desired[m]);
-  now_.clipped = plant_.advance(asked);
+  Pressures requested{};
+  for (std::size_t m = 0; m < kMuscles; ++m) requested[m] = rounded(desired[m]);
+  now_.clipped = plant_.advance(requested);
   for (std::size_t m = 0; m < kMuscles; ++m) {
     now_.observed[m] = plant_.config().ranges[m].pressure(plant_.state().activation[m]);
   }

@@ -104,7 +104,7 @@ Equilibrium Plant::equilibrium() const noexcept {
 
 void Plant::reset(std::uint64_t seed) noexcept {
   state_ = State{.motion = {.q = start_equilibrium_}, .commanded = start_pressures_};
-  state_.asked.fill(start_pressures_);
+  state_.requested.fill(start_pressures_);
   if (config_.start_noise > 0.0) {
     for (double& angle : state_.motion.q) {
       angle = std::clamp(angle + uniform(seed, -config_.start_noise, config_.start_noise),
@@ -137,12 +137,12 @@ Plant::Clipped Plant::advance(const Pressures& pressures, const Joints& external
   }
 
   // dead time: the muscles follow pressures that were asked for earlier
-  const auto newest = static_cast<std::size_t>(state_.iteration) % state_.asked.size();
-  state_.asked[newest] = state_.commanded;
+  const auto newest = static_cast<std::size_t>(state_.iteration) % state_.requested.size();
+  state_.requested[newest] = state_.commanded;
   for (std::size_t m = 0; m < kMuscles; ++m) {
     const std::size_t back = static_cast<std::size_t>(delay_[m / 2]);
-    const std::size_t then = (newest + state_.asked.size() - back) % state_.asked.size();
-    target[m] = config_.ranges[m].activation(state_.asked[then][m]);
+    const std::size_t then = (newest + state_.requested.size() - back) % state_.requested.size();
+    target[m] = config_.ranges[m].activation(state_.requested[then][m]);
   }
 
   // activations => motion

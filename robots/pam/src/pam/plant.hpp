@@ -62,7 +62,7 @@ class Plant {
     std::array<double, kMuscles> fibre_length{};  ///< [m], Hill model
     Pressures commanded{};                        ///< raw, within the ranges
     /// The last commanded pressures, a ring: the newest lies at iteration % its size.
-    std::array<Pressures, kLongestDeadTime + 1> asked{};
+    std::array<Pressures, kLongestDeadTime + 1> requested{};
     std::int64_t clipped = 0;  ///< iterations with a pressure out of range
   };
   static_assert(std::is_trivially_copyable_v<State>);

@@ -55,7 +55,7 @@ bool same_bits(const Plant& a, const Plant& b) {
          first.commanded == second.commanded && same_bits(first.motion.q, second.motion.q) &&
          same_bits(first.motion.dq, second.motion.dq) &&
          same_bits(first.activation, second.activation) &&
-         same_bits(first.fibre_length, second.fibre_length) && first.asked == second.asked;
+         same_bits(first.fibre_length, second.fibre_length) && first.requested == second.requested;
 }
 
 class PlantWithAnyMuscle : public testing::TestWithParam<MuscleModel> {

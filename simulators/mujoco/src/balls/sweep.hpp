@@ -39,8 +39,8 @@ struct Swept {
   double smallest = std::numeric_limits<double>::infinity();  // gap on the path [m], if watched
 };
 
-inline constexpr double kTouching = 1e-9;     // a smaller gap is a contact [m]
-inline constexpr double kFinestStep = 1e-4;   // of a sweep: a graze within it is 60 nm deep [m]
+inline constexpr double kTouching = 1e-9;    // a smaller gap is a contact [m]
+inline constexpr double kFinestStep = 1e-4;  // of a sweep: a graze within it is 60 nm deep [m]
 inline constexpr int kMaxSweepSteps = 4096;  // a path of 40 cm within kFinestStep of a surface
 
 /// One ball that passes one surface in a step.

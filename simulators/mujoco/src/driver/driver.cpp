@@ -102,10 +102,10 @@ void MujocoDriver::add_sensors(Schema& schema, Places& places) const {
 
 void MujocoDriver::describe(Schema& schema) const {
   (void)add_to(schema);
-  const std::int64_t asked = schema.asked_period();
+  const std::int64_t requested = schema.asked_period();
   const double timestep = simulation_.timestep();
   const std::uint32_t steps =
-      asked == 0 ? std::max(1U, steps_) : steps_in_period(asked, timestep, steps_);
+      requested == 0 ? std::max(1U, steps_) : steps_in_period(requested, timestep, steps_);
   schema.period(std::llround(steps * (timestep * 1e9)));
 }
 

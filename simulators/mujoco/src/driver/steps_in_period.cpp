@@ -42,13 +42,13 @@ constexpr double kPeriodTolerance = 1e-5;
 
 std::uint32_t steps_in_period(std::int64_t period, double timestep, std::uint32_t steps) {
   const double step = timestep * 1e9;
-  const auto asked = static_cast<double>(period);
-  const double count = steps > 0 ? steps : std::max(1.0, std::round(asked / step));
-  if (std::abs(count * step - asked) <= kPeriodTolerance * asked) {
+  const auto requested = static_cast<double>(period);
+  const double count = steps > 0 ? steps : std::max(1.0, std::round(requested / step));
+  if (std::abs(count * step - requested) <= kPeriodTolerance * requested) {
     return static_cast<std::uint32_t>(count);
   }
-  if (steps > 0) refuse_steps(asked, step, steps);
-  refuse_period(asked, step);
+  if (steps > 0) refuse_steps(requested, step, steps);
+  refuse_period(requested, step);
 }
 
 }  // namespace o80::mujoco

@@ -13,7 +13,7 @@ constexpr double kNear = 0.1;         // a ball that rises below this height has
 constexpr double kUnexplained = 2.0;  // a velocity farther off begins a new flight [m/s]
 constexpr double kSlowest = 0.5;      // that comes nearer and has a crossing [m/s]
 constexpr double kLongest = 2.0;      // flight that is predicted, however wrong an estimate is [s]
-constexpr double kMaxLate = 0.3;     // correction of a predicted time, and longest way back [s]
+constexpr double kMaxLate = 0.3;      // correction of a predicted time, and longest way back [s]
 constexpr int kPieces = 4;            // in which a long flight is computed
 constexpr double kTiny = 1e-9;
 

@@ -26,7 +26,7 @@ namespace {
 
 constexpr std::size_t kNumbers = 9;       // of a ball: position, velocity, spin
 constexpr std::size_t kNodeNumbers = 11;  // time, ball, bounced
-constexpr double kMaxSteps = 1e6;        // of one call
+constexpr double kMaxSteps = 1e6;         // of one call
 
 using Doubles = nb::ndarray<nb::numpy, double>;
 template <int Columns>

@@ -68,7 +68,7 @@ class Rows {
 
 // ------------------------------------------------------------------------- single commands
 
-struct Asked {
+struct Requested {
   std::int64_t frequency;
   Limits limits;
   RecordHead head;
@@ -83,7 +83,7 @@ TEST(Arrival, CommandsRestAtTheirTargets) {
   const Limits franka{.speed = 2.6, .acceleration = 10.0, .jerk = 5000.0};
   const Limits slow{.speed = 1.5, .acceleration = 5.0, .jerk = 100.0};
   const Limits plain{.speed = 2.0, .acceleration = 10.0};
-  const Asked all[] = {
+  const Requested all[] = {
       {500, arm, smoothly(at_speed(1.0)), 0.1, 112},
       {500, arm, at_speed(1.0), 0.1, 99},
       {500, arm, smoothly(during(100 * kMillisecond)), 0.1, 99},
@@ -102,12 +102,12 @@ TEST(Arrival, CommandsRestAtTheirTargets) {
        -0.5057,
        388},
   };
-  for (const Asked& asked : all) {
-    SCOPED_TRACE(testing::Message() << to_text(asked.head.pace) << " to " << asked.target << " at "
-                                    << asked.frequency << " Hz");
-    Rig rig(limited_robot(asked.frequency, asked.limits));
+  for (const Requested& requested : all) {
+    SCOPED_TRACE(testing::Message() << to_text(requested.head.pace) << " to " << requested.target
+                                    << " at " << requested.frequency << " Hz");
+    Rig rig(limited_robot(requested.frequency, requested.limits));
     Rows rows(rates_of(rig.schema));
-    rig.add(0, asked.head, {asked.target});
+    rig.add(0, requested.head, {requested.target});
     const CommandId command = rig.pulse() + 2;
     double furthest = 0.0;
     for (int i = 0; i < 2000 && !is_end(rig.witness.status(command)); ++i) {
@@ -117,10 +117,10 @@ TEST(Arrival, CommandsRestAtTheirTargets) {
       EXPECT_FALSE(rig.clamped());
     }
     EXPECT_EQ(rig.witness.last(command).status, Status::completed);
-    EXPECT_EQ(rig.witness.last(command).iteration, asked.takes);
-    EXPECT_EQ(rig.desired(), asked.target);
-    EXPECT_LE(furthest, std::abs(asked.target));
-    for (const double position : rig.run(500)) ASSERT_EQ(position, asked.target);
+    EXPECT_EQ(rig.witness.last(command).iteration, requested.takes);
+    EXPECT_EQ(rig.desired(), requested.target);
+    EXPECT_LE(furthest, std::abs(requested.target));
+    for (const double position : rig.run(500)) ASSERT_EQ(position, requested.target);
     EXPECT_FALSE(rig.active());
   }
 }
@@ -576,9 +576,9 @@ class RandomArrival {
     for (std::size_t n = 0; n < rows_.size(); ++n) {
       EXPECT_EQ(rig.desired(static_cast<std::uint32_t>(n)), sent.target[n]);
     }
-    EXPECT_GE(took, asked_);
-    EXPECT_LE(took, std::max(asked_, fewest_ + 1));
-    if (took > asked_ && asked_ > 0 && sent.head.pace != Pace::direct) {
+    EXPECT_GE(took, requested_);
+    EXPECT_LE(took, std::max(requested_, fewest_ + 1));
+    if (took > requested_ && requested_ > 0 && sent.head.pace != Pace::direct) {
       EXPECT_EQ(told.reason, Reason::limits);
     }
   }
@@ -614,11 +614,11 @@ class RandomArrival {
       high_.push_back(std::max({m.position, end, turn, sent.target[n]}));
     }
     const RecordHead& head = sent.head;
-    asked_ = head.pace == Pace::iterations ? head.amount
-             : head.pace == Pace::until    ? head.amount - first + 1
-             : head.pace == Pace::direct   ? 2 * head.amount / kMillisecond
-                                           : 0;
-    if (is_equal) asked_ = 0;
+    requested_ = head.pace == Pace::iterations ? head.amount
+                 : head.pace == Pace::until    ? head.amount - first + 1
+                 : head.pace == Pace::direct   ? 2 * head.amount / kMillisecond
+                                               : 0;
+    if (is_equal) requested_ = 0;
     // a smooth motion at a speed takes up to twice as long, and longer if it turns first; equal
     // set-points go on
     if (is_equal) fewest_ = 1000;
@@ -635,7 +635,7 @@ class RandomArrival {
   CommandId command_ = 0;
   Iteration first_ = 0;
   std::int64_t fewest_ = 1;
-  std::int64_t asked_ = 0;
+  std::int64_t requested_ = 0;
 };
 
 #ifdef O80_TEST_SANITIZED

@@ -47,10 +47,10 @@ TEST_F(LivenessTest, AsksTheKernelOnlyAboutLanesThatHaveAnOwner) {
   EXPECT_LE(liveness.queries(), liveness.rounds());
   sender.reset();
   while (liveness.lane(0).state != LaneState::closed) std::this_thread::yield();
-  const std::uint64_t asked = liveness.queries();
+  const std::uint64_t requested = liveness.queries();
   const std::uint32_t closed = liveness.rounds();
   while (liveness.rounds() < closed + 3) std::this_thread::yield();
-  EXPECT_EQ(liveness.queries(), asked) << "nobody owns a lane any more";
+  EXPECT_EQ(liveness.queries(), requested) << "nobody owns a lane any more";
 }
 
 TEST_F(LivenessTest, NoticesByItself) {

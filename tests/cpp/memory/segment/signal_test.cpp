@@ -77,17 +77,17 @@ TEST_F(SignalTest, WakesEveryoneOfManyWaitersForDifferentRows) {
 
 TEST_F(SignalTest, LetsReadersWithoutWritePermissionPoll) {
   const AttachedSegment reader = attach("arm", Access::read_only);
-  std::atomic<bool> asked{false};
+  std::atomic<bool> requested{false};
   std::thread sleeper([&] {
     RowWaiter waiter(reader);
     EXPECT_EQ(waiter.wait_for_row(0, patient(),
                                   [&] {
-                                    asked = true;
+                                    requested = true;
                                     return true;
                                   }),
               Waited::ready);
   });
-  while (!asked) std::this_thread::yield();
+  while (!requested) std::this_thread::yield();
   EXPECT_EQ(wanted(), kNobody);
   publish(0, 0);
   sleeper.join();

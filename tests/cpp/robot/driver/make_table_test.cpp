@@ -87,8 +87,8 @@ TEST_F(MakeTableTest, DescribesTheDriverAcrossTheTable) {
 }
 
 TEST_F(MakeTableTest, ARobotWithAPeriodOfItsOwnRunsAtItOrIsNotStarted) {
-  const auto period_of = [](std::int64_t asked) {
-    return InlineSimulation("ticking", *robot_table<TickingSensor>("ticking"), {}, asked)
+  const auto period_of = [](std::int64_t requested) {
+    return InlineSimulation("ticking", *robot_table<TickingSensor>("ticking"), {}, requested)
         .frontend.period();
   };
   EXPECT_EQ(period_of(0), TickingSensor::kPeriod);

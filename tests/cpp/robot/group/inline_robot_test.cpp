@@ -57,9 +57,9 @@ TEST_F(InlineRobotTest, LetsOthersWatchAndCommand) {
 }
 
 TEST_F(InlineRobotTest, LeavesTheRestOfABurstThatItsCallerCuts) {
-  int asked = 0;
+  int requested = 0;
   const auto robot = std::make_shared<InlineRobot>(two_joints(), BackendOptions{.segment = "here"},
-                                                   [&asked] { return ++asked < 2; });
+                                                   [&requested] { return ++requested < 2; });
   UntypedFrontend frontend("here", robot);
   EXPECT_THROW(frontend.burst(1'000'000'000'000, kPatience), Cancelled);
   const Iteration reached = frontend.published();

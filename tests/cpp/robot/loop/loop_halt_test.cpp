@@ -170,16 +170,16 @@ TEST_F(LoopHaltTest, BrakingThatTakesTooLongIsCut) {
   Puppet::limits = {.speed = 1000.0, .acceleration = 1.0};  // a quarter of an hour to stop
   Loop loop = timed_loop();
   loop.start();
-  std::int64_t asked = 0;
+  std::int64_t requested = 0;
   std::thread user([&] {
     UntypedFrontend frontend("puppet");
     send(frontend, 0, 1e6, {.pace = speed(1000.0), .profile = Profile::linear});
     frontend.wait_for(15'000, kPatience);
-    asked = monotonic_now();
+    requested = monotonic_now();
     loop.ask_to_stop();
   });
   EXPECT_TRUE(loop.run().in_order);
-  const std::int64_t took = monotonic_now() - asked;
+  const std::int64_t took = monotonic_now() - requested;
   user.join();
   EXPECT_GT(took, 900'000'000);
   EXPECT_EQ(Puppet::calls.stopped, 1);

@@ -15,7 +15,7 @@ namespace {
 using ::testing::HasSubstr;
 using HaltSuccessorTest = StationTest;
 
-enum class Before { idle, acting, halted, asked, resumed, stopped, failed };
+enum class Before { idle, acting, halted, requested, resumed, stopped, failed };
 
 /// Leaves a backend in some state and dies.
 void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting = false) {
@@ -43,7 +43,7 @@ void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting
     if (frontend.halted()) return;  // without a word
     iterate();
   }
-  if (before == Before::asked) frontend.halt("me");
+  if (before == Before::requested) frontend.halt("me");
   if (before == Before::stopped) station.backend.end(BackendState::stopped);
   if (before == Before::failed) station.backend.end(BackendState::failed, "broken");
   ready();
@@ -77,7 +77,7 @@ TEST_F(HaltSuccessorTest, OfABackendThatWasKilledWhileItActedStartsHalted) {
 }
 
 TEST_F(HaltSuccessorTest, OfAHaltedBackendStartsHalted) {
-  for (const Before before : {Before::halted, Before::asked}) {
+  for (const Before before : {Before::halted, Before::requested}) {
     const auto halt = halt_of_successor(before);
     ASSERT_TRUE(halt);
     EXPECT_EQ(halt->cause, HaltCause::predecessor);

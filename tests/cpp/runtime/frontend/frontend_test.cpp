@@ -298,8 +298,8 @@ TEST_F(FrontendTest, AWaitEndsWhenItsCallerSaysSo) {
   Station station;
   station.start();
   UntypedFrontend frontend("pair");
-  int asked = 0;
-  EXPECT_THROW(frontend.wait_for(99, kPatience, [&] { return ++asked < 2; }), Cancelled);
+  int requested = 0;
+  EXPECT_THROW(frontend.wait_for(99, kPatience, [&] { return ++requested < 2; }), Cancelled);
   const Batch batch = send(frontend, 0, 1.0);
   EXPECT_THROW(batch.wait(kPatience, [] { return false; }), Cancelled);
 }

@@ -101,7 +101,7 @@ class Motions:
         episodes = _Episodes(self._count)
         each = [generator] * self._count
         first = self._observer.begin(
-            self._look(0), self._shared(self._asked), each, np.arange(self._count)
+            self._look(0), self._shared(self._commanded), each, np.arange(self._count)
         )
         observations, actions = [first], list[Float32Array]()
         while episodes.running.any():
@@ -109,7 +109,7 @@ class Motions:
             self._step(action)
             state = self._look(len(actions) + 1)
             actions.append(action)
-            observations.append(self._observer.observe(state, self._shared(self._asked)))
+            observations.append(self._observer.observe(state, self._shared(self._commanded)))
             self._judge(state, episodes)
         rewards = np.array(episodes.rewards, np.float32)
         lengths = episodes.lengths
@@ -137,7 +137,7 @@ class Motions:
             flights=[draw.balls.flights],
         )
         rig.begin()
-        self._asked = rig.arm.asked()
+        self._commanded = rig.arm.commanded()
         self._goals = np.broadcast_to(draw.goal, (self._count, *draw.goal.shape))
         return draw.balls.numbers
 
@@ -150,8 +150,8 @@ class Motions:
         """As the environment steps."""
         for _ in range(self.settings.repeat):
             factor = self.settings.factor
-            self._asked = changed_pressures(self._asked, action[np.newaxis], factor=factor)
-            self._rig.step(self._asked)
+            self._commanded = changed_pressures(self._commanded, action[np.newaxis], factor=factor)
+            self._rig.step(self._commanded)
 
     def _look(self, steps: int) -> State:
         """The states of all balls."""
