@@ -60,11 +60,11 @@ class Plain:
             stack.callback(library.plain_destroy, ctypes.c_void_p(plain))
         # those of random actions
         with closing(accelerated_environment(rig=rig)) as one:
-            pressures, requested = one.rig.arm.range, one.rig.arm.requested()[0]
+            pressures, commanded = one.rig.arm.range, one.rig.arm.commanded()[0]
         raw = []
         for action in random_actions(episode, MUSCLES):
-            requested = changed_pressures(requested, action, factor=TASK.factor)
-            raw.append(pressures.raw(requested))
+            commanded = changed_pressures(commanded, action, factor=TASK.factor)
+            raw.append(pressures.raw(commanded))
         self._raw = np.array(raw)
 
     def play(self, steps: int) -> None:

@@ -80,14 +80,15 @@ nb::object text_of(const std::string& bytes) {
   return nb::bytes(bytes.data(), bytes.size()).attr("decode")("utf-8", "replace");
 }
 
-/// Bytes, number of the first entry, number after the last one, whether there may be more, and
-/// text and iteration of the marks in them.
+/// Bytes, number of the first entry, number after the last one, whether there may be more, text and
+/// iteration of the marks in them, whether entries are notable.
 nb::tuple read_raw(o80::RawJournal& journal, std::size_t most) {
   const o80::RawJournal::Entries entries = journal.read(most);
   nb::list marks;
   for (const auto& mark : entries.marks)
     marks.append(nb::make_tuple(text_of(mark.text), mark.iteration));
-  return nb::make_tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more, marks);
+  return nb::make_tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more, marks,
+                        entries.notable);
 }
 
 std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal, const nb::bytes& bytes,
@@ -109,7 +110,7 @@ void bind_raw(nb::module_& m) {
       .def_prop_ro("exists", &o80::RawJournal::exists)
       .def("read", &read_raw, "most"_a,
            nb::sig("def read(self, most: int) "
-                   "-> tuple[bytes, int, int, bool, list[tuple[str, int]]]"));
+                   "-> tuple[bytes, int, int, bool, list[tuple[str, int]], bool]"));
   nb::class_<o80::RecordedJournal>(m, "RecordedJournal")
       .def(nb::init<std::shared_ptr<const o80::Description>, std::uint64_t, bool>(),
            "description"_a, "first"_a, "rests"_a = false)

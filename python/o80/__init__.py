@@ -61,22 +61,22 @@ if TYPE_CHECKING:
     from o80.frontend.frontend import Frontend as Frontend
     from o80.frontend.frontend import register_frontend as register_frontend
     from o80.frontend.frontend import wait_for_first as wait_for_first
-    from o80.frontend.prepared_burst import GroupBurst as GroupBurst
-    from o80.frontend.prepared_burst import GroupRequest as GroupRequest
     from o80.frontend.prepared_burst import PreparedBurst as PreparedBurst
     from o80.frontend.reader import Journal as Journal
     from o80.frontend.results import Halt as Halt
     from o80.frontend.results import Preview as Preview
     from o80.frontend.results import RunningRequest as RunningRequest
-    from o80.frontend.results import halt as halt
     from o80.frontend.segments import Segment as Segment
     from o80.frontend.segments import clean as clean
     from o80.frontend.segments import segments as segments
+    from o80.frontend.stopping import halt as halt
     from o80.frontend.stopping import stop as stop
-    from o80.groups.burst_group import BurstGroup as BurstGroup
-    from o80.groups.burst_group import burst as burst
+    from o80.groups.burst_set import BurstGroup as BurstGroup
+    from o80.groups.burst_set import burst as burst
     from o80.groups.gather import Gather as Gather
     from o80.groups.gather import Gathered as Gathered
+    from o80.groups.group_burst import GroupBurst as GroupBurst
+    from o80.groups.group_burst import GroupRequest as GroupRequest
     from o80.groups.inline_group import InlineGroup as InlineGroup
     from o80.joining.align import Aligned as Aligned
     from o80.joining.align import AlignedHistory as AlignedHistory
@@ -109,10 +109,10 @@ else:  # a type checker that read this would accept every name
     _LAZY = {
         "rows.actuators": "Actuator IntegralBounds Limits Number",
         "drivers.backend": "Backend Running StartAfresh",
-        "groups.burst_group": "BurstGroup burst",
+        "groups.burst_set": "BurstGroup burst",
         "frontend.frontend": "Frontend register_frontend wait_for_first",
         "frontend.reader": "Journal",
-        "frontend.results": "Halt Preview RunningRequest halt",
+        "frontend.results": "Halt Preview RunningRequest",
         "rows.history": "History",
         "groups.gather": "Gather Gathered",
         "groups.inline_group": "InlineGroup",
@@ -121,7 +121,8 @@ else:  # a type checker that read this would accept every name
         "joining.latency": "Latency latency",
         "rows.journal": "JournalCommand JournalEntry",
         "playing.playback": "Playback play",
-        "frontend.prepared_burst": "GroupBurst GroupRequest PreparedBurst",
+        "frontend.prepared_burst": "PreparedBurst",
+        "groups.group_burst": "GroupBurst GroupRequest",
         "rows.provenance": "Provenance ProvenanceFile",
         "rows.record": "Record States",
         "recording.reader": "RecordingFile open",
@@ -129,7 +130,7 @@ else:  # a type checker that read this would accept every name
         "replaying.replay": "replay",
         "replaying.report": "ReplayReport RunReport",
         "frontend.segments": "Segment clean segments",
-        "frontend.stopping": "stop",
+        "frontend.stopping": "halt stop",
         "view.view": "View",
         "base.words": "Mode Profile Reason Start Status",
     }

@@ -20,6 +20,7 @@ WAIT = 60.0  # [s] longer than any wait should take
 for _module in (
     "base.screen",
     "frontend.results",
+    "frontend.stopping",
     "rows.actuators",
     "rows.journal",
     "rows.provenance",

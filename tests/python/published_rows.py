@@ -26,6 +26,7 @@ from o80.datasets.episodes import episodes_of
 from o80.datasets.export import write
 from o80.difference import first_difference
 from o80.plot import plot
+from o80.recording.epoch import topic_of
 from o80.rows.history import columns_in
 from o80.view.base64_arrays import packed
 from o80.view.curves import Panels
@@ -299,7 +300,7 @@ def played(path: Path, segment: str, expected: Columns) -> None:
 
 def messages(path: Path, segment: str, expected: Columns) -> None:
     """Messages as the libraries of mcap and rosbags read them."""
-    topic = f"/{segment}"
+    topic = topic_of(segment)
     with AnyReader([path]) as reader:
         found = [(each, raw) for each, _, raw in reader.messages() if each.topic == topic]
         rows: list[Any] = [reader.deserialize(raw, each.msgtype) for each, raw in found]

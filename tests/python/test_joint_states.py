@@ -8,6 +8,7 @@ import pytest
 from rosbags.highlevel import AnyReader
 
 import o80
+from o80.recording.epoch import topic_of
 from o80.recording.joint_states import joints_of
 from o80.recording.recorder import Recorder
 
@@ -15,7 +16,7 @@ JOINT = np.dtype([("position", "f8"), ("velocity", "f4"), ("torque", "f8")])
 
 
 def joint_states(path: Path, segment: str) -> list[Any]:
-    topic = f"/{segment}/joint_states"
+    topic = topic_of(segment, "joint_states")
     with AnyReader([path]) as reader:
         return [
             reader.deserialize(raw, each.msgtype)

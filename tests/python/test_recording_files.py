@@ -1,5 +1,7 @@
 """Files of recordings: what public readers see, and what is left of cut and damaged ones."""
 
+import json
+import re
 import resource
 from pathlib import Path
 from typing import IO, Any
@@ -10,6 +12,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 import o80
+from o80.recording.epoch import topic_of
 from o80.recording.file_writer import FileWriter
 from o80.recording.recorder import Recorder
 from o80.recording.scan import scan
@@ -33,7 +36,7 @@ def recorded(arm: o80.Frontend, tmp_path: Path) -> tuple[Path, o80.History]:
 def rows_in(file: IO[bytes], arm: o80.Frontend) -> int:
     """Rows that a public reader finds."""
     reader = make_reader(file, validate_crcs=True)
-    return sum(1 for _ in reader.iter_messages([f"/{arm.segment}"]))
+    return sum(1 for _ in reader.iter_messages([topic_of(arm.segment)]))
 
 
 def test_the_mcap_library_reads_it(recorded: tuple[Path, o80.History], arm: o80.Frontend) -> None:
@@ -47,7 +50,7 @@ def test_the_mcap_library_reads_it(recorded: tuple[Path, o80.History], arm: o80.
     assert summary is not None
     assert summary.statistics is not None
     assert summary.statistics.message_count == len(messages)
-    rows = [message for _, channel, message in messages if channel.topic == f"/{arm.segment}"]
+    rows = [message for _, channel, message in messages if channel.topic == topic_of(arm.segment)]
     assert len(rows) == len(history)
     assert [len(attachment.data) > 0 for attachment in attachments] == [True]
 
@@ -60,12 +63,71 @@ def test_rosbags_reads_every_row_in_order(
         rows: list[Any] = [
             reader.deserialize(raw, each.msgtype)
             for each, _, raw in reader.messages()
-            if each.topic == f"/{arm.segment}"
+            if each.topic == topic_of(arm.segment)
         ]
 
     assert [row.iteration for row in rows] == history.iteration.tolist()
-    assert np.array_equal([row.desired for row in rows], history.desired)
+    desired = [(row.desired.shoulder, row.desired.elbow) for row in rows]
+    assert np.array_equal(desired, history.desired)
+    assert [row.active.elbow for row in rows] == history.active[:, 1].tolist()
     assert np.array_equal([row.extended.effort for row in rows], history.extended.effort)
+
+
+def test_rosbags_reads_marks_and_what_happened_in_words(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, [arm]) as recording:
+        arm.mark("begin")
+        arm.add_command("elbow", 0.5, iterations=20)
+        arm.burst(10)
+        arm.halt("the ball is on the floor")
+        arm.burst(10)
+        recording.mark("episode", number=3, gains=[0.5, 1.0])
+    file = o80.open(path)
+    epoch = file[arm.segment].epochs[0]
+    with AnyReader([path]) as reader:
+        found = [
+            (each.topic, time, reader.deserialize(raw, each.msgtype))
+            for each, time, raw in reader.messages()
+        ]
+    marks: list[Any] = [mark for topic, _, mark in found if topic == "/o80/marks"]
+    lines: list[Any] = [line for topic, _, line in found if topic == "/rosout"]
+    times = dict(zip(epoch.history().iteration.tolist(), epoch.history().time, strict=True))
+    expected = sorted(file.marks, key=lambda mark: mark.rows[arm.segment])
+
+    assert [(each.name, each.time, each.segments, each.rows.tolist()) for each in marks] == [
+        (each.name, each.time, [*each.rows], [*each.rows.values()]) for each in expected
+    ]
+    assert [json.loads(each.values) for each in marks] == [each.values for each in expected]
+    assert {line.name for line in lines} == {arm.segment, ""}
+    texts = "\n".join(line.msg for line in lines)
+    assert "run 0" in texts
+    assert "elbow to 0.5 in 20 iterations: halted" in texts
+    assert "the ball is on the floor" in texts
+    assert "mark episode" in texts
+    for line in lines:
+        row = re.match(r"row (\d+):", line.msg)
+        if row and int(row[1]) in times:
+            stamp = line.stamp.sec * 10**9 + line.stamp.nanosec
+            assert stamp == times[int(row[1])] + epoch.wall_offset
+
+
+def test_names_with_one_topic_are_not_recorded_together(segment: str, tmp_path: Path) -> None:
+    near = segment.replace("-", "_")
+    load = o80.robots.load("two_joints").inline
+    path = tmp_path / "run.mcap"
+    with load(segment), load(near):
+        with pytest.raises(o80.RecordingError, match="rename one") as refused:
+            Recorder(path, [segment, near])
+        assert near in str(refused.value)
+        assert not path.exists()
+    with load(segment):
+        recorder = Recorder(path, [segment.replace("-", "?")])
+        with load(near):
+            recorder._search_at = 0.0  # now
+            with pytest.warns(RuntimeWarning, match="rename one"):
+                recorder.poll()
+        recorder.finish()
+    assert [*o80.open(path)] == [segment]
 
 
 def test_o80_reads_the_same_bytes(recorded: tuple[Path, o80.History]) -> None:

@@ -13,7 +13,7 @@ from gymnasium.vector import AutoresetMode
 from vector_equality import MODES, beside, both
 
 import o80_table_tennis
-from o80.frontend.prepared_burst import GroupBurst
+from o80.groups.group_burst import GroupBurst
 from o80.learning import VectorEnvironment
 from o80_table_tennis.balls.simulated_shots import simulated_shot
 from o80_table_tennis.balls.sources import balls_from

@@ -8,7 +8,7 @@ import typer
 
 from o80.base.errors import InvalidArgument
 from o80.cli.attach import attach
-from o80.frontend.results import halt as halt_backend
+from o80.frontend.stopping import halt as halt_backend
 
 
 def halt(

@@ -14,11 +14,11 @@ from o80.base.errors import Error, TimeoutError
 from o80.base.screen import style
 from o80.frontend.frontend import Frontend
 from o80.frontend.reader import Journal
-from o80.rows.journal import JournalCommand, JournalEntry
+from o80.rows.journal import JournalEntry
+from o80.rows.journal_text import JournalText
 
 _LOOK = 0.05  # between two looks for new entries [s]
 _BEFORE = 10  # entries of a living backend that are printed at the start
-_MAX_NUMBERS = 8  # of a target
 
 
 def follow(frontend: Frontend, count: int, as_json: bool, timeout: float | None) -> None:
@@ -75,137 +75,20 @@ def print_recorded(path: str, count: int, as_json: bool) -> None:
 
 
 class _Lines:
-    """Lines of entries; remembers commands that have not ended, to name them at their end."""
+    """Lines of entries."""
 
     def __init__(self, as_json: bool) -> None:
         self._as_json = as_json
-        self._open: dict[tuple[int | None, int], str] = {}
+        self._text = JournalText(style)
 
     def line(self, entry: JournalEntry) -> str:
         if self._as_json:
             return json.dumps(asdict(entry), default=_plain)
-        said = self._text(entry)
+        said = self._text.text(entry)
         parts = [style(f"{entry.iteration:>8}", "bold"), said]
         if entry.missed:
             parts.insert(0, f"({entry.missed} entries were overwritten before they were read)\n")
         return " ".join(parts)
-
-    def _text(self, entry: JournalEntry) -> str:
-        if entry.kind in ("taken", "scheduled", "rejected"):
-            return self._batch(entry)
-        if entry.kind == "status":
-            return self._status(entry)
-        if entry.kind == "none":
-            return f"something of a newer o80 ({entry.unknown})"
-        who = f"{_sender(entry)}: "
-        if entry.kind in ("halt", "halt_reason"):
-            by = f" by {entry.sender}" if entry.sender else ""
-            word = "HALT" if entry.kind == "halt" else "reason of halt"
-            return style(f"{word} {entry.halt}", "yellow") + f" ({entry.cause}{by}): {entry.text}"
-        if entry.kind == "resume":
-            return f"{who}resumed halt {entry.halt}"
-        if entry.kind == "burst":
-            until = (
-                "until its batch has ended" if entry.burst == -1 else f"{entry.burst} iterations"
-            )
-            return f"{who}burst, {until}"
-        if entry.kind == "burst_ended":
-            return f"{who}burst ended{' early' if entry.cut else ''}"
-        if entry.kind == "interrupted":
-            return f"the robot interrupted {entry.actuator}"
-        if entry.kind == "snapshot":
-            return f"the robot keeps its state in slot {entry.slot}"
-        if entry.kind == "ended":
-            return "the backend ended" + (f": {entry.text}" if entry.text else "")
-        said = {
-            "control_taken": f"{who}took control",
-            "control_released": f"{who}released control",
-            "control_lost": f"{who}lost control",
-            "died": f"{who}died",
-            "silent": f"{who}gave no sign of life",
-            "fresh_start": "fresh start",
-            "order_lost": "the ticket counter is damaged",
-            "stopping": "stopping: all commands are dropped",
-        }
-        return said.get(entry.kind, entry.kind)
-
-    def _batch(self, entry: JournalEntry) -> str:
-        texts = []
-        for command in entry.commands:
-            texts.append(command_text(command))
-            if entry.kind != "rejected":
-                self._open[entry.lane, command.id] = texts[-1]
-        what = "; ".join(texts) or ("commands were overwritten" if entry.commands_lost else "burst")
-        if entry.kind == "rejected":
-            return f"{_sender(entry)}: {what}: {style(f'rejected ({entry.reason})', 'red')}"
-        later = f" (for iteration {entry.at})" if entry.kind == "scheduled" else ""
-        return f"{_sender(entry)}: {what}{later}"
-
-    def _status(self, entry: JournalEntry) -> str:
-        key = (entry.lane, entry.id or 0)
-        what = self._open.get(key, f"command {entry.id} of lane {entry.lane}")
-        if entry.status != "active":
-            self._open.pop(key, None)
-        status = "begins" if entry.status == "active" else str(entry.status)
-        reason = f" ({entry.reason})" if entry.reason not in (None, "none") else ""
-        return f"  {what}: {status}{reason}"
-
-
-def _sender(entry: JournalEntry) -> str:
-    return entry.sender or f"lane {entry.lane}"
-
-
-def command_text(command: JournalCommand) -> str:
-    """A command in words: "elbow to 0.5 in 2 s"."""
-    if command.kind == "purge":
-        own = "own commands of " if command.only_own else ""
-        return f"purge {own}{', '.join(command.actuators) or 'all'}"
-    if command.kind == "request":
-        fields = ", ".join(f"{name}={value}" for name, value in (command.fields or {}).items())
-        return f"{command.request}({fields})"
-    if command.kind == "resume":
-        return f"resume halt {command.halt}"
-    if command.kind == "mark":
-        return "mark " + json.dumps(command.text, ensure_ascii=False)
-    if command.kind == "unknown":
-        return f"something of a newer o80 ({command.unknown})"
-    if command.kind != "command":
-        return command.kind.replace("_", " ")
-    parts = [
-        f"{name} to {_target(target)}"
-        for name, target in zip(command.actuators, command.targets, strict=True)
-    ]
-    overwrite = ", overwriting" if command.mode == "overwrite" else ""
-    return f"{', '.join(parts)}{_pace(command)}{overwrite}"
-
-
-def _pace(command: JournalCommand) -> str:
-    if command.times:
-        return f" in {command.times[-1]:g} s"
-    amount = command.amount
-    return {
-        "duration": f" in {amount} s" if amount is None else f" in {amount:g} s",
-        "speed": f" at {amount}/s",
-        "until": f" until iteration {amount}",
-        "iterations": f" in {amount} iterations each"
-        if _is_trajectory(command)
-        else f" in {amount} iterations",
-        "fastest": " as fast as possible",
-    }.get(command.pace, "")
-
-
-def _is_trajectory(command: JournalCommand) -> bool:
-    return any(isinstance(target, np.ndarray) and target.ndim > 0 for target in command.targets)
-
-
-def _target(target: Any) -> str:
-    if isinstance(target, dict):
-        return "{" + ", ".join(f"{name}: {_target(value)}" for name, value in target.items()) + "}"
-    if isinstance(target, np.ndarray):
-        if target.size > _MAX_NUMBERS:
-            return f"{len(target)} waypoints, the last {target[-1]}"
-        return str(target.tolist())
-    return f"{target:g}" if isinstance(target, float) else str(target)
 
 
 def _plain(value: Any) -> Any:

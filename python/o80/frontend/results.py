@@ -5,8 +5,6 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
-import o80._core as _core
-
 if TYPE_CHECKING:
     from o80.rows.record import States
 
@@ -42,11 +40,3 @@ class Preview:
     #: the desired states of all actuators, as in History.desired: (iterations, actuators), or a
     #: record of groups
     rows: States = field(repr=False)
-
-
-def halt(segment: str, reason: str = "", timeout: float | None = 0.0) -> int:
-    """Halts the backend of a segment, also one that is still starting; returns the halt's number.
-
-    timeout: how long to wait for the backend [s]. Raises TimeoutError, SegmentError, BackendGone.
-    """
-    return _core.halt(segment, reason, timeout)

@@ -1,4 +1,4 @@
-"""Stops backends in other processes."""
+"""Stops and halts backends in other processes."""
 
 import contextlib
 import os
@@ -11,6 +11,14 @@ from o80.base.errors import InvalidArgument, SegmentError, TimeoutError
 from o80.frontend.segments import Segment, segments
 
 LOOK = 0.01  # [s] between checks of a backend that stops
+
+
+def halt(segment: str, reason: str = "", timeout: float | None = 0.0) -> int:
+    """Halts the backend of a segment, also one that is still starting; returns the halt's number.
+
+    timeout: how long to wait for the backend [s]. Raises TimeoutError, SegmentError, BackendGone.
+    """
+    return _core.halt(segment, reason, timeout)
 
 
 def stop(name: str, timeout: float = 5.0) -> None:

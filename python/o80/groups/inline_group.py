@@ -24,13 +24,13 @@ from o80.base.errors import InvalidArgument, UsedAfterFork
 from o80.base.lifecycle import Closeable
 from o80.base.words import ModeWord, ProfileWord, StartWord
 from o80.frontend.frontend import Frontend
-from o80.frontend.prepared_burst import GroupBurst, GroupRequest, chosen_copies
 from o80.groups.gather import Comparison, Gather, Gathered, flags_from, numbers_from
+from o80.groups.group_burst import GroupBurst, GroupRequest, chosen_copies
 from o80.rows.enumerations import labelled
 from o80.rows.layout import Layout, dtype_of_type, labels_of_type
 
 if TYPE_CHECKING:
-    from o80.frontend.prepared_burst import Copies
+    from o80.groups.group_burst import Copies
 
 
 class InlineGroup(Closeable):

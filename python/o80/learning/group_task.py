@@ -9,8 +9,8 @@ from gymnasium import Space, spaces
 from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
-from o80.frontend.prepared_burst import GroupBurst
 from o80.groups.gather import Gather
+from o80.groups.group_burst import GroupBurst
 from o80.groups.inline_group import InlineGroup
 from o80.learning.task import Index, Task
 

@@ -1,6 +1,7 @@
-"""Parts of an MCAP chunk: many messages of one channel, built as one array; single messages."""
+"""Parts of an MCAP chunk: many messages of one channel, built as one array; few messages."""
 
 import struct
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,35 +70,46 @@ class Block:
         entries = np.empty((len(self.log_times), 2), "<u8")
         entries[:, 0] = self.log_times
         entries[:, 1] = offset + np.arange(len(entries)) * self.records.shape[1]
-        content = entries.tobytes()
-        head = struct.pack("<BQHI", MESSAGE_INDEX, 6 + len(content), self.channel, len(content))
-        return head + content
+        return _index(self.channel, entries)
 
 
 @dataclass(frozen=True)
-class SingleMessage:
-    """A message in a chunk in which its channel has no other."""
+class Messages:
+    """A few messages of one channel, of any sizes."""
 
     channel: int
-    time: int  #: log time [ns]
-    message: bytes
+    messages: Sequence[tuple[int, bytes]]  #: log time [ns] and data of each; not empty
 
     @property
     def content(self) -> bytes:
-        length = MESSAGE_HEAD.itemsize - LENGTH_ENDS_AT + len(self.message)
-        head = struct.pack("<BQHIQQ", MESSAGE, length, self.channel, 0, self.time, self.time)
-        return head + self.message
+        return b"".join(self._records())
 
     @property
     def count(self) -> int:
-        return 1
+        return len(self.messages)
 
     @property
     def time_range(self) -> tuple[int, int]:
-        return self.time, self.time
+        times = [time for time, _ in self.messages]
+        return min(times), max(times)
 
     def index(self, offset: int) -> bytes:
-        return struct.pack("<BQHIQQ", MESSAGE_INDEX, 22, self.channel, 16, self.time, offset)
+        entries = []
+        for (time, _), record in zip(self.messages, self._records(), strict=True):
+            entries.append((time, offset))
+            offset += len(record)
+        return _index(self.channel, np.array(entries, "<u8"))
+
+    def _records(self) -> Iterator[bytes]:
+        for time, data in self.messages:
+            length = MESSAGE_HEAD.itemsize - LENGTH_ENDS_AT + len(data)
+            yield struct.pack("<BQHIQQ", MESSAGE, length, self.channel, 0, time, time) + data
+
+
+def _index(channel: int, entries: NDArray[np.uint64]) -> bytes:
+    """The message index of a channel: (n, 2), log time and offset in the chunk."""
+    content = entries.tobytes()
+    return struct.pack("<BQHI", MESSAGE_INDEX, 6 + len(content), channel, len(content)) + content
 
 
 def messages_in(content: bytes, index: NDArray[np.uint64]) -> NDArray[np.uint8]:

@@ -83,9 +83,15 @@ class EpochNote:
         return replace(self, wall_offset=offset)
 
 
-def topic_of(segment: str) -> str:
-    """Topic of a segment's rows."""
-    return f"/{segment}"
+def topic_of(segment: str, content: str = "") -> str:
+    """Topic of a segment's rows, or of something else of it, as ROS 2 accepts it.
+
+    All but letters and digits are single underscores between them; a name that begins with a digit
+    gets `x_`. Two names may have one topic; the metadata of the channel have the name itself.
+    """
+    plain = re.sub(r"[^A-Za-z0-9]+", "_", segment).strip("_") or "x"
+    name = f"x_{plain}" if plain[0].isdigit() else plain
+    return f"/{name}/{content}" if content else f"/{name}"
 
 
 def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:

@@ -8,7 +8,6 @@ Velocities and efforts come from the same place: numbers `velocity` and `effort`
 the state, arrays of sensor values with one number for each joint.
 """
 
-import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -17,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80.recording.blocks import Block
-from o80.recording.epoch import EpochNote
-from o80.recording.message_plan import ENCAPSULATION
+from o80.recording.cdr import CdrWriter
+from o80.recording.epoch import EpochNote, topic_of
 from o80.rows.layout import Layout, is_plain
 
 if TYPE_CHECKING:
@@ -49,7 +48,6 @@ QUANTITIES = {
 }
 """Names of the fields of a state, for each member of the message."""
 FLOATS = ("float32", "float64")
-_FIRST_VALUES = len(ENCAPSULATION)
 
 
 @dataclass(frozen=True)
@@ -66,11 +64,6 @@ class Joints:
 
     names: tuple[str, ...]
     numbers: dict[str, tuple[Number, ...]]  #: by member of the message; empty if there are none
-
-
-def topic_of(segment: str) -> str:
-    """Topic of the joint states of a segment."""
-    return f"/{segment}/joint_states"
 
 
 def joints_of(layout: Layout) -> Joints | None:
@@ -157,31 +150,21 @@ class JointWriter:
         if channel is None:
             schema = file.add_schema(TYPE, DEFINITION)
             texts = note.channel_texts(CONTENT)
-            channel = file.add_channel(topic_of(note.segment), schema, texts)
+            channel = file.add_channel(topic_of(note.segment, CONTENT), schema, texts)
         return cls(joints, channel)
 
     def __init__(self, joints: Joints, channel: int) -> None:
         self.channel = channel
-        self._template = bytearray(ENCAPSULATION)
-        self._add(4, bytes(8))  # the stamp
-        self._add_text("")
-        self._add(4, struct.pack("<I", len(joints.names)))
-        for name in joints.names:
-            self._add_text(name)
+        cdr = CdrWriter()
+        self._stamp = cdr.stamp(0)
+        cdr.text("")
+        cdr.texts(joints.names)
         self._values: list[tuple[int, tuple[Number, ...]]] = []
         for numbers in joints.numbers.values():
-            self._add(4, struct.pack("<I", len(numbers)))
+            cdr.numbers("I", len(numbers))
             if numbers:
-                self._add(8, b"")
-                self._values.append((len(self._template), numbers))
-                self._add(8, bytes(8 * len(numbers)))
-
-    def _add(self, alignment: int, content: bytes) -> None:
-        self._template += bytes(-(len(self._template) - _FIRST_VALUES) % alignment) + content
-
-    def _add_text(self, text: str) -> None:
-        encoded = text.encode() + b"\0"
-        self._add(4, struct.pack("<I", len(encoded)) + encoded)
+                self._values.append((cdr.numbers("d", *[0.0] * len(numbers)), numbers))
+        self._template = cdr.data
 
     def block(self, raw: NDArray[np.uint8], log_times: NDArray[np.uint64], first: int) -> Block:
         """The messages of rows (n, bytes of a row); first: iteration of the first one."""
@@ -190,7 +173,7 @@ class JointWriter:
         messages[:] = np.frombuffer(self._template, np.uint8)
         stamps = np.empty((len(raw), 2), "<u4")
         stamps[:, 0], stamps[:, 1] = np.divmod(log_times, np.uint64(1_000_000_000))
-        messages[:, _FIRST_VALUES : _FIRST_VALUES + 8] = stamps.view(np.uint8)
+        messages[:, self._stamp : self._stamp + 8] = stamps.view(np.uint8)
         for place, numbers in self._values:
             values = np.empty((len(raw), len(numbers)), "<f8")
             for i, number in enumerate(numbers):

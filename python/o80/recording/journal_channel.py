@@ -9,15 +9,14 @@ from dataclasses import dataclass
 from typing import IO, TYPE_CHECKING
 
 import o80._core as _core
-from o80.recording.blocks import SingleMessage
-from o80.recording.message_plan import ENCAPSULATION
+from o80.recording.cdr import ENCAPSULATION
+from o80.recording.epoch import EpochNote, topic_of
 from o80.recording.scan import Scan, messages_of
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
 
     from o80.frontend.frontend import Frontend
-    from o80.recording.epoch import EpochNote
     from o80.recording.file_writer import FileWriter
 
 TYPE = "o80/msg/Journal"
@@ -61,12 +60,7 @@ class Entries:
         raise ValueError("a message of the journal is damaged")
 
 
-def topic_of(segment: str) -> str:
-    """Topic of the journal of a segment."""
-    return f"/{segment}/journal"
-
-
-class JournalWriter:
+class JournalRecorder:
     """Reads the journal of one backend and makes messages of it."""
 
     def __init__(self, frontend: "Frontend", channel: int | None, first: int) -> None:
@@ -76,6 +70,7 @@ class JournalWriter:
         self.begin = 0  #: number of the first entry; of a journal that is continued, 0
         self.drained = False  #: nothing was left at the last read
         self.marks: list[tuple[str, int]] = []  #: text and iteration, in the last read
+        self.notable = False  #: the last read has more than batches, bursts and ends of commands
         self._core = _core.RawJournal(frontend, first)
         self._next = first if first > 0 else None  # None: begins with the oldest entry
 
@@ -84,19 +79,18 @@ class JournalWriter:
         """The backend was started with a journal."""
         return self._core.exists
 
-    def add_channel(self, file: "FileWriter", note: "EpochNote") -> None:
+    def add_channel(self, file: "FileWriter", note: EpochNote) -> None:
         """Adds a channel to a file, in which the next entries are written."""
         schema = file.add_schema(TYPE, DEFINITION)
         self.channel = file.add_channel(
-            topic_of(note.segment),
+            topic_of(note.segment, CONTENT),
             schema,
             note.channel_texts(CONTENT) | {CODEC: str(_core.JOURNAL_CODEC)},
         )
 
-    def read(self, log_time: int) -> tuple[SingleMessage | None, tuple[int, int] | None]:
+    def read(self) -> tuple[Entries | None, tuple[int, int] | None]:
         """The entries since the last call, and the first and last number of a gap before them."""
-        assert self.channel is not None
-        content, first, end, more, self.marks = self._core.read(MOST)
+        content, first, end, more, self.marks, self.notable = self._core.read(MOST)
         self.drained = not more
         if not content:
             return None, None
@@ -107,8 +101,7 @@ class JournalWriter:
             gap = self._next, first - 1
             self.missed += first - self._next
         self._next = end
-        message = Entries(first, end, content).message()
-        return SingleMessage(self.channel, log_time, message), gap
+        return Entries(first, end, content), gap
 
 
 def codec_of(found: Scan, channel: int) -> int:

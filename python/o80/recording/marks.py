@@ -5,7 +5,7 @@ A program that records writes them with `mark`; others note them in the journal 
 """
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 from typing import IO, Any
@@ -13,12 +13,20 @@ from typing import IO, Any
 import numpy as np
 
 from o80.base.screen import html
-from o80.recording.blocks import SingleMessage
+from o80.recording.blocks import Messages
+from o80.recording.cdr import CdrReader, CdrWriter
 from o80.recording.file_writer import FileWriter
 from o80.recording.scan import Scan, messages_of
 
 TOPIC = "/o80/marks"
-SCHEMA = '{"type": "object", "properties": {"name": {"type": "string"}}}'
+TYPE = "o80/msg/Mark"
+DEFINITION = """\
+string name
+int64 time  # wall clock, when it was made [ns since 1970]
+string[] segments
+int64[] rows  # newest iteration of each of these segments then
+string values  # JSON
+"""
 
 
 @dataclass(frozen=True)
@@ -31,14 +39,31 @@ class Mark:
     values: Mapping[str, Any] = field(default_factory=dict)
 
     def message(self) -> bytes:
-        """As JSON. Raises TypeError if a value has no form in JSON."""
-        texts = {"name": self.name, "time": self.time, "rows": self.rows, "values": self.values}
-        return json.dumps(texts, default=_plain).encode()
+        """In CDR. Raises TypeError if a value has no form in JSON."""
+        cdr = CdrWriter()
+        cdr.text(self.name)
+        cdr.numbers("q", self.time)
+        cdr.texts([*self.rows])
+        cdr.numbers("I", len(self.rows))
+        if self.rows:
+            cdr.numbers("q", *self.rows.values())
+        cdr.text(json.dumps(self.values, default=_plain))
+        return bytes(cdr.data)
 
     @classmethod
-    def of(cls, message: bytes) -> "Mark":
-        """Raises ValueError, TypeError, RecursionError if it is damaged."""
-        mark = cls(**json.loads(message))
+    def of(cls, message: bytes, encoding: str) -> "Mark":
+        """From a message in this encoding of its channel: cdr, or json, as an earlier o80 wrote.
+
+        Raises ValueError, TypeError, RecursionError, struct.error if it is damaged.
+        """
+        if encoding == "json":
+            mark = cls(**json.loads(message))
+        else:
+            cdr = CdrReader(message)
+            name, (time,), segments = cdr.text(), cdr.numbers("q", 1), cdr.texts()
+            (count,) = cdr.numbers("I", 1)
+            rows = cdr.numbers("q", count) if count else ()
+            mark = cls(name, time, dict(zip(segments, rows, strict=True)), json.loads(cdr.text()))
         is_whole = (
             isinstance(mark.name, str)
             and isinstance(mark.time, int)
@@ -76,26 +101,27 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"a mark holds what JSON can hold, not {type(value).__name__}: {value!r:.60}")
 
 
-def add_mark(file: FileWriter, mark: Mark, log_time: int) -> None:
-    """Writes a mark, in a chunk of its own. log_time: that of its newest row [ns]."""
-    message = mark.message()
+def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Messages:
+    """Messages of marks, at least one, each with its log time: that of its newest row [ns]."""
     channel = _channel_in(file.found)
-    if channel is None:
-        schema = file.add_schema("o80/Mark", SCHEMA, encoding="jsonschema")
-        channel = file.add_channel(TOPIC, schema, {}, encoding="json")
-    file.add_chunk([SingleMessage(channel, log_time, message)])
+    if channel is None or file.found.channels[channel].message_encoding == "json":
+        schema = file.add_schema(TYPE, DEFINITION)
+        channel = file.add_channel(TOPIC, schema, {})
+    return Messages(channel, [(time, mark.message()) for time, mark in marks])
 
 
 def marks_in(file: IO[bytes], found: Scan) -> list[Mark]:
     """All marks of a file, in their order."""
-    channel = _channel_in(found)
+    channels = [each for each in found.channels.values() if each.topic == TOPIC]
     return [
-        Mark.of(message)
+        Mark.of(message, channel.message_encoding)
         for chunk in found.chunks
-        if channel is not None and channel in chunk.message_index_offsets
-        for message in messages_of(file, chunk, channel)
+        for channel in channels
+        if channel.id in chunk.message_index_offsets
+        for message in messages_of(file, chunk, channel.id)
     ]
 
 
 def _channel_in(found: Scan) -> int | None:
-    return next((each.id for each in found.channels.values() if each.topic == TOPIC), None)
+    """The newest channel of marks."""
+    return max((each.id for each in found.channels.values() if each.topic == TOPIC), default=None)

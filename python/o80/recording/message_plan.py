@@ -12,10 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.recording.cdr import ENCAPSULATION
 from o80.recording.message_types import MessageType
-
-ENCAPSULATION = b"\x00\x01\x00\x00"
-"""First bytes of a message: CDR, little endian."""
 
 Bytes = NDArray[np.uint8]
 

@@ -26,7 +26,8 @@ class Member:
     offset: int  #: in the row, or in the struct it is part of [bytes]
     count: int | None = None  #: elements of an array; None: no array
     type: "MessageType | None" = None
-    bits: bool = False  #: a mask of the row: one bit per element there, one bool in the message
+    #: a mask of the row: one bit per element there, one bool in the message; `type` may name them
+    bits: bool = False
 
 
 @dataclass(frozen=True)
@@ -62,8 +63,17 @@ def row_type(layout: Layout) -> MessageType:
     if layout.actuators:
         states = _states_members(layout)
         members += [_placed(states, part, row[part]) for part in ("desired", "observed")]
+        mask_type = _mask_type(layout)
         members += [
-            Member(mask, "bool", 1, row[mask], layout.actuators, bits=True)
+            Member(
+                mask,
+                mask_type.name if mask_type else "bool",
+                1,
+                row[mask],
+                layout.actuators,
+                mask_type,
+                True,
+            )
             for mask in ("active", "clamped", "braking")
         ]
     if layout.extras.itemsize:
@@ -73,32 +83,56 @@ def row_type(layout: Layout) -> MessageType:
 
 
 def _states_members(layout: Layout) -> Member:
-    """The states of all actuators as one member: an array, or a struct of groups."""
+    """The states of all actuators as one member: an array, or a struct of actuators or groups."""
     groups = layout.schema["groups"]
-    members = [_group_member(group) for group in groups]
-    if len(groups) == 1 and not groups[0]["name"]:
-        return members[0]
-    states = _type("States", members)
+    if _has_names(layout):
+        described = [(each, groups[each["group"]]["type"]) for each in layout.schema["actuators"]]
+        members = [_state_member(kind, each["name"], each["offset"]) for each, kind in described]
+        notes = {
+            each["name"]: _note(kind["fields"][0]) for each, kind in described if is_plain(kind)
+        }
+    else:
+        members, notes = [_group_member(group) for group in groups], {}
+        if len(groups) == 1 and not groups[0]["name"]:
+            return members[0]
+    states = _type("States", members, notes=notes)
     return Member("", states.name, 0, 0, None, states)
 
 
+def _has_names(layout: Layout) -> bool:
+    """Whether someone has named the actuators: a group's own ones are `GROUP_0`, `GROUP_1`, ..."""
+    for group in layout.schema["groups"]:
+        first = group["first_actuator"]
+        for i in range(group["count"] if group["array"] else 0):
+            if layout.schema["actuators"][first + i]["name"] != f"{group['name']}_{i}".lstrip("_"):
+                return True
+    return not any(group["array"] for group in layout.schema["groups"])
+
+
+def _mask_type(layout: Layout) -> MessageType | None:
+    """A bool for each actuator, by its name; None: they have none."""
+    if not _has_names(layout):
+        return None
+    names = [each["name"] for each in layout.schema["actuators"]]
+    return _type("Mask", [Member(_field_name(name), "bool", 1, 0) for name in names])
+
+
 def _group_member(group: dict[str, Any]) -> Member:
-    described = group["type"]
     count = group["count"] if group["array"] else None
+    return _state_member(group["type"], group["name"] or "state", group["offset"], count)
+
+
+def _state_member(
+    described: dict[str, Any], name: str, offset: int, count: int | None = None
+) -> Member:
+    """One state, or an array of `count`."""
     if is_plain(described):
-        plain = _field_member(described["fields"][0], group["name"] or "state")
+        plain = _field_member(described["fields"][0], name)
         inner = plain.count or 1
         total = inner * (count or 1) if count is not None or plain.count is not None else None
-        return Member(plain.name, plain.kind, plain.size, group["offset"], total, plain.type)
-    struct = _struct(described, group["name"] or "State")
-    return Member(
-        _field_name(group["name"] or "state"),
-        struct.name,
-        described["size"],
-        group["offset"],
-        count,
-        struct,
-    )
+        return Member(plain.name, plain.kind, plain.size, offset, total, plain.type)
+    struct = _struct(described, name)
+    return Member(_field_name(name), struct.name, described["size"], offset, count, struct)
 
 
 def _placed(member: Member, name: str, offset: int) -> Member:
@@ -157,7 +191,8 @@ def _type(
     members = _with_unique_names(members)
     for member in members:
         kind = member.kind if member.type is None else f"{PACKAGE}/{member.type.name}"
-        array = "" if member.count is None else f"[{member.count}]"
+        is_array = member.count is not None and not (member.bits and member.type)
+        array = f"[{member.count}]" if is_array else ""
         note = (notes or {}).get(member.name, "")
         lines.append(f"{kind}{array} {member.name}" + (f"  # {note}" if note else ""))
     text = "\n".join(lines) + "\n"

@@ -10,11 +10,11 @@ from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
 from o80.recording import joint_states
 from o80.recording.blocks import messages_in
+from o80.recording.cdr import ENCAPSULATION
 from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.file_writer import FileWriter
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import last_entry_in
-from o80.recording.message_plan import ENCAPSULATION
 from o80.recording.reader import RecordingFile, files_of
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, content_of, has_end, index_of, scan
 

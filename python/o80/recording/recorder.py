@@ -4,6 +4,7 @@ import fnmatch
 import math
 import os
 import time
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -12,7 +13,9 @@ from typing import Any
 
 from o80.base.errors import Error, InvalidArgument, RecordingError
 from o80.frontend.segments import segments
-from o80.recording.marks import Mark, add_mark
+from o80.recording.epoch import topic_of
+from o80.recording.log_channel import INFO, Line, added_lines
+from o80.recording.marks import Mark, added_marks
 from o80.recording.output import Predecessor, next_file, opened, opened_in
 from o80.recording.reader import files_of
 from o80.recording.source import Source
@@ -62,13 +65,14 @@ class Recorder:
         self._file_begun = time.monotonic()
         self.sources: dict[str, Source] = {}
         self._search_at = 0.0
+        self._left_out: set[str] = set()  # found, but not recorded
         try:
             self._before = Predecessor(self.file, before) if proceed else None
             with self.writing():
                 for name in names:
                     if name not in self._patterns:
                         self._add(name, from_now)
-                self._search(from_now)
+                self._search(from_now, new=True)
         except BaseException:
             self._close_sources()
             self.file.close()
@@ -106,14 +110,22 @@ class Recorder:
             if self._patterns and time.monotonic() >= self._search_at:
                 self._search()
             blocks = [block for source in self.sources.values() for block in source.poll()]
-            if blocks:
-                self.file.add_chunk(blocks)
+            count = sum(block.count for block in blocks)
+            marks, lines = [], []
             for source in self.sources.values():
                 for text, iteration in source.marks:
                     mark = Mark(text, time.time_ns(), {source.name: iteration})
-                    add_mark(self.file, mark, source.log_time(iteration))
+                    marks.append((source.log_time(iteration), mark))
+                lines += source.log
                 source.marks.clear()
-        return sum(block.count for block in blocks)
+                source.log.clear()
+            if marks:
+                blocks.append(added_marks(self.file, marks))
+            if lines:
+                blocks.append(added_lines(self.file, lines))
+            if blocks:
+                self.file.add_chunk(blocks)
+        return count
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -133,7 +145,11 @@ class Recorder:
         with self.writing():
             now, newest = time.time_ns(), self.newest
             log_times = (self.sources[each].log_time(row) for each, row in newest.items())
-            add_mark(self.file, Mark(name, now, newest, values), max(log_times, default=now))
+            mark = Mark(name, now, newest, values)
+            log_time = max(log_times, default=now)
+            line = Line("", log_time, INFO, f"mark {name}")
+            blocks = added_marks(self.file, [(log_time, mark)]), added_lines(self.file, [line])
+            self.file.add_chunk(blocks)
 
     def catch_up(self) -> None:
         """Polls until rows and decisions that were published before the call are written."""
@@ -172,18 +188,33 @@ class Recorder:
             self._bytes_before += full.size
 
     def _add(self, name: str, from_now: bool) -> None:
+        """Raises RecordingError for a name that others would take for one that is recorded."""
+        for other in self.sources:
+            if topic_of(other) == topic_of(name):
+                raise RecordingError(
+                    f"'{name}' and '{other}' would have one topic, {topic_of(name)}, because ROS 2 "
+                    f"accepts letters, digits and underscores only: rename one, or record it to "
+                    f"another file"
+                )
         written = self._before.written(name) if self._before else {}
         self.sources[name] = Source(name, self.file, written, from_now=from_now)
 
-    def _search(self, from_now: bool = False) -> None:
+    def _search(self, from_now: bool = False, *, new: bool = False) -> None:
         """Adds segments that match a pattern and are not recorded yet."""
         self._search_at = time.monotonic() + BETWEEN_SEARCHES
         if not self._patterns:
             return
         for segment in segments():
             matches = any(fnmatch.fnmatchcase(segment.name, each) for each in self._patterns)
-            if matches and segment.readable and segment.name not in self.sources:
-                self._add(segment.name, from_now)
+            known = self.sources.keys() | self._left_out
+            if matches and segment.readable and segment.name not in known:
+                try:
+                    self._add(segment.name, from_now)
+                except RecordingError as error:
+                    if new:
+                        raise
+                    self._left_out.add(segment.name)  # the others go on
+                    warnings.warn(f"not recorded: {error}", RuntimeWarning, stacklevel=3)
 
 
 @dataclass(frozen=True)

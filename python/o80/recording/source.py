@@ -1,18 +1,19 @@
 """One segment that is recorded: rows and journal in order, through restarts of its backend."""
 
-import time
 from collections.abc import Mapping
 from dataclasses import replace
+from time import monotonic, time_ns
 
 import o80._core as _core
 from o80.base.errors import BackendGone, RecordingError, SegmentError, TimeoutError
 from o80.frontend.frontend import Frontend
-from o80.recording.blocks import Block, SingleMessage
+from o80.recording.blocks import Block, Messages
 from o80.recording.epoch import GAP, note_of
 from o80.recording.file_writer import FileWriter, MessageBlock
 from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
-from o80.recording.journal_channel import JournalWriter, codec_of
+from o80.recording.journal_channel import JournalRecorder, codec_of
+from o80.recording.log_channel import ERROR, INFO, JournalLog, Line
 from o80.recording.output import Written
 from o80.recording.row_writer import RowWriter
 
@@ -33,12 +34,15 @@ class Source:
         self.behind = 0  #: published and not read, at the last look
         #: Marks of frontends that were read and not written yet: text and iteration.
         self.marks: list[tuple[str, int]] = []
+        self.log: list[Line] = []  #: what was not written yet
         self._file = file
         self._written = dict(written)
         self._from_now = from_now
         self._frontend: Frontend | None = None
         self._writer: RowWriter | None = None
-        self._journal: JournalWriter | None = None
+        self._journal: JournalRecorder | None = None
+        self._journal_log: JournalLog | None = None
+        self._has_told_end = False
         self._next = 0
         self._last_log_time = max((each.last_log_time for each in written.values()), default=0)
         self._look_at = 0.0
@@ -98,6 +102,7 @@ class Source:
         blocks = self._read(self._frontend)
         if not blocks and not self._frontend.alive:
             blocks = self._read(self._frontend)  # what was published just before its end
+            self._tell_death(self._frontend)
             if not blocks and self._attach():
                 blocks = self._read(self._frontend)
         return blocks
@@ -112,7 +117,7 @@ class Source:
 
     def _attach(self) -> bool:
         """Attaches to a backend that is not the one that was read. False: there is none."""
-        now = time.monotonic()
+        now = monotonic()
         if now < self._look_at:
             return False
         self._look_at = now + BETWEEN_LOOKS
@@ -142,10 +147,16 @@ class Source:
             joints = JointWriter.added_to(self._file, layout, note, known.joints)
             self._writer = RowWriter(layout, note, known.channel, joints)
         self._refuse_other_format(known)
-        journal = JournalWriter(frontend, known.journal, known.journal_next)
+        journal = JournalRecorder(frontend, known.journal, known.journal_next)
         self._journal = journal if journal.exists else None
-        if self._journal is not None and known.journal is None:
-            self._journal.add_channel(self._file, note)
+        if self._journal is not None:
+            self._journal_log = JournalLog(frontend)
+            if known.journal is None:
+                self._journal.add_channel(self._file, note)
+        self._has_told_end = False
+        self._tell(
+            self._next, INFO, f"run {note.number} of '{note.segment}' ({note.robot}) is recorded"
+        )
 
     def _refuse_other_format(self, known: Written) -> None:
         """A journal is continued in the format in which it was begun."""
@@ -205,14 +216,32 @@ class Source:
         self._last_log_time = blocks[0].time_range[1]
         return blocks
 
-    def _read_journal(self) -> SingleMessage | None:
+    def _read_journal(self) -> Messages | None:
         if self._journal is None:
             return None
-        message, gap = self._journal.read(self._last_log_time or time.time_ns())
+        entries, gap = self._journal.read()
         if gap is not None:
             self._note_gap(JOURNAL_GAP, *gap)
         self.marks += self._journal.marks
-        return message
+        if entries is None:
+            return None
+        assert self._journal.channel is not None
+        assert self._journal_log is not None
+        for iteration, level, text in self._journal_log.told(entries, self._journal.notable):
+            self._tell(iteration, level, text)
+        time = self._last_log_time or time_ns()
+        return Messages(self._journal.channel, [(time, entries.message())])
+
+    def _tell_death(self, frontend: Frontend) -> None:
+        """A backend that was killed could not write its end into the journal."""
+        if not self._has_told_end and frontend.life in ("killed", "superseded"):
+            self._tell(frontend.published, ERROR, f"the backend was {frontend.life}")
+            self._has_told_end = True
+
+    def _tell(self, iteration: int, level: int, text: str) -> None:
+        """Adds a line to the log."""
+        said = f"row {iteration}: {text}" if iteration >= 0 else text
+        self.log.append(Line(self.name, self.log_time(iteration), level, said))
 
     def log_time(self, iteration: int) -> int:
         """Log time of a row [ns]; if it is not there any more, that of the newest one read."""
@@ -220,7 +249,7 @@ class Source:
             rows = self._frontend.history(since=iteration, until=iteration)
             if len(rows):
                 return int(rows.time[0]) + self._writer.note.wall_offset
-        return self._last_log_time or time.time_ns()
+        return self._last_log_time or time_ns()
 
     def _note_gap(self, name: str, first: int, last: int) -> None:
         assert self._writer is not None

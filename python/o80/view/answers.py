@@ -10,7 +10,7 @@ import numpy as np
 
 from o80.base.errors import Error, InvalidArgument, ReadOnly
 from o80.frontend.frontend import Frontend
-from o80.frontend.results import halt as halt_backend
+from o80.frontend.stopping import halt as halt_backend
 from o80.rows.history import History
 from o80.view.curves import Panels
 from o80.view.scene import Scene

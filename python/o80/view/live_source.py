@@ -98,7 +98,7 @@ class LiveSource(Source):
         with self._lock:
             journal, more = self._journal, True
             while journal is not None and journal.exists and more:
-                *_, more, found = journal.read(JOURNAL_BYTES)
+                *_, more, found, _ = journal.read(JOURNAL_BYTES)
                 self._marks += found
             del self._marks[:-MAX_MARKS]
             return list(self._marks)

@@ -35,7 +35,7 @@
 #include "runtime/backend/staging.hpp"
 #include "runtime/backend/status_outbox.hpp"
 #include "runtime/backend/work_share.hpp"
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 
 namespace o80 {
 
@@ -130,7 +130,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   const Provenance provenance;
   OwnedSegment segment;
   HistoryWriter history;
-  DecisionJournal journal;
+  JournalAuthor journal;
   RowSignal row_signal;
   BellWaiter bell;
   LaneReceivers lanes;

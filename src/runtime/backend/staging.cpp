@@ -7,7 +7,7 @@
 namespace o80 {
 
 Staging::Staging(LaneReceivers& lanes, BlockPool& pool, Controller& controller,
-                 DecisionJournal& journal)
+                 JournalAuthor& journal)
     : lanes_(lanes),
       pool_(pool),
       controller_(controller),

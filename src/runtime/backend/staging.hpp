@@ -9,7 +9,7 @@
 #include "control/queue/controller.hpp"
 #include "memory/ring/lane_receiver.hpp"
 #include "runtime/backend/schedule.hpp"
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 
 namespace o80 {
 
@@ -22,7 +22,7 @@ namespace o80 {
 /// Realtime: everything but construction; each step takes its cost off a budget.
 class Staging {
  public:
-  Staging(LaneReceivers& lanes, BlockPool& pool, Controller& controller, DecisionJournal& journal);
+  Staging(LaneReceivers& lanes, BlockPool& pool, Controller& controller, JournalAuthor& journal);
 
   /// Copies and checks the next batch of a lane and takes its blocks off `budget`. True when that
   /// batch is staged or was dropped as invalid; false when the budget ended first.
@@ -78,7 +78,7 @@ class Staging {
   LaneReceivers& lanes_;
   BlockPool& pool_;
   Controller& controller_;
-  DecisionJournal& journal_;
+  JournalAuthor& journal_;
   std::vector<Stage> stages_;
   std::vector<std::uint64_t> tickets_;
   std::vector<Waiting> waiting_;  // one for each block

@@ -7,7 +7,7 @@
 #include "control/batch/status_sink.hpp"
 #include "memory/ring/lane_receiver.hpp"
 #include "memory/ring/status_word.hpp"
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 
 namespace o80 {
 
@@ -21,7 +21,7 @@ namespace o80 {
 class StatusOutbox {
  public:
   /// `most`: most ends of commands in one step.
-  StatusOutbox(LaneReceivers& lanes, DecisionJournal& journal, std::size_t most)
+  StatusOutbox(LaneReceivers& lanes, JournalAuthor& journal, std::size_t most)
       : lanes_(lanes), journal_(journal) {
     waiting_.reserve(most);
   }
@@ -63,7 +63,7 @@ class StatusOutbox {
   void tell(const Run& run, bool ends) noexcept;
 
   LaneReceivers& lanes_;
-  DecisionJournal& journal_;
+  JournalAuthor& journal_;
   std::vector<Run> waiting_;  // ends
   /// The last command that began in this step, until it is known whether its end follows at once.
   /// Unused if `count` is 0.

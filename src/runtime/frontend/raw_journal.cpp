@@ -3,6 +3,27 @@
 #include "o80/runtime/frontend.hpp"
 
 namespace o80 {
+namespace {
+
+bool is_notable(JournalKind kind) {
+  switch (kind) {
+    using enum JournalKind;
+    case none:
+    case records:
+    case owner:
+    case taken:
+    case scheduled:
+    case statuses:
+    case burst:
+    case burst_ended:
+    case at_rest:
+      return false;
+    default:
+      return true;
+  }
+}
+
+}  // namespace
 
 RawJournal::RawJournal(const UntypedFrontend& frontend, std::uint64_t first)
     : link_(frontend.link()), reader_(link_->segment.view()), first_(first) {
@@ -25,6 +46,7 @@ RawJournal::Entries RawJournal::read(std::size_t most) {
       continue;
     }
     if (begins) entries.first = head.number;
+    entries.notable |= is_notable(head.kind);
     entries.next = head.number + head.numbers();
   }
   entries.marks = encoder_.take_marks();

@@ -25,6 +25,7 @@ class RawJournal {
     std::uint64_t first = 0;  // number of the first entry
     std::uint64_t next = 0;   // number after the last one; = first: there are no entries
     bool more = false;        // the next read may return entries at once
+    bool notable = false;     // there are others than batches, bursts and ends of commands
     std::vector<JournalFileEncoder::Mark> marks;  // in these entries
   };
 

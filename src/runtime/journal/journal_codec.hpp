@@ -11,7 +11,7 @@
 #include "control/batch/record.hpp"
 #include "memory/ring/journal.hpp"
 #include "memory/ring/status_word.hpp"
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 #include "runtime/journal/journal_encoder.hpp"
 
 namespace o80 {

@@ -6,7 +6,7 @@
 
 #include "base/printable.hpp"
 #include "memory/ring/status_word.hpp"
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 #include "runtime/journal/journal_records.hpp"
 
 namespace o80 {

@@ -11,7 +11,7 @@
 #include "memory/ring/journal.hpp"
 #include "o80/runtime/journal.hpp"
 #include "o80/runtime/observation.hpp"
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 
 namespace o80 {
 

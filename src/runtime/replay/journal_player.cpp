@@ -4,7 +4,7 @@
 #include <cstring>
 #include <utility>
 
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 
 namespace o80 {
 

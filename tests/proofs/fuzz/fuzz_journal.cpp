@@ -14,7 +14,7 @@
 #include "memory/ring/journal.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/journal.hpp"
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 #include "runtime/journal/journal_records.hpp"
 #include "runtime/journal/recorded_journal.hpp"
 

@@ -9,7 +9,7 @@
 
 #include "o80/base/error.hpp"
 #include "runtime/frontend/raw_journal.hpp"
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

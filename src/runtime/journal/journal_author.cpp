@@ -1,4 +1,4 @@
-#include "runtime/journal/decision_journal.hpp"
+#include "runtime/journal/journal_author.hpp"
 
 #include <algorithm>
 #include <array>
@@ -9,15 +9,15 @@
 
 namespace o80 {
 
-DecisionJournal::DecisionJournal(const SegmentView& view)
+JournalAuthor::JournalAuthor(const SegmentView& view)
     : writer_(view),
       view_(view),
       named_(view.shape.lanes),
       acts_(writer_.is_on()),
       half_(writer_.bytes() / 2) {}
 
-void DecisionJournal::begin_blocks(std::uint32_t lane, std::uint64_t sender,
-                                   std::uint32_t most) noexcept {
+void JournalAuthor::begin_blocks(std::uint32_t lane, std::uint64_t sender,
+                                 std::uint32_t most) noexcept {
   if (!writer_.is_on()) return;
   if (sender != 0 && named_[lane].incarnation != sender) name_owner(lane, sender);
   name_again(lane, sender);
@@ -25,12 +25,11 @@ void DecisionJournal::begin_blocks(std::uint32_t lane, std::uint64_t sender,
   writer_.begin(std::size_t{most} * kBlockBytes);
 }
 
-void DecisionJournal::end_blocks(std::uint32_t lane, CommandId batch,
-                                 std::uint32_t first) noexcept {
+void JournalAuthor::end_blocks(std::uint32_t lane, CommandId batch, std::uint32_t first) noexcept {
   writer_.end(head(JournalKind::records, lane, batch, first));
 }
 
-void DecisionJournal::name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept {
+void JournalAuthor::name_owner(std::uint32_t lane, std::uint64_t incarnation) noexcept {
   Named& named = named_[lane];
   named.incarnation = incarnation;
   named.position = writer_.position();
@@ -41,7 +40,7 @@ void DecisionJournal::name_owner(std::uint32_t lane, std::uint64_t incarnation) 
 
 /// Repeats the name once in each half of the ring, so that a reader that comes late finds it, also
 /// when the owner has left the lane.
-void DecisionJournal::name_again(std::uint32_t lane, std::uint64_t incarnation) noexcept {
+void JournalAuthor::name_again(std::uint32_t lane, std::uint64_t incarnation) noexcept {
   if (!writer_.is_on()) return;
   Named& named = named_[lane];
   if (incarnation == 0 || named.incarnation != incarnation || !is_far(named)) return;
@@ -49,7 +48,7 @@ void DecisionJournal::name_again(std::uint32_t lane, std::uint64_t incarnation) 
   write(head(JournalKind::owner, lane, incarnation), named.name.data(), sizeof named.name);
 }
 
-void DecisionJournal::dropped(std::uint32_t lane, CommandId batch) noexcept {
+void JournalAuthor::dropped(std::uint32_t lane, CommandId batch) noexcept {
   note(JournalKind::dropped, lane, batch);
 }
 
@@ -59,12 +58,12 @@ JournalBatch payload_of(const StagedBatch& sent) noexcept {
 }
 }  // namespace
 
-void DecisionJournal::scheduled(const StagedBatch& sent, CommandId batch) noexcept {
+void JournalAuthor::scheduled(const StagedBatch& sent, CommandId batch) noexcept {
   const JournalBatch payload = payload_of(sent);
   write(head(JournalKind::scheduled, sent.lane, batch), &payload, sizeof payload);
 }
 
-void DecisionJournal::decided(const StagedBatch& sent, const StatusChange& change) noexcept {
+void JournalAuthor::decided(const StagedBatch& sent, const StatusChange& change) noexcept {
   const auto kind = change.status == Status::rejected ? JournalKind::rejected : JournalKind::taken;
   const JournalBatch payload = payload_of(sent);
   write(head(kind, change.lane, change.id,
@@ -73,7 +72,7 @@ void DecisionJournal::decided(const StagedBatch& sent, const StatusChange& chang
         &payload, sizeof payload);
 }
 
-void DecisionJournal::statuses(std::uint32_t lane, JournalStatusRun run) noexcept {
+void JournalAuthor::statuses(std::uint32_t lane, JournalStatusRun run) noexcept {
   if (!writer_.is_on()) return;
   while (run.count > 0) {
     if (statuses_ == kMaxStatuses || status_lane_ != lane) flush();
@@ -91,27 +90,26 @@ void DecisionJournal::statuses(std::uint32_t lane, JournalStatusRun run) noexcep
   }
 }
 
-void DecisionJournal::write_statuses() noexcept {
+void JournalAuthor::write_statuses() noexcept {
   writer_.write(head(JournalKind::statuses, status_lane_, 0, statuses_), runs_.data(),
                 runs_used_ * sizeof(JournalStatusRun));
   statuses_ = runs_used_ = 0;
 }
 
-void DecisionJournal::halt(JournalKind halt_or_reason, const Halt& halt) noexcept {
+void JournalAuthor::halt(JournalKind halt_or_reason, const Halt& halt) noexcept {
   acts();
   const JournalHalt payload{static_cast<std::uint64_t>(halt.cause), halt.who, halt.text};
   write(head(halt_or_reason, 0, halt.number), &payload, sizeof payload);
 }
 
-void DecisionJournal::resume(std::uint32_t lane, std::uint64_t sender,
-                             std::uint64_t halt) noexcept {
+void JournalAuthor::resume(std::uint32_t lane, std::uint64_t sender, std::uint64_t halt) noexcept {
   acts();
   name_again(lane, sender);
   const JournalSender payload{sender};
   write(head(JournalKind::resume, lane, halt), &payload, sizeof payload);
 }
 
-void DecisionJournal::kept(const KeptState& state) noexcept {
+void JournalAuthor::kept(const KeptState& state) noexcept {
   constexpr std::array<std::byte, 8> kPadding{};
   const std::size_t rest = state.bytes.size() % kPadding.size();
   const std::size_t padding = rest == 0 ? 0 : kPadding.size() - rest;
@@ -128,26 +126,25 @@ void DecisionJournal::kept(const KeptState& state) noexcept {
   writer_.end(head(JournalKind::snapshot, 0, state.bytes.size(), state.slot));
 }
 
-void DecisionJournal::died(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
+void JournalAuthor::died(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
   acts();
   name_again(lane, owner);
   note(JournalKind::died, lane, owner, static_cast<std::uint32_t>(stale));
 }
 
-void DecisionJournal::silent(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
+void JournalAuthor::silent(std::uint32_t lane, std::uint64_t owner, Stale stale) noexcept {
   acts();
   name_again(lane, owner);
   note(JournalKind::silent, lane, owner, static_cast<std::uint32_t>(stale));
 }
 
-void DecisionJournal::burst(std::uint32_t lane, CommandId batch,
-                            const JournalBurst& burst) noexcept {
+void JournalAuthor::burst(std::uint32_t lane, CommandId batch, const JournalBurst& burst) noexcept {
   name_again(lane, burst.sender);
   write(head(JournalKind::burst, lane, batch), &burst, sizeof burst);
 }
 
-void DecisionJournal::burst_ended(std::uint32_t lane, std::uint64_t sender, CommandId batch,
-                                  Iteration row, BurstEnd how) noexcept {
+void JournalAuthor::burst_ended(std::uint32_t lane, std::uint64_t sender, CommandId batch,
+                                Iteration row, BurstEnd how) noexcept {
   name_again(lane, sender);
   JournalHead entry = head(JournalKind::burst_ended, lane, batch, static_cast<std::uint32_t>(how));
   entry.iteration = row;
@@ -155,7 +152,7 @@ void DecisionJournal::burst_ended(std::uint32_t lane, std::uint64_t sender, Comm
   write(entry, &payload, sizeof payload);
 }
 
-void DecisionJournal::ended(BackendState state, std::string_view text) noexcept {
+void JournalAuthor::ended(BackendState state, std::string_view text) noexcept {
   JournalText payload{};
   text.copy(payload.data(), payload.size() - 1);
   write(head(JournalKind::ended, 0, 0, static_cast<std::uint32_t>(state)), payload.data(),

@@ -65,9 +65,9 @@ using JournalText = std::array<char, 248>;
 ///
 /// Writer:   the backend's thread.
 /// Realtime: everything but construction.
-class DecisionJournal {
+class JournalAuthor {
  public:
-  explicit DecisionJournal(const SegmentView& view);
+  explicit JournalAuthor(const SegmentView& view);
 
   // rows in which nothing acts
   /// Something acts from now on; another entry says what.

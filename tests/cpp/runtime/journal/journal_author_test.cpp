@@ -28,9 +28,9 @@ std::vector<JournalKind> kinds_of(const std::vector<JournalEntry>& entries) {
 std::string this_process() { return "pid " + std::to_string(getpid()); }
 
 /// A backend, a commander, and a reader of the journal that may only observe.
-class DecisionJournalTest : public StationTest {
+class JournalAuthorTest : public StationTest {
  protected:
-  explicit DecisionJournalTest(const BackendOptions& options = {.segment = "pair"})
+  explicit JournalAuthorTest(const BackendOptions& options = {.segment = "pair"})
       : station(options) {
     station.start();
     commander.emplace("pair");
@@ -45,13 +45,13 @@ class DecisionJournalTest : public StationTest {
   std::optional<Journal> journal;
 };
 
-TEST_F(DecisionJournalTest, AnIterationWithoutCommandsWritesNothing) {
+TEST_F(JournalAuthorTest, AnIterationWithoutCommandsWritesNothing) {
   station.run(10);
   EXPECT_TRUE(journal->exists());
   EXPECT_TRUE(news().empty());
 }
 
-TEST_F(DecisionJournalTest, HoldsTheStateThatASnapshotKeeps) {
+TEST_F(JournalAuthorTest, HoldsTheStateThatASnapshotKeeps) {
   for (std::size_t size = 0; size <= 20; ++size) {
     station.kept.clear();
     for (std::size_t i = 0; i < size; ++i) station.kept.push_back(static_cast<std::byte>(i + 1));
@@ -72,7 +72,7 @@ TEST_F(DecisionJournalTest, HoldsTheStateThatASnapshotKeeps) {
   }
 }
 
-TEST_F(DecisionJournalTest, LeavesOutAStateThatIsLargerThanAnEntry) {
+TEST_F(JournalAuthorTest, LeavesOutAStateThatIsLargerThanAnEntry) {
   station.kept.resize(std::size_t{1} << 20);
   add_request<Snapshot>(*commander);
   commander->pulse();
@@ -80,7 +80,7 @@ TEST_F(DecisionJournalTest, LeavesOutAStateThatIsLargerThanAnEntry) {
   EXPECT_THAT(kinds_of(news()), ElementsAre(JournalKind::taken, JournalKind::status));
 }
 
-TEST_F(DecisionJournalTest, ShowsWhoSentWhatAndWhenItWasTakenStartedAndEnded) {
+TEST_F(JournalAuthorTest, ShowsWhoSentWhatAndWhenItWasTakenStartedAndEnded) {
   station.run(2);
   add(*commander, 1, 0.5, {.pace = iterations(3), .profile = Profile::linear});
   const Batch batch = commander->pulse();
@@ -114,7 +114,7 @@ TEST_F(DecisionJournalTest, ShowsWhoSentWhatAndWhenItWasTakenStartedAndEnded) {
   EXPECT_EQ(batch.handle(0).iteration, 5);
 }
 
-TEST_F(DecisionJournalTest, BatchesOfSeveralLanesStandInTheOrderOfTheirTickets) {
+TEST_F(JournalAuthorTest, BatchesOfSeveralLanesStandInTheOrderOfTheirTickets) {
   UntypedFrontend second("pair");
   for (int i = 0; i < 5; ++i) {
     send(second, 0, i);
@@ -133,7 +133,7 @@ TEST_F(DecisionJournalTest, BatchesOfSeveralLanesStandInTheOrderOfTheirTickets) 
   EXPECT_THAT(lanes, ElementsAre(0, 1, 0, 1, 0, 1, 0, 1, 0, 1));
 }
 
-TEST_F(DecisionJournalTest, ARejectedBatchComesWithItsRecordsAndTheReason) {
+TEST_F(JournalAuthorTest, ARejectedBatchComesWithItsRecordsAndTheReason) {
   commander->halt("enough");
   station.run(1);
   send(*commander, 0, 5.0);
@@ -151,7 +151,7 @@ TEST_F(DecisionJournalTest, ARejectedBatchComesWithItsRecordsAndTheReason) {
   EXPECT_EQ(unpack<double>(entries[1].records[0].targets[0].states.data()), 5.0);
 }
 
-TEST_F(DecisionJournalTest, ShowsAHaltAndItsResume) {
+TEST_F(JournalAuthorTest, ShowsAHaltAndItsResume) {
   send(*commander, 0, 5.0, {.pace = iterations(10)});
   station.run(2);
   const std::uint64_t number = commander->halt("stop");
@@ -169,7 +169,7 @@ TEST_F(DecisionJournalTest, ShowsAHaltAndItsResume) {
   EXPECT_THAT(entries[5].who, HasSubstr(this_process()));
 }
 
-TEST_F(DecisionJournalTest, ABatchForLaterIsScheduledAndThenTaken) {
+TEST_F(JournalAuthorTest, ABatchForLaterIsScheduledAndThenTaken) {
   add(*commander, 0, 1.0);
   commander->pulse({.at = 6});
   station.run(8);
@@ -183,7 +183,7 @@ TEST_F(DecisionJournalTest, ABatchForLaterIsScheduledAndThenTaken) {
   EXPECT_EQ(entries[1].records.size(), 1U);
 }
 
-TEST_F(DecisionJournalTest, ShowsWhoTookAndReleasedControl) {
+TEST_F(JournalAuthorTest, ShowsWhoTookAndReleasedControl) {
   commander->add_take_control();
   commander->pulse();
   station.run(1);
@@ -204,7 +204,7 @@ TEST_F(DecisionJournalTest, ShowsWhoTookAndReleasedControl) {
   EXPECT_EQ(entries[1].detail, entries[0].lane);
 }
 
-TEST_F(DecisionJournalTest, ControlIsLostWhenItsHolderCloses) {
+TEST_F(JournalAuthorTest, ControlIsLostWhenItsHolderCloses) {
   commander->add_take_control();
   commander->pulse();
   station.run(1);
@@ -216,7 +216,7 @@ TEST_F(DecisionJournalTest, ControlIsLostWhenItsHolderCloses) {
   EXPECT_THAT(kinds, ::testing::Contains(JournalKind::control_lost));
 }
 
-TEST_F(DecisionJournalTest, ShowsAnInterruptByTheDriver) {
+TEST_F(JournalAuthorTest, ShowsAnInterruptByTheDriver) {
   send(*commander, 1, 5.0, {.pace = iterations(10)});
   station.run(2);
   station.backend.interrupt(1);
@@ -229,7 +229,7 @@ TEST_F(DecisionJournalTest, ShowsAnInterruptByTheDriver) {
   EXPECT_EQ(entries[3].status, Status::interrupted);
 }
 
-TEST_F(DecisionJournalTest, ShowsRequestsWithTheirStructAndFreshStarts) {
+TEST_F(JournalAuthorTest, ShowsRequestsWithTheirStructAndFreshStarts) {
   add_request(*commander, Reset{.seed = 7});
   add_request(*commander, Refuse{});
   commander->pulse();
@@ -246,7 +246,7 @@ TEST_F(DecisionJournalTest, ShowsRequestsWithTheirStructAndFreshStarts) {
   EXPECT_EQ(entries[3].reason, Reason::driver);
 }
 
-TEST_F(DecisionJournalTest, TheEndOfTheBackendIsItsLastEntry) {
+TEST_F(JournalAuthorTest, TheEndOfTheBackendIsItsLastEntry) {
   send(*commander, 0, 5.0, {.pace = iterations(10)});
   station.run(2);
   station.backend.end(BackendState::failed, "the arm fell off");
@@ -258,7 +258,7 @@ TEST_F(DecisionJournalTest, TheEndOfTheBackendIsItsLastEntry) {
   EXPECT_EQ(entries[entries.size() - 2].status, Status::purged);
 }
 
-TEST_F(DecisionJournalTest, ReadsOnFromANumberWithoutLosingRecords) {
+TEST_F(JournalAuthorTest, ReadsOnFromANumberWithoutLosingRecords) {
   add(*commander, 0, 1.0);
   commander->pulse({.at = 4});
   station.run(1);
@@ -276,7 +276,7 @@ TEST_F(DecisionJournalTest, ReadsOnFromANumberWithoutLosingRecords) {
   EXPECT_TRUE(all_of(other).empty());
 }
 
-TEST_F(DecisionJournalTest, OfManyRejectedCommandsTheBatchIsOneEntry) {
+TEST_F(JournalAuthorTest, OfManyRejectedCommandsTheBatchIsOneEntry) {
   commander->halt("enough");
   station.run(1);
   for (int i = 0; i < 500; ++i) add(*commander, 0, i);
@@ -287,10 +287,9 @@ TEST_F(DecisionJournalTest, OfManyRejectedCommandsTheBatchIsOneEntry) {
 
 // ------------------------------------------------------------------------------ size
 
-class SmallJournalTest : public DecisionJournalTest {
+class SmallJournalTest : public JournalAuthorTest {
  protected:
-  SmallJournalTest()
-      : DecisionJournalTest({.segment = "pair", .lane_blocks = 16384, .journal = 1}) {}
+  SmallJournalTest() : JournalAuthorTest({.segment = "pair", .lane_blocks = 16384, .journal = 1}) {}
 };
 
 TEST_F(SmallJournalTest, ABatchLargerThanHalfOfItIsRefusedBeforeItIsSent) {
@@ -348,7 +347,7 @@ TEST_F(StationTest, ABackendMayHaveNoJournal) {
 
 // ------------------------------------------------------------------------------ deaths, bursts
 
-TEST_F(DecisionJournalTest, ShowsTheDeathOfACommander) {
+TEST_F(JournalAuthorTest, ShowsTheDeathOfACommander) {
   ChildProcess child([](const ChildProcess::Ready& ready) {
     UntypedFrontend frontend("pair");
     send(frontend, 0, 5.0, {.pace = iterations(1'000'000'000)});
@@ -371,9 +370,9 @@ TEST_F(DecisionJournalTest, ShowsTheDeathOfACommander) {
   EXPECT_EQ(entries[0].who, before[0].who);
 }
 
-class WatchedTest : public DecisionJournalTest {
+class WatchedTest : public JournalAuthorTest {
  protected:
-  WatchedTest() : DecisionJournalTest({.segment = "pair", .stale = Stale::purge, .silence = 5}) {}
+  WatchedTest() : JournalAuthorTest({.segment = "pair", .stale = Stale::purge, .silence = 5}) {}
 };
 
 TEST_F(WatchedTest, ShowsTheSilenceOfACommander) {
@@ -405,7 +404,7 @@ TEST_F(StationTest, TheJournalShowsBursts) {
   for (const std::size_t i : {0, 1, 3}) EXPECT_THAT(entries[i].who, HasSubstr(this_process()));
 }
 
-TEST_F(DecisionJournalTest, ACommandThatEndsInItsFirstIterationHasOneEntry) {
+TEST_F(JournalAuthorTest, ACommandThatEndsInItsFirstIterationHasOneEntry) {
   add(*commander, 0, 0.5);
   add(*commander, 1, 0.25);
   add(*commander, 1, 0.75, {.pace = iterations(2), .profile = Profile::linear});
@@ -427,9 +426,9 @@ TEST_F(DecisionJournalTest, ACommandThatEndsInItsFirstIterationHasOneEntry) {
 }
 
 /// The lane of the commander, when a reader comes after the ring was filled since its last batch.
-class LateReaderTest : public DecisionJournalTest {
+class LateReaderTest : public JournalAuthorTest {
  protected:
-  LateReaderTest() : DecisionJournalTest({.segment = "pair", .journal = 1 << 19}) {}
+  LateReaderTest() : JournalAuthorTest({.segment = "pair", .journal = 1 << 19}) {}
   /// Another frontend's batches until the ring has none of the entries before.
   void flood() {
     UntypedFrontend other("pair");

@@ -1,0 +1,164 @@
+"""Bursts and requests of copies that are repeated."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import o80._core as _core
+from o80.base.argument_checks import mapping
+from o80.base.errors import InvalidArgument
+from o80.frontend.prepared_burst import BurstArrays
+from o80.rows.layout import field_at
+
+#: Numbers of copies, each once, a slice, or a mask with a bool for each copy; None: all of them.
+Copies = ArrayLike | slice | None
+
+
+class GroupBurst(BurstArrays):
+    """A burst of copies: a PreparedBurst from `InlineGroup.prepared_burst`.
+
+    targets: (copies, steps, actuators). If the states of the actuators are of several types:
+        structured (copies,), with a field (steps,) for each actuator:
+        `targets["gripper"][:, 0]`.
+    rows: (copies, iterations), the rows of the last run of each copy.
+    """
+
+    def __init__(
+        self, group: _core.InlineGroup, everybody: NDArray[np.uint32], *options: Any
+    ) -> None:
+        super().__init__(*options)
+        self._group, self._everybody, self._all = group, everybody, everybody.view(np.uint8)
+        group.check(self._compiled)
+
+    def run(self, copies: Copies = None, *, timeout: float | None = None) -> None:
+        """Sends the targets, with all else that was added, and bursts; fills `rows`.
+
+        copies: numbers of the copies that run, a slice, or a mask (None: all).
+        timeout: for all of them together [s].
+
+        Raises CopyFailed with the exception of each copy that failed (for example targets that the
+        robot cannot follow, a halt, a fault of its driver); all others are done, and the rows of
+        those that failed are not valid. TimeoutError and
+        Ctrl-C leave each copy between two iterations; some have not run at all then.
+        """
+        chosen = self._all
+        if copies is not None:
+            chosen = chosen_copies(copies, self._everybody).view(np.uint8)
+        self._group.burst(self._compiled, chosen, timeout)
+
+    def then(self, following: GroupBurst, numbers: str | Mapping[str, str]) -> GroupBurst:
+        """This burst and one of another group that follows it, copy by copy, in one call.
+
+        numbers: for each field of the targets of `following` the path in the rows of this one
+            that gives it: `{"position": "extended.joint_positions"}`; for targets of one number
+            the path itself. Row i gives step i. Other fields keep their values.
+
+        The other group has as many copies and shares the threads of this one (`threads=group`).
+
+        Returns a burst with the targets of this one and the rows of `following`. The burst of a
+        copy that fails is not followed. Raises InvalidArgument.
+        """
+        feeds = list(_feeds(self._rows.dtype, following._targets, numbers))
+        both = copy.copy(self)
+        both._rows = following._rows
+        both._compiled = _core.PreparedBurst(
+            self._compiled, following._group, following._compiled, feeds
+        )
+        self._group.check(both._compiled)
+        return both
+
+
+class GroupRequest:
+    """A request that is sent to copies again and again; from `InlineGroup.prepared_request`.
+
+    fields: (copies,), structured: the fields of the request of each copy. They keep their values
+        from run to run.
+    rows: (copies,), structured like `history().rows`: the newest row of each copy after its last
+        run. Every run overwrites those of its copies.
+    """
+
+    def __init__(
+        self, group: _core.InlineGroup, request: int, fields: NDArray[Any], rows: NDArray[Any]
+    ) -> None:
+        self._group, self._request = group, request
+        self._everybody = np.arange(len(rows), dtype=np.uint32)
+        self._fields, self._rows, self._bytes = fields, rows, rows.view(np.uint8)
+
+    @property
+    def fields(self) -> NDArray[Any]:
+        """The fields of the request of each copy, (copies,)."""
+        return self._fields
+
+    @property
+    def rows(self) -> NDArray[Any]:
+        """The newest row of each copy after its last run, (copies,)."""
+        return self._rows
+
+    def run(self, copies: Copies = None, *, timeout: float | None = None) -> None:
+        """Sends the request and runs each copy until its request has ended.
+
+        copies: numbers of the copies, a slice, or a mask (None: all).
+        timeout: for all of them together [s].
+
+        Raises as `InlineGroup.request`.
+        """
+        chosen = chosen_copies(copies, self._everybody)
+        payloads = self._fields[chosen].view(np.uint8)
+        self._group.request(self._request, chosen.view(np.uint8), payloads, self._bytes, timeout)
+
+
+def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.uint32]:
+    """Numbers of copies. Raises InvalidArgument."""
+    if copies is None:
+        return everybody
+    if isinstance(copies, slice):
+        return everybody if copies == slice(None) else np.ascontiguousarray(everybody[copies])
+    given = np.asarray(copies)
+    if given.dtype == np.bool_:
+        if given.shape != everybody.shape:
+            raise InvalidArgument(
+                f"a mask of copies must have the shape {everybody.shape}, got {given.shape}"
+            )
+        return np.flatnonzero(given).astype(np.uint32)
+    if given.ndim != 1 or (given.size and given.dtype.kind not in "iu"):
+        raise InvalidArgument(
+            f"copies must be a list of numbers of copies or a mask of bools, got {copies!r}"
+        )
+    if given.size and not 0 <= given.min() <= given.max() < len(everybody):
+        raise InvalidArgument(f"there are copies 0 to {len(everybody) - 1}, got {copies!r}")
+    return np.ascontiguousarray(given, np.uint32)
+
+
+def _feeds(
+    rows: np.dtype[Any], targets: NDArray[Any], numbers: str | Mapping[str, str]
+) -> Iterator[tuple[int, int, int, int]]:
+    """Feed of each number of each actuator: offset in the row and in the targets, stride, size."""
+    state = targets.dtype
+    if targets.ndim == 1:
+        raise InvalidArgument(
+            "a burst that follows needs targets of one type: prepare it for actuators whose states "
+            f"are alike, not for {', '.join(state.names or ())}"
+        )
+    steps, actuators = targets.shape[1:]
+    if isinstance(numbers, str):
+        if state.fields is not None:
+            raise InvalidArgument(
+                f"targets of several numbers need a path for each: {', '.join(state.fields)}"
+            )
+        numbers = {"": numbers}
+    for field, path in mapping(numbers, "numbers", "fields to paths").items():
+        wanted, to = (state, 0) if field == "" else field_at(state, field, "field of the targets")
+        found, at = field_at(rows, path)
+        if found.base != wanted or found.shape != (actuators,):
+            raise InvalidArgument(
+                f"'{path}' must have a {wanted} for each of {actuators} actuators, "
+                f"it has {found.base} in the shape {found.shape}"
+            )
+        for actuator in range(actuators):
+            place = actuator * steps * state.itemsize + to
+            yield at + actuator * wanted.itemsize, place, state.itemsize, wanted.itemsize

@@ -1,0 +1,137 @@
+"""The log of a recording: what happened to its robots, in words.
+
+Messages are `rcl_interfaces/Log` on `/rosout`, which Foxglove, rqt and other tools show by
+themselves. The journal beside it holds the same exactly.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import o80._core as _core
+from o80.base.words import Status
+from o80.recording.blocks import Messages
+from o80.recording.cdr import CdrWriter
+from o80.recording.journal_channel import Entries
+from o80.recording.message_types import SEPARATOR
+from o80.rows.journal import ENDS, EntryDecoder, JournalEntry
+from o80.rows.journal_text import JournalText
+
+if TYPE_CHECKING:
+    from o80.frontend.frontend import Frontend
+    from o80.recording.file_writer import FileWriter
+
+TOPIC = "/rosout"
+TYPE = "rcl_interfaces/msg/Log"
+DEBUG, INFO, WARN, ERROR = 10, 20, 30, 40
+DEFINITION = f"""\
+byte DEBUG=10
+byte INFO=20
+byte WARN=30
+byte ERROR=40
+byte FATAL=50
+builtin_interfaces/Time stamp
+uint8 level
+string name
+string msg
+string file
+string function
+uint32 line
+{SEPARATOR}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+MAX_BYTES = 4096  # of a journal between two polls; of more, only the notable entries are told
+MAX_ENDS = 20  # of commands that are told one by one in a poll
+_SILENT = {"taken", "scheduled", "burst", "burst_ended"}
+_LEVELS = {
+    "halt": ERROR,
+    "halt_reason": ERROR,
+    "order_lost": ERROR,
+    "rejected": WARN,
+    "died": WARN,
+    "silent": WARN,
+    "control_lost": WARN,
+    "interrupted": WARN,
+    "snapshot": DEBUG,
+}
+_LEVELS_OF_ENDS = {Status.INTERRUPTED: WARN, Status.REJECTED: WARN, Status.HALTED: WARN}
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line of the log."""
+
+    segment: str
+    time: int  #: log time [ns]
+    level: int
+    text: str
+
+    def message(self) -> bytes:
+        """In CDR."""
+        cdr = CdrWriter()
+        cdr.stamp(self.time)
+        cdr.numbers("B", self.level)
+        for text in (self.segment, self.text, "", ""):
+            cdr.text(text)
+        cdr.numbers("I", 0)
+        return bytes(cdr.data)
+
+
+def added_lines(file: FileWriter, lines: Sequence[Line]) -> Messages:
+    """Messages of lines, at least one."""
+    found = (each.id for each in file.found.channels.values() if each.topic == TOPIC)
+    channel = next(found, None)
+    if channel is None:
+        channel = file.add_channel(TOPIC, file.add_schema(TYPE, DEFINITION), {})
+    return Messages(channel, [(each.time, each.message()) for each in lines])
+
+
+class JournalLog:
+    """Tells the entries of a journal while they are recorded."""
+
+    def __init__(self, frontend: Frontend) -> None:
+        self._native = _core.RecordedJournal(frontend._description, 0)
+        self._decoder = EntryDecoder(frontend.schema)
+        self._text = JournalText()
+
+    def told(self, entries: Entries, notable: bool) -> list[tuple[int, int, str]]:
+        """Iteration, level and text of what is worth a line.
+
+        notable: there are others among the entries than batches, bursts and ends of commands.
+        """
+        many = len(entries.content) > MAX_BYTES
+        if many and not notable:
+            return []
+        natives = self._native.decode(entries.content, entries.codec)
+        if many:
+            natives = [each for each in natives if each.kind not in {*_SILENT, "status"}]
+        told: list[tuple[int, int, str]] = []
+        ends: list[tuple[Status, tuple[int, int, str]]] = []
+        for native in natives:
+            entry = self._decoder.entry(native)
+            text = self._text.text(entry)
+            level = _level(entry)
+            if entry.status in ENDS and entry.kind == "status":
+                ends.append((entry.status, (entry.iteration, level, text.strip())))
+            elif level > 0:
+                told.append((entry.iteration, level, text))
+        if len(ends) <= MAX_ENDS:
+            told += [line for _, line in ends]
+        else:
+            found = [status for status, _ in ends]
+            counts = ", ".join(f"{found.count(each)} {each}" for each in dict.fromkeys(found))
+            told.append((ends[-1][1][0], INFO, f"commands ended: {counts}"))
+        return sorted(told, key=lambda line: line[0])
+
+
+def _level(entry: JournalEntry) -> int:
+    """0: not worth a line."""
+    if entry.kind == "status":
+        return _LEVELS_OF_ENDS.get(entry.status, INFO) if entry.status in ENDS else 0
+    if entry.kind == "ended":
+        return ERROR if entry.text else INFO
+    return 0 if entry.kind in _SILENT else _LEVELS.get(entry.kind, INFO)
