@@ -9,12 +9,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 import o80
 from o80.view.answers import Answers
+from o80.view.curves import STRETCHES, drawn_rows, readable
 from o80.view.source_list import SourceList
 
 Look = Callable[..., dict[str, Any]]
+Floats = NDArray[np.float64]
 
 
 def looks_at(*names: str, control: bool = False) -> Look:
@@ -61,7 +64,7 @@ def test_the_model_stands_as_the_row_says_and_the_ghost_as_desired(arm: o80.Fron
     assert pose[1, 3:] == pytest.approx(turn_about_y(shoulder + elbow), abs=1e-6)
     ghost = pose_of(answer, "ghost")
     assert ghost[0, 3:] == pytest.approx(turn_about_y(0.5), abs=1e-6)
-    assert answer["values"]["shoulder"]["desired"] == "0.5"
+    assert answer["values"]["shoulder"]["desired"] == "0.5 rad"
 
 
 def test_a_page_looks_back_through_the_ring_while_the_robot_goes_on(arm: o80.Frontend) -> None:
@@ -94,11 +97,60 @@ def test_curves_show_every_peak_with_few_points(arm: o80.Frontend) -> None:
     arm.add_command("elbow", 0.0)
     arm.burst(1500)
     curves = looks_at(arm.segment)(curves=True, panels=["elbow"], window=10.0)["curves"]
-    seconds, low, high = (numbers(text) for text in curves["panels"]["elbow"]["desired"])
-    assert len(seconds) == len(low) == len(high) <= 400
-    assert high.max() == 1.0, "one row of 3000"
-    assert (low <= high).all()
+    seconds, values = (numbers(text) for text in curves["panels"]["elbow"]["desired"])
+    assert len(seconds) == len(values) <= 1600
+    assert values.max() == 1.0, "one row of 3000"
     assert (np.diff(seconds) > 0).all()
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_a_curve_is_that_of_all_rows_within_one_pixel(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    values = random.choice([-1, 1]) * np.linspace(0, 1, int(random.integers(1, 30_000)))
+    values += random.choice([0.0, 0.01, 1.0]) * random.standard_normal(len(values))
+    drawn = drawn_rows(values)
+    width = -(-len(values) // max(1, -(-len(values) // STRETCHES)))  # [pixels]
+    places = np.arange(len(values)) * width / len(values)
+
+    exact = covered(places, values, width)
+    shown = covered(places[drawn], values[drawn], width)
+
+    for one, other in ((exact, shown), (shown, exact)):
+        low, high = widened(other)
+        assert (one[0] >= low).all()
+        assert (one[1] <= high).all()
+
+
+def test_a_falling_curve_is_drawn_falling() -> None:
+    values = np.linspace(1, 0, 10_000)
+    assert (np.diff(values[drawn_rows(values)]) < 0).all()
+
+
+def covered(places: Floats, values: Floats, width: int) -> tuple[Floats, Floats]:
+    """Lowest and highest value (width,) of a polyline in each column of pixels."""
+    at = np.union1d(places, np.linspace(0, width, 64 * width, endpoint=False))
+    line = np.interp(at, places, values)
+    columns = np.minimum(at.astype(int), width - 1)
+    low, high = np.full(width, np.inf), np.full(width, -np.inf)
+    np.minimum.at(low, columns, line)
+    np.maximum.at(high, columns, line)
+    return low, high
+
+
+def widened(covered: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
+    """By one column to both sides."""
+    low, high = (np.pad(each, 1, "edge") for each in covered)
+    return (
+        np.min([low[:-2], low[1:-1], low[2:]], axis=0),
+        np.max([high[:-2], high[1:-1], high[2:]], axis=0),
+    )
+
+
+def test_numbers_are_readable_and_have_their_unit() -> None:
+    said = [readable(*each) for each in ((15710.0, "Pa"), (0.5, "rad"), (-0.00042, "m"))]
+    assert said == ["15.71 kPa", "0.5 rad", "-420 \u00b5m"]
+    said = [readable(*each) for each in ((15710.4, ""), (0.0, "m"), (math.nan, "m"), (2e12, "kg"))]
+    assert said == ["15\u202f710", "0 m", "nan m", "2e+12 kg"]
 
 
 def test_curves_of_a_past_time_lie_around_it(arm: o80.Frontend) -> None:

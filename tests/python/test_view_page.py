@@ -10,6 +10,7 @@ import pytest
 
 import o80
 from chromium import Chromium, Page
+from o80.view.curves import readable
 from o80.view.serve import page_server
 
 pytestmark = pytest.mark.check
@@ -36,7 +37,7 @@ def browser() -> Iterator[Chromium]:
         yield started
 
 
-def curve(part: str, what: str = "low", chart: int = 0) -> str:
+def curve(part: str, what: str = "values", chart: int = 0) -> str:
     return f"Array.from(page.charts[{chart}].parts.{part}.{what})"
 
 
@@ -79,6 +80,26 @@ def test_a_page_shows_the_robot_its_curves_and_its_state(browser: Chromium, segm
         arm.close()
 
 
+def test_of_a_segment_that_is_waited_for_nothing_of_another_robot_is_shown(
+    browser: Chromium, process: o80.robots.Process
+) -> None:
+    with page_server([process.segment, "not-there"]) as server:
+        page = browser.page(server.url)
+        page.wait_for(SHOWN)
+        looks = page.value("page.looks")
+        page.value("page.choose('not-there')")
+        page.wait_for(f"page.looks > {looks + 2}")
+        shown = page.value("document.getElementById('robot').textContent")
+        assert shown == "not-there"
+        assert page.value("page.charts.length") == 0
+        assert page.value("page.scene.geoms.length") == 0
+        assert page.value("document.getElementById('halt').disabled")
+        page.value(f"page.choose('{process.segment}')")
+        page.wait_for(SHOWN)
+        assert not page.value("document.getElementById('halt').disabled")
+        page.close()
+
+
 def test_the_halt_button_halts_and_the_resume_button_resumes(
     browser: Chromium, process: o80.robots.Process
 ) -> None:
@@ -116,7 +137,7 @@ def test_the_slider_goes_back_through_the_ring_and_live_returns(
         scrub(page, first + (row.time - int(rows.time[0])) * 1e-9 + 1e-6)
         page.wait_for("page.timeline.at !== null && page.answer.last - page.answer.at > 0.01")
         shown = arm.history(since=page.value("page.answer.iteration"))[0]
-        assert page.value("page.answer.values.elbow.observed") == f"{shown.observed[1]:.4g}"
+        assert page.value("page.answer.values.elbow.observed") == readable(shown.observed[1], "rad")
         assert "s ago" in page.text()
         before = page.value("page.answer.last")
         page.wait_for(f"page.answer.last > {before}")  # the robot goes on
@@ -182,7 +203,7 @@ def test_a_recording_is_played_and_scrubbed(
         page.wait_for("!page.timeline.playing")
         scrub(page, 1.0)
         page.wait_for("page.answer.iteration === 1000")
-        assert page.value("page.answer.values.elbow.desired") == "0.5"
+        assert page.value("page.answer.values.elbow.desired") == "0.5 rad"
         click(page, "play")
         page.wait_for("page.answer.iteration > 1100")
         click(page, "play")

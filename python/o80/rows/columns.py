@@ -19,6 +19,7 @@ class Column(NamedTuple):
     offset: int  #: in the row
     labels: dict[str, int] | None  #: of an enumeration
     origin: str = "robot"  #: or "clock" or "world", from which its value comes (docs/drivers.md)
+    unit: str = ""
 
 
 def columns_of(schema: dict[str, Any]) -> Iterator[Column]:
@@ -52,7 +53,7 @@ def _numbers(
                 yield from _numbers(field["type"], name, offset, origin)
             else:
                 labels = labels_of_field(field)._labels_ if field["kind"] == "enum" else None
-                yield Column(name, dtype, offset, labels, origin)
+                yield Column(name, dtype, offset, labels, origin, field["unit"])
 
 
 def value_of(row: Any, column: Column) -> Any:

@@ -133,6 +133,7 @@ class _Shown:
             "robot": schema["robot"],
             "clock": schema["clock"],
             "panels": self.panels.names,
+            "units": self.panels.units,
             "first_panels": self.panels.first,
             "scene": None if self.scene is None else self.scene.geometry,
             "no_scene": "" if self.scene is not None else self.no_scene,

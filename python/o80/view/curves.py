@@ -1,5 +1,6 @@
-"""Curves of rows with as many points as a page can show: the extremes of each stretch."""
+"""Curves of rows with as many points as a page can show, and numbers as a person reads them."""
 
+import math
 from typing import Any
 
 import numpy as np
@@ -10,9 +11,12 @@ from o80.rows.columns import Column, columns_of, value_of
 from o80.rows.history import History, values_of
 from o80.view.base64_arrays import packed
 
-POINTS = 400  # of a curve
+STRETCHES = 400  # of a curve, about one for each pixel of its width
 MAX_PANELS = 12
 FIRST_PANELS = 3  # shown before the user chooses
+_PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}
+# units that take a prefix
+_PREFIXED = {"Pa", "N", "Nm", "m", "m/s", "rad", "rad/s", "s", "V", "A", "W", "J", "Hz"}
 
 
 class Panels:
@@ -44,24 +48,27 @@ class Panels:
     def curves(
         self, rows: History, panels: list[str], begin: int
     ) -> dict[str, dict[str, list[str]]]:
-        """By panel and part: seconds from `begin` [ns], lowest and highest values.
+        """By panel and part: seconds from `begin` [ns] and values of rows, in their order.
 
-        The highest are left out where they are the lowest.
+        They draw the curve of all rows: of each stretch its first, lowest, highest and last row.
         """
         found: dict[str, dict[str, list[str]]] = {}
-        starts = _stretches(len(rows))
-        if not len(starts):
+        if not len(rows):
             return found
-        seconds = packed((rows.time[starts] - begin) * 1e-9)
+        seconds = (rows.time - begin) * 1e-9
         for panel in panels[:MAX_PANELS]:
-            columns = self.columns.get(panel)
-            if columns is None:
-                continue
-            found[panel] = {
-                part: [seconds, *_extremes(values_of(rows, column), starts)]
-                for part, column in columns.items()
-            }
+            found |= {panel: {}} if panel in self.columns else {}
+            for part, column in self.columns.get(panel, {}).items():
+                values = values_of(rows, column).astype(np.float64)
+                drawn = drawn_rows(values)
+                found[panel][part] = [packed(seconds[drawn]), packed(values[drawn])]
         return found
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each panel that has one."""
+        units = {panel: next(iter(of.values())).unit for panel, of in self.columns.items()}
+        return {panel: unit for panel, unit in units.items() if unit}
 
     def values(self, row: Observation, panels: list[str]) -> dict[str, dict[str, str]]:
         """The numbers of one row as text, by panel and part."""
@@ -75,21 +82,16 @@ class Panels:
         }
 
 
-def _stretches(rows: int) -> NDArray[np.intp]:
-    """Where each stretch of rows begins."""
-    step = max(1, -(-rows // POINTS))
-    return np.arange(0, rows, step)
-
-
-def _extremes(values: NDArray[Any], starts: NDArray[np.intp]) -> list[str]:
-    numbers = values.astype(np.float64)
-    if len(starts) == len(numbers):
-        return [packed(numbers)]
-    # NaN in a stretch makes a gap in the curve
-    return [
-        packed(np.minimum.reduceat(numbers, starts)),
-        packed(np.maximum.reduceat(numbers, starts)),
-    ]
+def drawn_rows(values: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Indices of the rows that draw a curve: (n,), rising; NaN in a stretch is one of them."""
+    step = -(-len(values) // STRETCHES)
+    if step <= 4:
+        return np.arange(len(values))
+    starts = np.arange(0, len(values), step)
+    ends = np.minimum(starts + step, len(values)) - 1
+    grid = np.pad(values, (0, len(starts) * step - len(values)), "edge").reshape(-1, step)
+    extremes = [starts + grid.argmin(axis=1), starts + grid.argmax(axis=1)]
+    return np.unique(np.concatenate([starts, *extremes, ends]))
 
 
 def _text(value: Any, column: Column) -> str:
@@ -97,5 +99,21 @@ def _text(value: Any, column: Column) -> str:
         labels = {number: label for label, number in column.labels.items()}
         return labels.get(int(value), str(int(value)))
     if column.dtype.kind == "f":
-        return f"{float(value):.4g}"
-    return str(value.item())
+        return readable(float(value), column.unit)
+    return f"{value.item()} {column.unit}".strip()
+
+
+def readable(value: float, unit: str) -> str:
+    """A number with four digits, without powers of ten where a prefix or groups of digits do."""
+    if not math.isfinite(value) or value == 0:
+        return f"{value:g} {unit}".strip()
+    power = math.floor(math.log10(abs(value)))
+    prefix = ""
+    if unit in _PREFIXED and not -3 <= power <= 3:
+        thousands = min(max(power // 3 * 3, -9), 9)
+        value, power, prefix = value / 10.0**thousands, power - thousands, _PREFIXES[thousands]
+    if not -4 <= power <= 9:
+        return f"{value:.4g} {prefix}{unit}".strip()
+    text = f"{value:,.{max(0, 3 - power)}f}"
+    text = text.rstrip("0").rstrip(".") if "." in text else text
+    return f"{text} {prefix}{unit}".replace(",", "\u202f").strip()

@@ -10,8 +10,8 @@ function element(tag, text = "", kind = "") {
 }
 
 class Chart {
-  constructor(name) {
-    this.name = name;
+  constructor(name, unit) {
+    [this.name, this.unit] = [name, unit];
     this.box = element("div", "", "chart");
     this.head = element("header");
     this.canvas = element("canvas");
@@ -21,7 +21,7 @@ class Chart {
   }
 
   values(texts) {
-    this.head.replaceChildren(element("b", this.name));
+    this.head.replaceChildren(element("b", this.unit ? `${this.name} [${this.unit}]` : this.name));
     for (const [part, text] of Object.entries(texts || {})) {
       this.head.append(element("span", `${part === "extended" ? "" : `${part} `}${text}`, part));
     }
@@ -31,9 +31,8 @@ class Chart {
   // that is shown
   show(parts, { begin, end, marks }, cursor) {
     this.parts = {};
-    for (const [part, [seconds, low, high]] of Object.entries(parts || {})) {
-      const lows = floats(low);
-      this.parts[part] = { seconds: floats(seconds), low: lows, high: high ? floats(high) : lows };
+    for (const [part, [seconds, values]] of Object.entries(parts || {})) {
+      this.parts[part] = { seconds: floats(seconds), values: floats(values) };
     }
     [this.begin, this.end, this.marks, this.cursor] = [begin, end, marks, cursor];
     this.draw();
@@ -42,8 +41,10 @@ class Chart {
   range() {
     let [low, high] = [Infinity, -Infinity];
     for (const curve of Object.values(this.parts)) {
-      for (const value of curve.low) if (value < low && value > -Infinity) low = value;
-      for (const value of curve.high) if (value > high && value < Infinity) high = value;
+      for (const value of curve.values) {
+        if (value < low && value > -Infinity) low = value;
+        if (value > high && value < Infinity) high = value;
+      }
     }
     if (low > high) [low, high] = [0, 1];
     const margin = 0.06 * (high - low) || 0.05 * Math.abs(high) || 0.5;
@@ -111,7 +112,7 @@ class Chart {
       pen.moveTo(left, y(value));
       pen.lineTo(width - 4, y(value));
       pen.stroke();
-      pen.fillText(String(+value.toPrecision(6)), left - 4, y(value) + 3);
+      pen.fillText(grouped(+value.toPrecision(6)), left - 4, y(value) + 3);
     }
     pen.textAlign = "center";
     for (const seconds of ticks(this.begin, this.end, 5)) {
@@ -120,26 +121,30 @@ class Chart {
     }
   }
 
-  curve(pen, { seconds, low, high }, part, x, y) {
+  curve(pen, { seconds, values }, part, x, y) {
     pen.strokeStyle = COLOURS[part];
     pen.lineWidth = 1.5;
     pen.setLineDash(part === "desired" ? [5, 4] : []);
     pen.beginPath();
     let drawing = false;
     for (let i = 0; i < seconds.length; ++i) {
-      if (!Number.isFinite(low[i]) || !Number.isFinite(high[i])) {
+      if (!Number.isFinite(values[i])) {
         drawing = false; // a gap where a value is NaN
         continue;
       }
-      const at = x(seconds[i]);
-      if (drawing) pen.lineTo(at, y(low[i]));
-      else pen.moveTo(at, y(low[i]));
-      if (high[i] !== low[i]) pen.lineTo(at, y(high[i]));
+      if (drawing) pen.lineTo(x(seconds[i]), y(values[i]));
+      else pen.moveTo(x(seconds[i]), y(values[i]));
       drawing = true;
     }
     pen.stroke();
     pen.setLineDash([]);
   }
+}
+
+// 15 710 and 0.5, but 1e+12
+function grouped(value) {
+  if (Math.abs(value) >= 1e9) return value.toExponential();
+  return value.toLocaleString("en", { maximumSignificantDigits: 6 }).replaceAll(",", "\u202f");
 }
 
 // round numbers between two ends

@@ -91,13 +91,14 @@ class Page {
     byId("no-scene").textContent = lost || answer.new.no_scene;
     this.timeline.load(answer);
     this.scene.load(answer.new.scene);
+    [this.units, this.charts] = [answer.new.units, []];
     this.fields.load(answer.new.panels, answer.new.first_panels);
     this.curvesAt = 0;
   }
 
   buildCharts(names) {
     const there = new Map(this.charts.map((chart) => [chart.name, chart]));
-    this.charts = names.slice(0, 12).map((name) => there.get(name) ?? new Chart(name));
+    this.charts = names.slice(0, 12).map((name) => there.get(name) ?? new Chart(name, this.units[name]));
     byId("charts").replaceChildren(...this.charts.map((chart) => chart.box));
     this.curvesAt = 0;
   }
@@ -153,7 +154,12 @@ class Page {
 
   choose(name) {
     [this.source, this.key, this.said] = [name, null, ""];
-    this.scene.load(null);
+    this.scene.load(null); // nothing of another robot stays, also if this one is waited for
+    this.charts = [];
+    byId("charts").replaceChildren();
+    byId("robot").textContent = name;
+    byId("no-scene").textContent = "";
+    document.title = `${name} - o80 view`;
   }
 }
 
