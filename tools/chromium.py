@@ -57,7 +57,7 @@ class Chromium:
             time.sleep(0.05)
         raise TimeoutError("Chromium did not start")
 
-    def page(self, url: str, width: int = 1280, height: int = 760) -> "Page":
+    def page(self, url: str, width: int = 1280, height: int = 760, dark: bool = False) -> "Page":
         """Opens an address in a tab."""
         target = f"http://127.0.0.1:{self._port}/json/new?about:blank"
         with urllib.request.urlopen(urllib.request.Request(target, method="PUT")) as answer:
@@ -71,6 +71,8 @@ class Chromium:
             deviceScaleFactor=1,
             mobile=False,
         )
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
+        page.call("Emulation.setEmulatedMedia", features=[scheme])
         page.call("Page.navigate", url=url)
         return page
 

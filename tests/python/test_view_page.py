@@ -121,6 +121,32 @@ def test_the_halt_button_halts_and_the_resume_button_resumes(
         page.close()
 
 
+@pytest.mark.parametrize("dark", [False, True])
+def test_on_a_phone_nothing_runs_out_and_the_halt_button_is_large(
+    browser: Chromium, process: o80.robots.Process, dark: bool
+) -> None:
+    with page_server([process.segment], control=True) as server:
+        page = browser.page(server.url, 420, 860, dark=dark)
+        page.wait_for(SHOWN)
+        boxes = page.value(
+            "Object.fromEntries([...document.querySelectorAll('[id]')].filter(e => e.offsetWidth)"
+            ".map(e => [e.id, e.getBoundingClientRect().toJSON()]))"
+        )
+        assert page.value("document.documentElement.scrollWidth") <= 420
+        for name, box in boxes.items():
+            assert 0 <= box["left"] <= box["right"] <= 420, name
+        assert boxes["halt"]["height"] >= 48
+        assert boxes["halt"]["width"] >= 180
+        assert boxes["scene"]["bottom"] <= boxes["charts"]["top"]
+        assert "segments" not in boxes
+        click(page, "list")
+        assert page.value("document.getElementById('segments').offsetWidth") > 300
+        assert page.value("document.getElementById('halt').offsetHeight") >= 48
+        light = page.value("getComputedStyle(document.body).backgroundColor.match(/\\d+/)[0]")
+        assert (int(light) < 64) == dark
+        page.close()
+
+
 def test_the_slider_goes_back_through_the_ring_and_live_returns(
     browser: Chromium, process: o80.robots.Process
 ) -> None:

@@ -1,6 +1,7 @@
 // Curves over time, one chart for each field: desired dashed, observed solid.
 
-const COLOURS = { desired: "#e8730c", observed: "#1f6feb", extended: "#1a7f4b" };
+// a colour of the style sheet, which knows light and dark
+const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
 
 function element(tag, text = "", kind = "") {
   const made = document.createElement(tag);
@@ -76,7 +77,7 @@ class Chart {
     }
     for (const [seconds, text] of this.marks) this.mark(pen, text, x(seconds), bottom);
     pen.restore();
-    pen.strokeStyle = "#30363d";
+    pen.strokeStyle = colour("cursor");
     pen.beginPath();
     pen.moveTo(x(this.cursor - this.begin), 0);
     pen.lineTo(x(this.cursor - this.begin), bottom);
@@ -85,7 +86,7 @@ class Chart {
 
   // a note of a program or of a person: a line with its text
   mark(pen, text, at, bottom) {
-    pen.strokeStyle = pen.fillStyle = "#8a8500";
+    pen.strokeStyle = pen.fillStyle = colour("mark");
     pen.lineWidth = 1;
     pen.beginPath();
     pen.moveTo(at, 0);
@@ -103,8 +104,8 @@ class Chart {
 
   axes(pen, { low, high, left, bottom, width, length, x, y }) {
     pen.font = "10px system-ui, sans-serif";
-    pen.fillStyle = "#66707d";
-    pen.strokeStyle = "#eceff3";
+    pen.fillStyle = colour("dim");
+    pen.strokeStyle = colour("grid");
     pen.lineWidth = 1;
     pen.textAlign = "right";
     for (const value of ticks(low, high, 4)) {
@@ -122,7 +123,7 @@ class Chart {
   }
 
   curve(pen, { seconds, values }, part, x, y) {
-    pen.strokeStyle = COLOURS[part];
+    pen.strokeStyle = colour(part);
     pen.lineWidth = 1.5;
     pen.setLineDash(part === "desired" ? [5, 4] : []);
     pen.beginPath();

@@ -24,6 +24,7 @@ class Page {
     byId("halt").addEventListener("click", () => this.command("/halt", {}));
     byId("resume").addEventListener("click", () => this.command("/resume", { number: this.line().halt?.number }));
     byId("window").addEventListener("change", () => { this.curvesAt = 0; });
+    byId("list").addEventListener("click", () => document.body.classList.toggle("list"));
   }
 
   async post(path, body) {
@@ -153,6 +154,7 @@ class Page {
   }
 
   choose(name) {
+    document.body.classList.remove("list");
     [this.source, this.key, this.said] = [name, null, ""];
     this.scene.load(null); // nothing of another robot stays, also if this one is waited for
     this.charts = [];
