@@ -13,7 +13,7 @@ from rosbags.highlevel import AnyReader
 
 import o80
 from o80.recording.epoch import topic_of
-from o80.recording.file_writer import FileWriter
+from o80.recording.file_writer import FileWriter, Form
 from o80.recording.recorder import Recorder
 from o80.recording.scan import scan
 
@@ -71,6 +71,31 @@ def test_rosbags_reads_every_row_in_order(
     assert np.array_equal(desired, history.desired)
     assert [row.active.elbow for row in rows] == history.active[:, 1].tolist()
     assert np.array_equal([row.extended.effort for row in rows], history.extended.effort)
+
+
+@pytest.mark.parametrize("compression", ["zstd", "lz4", "none"])
+@pytest.mark.parametrize("joint_states", [True, False])
+def test_every_form_is_read_by_others_and_by_o80(
+    compression: str, joint_states: bool, arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    form = {"compression": compression, "joint_states": joint_states}
+    with o80.Recording(path, arm, **form):  # type: ignore[arg-type]
+        arm.add_command("elbow", 0.5, iterations=20)
+        arm.burst(50)
+    with path.open("rb") as file:
+        assert rows_in(file, arm) == 51
+    with AnyReader([path]) as reader:
+        topics = [each.topic for each, _, _ in reader.messages()]
+    assert topics.count(topic_of(arm.segment)) == 51
+    assert topics.count(topic_of(arm.segment, "joint_states")) == (51 if joint_states else 0)
+    assert o80.open(path)[arm.segment].history().rows.tobytes() == arm.history().rows.tobytes()
+
+
+def test_an_unknown_compression_is_refused(arm: o80.Frontend, tmp_path: Path) -> None:
+    with pytest.raises(o80.InvalidArgument, match="zstd, lz4, none, got 'gzip'"):
+        o80.Recording(tmp_path / "run.mcap", arm, compression="gzip")
+    assert not list(tmp_path.iterdir())
 
 
 def test_rosbags_reads_marks_and_what_happened_in_words(arm: o80.Frontend, tmp_path: Path) -> None:
@@ -230,7 +255,7 @@ def test_a_full_disk_ends_in_an_error_and_a_file_that_readers_open(
     arm: o80.Frontend, tmp_path: Path
 ) -> None:
     path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], compression="none")
+    recorder = Recorder(path, [arm.segment], form=Form("none"))
     limits = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (250_000, limits[1]))
     try:

@@ -44,6 +44,12 @@ def _size(text: str | None) -> float | None:
     return size
 
 
+def _on_or_off(text: str) -> str:
+    if text not in ("on", "off"):
+        raise typer.BadParameter(f"joint states are on or off, got '{text}'")
+    return text
+
+
 def record(
     names: Annotated[
         list[str], typer.Argument(help="Segments; a pattern such as 'arm*' includes later ones.")
@@ -73,16 +79,26 @@ def record(
             "--from-now", help="Begin with the newest row, not with the oldest that is there."
         ),
     ] = False,
+    compression: Annotated[str, typer.Option(help="zstd, lz4 or none.")] = "zstd",
+    joint_states: Annotated[
+        str,
+        typer.Option(
+            callback=_on_or_off,
+            help="on or off: rows of robots with joints also as sensor_msgs/JointState.",
+        ),
+    ] = "on",
 ) -> None:
     """Record rows and decisions of robots to an MCAP file until Ctrl-C.
 
     A robot that is not there yet is waited for; one that restarts is recorded on in the same file.
     """
+    from o80.recording.file_writer import Form
     from o80.recording.recorder import Recorder
 
+    form = Form(compression, joint_states == "on")
     most = _size(size)
     end = StopRequest()
-    recorder = Recorder(output, names, proceed=proceed, from_now=from_now, split=split)
+    recorder = Recorder(output, names, proceed=proceed, from_now=from_now, split=split, form=form)
     report = _Report(recorder, from_now)
     begin = time.monotonic()
     try:

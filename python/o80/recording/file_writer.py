@@ -8,10 +8,12 @@ import contextlib
 import os
 import struct
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
+import lz4.frame
 import zstandard
 from mcap.opcode import Opcode
 from mcap.records import (
@@ -26,14 +28,35 @@ from mcap.records import (
 )
 
 import o80._core as _core
-from o80.base.errors import RecordingError
+from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.locked_file import LockedFile, reserve
 from o80.recording.scan import HEAD, MAGIC, Scan, scan
 from o80.recording.summary import bytes_of, end_of_file, room_for_end
 
 PROFILE = "ros2"
-COMPRESSIONS = ("zstd", "none")
+_COMPRESS: dict[str, Callable[[], Callable[[bytes], bytes]]] = {
+    "zstd": lambda: zstandard.ZstdCompressor(level=1).compress,
+    "lz4": lambda: lz4.frame.compress,
+    "none": lambda: bytes,
+}
 CHUNK_HEAD = struct.Struct("<BQQQQI")
+
+
+@dataclass(frozen=True)
+class Form:
+    """How rows are written. Raises InvalidArgument."""
+
+    compression: str = "zstd"  #: zstd, lz4 or none
+    joint_states: bool = True  #: also as sensor_msgs/JointState, for robots with joints
+
+    def __post_init__(self) -> None:
+        if self.compression not in _COMPRESS:
+            raise InvalidArgument(
+                f"compression must be {', '.join(_COMPRESS)}, got {self.compression!r}"
+            )
+
+
+USUAL = Form()
 
 
 class MessageBlock(Protocol):
@@ -53,9 +76,9 @@ class MessageBlock(Protocol):
 class FileWriter:
     """Writes one file. Move-only: close it once; it is not finished unless `finish` was called."""
 
-    def __init__(self, path: Path, *, compression: str = "zstd") -> None:
+    def __init__(self, path: Path, form: Form = USUAL) -> None:
         """Creates the file. Raises OSError: no new file is left; FileExistsError."""
-        self._open(path, compression, os.O_CREAT | os.O_EXCL)
+        self._open(path, form, os.O_CREAT | os.O_EXCL)
         self._found = Scan()
         try:
             self._append(_beginning())
@@ -65,13 +88,13 @@ class FileWriter:
             raise
 
     @classmethod
-    def continued(cls, path: Path, *, compression: str = "zstd") -> "FileWriter":
+    def continued(cls, path: Path, form: Form = USUAL) -> "FileWriter":
         """Goes on behind the last whole group of a file.
 
         Raises RecordingError if it is being written, NotARecordingError, OSError.
         """
         self = cls.__new__(cls)
-        self._open(path, compression, 0)
+        self._open(path, form, 0)
         try:
             self._continue()
         except BaseException:
@@ -89,15 +112,11 @@ class FileWriter:
         self.size = found.end
         os.ftruncate(self._file.descriptor, self.size)
 
-    def _open(self, path: Path, compression: str, flags: int) -> None:
-        if compression not in COMPRESSIONS:
-            raise ValueError(
-                f"unknown compression '{compression}': choose {' or '.join(COMPRESSIONS)}"
-            )
+    def _open(self, path: Path, form: Form, flags: int) -> None:
         self.path = path
-        self.compression = compression
+        self.form = form
         self.size = 0  #: [bytes]
-        self._compressor = zstandard.ZstdCompressor(level=1) if compression == "zstd" else None
+        self._compress = _COMPRESS[form.compression]()
         try:
             self._file: LockedFile = LockedFile(path, flags)
         except BlockingIOError:
@@ -166,8 +185,8 @@ class FileWriter:
     def add_chunk(self, blocks: Sequence[MessageBlock]) -> None:
         """Adds messages, each channel at most once. Raises OSError: then nothing was added."""
         content = b"".join(block.content for block in blocks)
-        compressed = self._compressor.compress(content) if self._compressor else content
-        compression = "zstd" if self._compressor else ""
+        compressed = self._compress(content)
+        compression = "" if self.form.compression == "none" else self.form.compression
         start = min(block.time_range[0] for block in blocks)
         end = max(block.time_range[1] for block in blocks)
         named = compression.encode()

@@ -143,8 +143,8 @@ class JointWriter:
     def added_to(
         cls, file: "FileWriter", layout: Layout, note: EpochNote, channel: int | None
     ) -> "JointWriter | None":
-        """Adds a channel to a file, unless it has this one; None for a robot without joints."""
-        joints = joints_of(layout)
+        """Adds a channel to a file, unless it has this one; None if there is nothing to write."""
+        joints = joints_of(layout) if file.form.joint_states else None
         if joints is None:
             return None
         if channel is None:

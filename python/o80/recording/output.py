@@ -12,7 +12,7 @@ from o80.recording import joint_states
 from o80.recording.blocks import messages_in
 from o80.recording.cdr import ENCAPSULATION
 from o80.recording.epoch import EpochNote, channels_of
-from o80.recording.file_writer import FileWriter
+from o80.recording.file_writer import USUAL, FileWriter, Form
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import last_entry_in
 from o80.recording.reader import RecordingFile, files_of
@@ -35,12 +35,12 @@ class Written:
     joints: int | None = None  #: the channel of joint states there
 
 
-def opened(path: Path, *, proceed: bool, compression: str = "zstd") -> FileWriter:
+def opened(path: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
     """A new file; or, to `proceed`, the one that is there. Raises RecordingError."""
     try:
         if proceed and path.exists():
-            return FileWriter.continued(path, compression=compression)
-        return FileWriter(path, compression=compression)
+            return FileWriter.continued(path, form)
+        return FileWriter(path, form)
     except FileExistsError:
         raise RecordingError(
             f"{path} is a folder: give the name of a file, or --split"
@@ -58,7 +58,7 @@ def opened(path: Path, *, proceed: bool, compression: str = "zstd") -> FileWrite
         raise RecordingError(f"{path} cannot be written: {reason(path, error)}") from error
 
 
-def opened_in(folder: Path, *, proceed: bool, compression: str = "zstd") -> FileWriter:
+def opened_in(folder: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
     """The first file of a new folder; or, to `proceed`, the last one there.
 
     The files before it are finished. Raises RecordingError.
@@ -75,7 +75,7 @@ def opened_in(folder: Path, *, proceed: bool, compression: str = "zstd") -> File
     except OSError as error:
         raise RecordingError(f"{folder} cannot be written: {reason(folder, error)}") from error
     files = sorted(folder.glob(FILES)) or [folder / "0000.mcap"]
-    last = opened(files[-1], proceed=True, compression=compression)  # locks the folder
+    last = opened(files[-1], form, proceed=True)  # locks the folder
     for file in files:
         if file != last.path and not has_end(file):
             opened(file, proceed=True).finish()
@@ -96,7 +96,7 @@ def _has_begun(file: Path) -> bool:
 def next_file(file: FileWriter) -> FileWriter:
     """The next file in the folder of a file. Raises OSError."""
     name = f"{int(file.path.stem) + 1:04}.mcap"
-    return FileWriter(file.path.with_name(name), compression=file.compression)
+    return FileWriter(file.path.with_name(name), file.form)
 
 
 class Predecessor:

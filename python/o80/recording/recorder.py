@@ -14,6 +14,7 @@ from typing import Any
 from o80.base.errors import Error, InvalidArgument, RecordingError
 from o80.frontend.segments import segments
 from o80.recording.epoch import topic_of
+from o80.recording.file_writer import USUAL, Form
 from o80.recording.log_channel import INFO, Line, added_lines
 from o80.recording.marks import Mark, added_marks
 from o80.recording.output import Predecessor, next_file, opened, opened_in
@@ -38,8 +39,8 @@ class Recorder:
         *,
         proceed: bool = False,
         from_now: bool = False,
-        compression: str = "zstd",
         split: str | None = None,
+        form: Form = USUAL,
     ) -> None:
         """names: of segments, or patterns such as "arm*". proceed: continue an existing file.
         from_now: begin with the newest rows instead of the oldest that the segments hold.
@@ -59,7 +60,7 @@ class Recorder:
         self._patterns = [name for name in names if any(sign in name for sign in "*?[")]
         new = not path.exists()
         open_file = opened if self._split is None else opened_in
-        self.file = open_file(path, proceed=proceed, compression=compression)
+        self.file = open_file(path, form, proceed=proceed)
         before = [each for each in files_of(path) if each != self.file.path]
         self._bytes_before = sum(each.stat().st_size for each in before)
         self._file_begun = time.monotonic()

@@ -11,6 +11,7 @@ from typing import Any
 from o80.base.errors import Closed
 from o80.base.lifecycle import Closeable, close_later
 from o80.frontend.frontend import Frontend
+from o80.recording.file_writer import Form
 from o80.recording.recorder import Recorder
 
 BETWEEN_POLLS = 0.05  # [s]
@@ -29,6 +30,8 @@ class Recording(Closeable):
     from_now: begin with the newest rows; robots that start later are recorded from their first.
     split: go on in a new file after a size ("500M", "2G") or a time ("600s", "10min", "1h"): `path`
         is then a folder of complete files, which `o80.open` reads as one recording.
+    compression: "zstd", "lz4" or "none".
+    joint_states: whether rows of robots with joints are also written as sensor_msgs/JointState.
 
     A robot whose history is overwritten before the thread reads it leaves a gap: a program that
     bursts very many iterations at once calls `flush` between them. Raises RecordingError.
@@ -42,10 +45,15 @@ class Recording(Closeable):
         proceed: bool = False,
         from_now: bool = False,
         split: str | None = None,
+        compression: str = "zstd",
+        joint_states: bool = True,
     ) -> None:
         several = [segments] if isinstance(segments, (str, Frontend)) else segments
         names = [each.segment if isinstance(each, Frontend) else each for each in several]
-        self._recorder = Recorder(path, names, proceed=proceed, from_now=from_now, split=split)
+        form = Form(compression, joint_states)
+        self._recorder = Recorder(
+            path, names, proceed=proceed, from_now=from_now, split=split, form=form
+        )
         self._lock = threading.Lock()
         self._end = threading.Event()
         self._failure: Exception | None = None
