@@ -108,6 +108,7 @@ void bind_raw(nb::module_& m) {
           },
           "frontend"_a, "first"_a)
       .def_prop_ro("exists", &o80::RawJournal::exists)
+      .def_prop_ro("unread", &o80::RawJournal::unread)
       .def("read", &read_raw, "most"_a,
            nb::sig("def read(self, most: int) "
                    "-> tuple[bytes, int, int, bool, list[tuple[str, int]], bool]"));

@@ -202,6 +202,47 @@ def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_pa
     assert logged == [int(times[row]) + epoch.wall_offset for row in (1, 31, 51)]
 
 
+def test_chunks_grow_to_a_quarter_of_what_the_robot_holds(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load("two_joints").inline(segment, history=1000) as arm:
+        arm.burst(5000)
+        recorder = Recorder(path, [segment])
+        assert recorder.is_due(), "in the first seconds chunks are short"
+        recorder._begun -= 60.0
+        recorder.catch_up()
+        assert not recorder.is_due()
+        arm.burst(200)
+        assert not recorder.is_due()
+        arm.burst(100)
+        assert recorder.is_due()
+        arm.burst(400)
+        recorder.file.close()  # killed, when it was late
+        with o80.Recording(path, segment, proceed=True):
+            arm.burst(10)
+        rows = o80.open(path)[segment].history()
+        assert np.array_equal(np.diff(rows.iteration), np.ones(len(rows) - 1))
+        assert rows.iteration[-1] == 5710
+
+
+def test_a_chunk_is_due_when_the_journal_fills(segment: str, tmp_path: Path) -> None:
+    with o80.robots.load("two_joints").inline(segment, journal=0.5) as arm:
+        recorder = Recorder(tmp_path / "run.mcap", [segment])
+        arm.burst(20_000)
+        recorder._begun -= 60.0
+        recorder.catch_up()
+        commands = 0
+        while not recorder.is_due() and commands < 4000:  # before the rows are a reason
+            arm.add_command("elbow", 0.1)
+            arm.burst(1)
+            commands += 1
+        recorder.catch_up()
+        recorder.finish()
+        assert 10 < commands < 4000
+        journal = recorder.sources[segment]._journal
+        assert journal is not None
+        assert journal.missed == 0
+
+
 def test_a_mark_has_the_log_time_of_the_newest_row(segment: str, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm) as file:

@@ -9,6 +9,7 @@ from typing import IO, Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.highlevel import AnyReader
 
 import o80
@@ -90,6 +91,104 @@ def test_every_form_is_read_by_others_and_by_o80(
     assert topics.count(topic_of(arm.segment)) == 51
     assert topics.count(topic_of(arm.segment, "joint_states")) == (51 if joint_states else 0)
     assert o80.open(path)[arm.segment].history().rows.tobytes() == arm.history().rows.tobytes()
+
+
+def copied(
+    path: Path, *sources: Path, topics: str = "", others: bool = True, **setting: Any
+) -> None:
+    """As a tool copies files: all that the mcap library reads, through its writer."""
+    with path.open("wb") as out:
+        writer = Writer(out, chunk_size=20_000, **setting)
+        writer.start(profile="ros2", library="a tool")
+        for source in sources:
+            with source.open("rb") as file:
+                reader = make_reader(file)
+                known: dict[int, int] = {}
+                for schema, channel, message in reader.iter_messages():
+                    assert schema is not None
+                    if not re.search(topics, channel.topic):
+                        continue
+                    if channel.id not in known:
+                        number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                        known[channel.id] = writer.register_channel(
+                            channel.topic, channel.message_encoding, number, channel.metadata
+                        )
+                    writer.add_message(
+                        known[channel.id],
+                        message.log_time,
+                        message.data,
+                        message.publish_time,
+                        message.sequence,
+                    )
+                for each in reader.iter_attachments() if others else ():
+                    writer.add_attachment(
+                        each.create_time, each.log_time, each.name, each.media_type, each.data
+                    )
+                for record in reader.iter_metadata() if others else ():
+                    writer.add_metadata(record.name, record.metadata)
+        writer.finish()
+
+
+SETTINGS: list[dict[str, Any]] = [
+    {},
+    {"compression": CompressionType.NONE},
+    {"compression": CompressionType.LZ4},
+    {"use_chunking": False},
+    {"index_types": IndexType.NONE},
+    {"repeat_channels": False, "repeat_schemas": False},
+    {"use_statistics": False},
+    {"use_statistics": False, "use_summary_offsets": False, "index_types": IndexType.NONE},
+    {"enable_crcs": False},
+]
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_a_copy_of_another_program_is_replayed(
+    setting: dict[str, Any], segment: str, tmp_path: Path
+) -> None:
+    path, copy, part = (tmp_path / f"{name}.mcap" for name in ("run", "copy", "part"))
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm) as file:
+        for i in range(5):
+            file.mark("episode", number=i)
+            arm.add_command("elbow", 0.1 * i, iterations=50)
+            arm.burst(100)
+            file.flush()
+        rows = arm.history().rows.tobytes()
+    copied(copy, path, **setting)
+    copied(part, path, topics="joint_states", **setting)
+
+    read = o80.open(copy)
+    assert read[segment].history().rows.tobytes() == rows
+    assert sorted(mark.values["number"] for mark in read.marks) == [0, 1, 2, 3, 4]
+    assert o80.replay(copy).identical
+    assert [*o80.open(part)] == []
+
+
+def test_two_files_that_another_program_has_merged_are_both_there(
+    segment: str, tmp_path: Path
+) -> None:
+    paths = [tmp_path / f"{i}.mcap" for i in range(2)]
+    for i, path in enumerate(paths):
+        robot = o80.robots.load("two_joints").inline(f"{segment}-{i}")
+        with robot as arm, o80.Recording(path, arm):
+            arm.burst(100 + i)
+    copied(tmp_path / "merged.mcap", *paths)
+    read = o80.open(tmp_path / "merged.mcap")
+    assert {name: read[name].epochs[0].rows for name in read} == {
+        f"{segment}-{i}": 101 + i for i in range(2)
+    }
+
+
+def test_what_a_copy_lacks_is_named(segment: str, tmp_path: Path) -> None:
+    path, copy = tmp_path / "run.mcap", tmp_path / "copy.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
+        arm.burst(100)
+    copied(copy, path, others=False)
+    with pytest.raises(o80.RecordingError, match=f"lacks the description of '{segment}'"):
+        o80.open(copy)[segment].history()
+    copied(copy, path, use_chunking=False)
+    with pytest.raises(o80.RecordingError, match="another program"):
+        o80.Recording(copy, segment, proceed=True)
 
 
 def test_an_unknown_compression_is_refused(arm: o80.Frontend, tmp_path: Path) -> None:

@@ -104,7 +104,8 @@ def record(
     try:
         while not end.requested:
             started = time.monotonic()
-            recorder.poll()
+            if recorder.is_due():
+                recorder.poll()
             report.show()
             if seconds is not None and started - begin >= seconds:
                 break

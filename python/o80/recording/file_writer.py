@@ -109,6 +109,10 @@ class FileWriter:
             self._found = Scan()
             self._append(_beginning())
         self._found = found = scan(self.path)
+        if found.foreign:
+            raise RecordingError(
+                f"{self.path} was written by another program: record to another file"
+            )
         self.size = found.end
         os.ftruncate(self._file.descriptor, self.size)
 

@@ -79,6 +79,11 @@ class JournalRecorder:
         """The backend was started with a journal."""
         return self._core.exists
 
+    @property
+    def unread(self) -> float:
+        """Share of the ring that was not read yet, from 0 to 1."""
+        return self._core.unread
+
     def add_channel(self, file: "FileWriter", note: EpochNote) -> None:
         """Adds a channel to a file, in which the next entries are written."""
         schema = file.add_schema(TYPE, DEFINITION)

@@ -9,6 +9,7 @@ from typing import Any
 
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.epoch import EpochNote, channels_of
+from o80.recording.foreign_file import copied
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.marks import Mark, Marks, marks_in
 from o80.recording.recorded_epoch import EpochPart, RecordedEpoch
@@ -52,7 +53,7 @@ class RecordingFile:
         marks = Marks()
         for path, found in self._files:
             try:
-                with path.open("rb") as file:
+                with found.opened(path) as file:
                     marks += marks_in(file, found)
             except (ValueError, TypeError, RecursionError, struct.error) as error:
                 raise RecordingError(f"{path}: {error}") from error
@@ -108,7 +109,8 @@ def files_of(path: Path) -> list[Path]:
 
 def _scanned(path: Path) -> Scan:
     try:
-        return scan(path)
+        found = scan(path)
+        return copied(path) if found.foreign else found
     except NotARecordingError as error:
         raise RecordingError(f"{error}: o80.open reads files of o80 record") from None
     except FileNotFoundError:

@@ -77,7 +77,7 @@ class EpochPart:
         """The description of the robot. Raises RecordingError."""
         for place in self.found.attachments:
             if place.name == self.note.attachment:
-                with self.path.open("rb") as file:
+                with self.reading() as file:
                     return attachment_of(file, place).data
         raise RecordingError(f"{self.path} lacks the description of '{self.note.segment}'")
 
@@ -85,7 +85,7 @@ class EpochPart:
     def reading(self) -> Iterator[IO[bytes]]:
         """The file; errors in its content are RecordingError and name it."""
         try:
-            with self.path.open("rb") as file:
+            with self.found.opened(self.path) as file:
                 yield file
         except (ValueError, struct.error) as error:
             raise RecordingError(f"{self.path}: {error}") from error

@@ -22,6 +22,8 @@ from o80.recording.reader import files_of
 from o80.recording.source import Source
 
 BETWEEN_SEARCHES = 0.5  # for segments that match a pattern [s]
+FIRST_SECONDS = 5.0  # in which chunks are short
+LONGEST_CHUNK = 2.5  # [s]
 _BYTES = {"k": 1e3, "M": 1e6, "G": 1e9}
 _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
@@ -30,7 +32,7 @@ class Recorder:
     """Reads segments and writes rows and journals; `poll` does a part of the work. One thread."""
 
     between_chunks = 0.1
-    """Longest time that `poll` should not be called [s]: what a killed recorder has not written."""
+    """Time between two questions whether a chunk is due [s]."""
 
     def __init__(
         self,
@@ -66,6 +68,7 @@ class Recorder:
         self._file_begun = time.monotonic()
         self.sources: dict[str, Source] = {}
         self._search_at = 0.0
+        self._begun = self._polled = time.monotonic()
         self._left_out: set[str] = set()  # found, but not recorded
         try:
             self._before = Predecessor(self.file, before) if proceed else None
@@ -103,8 +106,23 @@ class Recorder:
         """Iteration of the newest row of each segment; -1 for one that is not there."""
         return {name: source.newest for name, source in self.sources.items()}
 
+    def is_due(self) -> bool:
+        """Whether the next chunk should be written.
+
+        In the first seconds always, then when a quarter of what a segment holds was not read: so a
+        killed recorder's successor misses nothing.
+        """
+        now = time.monotonic()
+        if now - self._polled >= LONGEST_CHUNK or now - self._begun < FIRST_SECONDS:
+            return True
+        if self._patterns and now >= self._search_at:
+            with self.writing():
+                self._search()
+        return any(each.behind or each.is_filled(0.25) for each in self.sources.values())
+
     def poll(self) -> int:
         """Writes a chunk of what was published since the last call; returns how many messages."""
+        self._polled = time.monotonic()
         with self.writing():
             if self._is_full():
                 self._go_on_in_next_file()

@@ -137,6 +137,6 @@ class Recording(Closeable):
 def _run(recording: "weakref.ref[Recording]", end: threading.Event) -> None:
     while not end.wait(BETWEEN_POLLS):
         alive = recording()
-        if alive is None or not alive._catch_up():
+        if alive is None or (alive._recorder.is_due() and not alive._catch_up()):
             return
         del alive

@@ -1,12 +1,17 @@
 """Contents of an MCAP file, also of one that was cut off in the middle.
 
 A file of o80 is a sequence of groups, each written by one call: a schema, a channel, an attachment,
-a metadata record, or a chunk with the message indexes that follow it. A scan ends before the first
+a metadata record, or a chunk with the message indexes that follow it. A finished file has all of it
+again in its summary. Of a file without one a scan reads every record, and ends before the first
 group that is not whole.
 """
 
 import os
+import shutil
 import struct
+import tempfile
+import weakref
+import zlib
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from io import BytesIO
@@ -28,6 +33,7 @@ from mcap.records import (
     Metadata,
     MetadataIndex,
     Schema,
+    Statistics,
 )
 from mcap.stream_reader import breakup_chunk, get_chunk_data_stream
 from numpy.typing import NDArray
@@ -39,6 +45,8 @@ MAGIC = b"\x89MCAP0\r\n"
 HEAD = struct.Struct("<BQ")
 CHUNK_HEAD = struct.Struct("<QQQIL")
 FOOTER_LENGTH = HEAD.size + 20 + len(MAGIC)
+DATA_END_LENGTH = HEAD.size + 4
+_DAMAGED = (EndOfFile, ValueError, OverflowError, struct.error)
 
 
 class NotARecordingError(ValueError):
@@ -59,6 +67,25 @@ class Scan:
     end: int = 0  #: of the last whole group [bytes]
     finished: bool = False  #: with a summary and a footer
     library: str = ""
+    #: messages outside of chunks, chunks without indexes or with channels of their own: another
+    #: program has written them
+    foreign: bool = False
+    copy: "CopiedFile | None" = (
+        None  #: of a foreign file, as o80 writes one: what this is a scan of
+    )
+
+    def opened(self, path: Path) -> IO[bytes]:
+        """The file that this is a scan of. Raises OSError."""
+        return (path if self.copy is None else self.copy.path).open("rb")
+
+
+class CopiedFile:
+    """A file that is removed when nobody refers to this object any more."""
+
+    def __init__(self, name: str) -> None:
+        folder = tempfile.mkdtemp(prefix="o80-copy-")
+        self.path = Path(folder, name)
+        weakref.finalize(self, shutil.rmtree, folder, ignore_errors=True)
 
 
 def scan(path: str | os.PathLike[str]) -> Scan:
@@ -70,22 +97,121 @@ def scan(path: str | os.PathLike[str]) -> Scan:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MAGIC)) != MAGIC:
             raise NotARecordingError(f"{path} is not an MCAP file")
-        return _Scanner(file, size, path).run()
+        found = _by_summary(file, size) or _Scanner(file, size, path).run()
+    known = found.channels.keys()
+    for chunk in found.chunks:
+        found.foreign |= not known >= chunk.message_index_offsets.keys()
+        found.foreign |= not chunk.message_index_offsets and chunk.uncompressed_size > 0
+    return found
 
 
 def has_end(path: str | os.PathLike[str]) -> bool:
     """Whether a file ends with a summary and a footer. Raises OSError."""
     with Path(path).open("rb") as file:
-        return _has_footer(file, os.fstat(file.fileno()).st_size)
+        return _footer(file, os.fstat(file.fileno()).st_size) is not None
 
 
-def _has_footer(file: IO[bytes], size: int) -> bool:
+def _footer(file: IO[bytes], size: int) -> Footer | None:
+    """The footer, if there is a summary."""
     file.seek(max(0, size - FOOTER_LENGTH))
     data = file.read()
-    if len(data) != FOOTER_LENGTH or not data.endswith(MAGIC):
-        return False
+    if len(data) != FOOTER_LENGTH or not data.endswith(MAGIC) or data[0] != Opcode.FOOTER:
+        return None
     footer: Footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size :])))
-    return footer.summary_start > 0
+    return footer if footer.summary_start > 0 else None
+
+
+def _by_summary(file: IO[bytes], size: int) -> Scan | None:
+    """The scan that the summary gives; None if there is none that is whole and tells everything."""
+    try:
+        return _summary(file, size)
+    except _DAMAGED:  # a scan of all records says where
+        return None
+
+
+def _summary(file: IO[bytes], size: int) -> Scan | None:
+    footer = _footer(file, size)
+    if footer is None or not footer.summary_crc:
+        return None
+    end = footer.summary_start - DATA_END_LENGTH
+    file.seek(max(end, 0))
+    data = file.read(size)
+    behind = len(data) - len(MAGIC) - 4  # of what the checksum covers
+    if end < 0 or data[0] != Opcode.DATA_END:
+        return None
+    if zlib.crc32(data[DATA_END_LENGTH:behind]) != footer.summary_crc:
+        return None
+    found = Scan(end=end, finished=True)
+    statistics: Statistics | None = None
+    at = DATA_END_LENGTH
+    while at < behind:
+        opcode, length = HEAD.unpack_from(data, at)
+        at, begin = at + HEAD.size + length, at + HEAD.size
+        if opcode == Opcode.CHUNK_INDEX:
+            found.chunks.append(_chunk_index(data, begin))
+            continue
+        stream = ReadDataStream(BytesIO(data[begin:at]))
+        if opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            found.schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(stream)
+            found.channels[channel.id] = channel
+        elif opcode == Opcode.ATTACHMENT_INDEX:
+            found.attachments.append(AttachmentIndex.read(stream))
+        elif opcode == Opcode.METADATA_INDEX:
+            found.metadata_places.append(MetadataIndex.read(stream))
+        elif opcode == Opcode.STATISTICS:
+            statistics = Statistics.read(stream)
+    is_told = statistics is not None and (
+        len(found.chunks),
+        len(found.attachments),
+        len(found.metadata_places),
+        len(found.channels),
+        len(found.schemas),
+    ) == (
+        statistics.chunk_count,
+        statistics.attachment_count,
+        statistics.metadata_count,
+        statistics.channel_count,
+        statistics.schema_count,
+    )
+    if statistics is None or not is_told or (statistics.message_count and not found.chunks):
+        return None
+    found.counts = statistics.channel_message_counts
+    for place in found.metadata_places:
+        file.seek(place.offset + HEAD.size)
+        found.metadata.append(Metadata.read(ReadDataStream(BytesIO(file.read(place.length)))))
+    file.seek(len(MAGIC))
+    _, length = HEAD.unpack(file.read(HEAD.size))
+    found.library = Header.read(ReadDataStream(BytesIO(file.read(length)))).library
+    return found
+
+
+_CHUNK_INDEX = struct.Struct("<QQQQI")
+
+
+def _chunk_index(data: bytes, at: int) -> ChunkIndex:
+    """As ChunkIndex.read, but ten times as fast: there are very many."""
+    start, end, offset, length, bytes_of_offsets = _CHUNK_INDEX.unpack_from(data, at)
+    at += _CHUNK_INDEX.size
+    offsets = dict(struct.iter_unpack("<HQ", data[at : at + bytes_of_offsets]))
+    at += bytes_of_offsets
+    index_length, named = struct.unpack_from("<QI", data, at)
+    at += 12
+    compression = data[at : at + named].decode()
+    compressed, uncompressed = struct.unpack_from("<QQ", data, at + named)
+    return ChunkIndex(
+        chunk_length=length,
+        chunk_start_offset=offset,
+        compression=compression,
+        compressed_size=compressed,
+        message_end_time=end,
+        message_index_length=index_length,
+        message_index_offsets=offsets,
+        message_start_time=start,
+        uncompressed_size=uncompressed,
+    )
 
 
 def content_of(file: IO[bytes], chunk: ChunkIndex) -> bytes:
@@ -119,9 +245,13 @@ def messages_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> Iterator[by
 
 
 def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:
-    """An attachment with its data."""
+    """An attachment with its data. Raises ValueError if it is damaged."""
     file.seek(place.offset + HEAD.size)
-    attachment: Attachment = Attachment.read(ReadDataStream(file))
+    try:
+        stream = ReadDataStream(BytesIO(file.read(place.length - HEAD.size)))
+        attachment: Attachment = Attachment.read(stream)
+    except _DAMAGED as error:
+        raise ValueError(f"the record at byte {place.offset} is damaged") from error
     return attachment
 
 
@@ -132,18 +262,18 @@ class _Scanner:
         self._chunk: ChunkIndex | None = None  # whose message indexes are being read
 
     def run(self) -> Scan:
-        at = len(MAGIC)
+        at = self._file.seek(len(MAGIC))
         while at + HEAD.size <= self._size:
             opcode, length = HEAD.unpack(self._file.read(HEAD.size))
             after = at + HEAD.size + length
             if after > self._size:
                 break
             if opcode == Opcode.DATA_END:
-                self._scan.finished = _has_footer(self._file, self._size)
+                self._scan.finished = _footer(self._file, self._size) is not None
                 break
             try:
                 belongs = self._take(opcode, at, length)
-            except (EndOfFile, ValueError, OverflowError, struct.error) as error:
+            except _DAMAGED as error:
                 raise RecordingError(f"{self._path}: the record at byte {at} is damaged") from error
             if not belongs:
                 break
@@ -172,6 +302,8 @@ class _Scanner:
             scan.channels[channel.id] = channel
         elif opcode == Opcode.ATTACHMENT:
             self._take_attachment(Attachment.read(stream), at, after - at)
+        elif opcode == Opcode.MESSAGE:
+            scan.foreign = True
         elif opcode == Opcode.METADATA:
             metadata = Metadata.read(stream)
             scan.metadata.append(metadata)

@@ -94,6 +94,16 @@ class Source:
             self._frontend.close()
             self._frontend = None
 
+    def is_filled(self, share: float) -> bool:
+        """Whether so much of a ring was not read yet, or there may be something to attach to."""
+        frontend = self._frontend
+        if frontend is None or not frontend.alive:
+            return True
+        newest = frontend.published
+        if newest + 1 - self._next >= share * (newest + 1 - frontend.oldest):
+            return newest >= self._next
+        return self._journal is not None and self._journal.unread >= share
+
     def poll(self) -> list[MessageBlock]:
         """The rows and decisions since the last call; at most LARGEST_BLOCK bytes of rows."""
         if self._frontend is None and not self._attach():

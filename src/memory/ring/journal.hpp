@@ -141,6 +141,13 @@ class JournalReader {
   bool next(JournalItem& item);
   /// Continues behind the newest entry.
   void seek_end() noexcept;
+  /// Share of the ring that holds what was not read yet, from 0 to 1.
+  double unread() const noexcept {
+    if (bytes_ == 0) return 0.0;
+    const std::uint64_t end = published();
+    const std::uint64_t behind = std::min(end - std::min(end, position_), bytes_);
+    return static_cast<double>(behind) / static_cast<double>(bytes_);
+  }
 
  private:
   enum class Got : std::uint8_t { entry, nothing, overtaken, damaged };

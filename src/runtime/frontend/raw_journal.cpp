@@ -30,6 +30,11 @@ RawJournal::RawJournal(const UntypedFrontend& frontend, std::uint64_t first)
   link_->check_usable();
 }
 
+double RawJournal::unread() const {
+  link_->check_usable();
+  return reader_.unread();
+}
+
 RawJournal::Entries RawJournal::read(std::size_t most) {
   link_->check_usable();
   Entries entries;

@@ -35,6 +35,8 @@ class RawJournal {
 
   /// False if the backend was started without a journal.
   bool exists() const { return reader_.has_journal(); }
+  /// Share of the ring that holds what was not read yet, from 0 to 1. Throws Closed.
+  double unread() const;
   /// The entries since the last call. Ends before entries that were missed, and after `most` bytes.
   /// Does not wait. Throws Closed, UsedAfterFork.
   Entries read(std::size_t most);

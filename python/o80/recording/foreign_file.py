@@ -1,0 +1,81 @@
+"""Files of o80 that another program has written anew: filtered, merged, compressed, sorted."""
+
+from pathlib import Path
+
+from mcap.exceptions import EndOfFile
+from mcap.records import Attachment, Channel, Message, Metadata, Schema
+from mcap.stream_reader import StreamReader
+
+from o80.base.errors import RecordingError
+from o80.recording.blocks import Messages
+from o80.recording.file_writer import FileWriter, Form
+from o80.recording.scan import CopiedFile, Scan, scan
+
+BYTES = 1 << 20  # of messages in a chunk
+
+
+def copied(path: Path) -> Scan:
+    """Scan of a copy in which o80 finds everything: chunks with indexes.
+
+    Of a file that was cut it holds what is whole. Raises RecordingError, OSError.
+    """
+    copy = CopiedFile(path.name)
+    writer = FileWriter(copy.path, Form("lz4"))
+    try:
+        _Copier(writer).copy(path)
+    finally:
+        writer.finish()
+    found = scan(copy.path)
+    found.copy = copy
+    return found
+
+
+class _Copier:
+    def __init__(self, writer: FileWriter) -> None:
+        self._writer = writer
+        self._schemas: dict[int, Schema] = {}
+        self._channels: dict[int, int] = {}  # number here of each number there
+        self._waiting: dict[int, list[tuple[int, bytes]]] = {}
+        self._bytes = 0
+
+    def copy(self, path: Path) -> None:
+        with path.open("rb") as file:
+            try:
+                for record in StreamReader(file).records:
+                    self._take(record)
+            except EndOfFile:
+                pass
+            except Exception as error:  # each compression has exceptions of its own
+                raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
+        self._flush()
+
+    def _take(self, record: object) -> None:
+        match record:
+            case Message():
+                message = record.log_time, record.data
+                self._waiting.setdefault(self._channels[record.channel_id], []).append(message)
+                self._bytes += len(record.data)
+                if self._bytes >= BYTES:
+                    self._flush()
+            case Schema():
+                self._schemas[record.id] = record
+            case Channel() if record.id not in self._channels:
+                self._channels[record.id] = self._added(record)
+            case Attachment():
+                self._writer.attach(record.name, record.media_type, record.data, record.create_time)
+            case Metadata():
+                self._writer.add_metadata(record.name, record.metadata)
+
+    def _added(self, channel: Channel) -> int:
+        number, schema = 0, self._schemas.get(channel.schema_id)
+        if schema is not None:
+            text = schema.data.decode(errors="replace")
+            number = self._writer.add_schema(schema.name, text, encoding=schema.encoding)
+        return self._writer.add_channel(
+            channel.topic, number, channel.metadata, encoding=channel.message_encoding
+        )
+
+    def _flush(self) -> None:
+        if self._waiting:
+            self._writer.add_chunk([Messages(*each) for each in self._waiting.items()])
+        self._waiting, self._bytes = {}, 0
