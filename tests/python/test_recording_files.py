@@ -126,7 +126,7 @@ def copied(
                     )
                 for record in reader.iter_metadata() if others else ():
                     writer.add_metadata(record.name, record.metadata)
-        writer.finish()
+        writer.finish()  # type: ignore[no-untyped-call]
 
 
 SETTINGS: list[dict[str, Any]] = [
