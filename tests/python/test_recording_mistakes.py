@@ -201,7 +201,7 @@ def test_marks_hold_numbers_and_arrays_of_numpy(arm: o80.Frontend, tmp_path: Pat
     path = tmp_path / "run.mcap"
     with o80.Recording(path, arm) as recording:
         recording.mark("end", name="ball", hits=np.int64(3), target=np.zeros(2), won=np.True_)
-        with pytest.raises(TypeError, match="that JSON can hold, got {"):
+        with pytest.raises(TypeError, match="that JSON can hold"):
             recording.mark("end", balls={1, 2})
 
     (mark,) = o80.open(path).marks
