@@ -184,8 +184,8 @@ def test_a_ball_that_was_waved_in_a_plane_is_refused(files: Files) -> None:
         ('{"corners": {"camera_0": [[1, 2], [3, 4]]}}', "must have four corners"),
         ('{"corners": {"camera_0": [[1, 2], [3, 4], [5, 6], null]}}', "3 are needed"),
         ('{"corners": {"camera_0": [[1, 2], [3, 4], [5, 6], [7]]}}', "corners"),
-        ("[]", "does not tell the corners"),
-        ("", "does not tell the corners"),
+        ("[]", "does not hold the corners"),
+        ("", "does not hold the corners"),
         ('{"table": {"half": [0.7, -1]}, "corners": {}}', "must be lengths"),
     ],
 )
@@ -198,7 +198,7 @@ def test_damaged_marks_of_corners_are_told(files: Files, content: str, error: st
 def test_a_recording_of_something_else_is_told(files: Files) -> None:
     for content in (b"", b"nothing", files.lenses.read_bytes()):
         files.wave.write_bytes(content)
-        with pytest.raises(SystemExit, match="is no recording of a waved ball"):
+        with pytest.raises(SystemExit, match="is not a recording of a waved ball"):
             files.place()
 
 

@@ -109,5 +109,5 @@ def test_a_cut_recording_is_told(tmp_path: Path) -> None:
     with pytest.raises(o80.InvalidArgument, match="is cut after frame 5"):
         load(cut)
     cut.write_bytes(b"0" * 100)
-    with pytest.raises(o80.InvalidArgument, match="is no recording of motion capture"):
+    with pytest.raises(o80.InvalidArgument, match="is not a recording of motion capture"):
         load(cut)

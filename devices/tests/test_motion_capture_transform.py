@@ -75,12 +75,12 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        ("", "is no file of a transform"),
-        ('{"rotation": 1}', "is no file of a transform"),
+        ("", "is not a file of a transform"),
+        ('{"rotation": 1}', "is not a file of a transform"),
         ('{"rotation": [[1]], "translation": [0, 0, 0]}', "rotation must be 3 x 3"),
         (
             '{"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0]}',
-            "rotation is no rotation",
+            "must be a rotation matrix",
         ),
     ],
 )

@@ -101,7 +101,7 @@ o80::RowNumber row_number(const NumberPlace& place) {
   for (const auto& [name, kind] : kKinds) {
     if (std::get<1>(place) == name) return {std::get<0>(place), kind};
   }
-  throw o80::InvalidArgument("'" + std::get<1>(place) + "' is no type of a number");
+  throw o80::InvalidArgument("'" + std::get<1>(place) + "' is not a type of numbers");
 }
 
 o80::EventFlag::Compare compare_of(const std::string& word) {

@@ -98,7 +98,7 @@ class TwoJoints {
   }
 
   o80::Served on(const Home& home) {
-    if (!(home.speed > 0)) return o80::Served::rejected("speed must be above 0");
+    if (!(home.speed > 0)) return o80::Served::rejected("speed must be positive");
     now_.mode = Mode::homes;
     now_.speed = home.speed;
     now_.effort = {};
@@ -123,7 +123,7 @@ class TwoJoints {
 
   static void refuse_unless_above_0(const std::string& option, double value) {
     if (value > 0) return;
-    throw std::invalid_argument(option + " must be above 0, got " + std::to_string(value));
+    throw std::invalid_argument(option + " must be positive, got " + std::to_string(value));
   }
 
   void move_home(double period) {

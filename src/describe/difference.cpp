@@ -192,7 +192,7 @@ std::string difference(const Schema& expected, const Schema& found) {
   same.shown = expected.shown;
   if (expected == same) return "";
   const std::string text = compare(lines_of(expected), lines_of(found));
-  return text.empty() ? "  names of types, helps or groups differ\n" : text;
+  return text.empty() ? "  names of types, help texts or groups differ\n" : text;
 }
 
 std::string layout_difference(const Schema& expected, const Schema& found) {

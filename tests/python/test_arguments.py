@@ -19,7 +19,7 @@ import o80
         (lambda arm: arm.history("x"), "observations, must be a whole number, got 'x'"),
         (lambda arm: arm.history(since="x"), "since must be a whole number, got 'x'"),
         (lambda arm: arm.prepared_burst("x"), "a burst must be a whole number, got 'x'"),
-        (lambda arm: arm.add_trajectory([[0, 0]], times="abc"), "times .* not 'abc'"),
+        (lambda arm: arm.add_trajectory([[0, 0]], times="abc"), "times .* got 'abc'"),
         (lambda arm: arm.add_command(0, 0.1, mode=None), "mode must be one of .*, got None"),
         (lambda arm: arm.add_command(0, 0.1, start=None), "start must be one of .*, got None"),
         (lambda arm: arm.add_command(0, 0.1, every=0), "every must be positive, got 0"),

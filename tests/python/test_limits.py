@@ -72,7 +72,7 @@ def test_so_is_whatever_else_a_robot_is_described_with(segment: str) -> None:
     bounds: Any = o80.IntegralBounds
     limits: Any = o80.Limits
     for make, text in (
-        (lambda: bounds(5), "field of o80.IntegralBounds must be a text, got 5"),
+        (lambda: bounds(5), "field of o80.IntegralBounds must be a string, got 5"),
         (lambda: bounds("x", minimum="low"), "minimum of o80.IntegralBounds must be a number"),
         (lambda: bounds("x", reaction=None), "reaction of o80.IntegralBounds must be a number"),
         (lambda: limits(integral="position"), "integral of o80.Limits must be o80.IntegralBounds"),

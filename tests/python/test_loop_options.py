@@ -156,7 +156,7 @@ def test_an_unknown_option_offers_the_nearest_one(segment: str, verb: str) -> No
 def test_a_robot_says_what_its_own_options_must_be(segment: str) -> None:
     robot = o80.robots.load("two_joints")
     for begin in (robot.start, robot.inline):
-        with pytest.raises(o80.DriverError, match="gain must be above 0, got -3"):
+        with pytest.raises(o80.DriverError, match="gain must be positive, got -3"):
             begin(segment, gain=-3)
 
 

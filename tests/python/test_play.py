@@ -136,7 +136,7 @@ def test_a_part_is_played(recorded: Path, segment: str) -> None:
             assert arm.history().iteration.tolist() == list(range(50, 101))
             with pytest.raises(o80.RowOverwritten):
                 arm.wait_for(49)
-    with pytest.raises(o80.InvalidArgument, match="no row in the part"):
+    with pytest.raises(o80.InvalidArgument, match="no row in the requested part"):
         o80.play(recorded, begin=1000.0)
 
 

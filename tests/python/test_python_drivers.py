@@ -221,13 +221,13 @@ def test_a_verb_that_returns_something_is_named_with_it(
 @pytest.mark.parametrize(
     ("report", "text"),
     [
-        (lambda it: it.halt(5), "reason of reading.halt must be a text, got 5"),
-        (lambda it: it.halt(OSError()), r"reading.halt must be a text, got OSError\(\)"),
-        (lambda it: it.fault(5), "reason of reading.fault must be a text, got 5"),
-        (lambda it: it.progress("home", 5), "reading.progress must be a text, got 5"),
+        (lambda it: it.halt(5), "reason of reading.halt must be a string, got 5"),
+        (lambda it: it.halt(OSError()), r"reading.halt must be a string, got OSError\(\)"),
+        (lambda it: it.fault(5), "reason of reading.fault must be a string, got 5"),
+        (lambda it: it.progress("home", 5), "reading.progress must be a string, got 5"),
         (lambda it: it.ended("home", False), "answer must be None or o80.StartAfresh.*got False"),
-        (lambda it: it.ended("home", rejected=5), "rejected must be a text, got 5"),
-        (lambda it: o80.Running(cast(str, 5)), "progress of o80.Running must be a text, got 5"),
+        (lambda it: it.ended("home", rejected=5), "rejected must be a string, got 5"),
+        (lambda it: o80.Running(cast(str, 5)), "progress of o80.Running must be a string, got 5"),
     ],
 )
 def test_a_report_of_another_type_says_what_it_wants(
@@ -415,7 +415,7 @@ def test_a_script_with_a_driver_of_its_own_needs_a_main_guard(
     [
         ("no_such_module:Driver", "cannot be imported: ModuleNotFoundError"),
         ("room_sensor:RoomSensr", "has no class 'RoomSensr'.*Did you mean 'RoomSensor'"),
-        ("room_sensor:Colour", "Colour is no driver: give it read"),
+        ("room_sensor:Colour", "Colour is not a driver: give it read"),
     ],
 )
 def test_a_class_that_is_no_driver_is_named(place: str, text: str) -> None:

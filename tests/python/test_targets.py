@@ -298,7 +298,7 @@ def test_a_trajectory_may_overwrite(arm: o80.Frontend) -> None:
         (np.zeros((2, 2)), {"times": [0.1, float("nan")]}, "finite"),
         (np.zeros((2, 2)), {"times": [0.1, 0.2], "iterations": 1}, "one pace"),
         (np.zeros((2, 2)), {"iterations": 1, "speed": 1.0}, "one pace"),
-        (np.zeros((2, 2)), {"iterations": 0}, "at least 1"),
+        (np.zeros((2, 2)), {"iterations": 0}, "iterations must be from 1"),
         ([[0.0, 0.0], [0.0, 9.0]], {}, "elbow"),
         (np.full((2, 2), np.nan), {}, "shoulder"),
         ({"position": [0.0]}, {}, "plain number"),

@@ -54,7 +54,9 @@ def of_examples(
     examples count as well, so that a few hundred pixels are enough. Raises InvalidArgument.
     """
     if len(ball) == 0 or len(others) == 0:
-        raise InvalidArgument("examples of the ball and of everything else are needed")
+        raise InvalidArgument(
+            f"ball and others must each have a pixel, got {len(ball)} and {len(others)}"
+        )
     of_ball, of_others = _density(ball), _density(others)
     likely = share * of_ball / np.maximum(share * of_ball + (1 - share) * of_others, 1e-12)
     table: ColourTable = np.round(255 * likely).astype(np.uint8).ravel()

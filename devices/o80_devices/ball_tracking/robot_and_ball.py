@@ -52,7 +52,7 @@ class RobotAndBall:
                 ball, robot = ast.literal_eval(line)
                 row = (int(ball[0]), int(ball[1]), ball[2], ball[3], int(robot[0]), *robot[1:])
                 if [len(part) for part in (row[2], row[3], row[5], row[6])] != [3, 3, 4, 4]:
-                    raise ValueError("wrong lengths")
+                    raise ValueError("lists must have 3, 3, 4 and 4 numbers")
                 rows.append(row)
             except (ValueError, SyntaxError, TypeError, IndexError) as error:
                 raise InvalidArgument(

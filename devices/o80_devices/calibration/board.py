@@ -123,7 +123,9 @@ def board_reprojection(lens: RigCamera, boards: Sequence[FloatArray], board: Boa
 def pictures_of(folder: Path) -> dict[str, list[Path]]:
     """The pictures of each camera, a folder for each. Raises InvalidArgument."""
     if not folder.is_dir():
-        raise InvalidArgument(f"{folder} is no folder: it holds a folder of pictures per camera")
+        raise InvalidArgument(
+            f"{folder} is not a folder: give one that holds a folder of pictures for each camera"
+        )
     found = {
         each.name: sorted(file for file in each.iterdir() if file.suffix.lower() in SUFFIXES)
         for each in sorted(folder.iterdir())

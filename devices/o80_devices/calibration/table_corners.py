@@ -36,7 +36,7 @@ class TableCorners:
             sound = np.isfinite(table.corners).all() and min(table.half) > 0
         except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
             raise InvalidArgument(
-                f"{path} does not tell the corners of the table ({error}): it holds {EXAMPLE}"
+                f"{path} does not hold the corners of the table ({error}): expected {EXAMPLE}"
             ) from error
         if not sound:
             raise InvalidArgument(f'{path}: "middle" and "half" must be lengths [m]')
@@ -63,5 +63,5 @@ def _pixels(name: str, marks: Any) -> FloatArray:
         raise ValueError(f"{name} must have four corners, null for one that it does not see")
     pixels = np.array([[np.nan, np.nan] if mark is None else mark for mark in marks], float)
     if pixels.shape != (4, 2):
-        raise ValueError(f"a corner of {name} is no pair of numbers")
+        raise ValueError(f"a corner of {name} must be a pair of numbers")
     return pixels

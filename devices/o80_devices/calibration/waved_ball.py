@@ -50,7 +50,7 @@ class WavedBall:
                 names = tuple(str(name) for name in content["names"])
                 pixels = np.asarray(content["pixels"], float)
         except (OSError, ValueError, KeyError, EOFError, TypeError, zipfile.BadZipFile) as error:
-            raise InvalidArgument(f"{path} is no recording of a waved ball: {error}") from error
+            raise InvalidArgument(f"{path} is not a recording of a waved ball: {error}") from error
         if pixels.shape[1:] != (len(names), 2):
             raise InvalidArgument(
                 f"{path}: 'pixels' must have the shape (moments, {len(names)}, 2), got "

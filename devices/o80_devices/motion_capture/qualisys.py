@@ -87,7 +87,7 @@ def body_names(settings: str) -> list[str]:
     try:
         root = ElementTree.fromstring(settings.strip())
     except ElementTree.ParseError as error:
-        raise ValueError(f"the server's settings are no XML: {error}") from error
+        raise ValueError(f"the server's settings are not XML: {error}") from error
     return [(body.findtext("Name") or "").strip() for body in root.findall("The_6D/Body")]
 
 
@@ -108,7 +108,7 @@ class QualisysFrames(FrameStream):
             connection = QualisysConnection(self._host, self._port)
         except (OSError, ValueError) as error:
             raise DriverError(
-                f"Qualisys Track Manager at {self._host}:{self._port} does not tell its bodies: "
+                f"Qualisys Track Manager at {self._host}:{self._port} does not list its bodies: "
                 f"{error}. Start it, correct --host and --port, or name the bodies with --subjects"
             ) from error
         connection.close()

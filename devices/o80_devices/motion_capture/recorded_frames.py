@@ -43,7 +43,7 @@ def load(file: Path) -> RecordedFrames:
             frames.append(frame)
     except (struct.error, ValueError, OverflowError) as error:
         raise InvalidArgument(
-            f"{file} is no recording of motion capture, or is cut after frame {len(frames)}: "
+            f"{file} is not a recording of motion capture, or is cut after frame {len(frames)}: "
             f"{error}"
         ) from error
     if not frames or not MIN_RATE < rate < MAX_RATE:

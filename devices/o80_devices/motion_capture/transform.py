@@ -63,7 +63,7 @@ class Transform:
             translation = np.array(content["translation"], float)
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InvalidArgument(
-                f"{file} is no file of a transform ({type(error).__name__}: {error}): it holds "
+                f"{file} is not a file of a transform ({type(error).__name__}: {error}): expected "
                 '{"rotation": [[...], [...], [...]], "translation": [x, y, z]}'
             ) from error
         if rotation.shape != (3, 3) or translation.shape != (3,):
@@ -73,7 +73,9 @@ class Transform:
             )
         off = np.abs(rotation @ rotation.T - np.eye(3)).max()
         if not off < 1e-6 or np.linalg.det(rotation) < 0 or not np.isfinite(translation).all():
-            raise InvalidArgument(f"{file}: rotation is no rotation, or a number is not finite")
+            raise InvalidArgument(
+                f"{file}: rotation must be a rotation matrix, and all numbers finite"
+            )
         return cls(rotation, translation, content.get("residuals", {}))
 
     def save(self, file: Path) -> None:

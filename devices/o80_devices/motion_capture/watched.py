@@ -72,7 +72,7 @@ class ChildConnection:
                 raise ConnectionError(f"the client has ended with code {self._child.wait()}")
             self._buffer += got
             if len(self._buffer) > LONGEST_LINE:
-                raise ValueError("the client prints something that is no frame")
+                raise ValueError("the client printed something that is not a frame")
         line, _, self._buffer = self._buffer.partition(b"\n")
         return self._frame(line)
 

@@ -74,7 +74,7 @@ class Desired {
     const auto at = reinterpret_cast<std::uintptr_t>(&number);
     const auto first = reinterpret_cast<std::uintptr_t>(&states);
     if (at < first || at - first >= sizeof states) {
-      throw InvalidArgument("rate() and rate2() want a number of these desired states, not a copy");
+      throw InvalidArgument("rate() and rate2() need a number of these desired states, not a copy");
     }
     return difference(Place<Number>{static_cast<std::uint32_t>(at - first)}, order);
   }

@@ -40,7 +40,7 @@ def number(value: Any, name: str) -> float:
 def text(value: Any, name: str) -> str:
     """A text. Raises InvalidArgument."""
     if not isinstance(value, str):
-        raise InvalidArgument(f"{name} must be a text, got {value!r}")
+        raise InvalidArgument(f"{name} must be a string, got {value!r}")
     return value
 
 

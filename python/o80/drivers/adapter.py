@@ -182,7 +182,7 @@ def check_verbs(driver: type[Any]) -> None:
         "stop": (),
     }
     if not callable(getattr(driver, "read", None)):
-        raise InvalidArgument(f"{driver.__name__} is no driver: give it read(self, reading)")
+        raise InvalidArgument(f"{driver.__name__} is not a driver: give it read(self, reading)")
     for name, arguments in wanted.items():
         verb = getattr(driver, name, None)
         if verb is None:

@@ -296,7 +296,7 @@ class Backend:
                 raise InvalidArgument(f"there is no actuator '{actuator}'{instead}")
             actuator = names.index(actuator)
         if not 0 <= actuator < len(names):
-            raise InvalidArgument(f"there is no actuator {actuator}: there are {len(names)}")
+            raise InvalidArgument(f"there is no actuator {actuator}: the robot has {len(names)}")
         self._open.interrupt(actuator)
 
     def stop(self) -> None:

@@ -82,7 +82,7 @@ class Desired:
             view = view[name]
         if view.dtype.names:
             raise InvalidArgument(
-                f"rate() and rate2() want one field of a state: {', '.join(view.dtype.names)}"
+                f"rate() and rate2() need one field of a state: {', '.join(view.dtype.names)}"
             )
         first = view.__array_interface__["data"][0] - self._block.__array_interface__["data"][0]
         places = np.full(view.shape, first)

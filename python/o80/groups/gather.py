@@ -79,7 +79,7 @@ def numbers_from(wanted: Sequence[str | Gathered], schema: dict[str, Any]) -> li
     for each in sequence(wanted, "numbers", "['observed']"):
         gathered = Gathered(each) if isinstance(each, str) else each
         if not isinstance(gathered, Gathered):
-            raise InvalidArgument(f"numbers holds paths and o80.Gathered, got {each!r}")
+            raise InvalidArgument(f"numbers must hold paths and o80.Gathered, got {each!r}")
         found += _numbers_of(gathered, schema)
     return found
 
@@ -116,7 +116,7 @@ def flags_from(
         columns = _columns_at(path, schema)
         if len(columns) != 1:
             raise InvalidArgument(
-                f"flag '{name}' must look at one number, and '{path}' has {len(columns)}: "
+                f"flag '{name}' must compare one number, and '{path}' has {len(columns)}: "
                 f"name one, such as '{columns[0].name}'"
             )
         flags[name] = _place(columns[0]), compare, _value_of(value, columns[0], name)

@@ -140,7 +140,7 @@ def _times(
         given = np.asarray(at)
         if given.ndim != 1 or given.dtype.kind not in "iu":
             raise InvalidArgument(
-                f"at must be whole nanoseconds (T,), got {given.dtype} {given.shape}"
+                f"at must be an array (T,) of whole nanoseconds, got {given.dtype} {given.shape}"
             )
         return given.astype(np.int64)
     assert period is not None

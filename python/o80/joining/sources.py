@@ -60,7 +60,7 @@ def timed(
             f"{name}: {history.schema['clock']}" for name, (history, _) in found.items()
         )
         raise InvalidArgument(
-            f"the rows have times of different clocks ({clocks}); say with offsets={{name: ns}} "
+            f"the rows have times of different clocks ({clocks}); give offsets={{name: ns}}, "
             "what to add to the times of each"
         )
     return {name: _on_clock(history, shifts[name]) for name, (history, _) in found.items()}

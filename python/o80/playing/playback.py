@@ -252,7 +252,7 @@ class Playback(Closeable):
             for begin, end in (track.time_range for track in tracks)
         ):
             return
-        raise InvalidArgument(f"{path} has no row in the part that was asked for")
+        raise InvalidArgument(f"{path} has no row in the requested part")
 
 
 def _tracks(path: str | os.PathLike[str], segments: str | Sequence[str] | None) -> list[Track]:

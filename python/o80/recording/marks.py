@@ -98,7 +98,7 @@ def _plain(value: Any) -> Any:
     """Numbers and lists of what NumPy computed."""
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()
-    raise TypeError(f"a mark holds what JSON can hold, not {type(value).__name__}: {value!r:.60}")
+    raise TypeError(f"a mark must be a value that JSON can hold, got {value!r:.60}")
 
 
 def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Messages:

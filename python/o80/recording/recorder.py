@@ -56,8 +56,8 @@ class Recorder:
         self._split = None if split is None else Split.of(split)
         if path.suffix != ".mcap":
             raise RecordingError(
-                f"the name of a recording ends in .mcap, got '{path}': o80 plot, export and diff "
-                f"know a recording by it"
+                f"the name of a recording must end in .mcap, got '{path}': o80 plot, export and "
+                f"diff know a recording by it"
             )
         self._patterns = [name for name in names if any(sign in name for sign in "*?[")]
         new = not path.exists()

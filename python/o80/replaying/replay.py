@@ -144,7 +144,7 @@ class _RunReplay:
         self._run, self._robot, self._options = run, robot, options
         self._tolerances, self._ignore, self._progress = tolerances, ignore, progress
         self._since = since
-        self._no_driver = reads_the_world(run.schema) if driver else "it was asked for"
+        self._no_driver = reads_the_world(run.schema) if driver else "as requested"
         self._start = Start()
         self._rows = 0
         self._times = [0, 0]  # of the first and the last row compared [ns]
@@ -312,7 +312,7 @@ class _RunReplay:
             found = self._first_difference(block[: len(replayed)], replayed)
         except RobotsDifferError as error:
             raise InvalidArgument(
-                f"robot '{self._run.schema['robot']}' is not described as when segment "
+                f"robot '{self._run.schema['robot']}' is described differently than when segment "
                 f"'{self._run.segment}' was recorded: {error}. Give the robot as it was then "
                 f"(--robot FILE.so, in Python robot=), or compare only desired states "
                 f"(--without-driver, in Python driver=False)"

@@ -64,7 +64,7 @@ class Provenance:
         known = {field.name for field in fields(cls)}
         provenance = cls.from_fields({name: found[name] for name in found if name in known})
         if not all(isinstance(each, dict) for each in (provenance.options, provenance.run_options)):
-            raise TypeError("options are no mapping")
+            raise TypeError("options are not a mapping")
         texts = [
             *(getattr(provenance, name) for name in _TEXTS),
             *(
@@ -75,10 +75,10 @@ class Provenance:
             *(text for file in provenance.files for text in vars(file).values()),
         ]
         if not all(isinstance(text, str) for text in texts):
-            raise ValueError("a value is no text")
+            raise ValueError("a value is not a text")
         for number in (provenance.wall_clock_offset, provenance.motion_rules):
             if not isinstance(number, int):
-                raise ValueError("a value is no whole number")
+                raise ValueError("a value is not a whole number")
         if not 0 <= provenance.motion_rules < 2**31:
             raise ValueError("the version of the motion rules is out of range")
         return provenance

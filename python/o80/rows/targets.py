@@ -159,10 +159,12 @@ def times_of(times: ArrayLike) -> NDArray[np.int64]:
         seconds = np.asarray(times, np.float64)
     except (TypeError, ValueError):
         raise InvalidArgument(
-            f"the times of a trajectory are finite numbers (T,) [s], not {times!r}"
+            f"the times of a trajectory must be finite numbers (T,) [s], got {times!r}"
         ) from None
     if seconds.ndim != 1 or not np.all(np.isfinite(seconds)):
-        raise InvalidArgument("the times of a trajectory are finite numbers (T,) [s]")
+        raise InvalidArgument(
+            f"the times of a trajectory must be finite numbers (T,) [s], got {times!r:.60}"
+        )
     if seconds.size == 0:
         raise InvalidArgument("the times of a trajectory are empty: give one for each row")
     if np.any(np.abs(seconds) > 1e9):

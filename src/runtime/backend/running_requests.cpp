@@ -17,7 +17,7 @@ bool RunningRequests::may_begin(std::uint32_t request, ShortText<248>& why) cons
     return false;
   }
   if (std::ranges::all_of(entries_, &Entry::runs)) {
-    why.add(kMaxRunning).add(" requests are running, which is the most: wait for the end of one");
+    why.add(kMaxRunning).add(" requests are running, the maximum: wait for the end of one");
     return false;
   }
   return true;

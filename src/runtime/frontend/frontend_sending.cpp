@@ -29,27 +29,24 @@ RecordHead head_of(std::uint32_t actuator, const CommandOptions& options, Profil
 }
 
 void check_pace(const PaceSpec& pace, std::uint32_t rows) {
-  const auto refuse = [](const std::string& why) { throw InvalidArgument("the pace " + why); };
+  const auto check = [&pace](const std::string& name, std::int64_t low, std::int64_t high) {
+    if (pace.amount >= low && pace.amount <= high) return;
+    throw InvalidArgument(name + " must be from " + std::to_string(low) + " to " +
+                          std::to_string(high) + ", got " + std::to_string(pace.amount));
+  };
   switch (pace.pace) {
     case Pace::speed:
     case Pace::fastest:
       return;
     case Pace::direct:
-      if (pace.amount < 0) refuse("has a negative time between set-points");
-      if (pace.amount > kLongestDuration) refuse("has too long a time between set-points");
-      return;
+      return check("every [ns]", 0, kLongestDuration);
     case Pace::duration:
-      if (pace.amount < 0) refuse("is a negative duration");
-      if (pace.amount > kLongestDuration) refuse("is a duration too long to be counted");
-      return;
+      return check("duration [ns]", 0, kLongestDuration);
     case Pace::iterations:
-      if (pace.amount < 1) refuse("of iterations must be at least 1");
-      if (pace.amount > kMaxIterations) refuse("is too many iterations");
-      return;
+      return check("iterations", 1, kMaxIterations);
     case Pace::until:
-      if (rows > 1) refuse("'until' suits one target; give a trajectory iterations or times");
-      if (pace.amount < 0) refuse("'until' is a negative iteration");
-      if (pace.amount > kMaxIterations) refuse("'until' lies too far");
+      if (rows == 1) return check("until", 0, kMaxIterations);
+      throw InvalidArgument("until is for one target: give a trajectory iterations or times");
   }
 }
 

@@ -92,7 +92,7 @@ void settle(const Description& robot, Rows& rows) {
 
 [[noreturn]] void throw_too_long() {
   throw InvalidArgument("the command takes more than " + std::to_string(kMaxPreviewed) +
-                        " iterations, the most that a preview has rows for");
+                        " iterations, for which a preview has no rows");
 }
 
 }  // namespace

@@ -101,7 +101,7 @@ def read_recording(
     usual = BALL_GUN_FRAME if file.suffix == ".json" else LAUNCHER_FRAME
     offset = usual.offset if frame_offset is None else tuple(float(v) for v in frame_offset)
     if len(offset) != 3:
-        raise ValueError(f"frame_offset needs three numbers [m], not {frame_offset}")
+        raise ValueError(f"frame_offset must be three numbers [m], got {frame_offset}")
     frame = Frame(
         offset=(offset[0], offset[1], offset[2]),
         yaw=usual.yaw if frame_yaw is None else frame_yaw,

@@ -94,7 +94,7 @@ class BallTrajectory:
         recorded velocities, are off by 0.2 to 0.9 m/s. The fit is made once and kept.
         """
         if not (np.isfinite(period) and period > 0):
-            raise ValueError(f"period must be a positive number of seconds, not {period}")
+            raise ValueError(f"period must be a positive number of seconds, got {period}")
         fit = self.fit
         count = int(np.floor((fit.end - fit.start) / period + 1e-6)) + 1
         times = fit.start + np.arange(count, dtype=np.float64) * period

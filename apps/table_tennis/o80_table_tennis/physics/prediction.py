@@ -159,4 +159,4 @@ def _crossing(nodes: FloatArray, axis: int, at: float) -> Crossing:
 def _require_positive(**values: float) -> None:
     for name, value in values.items():
         if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be a positive number of seconds, not {value}")
+            raise ValueError(f"{name} must be a positive number of seconds, got {value}")

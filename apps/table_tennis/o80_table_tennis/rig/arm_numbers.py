@@ -72,7 +72,7 @@ class ArmNumbers:
             values = tuple(float(each) for each in told.get(name, "").split())
             if len(values) != count:
                 raise ValueError(
-                    f"the arm '{arm.segment}' tells {len(values)} numbers of {name}, not {count}"
+                    f"the arm '{arm.segment}' has {len(values)} numbers of {name}, not {count}"
                 )
             return values
 

@@ -19,14 +19,14 @@ class PressureRange:
     def __init__(self, least: Sequence[float], most: Sequence[float]) -> None:
         if len(least) != len(most):
             raise ValueError(
-                f"a pressure range needs as many least pressures ({len(least)}) as most pressures "
-                f"({len(most)})"
+                f"least and most must have one pressure for each muscle, got {len(least)} and "
+                f"{len(most)}"
             )
         for muscle, (low, high) in enumerate(zip(least, most, strict=True)):
             if not (math.isfinite(low) and math.isfinite(high) and low < high):
                 raise ValueError(
-                    f"muscle {muscle}: the least pressure, {low:g}, must be below the most, "
-                    f"{high:g}, and both finite"
+                    f"muscle {muscle}: the least pressure must be below the most, and both must be "
+                    f"finite, got {low:g} and {high:g}"
                 )
         self.least: FloatArray = np.array(least, dtype=np.float64)
         self._span: FloatArray = np.array(most, dtype=np.float64) - self.least
