@@ -168,18 +168,16 @@ class FakeQualisys:
 
     def _stream(self, connected: socket.socket, words: list[str]) -> Stream | None:
         """The stream that `streamframes` asks for; None to stop, or if it is not understood."""
-        requested = re.fullmatch(
+        found = re.fullmatch(
             r"(allframes|frequency:(\d+)|frequencydivisor:(\d+))( udp:(\d+))?(.*)", " ".join(words)
         )
-        if requested is None or not set(requested[6].split()) <= set(COMPONENTS):
+        if found is None or not set(found[6].split()) <= set(COMPONENTS):
             return None
-        every = max(
-            1, round(self.frequency / int(requested[2])) if requested[2] else int(requested[3] or 1)
-        )
-        components = requested[6].split()
-        if not requested[5]:
+        every = max(1, round(self.frequency / int(found[2])) if found[2] else int(found[3] or 1))
+        components = found[6].split()
+        if not found[5]:
             return Stream(connected.sendall, components, every)
-        there = connected.getpeername()[0], int(requested[5])
+        there = connected.getpeername()[0], int(found[5])
         return Stream(lambda content: self._datagrams.sendto(content, there), components, every)
 
     def _answer(
