@@ -1,6 +1,7 @@
 """A driver class in Python is a robot like any other."""
 
 import os
+import random
 import re
 import signal
 import subprocess
@@ -485,6 +486,8 @@ def test_a_recording_cannot_name_a_class_to_import(segment: str, tmp_path: Path)
 
 
 CART = """
+import random
+
 import numpy as np
 import o80
 
@@ -507,7 +510,7 @@ class Cart:
         reading.observed[0] = self.x
 
     def on_reset(self, fields):
-        self.x = float(fields.seed)
+        self.x = random.Random(fields.seed).uniform(-1, 1)
         return o80.StartAfresh()
 
     def on_snapshot(self, fields):
@@ -524,6 +527,8 @@ def test_a_simulation_in_python_is_replayed_from_its_segment(segment: str, tmp_p
     file.write_text(CART)
     cart = o80.robots.load(f"{file}:Cart")
     with cart.inline(segment) as frontend:
+        frontend.request("reset", seed=3)  # a number of Python, as random.Random wants it
+        assert frontend.latest().observed[0] == random.Random(3).uniform(-1, 1)
         frontend.add_command("x", 1.0, iterations=10)
         frontend.burst(20)
         (run,) = o80.replay(frontend)
@@ -538,7 +543,7 @@ def test_a_simulation_in_python_is_replayed_from_its_segment(segment: str, tmp_p
             timeout=WAIT,
             check=True,
         )
-        assert said.stdout == f"{segment}: 21 rows, identical\n"
+        assert said.stdout == f"{segment}: 22 rows, identical\n"
 
 
 def test_the_thermometer_of_the_page_runs(segment: str, tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ from o80.base.errors import Error, InvalidArgument, RequestRejected, exception_t
 from o80.drivers.backend import KEEPS
 from o80.drivers.description import SchemaWriter
 from o80.drivers.reading import Answer, Desired, Differences, DriverFaultError, Reading
-from o80.rows.layout import Layout, dtype_of_type, record_of
+from o80.rows.layout import Layout, dtype_of_type, request_fields
 
 NANOSECOND = 1e-9
 
@@ -145,7 +145,7 @@ class Adapter:
 
     def request(self, index: int, payload: bytes) -> tuple[int, str]:
         row = self._requests[index]
-        fields = record_of(row["type"], bytearray(payload))
+        fields = request_fields(row["type"], bytearray(payload))
         handler = getattr(self._driver, f"on_{row['name']}")
         try:
             return Answer.of(handler(fields), f"on_{row['name']}")

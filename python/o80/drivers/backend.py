@@ -17,7 +17,7 @@ from o80.base.loop_options import loop_texts, names_of
 from o80.base.words import IdleWord, StaleWord
 from o80.drivers.description import Described, Limit, SchemaWriter
 from o80.rows.enumerations import numbers_of
-from o80.rows.layout import Layout, record_of
+from o80.rows.layout import Layout, request_fields
 from o80.rows.record import Record
 
 
@@ -388,7 +388,7 @@ class Server:
             )
         fields = np.frombuffer(bytearray(payload), np.uint8)
         try:
-            answer = handler(record_of(row["type"], fields))
+            answer = handler(request_fields(row["type"], fields))
         except RequestRejected as why:
             return str(why) or "the handler gave no reason"
         if answer is None:

@@ -9,7 +9,7 @@ import numpy as np
 import o80._core as _core
 from o80.base.words import CommandEnd, Reason, Status
 from o80.rows.enumerations import labelled
-from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, record_of
+from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, request_fields
 from o80.rows.record import Record
 
 ENDS = frozenset(
@@ -180,7 +180,7 @@ class EntryDecoder:
             return JournalCommand(kind, native.id, names, only_own=native.only_own)
         if kind == "request":
             described = self._schema["requests"][native.request]
-            record = record_of(described["type"], native.payload)
+            record = request_fields(described["type"], native.payload)
             fields = {name: _plain(record[name]) for name in record}
             return JournalCommand(kind, native.id, request=described["name"], fields=fields)
         return JournalCommand(

@@ -11,7 +11,7 @@ import o80._core as _core
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument
 from o80.rows.enumerations import Enumeration, enumeration_of, labelled
-from o80.rows.record import Record
+from o80.rows.record import Fields, Record
 
 HEAD = (
     ("iteration", "i8"),
@@ -79,9 +79,9 @@ def labels_of_field(field: dict[str, Any], otherwise: str = "") -> Any:
     return enumeration_of(field["name"] or otherwise or "state", tuple(labels))
 
 
-def record_of(described: dict[str, Any], buffer: Any) -> Record:
-    """A record of a described type in the memory of a buffer."""
-    return Record(np.ndarray((), dtype_of_type(described), buffer), labels_of_type(described))
+def request_fields(described: dict[str, Any], buffer: Any) -> Fields:
+    """The fields of a request in the memory of a buffer."""
+    return Fields(np.ndarray((), dtype_of_type(described), buffer), labels_of_type(described))
 
 
 def dtype_of_block(groups: list[dict[str, Any]], size: int) -> np.dtype[Any]:

@@ -32,7 +32,7 @@ class Record:
             raise KeyError(f"there is no value {name!r}{instead}") from None
         labels = self._labels.get(name) if self._labels else None
         if value.dtype.names and value.ndim == self._array.ndim:
-            value = Record(value, labels)
+            value = type(self)(value, labels)
         elif labels is None:
             value = value if value.ndim else value[()]
         else:
@@ -72,12 +72,22 @@ class Record:
         return isinstance(other, Record) and bool(np.array_equal(self._array, other._array))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Record, (self._array, self._labels)
+        return type(self), (self._array, self._labels)
 
     __hash__ = None  # type: ignore[assignment]
 
     def __repr__(self) -> str:
         return f"Record({', '.join(f'{name}={self[name]}' for name in self)})"
+
+
+class Fields(Record):
+    """The fields of a request: their numbers are Python's, which any library takes."""
+
+    __slots__ = ()
+
+    def __getitem__(self, name: str) -> Any:
+        value = super().__getitem__(name)
+        return value.item() if isinstance(value, np.generic) else value
 
 
 if TYPE_CHECKING:
