@@ -149,6 +149,9 @@ def test_a_recording_that_begins_late_is_replayed_from_where_nothing_acts(
     assert run.rows > 60
     done = o80_replay(str(path))
     assert "--without-driver" in done.stdout, done.stdout
+    assert o80_replay(str(path), "--without-driver").returncode == 0
+    done = o80_replay(str(path), "--without-driver", "--set", "gain=2")
+    assert (done.returncode, "not used" in done.stdout) == (2, True), done.stdout
 
 
 def test_the_journal_says_that_nothing_acts_however_much_is_written(

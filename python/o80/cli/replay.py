@@ -64,7 +64,7 @@ def replay(
 
     Exit code 0: all rows are identical. 1: a row differs, and the first one is printed. 2: not all
     rows could be compared (rows or decisions are missing, or this o80 moves by other rules), and
-    those that were are identical.
+    those that were are identical; or --robot or --set could not be used.
     """
     from o80.replaying.replay import replay as replay_all
 
@@ -91,7 +91,7 @@ def replay(
             print(f"  {run.rows / run.seconds:.0f} rows/s, {speed:.3g} times as fast as it ran")
     if report.difference is not None:
         raise typer.Exit(1)
-    if not report.identical:
+    if not report.identical or any(run.unused for run in report):
         raise typer.Exit(2)
 
 

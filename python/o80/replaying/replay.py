@@ -160,6 +160,7 @@ class _RunReplay:
             rows=self._rows,
             difference=difference,
             gap="" if difference else self._gap,
+            unused=bool(self._no_driver and (self._robot or self._options)),
             notes=tuple(self._notes),
             seconds=time.monotonic() - begin,
             recorded_seconds=(self._times[1] - self._times[0]) * 1e-9,

@@ -15,6 +15,7 @@ class RunReport:
     rows: int = 0  #: compared rows, from row 0 on
     difference: Difference | None = None  #: the first one; values: recorded and replayed
     gap: str = ""  #: why later rows were not replayed; empty: all were
+    unused: bool = False  #: a robot or options were given, but none was started
     notes: tuple[str, ...] = ()  #: what differs between then and now
     seconds: float = 0.0  #: that the replay took
     recorded_seconds: float = 0.0  #: that the compared rows span, on the clock of the run
