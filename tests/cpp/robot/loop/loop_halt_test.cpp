@@ -57,9 +57,7 @@ TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
   const std::uint64_t number = frontend.halt("");
   loop->run_granted(kAll);
   const auto resume = [&] {
-    BatchBuilder builder;
-    builder.resume(number);
-    const Batch batch = frontend.pulse(builder);
+    const Batch batch = send_resume(frontend, number);
     loop->run_granted(kAll);
     return batch.handle(0);
   };
@@ -108,6 +106,18 @@ TEST_F(LoopHaltTest, SoIsOneOfAFreshStart) {
 
 // ------------------------------------------------------------------------------ ends in order
 
+/// From 0, with an acceleration of 0.01 at most, to rest.
+void expect_braked(const std::vector<double>& written) {
+  ASSERT_GT(written.size(), 10U);
+  double before = written.front();
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    const double step = written[i] - written[i - 1];
+    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
+    before = step;
+  }
+  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+}
+
 TEST_F(LoopHaltTest, AStopBrakesWithinTheLimitsAndThenStopsTheDriver) {
   Puppet::limits = {.speed = 1000.0, .acceleration = 1e6};  // of iterations: 0.1 and 0.01
   std::vector<double> written;
@@ -125,14 +135,7 @@ TEST_F(LoopHaltTest, AStopBrakesWithinTheLimitsAndThenStopsTheDriver) {
   user.join();
   EXPECT_TRUE(ended.in_order);
   EXPECT_EQ(Puppet::calls.stopped, 1);
-  ASSERT_GT(written.size(), 10U);
-  double before = written.front();  // from 0
-  for (std::size_t i = 1; i < written.size(); ++i) {
-    const double step = written[i] - written[i - 1];
-    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
-    before = step;
-  }
-  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+  expect_braked(written);
 }
 
 TEST_F(LoopHaltTest, ARobotThatIsDoneBrakesBeforeItIsStopped) {
@@ -147,14 +150,7 @@ TEST_F(LoopHaltTest, ARobotThatIsDoneBrakesBeforeItIsStopped) {
   UntypedFrontend frontend("puppet");
   send(frontend, 0, 1000.0, {.pace = speed(1000.0), .profile = Profile::linear});
   EXPECT_TRUE(loop.run().in_order);
-  ASSERT_GT(written.size(), 10U);
-  double before = written.front();  // from 0
-  for (std::size_t i = 1; i < written.size(); ++i) {
-    const double step = written[i] - written[i - 1];
-    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
-    before = step;
-  }
-  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+  expect_braked(written);
   EXPECT_EQ(Puppet::calls.stopped, 1);
 }
 
@@ -242,9 +238,7 @@ class ReadingTest : public LoopHaltTest {
     return number;
   }
   Handle resume(std::uint64_t number, bool accepts = false) {
-    BatchBuilder builder;
-    builder.resume(number, accepts);
-    const Batch batch = frontend_->pulse(builder);
+    const Batch batch = send_resume(*frontend_, number, accepts);
     loop_->run_granted(kAll);
     return batch.handle(0);
   }
