@@ -5,10 +5,10 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <stdexcept>
 #include <thread>
 
+#include "dice.hpp"
 #include "memory/segment/verb_word.hpp"
 #include "readings_played.hpp"
 #include "robot/loop/loop.hpp"
@@ -253,26 +253,23 @@ class ReadingTest : public LoopHaltTest {
 };
 
 TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
-  std::mt19937 random(3);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution(low, high)(random);
-  };
+  Dice dice(3);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double period = 1e-3;
   for (int i = 0; i < readings_played(63); ++i) {
-    Limits limits{.minimum = -5.0, .maximum = 5.0, .speed = uniform(0.5, 4.0)};
-    if (i % 2 == 0) limits.error = uniform(0.1, 1.0);
+    Limits limits{.minimum = -5.0, .maximum = 5.0, .speed = dice.real(0.5, 4.0)};
+    if (i % 2 == 0) limits.error = dice.real(0.1, 1.0);
     begin(limits);
     offset_ = fresh_offset_ = moved_ = 0.0;
-    add(*frontend_, 0, uniform(-2.0, 2.0), {.pace = iterations(20)});
-    run(static_cast<int>(uniform(1.0, 30.0)));
+    add(*frontend_, 0, dice.real(-2.0, 2.0), {.pace = iterations(20)});
+    run(static_cast<int>(dice.real(1.0, 30.0)));
     const std::uint64_t number = halt();
-    run(static_cast<int>(uniform(1.0, 5.0)));
+    run(static_cast<int>(dice.real(1.0, 5.0)));
 
     const double tolerance = limits.speed * period + (i % 2 == 0 ? limits.error / 10.0 : 0.0);
     const double sizes[] = {2.1 * tolerance, 10.0 * tolerance, 10.0,        1e6,
                             1e300,           kInfinity,        std::nan("")};
-    const double wrong = std::copysign(sizes[i % 7], uniform(-1.0, 1.0));
+    const double wrong = std::copysign(sizes[i % 7], dice.real(-1.0, 1.0));
     const int when = i % 3;
     if (when == 0) fresh_offset_ = wrong;
     if (when == 1) offset_ = wrong;  // of the last row, and from then on
@@ -327,20 +324,17 @@ TEST_F(ReadingTest, OneTurnOffInEveryRowIsRefusedUntilItIsAccepted) {
 }
 
 TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
-  std::mt19937 random(5);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution(low, high)(random);
-  };
+  Dice dice(5);
   for (int i = 0; i < readings_played(20); ++i) {
-    const Limits limits{.speed = uniform(0.5, 4.0), .error = uniform(0.1, 1.0)};
+    const Limits limits{.speed = dice.real(0.5, 4.0), .error = dice.real(0.1, 1.0)};
     begin(limits);
     double place = 0.0;
     const std::uint64_t number = halt();
-    const double motion = uniform(-1.0, 1.0) * limits.speed * 1e-3;
+    const double motion = dice.real(-1.0, 1.0) * limits.speed * 1e-3;
     const double noise = limits.error / 20.0;
     for (int k = 0; k < 50; ++k) {
       place += motion;
-      moved_ = place + uniform(-noise, noise);
+      moved_ = place + dice.real(-noise, noise);
       run(1);
     }
     const Handle handle = resume(number);
