@@ -33,12 +33,11 @@ wheel:
 	@tools/setup.sh wheels
 	@.venv/bin/python tools/wheels.py $(ARGS)
 
-# random scripts of motion, 100 000 by default: ARGS="--count 1000000 --seed 5000000", or
-# ARGS="--count 0 --arrivals 10000000"
+# random scripts of motion, 100 000 of each kind by default: ARGS="--count 1000000 --seed 5000000"
 scripts:
 	@tools/setup.sh tools
 	@.venv/bin/cmake --preset dev > /dev/null
-	@.venv/bin/cmake --build --preset dev --target o80_test_scripts o80_test_control
+	@.venv/bin/cmake --build --preset dev --target o80_test_scripts
 	@.venv/bin/python tools/scripts.py $(ARGS)
 
 # processes killed and stopped until ARGS="--kills 10000" is reached

@@ -11,32 +11,27 @@ import sys
 
 from sources import ROOT
 
-PROGRAMS = ROOT / "build" / "dev" / "bin"
+PROGRAM = ROOT / "build" / "dev" / "bin" / "o80_test_scripts"
 
 
-def start(
-    test: str, program: str = "o80_test_scripts", **variables: object
-) -> "subprocess.Popen[bytes]":
+def start(test: str, **variables: object) -> "subprocess.Popen[bytes]":
     """The test program with variables in its environment."""
     environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
-    command = [str(PROGRAMS / program), f"--gtest_filter={test}", "--gtest_brief=1"]
+    command = [str(PROGRAM), f"--gtest_filter={test}", "--gtest_brief=1"]
     return subprocess.Popen(command, env=environment)
 
 
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--count", type=int, default=100_000, help="scripts to play")
+    parser.add_argument("--count", type=int, default=100_000, help="scripts of each kind")
     parser.add_argument("--seed", type=int, default=0, help="of the first one")
-    parser.add_argument(
-        "--arrivals", type=int, default=100_000, help="short scripts that must arrive"
-    )
     parser.add_argument("--iterations", type=int, default=480_000, help="beside the reference")
     arguments = parser.parse_args()
     jobs = len(os.sched_getaffinity(0))
     share = -(-arguments.count // jobs)
     running = [
         start(
-            "Script.KeepsEveryPromise",
+            "Script.*KeepsEveryPromise",
             O80_SCRIPTS=min(share, arguments.count - job * share),
             O80_SCRIPT_SEED=arguments.seed + job * share,
         )
@@ -45,18 +40,6 @@ def main() -> int:
     ]
     failed = [process.wait() for process in running]
     failed.append(start("LinearReference.*", O80_REFERENCE_ITERATIONS=arguments.iterations).wait())
-    share = -(-arguments.arrivals // jobs)
-    running = [
-        start(
-            "*RandomArrivals.*",
-            "o80_test_control",
-            O80_ARRIVALS=share,
-            O80_ARRIVAL_SEED=arguments.seed + job * share,
-        )
-        for job in range(jobs)
-        if arguments.arrivals > 0
-    ]
-    failed += [process.wait() for process in running]
     return int(any(failed))
 
 

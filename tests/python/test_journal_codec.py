@@ -9,6 +9,7 @@ import struct
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -205,8 +206,9 @@ def record_limited(path: Path, segment: str, profile: ProfileWord = "linear") ->
     return path
 
 
-def rules_of(path: Path, rules: int, monkeypatch: pytest.MonkeyPatch, segment: str) -> Path:
-    """A recording by an o80 with these rules."""
+@contextmanager
+def motion_rules(rules: object, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Records as an o80 with these rules."""
     honest = Provenance.as_json
     with monkeypatch.context() as forged:
         forged.setattr(
@@ -214,7 +216,7 @@ def rules_of(path: Path, rules: int, monkeypatch: pytest.MonkeyPatch, segment: s
             "as_json",
             lambda self: json.dumps(json.loads(honest(self)) | {"motion_rules": rules}),
         )
-        return record_limited(path, segment)
+        yield
 
 
 def test_a_recording_says_under_which_motion_rules_it_was_made(
@@ -234,7 +236,8 @@ def test_a_recording_says_under_which_motion_rules_it_was_made(
 def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_change(
     other: int, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    path = rules_of(tmp_path / "run.mcap", other, monkeypatch, segment)
+    with motion_rules(other, monkeypatch):
+        path = record_limited(tmp_path / "run.mcap", segment)
     (run,) = o80.replay(path)
 
     assert run.difference is None
@@ -253,13 +256,7 @@ def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_c
 def test_rules_that_change_no_command_of_the_run_are_noted(
     segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    honest = Provenance.as_json
-    with monkeypatch.context() as forged:
-        forged.setattr(
-            Provenance,
-            "as_json",
-            lambda self: json.dumps(json.loads(honest(self)) | {"motion_rules": 77}),
-        )
+    with motion_rules(77, monkeypatch):
         path = record(tmp_path / "run.mcap", segment)
     (run,) = o80.replay(path)
 
@@ -283,13 +280,7 @@ def test_the_first_command_is_found_whatever_the_rules_are(segment: str, tmp_pat
 def test_damaged_rules_are_told(
     rules: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    honest = Provenance.as_json
-    with monkeypatch.context() as forged:
-        forged.setattr(
-            Provenance,
-            "as_json",
-            lambda self: json.dumps(json.loads(honest(self)) | {"motion_rules": json.loads(rules)}),
-        )
+    with motion_rules(json.loads(rules), monkeypatch):
         path = record_limited(tmp_path / "run.mcap", segment)
     with pytest.raises(o80.RecordingError, match="provenance is damaged"):
         o80.replay(path)

@@ -1,7 +1,6 @@
 """Limits, fields that rest, and the fastest way, as Python sees them."""
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -112,22 +111,6 @@ def test_the_fastest_way_needs_limits(loop: Loop) -> None:
         loop.frontend.add_command("joint", {"position": 0.5, "velocity": 0.0}, fastest=True)
     with pytest.raises(o80.InvalidArgument, match="one pace"):
         loop.frontend.add_command("joint", {"position": 0.5}, fastest=True, duration=1.0)
-
-
-@pytest.mark.parametrize(
-    ("limits", "text"),
-    [
-        (o80.Limits(acceleration=1.0), "without a speed"),
-        (o80.Limits(speed=1.0, jerk=1.0), "without an acceleration"),
-        (o80.Limits(minimum=1.0, maximum=-1.0), "minimum must not exceed the maximum"),
-        (o80.Limits(speed=0.0), "speed"),
-    ],
-)
-def test_limits_that_make_no_sense_are_refused(
-    segment: str, limits: o80.Limits, text: str, tmp_path: Path
-) -> None:
-    with pytest.raises(o80.InvalidArgument, match=text):
-        o80.Backend(segment, ["joint"], limits={"joint": limits})
 
 
 def test_bounds_of_an_integral_end_a_velocity_and_say_so(segment: str) -> None:

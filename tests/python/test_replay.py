@@ -82,19 +82,12 @@ def test_a_run_of_bursts_is_identical(arm: o80.Frontend, seed: int) -> None:
     assert kinds >= {"taken", "scheduled", "fresh_start", "halt", "resume"}
 
 
-def test_the_options_of_the_run_are_used(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, gain=7.5) as arm:
-        arm.burst(5)
-        arm.add_command("elbow", 0.5)
-        arm.burst(5)
-        assert o80.replay(arm).identical
-
-
 def test_the_first_difference_of_another_option_is_told(segment: str) -> None:
     with o80.robots.load("two_joints").inline(segment, gain=7.5) as arm:
         arm.burst(5)
         arm.add_command("elbow", 0.5)
         arm.burst(5)
+        assert o80.replay(arm).identical  # with the options of the run
         found = o80.replay(arm, options={"gain": 7.6}).difference
 
         assert found is not None
@@ -136,17 +129,6 @@ def test_a_history_without_row_0_begins_at_a_reset_or_a_snapshot(segment: str, s
             assert run.difference is None, (row, run)
             began |= {note.rpartition(" ")[2] for note in run.notes if "begins with" in note}
         assert len(began) > 1
-
-
-def test_a_replay_begins_with_a_restored_snapshot(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, history=60) as arm:
-        arm.request("snapshot", slot=2)
-        arm.burst(100)
-        arm.request("restore", slot=2)
-        arm.burst(5)
-        (run,) = o80.replay(arm)
-        assert run.identical, run
-        assert run.rows == 6
 
 
 def test_a_snapshot_of_another_robot_is_refused() -> None:

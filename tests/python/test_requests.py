@@ -75,21 +75,6 @@ def test_a_request_may_be_part_of_a_pulse(arm: o80.Frontend) -> None:
     assert observation.desired[0] == 0.5
 
 
-def test_snapshot_run_restore_run_is_the_same(arm: o80.Frontend) -> None:
-    def run() -> list[list[float]]:
-        first = arm.published + 1
-        arm.add_command(0, 1.0, iterations=20)
-        arm.burst(20)
-        rows: list[list[float]] = arm.history(since=first).observed.tolist()
-        return rows
-
-    arm.request("snapshot", slot=3)
-    once = run()
-    arm.request("restore", slot=3)
-
-    assert run() == once
-
-
 def test_purge_needs_no_pulse(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0, iterations=100)
     arm.add_command(1, 1.0, iterations=100)

@@ -211,7 +211,7 @@ TEST_P(IterationTest, CallsNothingWhileFrontendsComeGoAndDie) {
   WatchedLoop loop(short_lived);
   UntypedFrontend other("subject");
   for (int round = 0; round < 4; ++round) {
-    ChildProcess child([](const ChildProcess::Ready& ready) {
+    StandingProcess child([](const StandingProcess::Stand& stand) {
       UntypedFrontend doomed("subject");
       UntypedFrontend second("subject");
       for (std::uint32_t i = 0; i < 3000; ++i) {
@@ -220,10 +220,8 @@ TEST_P(IterationTest, CallsNothingWhileFrontendsComeGoAndDie) {
       }
       doomed.pulse();
       second.pulse();
-      ready();
-      pause_for_ever();
+      stand();
     });
-    ASSERT_TRUE(child.wait_until_ready());
     send(other, 0, 3.0);
     const auto active = [&] { return loop.keeper->latest().active(0); };
     loop.go_on_until(active);

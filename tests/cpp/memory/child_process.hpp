@@ -73,3 +73,19 @@ class ChildProcess {
 [[noreturn]] inline void pause_for_ever() {
   while (true) pause();
 }
+
+/// A ChildProcess that is ready when it has been made; from its `stand()` on it does nothing.
+class StandingProcess : public ChildProcess {
+ public:
+  using Stand = std::function<void()>;
+
+  explicit StandingProcess(const std::function<void(const Stand&)>& body)
+      : ChildProcess([&](const Ready& ready) {
+          body([&] {
+            ready();
+            pause_for_ever();
+          });
+        }) {
+    if (!wait_until_ready()) throw std::runtime_error("the child process ended without a word");
+  }
+};

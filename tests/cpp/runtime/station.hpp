@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "control/batch/batch_builder.hpp"
 #include "memory/private_directory.hpp"
 #include "o80/robot/plant_requests.hpp"
 #include "o80/runtime/backend.hpp"
@@ -42,7 +43,7 @@ inline constexpr Timeout kAtOnce = std::chrono::nanoseconds(0);
 inline constexpr Timeout kPatience = std::chrono::seconds(60);
 
 /// A backend driven by hand, iteration after iteration, with no clock.
-class Station final : private RequestServer {
+class Station : private RequestServer {
  public:
   explicit Station(const BackendOptions& options = {.segment = "pair"},
                    const std::function<void(Schema&)>& describe = {})
@@ -151,6 +152,16 @@ class Station final : private RequestServer {
   State kept_;
 };
 
+/// One whose row 0 is out.
+class StartedStation final : public Station {
+ public:
+  explicit StartedStation(const BackendOptions& options = {.segment = "pair"},
+                          const std::function<void(Schema&)>& describe = {})
+      : Station(options, describe) {
+    start();
+  }
+};
+
 /// A station that serves bursts in a thread of its own.
 class BurstingStation {
  public:
@@ -185,6 +196,12 @@ inline Batch send(UntypedFrontend& frontend, std::uint32_t actuator, double targ
                   const CommandOptions& options = {}) {
   add(frontend, actuator, target, options);
   return frontend.pulse();
+}
+/// As Frontend.resume() sends it, not waited for.
+inline Batch send_resume(UntypedFrontend& frontend, std::uint64_t number, bool accepts = false) {
+  BatchBuilder builder;
+  builder.resume(number, accepts);
+  return frontend.pulse(builder);
 }
 template <class Request>
 std::uint32_t add_request(UntypedFrontend& frontend, const Request& request = {}) {

@@ -35,6 +35,7 @@ enum class Action : std::uint8_t {
   command,       // adds a command or trajectory to the batch of a lane
   pulse,         // the batch of a lane is taken
   run,           // iterations
+  settle,        // iterations until no command is left
   purge,         // one actuator or all, whoever sent
   purge_own,     // the same, of one lane
   interrupt,     // one actuator

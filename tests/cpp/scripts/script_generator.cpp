@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "dice.hpp"
+
 namespace o80::test {
 namespace {
 
@@ -65,6 +67,7 @@ class Generator {
     if (grouping_ != nullptr && count > 1) add_groups();
     return std::move(script_);
   }
+  Script planned_script();
 
  private:
   ScriptStep& add(Action action) {
@@ -98,6 +101,7 @@ class Generator {
   void add_trajectory(std::uint16_t actuator, std::uint32_t lane);
   void add_command(std::uint16_t actuator, std::uint32_t lane);
   void add_restart();
+  RecordHead any_planned_head();
   void add_groups();
   bool may_join(std::uint16_t actuator, const ScriptStep& first) const;
   bool can_go_fastest(std::uint16_t actuator) const;
@@ -113,6 +117,57 @@ class Generator {
   std::vector<std::vector<Range>> ranges_;
   std::int64_t played_ = 0;
 };
+
+/// Full speed takes up to 100 iterations to reach; targets are up to 100 iterations at it away.
+Script Generator::planned_script() {
+  auto& numbers = script_.actuators.emplace_back().numbers;
+  auto& ranges = ranges_.emplace_back();
+  for (std::int64_t n = dice_.whole(1, 3); n > 0; --n) {
+    Limits& limits = numbers.emplace_back().limits;
+    limits.speed = dice_.magnitude(0.001, 1.0) * kSecond;
+    limits.acceleration = limits.speed / dice_.magnitude(0.3, 100.0) * kSecond;
+    if (!dice_.one_in(3)) {
+      limits.jerk = limits.acceleration / dice_.magnitude(0.3, 30.0) * kSecond;
+    }
+    const double size = limits.speed / kSecond * 100.0;
+    ranges.push_back({-size, size});
+  }
+  std::vector<double> targets(numbers.size(), 0.0);
+  for (std::int64_t commands = dice_.whole(1, 5); commands > 0; --commands) {
+    ScriptStep& step = add(Action::command);
+    step.head = any_planned_head();
+    for (std::size_t n = 0; n < numbers.size(); ++n) {
+      const double far = ranges[n].high * dice_.magnitude(0.001, 1.0);
+      if (!dice_.one_in(10)) targets[n] = dice_.real(-far, far);
+    }
+    step.values = targets;
+    pulse(0);
+    if (commands == 1 || dice_.one_in(3)) {
+      add(Action::settle);
+    } else {
+      run(dice_.whole(0, 150));
+    }
+  }
+  return std::move(script_);
+}
+
+RecordHead Generator::any_planned_head() {
+  RecordHead head;
+  head.pace = std::array{Pace::fastest, Pace::speed, Pace::direct, Pace::until,
+                         Pace::iterations}[static_cast<std::size_t>(dice_.whole(0, 4))];
+  if (head.pace == Pace::speed) {
+    head.speed = script_.actuators[0].numbers[0].limits.speed * dice_.magnitude(0.16, 2.0);
+  } else if (head.pace == Pace::direct) {
+    head.amount = dice_.whole(0, 1) * dice_.whole(1, 30) * 1'000'000;
+  } else if (head.pace == Pace::until) {
+    head.amount = played_ + dice_.whole(1, 300);
+  } else if (head.pace == Pace::iterations) {
+    head.amount = dice_.whole(1, 300);
+  }
+  if (head.pace != Pace::fastest && dice_.one_in(2)) head.profile = Profile::minimum_jerk;
+  if (!dice_.one_in(3)) head.mode = Mode::overwrite;
+  return head;
+}
 
 void Generator::add_actuator() {
   ActuatorSpec spec;
@@ -450,11 +505,8 @@ void Generator::add_trajectory(std::uint16_t actuator, std::uint32_t lane) {
 
 }  // namespace
 
-double Dice::magnitude(double low, double high) {
-  return low * std::exp(real(0.0, 1.0) * std::log(high / low));
-}
-
 Script random_script(std::uint64_t seed) { return Generator(seed, false).script(); }
 Script linear_script(std::uint64_t seed) { return Generator(seed, true).script(); }
+Script planned_script(std::uint64_t seed) { return Generator(seed, false).planned_script(); }
 
 }  // namespace o80::test

@@ -1,36 +1,17 @@
 #pragma once
 
 #include <cstdint>
-#include <random>
 
 #include "scripts/script.hpp"
 
 namespace o80::test {
-
-/// Random numbers that are the same on every machine, unlike the standard distributions.
-class Dice {
- public:
-  explicit Dice(std::uint64_t seed) : random_(seed) {}
-
-  std::int64_t whole(std::int64_t low, std::int64_t high) {
-    const auto count = static_cast<std::uint64_t>(high - low) + 1;
-    return low + static_cast<std::int64_t>(random_() % count);
-  }
-  double real(double low, double high) {
-    return low + (high - low) * static_cast<double>(random_() >> 11) * 0x1p-53;
-  }
-  bool one_in(std::int64_t n) { return whole(1, n) == 1; }
-  /// Evenly spread in its logarithm.
-  double magnitude(double low, double high);
-
- private:
-  std::mt19937_64 random_;
-};
 
 /// The script of a seed: one to three actuators of any kinds of fields and limits, and some
 /// hundred iterations in which everything happens to them that a script knows.
 Script random_script(std::uint64_t seed);
 /// The same with linear motion only, and without limits, resting fields and odd readings.
 Script linear_script(std::uint64_t seed);
+/// One to five commands of an actuator that has limits of acceleration and no bounds.
+Script planned_script(std::uint64_t seed);
 
 }  // namespace o80::test

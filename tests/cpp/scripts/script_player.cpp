@@ -12,6 +12,7 @@ namespace o80::test {
 namespace {
 
 constexpr int kIdleIterations = 8;
+constexpr std::int64_t kLongestMotion = 1'000'000;
 
 class Player {
  public:
@@ -28,6 +29,7 @@ class Player {
  private:
   std::optional<Failure> act(const ScriptStep& step, std::size_t place);
   std::optional<Failure> run(std::int64_t iterations);
+  std::optional<Failure> settle();
   std::optional<Failure> come_to_rest();
   std::optional<Failure> finish();
   void watch_again();
@@ -44,6 +46,8 @@ std::optional<Failure> Player::act(const ScriptStep& step, std::size_t place) {
   switch (step.action) {
     case Action::run:
       return run(step.count);
+    case Action::settle:
+      return settle();
     case Action::resume:
       if (auto failure = come_to_rest()) return failure;
       world_.restart(nullptr);
@@ -74,6 +78,14 @@ std::optional<Failure> Player::run(std::int64_t iterations) {
     if (auto failure = spans_.step(world_)) return failure;
     if (auto failure = ends_.step(world_)) return failure;
     if (auto failure = times_.step(world_)) return failure;
+  }
+  return std::nullopt;
+}
+
+std::optional<Failure> Player::settle() {
+  for (std::int64_t i = 0; world_.rig.controller.active(); ++i) {
+    if (i == kLongestMotion) return Failure{"arrival", "a command never arrives"};
+    if (auto failure = run(1)) return failure;
   }
   return std::nullopt;
 }

@@ -25,10 +25,11 @@ constexpr std::array<std::pair<Kind, const char*>, 12> kKindWords{{
     {Kind::float64, "float64"},
     {Kind::enumeration, "enumeration"},
 }};
-constexpr std::array<std::pair<Action, const char*>, 12> kActionWords{{
+constexpr std::array<std::pair<Action, const char*>, 13> kActionWords{{
     {Action::command, "command"},
     {Action::pulse, "pulse"},
     {Action::run, "run"},
+    {Action::settle, "settle"},
     {Action::purge, "purge"},
     {Action::purge_own, "purge_own"},
     {Action::interrupt, "interrupt"},

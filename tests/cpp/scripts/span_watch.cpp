@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstdio>
 #include <string>
+#include <utility>
 
+#include "control/motion/fastest_motion.hpp"
 #include "scripts/limit_watch.hpp"
 
 namespace o80::test {
@@ -13,6 +15,7 @@ namespace {
 
 constexpr long double kPeriod = 1e-3L;
 constexpr Iteration kSmoothAfter = 5;
+constexpr Iteration kAnyTime = std::int64_t{1} << 40;  // [iterations]
 
 /// The number whose speed a command asks for: the first it names that moves.
 std::optional<std::size_t> paced_number(const ScriptWorld& world, const SentCommand& command) {
@@ -43,6 +46,7 @@ SpanWatch::SpanWatch(const ScriptWorld& world) {
 }
 
 void SpanWatch::restart(const ScriptWorld& world) {
+  plans_.assign(numbers_.size(), {});
   for (std::size_t a = 0; a < numbers_.size(); ++a) {
     for (std::size_t n = 0; n < numbers_[a].size(); ++n) {
       const long double place = world.actuators[a].numbers[n].now;
@@ -135,6 +139,80 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
   }
 }
 
+bool SpanWatch::is_planned(const ScriptWorld& world, const SentCommand& command) {
+  const ScriptStep& step = world.step_of(command);
+  const ActuatorSpec& spec = world.script.actuators[step.actuator];
+  return !command.is_member && step.mask == 0 && world.rows_of(command) == 1 &&
+         step.head.start == Start::desired && step.head.profile != Profile::as_sent &&
+         !spec.follow && std::ranges::all_of(spec.numbers, [](const NumberSpec& number) {
+           return number.kind == Kind::float64 && !number.bounded() && !number.resting &&
+                  std::isfinite(number.limits.acceleration);
+         });
+}
+
+/// Span, and number of iterations, of the motion that begins.
+void SpanWatch::plan(const ScriptWorld& world, std::size_t actuator) {
+  Plan& plan = plans_[actuator];
+  const SentCommand& command = *world.actuators[actuator].driver;
+  const SentCommand* before = std::exchange(plan.command, &command);
+  const ScriptStep& step = world.step_of(command);
+  const RecordHead& head = step.head;
+  const bool was_known = std::exchange(plan.is_known, is_planned(world, command));
+  if (!plan.is_known) return;
+  plan.requested = 0;
+  if (before != nullptr && was_known && head.pace == Pace::direct) {
+    const ScriptStep& former = world.step_of(*before);
+    if (former.head.pace == Pace::direct && former.head.amount == head.amount &&
+        former.head.profile == head.profile && former.values == step.values) {
+      plan.fewest = kAnyTime;  // an equal set-point goes on with the motion
+      return;
+    }
+  }
+  plan.fewest = 1;
+  for (std::size_t n = 0; n < numbers_[actuator].size(); ++n) {
+    Number& number = numbers_[actuator][n];
+    const Limits& limits = world.script.actuators[actuator].numbers[n].limits;
+    Rates rates{limits.speed * 1e-3, limits.acceleration * 1e-6, limits.jerk * 1e-9};
+    if (head.pace == Pace::speed && n == 0) rates.speed = std::min(rates.speed, head.speed * 1e-3);
+    const auto place = static_cast<double>(world.actuators[actuator].numbers[n].before);
+    const double highest = rates.acceleration * (1.0 - 1e-12);
+    const Moment now{place, static_cast<double>(number.first), static_cast<double>(number.second)};
+    const VelocityChange stop(-now.speed, std::clamp(now.acceleration, -highest, highest), rates);
+    plan.fewest = std::max(plan.fewest, FastestMotion(now, step.values[n], rates).iterations());
+    number.planned = {place, place};
+    for (const double turn :
+         {place + stop.displacement(), place + stop.run_before_turn(now.speed), step.values[n]}) {
+      number.planned.include(turn);
+    }
+    const double slack = 1e-10 * rates.speed;  // of sums over hundreds of iterations
+    number.planned = {number.planned.low - slack, number.planned.high + slack};
+  }
+  if (head.pace == Pace::iterations) plan.requested = head.amount;
+  if (head.pace == Pace::until) plan.requested = head.amount - world.iteration + 1;
+  if (head.pace == Pace::direct) plan.requested = 2 * head.amount / 1'000'000;
+  if (head.pace == Pace::duration) plan.requested = head.amount / 1'000'000 + 1;
+  // a smooth motion at a speed takes up to twice as long, and longer if it turns first
+  if (head.pace == Pace::speed && head.profile == Profile::minimum_jerk) plan.fewest *= 5;
+}
+
+/// A planned motion takes the iterations requested, or the fewest that its limits allow and one.
+std::optional<Failure> SpanWatch::takes_its_time(const ScriptWorld& world,
+                                                 std::size_t actuator) const {
+  const Plan& plan = plans_[actuator];
+  const SentCommand& command = *world.actuators[actuator].driver;
+  if (!plan.is_known || command.status != Status::completed) return std::nullopt;
+  const Iteration took = command.ended_at - command.active_since + 1;
+  const Iteration longest = std::max(plan.requested, plan.fewest + 1);
+  const bool is_set_point = world.step_of(command).head.pace == Pace::direct;
+  if (took <= longest && (!is_set_point || took >= plan.requested)) return std::nullopt;
+  std::array<char, 160> text{};
+  std::snprintf(text.data(), text.size(),
+                "%lld iterations; %lld were requested, and %lld are the fewest",
+                static_cast<long long>(took), static_cast<long long>(plan.requested),
+                static_cast<long long>(plan.fewest));
+  return Failure{"time of a plan", world.where(actuator, 0) + text.data()};
+}
+
 std::optional<Failure> SpanWatch::check(const ScriptWorld& world, std::size_t actuator,
                                         std::size_t n) const {
   const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
@@ -143,12 +221,14 @@ std::optional<Failure> SpanWatch::check(const ScriptWorld& world, std::size_t ac
   const long double rounding =
       std::max(rounding_of(spec, track.now), rounding_of(spec, track.before));
   std::array<char, 160> text{};
-  if (!spec.limited() && !world.script.actuators[actuator].blend) {
+  const bool has_span = !spec.limited() && !world.script.actuators[actuator].blend;
+  const Span& span = plans_[actuator].is_known ? number.planned : number.span;
+  if (has_span || plans_[actuator].is_known) {
     const long double slack =
-        rounding + 1e-12L * std::max(std::fabs(number.span.low), std::fabs(number.span.high));
-    if (track.now < number.span.low - slack || track.now > number.span.high + slack) {
+        rounding + 1e-12L * std::max(std::fabs(span.low), std::fabs(span.high));
+    if (track.now < span.low - slack || track.now > span.high + slack) {
       std::snprintf(text.data(), text.size(), "at %.12Lg, outside the span %.12Lg to %.12Lg",
-                    track.now, number.span.low, number.span.high);
+                    track.now, span.low, span.high);
       return Failure{"span", world.where(actuator, n) + text.data()};
     }
   }
@@ -172,6 +252,10 @@ std::optional<Failure> SpanWatch::step(const ScriptWorld& world) {
       const bool taken_over =
           actuator.previous != nullptr && actuator.previous->status == Status::overwritten;
       begin(world, a, taken_over);
+      plan(world, a);
+    }
+    if (actuator.driver != nullptr && actuator.driver->ended_at == world.iteration) {
+      if (auto failure = takes_its_time(world, a)) return failure;
     }
     for (std::size_t n = 0; n < numbers_[a].size(); ++n) {
       Number& number = numbers_[a][n];

@@ -52,31 +52,6 @@ TEST(CommandGroup, MovesAllAndTellsOneStatus) {
   EXPECT_TRUE(rig.all_blocks_back());
 }
 
-TEST(CommandGroup, BeginsWhenAllQueuesHaveComeToIt) {
-  Rig rig(plain_robot(2));
-  rig.add(0, over(3), {3.0});
-  add_group(rig, {0, 1}, over(1), {9.0, 9.0});
-  rig.add(1, direct(), {5.0});
-  rig.pulse();
-  EXPECT_THAT(run(rig, 5, {0, 1}),
-              ElementsAre(ElementsAre(1, 0), ElementsAre(2, 0), ElementsAre(3, 0),
-                          ElementsAre(9, 9), ElementsAre(9, 5)));
-}
-
-TEST(CommandGroup, TakesAsManyIterationsAsItsSlowest) {
-  Rig rig(plain_robot(2));
-  add_group(rig, {0, 1}, at_speed(1000.0), {2.0, 4.0});  // 1 an iteration
-  rig.pulse();
-  EXPECT_THAT(run(rig, 4, {0, 1}), ElementsAre(ElementsAre(0.5, 1), ElementsAre(1, 2),
-                                               ElementsAre(1.5, 3), ElementsAre(2, 4)));
-  // each row of a trajectory by itself
-  add_group(rig, {0, 1}, at_speed(1000.0), {4.0, 5.0, 5.0, 9.0}, 2);
-  rig.pulse();
-  EXPECT_THAT(run(rig, 6, {0, 1}),
-              ElementsAre(ElementsAre(3, 4.5), ElementsAre(4, 5), ElementsAre(4.25, 6),
-                          ElementsAre(4.5, 7), ElementsAre(4.75, 8), ElementsAre(5, 9)));
-}
-
 TEST(CommandGroup, TakesTheFastestWayThatAllCanKeep) {
   Schema schema = plain_robot(2);
   for (const std::uint32_t i : {0U, 1U}) {

@@ -1,19 +1,16 @@
 // Every command ends at its target, within the limits (docs/commands.md#limits): the commands that
-// users have sent, random ones, and streams of set-points.
+// users have sent, and streams of set-points.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <deque>
 #include <limits>
-#include <random>
-#include <string>
 #include <vector>
 
-#include "control/motion/fastest_motion.hpp"
 #include "control/motion/motion.hpp"
 #include "control/rig.hpp"
+#include "dice.hpp"
 
 namespace o80::test {
 namespace {
@@ -340,10 +337,7 @@ struct Stream {
 
 /// Plays a stream for four seconds; returns the lag behind it [ms].
 double play(const Stream& stream, std::uint64_t seed) {
-  std::mt19937_64 random(seed);
-  const auto real = [&](double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random);
-  };
+  Dice dice(seed);
   Rig rig(limited_robot(stream.frequency, stream.limits));
   Rows rows(rates_of(rig.schema));
   const std::int64_t every = stream.frequency / stream.rate;
@@ -367,15 +361,16 @@ double play(const Stream& stream, std::uint64_t seed) {
     if (i < end && i % every == 0) {
       const double time = static_cast<double>(i) / frequency;
       double target = wanted(time);
-      if (stream.kind == Stream::steps) target = real(0.0, 1.0) < 0.1 ? real(-1.0, 1.0) : drawn;
-      if (stream.kind == Stream::noise) target += real(-0.02, 0.02);
+      if (stream.kind == Stream::steps)
+        target = dice.real(0.0, 1.0) < 0.1 ? dice.real(-1.0, 1.0) : drawn;
+      if (stream.kind == Stream::noise) target += dice.real(-0.02, 0.02);
       std::int64_t at = i;
       bool lost = false;
       bool doubled = false;
       if (stream.kind == Stream::jitter) {
-        at += static_cast<std::int64_t>(real(0.0, 1.0) * static_cast<double>(every));
-        lost = real(0.0, 1.0) < 0.08;
-        doubled = real(0.0, 1.0) < 0.05;
+        at += static_cast<std::int64_t>(dice.real(0.0, 1.0) * static_cast<double>(every));
+        lost = dice.real(0.0, 1.0) < 0.08;
+        doubled = dice.real(0.0, 1.0) < 0.05;
       }
       if (stream.kind == Stream::silent && std::fmod(time, 1.0) > 0.6) lost = true;
       if (!lost) sent.emplace_back(at, target);
@@ -386,7 +381,7 @@ double play(const Stream& stream, std::uint64_t seed) {
       low = std::min(low, sent.front().second);
       high = std::max(high, sent.front().second);
       last = sent.front().second;
-      rig.add(0, real(0.0, 1.0) < 0.5 ? head : overwriting(head), {last});
+      rig.add(0, dice.real(0.0, 1.0) < 0.5 ? head : overwriting(head), {last});
       rig.pulse();
       sent.pop_front();
     }
@@ -452,226 +447,6 @@ TEST(Arrival, AStreamLagsNoMoreThanWhoeverCanStopAtEachTarget) {
   EXPECT_LE(play({500, arm, 50, Stream::noise}, 1), 1.1 * 84.0) << "uniform, of 20 mrad";
   EXPECT_LE(play({500, arm, 50, Stream::jitter}, 1), 1.1 * 98.0);
 }
-
-// ------------------------------------------------------------------------- random commands
-
-class RandomArrival {
- public:
-  explicit RandomArrival(std::uint64_t seed) : random_(seed) {}
-
-  void run() {
-    const auto numbers = static_cast<std::uint32_t>(whole(1, 3));
-    Schema schema = plain_robot(1, numbers);
-    for (std::uint32_t i = 0; i < numbers; ++i) {
-      schema.actuator(0).limits(numbers == 1 ? "" : "x" + std::to_string(i), any_limits());
-    }
-    Rig rig(schema, 64);  // a larger pool takes longer than a script
-    for (std::uint32_t i = 0; i < numbers; ++i) rows_.emplace_back(rates_of(rig.schema, i));
-    const int commands = whole(1, 5);
-    for (int i = 0; i < commands; ++i) {
-      const bool last = i + 1 == commands;
-      send(rig, i > 0 && whole(0, 2) > 0);
-      const int iterations = last || whole(0, 2) == 0 ? 5'000'000 : whole(0, 150);
-      for (int k = 0; k < iterations && !is_end(rig.witness.status(command_)); ++k) {
-        step(rig);
-        if (testing::Test::HasFailure()) return;
-      }
-    }
-    EXPECT_EQ(rig.witness.last(command_).status, Status::completed);
-    // it stays there
-    for (int k = 0; k < 5; ++k) {
-      rig.step();
-      for (std::uint32_t n = 0; n < numbers; ++n) {
-        rows_[n].add(rig.desired(n));
-        EXPECT_EQ(rig.desired(n), target_[n]);
-      }
-    }
-  }
-
- private:
-  double real(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  double magnitude(double low, double high) { return std::pow(10.0, real(low, high)); }
-  int whole(int low, int high) { return std::uniform_int_distribution<int>(low, high)(random_); }
-
-  /// Steps of up to a tenth at full speed, which take 1 to 200 iterations to reach.
-  Limits any_limits() {
-    Limits limits;
-    limits.speed = magnitude(-2.5, -1.0);
-    limits.acceleration = limits.speed / magnitude(0.0, 1.5);
-    if (whole(0, 2) > 0) limits.jerk = limits.acceleration / magnitude(-0.3, 1.2);
-    limits.speed *= 1e3;
-    limits.acceleration *= 1e6;
-    limits.jerk *= 1e9;
-    return limits;
-  }
-
-  void send(Rig& rig, bool overwrites) {
-    RecordHead head;
-    switch (whole(0, 4)) {
-      case 0:
-        head = paced(Pace::fastest, 0);
-        break;
-      case 1:
-        head = at_speed(magnitude(-0.8, 0.3) * rows_[0].rates().speed * 1e3);
-        break;
-      case 2:
-        head = paced(Pace::direct, whole(0, 1) * whole(1, 30) * kMillisecond);
-        break;
-      case 3:
-        head = until(rig.next + whole(0, 300));
-        break;
-      default:
-        head = over(whole(1, 300));
-    }
-    if (whole(0, 1) == 0 && head.pace != Pace::fastest) head = smoothly(head);
-    // behind another command it might come too late
-    if (overwrites || head.pace == Pace::until) head = overwriting(head);
-    target_.clear();
-    for (const Rows& rows : rows_) {
-      const double far = rows.rates().speed * magnitude(-1.0, 2.0);
-      target_.push_back(whole(0, 9) == 0 ? rows.moment().position : real(-far, far));
-    }
-    rig.add(0, head, target_);
-    command_ = rig.pulse() + 2;
-    sent_.push_back({command_, head, target_});
-  }
-
-  /// A command that was sent, and has not ended.
-  struct Sent {
-    CommandId id;
-    RecordHead head;
-    std::vector<double> target;
-    bool begun = false;
-  };
-
-  void step(Rig& rig) {
-    std::vector<Moment> before;
-    for (const Rows& rows : rows_) before.push_back(rows.moment());
-    rig.step();
-    ASSERT_FALSE(rig.clamped()) << "a plan passes the limiter unchanged";
-    for (Sent& sent : sent_) {
-      const Status status = rig.witness.last(sent.id).status;
-      if (sent.begun || (status != Status::active && status != Status::completed)) continue;
-      sent.begun = true;
-      begin(sent, before, rig.next - 1);
-    }
-    for (std::size_t n = 0; n < rows_.size(); ++n) {
-      const double position = rig.desired(static_cast<std::uint32_t>(n));
-      rows_[n].add(position);
-      const double rounding = 1e-12 * (1.0 + std::abs(position));  // of sums over hundreds of them
-      ASSERT_LE(low_[n] - position, rounding);
-      ASSERT_LE(position - high_[n], rounding);
-    }
-    std::erase_if(sent_, [&](const Sent& sent) {
-      const StatusChange told = rig.witness.last(sent.id);
-      if (told.status == Status::completed) ended(rig, sent, told);
-      return is_end(told.status);
-    });
-  }
-
-  void ended(Rig& rig, const Sent& sent, const StatusChange& told) const {
-    const std::int64_t took = told.iteration - first_ + 1;
-    for (std::size_t n = 0; n < rows_.size(); ++n) {
-      EXPECT_EQ(rig.desired(static_cast<std::uint32_t>(n)), sent.target[n]);
-    }
-    EXPECT_GE(took, requested_);
-    EXPECT_LE(took, std::max(requested_, fewest_ + 1));
-    if (took > requested_ && requested_ > 0 && sent.head.pace != Pace::direct) {
-      EXPECT_EQ(told.reason, Reason::limits);
-    }
-  }
-
-  /// The span of the command and the fewest iterations, by the rules.
-  void begin(const Sent& sent, const std::vector<Moment>& before, Iteration first) {
-    // an equal set-point changes nothing
-    const bool is_equal = in_force_.head.pace == Pace::direct && sent.head.pace == Pace::direct &&
-                          in_force_.head.amount == sent.head.amount &&
-                          in_force_.head.profile == sent.head.profile &&
-                          in_force_.target == sent.target;
-    in_force_ = sent;
-    first_ = first;
-    fewest_ = 1;
-    if (!is_equal) {
-      low_.clear();
-      high_.clear();
-    }
-    for (std::size_t n = 0; n < rows_.size(); ++n) {
-      const Moment& m = before[n];
-      Rates rates = rows_[n].rates();
-      if (sent.head.pace == Pace::speed && n == 0) {
-        rates.speed = std::min(rates.speed, sent.head.speed * 1e-3);
-      }
-      const FastestMotion fastest(m, sent.target[n], rates);
-      fewest_ = std::max(fewest_, fastest.iterations());
-      if (is_equal) continue;
-      const double limit = rates.acceleration * (1.0 - 1e-12);
-      const VelocityChange stop(-m.speed, std::clamp(m.acceleration, -limit, limit), rates);
-      const double end = m.position + stop.displacement();
-      const double turn = m.position + stop.run_before_turn(m.speed);
-      low_.push_back(std::min({m.position, end, turn, sent.target[n]}));
-      high_.push_back(std::max({m.position, end, turn, sent.target[n]}));
-    }
-    const RecordHead& head = sent.head;
-    requested_ = head.pace == Pace::iterations ? head.amount
-                 : head.pace == Pace::until    ? head.amount - first + 1
-                 : head.pace == Pace::direct   ? 2 * head.amount / kMillisecond
-                                               : 0;
-    if (is_equal) requested_ = 0;
-    // a smooth motion at a speed takes up to twice as long, and longer if it turns first; equal
-    // set-points go on
-    if (is_equal) fewest_ = 1000;
-    if (head.pace == Pace::speed && head.profile == Profile::minimum_jerk) fewest_ *= 5;
-  }
-
-  std::mt19937_64 random_;
-  std::vector<Rows> rows_;
-  std::vector<double> target_;
-  std::vector<double> low_;
-  std::vector<double> high_;
-  std::vector<Sent> sent_;
-  Sent in_force_{};
-  CommandId command_ = 0;
-  Iteration first_ = 0;
-  std::int64_t fewest_ = 1;
-  std::int64_t requested_ = 0;
-};
-
-#ifdef O80_TEST_SANITIZED
-constexpr std::uint64_t kScriptsOfEach = 200;
-#else
-constexpr std::uint64_t kScriptsOfEach = 4'000;
-#endif
-constexpr std::uint64_t kParts = 5;  // run at the same time
-
-class RandomArrivals : public testing::TestWithParam<std::uint64_t> {};
-
-TEST_P(RandomArrivals, CommandsArriveWithinTheirLimits) {
-  const char* wanted = std::getenv("O80_ARRIVALS");
-  const std::uint64_t count = wanted == nullptr ? kScriptsOfEach : std::stoull(wanted) / kParts;
-  const char* start = std::getenv("O80_ARRIVAL_SEED");
-  const std::uint64_t first = (start == nullptr ? 0 : std::stoull(start)) + GetParam() * count;
-  for (std::uint64_t seed = first; seed < first + count; ++seed) {
-    RandomArrival(seed).run();
-    if (HasFailure()) FAIL() << "seed " << seed;
-  }
-}
-
-TEST(RandomArrival, ThoseOfManyMillionsThatFailedArrive) {
-  for (const std::uint64_t seed : {
-           502395550,   // a smooth motion that waits is longer than it proposed
-           702417663,   // speeds just above its cruising speed lead to almost the same place
-           1001878575,  // it needs an iteration more to get to that speed
-           1103195080,  // the same, to a lower speed
-           1002301276,  // stretched by one iteration, it would end before its target
-       }) {
-    RandomArrival(seed).run();
-    if (HasFailure()) FAIL() << "seed " << seed;
-  }
-}
-
-INSTANTIATE_TEST_SUITE_P(Seeds, RandomArrivals, testing::Range(std::uint64_t{0}, kParts));
 
 }  // namespace
 }  // namespace o80::test

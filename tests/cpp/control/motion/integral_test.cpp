@@ -5,11 +5,11 @@
 #include <cmath>
 #include <deque>
 #include <limits>
-#include <random>
 #include <vector>
 
 #include "control/motion/motion.hpp"
 #include "control/rig.hpp"
+#include "dice.hpp"
 
 namespace o80::test {
 namespace {
@@ -69,25 +69,22 @@ class VelocityRig : public Rig {
 
 /// How far random streams of velocities come past the bounds [rad].
 double farthest_outside(int streams, double reaction, int delay, double lag, double noise) {
-  std::mt19937 random(1);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution(low, high)(random);
-  };
+  Dice dice(1);
   double farthest = 0.0;
   for (int stream = 0; stream < streams; ++stream) {
     VelocityRig rig(kJoint, reaction, delay, lag);
-    const int every = 1 + static_cast<int>(uniform(1.0, 25.0));
-    const bool wanders = uniform(0.0, 1.0) < 0.5;
+    const int every = 1 + static_cast<int>(dice.real(1.0, 25.0));
+    const bool wanders = dice.real(0.0, 1.0) < 0.5;
     double velocity = 0.0;
     double before = 0.0;
     double change = 0.0;
     for (int i = 0; i < 1500; ++i) {
       if (i % every == 0) {
-        velocity = wanders ? std::clamp(velocity + uniform(-0.6, 0.6), -1.5, 1.5)
-                           : std::copysign(uniform(0.1, 1.5), uniform(-0.4, 0.6));
+        velocity = wanders ? std::clamp(velocity + dice.real(-0.6, 0.6), -1.5, 1.5)
+                           : std::copysign(dice.real(0.1, 1.5), dice.real(-0.4, 0.6));
         rig.command(velocity);
       }
-      rig.iterate(uniform(-noise, noise));
+      rig.iterate(dice.real(-noise, noise));
       const double now = rig.desired(1) - before;
       EXPECT_LE(std::abs(now), 5.0 * VelocityRig::kPeriod * (1.0 + 1e-8));
       EXPECT_LE(std::abs(now - change),
@@ -203,10 +200,7 @@ TEST(IntegralBounds, AReadingThatIsNoNumberIsTheLastOne) {
 // ------------------------------------------------------------------------- differences
 
 TEST(Differences, SumToTheStates) {
-  std::mt19937 random(7);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution(low, high)(random);
-  };
+  Dice dice(7);
   for (const Limits& limits :
        {Limits{}, Limits{.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}}) {
     Schema robot = plain_robot(2, 2);
@@ -215,10 +209,10 @@ TEST(Differences, SumToTheStates) {
     std::vector<double> sums(4, 0.0);
     std::vector<double> speeds(4, 0.0);
     for (int i = 0; i < 3000; ++i) {
-      if (uniform(0.0, 1.0) < 0.02) {
-        RecordHead head = uniform(0.0, 1.0) < 0.5 ? direct() : over(1 + i % 70);
-        if (uniform(0.0, 1.0) < 0.5) head = overwriting(head);
-        rig.add(i % 2, smoothly(head), {uniform(-1.0, 1.0), uniform(-1.0, 1.0)});
+      if (dice.real(0.0, 1.0) < 0.02) {
+        RecordHead head = dice.real(0.0, 1.0) < 0.5 ? direct() : over(1 + i % 70);
+        if (dice.real(0.0, 1.0) < 0.5) head = overwriting(head);
+        rig.add(i % 2, smoothly(head), {dice.real(-1.0, 1.0), dice.real(-1.0, 1.0)});
         rig.pulse();
       }
       rig.step();

@@ -28,18 +28,6 @@ TEST(Limiter, TargetsOutsideTheBoundsAreRejected) {
   EXPECT_EQ(rig.witness.last(batch + 3).reason, Reason::invalid);
 }
 
-TEST(Limiter, NothingMovesFasterThanItsSpeed) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits({.speed = 500.0});  // half a unit an iteration
-  Rig rig(schema);
-  rig.add(0, over(2), {2.0});
-  rig.add(0, over(2), {1.5});
-  const CommandId batch = rig.pulse();
-  EXPECT_THAT(rig.run(6), ElementsAre(0.5, 1.0, 1.5, 2.0, 1.75, 1.5));
-  EXPECT_EQ(rig.witness.last(batch + 2).reason, Reason::limits);
-  EXPECT_EQ(rig.witness.last(batch + 3).reason, Reason::none);
-}
-
 TEST(Limiter, ATrajectoryIsFollowedInsideItsSpanToItsLastRow) {
   Schema schema = plain_robot(1);
   schema.actuator(0).limits({.speed = 1000.0, .acceleration = 100'000.0});
@@ -84,45 +72,6 @@ TEST(Limiter, ATrajectoryGoesOnUntilItsLastRowIsReached) {
   for (const double position : rig.run(50)) ASSERT_EQ(position, 10.0);
 }
 
-TEST(Limiter, APurgedMotionBrakesAndTheRowSaysSo) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits({.speed = 1000.0, .acceleration = 100'000.0});
-  Rig rig(schema);
-  rig.add(0, smoothly(over(50)), {10.0});
-  rig.pulse();
-  rig.run(25);
-  const double before = rig.desired();
-  rig.batch.purge(0);
-  rig.pulse();
-  rig.step();
-  EXPECT_TRUE(rig.braking());
-  EXPECT_TRUE(rig.active());
-  EXPECT_GT(rig.desired(), before);
-  rig.run(10);
-  EXPECT_FALSE(rig.braking());
-  EXPECT_FALSE(rig.active());
-  EXPECT_FALSE(rig.controller.braking());
-  const double stopped = rig.desired();
-  EXPECT_THAT(rig.run(2), ElementsAre(stopped, stopped));
-}
-
-TEST(Limiter, TheNextMotionContinuesOneThatBrakes) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits({.speed = 1000.0, .acceleration = 10'000.0});
-  Rig rig(schema);
-  rig.add(0, smoothly(over(100)), {20.0});
-  rig.pulse();
-  rig.run(50);
-  rig.batch.purge(0);
-  rig.add(0, smoothly(over(200)), {30.0});
-  const CommandId batch = rig.pulse();
-  for (int i = 0; i < 200; ++i) {
-    rig.step();
-    ASSERT_FALSE(rig.clamped()) << i;
-  }
-  EXPECT_EQ(rig.witness.status(batch + 3), Status::completed);
-}
-
 TEST(Limiter, AStatusSaysWhichLimitItWas) {
   Schema schema = plain_robot(1, 2);
   schema.actuator(0).limits("x1", {.minimum = -0.5, .maximum = 0.5, .speed = 100.0});
@@ -134,32 +83,6 @@ TEST(Limiter, AStatusSaysWhichLimitItWas) {
   EXPECT_EQ(told.status, Status::completed);
   EXPECT_EQ(told.reason, Reason::limits);
   EXPECT_EQ(told.detail, (Limited{Limit::speed, 1}.packed()));
-}
-
-TEST(Limiter, TheFastestWayIsFollowedToTheTargetAndRests) {
-  Schema schema = plain_robot(1, 2);
-  schema.actuator(0).limits("x0", {.speed = 1000.0, .acceleration = 10'000.0});
-  schema.actuator(0).limits("x1", {.speed = 500.0, .acceleration = 10'000.0, .jerk = 1e6});
-  Rig rig(schema);
-  RecordHead fastest;
-  fastest.pace = Pace::fastest;
-  rig.add(0, fastest, {100.0, -40.0});
-  const CommandId batch = rig.pulse();
-  int iterations = 0;
-  int first_there = 0;
-  while (rig.controller.active()) {
-    rig.step();
-    ++iterations;
-    ASSERT_FALSE(rig.clamped()) << iterations;
-    if (first_there == 0 && rig.desired(0) == 100.0) first_there = iterations;
-  }
-  EXPECT_EQ(rig.witness.status(batch + 2), Status::completed);
-  EXPECT_EQ(iterations, 200) << "100 at full speed, and as long to reach it and to leave it";
-  EXPECT_GE(first_there, iterations - 1);
-  EXPECT_EQ(rig.desired(0), 100.0);
-  EXPECT_EQ(rig.desired(1), -40.0);
-  rig.step();
-  EXPECT_FALSE(rig.braking());
 }
 
 TEST(Limiter, TheFastestWayIsRefusedForANumberWithoutLimitsOfSpeedAndAcceleration) {

@@ -4,32 +4,28 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
+
+#include "dice.hpp"
 
 namespace o80 {
 namespace {
 
-class VelocityChangeTest : public testing::Test {
+class VelocityChangeTest : public testing::Test, protected test::Dice {
  protected:
-  double real(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
-  }
-  double magnitude(double low, double high) { return std::pow(10.0, real(low, high)); }
-
-  std::mt19937_64 random_{7};
+  VelocityChangeTest() : Dice(7) {}
 };
 
 TEST_F(VelocityChangeTest, EndsAtRestWithinItsLimitsAndKnowsHowFarItGets) {
   for (int round = 0; round < 200'000; ++round) {
-    Rates rates{std::numeric_limits<double>::infinity(), magnitude(-4, 2),
+    Rates rates{std::numeric_limits<double>::infinity(), magnitude(1e-4, 1e2),
                 std::numeric_limits<double>::infinity()};
     const bool jerk = real(0, 1) < 0.7;
-    if (jerk) rates.jerk = rates.acceleration * magnitude(-2.5, 1);
+    if (jerk) rates.jerk = rates.acceleration * magnitude(3e-3, 10.0);
     double start = jerk ? real(-1, 1) * rates.acceleration : 0.0;
     if (real(0, 1) < 0.1) start = 0.0;
     if (jerk && real(0, 1) < 0.1) start = rates.jerk * std::round(real(-3, 3));
     if (std::abs(start) > rates.acceleration) start = 0.0;
-    const double change = real(-1, 1) * rates.acceleration * magnitude(-3, 2.5);
+    const double change = real(-1, 1) * rates.acceleration * magnitude(1e-3, 3e2);
 
     const VelocityChange plan(change, start, rates);
     double speed = -change;  // what is left
@@ -75,11 +71,11 @@ TEST_F(VelocityChangeTest, EndsAtRestWithinItsLimitsAndKnowsHowFarItGets) {
 
 TEST_F(VelocityChangeTest, TakesTheFewestIterations) {
   for (int round = 0; round < 20'000; ++round) {
-    const double acceleration = magnitude(-2, 2);
+    const double acceleration = magnitude(1e-2, 1e2);
     const Rates rates{std::numeric_limits<double>::infinity(), acceleration,
-                      acceleration * magnitude(-1.5, 0.5)};
+                      acceleration * magnitude(0.03, 3.0)};
     const double start = real(-1, 1) * acceleration;
-    const double change = real(-1, 1) * acceleration * magnitude(-2, 1.5);
+    const double change = real(-1, 1) * acceleration * magnitude(1e-2, 30.0);
     const VelocityChange plan(change, start, rates);
     // with one iteration less not even the extremes reach it
     const auto steps = static_cast<double>(plan.steps() - 1);

@@ -21,36 +21,6 @@ Schema robot_with_requests() {
   return schema;
 }
 
-TEST(Controller, OverwritingDropsWhatRunsAndWhatIsQueuedAndStartsAtOnce) {
-  Rig rig(plain_robot(1));
-  rig.add(0, over(4), {4.0});
-  rig.add(0, over(4), {8.0});
-  const CommandId first = rig.pulse();
-  EXPECT_THAT(rig.run(2), ElementsAre(1.0, 2.0));
-  rig.add(0, overwriting(over(2)), {0.0});
-  const CommandId second = rig.pulse();
-  EXPECT_THAT(rig.run(3), ElementsAre(1.0, 0.0, 0.0));
-  for (const CommandId dropped : {first + 2, first + 3}) {
-    EXPECT_EQ(rig.witness.status(dropped), Status::overwritten);
-    EXPECT_EQ(rig.witness.last(dropped).iteration, 3);
-  }
-  EXPECT_EQ(rig.witness.status(first + 1), Status::completed) << "nobody is left waiting";
-  EXPECT_EQ(rig.witness.status(second + 2), Status::completed);
-}
-
-TEST(Controller, OverwritingConcernsOneActuatorOnly) {
-  Rig rig(plain_robot(2));
-  rig.add(0, over(4), {4.0});
-  rig.add(1, over(4), {4.0});
-  rig.pulse();
-  rig.run(2);
-  rig.add(1, overwriting(direct()), {0.0});
-  rig.pulse();
-  rig.step();
-  EXPECT_EQ(rig.desired(0), 3.0);
-  EXPECT_EQ(rig.desired(1), 0.0);
-}
-
 TEST(Controller, OverwritingDropsEarlierCommandsOfItsOwnBatchToo) {
   Rig rig(plain_robot(1));
   rig.add(0, over(4), {4.0});

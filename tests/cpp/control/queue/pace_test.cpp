@@ -1,5 +1,4 @@
-// Paces that were not kept: speeds of integers, a speed without the first field, trajectories with
-// times of their own (rules 5 and 10).
+// Paces that were not kept: speeds of integers, a speed without the first field (rule 5).
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -63,87 +62,6 @@ TEST(Pace, ASpeedIsThatOfTheFirstNumberTheCommandNames) {
     EXPECT_EQ(end.status, Status::completed);
     EXPECT_EQ(end.iteration, smooth ? 936 : 500);
   }
-}
-
-/// The iteration at which a trajectory of so many rows, evenly over a time, ends.
-Iteration end_of_trajectory(std::uint32_t rows, std::int64_t duration) {
-  Rig rig(plain_robot(1), 4096);
-  std::vector<double> targets;
-  std::vector<std::int64_t> times;
-  for (std::uint32_t row = 1; row <= rows; ++row) {
-    targets.push_back(row);
-    times.push_back(duration * row / rows);
-  }
-  rig.add_rows(0, during(0), rows, targets, times);
-  const CommandId batch = rig.pulse();
-  for (int i = 0; i < 20'000 && rig.controller.active(); ++i) rig.step();
-  EXPECT_EQ(rig.desired(), rows);
-  EXPECT_EQ(rig.witness.status(batch + 2), Status::completed);
-  return rig.witness.last(batch + 2).iteration;
-}
-
-TEST(Pace, ATrajectoryWithTimesOfItsOwnDoesNotDrift) {
-  constexpr std::int64_t kSecond = 1000 * kMillisecond;
-  EXPECT_EQ(end_of_trajectory(199, kSecond), 1000);
-  EXPECT_EQ(end_of_trajectory(10, kSecond), 1000);
-  EXPECT_EQ(end_of_trajectory(999, kSecond), 1000);
-}
-
-TEST(Pace, RowsCloserThanAnIterationAreNoDebtOfThoseThatFollow) {
-  // 199 rows over 1 s: every 10 ms one, and another one 0.1 ms later
-  Rig rig(plain_robot(1));
-  std::vector<double> targets;
-  std::vector<std::int64_t> times;
-  for (std::int64_t i = 1; i <= 100; ++i) {
-    for (std::int64_t late = 0; late < (i < 100 ? 2 : 1); ++late) {
-      targets.push_back(static_cast<double>(i));
-      times.push_back(10 * i * kMillisecond + late * kMillisecond / 10);
-    }
-  }
-  rig.add_rows(0, during(0), 199, targets, times);
-  const CommandId batch = rig.pulse();
-  rig.run(1200);
-  EXPECT_EQ(rig.witness.last(batch + 2).iteration, 1000);
-}
-
-TEST(Pace, ATrajectoryWithRowsDenserThanIterationsEndsInTime) {
-  EXPECT_NEAR(static_cast<double>(end_of_trajectory(2000, 1000 * kMillisecond)), 1000.0, 1.0);
-  EXPECT_NEAR(static_cast<double>(end_of_trajectory(100, 10 * kMillisecond)), 10.0, 1.0);
-}
-
-TEST(Pace, RowsOfATrajectoryAtTheSameTimeDoNotDelayTheOthers) {
-  Rig rig(plain_robot(1));
-  const std::int64_t ms = kMillisecond;
-  rig.add_rows(0, during(0), 6, {1.0, 2.0, 3.0, 4.0, 5.0, 6.0},
-               {2 * ms, 2 * ms, 2 * ms, 2 * ms, 12 * ms, 20 * ms});
-  const CommandId batch = rig.pulse();
-  rig.run(30);
-  EXPECT_NEAR(static_cast<double>(rig.witness.last(batch + 2).iteration), 20.0, 1.0);
-}
-
-TEST(Pace, TheExactTimeOfAQueueRunsOnThroughOtherPaces) {
-  Rig rig(plain_robot(1));
-  // 0.4 ms are lost by each rounding down, unless they are carried on
-  for (int i = 0; i < 10; ++i) {
-    rig.add(0, during(3'400'000), {1.0 * i});
-    rig.add(0, over(2), {0.5});
-    rig.add(0, direct(), {0.25});
-  }
-  const CommandId batch = rig.pulse();
-  rig.run(80);
-  EXPECT_EQ(rig.witness.last(batch + 2 + 29).iteration, 34 + 20 + 10);
-}
-
-TEST(Pace, TheExactTimeOfAQueueStartsAnewAtAnUntil) {
-  Rig rig(plain_robot(1));
-  rig.add(0, during(3'400'000), {1.0});
-  rig.add(0, until(20), {2.0});
-  rig.add(0, during(3'400'000), {3.0});
-  rig.add(0, during(3'400'000), {4.0});
-  const CommandId batch = rig.pulse();
-  rig.run(40);
-  EXPECT_EQ(rig.witness.last(batch + 4).iteration, 23);
-  EXPECT_EQ(rig.witness.last(batch + 5).iteration, 27);
 }
 
 }  // namespace

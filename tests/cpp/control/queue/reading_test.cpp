@@ -51,45 +51,6 @@ TEST(Reading, InRowZeroThatIsNoNumberIsNeverDesired) {
   }
 }
 
-TEST(Reading, ThatIsNoNumberIsNotFollowed) {
-  for (const double odd : {kNan, kInfinity, -kInfinity}) {
-    Rig rig(robot_with({.speed = 1.0}, WhenIdle::follow));
-    rig.observe(0, 0.25);
-    rig.step();
-    EXPECT_EQ(rig.desired(), 0.25);
-    rig.observe(0, odd);
-    rig.step();
-    EXPECT_EQ(rig.desired(), 0.25);
-    expect_that_limits_hold(rig);
-  }
-}
-
-TEST(Reading, ThatIsNoNumberDoesNotStartACommand) {
-  for (const double odd : {kNan, kInfinity, -kInfinity}) {
-    Rig rig(robot_with({.speed = 1.0}));
-    rig.observe(0, odd);
-    rig.add(0, from_observed(over(100)), {0.01});
-    rig.pulse();
-    for (int i = 0; i < 100; ++i) {
-      rig.step();
-      expect_finite(rig);
-      ASSERT_LE(std::abs(rig.desired()), 0.01);
-    }
-    EXPECT_EQ(rig.desired(), 0.01);
-  }
-}
-
-TEST(Reading, InAFreshStartThatIsNoNumberIsNeverDesired) {
-  for (const double odd : {kNan, kInfinity, -kInfinity}) {
-    Rig rig(robot_with({.speed = 1.0}));
-    rig.step();
-    rig.observe(0, odd);
-    rig.controller.restart(rig.observed.data(), nullptr, rig.next);
-    ++rig.next;
-    expect_that_limits_hold(rig);
-  }
-}
-
 TEST(Reading, OutsideTheBoundsIsLeftAtThePaceOfTheCommand) {
   Rig rig(robot_with({.minimum = -1.0, .maximum = 1.0}));
   rig.observe(0, 1.2);
@@ -106,13 +67,6 @@ TEST(Reading, OutsideTheBoundsIsLeftAtThePaceOfTheCommand) {
     before = rig.desired();
   }
   EXPECT_EQ(rig.desired(), 0.5);
-}
-
-TEST(Reading, OutsideTheBoundsIsHeldUntilThereIsACommand) {
-  Rig rig(robot_with({.minimum = -1.0, .maximum = 1.0, .speed = 1.0}));
-  rig.observe(0, 1.2);
-  rig.controller.restart(rig.observed.data(), nullptr, 0);
-  for (const double position : rig.run(10)) ASSERT_EQ(position, 1.2);
 }
 
 TEST(Reading, OutsideTheBoundsIsNeverLeftOutwards) {

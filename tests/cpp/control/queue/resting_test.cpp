@@ -23,72 +23,6 @@ Schema joint(double rest, const Limits& of_velocity = {}) {
   return schema;
 }
 
-TEST(Resting, AfterACommandThatIsNotDirectTheFieldRestsAtOnce) {
-  for (const double rest : {0.0, 0.5}) {
-    for (const RecordHead& head : {over(3), smoothly(over(3)), during(3 * kMillisecond)}) {
-      Rig rig(joint(rest));
-      rig.add(0, head, {1.0, 2.0});
-      rig.pulse();
-      rig.run(3);
-      EXPECT_EQ(rig.desired(kVelocity), 2.0);
-      rig.step();
-      EXPECT_EQ(rig.desired(kVelocity), rest);
-      EXPECT_EQ(rig.desired(), 1.0) << "the position stays";
-      rig.step();
-      EXPECT_EQ(rig.desired(kVelocity), rest);
-      EXPECT_FALSE(rig.active());
-    }
-  }
-}
-
-TEST(Resting, AfterATrajectoryWithVelocitiesTheLastVelocityIsNotHeld) {
-  Rig rig(joint(0.0));
-  rig.add_rows(0, during(0), 3, {0.1, 1.0, 0.2, 2.0, 0.3, 3.0},
-               {kMillisecond, 2 * kMillisecond, 3 * kMillisecond});
-  rig.pulse();
-  rig.run(3);
-  EXPECT_EQ(rig.desired(kVelocity), 3.0);
-  rig.step();
-  EXPECT_EQ(rig.desired(kVelocity), 0.0);
-  EXPECT_EQ(rig.desired(), 0.3);
-}
-
-TEST(Resting, AfterADirectCommandTheFieldKeepsItsValue) {
-  Rig rig(joint(0.0));
-  rig.add(0, direct(), {1.0, 2.0});
-  rig.pulse();
-  for (const double velocity : rig.run(50, kVelocity)) ASSERT_EQ(velocity, 2.0);
-}
-
-TEST(Resting, APurgeAndAHaltEndWhatADirectCommandAsked) {
-  for (const bool halt : {false, true}) {
-    Rig rig(joint(0.5));
-    rig.add(0, direct(), {1.0, 2.0});
-    rig.pulse();
-    rig.run(5);
-    EXPECT_EQ(rig.desired(kVelocity), 2.0);
-    if (halt) {
-      rig.controller.halt(rig.next);
-    } else {
-      rig.controller.purge(kEveryActuator, rig.next);
-    }
-    rig.step();
-    EXPECT_EQ(rig.desired(kVelocity), 0.5);
-    EXPECT_EQ(rig.desired(), 1.0);
-  }
-}
-
-TEST(Resting, APurgeInTheMiddleOfACommandEndsItsVelocity) {
-  Rig rig(joint(0.0));
-  rig.add(0, over(10), {1.0, 2.0});
-  rig.pulse();
-  rig.run(5);
-  EXPECT_EQ(rig.desired(kVelocity), 1.0);
-  rig.controller.purge(kEveryActuator, rig.next);
-  rig.step();
-  EXPECT_EQ(rig.desired(kVelocity), 0.0);
-}
-
 TEST(Resting, ASuccessorGoesOnFromWhatADirectCommandAsked) {
   Rig rig(joint(0.0));
   rig.add(0, direct(), {0.0, 4.0});
@@ -98,41 +32,6 @@ TEST(Resting, ASuccessorGoesOnFromWhatADirectCommandAsked) {
   rig.pulse();
   rig.step();
   EXPECT_EQ(rig.desired(kVelocity), 5.0);
-}
-
-TEST(Resting, ASuccessorThatIsPurgedEndsWhatADirectCommandAsked) {
-  Rig rig(joint(0.5));
-  rig.add(0, direct(), {0.0, 4.0});
-  rig.pulse(1);
-  rig.run(3);
-  rig.add(0, over(4), {0.0, 8.0});
-  rig.pulse(0);
-  rig.run(2);
-  // only what the second lane sent
-  rig.controller.purge_lane(0, kEveryActuator, rig.next);
-  rig.step();
-  EXPECT_EQ(rig.desired(kVelocity), 0.5);
-}
-
-TEST(Resting, KeepsTheLimitsOnTheWay) {
-  // a rest that takes 20 iterations at 100/s
-  Rig rig(joint(0.0, {.speed = 100.0}));
-  rig.add(0, over(40), {1.0, 2.0});
-  rig.pulse();
-  rig.run(40);
-  EXPECT_EQ(rig.desired(kVelocity), 2.0);
-  double before = 2.0;
-  for (int i = 0; i < 20; ++i) {
-    rig.step();
-    ASSERT_NEAR(before - rig.desired(kVelocity), 0.1, 1e-12);
-    ASSERT_TRUE(rig.active());
-    ASSERT_TRUE(rig.controller.braking());
-    before = rig.desired(kVelocity);
-  }
-  EXPECT_EQ(rig.desired(kVelocity), 0.0);
-  rig.step();
-  EXPECT_FALSE(rig.active());
-  EXPECT_FALSE(rig.controller.braking());
 }
 
 TEST(Resting, AFieldThatACommandDoesNotNameGoesToRestWhileItRuns) {

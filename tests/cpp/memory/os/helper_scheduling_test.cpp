@@ -175,13 +175,11 @@ class BusyMachineTest : public HelperSchedulingTest {
 
 TEST_F(BusyMachineTest, NoticesADeathWhileARealTimeThreadSpinsOnEachProcessor) {
   const OwnedSegment segment = running_segment();
-  ChildProcess owner([](const ChildProcess::Ready& ready) {
+  StandingProcess owner([](const StandingProcess::Stand& stand) {
     const AttachedSegment attached = attach();
     const LaneSender sender(attached);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(owner.wait_until_ready());
   const LaneLiveness liveness(segment);
   ASSERT_EQ(liveness.lane(0).state, LaneState::alive);
   const BusyProcessors busy;

@@ -72,13 +72,11 @@ TEST_F(HostileObserverTest, ThatTakesEveryLockKeepsNoLaneFromTheCommanders) {
 TEST_F(HostileObserverTest, ThatQueuesForEveryLockDoesNotHideTheDeathOfACommander) {
   const OwnedSegment segment = running_segment(spec_);
   LaneLiveness liveness(segment);
-  ChildProcess commander([](const ChildProcess::Ready& ready) {
+  StandingProcess commander([](const StandingProcess::Stand& stand) {
     const AttachedSegment attached = attach();
     const LaneSender lane(attached);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(commander.wait_until_ready());
   if (!harass()) GTEST_SKIP() << kNoStranger;
   liveness.refresh();
   EXPECT_EQ(liveness.lane(0), (LaneLife{LaneState::alive, 1}));
@@ -90,12 +88,10 @@ TEST_F(HostileObserverTest, ThatQueuesForEveryLockDoesNotHideTheDeathOfACommande
 }
 
 TEST_F(HostileObserverTest, ThatQueuesForEveryLockDoesNotHideTheDeathOfABackend) {
-  ChildProcess backend([&](const ChildProcess::Ready& ready) {
+  StandingProcess backend([&](const StandingProcess::Stand& stand) {
     const OwnedSegment segment = running_segment(spec_);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(backend.wait_until_ready());
   const AttachedSegment commander = attach();
   const AttachedSegment observer = attach("arm", Access::read_only);
   if (!harass()) GTEST_SKIP() << kNoStranger;
@@ -111,12 +107,10 @@ TEST_F(HostileObserverTest, ThatQueuesForEveryLockDoesNotHideTheDeathOfABackend)
 
 TEST_F(HostileObserverTest, DoesNotKeepTheNameOfADeadBackend) {
   for (const bool by_a_cleaner : {false, true}) {
-    ChildProcess backend([&](const ChildProcess::Ready& ready) {
+    StandingProcess backend([&](const StandingProcess::Stand& stand) {
       const OwnedSegment segment = running_segment(spec_);
-      ready();
-      pause_for_ever();
+      stand();
     });
-    ASSERT_TRUE(backend.wait_until_ready());
     if (!harass()) GTEST_SKIP() << kNoStranger;
     backend.kill_now();
 
@@ -130,13 +124,11 @@ TEST_F(HostileObserverTest, DoesNotKeepTheNameOfADeadBackend) {
 
 TEST_F(HostileObserverTest, DoesNotKeepTheFilesOfADeadStarter) {
   // killed when others may already read its draft, which has no name yet
-  ChildProcess starter([&](const ChildProcess::Ready& ready) {
+  StandingProcess starter([&](const StandingProcess::Stand& stand) {
     SegmentDraft draft("arm");
     draft.permit(0644);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(starter.wait_until_ready());
   if (!harass()) GTEST_SKIP() << kNoStranger;
   starter.kill_now();
 

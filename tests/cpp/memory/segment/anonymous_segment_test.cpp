@@ -47,13 +47,11 @@ TEST_F(AnonymousSegmentTest, EndsForItsFrontendsWithItsOwner) {
 }
 
 TEST_F(AnonymousSegmentTest, IsLeftNowhereByAKilledProcess) {
-  ChildProcess child([](const ChildProcess::Ready& ready) {
+  StandingProcess child([](const StandingProcess::Stand& stand) {
     const OwnedSegment one = running_anonymous();
     const OwnedSegment other = running_anonymous();
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(child.wait_until_ready());
   child.kill_now();
   EXPECT_EQ(directory_.files(), 0U);
 }
@@ -96,12 +94,10 @@ TEST_F(AnonymousSegmentTest, DoesNotTakeTheNameOfALivingBackend) {
 }
 
 TEST_F(AnonymousSegmentTest, ReplacesAKilledBackendOfThatName) {
-  ChildProcess child([](const ChildProcess::Ready& ready) {
+  StandingProcess child([](const StandingProcess::Stand& stand) {
     const OwnedSegment dead = running_segment();
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(child.wait_until_ready());
   const AttachedSegment former = attach();
   child.kill_now();
   OwnedSegment owner = running_anonymous();

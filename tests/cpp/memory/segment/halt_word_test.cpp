@@ -147,12 +147,10 @@ TEST_F(HaltWordTest, AForkedChildMayHalt) {
 }
 
 TEST_F(HaltWordTest, TheHaltOfAKilledProcessStands) {
-  ChildProcess child([&](const ChildProcess::Ready& ready) {
+  StandingProcess child([&](const StandingProcess::Stand& stand) {
     ask_for_halt(attach().view(), HaltCause::frontend, "gone", "last word");
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(child.wait_until_ready());
   child.kill_now();
   ASSERT_TRUE(latch_.look());
   EXPECT_TRUE(latch_.show(0));

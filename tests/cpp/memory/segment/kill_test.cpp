@@ -32,16 +32,14 @@ void publish(const OwnedSegment& segment, Iteration rows) {
   }
 }
 
-void be_a_backend(const ChildProcess::Ready& ready) {
+void be_a_backend(const StandingProcess::Stand& stand) {
   const OwnedSegment segment = running_segment();
   publish(segment, 10);
-  ready();
-  pause_for_ever();
+  stand();
 }
 
 TEST_F(KillTest, EndsTheWaitsOfItsFrontendsAndLeavesTheHistory) {
-  ChildProcess backend(be_a_backend);
-  ASSERT_TRUE(backend.wait_until_ready());
+  StandingProcess backend(be_a_backend);
   const AttachedSegment segment = attach();
   const AttachedSegment reader = attach("arm", Access::read_only);
   LaneSender sender(segment);
@@ -87,8 +85,7 @@ TEST_F(KillTest, EndsTheWaitsOfItsFrontendsAndLeavesTheHistory) {
 }
 
 TEST_F(KillTest, LetsANewBackendTakeOverAtOnceWhileOldReadersReadOn) {
-  ChildProcess backend(be_a_backend);
-  ASSERT_TRUE(backend.wait_until_ready());
+  StandingProcess backend(be_a_backend);
   const AttachedSegment old = attach();
   backend.kill_now();
 
@@ -103,8 +100,7 @@ TEST_F(KillTest, LetsANewBackendTakeOverAtOnceWhileOldReadersReadOn) {
 }
 
 TEST_F(KillTest, IsNotForgottenWhileASuccessorHoldsTheLockOfTheDead) {
-  ChildProcess backend(be_a_backend);
-  ASSERT_TRUE(backend.wait_until_ready());
+  StandingProcess backend(be_a_backend);
   const AttachedSegment seen = attach();
   AttachedSegment other = attach();
   LaneSender sender(seen);
@@ -133,15 +129,13 @@ TEST_F(KillTest, IsNotForgottenWhileASuccessorHoldsTheLockOfTheDead) {
 TEST_F(KillTest, FreesTheLaneOfADeadFrontendAndKeepsWhatItCommitted) {
   const OwnedSegment segment = running_segment();
   LaneReceivers lanes(segment.view(), kTicketAt);
-  ChildProcess frontend([](const ChildProcess::Ready& ready) {
+  StandingProcess frontend([](const StandingProcess::Stand& stand) {
     const AttachedSegment attached = attach();
     LaneSender sender(attached);
     sender.draw_ids(11);
     send(sender, 1, 3);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(frontend.wait_until_ready());
   frontend.kill_now();
 
   const AttachedSegment attached = attach();

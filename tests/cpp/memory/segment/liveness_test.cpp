@@ -63,13 +63,11 @@ TEST_F(LivenessTest, NoticesByItself) {
 
 TEST_F(LivenessTest, SeesTheDeathOfAnOwnerAndTheLifeOfTheNext) {
   const OwnedSegment segment = running_segment();
-  ChildProcess owner([](const ChildProcess::Ready& ready) {
+  StandingProcess owner([](const StandingProcess::Stand& stand) {
     const AttachedSegment attached = attach();
     const LaneSender sender(attached);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(owner.wait_until_ready());
   LaneLiveness liveness(segment);
   EXPECT_EQ(liveness.lane(0), (LaneLife{LaneState::alive, 1}));
 
@@ -85,13 +83,11 @@ TEST_F(LivenessTest, SeesTheDeathOfAnOwnerAndTheLifeOfTheNext) {
 
 TEST_F(LivenessTest, LeavesALaneToAnOwnerThatIsOnlyStopped) {
   const OwnedSegment segment = running_segment();
-  ChildProcess owner([](const ChildProcess::Ready& ready) {
+  StandingProcess owner([](const StandingProcess::Stand& stand) {
     const AttachedSegment attached = attach();
     const LaneSender sender(attached);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(owner.wait_until_ready());
   owner.stop_and_wait_until_stopped();
   LaneLiveness liveness(segment);
   EXPECT_EQ(liveness.lane(0).state, LaneState::alive);

@@ -95,25 +95,6 @@ TEST_F(OwnedSegmentTest, TakesOverWhateverFileNobodyHolds) {
   EXPECT_EQ(attach().epoch(), segment.epoch());
 }
 
-TEST_F(OwnedSegmentTest, TellsThoseAttachedToItsPredecessorThatItIsSuperseded) {
-  running_segment().end(BackendState::failed);
-  AttachedSegment old = AttachedSegment::attach("arm", Access::read_only, soon(),
-                                                {.dead = AttachOptions::Dead::accept});
-  const OwnedSegment next = running_segment();
-
-  EXPECT_EQ(old.life(), Life::superseded);
-  EXPECT_THROW(old.throw_if_gone(), BackendSuperseded);
-  EXPECT_NE(old.epoch(), next.epoch());
-}
-
-TEST_F(OwnedSegmentTest, SweepsAwayTheDraftsOfDeadStarters) {
-  std::ofstream(directory_.file_of("arm.new-0123456789abcdef")) << "half a segment";
-
-  const OwnedSegment segment = OwnedSegment::create(small_spec());
-
-  EXPECT_EQ(directory_.files(), 2U);
-}
-
 TEST_F(OwnedSegmentTest, SaysWhenSharedMemoryIsTooSmallAndLeavesNothing) {
   SegmentSpec spec = small_spec();
   spec.rows = 1ULL << 38;

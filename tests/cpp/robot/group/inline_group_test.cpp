@@ -37,25 +37,6 @@ std::size_t open_files() {
   return count;
 }
 
-TEST_F(InlineGroupTest, SendsEachCopyItsTargetsAndReturnsItsRows) {
-  InlineGroup group(drifter(), {}, group_of(3));
-  GroupBurst burst(group, 2, 1, 4);
-  for (std::size_t copy = 0; copy < 3; ++copy) {
-    burst.target(copy, 0) = static_cast<double>(copy);
-    burst.target(copy, 1) = -1;
-  }
-  burst.run();
-  const RowLayout& layout = group.description().layout;
-  for (std::size_t copy = 0; copy < 3; ++copy) {
-    for (std::size_t i = 0; i < 4; ++i) {
-      const std::byte* row = burst.of(copy).data() + i * layout.size;
-      EXPECT_EQ(unpack<RowHead>(row).iteration, static_cast<Iteration>(i + 1));
-      EXPECT_EQ(unpack<double>(row + layout.desired), static_cast<double>(copy));
-      EXPECT_EQ(unpack<double>(row + layout.desired + 8), -1);
-    }
-  }
-}
-
 TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeedsIt) {
   for (const std::int64_t journal : {0, 1 << 20}) {
     InlineGroup::Options options = group_of(1);

@@ -5,10 +5,10 @@
 #include <chrono>
 #include <cmath>
 #include <limits>
-#include <random>
 #include <stdexcept>
 #include <thread>
 
+#include "dice.hpp"
 #include "memory/segment/verb_word.hpp"
 #include "readings_played.hpp"
 #include "robot/loop/loop.hpp"
@@ -57,9 +57,7 @@ TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
   const std::uint64_t number = frontend.halt("");
   loop->run_granted(kAll);
   const auto resume = [&] {
-    BatchBuilder builder;
-    builder.resume(number);
-    const Batch batch = frontend.pulse(builder);
+    const Batch batch = send_resume(frontend, number);
     loop->run_granted(kAll);
     return batch.handle(0);
   };
@@ -108,6 +106,18 @@ TEST_F(LoopHaltTest, SoIsOneOfAFreshStart) {
 
 // ------------------------------------------------------------------------------ ends in order
 
+/// From 0, with an acceleration of 0.01 at most, to rest.
+void expect_braked(const std::vector<double>& written) {
+  ASSERT_GT(written.size(), 10U);
+  double before = written.front();
+  for (std::size_t i = 1; i < written.size(); ++i) {
+    const double step = written[i] - written[i - 1];
+    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
+    before = step;
+  }
+  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+}
+
 TEST_F(LoopHaltTest, AStopBrakesWithinTheLimitsAndThenStopsTheDriver) {
   Puppet::limits = {.speed = 1000.0, .acceleration = 1e6};  // of iterations: 0.1 and 0.01
   std::vector<double> written;
@@ -125,14 +135,7 @@ TEST_F(LoopHaltTest, AStopBrakesWithinTheLimitsAndThenStopsTheDriver) {
   user.join();
   EXPECT_TRUE(ended.in_order);
   EXPECT_EQ(Puppet::calls.stopped, 1);
-  ASSERT_GT(written.size(), 10U);
-  double before = written.front();  // from 0
-  for (std::size_t i = 1; i < written.size(); ++i) {
-    const double step = written[i] - written[i - 1];
-    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
-    before = step;
-  }
-  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+  expect_braked(written);
 }
 
 TEST_F(LoopHaltTest, ARobotThatIsDoneBrakesBeforeItIsStopped) {
@@ -147,14 +150,7 @@ TEST_F(LoopHaltTest, ARobotThatIsDoneBrakesBeforeItIsStopped) {
   UntypedFrontend frontend("puppet");
   send(frontend, 0, 1000.0, {.pace = speed(1000.0), .profile = Profile::linear});
   EXPECT_TRUE(loop.run().in_order);
-  ASSERT_GT(written.size(), 10U);
-  double before = written.front();  // from 0
-  for (std::size_t i = 1; i < written.size(); ++i) {
-    const double step = written[i] - written[i - 1];
-    EXPECT_LE(std::abs(step - before), 0.01 + 1e-9) << "row " << i;
-    before = step;
-  }
-  EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
+  expect_braked(written);
   EXPECT_EQ(Puppet::calls.stopped, 1);
 }
 
@@ -242,9 +238,7 @@ class ReadingTest : public LoopHaltTest {
     return number;
   }
   Handle resume(std::uint64_t number, bool accepts = false) {
-    BatchBuilder builder;
-    builder.resume(number, accepts);
-    const Batch batch = frontend_->pulse(builder);
+    const Batch batch = send_resume(*frontend_, number, accepts);
     loop_->run_granted(kAll);
     return batch.handle(0);
   }
@@ -259,26 +253,23 @@ class ReadingTest : public LoopHaltTest {
 };
 
 TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
-  std::mt19937 random(3);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution(low, high)(random);
-  };
+  Dice dice(3);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double period = 1e-3;
   for (int i = 0; i < readings_played(63); ++i) {
-    Limits limits{.minimum = -5.0, .maximum = 5.0, .speed = uniform(0.5, 4.0)};
-    if (i % 2 == 0) limits.error = uniform(0.1, 1.0);
+    Limits limits{.minimum = -5.0, .maximum = 5.0, .speed = dice.real(0.5, 4.0)};
+    if (i % 2 == 0) limits.error = dice.real(0.1, 1.0);
     begin(limits);
     offset_ = fresh_offset_ = moved_ = 0.0;
-    add(*frontend_, 0, uniform(-2.0, 2.0), {.pace = iterations(20)});
-    run(static_cast<int>(uniform(1.0, 30.0)));
+    add(*frontend_, 0, dice.real(-2.0, 2.0), {.pace = iterations(20)});
+    run(static_cast<int>(dice.real(1.0, 30.0)));
     const std::uint64_t number = halt();
-    run(static_cast<int>(uniform(1.0, 5.0)));
+    run(static_cast<int>(dice.real(1.0, 5.0)));
 
     const double tolerance = limits.speed * period + (i % 2 == 0 ? limits.error / 10.0 : 0.0);
     const double sizes[] = {2.1 * tolerance, 10.0 * tolerance, 10.0,        1e6,
                             1e300,           kInfinity,        std::nan("")};
-    const double wrong = std::copysign(sizes[i % 7], uniform(-1.0, 1.0));
+    const double wrong = std::copysign(sizes[i % 7], dice.real(-1.0, 1.0));
     const int when = i % 3;
     if (when == 0) fresh_offset_ = wrong;
     if (when == 1) offset_ = wrong;  // of the last row, and from then on
@@ -333,20 +324,17 @@ TEST_F(ReadingTest, OneTurnOffInEveryRowIsRefusedUntilItIsAccepted) {
 }
 
 TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
-  std::mt19937 random(5);
-  const auto uniform = [&](double low, double high) {
-    return std::uniform_real_distribution(low, high)(random);
-  };
+  Dice dice(5);
   for (int i = 0; i < readings_played(20); ++i) {
-    const Limits limits{.speed = uniform(0.5, 4.0), .error = uniform(0.1, 1.0)};
+    const Limits limits{.speed = dice.real(0.5, 4.0), .error = dice.real(0.1, 1.0)};
     begin(limits);
     double place = 0.0;
     const std::uint64_t number = halt();
-    const double motion = uniform(-1.0, 1.0) * limits.speed * 1e-3;
+    const double motion = dice.real(-1.0, 1.0) * limits.speed * 1e-3;
     const double noise = limits.error / 20.0;
     for (int k = 0; k < 50; ++k) {
       place += motion;
-      moved_ = place + uniform(-noise, noise);
+      moved_ = place + dice.real(-noise, noise);
       run(1);
     }
     const Handle handle = resume(number);

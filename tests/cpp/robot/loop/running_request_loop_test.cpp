@@ -5,7 +5,6 @@
 #include <functional>
 #include <memory>
 
-#include "control/batch/batch_builder.hpp"
 #include "robot/loop/loop.hpp"
 #include "robot/puppet.hpp"
 
@@ -99,9 +98,7 @@ TEST_F(RunningRequestLoopTest, MayEndInTheReadingOfAnothersFreshStart) {
   const std::uint64_t number = frontend_->halt("");
   loop_->run_granted(kAll);
   EXPECT_EQ(batch.handle(0).status, Status::halted);
-  BatchBuilder resume;
-  resume.resume(number);
-  frontend_->pulse(resume);
+  send_resume(*frontend_, number);
   loop_->run_granted(kAll);
   EXPECT_FALSE(frontend_->halted());
 }
@@ -124,9 +121,7 @@ TEST_F(RunningRequestLoopTest, AResumeCannotRun) {
   Puppet::on_resume = [] { return Served::running("warming up"); };
   const std::uint64_t number = frontend_->halt("");
   loop_->run_granted(kAll);
-  BatchBuilder resume;
-  resume.resume(number);
-  const Batch batch = frontend_->pulse(resume);
+  const Batch batch = send_resume(*frontend_, number);
   loop_->run_granted(kAll);
   EXPECT_THAT(batch.handle(0).text, HasSubstr("resume it again when it is"));
   EXPECT_TRUE(frontend_->halted());

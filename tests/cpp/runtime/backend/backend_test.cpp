@@ -24,8 +24,7 @@ TEST_F(BackendTest, RowZeroIsTheRobotBeforeAnythingWasAsked) {
 }
 
 TEST_F(BackendTest, ARowShowsWhatWasAskedAndWhatCameOfIt) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0);
   station.run(1);
@@ -46,8 +45,7 @@ TEST_F(BackendTest, IsStartingUntilRowZeroAndRunningFromThenOn) {
 }
 
 TEST_F(BackendTest, TakesABatchWholeForAllActuators) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   add(frontend, 0, 1.0, {.pace = iterations(2)});
   station.run(2);
@@ -63,8 +61,7 @@ TEST_F(BackendTest, TakesABatchWholeForAllActuators) {
 }
 
 TEST_F(BackendTest, TakesBatchesInTheOrderOfTheirPulsesAcrossFrontends) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend one("pair");
   UntypedFrontend two("pair");
   std::vector<double> expected;
@@ -84,8 +81,7 @@ TEST_F(BackendTest, TakesBatchesInTheOrderOfTheirPulsesAcrossFrontends) {
 }
 
 TEST_F(BackendTest, TakesABatchAtItsIterationExactly) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   add(frontend, 0, 1.0);
   const Batch later = frontend.pulse({.at = 5});
@@ -102,8 +98,7 @@ TEST_F(BackendTest, TakesABatchAtItsIterationExactly) {
 }
 
 TEST_F(BackendTest, RejectsABatchWhoseIterationHasBegunUnlessItMayBeLate) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   station.run(4);
   add(frontend, 0, 1.0);
@@ -122,8 +117,7 @@ TEST_F(BackendTest, RejectsABatchWhoseIterationHasBegunUnlessItMayBeLate) {
 }
 
 TEST_F(BackendTest, NothingIsCompletedBeforeItsRowIsOut) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0);
   station.before_publish = [&] {
@@ -136,8 +130,7 @@ TEST_F(BackendTest, NothingIsCompletedBeforeItsRowIsOut) {
 }
 
 TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0);
   ASSERT_EQ(station.backend.try_step(), Step::run);
@@ -148,8 +141,7 @@ TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
 }
 
 TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   UntypedFrontend other("pair");
   constexpr int kCommands = 3000;  // of a block each: three iterations of 1024
@@ -174,8 +166,7 @@ TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
 }
 
 TEST_F(BackendTest, GivesTheMemoryOfALaneBackForEver) {
-  Station station({.segment = "pair", .lanes = 2, .lane_blocks = 64});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 2, .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   for (int round = 0; round < 2000; ++round) {
     for (int i = 0; i < 10; ++i) add(frontend, i % 2, round, {.mode = Mode::overwrite});
@@ -186,8 +177,7 @@ TEST_F(BackendTest, GivesTheMemoryOfALaneBackForEver) {
 }
 
 TEST_F(BackendTest, InterruptsAnActuatorInTheIterationUnderWay) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   add(frontend, 0, 10.0, {.pace = iterations(10)});
   add(frontend, 0, 20.0, {.pace = iterations(10)});
@@ -207,8 +197,7 @@ TEST_F(BackendTest, InterruptsAnActuatorInTheIterationUnderWay) {
 }
 
 TEST_F(BackendTest, TellsTimeByTheIterationWhenItBursts) {
-  Station station({.segment = "pair", .period = 2'000'000, .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .period = 2'000'000, .bursting = true});
   UntypedFrontend frontend("pair");
   frontend.start_burst(3);
   EXPECT_EQ(station.drive(), Step::standing);
@@ -217,8 +206,7 @@ TEST_F(BackendTest, TellsTimeByTheIterationWhenItBursts) {
 }
 
 TEST_F(BackendTest, PublishesTheTimingOfThePeriods) {
-  Station station;
-  station.start();
+  StartedStation station;
   station.backend.set_timing({.lateness = 17, .overruns = 2, .skipped = 5});
   station.run(1);
   const RowHead head = UntypedFrontend("pair").latest().head();
@@ -245,8 +233,7 @@ TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
 // ------------------------------------------------------------------------------ requests
 
 TEST_F(BackendTest, StartsAfreshInARowOfItsOwn) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const Batch moving = send(frontend, 1, 9.0, {.pace = iterations(9)});
   station.run(3);
@@ -275,8 +262,7 @@ TEST_F(BackendTest, StartsAfreshInARowOfItsOwn) {
 }
 
 TEST_F(BackendTest, AloneAFreshStartEndsItsBatchInItsOwnRow) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   add_request(frontend, Reset{.seed = 5});
   const Batch batch = frontend.pulse();
@@ -325,8 +311,7 @@ TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {
 // ------------------------------------------------------------------------------ stopping
 
 TEST_F(BackendTest, EndsEveryCommandWhenItStops) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   add(frontend, 0, 1.0, {.pace = iterations(50)});
   add(frontend, 0, 2.0, {.pace = iterations(50)});

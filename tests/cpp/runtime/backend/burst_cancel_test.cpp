@@ -135,8 +135,7 @@ TEST_F(BurstCancelTest, NoMemberOfAGroupMovesIfOneCannot) {
     return message;
   };
 
-  Station other({.segment = "other", .bursting = true, .lanes = 1, .lane_blocks = 16});
-  other.start();
+  StartedStation other({.segment = "other", .bursting = true, .lanes = 1, .lane_blocks = 16});
   UntypedFrontend second("other");
   EXPECT_THAT(refused_with(second, 0), HasSubstr("at least 1"));
 
@@ -151,8 +150,7 @@ TEST_F(BurstCancelTest, NoMemberOfAGroupMovesIfOneCannot) {
   EXPECT_THAT(refused_with(second, 5), HasSubstr("blocks"));
   second.forget_added();
   {  // a clock of its own
-    Station paced({.segment = "paced"});
-    paced.start();
+    StartedStation paced({.segment = "paced"});
     UntypedFrontend third("paced");
     EXPECT_THAT(refused_with(third, 5), HasSubstr("cannot be burst"));
   }
@@ -165,8 +163,7 @@ TEST_F(BurstCancelTest, NoMemberOfAGroupMovesIfOneCannot) {
 }
 
 TEST_F(BurstCancelTest, AGroupReturnsAtOnceWithEachItsOwnIterationsToWaitFor) {
-  Station other({.segment = "other", .bursting = true});
-  other.start();
+  StartedStation other({.segment = "other", .bursting = true});
   UntypedFrontend first("pair");
   UntypedFrontend second("other");
   const BurstMember group[] = {{&first, 5}, {&second, 3}};
@@ -183,8 +180,7 @@ TEST_F(BurstCancelTest, AGroupReturnsAtOnceWithEachItsOwnIterationsToWaitFor) {
 }
 
 TEST_F(BurstCancelTest, AGroupThatIsNotDoneInTimeIsCancelledWhole) {
-  Station other({.segment = "other", .bursting = true});
-  other.start();
+  StartedStation other({.segment = "other", .bursting = true});
   UntypedFrontend first("pair");
   UntypedFrontend second("other");
   const BurstMember group[] = {{&first, 1'000'000}, {&second, 1'000'000}};

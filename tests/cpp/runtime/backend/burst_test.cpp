@@ -73,8 +73,7 @@ TEST_F(BurstTest, OfMoreRowsThanTheHistoryKeepsIsAnErrorAtOnce) {
 }
 
 TEST_F(BurstTest, NothingSentLaterActsInIt) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   UntypedFrontend one("pair");
   UntypedFrontend two("pair");
   const Burst burst = one.start_burst(3);
@@ -89,8 +88,7 @@ TEST_F(BurstTest, NothingSentLaterActsInIt) {
 }
 
 TEST_F(BurstTest, TwoFrontendsBurstOneAfterTheOther) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   UntypedFrontend one("pair");
   UntypedFrontend two("pair");
   add(one, 0, 1.0);
@@ -105,8 +103,7 @@ TEST_F(BurstTest, TwoFrontendsBurstOneAfterTheOther) {
 }
 
 TEST_F(BurstTest, StagesAllThatWasSentBeforeIt) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   UntypedFrontend one("pair");
   UntypedFrontend two("pair");
   for (int i = 0; i < 5000; ++i) add(one, 0, i + 1);
@@ -144,8 +141,7 @@ TEST_F(BurstTest, ABatchThatEndsWithoutMotionNeedsNoIteration) {
 }
 
 TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   UntypedFrontend frontend("pair");
   add(frontend, 0, 9.0, {.pace = iterations(9)});
   const Batch batch = frontend.pulse_to_end();
@@ -166,8 +162,7 @@ TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
 }
 
 TEST_F(BurstTest, OfABackendWithAClockOfItsOwnIsAnErrorAtOnce) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   EXPECT_THAT(message_of<NotBursting>([&] { frontend.burst(1, std::nullopt); }),
               HasSubstr("start it with bursting"));
@@ -231,8 +226,7 @@ TEST_F(BurstTest, EndsWithAnErrorWhenTheBackendStopsInIt) {
 
 TEST_F(BurstTest, ThatIsRejectedBecauseTheBackendEndsSaysWhyItEnded) {
   for (const BackendState state : {BackendState::stopped, BackendState::failed}) {
-    Station station({.segment = "pair", .bursting = true});
-    station.start();
+    StartedStation station({.segment = "pair", .bursting = true});
     UntypedFrontend frontend("pair");
     add(frontend, 0, 1.0);
     const Burst burst = frontend.start_burst(5, {.at = 3});
@@ -303,8 +297,7 @@ TEST_F(BurstTest, TwoRunsOfTheSameScriptGiveHistoriesIdenticalBitForBit) {
 }
 
 TEST_F(BurstTest, AStepWithinATimeGivesUpStanding) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   EXPECT_EQ(station.backend.step_within(0), Step::standing);
   EXPECT_EQ(station.backend.step_within(1'000'000), Step::standing);
   UntypedFrontend frontend("pair");
@@ -313,8 +306,7 @@ TEST_F(BurstTest, AStepWithinATimeGivesUpStanding) {
 }
 
 TEST_F(BurstTest, ThatIsCutIsDoneAndTheNextOneBegins) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   UntypedFrontend frontend("pair");
   const Burst first = frontend.start_burst(100);
   const Burst second = frontend.start_burst(2);

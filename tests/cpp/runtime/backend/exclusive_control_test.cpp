@@ -9,8 +9,7 @@ using ::testing::HasSubstr;
 using ExclusiveControl = StationTest;
 
 TEST_F(ExclusiveControl, WhoHasControlHasItAlone) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   const Batch before = send(other, 1, 5.0, {.pace = iterations(5)});
@@ -51,8 +50,7 @@ TEST_F(ExclusiveControl, WhoHasControlHasItAlone) {
 }
 
 TEST_F(ExclusiveControl, ControlFallsWhenItsHolderCloses) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   holder.add_take_control();
@@ -67,8 +65,7 @@ TEST_F(ExclusiveControl, ControlFallsWhenItsHolderCloses) {
 }
 
 TEST_F(ExclusiveControl, ControlDoesNotPassToWhoGetsTheLaneNext) {
-  Station station({.segment = "pair", .lanes = 2});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 2});
   auto holder = std::make_unique<UntypedFrontend>("pair");
   UntypedFrontend other("pair");
   holder->add_take_control();

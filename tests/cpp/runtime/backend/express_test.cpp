@@ -167,9 +167,7 @@ TEST_F(ExpressTest, AResumeWaitsForWhatWasSentBeforeIt) {
   station.run(1);
   const auto others = flood(7);
   station.run(1);
-  BatchBuilder resume;
-  resume.resume(number);
-  const Batch resumed = one.pulse(resume);
+  const Batch resumed = send_resume(one, number);
   for (int i = 0; i < 1000 && !resumed.ended(); ++i) station.run(1);
   EXPECT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
   for (const Batch& flood : floods) {
@@ -308,8 +306,7 @@ TEST_F(ExpressTest, WhatMayBeLateActsInOrderInTheIterationsThatFollow) {
 // ------------------------------------------------------------------------------ ids
 
 TEST_F(ExpressTest, APurgeAlwaysHasIdsHoweverNarrowTheGapsBetweenThoseInUse) {
-  Station bursting({.segment = "bursting", .bursting = true, .lane_blocks = 1024});
-  bursting.start();
+  StartedStation bursting({.segment = "bursting", .bursting = true, .lane_blocks = 1024});
   UntypedFrontend one("bursting");
   // long commands and bursts in turn leave gaps of ids two wide
   std::vector<Batch> running;

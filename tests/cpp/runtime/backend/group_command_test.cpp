@@ -27,8 +27,7 @@ std::uint32_t add_both(UntypedFrontend& frontend, double shoulder, double elbow,
 class GroupCommandTest : public StationTest {};
 
 TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   add_both(frontend, 2.0, 4.0, {.pace = iterations(2)});
   EXPECT_EQ(frontend.added(), 1U);
@@ -45,8 +44,7 @@ TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
 }
 
 TEST_F(GroupCommandTest, ATrajectoryIsOneToo) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const std::array<double, 6> rows{1, 2, 3, 10, 20, 30};
   frontend.add_trajectories(kBoth, 3, std::as_bytes(std::span(rows)));
@@ -96,8 +94,7 @@ TEST_F(GroupCommandTest, MovesSmoothlyIfOneOfItsActuatorsDoesByDefault) {
 }
 
 TEST_F(GroupCommandTest, FillsItsLaneAsItsBlocksSay) {
-  Station station({.segment = "pair", .lane_blocks = 64});
-  station.start();
+  StartedStation station({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   // a block for the batch, then three for each: its head and two members
   for (int i = 0; i < 20; ++i) add_both(frontend, i, i);
@@ -113,8 +110,7 @@ TEST_F(GroupCommandTest, FillsItsLaneAsItsBlocksSay) {
 }
 
 TEST_F(GroupCommandTest, ABatchStagedOverSeveralIterationsActsWhole) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   constexpr int kGroups = 2000;
   for (int i = 1; i <= kGroups; ++i) add_both(frontend, i, -i);
@@ -141,8 +137,7 @@ TEST_F(GroupCommandTest, ABatchStagedOverSeveralIterationsActsWhole) {
 
 TEST_F(GroupCommandTest, EndsAtOnceWhenAllItsMembersDo) {
   const auto ends_as = [](auto&& end, Status status) {
-    Station station;
-    station.start();
+    StartedStation station;
     UntypedFrontend frontend("pair");
     add_both(frontend, 8.0, 8.0, {.pace = iterations(8)});
     add_both(frontend, 9.0, 9.0, {.pace = iterations(8)});
@@ -172,8 +167,7 @@ TEST_F(GroupCommandTest, EndsAtOnceWhenAllItsMembersDo) {
 }
 
 TEST_F(GroupCommandTest, EndsWithItsFrontendIfToldSo) {
-  Station station({.segment = "pair", .stale = Stale::purge, .silence = 5});
-  station.start();
+  StartedStation station({.segment = "pair", .stale = Stale::purge, .silence = 5});
   UntypedFrontend frontend("pair");
   add_both(frontend, 100.0, 100.0, {.pace = iterations(100)});
   const Batch batch = frontend.pulse();
@@ -186,8 +180,7 @@ TEST_F(GroupCommandTest, EndsWithItsFrontendIfToldSo) {
 // ------------------------------------------------------------------------------ bursting
 
 TEST_F(GroupCommandTest, ABurstUntilItsEndRunsUntilItsLastMemberHasEnded) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   UntypedFrontend frontend("pair");
   add(frontend, 0, 3.0, {.pace = iterations(3)});
   add_both(frontend, 4.0, 2.0, {.pace = iterations(2)});
@@ -200,8 +193,7 @@ TEST_F(GroupCommandTest, ABurstUntilItsEndRunsUntilItsLastMemberHasEnded) {
 TEST_F(GroupCommandTest, BeginsAtTheSameIterationHoweverLongTheBackendStoodBefore) {
   // one queue waits behind a dropped member of a group; telling its drop takes several iterations
   const auto begins = [](bool stands_between) {
-    Station station({.segment = "pair", .bursting = true});
-    station.start();
+    StartedStation station({.segment = "pair", .bursting = true});
     UntypedFrontend frontend("pair");
     for (int i = 0; i < 5000; ++i) add(frontend, 1, 1.0, {.pace = iterations(1'000'000)});
     add_both(frontend, 5.0, 5.0);

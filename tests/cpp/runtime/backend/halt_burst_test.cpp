@@ -13,30 +13,23 @@ using ::testing::HasSubstr;
 using HaltBurstTest = StationTest;
 
 TEST_F(HaltBurstTest, AHaltEndsABurstAfterTheIterationUnderWay) {
-  BurstingStation bursting("pair", [](Station& station) {
-    station.before_publish = [&station] {
-      if (station.backend.iteration() == 5) station.backend.halt(HaltCause::driver, "five");
+  for (const bool to_end : {false, true}) {
+    BurstingStation bursting("pair", [](Station& station) {
+      station.before_publish = [&station] {
+        if (station.backend.iteration() == 5) station.backend.halt(HaltCause::driver, "five");
+      };
+    });
+    UntypedFrontend frontend("pair");
+    add(frontend, 0, 100.0, {.pace = iterations(100)});
+    const auto burst = [&] {
+      to_end ? frontend.pulse_and_wait(kPatience) : frontend.burst(100, kPatience);
     };
-  });
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 100.0, {.pace = iterations(100)});
-  EXPECT_THAT(message_of<BackendHalted>([&] { frontend.burst(100, kPatience); }),
-              AllOf(HasSubstr("ended in iteration 5"), HasSubstr("five")));
-  EXPECT_EQ(frontend.published(), 5);
-  ASSERT_TRUE(frontend.halted());
-  EXPECT_EQ(frontend.halted()->iteration, 6) << "the next one, that has not begun";
-}
-
-TEST_F(HaltBurstTest, AHaltEndsAPulseAndWait) {
-  BurstingStation bursting("pair", [](Station& station) {
-    station.before_publish = [&station] {
-      if (station.backend.iteration() == 5) station.backend.halt(HaltCause::driver, "five");
-    };
-  });
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 100.0, {.pace = iterations(100)});
-  EXPECT_THROW(frontend.pulse_and_wait(kPatience), BackendHalted);
-  EXPECT_EQ(frontend.published(), 5);
+    EXPECT_THAT(message_of<BackendHalted>(burst),
+                AllOf(HasSubstr(to_end ? "" : "ended in iteration 5"), HasSubstr("five")));
+    EXPECT_EQ(frontend.published(), 5);
+    ASSERT_TRUE(frontend.halted());
+    EXPECT_EQ(frontend.halted()->iteration, 6) << "the next one, that has not begun";
+  }
 }
 
 TEST_F(HaltBurstTest, BurstsAreServedWhileHalted) {

@@ -4,7 +4,6 @@
 
 #include <optional>
 
-#include "control/batch/batch_builder.hpp"
 #include "memory/child_process.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/station.hpp"
@@ -19,8 +18,7 @@ enum class Before { idle, acting, halted, requested, resumed, stopped, failed };
 
 /// Leaves a backend in some state and dies.
 void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting = false) {
-  Station station({.segment = "pair", .bursting = bursting});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = bursting});
   UntypedFrontend frontend("pair");
   const auto iterate = [&] {
     if (bursting) frontend.start_burst(1);
@@ -36,9 +34,7 @@ void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting
     iterate();
   }
   if (before == Before::resumed) {
-    BatchBuilder builder;
-    builder.resume(1);
-    frontend.pulse(builder);
+    send_resume(frontend, 1);
     iterate();
     if (frontend.halted()) return;  // without a word
     iterate();
@@ -56,8 +52,7 @@ std::optional<Halt> halt_of_successor(Before before, BackendOptions options = {.
       [&](const ChildProcess::Ready& ready) { live_and_die(before, ready, was_bursting); });
   EXPECT_TRUE(child.wait_until_ready());
   child.kill_now();
-  Station station(options);
-  station.start();
+  StartedStation station(options);
   UntypedFrontend frontend("pair");
   const auto halt = frontend.halted();
   EXPECT_EQ(frontend.wait_for(0, kAtOnce).head().halted, halt ? 1U : 0U);
@@ -91,15 +86,12 @@ TEST_F(HaltSuccessorTest, OfAHaltedBackendWithoutARowStartsHaltedToo) {
   ASSERT_TRUE(child.wait_until_ready());
   child.kill_now();
   // this one does not live to publish a row
-  ChildProcess second([&](const ChildProcess::Ready& ready) {
+  StandingProcess second([&](const StandingProcess::Stand& stand) {
     Station station;
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(second.wait_until_ready());
   second.kill_now();
-  Station station;
-  station.start();
+  StartedStation station;
   EXPECT_TRUE(UntypedFrontend("pair").halted());
 }
 

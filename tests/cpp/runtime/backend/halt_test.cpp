@@ -20,8 +20,7 @@ std::uint32_t halted_in_row(const UntypedFrontend& frontend, Iteration k) {
 }
 
 TEST_F(HaltTest, ActsInTheFirstStepBegunAfterIt) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend commander("pair");
   UntypedFrontend other("pair");
   add(commander, 0, 10.0, {.pace = iterations(10)});
@@ -54,16 +53,14 @@ TEST_F(HaltTest, ActsInTheFirstStepBegunAfterIt) {
 }
 
 TEST_F(HaltTest, AReadOnlyFrontendMayNotHalt) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend reader("pair", {.access = Access::read_only});
   EXPECT_THROW(reader.halt("no"), ReadOnly);
   EXPECT_FALSE(reader.halted());
 }
 
 TEST_F(HaltTest, CommandsAreRejectedWithCauseIterationAndWho) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   frontend.halt("enough");
   station.run(1);
@@ -79,8 +76,7 @@ TEST_F(HaltTest, CommandsAreRejectedWithCauseIterationAndWho) {
 }
 
 TEST_F(HaltTest, NoRequestIsServedThatWasSentAfterAHaltInTheSameStep) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   Batch request;
   station.on_refuse = [&] {
@@ -95,8 +91,7 @@ TEST_F(HaltTest, NoRequestIsServedThatWasSentAfterAHaltInTheSameStep) {
 }
 
 TEST_F(HaltTest, EndsWhatWasSentBeforeItWhereverItIs) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const Batch running = send(frontend, 0, 9.0, {.pace = iterations(9)});
   add(frontend, 1, 1.0);
@@ -119,8 +114,7 @@ TEST_F(HaltTest, EndsWhatWasSentBeforeItWhereverItIs) {
 }
 
 TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   BatchBuilder late;
   send(frontend, 1, 0.0);
@@ -138,9 +132,7 @@ TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
   record.id = sender.next_id();
   sender.draw_ids(record.id + 3);
   frontend.forget_added();
-  BatchBuilder resume;
-  resume.resume(1);
-  const Batch resumed = frontend.pulse(resume);
+  const Batch resumed = send_resume(frontend, 1);
   station.run(1);
   EXPECT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
   EXPECT_FALSE(frontend.halted());
@@ -157,8 +149,7 @@ TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
 }
 
 TEST_F(HaltTest, NobodysExclusiveControlStopsIt) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   holder.add_take_control();
@@ -171,8 +162,7 @@ TEST_F(HaltTest, NobodysExclusiveControlStopsIt) {
 }
 
 TEST_F(HaltTest, NeedsNoLane) {
-  Station station({.segment = "pair", .lanes = 1});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 1});
   UntypedFrontend holder("pair");
   const Batch batch = send(holder, 0, 9.0, {.pace = iterations(9)});
   station.run(1);
@@ -193,8 +183,7 @@ TEST_F(HaltTest, IsLatchedBeforeRowZero) {
 }
 
 TEST_F(HaltTest, IsTheBackendsOwnTooAndOnceForEachCause) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 3; ++i) {
     station.backend.halt(HaltCause::driver, "motor 3 is hot");
@@ -209,8 +198,7 @@ TEST_F(HaltTest, IsTheBackendsOwnTooAndOnceForEachCause) {
 }
 
 TEST_F(HaltTest, OfTheBackendForAnotherReasonIsAnotherOne) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   station.backend.halt(HaltCause::driver, "the belt slipped");
   station.run(1);
@@ -221,17 +209,14 @@ TEST_F(HaltTest, OfTheBackendForAnotherReasonIsAnotherOne) {
     EXPECT_EQ(frontend.halted()->number, 2U);
     EXPECT_EQ(frontend.halted()->reason(), "a person is in the cell");
   }
-  BatchBuilder builder;
-  builder.resume(1);
-  const Batch resume = frontend.pulse(builder);
+  const Batch resume = send_resume(frontend, 1);
   station.run(1);
   EXPECT_EQ(resume.handle(0).status, Status::rejected);
   EXPECT_THAT(resume.handle(0).text, HasSubstr("halt 2 came after it"));
 }
 
 TEST_F(HaltTest, AStatusBearsNoReasonOfALaterHalt) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const auto ended_by = [&](const char* why) {
     const Batch batch = send(frontend, 0, 9.0, {.pace = iterations(9)});
@@ -243,9 +228,7 @@ TEST_F(HaltTest, AStatusBearsNoReasonOfALaterHalt) {
   const Batch first = ended_by("the first");
   const Batch refused = send(frontend, 0, 1.0);
   station.run(1);
-  BatchBuilder builder;
-  builder.resume(1);
-  frontend.pulse(builder);
+  send_resume(frontend, 1);
   station.run(1);
   const Batch second = ended_by("the second");
   for (const Handle& handle : {first.handle(0), refused.handle(0)}) {

@@ -62,8 +62,7 @@ void scribble_until_over(const SharedScene& scene, std::uint64_t seed,
 }
 
 TEST_F(HostileTest, EveryReadOfDamagedCountersEnds) {
-  Station station;
-  station.start();
+  StartedStation station;
   station.run(20);
   UntypedFrontend reader("pair", {.access = Access::read_only});
   std::fstream file(segment_path("pair"), std::ios::binary | std::ios::in | std::ios::out);
@@ -180,8 +179,7 @@ TEST_F(HostileTest, GarbageThatComesFasterThanItIsThrownAwayDoesNotKeepTheLoop) 
 }
 
 TEST_F(HostileTest, APurgeWhoseTicketIsFarAheadEndsNothingThatIsSentLater) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend honest("pair");
   UntypedFrontend liar("pair");
   send(honest, 0, 0.5);
@@ -268,8 +266,7 @@ TEST_F(HostileTest, ABackendThatStandsStillHearsOfABurstWhoseBellWasPutBack) {
 }
 
 TEST_F(HostileTest, ControlFallsWithADeadHolderWhateverItWroteAboutItself) {
-  Station station;
-  station.start();
+  StartedStation station;
   const SharedScene scene;
   ChildProcess holder([&](const ChildProcess::Ready& ready) {
     Liar own;
@@ -299,8 +296,7 @@ TEST_F(HostileTest, ControlFallsWithADeadHolderWhateverItWroteAboutItself) {
 }
 
 TEST_F(HostileTest, IdsByLeapsAreRefusedAndTheNextOwnerOfTheLaneIsToldTheTruth) {
-  Station station({.segment = "pair", .lanes = 1, .lane_blocks = 64});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 1, .lane_blocks = 64});
   {
     Liar liar;
     const auto send_with_id = [&](std::uint64_t id) {

@@ -45,8 +45,7 @@ class Commander {
 
 TEST_F(KillTest, TheBackendGoesOnWhenACommandingFrontendIsKilledAndTheNextOneCommands) {
   Commander commander;
-  Station station({.segment = "pair", .lanes = 1});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 1});
   commander.command();
   station.run(3);
   commander.kill_now();
@@ -61,8 +60,7 @@ TEST_F(KillTest, TheBackendGoesOnWhenACommandingFrontendIsKilledAndTheNextOneCom
 
 TEST_F(KillTest, PurgesTheCommandsOfADeadFrontendIfToldSo) {
   Commander commander;
-  Station station({.segment = "pair", .stale = Stale::purge});
-  station.start();
+  StartedStation station({.segment = "pair", .stale = Stale::purge});
   UntypedFrontend reader("pair");
   commander.command();
   station.run(3);
@@ -76,17 +74,14 @@ TEST_F(KillTest, PurgesTheCommandsOfADeadFrontendIfToldSo) {
 
 TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
   for (const bool successor_stays : {true, false}) {
-    Station station({.segment = "pair", .lanes = 1, .stale = Stale::purge});
-    station.start();
+    StartedStation station({.segment = "pair", .lanes = 1, .stale = Stale::purge});
     UntypedFrontend reader("pair");
-    ChildProcess dying([](const ChildProcess::Ready& ready) {
+    StandingProcess dying([](const StandingProcess::Stand& stand) {
       UntypedFrontend frontend("pair", {.timeout = kPatience});
       add(frontend, 0, 1.0);
       frontend.pulse({.at = 300});
-      ready();
-      pause_for_ever();
+      stand();
     });
-    ASSERT_TRUE(dying.wait_until_ready());
     station.run(3);  // it waits for its iteration
     dying.kill_now();
     std::optional<UntypedFrontend> successor("pair");
@@ -101,8 +96,7 @@ TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
 
 TEST_F(KillTest, StopsWhenACommandingFrontendDiesIfToldSo) {
   Commander commander;
-  Station station({.segment = "pair", .stale = Stale::stop});
-  station.start();
+  StartedStation station({.segment = "pair", .stale = Stale::stop});
   commander.command();
   station.run(3);
   commander.kill_now();

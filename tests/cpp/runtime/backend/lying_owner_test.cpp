@@ -76,13 +76,11 @@ class LyingOwnerTest : public StationTest {
     next.close();
 
     // its command goes on, since it closed, when the lane has its next owner; that one dies
-    ChildProcess owner([](const ChildProcess::Ready& ready) {
+    StandingProcess owner([](const StandingProcess::Stand& stand) {
       UntypedFrontend frontend("pair");
       send(frontend, 0, 0.5, {.pace = iterations(1'000'000)});
-      ready();
-      pause_for_ever();
+      stand();
     });
-    ASSERT_TRUE(owner.wait_until_ready());
     station_.run(2);
     EXPECT_EQ(*station_.backend.active() & 3, 3U) << "of the closed owner, and of the living one";
     owner.kill_now();

@@ -28,8 +28,7 @@ TEST(OverrunLimit, OfNoneIsNeverExceeded) {
 using OverrunLimitTest = StationTest;
 
 TEST_F(OverrunLimitTest, HaltsTheBackend) {
-  Station station({.segment = "pair", .max_overruns = 2});
-  station.start();
+  StartedStation station({.segment = "pair", .max_overruns = 2});
   UntypedFrontend frontend("pair");
   station.backend.set_timing({.lateness = 5, .overruns = 1});
   station.backend.set_timing({.lateness = 0, .overruns = 1});

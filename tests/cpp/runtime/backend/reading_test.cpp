@@ -6,7 +6,6 @@
 #include <limits>
 #include <random>
 
-#include "control/batch/batch_builder.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "readings_played.hpp"
@@ -164,9 +163,7 @@ TEST_F(FollowerTest, OneTurnOffInEveryRowIsAcceptedByAResumeOnly) {
   EXPECT_EQ(refused.handle(0).reason, Reason::reading);
   const std::uint64_t number = frontend.halt("");
   follower.run(3);
-  BatchBuilder builder;
-  builder.resume(number, true);
-  const Batch resumed = frontend.pulse(builder);
+  const Batch resumed = send_resume(frontend, number, true);
   follower.run(1);
   ASSERT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
   const Batch taken = send(frontend, 0, 6.283e5, {.pace = iterations(5)});

@@ -17,17 +17,14 @@ using ::testing::HasSubstr;
 using ResumeTest = StationTest;
 
 TEST_F(ResumeTest, StartsAfreshFromWhereTheRobotIs) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   send(frontend, 0, 10.0, {.pace = iterations(10)});
   station.run(3);
   const std::uint64_t number = frontend.halt("");
   station.run(1);
   station.now = {1.5, -2.5};  // somebody moved it
-  BatchBuilder builder;
-  builder.resume(number);
-  const Batch resume = frontend.pulse(builder);
+  const Batch resume = send_resume(frontend, number);
   station.run(1);
   EXPECT_EQ(resume.handle(0).status, Status::completed);
   const auto fresh = frontend.wait_for(resume.handle(0).iteration, kAtOnce);
@@ -43,8 +40,7 @@ TEST_F(ResumeTest, StartsAfreshFromWhereTheRobotIs) {
 }
 
 TEST_F(ResumeTest, OfAHaltThatWasRequestedInTheSameStepClearsIt) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   Batch resume;
   // a scheduled request is served after the step has looked for halts, and before it takes batches
@@ -87,17 +83,14 @@ TEST_F(ResumeTest, IsRefusedUntilTheRobotHasBraked) {
 }
 
 TEST_F(ResumeTest, ClearsNoHaltThatCameAfterTheOneItNames) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   frontend.halt("first");
   station.run(1);
   frontend.halt("second");
   station.run(1);
   for (const std::uint64_t number : {1, 3}) {
-    BatchBuilder builder;
-    builder.resume(number);
-    const Batch resume = frontend.pulse(builder);
+    const Batch resume = send_resume(frontend, number);
     station.run(1);
     EXPECT_EQ(resume.handle(0).status, Status::rejected);
     EXPECT_THAT(resume.handle(0).text,
@@ -108,14 +101,11 @@ TEST_F(ResumeTest, ClearsNoHaltThatCameAfterTheOneItNames) {
 }
 
 TEST_F(ResumeTest, LosesAgainstALaterHaltInTheSameIteration) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const std::uint64_t number = frontend.halt("");
   station.run(1);
-  BatchBuilder builder;
-  builder.resume(number);
-  const Batch resume = frontend.pulse(builder);
+  const Batch resume = send_resume(frontend, number);
   frontend.halt("second");
   station.run(1);
   EXPECT_EQ(resume.handle(0).status, Status::rejected);
@@ -128,8 +118,7 @@ void limit_shoulder(Schema& schema) {
 }
 
 TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
-  Station station({.segment = "pair"}, limit_shoulder);
-  station.start();
+  StartedStation station({.segment = "pair"}, limit_shoulder);
   UntypedFrontend frontend("pair");
   const auto resume = [&] {
     BatchBuilder builder;
@@ -149,8 +138,7 @@ TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
 }
 
 TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
-  Station station({.segment = "pair"}, limit_shoulder);
-  station.start();
+  StartedStation station({.segment = "pair"}, limit_shoulder);
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
   station.run(20);
@@ -179,8 +167,7 @@ TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
 }
 
 TEST_F(ResumeTest, OfAFrontendCanBeCalledOffHoweverFastRowsCome) {
-  Station station({.segment = "pair"}, limit_shoulder);
-  station.start();
+  StartedStation station({.segment = "pair"}, limit_shoulder);
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
   station.run(20);
@@ -201,8 +188,7 @@ TEST_F(ResumeTest, OfAFrontendCanBeCalledOffHoweverFastRowsCome) {
 }
 
 TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
-  Station station({.segment = "pair"}, limit_shoulder);
-  station.start();
+  StartedStation station({.segment = "pair"}, limit_shoulder);
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
   station.run(20);
@@ -215,8 +201,7 @@ TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
 }
 
 TEST_F(ResumeTest, NeedsNoControl) {
-  Station station({.segment = "pair", .lanes = 3});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 3});
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   holder.add_take_control();
@@ -228,9 +213,7 @@ TEST_F(ResumeTest, NeedsNoControl) {
   mixed.resume(number);
   mixed.purge(kEveryActuator);
   const Batch refused = other.pulse(mixed);
-  BatchBuilder builder;
-  builder.resume(number);
-  const Batch resume = other.pulse(builder);
+  const Batch resume = send_resume(other, number);
   station.run(1);
   EXPECT_EQ(refused.handle(0).reason, Reason::exclusive) << "nothing else passes with it";
   EXPECT_EQ(resume.handle(0).status, Status::completed) << resume.handle(0).text;
@@ -240,21 +223,17 @@ TEST_F(ResumeTest, NeedsNoControl) {
 }
 
 TEST_F(ResumeTest, WithoutAHaltChangesNothing) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const Batch running = send(frontend, 0, 9.0, {.pace = iterations(9)});
-  BatchBuilder builder;
-  builder.resume(7);
-  const Batch resume = frontend.pulse(builder);
+  const Batch resume = send_resume(frontend, 7);
   station.run(3);
   EXPECT_EQ(resume.handle(0).status, Status::completed);
   EXPECT_EQ(running.handle(0).status, Status::active);
 }
 
 TEST_F(ResumeTest, IsNotNeededByRequestsThatAreServedWhileHalted) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   frontend.halt("");
   station.run(1);

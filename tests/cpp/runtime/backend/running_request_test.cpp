@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include "control/batch/batch_builder.hpp"
 #include "memory/child_process.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "runtime/station.hpp"
@@ -81,11 +80,22 @@ Batch ask(UntypedFrontend& frontend, const Request& request = {}) {
   return frontend.pulse();
 }
 
-using RunningRequestTest = StationTest;
+using RunningRequestOptionsTest = StationTest;
+
+class RunningRequestTest : public StationTest {
+ protected:
+  /// A request that runs since iteration 1.
+  Batch home() {
+    const Batch batch = ask<Home>(frontend);
+    station.run(1);
+    return batch;
+  }
+
+  HomingStation station;
+  UntypedFrontend frontend{"pair"};
+};
 
 TEST_F(RunningRequestTest, IsActiveUntilTheDriverEndsIt) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
   const Batch batch = ask<Home>(frontend);
   station.run(3);
   EXPECT_EQ(batch.handle(0).status, Status::active);
@@ -106,8 +116,6 @@ TEST_F(RunningRequestTest, IsActiveUntilTheDriverEndsIt) {
 }
 
 TEST_F(RunningRequestTest, ShowsItsProgressToItsSenderAndToObservers) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
   const Batch batch = ask<Home>(frontend);
   EXPECT_EQ(batch.handle(0).progress, "");
   station.run(1);
@@ -130,10 +138,7 @@ TEST_F(RunningRequestTest, ShowsItsProgressToItsSenderAndToObservers) {
 }
 
 TEST_F(RunningRequestTest, ALongProgressIsCut) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   station.backend.progress<Home>(std::string(1000, 'x'));
   EXPECT_EQ(batch.handle(0).progress, std::string(247, 'x'));
   station.backend.progress<Home>({});
@@ -141,10 +146,7 @@ TEST_F(RunningRequestTest, ALongProgressIsCut) {
 }
 
 TEST_F(RunningRequestTest, MayEndAsRejectedWithItsReason) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   station.backend.ended<Home>(Served::rejected("no index pulse within 20 s"));
   station.run(1);
   EXPECT_EQ(batch.handle(0).status, Status::rejected);
@@ -154,10 +156,7 @@ TEST_F(RunningRequestTest, MayEndAsRejectedWithItsReason) {
 }
 
 TEST_F(RunningRequestTest, MayEndTheBackend) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   station.backend.ended<Home>(Served::failed("the gear broke"));
   station.run(1);
   EXPECT_EQ(batch.handle(0).status, Status::rejected);
@@ -166,8 +165,6 @@ TEST_F(RunningRequestTest, MayEndTheBackend) {
 }
 
 TEST_F(RunningRequestTest, MayEndWithAFreshStart) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
   const Batch moves = send(frontend, 0, 5.0, {.pace = iterations(100)});
   const Batch batch = ask<Home>(frontend);
   station.run(2);
@@ -185,7 +182,7 @@ TEST_F(RunningRequestTest, MayEndWithAFreshStart) {
   EXPECT_THAT(desired(frontend, 4, 5), ElementsAre(-1.0, -1.0));
 }
 
-TEST_F(RunningRequestTest, AFreshStartAtItsEndIsNoErrorOfTheRobot) {
+TEST_F(RunningRequestOptionsTest, AFreshStartAtItsEndIsNoErrorOfTheRobot) {
   HomingStation station({.segment = "pair"},
                         [](Schema& schema) { schema.actuator(0).limits({.error = 0.5}); });
   UntypedFrontend frontend("pair");
@@ -198,10 +195,7 @@ TEST_F(RunningRequestTest, AFreshStartAtItsEndIsNoErrorOfTheRobot) {
 }
 
 TEST_F(RunningRequestTest, AReadingThatIsNoNumberFailsItsFreshStart) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   station.now[1] = std::numeric_limits<double>::quiet_NaN();
   station.end_in_next_row(Served::start_afresh());
   station.run(1);
@@ -211,8 +205,6 @@ TEST_F(RunningRequestTest, AReadingThatIsNoNumberFailsItsFreshStart) {
 }
 
 TEST_F(RunningRequestTest, ASecondOfItsKindIsRejectedBeforeItsHandlerIsAsked) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
   UntypedFrontend other("pair");
   const Batch first = ask<Home>(frontend);
   station.run(2);
@@ -232,8 +224,6 @@ TEST_F(RunningRequestTest, ASecondOfItsKindIsRejectedBeforeItsHandlerIsAsked) {
 }
 
 TEST_F(RunningRequestTest, AnotherKindIsServedBesideIt) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
   const Batch home = ask<Home>(frontend);
   station.run(1);
   const Batch calibrate = ask<Calibrate>(frontend);
@@ -249,8 +239,6 @@ TEST_F(RunningRequestTest, AnotherKindIsServedBesideIt) {
 }
 
 TEST_F(RunningRequestTest, WhatFollowsItInItsBatchDoesNotWait) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
   add_request<Home>(frontend);
   add(frontend, 0, 5.0);
   const Batch batch = frontend.pulse();
@@ -260,10 +248,7 @@ TEST_F(RunningRequestTest, WhatFollowsItInItsBatchDoesNotWait) {
 }
 
 TEST_F(RunningRequestTest, APurgeLeavesItRunning) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   frontend.add_purge();
   frontend.pulse();
   station.run(1);
@@ -271,10 +256,7 @@ TEST_F(RunningRequestTest, APurgeLeavesItRunning) {
 }
 
 TEST_F(RunningRequestTest, AHaltEndsItAndADriverThatEndsItLaterChangesNothing) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   bool ran = true;
   station.backend.on_halt([&] { ran = station.backend.runs<Home>(); });
   const std::uint64_t number = frontend.halt("a hand in the cell");
@@ -290,19 +272,14 @@ TEST_F(RunningRequestTest, AHaltEndsItAndADriverThatEndsItLaterChangesNothing) {
   const Batch refused = ask<Home>(frontend);
   station.run(1);
   EXPECT_EQ(refused.handle(0).status, Status::rejected);
-  BatchBuilder resume;
-  resume.resume(number);
-  frontend.pulse(resume);
+  send_resume(frontend, number);
   ask<Home>(frontend);
   station.run(1);
   EXPECT_EQ(station.homed, 2);
 }
 
 TEST_F(RunningRequestTest, AHaltWinsOverAFreshStartAtItsEnd) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   station.end_in_next_row(Served::start_afresh());
   station.run(1);
   frontend.halt("");
@@ -312,8 +289,6 @@ TEST_F(RunningRequestTest, AHaltWinsOverAFreshStartAtItsEnd) {
 }
 
 TEST_F(RunningRequestTest, OneThatIsServedInHaltsGoesOnInThem) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
   const Batch before = ask<Calibrate>(frontend);
   station.run(1);
   const std::uint64_t number = frontend.halt("");
@@ -324,19 +299,14 @@ TEST_F(RunningRequestTest, OneThatIsServedInHaltsGoesOnInThem) {
   EXPECT_EQ(before.handle(0).status, Status::completed);
   const Batch within = ask<Calibrate>(frontend);
   station.run(1);
-  BatchBuilder resume;
-  resume.resume(number);
-  frontend.pulse(resume);
+  send_resume(frontend, number);
   station.run(1);
   EXPECT_FALSE(frontend.halted());
   EXPECT_EQ(within.handle(0).status, Status::active);
 }
 
 TEST_F(RunningRequestTest, AnEndOfTheBackendEndsIt) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   station.backend.untyped().end(BackendState::stopped);
   EXPECT_EQ(batch.handle(0).status, Status::purged);
   EXPECT_EQ(batch.handle(0).reason, Reason::stopped);
@@ -344,10 +314,7 @@ TEST_F(RunningRequestTest, AnEndOfTheBackendEndsIt) {
 }
 
 TEST_F(RunningRequestTest, AStopInOrderEndsItBeforeItBrakes) {
-  HomingStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask<Home>(frontend);
-  station.run(1);
+  const Batch batch = home();
   station.backend.untyped().ask_to_stop();
   EXPECT_EQ(station.iterate(), Step::ended);
   EXPECT_EQ(station.backend.untyped().brake(), Step::run) << "the driver learns of it in this one";
@@ -355,7 +322,7 @@ TEST_F(RunningRequestTest, AStopInOrderEndsItBeforeItBrakes) {
   EXPECT_EQ(batch.handle(0).status, Status::purged);
 }
 
-TEST_F(RunningRequestTest, ItGoesOnWhenItsSenderCloses) {
+TEST_F(RunningRequestOptionsTest, ItGoesOnWhenItsSenderCloses) {
   HomingStation station;
   {
     UntypedFrontend frontend("pair");
@@ -372,15 +339,13 @@ TEST_F(RunningRequestTest, ItGoesOnWhenItsSenderCloses) {
   EXPECT_THAT(successor.running_requests(), IsEmpty());
 }
 
-TEST_F(RunningRequestTest, ItGoesOnWhenItsSenderIsKilledAndCommandsArePurged) {
+TEST_F(RunningRequestOptionsTest, ItGoesOnWhenItsSenderIsKilledAndCommandsArePurged) {
   HomingStation station({.segment = "pair", .stale = Stale::purge});
-  ChildProcess child([](const ChildProcess::Ready& ready) {
+  StandingProcess child([](const StandingProcess::Stand& stand) {
     UntypedFrontend frontend("pair");
     ask<Home>(frontend);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(child.wait_until_ready());
   station.run(1);
   ASSERT_EQ(station.homed, 1);
   child.kill_now();
@@ -391,7 +356,7 @@ TEST_F(RunningRequestTest, ItGoesOnWhenItsSenderIsKilledAndCommandsArePurged) {
   EXPECT_TRUE(station.backend.runs<Home>());
 }
 
-TEST_F(RunningRequestTest, ItsSilentSenderIsHaltedByTheWatchdog) {
+TEST_F(RunningRequestOptionsTest, ItsSilentSenderIsHaltedByTheWatchdog) {
   HomingStation station({.segment = "pair", .stale = Stale::halt, .silence = 5});
   UntypedFrontend frontend("pair");
   const Batch batch = ask<Home>(frontend);
@@ -401,7 +366,7 @@ TEST_F(RunningRequestTest, ItsSilentSenderIsHaltedByTheWatchdog) {
   EXPECT_EQ(batch.handle(0).status, Status::halted);
 }
 
-TEST_F(RunningRequestTest, OneThatMovesNothingNeedsNoSignOfLife) {
+TEST_F(RunningRequestOptionsTest, OneThatMovesNothingNeedsNoSignOfLife) {
   HomingStation station({.segment = "pair", .stale = Stale::halt, .silence = 5});
   UntypedFrontend frontend("pair");
   ask<Calibrate>(frontend);
@@ -409,16 +374,14 @@ TEST_F(RunningRequestTest, OneThatMovesNothingNeedsNoSignOfLife) {
   EXPECT_FALSE(frontend.halted());
 }
 
-TEST_F(RunningRequestTest, ABackendThatIsReplacedWhileItRunsLeavesAHalt) {
-  ChildProcess child([](const ChildProcess::Ready& ready) {
+TEST_F(RunningRequestOptionsTest, ABackendThatIsReplacedWhileItRunsLeavesAHalt) {
+  StandingProcess child([](const StandingProcess::Stand& stand) {
     HomingStation station({.segment = "pair"});
     UntypedFrontend frontend("pair");
     ask<Home>(frontend);
     station.run(1);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(child.wait_until_ready());
   child.kill_now();
   HomingStation station({.segment = "pair"});
   station.run(1);
@@ -427,38 +390,25 @@ TEST_F(RunningRequestTest, ABackendThatIsReplacedWhileItRunsLeavesAHalt) {
   EXPECT_EQ(frontend.halted()->cause, HaltCause::predecessor);
 }
 
-TEST_F(RunningRequestTest, ABurstUntilTheEndLastsUntilItsEnd) {
-  HomingStation station({.segment = "pair", .bursting = true});
-  UntypedFrontend frontend("pair");
-  add_request<Home>(frontend);
-  const Batch batch = frontend.pulse_to_end();
-  station.before_publish = [&] {
-    if (station.backend.untyped().iteration() == 7) station.backend.ended<Home>(Served::done());
-  };
-  while (station.iterate() == Step::run) {
-  }
-  EXPECT_EQ(station.last(), 7);
-  EXPECT_EQ(batch.last_iteration(), 7);
-}
-
-TEST_F(RunningRequestTest, ABurstUntilTheEndLastsUntilItsFreshStart) {
-  HomingStation station({.segment = "pair", .bursting = true});
-  UntypedFrontend frontend("pair");
-  add_request<Home>(frontend);
-  const Batch batch = frontend.pulse_to_end();
-  station.before_publish = [&] {
-    if (station.backend.untyped().iteration() == 7) {
-      station.backend.ended<Home>(Served::start_afresh());
+TEST_F(RunningRequestOptionsTest, ABurstUntilTheEndLastsUntilItsEndOrItsFreshStart) {
+  for (const bool afresh : {false, true}) {
+    HomingStation station({.segment = "pair", .bursting = true});
+    UntypedFrontend frontend("pair");
+    add_request<Home>(frontend);
+    const Batch batch = frontend.pulse_to_end();
+    station.before_publish = [&] {
+      if (station.backend.untyped().iteration() != 7) return;
+      station.backend.ended<Home>(afresh ? Served::start_afresh() : Served::done());
+    };
+    while (station.iterate() == Step::run) {
     }
-  };
-  while (station.iterate() == Step::run) {
+    EXPECT_EQ(station.last(), afresh ? 8 : 7);
+    EXPECT_EQ(frontend.latest().head().fresh, afresh ? 1U : 0U);
+    EXPECT_EQ(batch.last_iteration(), station.last());
   }
-  EXPECT_EQ(station.last(), 8);
-  EXPECT_EQ(frontend.latest().head().fresh, 1U);
-  EXPECT_EQ(batch.last_iteration(), 8);
 }
 
-TEST_F(RunningRequestTest, AFreshStartAtTheEndOfABurstNeedsNoOtherBurst) {
+TEST_F(RunningRequestOptionsTest, AFreshStartAtTheEndOfABurstNeedsNoOtherBurst) {
   HomingStation station({.segment = "pair", .bursting = true});
   UntypedFrontend frontend("pair");
   add_request<Home>(frontend);
@@ -475,7 +425,7 @@ TEST_F(RunningRequestTest, AFreshStartAtTheEndOfABurstNeedsNoOtherBurst) {
   EXPECT_EQ(station.last(), 4) << "the fresh row";
 }
 
-TEST_F(RunningRequestTest, ThousandsOfThemLeaveNoBlockBehind) {
+TEST_F(RunningRequestOptionsTest, ThousandsOfThemLeaveNoBlockBehind) {
   HomingStation station({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 2000; ++i) {
@@ -487,7 +437,7 @@ TEST_F(RunningRequestTest, ThousandsOfThemLeaveNoBlockBehind) {
   }
 }
 
-TEST_F(RunningRequestTest, ItsStatusIsNotForgottenWhileOthersComeAndGo) {
+TEST_F(RunningRequestOptionsTest, ItsStatusIsNotForgottenWhileOthersComeAndGo) {
   HomingStation station({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   const Batch batch = ask<Home>(frontend);

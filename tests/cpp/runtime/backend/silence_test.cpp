@@ -19,8 +19,7 @@ BackendOptions watched(Stale stale, std::int64_t silence = 5) {
 }
 
 TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
-  Station station(watched(Stale::purge));
-  station.start();
+  StartedStation station(watched(Stale::purge));
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
   station.run(6);
@@ -32,8 +31,7 @@ TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
 }
 
 TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
-  Station station(watched(Stale::purge, 50));
-  station.start();
+  StartedStation station(watched(Stale::purge, 50));
   UntypedFrontend silent("pair");
   UntypedFrontend lively("pair");
   const Batch batch = send(silent, 0, 1000.0, {.pace = iterations(1000)});
@@ -54,8 +52,7 @@ TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
 }
 
 TEST_F(SilenceTest, CountsNoPeriodsThatWereMissedWhileHalted) {
-  Station station(watched(Stale::purge, 50));
-  station.start();
+  StartedStation station(watched(Stale::purge, 50));
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   holder.add_take_control();
@@ -65,9 +62,7 @@ TEST_F(SilenceTest, CountsNoPeriodsThatWereMissedWhileHalted) {
   station.run(2);
   station.backend.set_timing({.skipped = 1000});
   station.run(2);
-  BatchBuilder builder;
-  builder.resume(number);
-  const Batch resume = other.pulse(builder);
+  const Batch resume = send_resume(other, number);
   station.run(20);
   EXPECT_EQ(resume.handle(0).status, Status::completed);
   const Batch refused = send(other, 0, 1.0);
@@ -76,8 +71,7 @@ TEST_F(SilenceTest, CountsNoPeriodsThatWereMissedWhileHalted) {
 }
 
 TEST_F(SilenceTest, EndsWhatTheSilentCommanderHasScheduled) {
-  Station station(watched(Stale::purge));
-  station.start();
+  StartedStation station(watched(Stale::purge));
   UntypedFrontend silent("pair");
   UntypedFrontend lively("pair");
   send(silent, 0, 100.0, {.pace = iterations(100)});
@@ -102,8 +96,7 @@ TEST_F(SilenceTest, EndsWhatTheSilentCommanderHasScheduled) {
 }
 
 TEST_F(SilenceTest, AHaltEndsItTooAlsoWhatAHaltWouldLeave) {
-  Station station(watched(Stale::halt));
-  station.start();
+  StartedStation station(watched(Stale::halt));
   UntypedFrontend silent("pair");
   send(silent, 0, 100.0, {.pace = iterations(100)});
   add(silent, 1, 5.0);
@@ -118,8 +111,7 @@ TEST_F(SilenceTest, AHaltEndsItTooAlsoWhatAHaltWouldLeave) {
 }
 
 TEST_F(SilenceTest, StopsIfToldSo) {
-  Station station(watched(Stale::stop));
-  station.start();
+  StartedStation station(watched(Stale::stop));
   UntypedFrontend frontend("pair");
   send(frontend, 0, 100.0, {.pace = iterations(100)});
   for (int i = 0; i < 20 && station.iterate() == Step::run; ++i) {
@@ -130,8 +122,7 @@ TEST_F(SilenceTest, StopsIfToldSo) {
 }
 
 TEST_F(SilenceTest, HaltsIfToldSo) {
-  Station station(watched(Stale::halt));
-  station.start();
+  StartedStation station(watched(Stale::halt));
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
   station.run(7);
@@ -143,8 +134,7 @@ TEST_F(SilenceTest, HaltsIfToldSo) {
 }
 
 TEST_F(SilenceTest, BatchesOfAnotherFrontendAreNoLife) {
-  Station station(watched(Stale::purge));
-  station.start();
+  StartedStation station(watched(Stale::purge));
   UntypedFrontend silent("pair");
   UntypedFrontend lively("pair");
   const Batch batch = send(silent, 0, 100.0, {.pace = iterations(100)});
@@ -157,8 +147,7 @@ TEST_F(SilenceTest, BatchesOfAnotherFrontendAreNoLife) {
 }
 
 TEST_F(SilenceTest, RejectedBatchesAreLifeOfTheirSenderOnly) {
-  Station station(watched(Stale::purge));
-  station.start();
+  StartedStation station(watched(Stale::purge));
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   holder.add_take_control();
@@ -172,8 +161,7 @@ TEST_F(SilenceTest, RejectedBatchesAreLifeOfTheirSenderOnly) {
 }
 
 TEST_F(SilenceTest, ControlIsSomethingThatActsAndEnds) {
-  Station station(watched(Stale::purge));
-  station.start();
+  StartedStation station(watched(Stale::purge));
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   holder.add_take_control();
@@ -189,8 +177,7 @@ TEST_F(SilenceTest, ControlIsSomethingThatActsAndEnds) {
 }
 
 TEST_F(SilenceTest, KeepAliveAndPulsesAreLife) {
-  Station station(watched(Stale::purge));
-  station.start();
+  StartedStation station(watched(Stale::purge));
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
   for (int i = 0; i < 5; ++i) {
@@ -206,8 +193,7 @@ TEST_F(SilenceTest, KeepAliveAndPulsesAreLife) {
 }
 
 TEST_F(SilenceTest, LifeCountsFromWhenItWasShown) {
-  Station station(watched(Stale::purge, 10));
-  station.start();
+  StartedStation station(watched(Stale::purge, 10));
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
   station.run(4);
@@ -220,8 +206,7 @@ TEST_F(SilenceTest, LifeCountsFromWhenItWasShown) {
 }
 
 TEST_F(SilenceTest, ReadingIsNoLife) {
-  Station station(watched(Stale::purge));
-  station.start();
+  StartedStation station(watched(Stale::purge));
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
   for (int i = 0; i < 8; ++i) {
@@ -235,8 +220,7 @@ TEST_F(SilenceTest, ReadingIsNoLife) {
 }
 
 TEST_F(SilenceTest, AWaitForOnesOwnBatchIsLife) {
-  Station station(watched(Stale::purge, 3));
-  station.start();
+  StartedStation station(watched(Stale::purge, 3));
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 20.0, {.pace = iterations(20)});
   // each look of a wait that does not wait
@@ -249,8 +233,7 @@ TEST_F(SilenceTest, AWaitForOnesOwnBatchIsLife) {
 }
 
 TEST_F(SilenceTest, NothingThatActsNoSilence) {
-  Station station(watched(Stale::stop));
-  station.start();
+  StartedStation station(watched(Stale::stop));
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0);
   station.run(50);
@@ -262,8 +245,7 @@ TEST_F(SilenceTest, NothingThatActsNoSilence) {
 TEST_F(SilenceTest, ABurstIsItsSendersLifeAndStandingStillCountsNone) {
   BackendOptions options = watched(Stale::purge);
   options.bursting = true;
-  Station station(options);
-  station.start();
+  StartedStation station(options);
   UntypedFrontend frontend("pair");
   add(frontend, 0, 100.0, {.pace = iterations(100)});
   const Burst burst = frontend.start_burst(50);
@@ -278,8 +260,7 @@ TEST_F(SilenceTest, ABurstIsItsSendersLifeAndStandingStillCountsNone) {
 TEST_F(SilenceTest, AnothersBurstIsNot) {
   BackendOptions options = watched(Stale::purge);
   options.bursting = true;
-  Station station(options);
-  station.start();
+  StartedStation station(options);
   UntypedFrontend silent("pair");
   UntypedFrontend other("pair");
   const Batch batch = send(silent, 0, 100.0, {.pace = iterations(100)});
@@ -289,8 +270,7 @@ TEST_F(SilenceTest, AnothersBurstIsNot) {
 }
 
 TEST_F(SilenceTest, LifeFromTheFutureIsThatOfNow) {
-  Station station(watched(Stale::purge));
-  station.start();
+  StartedStation station(watched(Stale::purge));
   Liar liar;
   BatchBuilder builder;
   RecordHead head;
@@ -316,8 +296,7 @@ void rest_at_zero(Schema& schema) {
 }
 
 TEST_F(SilenceTest, ADirectValueThatStillActsCountsAlthoughNothingIsQueued) {
-  Station station(watched(Stale::purge), rest_at_zero);
-  station.start();
+  StartedStation station(watched(Stale::purge), rest_at_zero);
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 3.0);
   station.run(6);
@@ -328,8 +307,7 @@ TEST_F(SilenceTest, ADirectValueThatStillActsCountsAlthoughNothingIsQueued) {
 }
 
 TEST_F(SilenceTest, WithoutAWatchdogADirectValueThatDoesNotRestIsRefused) {
-  Station station({.segment = "pair"}, rest_at_zero);
-  station.start();
+  StartedStation station({.segment = "pair"}, rest_at_zero);
   UntypedFrontend frontend("pair");
   EXPECT_THAT(message_of<InvalidArgument>([&] { add(frontend, 0, 3.0); }),
               AllOf(HasSubstr("actuator 'shoulder'"), HasSubstr("--silence")));
@@ -340,16 +318,14 @@ TEST_F(SilenceTest, WithoutAWatchdogADirectValueThatDoesNotRestIsRefused) {
 }
 
 TEST_F(SilenceTest, ASimulationNeedsNoWatchdog) {
-  Station station({.segment = "pair", .bursting = true}, rest_at_zero);
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true}, rest_at_zero);
   UntypedFrontend frontend("pair");
   add(frontend, 0, 3.0);
   EXPECT_EQ(frontend.added(), 1U);
 }
 
 TEST_F(SilenceTest, TheSchemaTellsFrontends) {
-  Station station(watched(Stale::halt, 7));
-  station.start();
+  StartedStation station(watched(Stale::halt, 7));
   const UntypedFrontend frontend("pair");
   EXPECT_EQ(frontend.schema().head.silence, 7);
   EXPECT_EQ(frontend.schema().head.stale, Stale::halt);
@@ -364,15 +340,12 @@ TEST_F(SilenceTest, HaltsUnlessAnotherPolicyIsAskedFor) {
 }
 
 TEST_F(SilenceTest, ADeadCommanderHaltsIfToldSo) {
-  Station station({.segment = "pair", .stale = Stale::halt});
-  station.start();
-  ChildProcess child([](const ChildProcess::Ready& ready) {
+  StartedStation station({.segment = "pair", .stale = Stale::halt});
+  StandingProcess child([](const StandingProcess::Stand& stand) {
     UntypedFrontend frontend("pair");
     send(frontend, 0, 1e6, {.pace = iterations(1'000'000)});
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(child.wait_until_ready());
   station.run(2);
   child.kill_now();
   UntypedFrontend frontend("pair");

@@ -29,8 +29,7 @@ void pause_for_a_millisecond() {
 }
 
 void be_a_backend(bool bursting, const ChildProcess::Ready& ready) {
-  Station station({.segment = "pair", .bursting = bursting});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = bursting});
   ready();
   if (bursting) return station.serve_bursts();
   while (true) {
@@ -134,8 +133,7 @@ void let_the_helper_ask() {
 TEST_F(SuspendedTest, AFrontendKeepsItsLaneAndItsCommandsLiveOnWhateverThePolicyForTheDead) {
   for (const Stale stale : {Stale::hold, Stale::purge, Stale::stop}) {
     // the movement of the child begins with the first iteration after its pulse
-    Station station({.segment = "pair", .lanes = 1, .stale = stale});
-    station.start();
+    StartedStation station({.segment = "pair", .lanes = 1, .stale = stale});
     SuspendedCommander commander(false);
     ASSERT_TRUE(commander.child().wait_until_ready());
     station.run(10);
@@ -158,8 +156,7 @@ TEST_F(SuspendedTest, AFrontendKeepsItsLaneAndItsCommandsLiveOnWhateverThePolicy
 }
 
 TEST_F(SuspendedTest, AHolderOfControlKeepsItUntilItLetsGo) {
-  Station station;
-  station.start();
+  StartedStation station;
   SuspendedCommander commander(true);
   ASSERT_TRUE(commander.child().wait_until_ready());
   station.run(10);

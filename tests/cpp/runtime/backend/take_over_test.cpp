@@ -19,12 +19,10 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 class TakeOverTest : public StationTest {};
 
-void run_until_killed(const ChildProcess::Ready& ready) {
-  Station station;
-  station.start();
+void run_until_killed(const StandingProcess::Stand& stand) {
+  StartedStation station;
   station.run(5);
-  ready();
-  pause_for_ever();
+  stand();
 }
 
 /// What the frontend says of its backend, whichever verb meets it first.
@@ -39,39 +37,34 @@ void expect_every_verb_says(UntypedFrontend& frontend, const std::string& what) 
 }
 
 TEST_F(TakeOverTest, SaysWhatBecameOfTheOldBackendByNameAndPid) {
-  ChildProcess killed(run_until_killed);
-  ASSERT_TRUE(killed.wait_until_ready());
+  StandingProcess killed(run_until_killed);
   UntypedFrontend first("pair");
   const std::string pid = "pid " + std::to_string(killed.pid());
   killed.kill_now();
   expect_every_verb_says<BackendKilled>(first, pid + ") was killed");
 
   {
-    Station second;
-    second.start();
+    StartedStation second;
     expect_every_verb_says<BackendSuperseded>(first, pid + ") is gone and a new one has its name");
     UntypedFrontend of_second("pair");
     second.backend.end(BackendState::failed, "the elbow is too hot");
     expect_every_verb_says<BackendFailed>(of_second, "failed: the elbow is too hot");
     second.backend.end(BackendState::stopped);
   }
-  Station third;
-  third.start();
+  StartedStation third;
   UntypedFrontend of_third("pair");
   third.backend.end(BackendState::stopped);
   expect_every_verb_says<BackendStopped>(of_third, "has stopped");
 }
 
 TEST_F(TakeOverTest, LetsAFrontendAttachAgainInItsOwnPlace) {
-  ChildProcess killed(run_until_killed);
-  ASSERT_TRUE(killed.wait_until_ready());
+  StandingProcess killed(run_until_killed);
   UntypedFrontend arm("pair");
   const Batch old = send(arm, 0, 5.0);
   killed.kill_now();
   EXPECT_THROW(old.wait(kPatience), BackendKilled);
 
-  Station next;
-  next.start();
+  StartedStation next;
   EXPECT_THROW(old.wait(kPatience), BackendSuperseded);
   arm = UntypedFrontend("pair");
   const Batch batch = send(arm, 0, 1.0);
@@ -97,12 +90,10 @@ TEST_F(TakeOverTest, WaitsForNoPeriodOfThoseWhoWatch) {
   constexpr int kAttempts = 50;
   double shortest = 1.0;
   for (int i = 0; i < kAttempts && shortest > 0.02; ++i) {
-    ChildProcess killed(run_until_killed);
-    ASSERT_TRUE(killed.wait_until_ready());
+    StandingProcess killed(run_until_killed);
     killed.kill_now();
     const double before = seconds_slept();
-    Station next({.segment = "pair", .history = 100, .lane_blocks = 64});
-    next.start();
+    StartedStation next({.segment = "pair", .history = 100, .lane_blocks = 64});
     shortest = std::min(shortest, seconds_slept() - before);
   }
   EXPECT_LT(shortest, 0.02);

@@ -116,9 +116,7 @@ TEST_F(TypedBackendTest, IsNotResumedWhileItsReadingIsNoNumber) {
   backend.publish({});
   Frontend<Pair> frontend("pair");
   const auto resume = [&] {
-    BatchBuilder builder;
-    builder.resume(1);
-    const Batch batch = frontend.pulse(builder);
+    const Batch batch = send_resume(frontend, 1);
     EXPECT_TRUE(backend.step());
     return batch.handle(0);
   };

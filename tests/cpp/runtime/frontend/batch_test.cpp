@@ -48,8 +48,7 @@ TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
 }
 
 TEST_F(BatchTest, KeepsTheEndStatusesItSawAndForgetsTheRest) {
-  Station station({.segment = "pair", .lane_blocks = 16});
-  station.start();
+  StartedStation station({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   const Batch seen = send(frontend, 0, 1.0);
   const Batch unseen = send(frontend, 0, 2.0);
@@ -65,8 +64,7 @@ TEST_F(BatchTest, KeepsTheEndStatusesItSawAndForgetsTheRest) {
 }
 
 TEST_F(BatchTest, TheEndOfAnOldCommandDisturbsNoNewOne) {
-  Station station({.segment = "pair", .lane_blocks = 16});
-  station.start();
+  StartedStation station({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0, {.pace = iterations(200)});
   Batch last;
@@ -84,8 +82,7 @@ TEST_F(BatchTest, TheEndOfAnOldCommandDisturbsNoNewOne) {
 }
 
 TEST_F(BatchTest, NeverForgetsWhatStillRunsHoweverMuchIsSentMeanwhile) {
-  Station station({.segment = "pair", .lane_blocks = 16});
-  station.start();
+  StartedStation station({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   const Batch slow = send(frontend, 0, 1.0, {.pace = iterations(500)});
   for (int i = 0; i < 499; ++i) {
@@ -101,8 +98,7 @@ TEST_F(BatchTest, NeverForgetsWhatStillRunsHoweverMuchIsSentMeanwhile) {
 }
 
 TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   add(frontend, 0, 1.0, {.pace = iterations(300)});
   add(frontend, 1, 1.0, {.pace = iterations(500)});
@@ -116,16 +112,14 @@ TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {
 }
 
 TEST_F(BatchTest, AWaitThatTakesTooLongSaysWhatToDo) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0);
   EXPECT_THAT(message_of<TimeoutError>([&] { batch.wait(kAtOnce); }), HasSubstr("purge"));
 }
 
 TEST_F(BatchTest, CopiesMeanTheSameBatch) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0);
   const Batch copy = batch;

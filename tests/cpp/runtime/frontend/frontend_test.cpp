@@ -52,8 +52,7 @@ TEST_F(FrontendTest, TheLastStateOfATrajectoryIsNoDirectValue) {
 }
 
 TEST_F(FrontendTest, RefusesOptionsThatContradictEachOther) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const auto refusal = [&](const CommandOptions& options) {
     return message_of<InvalidArgument>([&] { add(frontend, 0, 1.0, options); });
@@ -68,8 +67,7 @@ TEST_F(FrontendTest, RefusesOptionsThatContradictEachOther) {
 }
 
 TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const std::array<double, 3> rows{1, 2, 4};
   const auto add_with = [&](std::vector<std::int64_t> times, CommandOptions options = {}) {
@@ -86,8 +84,7 @@ TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
 // ------------------------------------------------------------------------------ sending
 
 TEST_F(FrontendTest, AnEmptyBatchReturnsAtOnce) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const Batch batch = frontend.pulse();
   EXPECT_TRUE(batch.empty());
@@ -99,8 +96,7 @@ TEST_F(FrontendTest, AnEmptyBatchReturnsAtOnce) {
 }
 
 TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
-  Station station({.segment = "pair", .lane_blocks = 64});
-  station.start();
+  StartedStation station({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 40; ++i) add(frontend, 0, i, {.pace = iterations(2)});
   const Batch first = frontend.pulse();
@@ -123,8 +119,7 @@ TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
 }
 
 TEST_F(FrontendTest, ALaneFullOfCommandsStillTakesAPurge) {
-  Station station({.segment = "pair", .lane_blocks = 16});
-  station.start();
+  StartedStation station({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   Batch endless;
   const auto fill = [&] {
@@ -145,8 +140,7 @@ TEST_F(FrontendTest, ALaneFullOfCommandsStillTakesAPurge) {
 }
 
 TEST_F(FrontendTest, ALaneFullOfWhatIsScheduledStillTakesABurst) {
-  Station station({.segment = "pair", .bursting = true, .lane_blocks = 16});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true, .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   const auto fill = [&] {
     while (true) {
@@ -162,8 +156,7 @@ TEST_F(FrontendTest, ALaneFullOfWhatIsScheduledStillTakesABurst) {
 }
 
 TEST_F(FrontendTest, ABatchLargerThanItsLaneSaysHowToSendIt) {
-  Station station({.segment = "pair", .lane_blocks = 64});
-  station.start();
+  StartedStation station({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 64; ++i) add(frontend, 0, i);
   EXPECT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }),
@@ -175,8 +168,7 @@ TEST_F(FrontendTest, ABatchLargerThanItsLaneSaysHowToSendIt) {
 }
 
 TEST_F(FrontendTest, APureReaderTakesNoLaneAndMayBeReadOnly) {
-  Station station({.segment = "pair", .lanes = 1});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 1});
   UntypedFrontend reader("pair", {.access = Access::read_only});
   UntypedFrontend another("pair");
   UntypedFrontend commander("pair");
@@ -188,8 +180,7 @@ TEST_F(FrontendTest, APureReaderTakesNoLaneAndMayBeReadOnly) {
 }
 
 TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
-  Station station({.segment = "pair", .lanes = 1});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 1});
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(2)});
   frontend.close();
@@ -208,8 +199,7 @@ TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
 // ------------------------------------------------------------------------------ reading
 
 TEST_F(FrontendTest, ReadsRowsByTheirIteration) {
-  Station station({.segment = "pair", .history = 10});
-  station.start();
+  StartedStation station({.segment = "pair", .history = 10});
   UntypedFrontend frontend("pair");
   station.run(25);
   EXPECT_EQ(frontend.published(), 25);
@@ -234,8 +224,7 @@ TEST_F(FrontendTest, ReadsRowsByTheirIteration) {
 }
 
 TEST_F(FrontendTest, ReadsOneRowAfterTheOtherAndCountsWhatItMissed) {
-  Station station({.segment = "pair", .history = 5});
-  station.start();
+  StartedStation station({.segment = "pair", .history = 5});
   const UntypedFrontend frontend("pair");
   UntypedObservation row(frontend.description());
   Iteration position = 0;
@@ -252,8 +241,7 @@ TEST_F(FrontendTest, ReadsOneRowAfterTheOtherAndCountsWhatItMissed) {
 }
 
 TEST_F(FrontendTest, AReaderThatIsOvertakenAllTheTimeStillReadsTrueRowsInOrder) {
-  Station station({.segment = "pair", .history = 1});
-  station.start();
+  StartedStation station({.segment = "pair", .history = 1});
   const UntypedFrontend frontend("pair");
   std::atomic<bool> done{false};
   std::thread reader([&] {
@@ -295,8 +283,7 @@ TEST_F(FrontendTest, WaitsEndWithAnErrorThatSaysWhatBecameOfTheBackend) {
 }
 
 TEST_F(FrontendTest, AWaitEndsWhenItsCallerSaysSo) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   int requested = 0;
   EXPECT_THROW(frontend.wait_for(99, kPatience, [&] { return ++requested < 2; }), Cancelled);

@@ -35,8 +35,7 @@ std::int64_t time_of(const UntypedFrontend& frontend, Iteration k) {
 }
 
 TEST_F(LoopStateTest, GivesTheRateAtWhichRowsCame) {
-  Station station;
-  station.start();
+  StartedStation station;
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
   Timing timing;
   for (timing.overruns = 1; timing.overruns <= 20; ++timing.overruns) {
@@ -69,8 +68,7 @@ TEST_F(LoopStateTest, OfRowsThatStoppedComingHasARateOfZero) {
 }
 
 TEST_F(LoopStateTest, OfABackendThatWaitsForABurstKnowsNeitherRateNorAge) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
   const LoopState state = loop_state(frontend, monotonic_now() + 10 * kSecond);
 
@@ -80,8 +78,7 @@ TEST_F(LoopStateTest, OfABackendThatWaitsForABurstKnowsNeitherRateNorAge) {
 }
 
 TEST_F(LoopStateTest, TellsAVerbThatHangsFromABackendThatStandsStill) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
   station.backend.enter(Verb::read);
   while (loop_state(frontend).slow_verb == Verb::none) std::this_thread::yield();

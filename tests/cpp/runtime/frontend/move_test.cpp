@@ -102,8 +102,7 @@ TEST_F(MoveTest, ThrowsIfItsCommandDoesNotComplete) {
 }
 
 TEST_F(MoveTest, InRealTimeItWaitsForTheRowsAsTheyCome) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   station.before_publish = [&] {
     if (station.backend.iteration() < 50) station.now[0] = 0;  // it begins to move late
@@ -118,8 +117,7 @@ TEST_F(MoveTest, InRealTimeItWaitsForTheRowsAsTheyCome) {
 }
 
 TEST_F(MoveTest, AHaltWhileItSettlesEndsIt) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   station.before_publish = [&] { station.now[0] = 0; };  // it is stuck
   const Move move = frontend.start_move(kShoulder, bytes(std::array{1.0}), {.tolerance = 0.1});
@@ -132,8 +130,7 @@ TEST_F(MoveTest, AHaltWhileItSettlesEndsIt) {
 }
 
 TEST_F(MoveTest, RefusesTolerancesThatDoNotFit) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const auto told = [&](const MoveOptions& options) {
     return message_of<InvalidArgument>(

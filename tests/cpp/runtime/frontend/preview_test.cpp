@@ -299,8 +299,7 @@ TEST_F(PreviewTest, SaysByHowMuchLaterAndWhy) {
 }
 
 TEST_F(PreviewTest, BeginsAfterTheRowThatIsGiven) {
-  Station station;
-  station.start();
+  StartedStation station;
   UntypedFrontend frontend("pair");
   const std::uint32_t shoulder = 0;
   const double target = 2.0;

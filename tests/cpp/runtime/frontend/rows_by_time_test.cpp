@@ -17,8 +17,7 @@ BackendOptions millisecond(std::uint64_t history) {
 }
 
 TEST_F(RowsByTimeTest, FindsTheNewestRowAtOrBeforeATime) {
-  Station station(millisecond(64));
-  station.start();
+  StartedStation station(millisecond(64));
   UntypedFrontend frontend("pair");
   frontend.start_burst(20);
   station.drive();
@@ -32,8 +31,7 @@ TEST_F(RowsByTimeTest, FindsTheNewestRowAtOrBeforeATime) {
 }
 
 TEST_F(RowsByTimeTest, AgreesWithASearchThroughAllRowsThatAreThere) {
-  Station station(millisecond(32));
-  station.start();
+  StartedStation station(millisecond(32));
   UntypedFrontend frontend("pair");
   std::mt19937_64 random(7);
   for (int round = 0; round < 50; ++round) {
@@ -69,8 +67,7 @@ TEST_F(RowsByTimeTest, AgreesWithASearchThroughAllRowsThatAreThere) {
 }
 
 TEST_F(RowsByTimeTest, SaysThatARowIsNoLongerThere) {
-  Station station(millisecond(8));
-  station.start();
+  StartedStation station(millisecond(8));
   UntypedFrontend frontend("pair");
   frontend.start_burst(100);
   station.drive();

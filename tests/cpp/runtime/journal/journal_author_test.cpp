@@ -333,8 +333,7 @@ TEST_F(SmallJournalTest, AReaderThatWasOvertakenIsToldHowMuchItMissedAndGoesOn) 
 }
 
 TEST_F(StationTest, ABackendMayHaveNoJournal) {
-  Station station({.segment = "pair", .journal = 0});
-  station.start();
+  StartedStation station({.segment = "pair", .journal = 0});
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 5000; ++i) add(frontend, 0, i);
   frontend.pulse();
@@ -348,13 +347,11 @@ TEST_F(StationTest, ABackendMayHaveNoJournal) {
 // ------------------------------------------------------------------------------ deaths, bursts
 
 TEST_F(JournalAuthorTest, ShowsTheDeathOfACommander) {
-  ChildProcess child([](const ChildProcess::Ready& ready) {
+  StandingProcess child([](const StandingProcess::Stand& stand) {
     UntypedFrontend frontend("pair");
     send(frontend, 0, 5.0, {.pace = iterations(1'000'000'000)});
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(child.wait_until_ready());
   station.run(1);
   const auto before = news();
   ASSERT_FALSE(before.empty());
@@ -387,8 +384,7 @@ TEST_F(WatchedTest, ShowsTheSilenceOfACommander) {
 }
 
 TEST_F(StationTest, TheJournalShowsBursts) {
-  Station station({.segment = "pair", .bursting = true});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true});
   UntypedFrontend frontend("pair");
   Journal journal(frontend);
   add(frontend, 0, 1.0);

@@ -338,8 +338,7 @@ class LaterFileTest : public StationTest {
  protected:
   void SetUp() override {
     StationTest::SetUp();
-    Station station;
-    station.start();
+    StartedStation station;
     description_ = UntypedFrontend("pair").description();
   }
   void begin_batch(std::uint32_t records, std::uint32_t blocks) {

@@ -98,8 +98,7 @@ TEST_F(ProvenanceTest, IsReadByFrontends) {
   Provenance given;
   given.robot = "arm";
   given.options = {{"gain", "2.5"}, {"address", "10.0.0.2\n"}};
-  Station station({.segment = "pair", .bursting = true, .provenance = given});
-  station.start();
+  StartedStation station({.segment = "pair", .bursting = true, .provenance = given});
   const UntypedFrontend observer("pair", {.access = Access::read_only});
 
   const Provenance found = observer.provenance();
@@ -113,8 +112,7 @@ TEST_F(ProvenanceTest, IsReadByFrontends) {
 }
 
 TEST_F(ProvenanceTest, HasTheEffectiveValuesOfOptionsThatWereNotGiven) {
-  Station station({.segment = "pair", .lanes = 1, .lane_blocks = 100});
-  station.start();
+  StartedStation station({.segment = "pair", .lanes = 1, .lane_blocks = 100});
   const Provenance found = UntypedFrontend("pair").provenance();
   EXPECT_EQ(found.robot, "pair");
   EXPECT_THAT(found.options, IsEmpty());
@@ -129,8 +127,7 @@ TEST_F(ProvenanceTest, HasTheEffectiveValuesOfOptionsThatWereNotGiven) {
 TEST_F(ProvenanceTest, LeadsFromTheTimeOfARowToTheWallClock) {
   for (const bool bursting : {false, true}) {
     const std::int64_t before = wall_clock_now();
-    Station station({.segment = "pair", .bursting = bursting});
-    station.start();
+    StartedStation station({.segment = "pair", .bursting = bursting});
     const std::int64_t after = wall_clock_now();
     const UntypedFrontend observer("pair", {.access = Access::read_only});
     const std::int64_t time =
@@ -142,8 +139,7 @@ TEST_F(ProvenanceTest, LeadsFromTheTimeOfARowToTheWallClock) {
 }
 
 TEST_F(ProvenanceTest, ThatIsDamagedIsAnErrorOfItsReaderOnly) {
-  Station station;
-  station.start();
+  StartedStation station;
   const UntypedFrontend frontend("pair");
   const SegmentOffsets& offsets = frontend.link()->segment.view().offsets;
   std::fstream file(segment_path("pair"), std::ios::binary | std::ios::in | std::ios::out);

@@ -28,8 +28,7 @@ class PlayedSegmentTest : public StationTest {
 
   void SetUp() override {
     StationTest::SetUp();
-    Station station({.segment = "recorded", .bursting = true});
-    station.start();
+    StartedStation station({.segment = "recorded", .bursting = true});
     UntypedFrontend frontend("recorded");
     description_ = to_bytes(frontend.schema());
     add(frontend, 0, 1.0, {.pace = iterations(30)});
@@ -188,13 +187,11 @@ TEST_F(PlayedSegmentTest, ABurstEndsWithItsSender) {
 TEST_F(PlayedSegmentTest, ABurstEndsWithTheDeathOfItsSender) {
   PlayedSegment played(options(true));
   played.publish(rows(0, 0), {});
-  ChildProcess sender([&](const ChildProcess::Ready& ready) {
+  StandingProcess sender([&](const StandingProcess::Stand& stand) {
     UntypedFrontend frontend("pair");
     frontend.start_burst(1'000'000);
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(sender.wait_until_ready());
   ::kill(sender.pid(), SIGKILL);
   sender.wait();
   UntypedFrontend successor("pair");
@@ -240,28 +237,23 @@ TEST_F(PlayedSegmentTest, ShowsHaltsOfTheRows) {
 }
 
 TEST_F(PlayedSegmentTest, ARobotDoesNotInheritAHaltOfARecording) {
-  ChildProcess player([&](const ChildProcess::Ready& ready) {
+  StandingProcess player([&](const StandingProcess::Stand& stand) {
     PlayedSegment played(options());
     played.publish(halted(0, 3), {});
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(player.wait_until_ready());
   ::kill(player.pid(), SIGKILL);
   player.wait();
-  Station robot;
-  robot.start();
+  StartedStation robot;
   EXPECT_FALSE(UntypedFrontend("pair").halted());
 }
 
 TEST_F(PlayedSegmentTest, AKilledPlayerIsSeenAndReplaced) {
-  ChildProcess player([&](const ChildProcess::Ready& ready) {
+  StandingProcess player([&](const StandingProcess::Stand& stand) {
     PlayedSegment played(options());
     played.publish(rows(0, 9), {});
-    ready();
-    pause_for_ever();
+    stand();
   });
-  ASSERT_TRUE(player.wait_until_ready());
   const UntypedFrontend reader("pair");
   ::kill(player.pid(), SIGKILL);
   player.wait();
@@ -277,18 +269,14 @@ TEST_F(PlayedSegmentTest, AKilledPlayerIsSeenAndReplaced) {
 
 TEST_F(PlayedSegmentTest, DoesNotReplaceARobotThatLivesOrWasKilled) {
   {
-    Station robot;
-    robot.start();
+    StartedStation robot;
     EXPECT_THAT([&] { const PlayedSegment refused{options()}; },
                 ThrowsMessage<SegmentTaken>(HasSubstr("under another name with --prefix")));
   }
-  ChildProcess robot([&](const ChildProcess::Ready& ready) {
-    Station station;
-    station.start();
-    ready();
-    pause_for_ever();
+  StandingProcess robot([&](const StandingProcess::Stand& stand) {
+    StartedStation station;
+    stand();
   });
-  ASSERT_TRUE(robot.wait_until_ready());
   ::kill(robot.pid(), SIGKILL);
   robot.wait();
   EXPECT_THAT([&] { const PlayedSegment refused{options()}; },
