@@ -205,6 +205,4 @@ def test_a_missing_extra_is_named() -> None:
         "except o80.MissingExtra as error: print(error)"
     )
     printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout
-    assert printed == (
-        'o80.learning needs gymnasium, which is not installed: pip install "o80[gym]"\n'
-    )
+    assert 'needs gymnasium, which is not installed: pip install "o80[gym]"\n' in printed
