@@ -156,23 +156,6 @@ def test_a_recording_that_is_open_when_its_program_ends_is_finished(tmp_path: Pa
     assert segment.epochs[0].rows == 41
 
 
-def test_the_extra_is_named_when_a_part_of_it_is_missing() -> None:
-    program = (
-        "import sys\n"
-        "sys.modules['zstandard'] = None\n"
-        "import o80\n"
-        "try:\n"
-        "    o80.open('run.mcap')\n"
-        "except o80.MissingExtra as error:\n"
-        "    print(error)\n"
-    )
-    said = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
-    ).stdout
-
-    assert 'needs zstandard, which is not installed: pip install "o80[record]"' in said
-
-
 def test_the_end_of_a_recording_does_not_wait_for_rows_published_after_it(
     arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
