@@ -194,7 +194,7 @@ def test_a_recording_through_gymnasium_needs_no_import(tmp_path: Path) -> None:
 
 
 def test_a_recording_that_cannot_be_made_leaves_nothing_behind(tmp_path: Path) -> None:
-    with pytest.raises(o80.RecordingError, match=r"ends in \.mcap"):
+    with pytest.raises(o80.RecordingError, match=r"must end in \.mcap"):
         opened(record=tmp_path / "run.npz")
     assert not [segment.name for segment in o80.segments() if segment.life == "running"]
 
