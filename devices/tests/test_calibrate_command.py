@@ -2,8 +2,9 @@
 
 import json
 import re
+import shutil
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, ClassVar
@@ -142,39 +143,37 @@ def test_the_rig_is_written_and_its_errors_are_told(
     assert np.nanmean(away) < 0.005
 
 
-def test_corners_marked_in_a_mirrored_order_are_refused(files: Files) -> None:
-    files.write_corners(files.marks[:, [1, 0, 3, 2]])
-    with pytest.raises(SystemExit, match="below the table: the corners are mirrored"):
+def marked_otherwise(order: list[int], images: list[int]) -> Callable[[Files], None]:
+    def change(files: Files) -> None:
+        files.marks[images] = files.marks[images][:, order]
+        files.write_corners(files.marks)
+
+    return change
+
+
+ELSEWHERE = np.random.default_rng(1).uniform([0.3, 1.5, 1.0], [0.5, 1.7, 1.1], (160, 3))
+IN_A_PLANE = np.random.default_rng(1).uniform(*INSIDE, (160, 3)) * [1, 1, 0] + [0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("change", "text"),
+    [
+        (marked_otherwise([1, 0, 3, 2], [0, 1, 2, 3]), "below the table: the corners are mirrored"),
+        (marked_otherwise([1, 2, 3, 0], [0, 1, 2, 3]), r"only within \d+ mm: check the order"),
+        (marked_otherwise([1, 2, 3, 0], [2]), "marked at different places of the room"),
+        (lambda files: files.write_wave(ELSEWHERE), "wave it through the whole space"),
+        (lambda files: files.write_wave(IN_A_PLANE), "waved in a plane"),
+        (lambda files: files.wave.write_bytes(b""), "is not a recording of a waved ball"),
+        (lambda files: files.wave.write_bytes(b"nothing"), "is not a recording of a waved ball"),
+        (lambda files: shutil.copy(files.lenses, files.wave), "is not a recording of a waved ball"),
+        (lambda files: RIG.save(files.lenses), "make it with `calibrate lenses`"),
+    ],
+)
+def test_wrong_files_are_told(files: Files, change: Callable[[Files], object], text: str) -> None:
+    change(files)
+    with pytest.raises(SystemExit, match=text):
         files.place()
     assert not files.rig.exists()
-
-
-def test_corners_that_begin_at_another_one_are_refused(files: Files) -> None:
-    files.write_corners(files.marks[:, [1, 2, 3, 0]])
-    with pytest.raises(SystemExit, match=r"fit the table only within \d+ mm: check the order"):
-        files.place()
-
-
-def test_corners_in_another_order_in_one_image_are_refused(files: Files) -> None:
-    marks = files.marks.copy()
-    marks[2] = marks[2, [1, 2, 3, 0]]
-    files.write_corners(marks)
-    with pytest.raises(SystemExit, match="marked at different places of the room"):
-        files.place()
-
-
-def test_a_ball_that_hardly_moved_is_refused(files: Files) -> None:
-    files.write_wave(np.random.default_rng(1).uniform([0.3, 1.5, 1.0], [0.5, 1.7, 1.1], (160, 3)))
-    with pytest.raises(SystemExit, match="wave it through the whole space"):
-        files.place()
-
-
-def test_a_ball_that_was_waved_in_a_plane_is_refused(files: Files) -> None:
-    points = np.random.default_rng(1).uniform(*INSIDE, (160, 3))
-    points[:, 2] = 1.0
-    files.write_wave(points)
-    with pytest.raises(SystemExit, match="waved in a plane"):
-        files.place()
 
 
 @pytest.mark.parametrize(
@@ -192,19 +191,6 @@ def test_a_ball_that_was_waved_in_a_plane_is_refused(files: Files) -> None:
 def test_damaged_marks_of_corners_are_told(files: Files, content: str, error: str) -> None:
     files.corners.write_text(content)
     with pytest.raises(SystemExit, match=error):
-        files.place()
-
-
-def test_a_recording_of_something_else_is_told(files: Files) -> None:
-    for content in (b"", b"nothing", files.lenses.read_bytes()):
-        files.wave.write_bytes(content)
-        with pytest.raises(SystemExit, match="is not a recording of a waved ball"):
-            files.place()
-
-
-def test_lenses_that_are_a_rig_are_told(files: Files) -> None:
-    RIG.save(files.lenses)
-    with pytest.raises(SystemExit, match="make it with `calibrate lenses`"):
         files.place()
 
 

@@ -238,12 +238,6 @@ def test_a_backend_by_the_clock_is_not_burst(process: o80.robots.Process) -> Non
         arm.burst(1)
 
 
-@pytest.mark.parametrize("iterations", [0, -1])
-def test_a_burst_has_at_least_one_iteration(arm: o80.Frontend, iterations: int) -> None:
-    with pytest.raises(o80.InvalidArgument):
-        arm.burst(iterations)
-
-
 def test_a_burst_may_return_at_once(bursting: o80.robots.Process) -> None:
     with bursting.frontend() as arm:
         burst = arm.burst(10, wait=False)

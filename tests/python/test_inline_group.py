@@ -5,8 +5,9 @@ import pickle
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,25 +81,22 @@ def test_what_cannot_follow_a_burst_is_said_when_it_is_made(group: o80.InlineGro
         robot.inline(copies=COPIES, threads=group) as mirror,
         robot.inline(copies=COPIES, threads=2) as stranger,
     ):
-        with pytest.raises(o80.InvalidArgument, match="share its threads"):
-            first.then(stranger.prepared_burst(4, steps=4), "observed")
-        with pytest.raises(o80.InvalidArgument, match="share its threads"):
-            first.then(group.prepared_burst(4, steps=4), "observed")
-        with pytest.raises(o80.InvalidArgument, match="needs as many steps, got 2"):
-            first.then(mirror.prepared_burst(4, steps=2), "observed")
         second = mirror.prepared_burst(4, steps=4)
-        with pytest.raises(o80.InvalidArgument, match=r"no path in a row 'extended\.speed'"):
-            first.then(second, "extended.speed")
-        with pytest.raises(o80.InvalidArgument, match="must have a float64 for each of 2"):
-            first.then(second, "iteration")
-        with pytest.raises(o80.InvalidArgument, match="no field of the targets 'position'"):
-            first.then(second, {"position": "observed"})
-        with pytest.raises(o80.InvalidArgument, match="numbers must be a mapping from fields to"):
-            first.then(second, 5)  # type: ignore[arg-type]
         both = first.then(second, "observed")
-        for one, other in ((both, second), (first, both)):
-            with pytest.raises(o80.InvalidArgument, match="followed already"):
-                one.then(other, "observed")
+        wrong: list[tuple[o80.GroupBurst, o80.GroupBurst, Any, str]] = [
+            (first, stranger.prepared_burst(4, steps=4), "observed", "share its threads"),
+            (first, group.prepared_burst(4, steps=4), "observed", "share its threads"),
+            (first, mirror.prepared_burst(4, steps=2), "observed", "as many steps, got 2"),
+            (first, second, "extended.speed", r"no path in a row 'extended\.speed'"),
+            (first, second, "iteration", "must have a float64 for each of 2"),
+            (first, second, {"position": "observed"}, "no field of the targets 'position'"),
+            (first, second, 5, "numbers must be a mapping from fields to"),
+            (both, second, "observed", "followed already"),
+            (first, both, "observed", "followed already"),
+        ]
+        for one, other, numbers, words in wrong:
+            with pytest.raises(o80.InvalidArgument, match=words):
+                one.then(other, numbers)
 
 
 def test_leaves_no_file_and_names_a_copy_on_request(group: o80.InlineGroup) -> None:
@@ -234,35 +232,29 @@ def test_says_what_cannot_be_gathered(
 
 
 def test_refuses_wrong_arguments(group: o80.InlineGroup) -> None:
-    robot = o80.robots.load("two_joints")
-    with pytest.raises(o80.InvalidArgument, match="copies must be at least 1, got 0"):
-        robot.inline(copies=0)
-    with pytest.raises(o80.InvalidArgument, match="give copies too"):
-        robot.inline(threads=2)  # type: ignore[call-overload]
-    with pytest.raises(o80.InvalidArgument, match="leave out segment"):
-        robot.inline("arm", copies=2)  # type: ignore[call-overload]
-    with pytest.raises(o80.InvalidArgument, match="history=65"):
-        group.prepared_burst(65)
+    robot: Any = o80.robots.load("two_joints")
     burst = group.prepared_burst(4)
-    with pytest.raises(o80.InvalidArgument, match=r"\(copies, steps, actuators\) = \(5, 1, 2\)"):
-        burst.targets = np.zeros((5, 2))
     burst.targets = np.zeros((5, 1, 2))
-    for copies, words in (
-        ([5], "copies 0 to 4"),
-        ([-1], "copies 0 to 4"),
-        ([1, 1], "named twice"),
-        ([True], "must have the shape"),
-        ([0.5], "list of numbers"),
-        (3, "list of numbers"),
-    ):
+    wrong: list[tuple[Callable[[], object], str]] = [
+        (lambda: robot.inline(copies=0), "copies must be at least 1, got 0"),
+        (lambda: robot.inline(threads=2), "give copies too"),
+        (lambda: robot.inline("arm", copies=2), "leave out segment"),
+        (lambda: group.prepared_burst(65), "history=65"),
+        (lambda: setattr(burst, "targets", np.zeros((5, 2))), r"steps, actuators\) = \(5, 1, 2\)"),
+        (lambda: burst.run([5]), "copies 0 to 4"),
+        (lambda: burst.run([-1]), "copies 0 to 4"),
+        (lambda: burst.run([1, 1]), "named twice"),
+        (lambda: burst.run([True]), "must have the shape"),
+        (lambda: burst.run([0.5]), "list of numbers"),
+        (lambda: burst.run(3), "list of numbers"),
+        (lambda: group.request("reset", seed=[1, 2]), "seed of request 'reset' has 2 entries"),
+        (lambda: group.request("rest"), "'rest'.*Did you mean 'reset'"),
+    ]
+    for call, words in wrong:
         with pytest.raises(o80.InvalidArgument, match=words):
-            burst.run(copies)
+            call()
     burst.run([])
     assert not burst.rows["iteration"].any()
-    with pytest.raises(o80.InvalidArgument, match="seed of request 'reset' has 2 entries for 5"):
-        group.request("reset", seed=[1, 2])
-    with pytest.raises(o80.InvalidArgument, match=r"'rest'.*Did you mean 'reset'"):
-        group.request("rest")
     with pytest.raises(IndexError, match="copies 0 to 4"):
         group[5]
     for thing in (burst, group):

@@ -54,10 +54,7 @@ def newer(segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path
         return record(tmp_path / "run.mcap", segment)
 
 
-SAID = (
-    rf"written in version {NEWER} of the format, and this o80 reads versions 0 to "
-    rf"{_core.JOURNAL_CODEC}: read it with a newer o80"
-)
+SAID = f"version {NEWER} .* versions 0 to {_core.JOURNAL_CODEC}: read it with a newer o80"
 
 
 def test_a_newer_version_is_refused_with_a_message(newer: Path, segment: str) -> None:
@@ -244,9 +241,7 @@ def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_c
     assert not run.identical
     assert run.rows == 11  # up to row 10
     now = _core.MOTION_RULES
-    assert f"row 11 begins a command of lift, which motion rules {now} may move otherwise" in (
-        run.gap
-    )
+    assert f"command of lift, which motion rules {now} may move otherwise" in run.gap
     code, said = o80_command("replay", path)
     assert code == 2
     assert "11 rows, identical up to row 10; then row 11 begins a command of lift" in said

@@ -78,20 +78,18 @@ def test_signals_without_a_common_motion_are_told(segment: str) -> None:
 
 def test_wrong_arguments_are_named(segment: str) -> None:
     one = signal(segment, np.sin(np.arange(300) * 0.05))
-    for field, text in (
-        ("extended.valeu", "Did you mean 'extended.value'"),
-        ("extended.pair", "names 2 numbers"),
-    ):
+    value = (one, "extended.value")
+    wrong: list[tuple[Any, float, str]] = [
+        ((one, "extended.valeu"), 0.1, "Did you mean 'extended.value'"),
+        ((one, "extended.pair"), 0.1, "names 2 numbers"),
+        (value, 0.5, "too little"),
+        (value, float("nan"), "most must be"),
+        ((one[:20], "extended.value"), 0.1, "at least 50 are needed"),
+        ((one, lambda rows: 0.0), 0.1, "one for each"),
+    ]
+    for signal_of_one, most, text in wrong:
         with pytest.raises(o80.InvalidArgument, match=text):
-            o80.latency((one, field), (one, "extended.value"), most=0.1)
-    with pytest.raises(o80.InvalidArgument, match="too little"):
-        o80.latency((one, "extended.value"), (one, "extended.value"), most=0.5)
-    with pytest.raises(o80.InvalidArgument, match="most must be"):
-        o80.latency((one, "extended.value"), (one, "extended.value"), most=float("nan"))
-    with pytest.raises(o80.InvalidArgument, match="at least 50 are needed"):
-        o80.latency((one[:20], "extended.value"), (one, "extended.value"))
-    with pytest.raises(o80.InvalidArgument, match="one for each"):
-        o80.latency((one, lambda rows: 0.0), (one, "extended.value"), most=0.1)
+            o80.latency(signal_of_one, value, most=most)
 
 
 def command(*words: str | Path, code: int = 0) -> str:

@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import o80
 
 PUBLIC: list[str] = vars(o80)["__all__"]  # computed, so type checkers do not see it
@@ -61,3 +63,18 @@ def test_dir_shows_public_names_only() -> None:
     import o80
 
     assert set(dir(o80)) == {*PUBLIC, "open", "learning"}
+
+
+@pytest.mark.parametrize(
+    ("missing", "use", "extra"),
+    [
+        ("gymnasium", "o80.learning", "gym"),
+        ("stable_baselines3", "o80.learning.stable_baselines3(None)", "stable-baselines3"),
+        ("zstandard", "o80.open('run.mcap')", "record"),
+    ],
+)
+def test_a_missing_extra_is_named(missing: str, use: str, extra: str) -> None:
+    program = f"import sys; sys.modules[{missing!r}] = None; import o80\n"
+    program += f"try: {use}\nexcept o80.MissingExtra as error: print(error)"
+    said = in_a_fresh_interpreter(program)
+    assert f'needs {missing}, which is not installed: pip install "o80[{extra}]"' in said

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 import warnings
 from collections.abc import Iterator
 from copy import deepcopy
@@ -196,15 +194,3 @@ def test_renders_all_copies() -> None:
         pictures = vector.render()
         assert pictures is not None
         assert [picture.max() for picture in pictures] == [1, 1, 1]
-
-
-def test_a_missing_extra_is_named() -> None:
-    program = (
-        "import sys; sys.modules['gymnasium'] = None; import o80\n"
-        "try: o80.learning\n"
-        "except o80.MissingExtra as error: print(error)"
-    )
-    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout
-    assert printed == (
-        'o80.learning needs gymnasium, which is not installed: pip install "o80[gym]"\n'
-    )

@@ -143,11 +143,9 @@ def test_what_only_a_process_has_is_checked_before_it_starts(segment: str) -> No
 @pytest.mark.parametrize("verb", ["start", "inline"])
 def test_an_unknown_option_offers_the_nearest_one(segment: str, verb: str) -> None:
     begin = getattr(o80.robots.load("two_joints"), verb)
-    with pytest.raises(
-        o80.InvalidArgument, match=r"no option 'frequenzy'\. Did you mean 'frequency'\?"
-    ):
+    with pytest.raises(o80.InvalidArgument, match=r"'frequenzy'.* Did you mean 'frequency'"):
         begin(segment, frequenzy=500)
-    with pytest.raises(o80.InvalidArgument, match=r"no option 'gian'\. Did you mean 'gain'\?"):
+    with pytest.raises(o80.InvalidArgument, match=r"'gian'.* Did you mean 'gain'"):
         begin(segment, gian=2.0)
     with pytest.raises(o80.InvalidArgument, match="no option 'colour': its own are gain, reach"):
         begin(segment, colour="red")

@@ -71,7 +71,7 @@ def test_returns_the_first_observation_within_the_tolerance(joints: o80.Frontend
     assert observation.desired.joints["position"][0] == 1.0
 
 
-def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend, segment: str) -> None:
+def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend) -> None:
     plant.stuck = True
     with pytest.raises(o80.NotReached) as raised:
         joints.move_to(
@@ -85,10 +85,8 @@ def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend, segment: st
     assert isinstance(error, TimeoutError)
     assert error.batch is not None
     assert error.batch.statuses == [o80.Status.COMPLETED]
-    assert str(error).startswith(
-        f"'{segment}' was not at its targets within 0.02 s: position of 'joints_0' is observed at "
-        "0 rad, 0.5 rad from its target of 0.5 rad (tolerance 0.01 rad). Its command has completed"
-    )
+    assert "'joints_0' is observed at 0 rad, 0.5 rad from its target of 0.5 rad" in str(error)
+    assert "Its command has completed" in str(error)
 
 
 def test_a_tolerance_may_be_given_for_each_field_and_actuator(joints: o80.Frontend) -> None:

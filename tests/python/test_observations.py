@@ -195,13 +195,6 @@ def test_the_last_n_or_from_one_to_another(arm: o80.Frontend) -> None:
     assert len(arm.history(since=6, until=4)) == 0
 
 
-def test_a_history_that_cannot_be_is_refused(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument):
-        arm.history(3, since=1)
-    with pytest.raises(o80.InvalidArgument):
-        arm.history(-1)
-
-
 def test_a_history_is_a_sequence_of_observations(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0, iterations=10)
     arm.burst(10)
@@ -248,11 +241,6 @@ def test_a_row_to_come_is_waited_for(process: o80.robots.Process) -> None:
 def test_a_row_that_does_not_come_times_out(arm: o80.Frontend) -> None:
     with pytest.raises(o80.TimeoutError, match="burst"):
         arm.wait_for(5, timeout=0.01)
-
-
-def test_a_negative_row_is_refused(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument):
-        arm.wait_for(-1)
 
 
 def test_a_slow_reader_is_told_what_it_missed(segment: str) -> None:

@@ -81,9 +81,7 @@ def test_a_replay_of_an_earlier_version_says_how_far_it_goes(name: str) -> None:
     with pytest.raises(o80.InvalidArgument) as raised:
         o80.replay(path, segment="joints")
     text = str(raised.value)
-    assert text.startswith(
-        "robot 'two_joints' is described differently than when segment 'joints' was"
-    )
+    assert "'two_joints' is described differently than when segment 'joints'" in text
     assert "extended.homing is in one of them" in text
     assert "driver=False" in text
 

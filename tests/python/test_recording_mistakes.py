@@ -156,23 +156,6 @@ def test_a_recording_that_is_open_when_its_program_ends_is_finished(tmp_path: Pa
     assert segment.epochs[0].rows == 41
 
 
-def test_the_extra_is_named_when_a_part_of_it_is_missing() -> None:
-    program = (
-        "import sys\n"
-        "sys.modules['zstandard'] = None\n"
-        "import o80\n"
-        "try:\n"
-        "    o80.open('run.mcap')\n"
-        "except o80.MissingExtra as error:\n"
-        "    print(error)\n"
-    )
-    said = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True, timeout=60
-    ).stdout
-
-    assert 'needs zstandard, which is not installed: pip install "o80[record]"' in said
-
-
 def test_the_end_of_a_recording_does_not_wait_for_rows_published_after_it(
     arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -269,9 +252,8 @@ def run_file(arm: o80.Frontend, tmp_path: Path) -> Path:
 def test_an_export_that_cannot_be_written_is_one_line(name: str, run_file: Path) -> None:
     path = run_file.parent / "results" / name
 
-    assert f"{path} cannot be written: there is no folder" in refused(
-        "export", run_file, "-o", path
-    )
+    said = refused("export", run_file, "-o", path)
+    assert f"{path} cannot be written: there is no folder" in said
 
 
 def test_a_plot_that_cannot_be_written_is_one_line(run_file: Path) -> None:
@@ -313,9 +295,7 @@ def test_a_sensor_without_actuators_is_recorded_plotted_and_exported(
     history = o80.open(path)[segment].history()
 
     assert history.extended.force.tolist() == [1.5]
-    assert "has no actuators. Name sensor values in fields" in refused(
-        "plot", path, "-o", tmp_path / "run.png"
-    )
+    assert "Name sensor values in fields" in refused("plot", path, "-o", tmp_path / "run.png")
     for words in (("plot", "--fields", "force", "-o", "run.png"), ("export", "-o", "run.npz")):
         subprocess.run([O80, words[0], path, *words[1:]], cwd=tmp_path, check=True, timeout=60)
     assert np.load(tmp_path / "run.npz")[f"{segment}/extended.force"].tolist() == [1.5]

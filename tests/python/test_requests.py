@@ -24,15 +24,6 @@ def test_a_rejected_request_raises_the_text_of_the_driver(arm: o80.Frontend) -> 
         arm.request("snapshot", slot=8)
 
 
-def test_an_unknown_request_or_field_is_refused_with_what_there_is(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument, match="reset, snapshot, restore"):
-        arm.request("launch")
-    with pytest.raises(o80.InvalidArgument, match="seed"):
-        arm.request("reset", sed=1)
-    with pytest.raises(o80.InvalidArgument, match="seed"):
-        arm.request("reset", seed=-1)
-
-
 def test_fields_with_a_default_may_be_left_out(arm: o80.Frontend) -> None:
     arm.request("reset")
     arm.request("snapshot")

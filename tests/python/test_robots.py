@@ -43,11 +43,17 @@ def test_a_robot_is_loaded_by_path() -> None:
     assert o80.robots.load(str(path)).path == path
 
 
-def test_an_unknown_robot_is_refused_with_what_there_is() -> None:
-    with pytest.raises(o80.DriverError, match="two_joints"):
-        o80.robots.load("three_joints")
-    with pytest.raises(o80.DriverError, match="no robot library"):
-        o80.robots.load("/nowhere/robot.so")
+@pytest.mark.parametrize(
+    ("name", "text"),
+    [
+        ("three_joints", "two_joints"),
+        ("mujco", "Did you mean 'mujoco'"),
+        ("/nowhere/robot.so", "no robot library"),
+    ],
+)
+def test_an_unknown_robot_is_refused_with_what_there_is(name: str, text: str) -> None:
+    with pytest.raises(o80.DriverError, match=text):
+        o80.robots.load(name)
 
 
 def test_robots_of_further_folders_are_found(
@@ -68,11 +74,6 @@ def test_a_robot_whose_package_is_missing_names_it(
 
     with pytest.raises(o80.DriverError, match=f"`pip install o80-{name}`.*O80_ROBOT_PATH"):
         o80.robots.load(name)
-
-
-def test_a_misspelt_robot_of_a_package_is_recognised() -> None:
-    with pytest.raises(o80.DriverError, match="Did you mean 'mujoco'"):
-        o80.robots.load("mujco")
 
 
 def test_a_package_that_fails_does_not_hide_other_robots(tmp_path: Path) -> None:

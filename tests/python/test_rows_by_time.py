@@ -76,9 +76,7 @@ def test_a_row_of_a_history_is_found_by_its_iteration(old: o80.Frontend) -> None
     history = old.history(10)
     assert history.at_iteration(95).iteration == 95
     assert history[-1].iteration == 100
-    with pytest.raises(
-        o80.RowOverwritten, match="row 5 is not in this history, which holds rows 91"
-    ):
+    with pytest.raises(o80.RowOverwritten, match=r"row 5 is not in .* holds rows 91"):
         history.at_iteration(5)
     with pytest.raises(o80.RowOverwritten, match="which is empty"):
         history[:0].at_iteration(95)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from typing import Any
 
 import numpy as np
@@ -134,13 +132,3 @@ def test_ppo_learns_on_copies() -> None:
     finally:
         torch.set_num_threads(threads)
         copies.close()
-
-
-def test_a_missing_extra_is_named() -> None:
-    program = (
-        "import sys; sys.modules['stable_baselines3'] = None; import o80.learning\n"
-        "try: o80.learning.stable_baselines3(None)\n"
-        "except o80.MissingExtra as error: print(error)"
-    )
-    printed = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stdout
-    assert 'pip install "o80[stable-baselines3]"' in printed

@@ -184,11 +184,6 @@ def test_a_trajectory_of_several_actuators_is_one_command(arm: o80.Frontend) -> 
     assert len(arm.pulse()) == 1
 
 
-def test_times_that_are_empty_are_refused(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument, match="one for each row"):
-        arm.add_trajectory(np.zeros((1, 2)), times=[])
-
-
 # ---------------------------------------------------------------------------- several at once
 
 
@@ -236,11 +231,6 @@ def test_one_that_cannot_be_refuses_all(
     with pytest.raises(o80.InvalidArgument, match=message):
         arm.add_command(actuators, targets)
     assert arm.added == 0
-
-
-def test_each_of_them_is_named_once(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument, match="'elbow' is named twice"):
-        arm.add_command(["elbow", 1], [0.1, 0.2])
 
 
 def test_states_of_several_types_may_be_given_in_part(robot: Robot) -> None:

@@ -70,8 +70,6 @@ def test_balls_are_named_or_read_from_a_path(tmp_path: Path) -> None:
     assert len(balls_from(file)) == 1
     with pytest.raises(ValueError, match="ball_count=3 is for simulated shots"):
         balls_from(file, count=3)
-    with pytest.raises(ValueError, match="ball_count must be at least 1, got 0"):
-        TaskSettings(ball_count=0)
 
 
 def test_extra_balls_are_other_shots() -> None:

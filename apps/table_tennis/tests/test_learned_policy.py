@@ -69,9 +69,7 @@ def test_what_is_masked_changes_no_action() -> None:
 
 
 def test_a_missing_file_is_named_with_what_would_make_it(tmp_path: Path) -> None:
-    with pytest.raises(
-        FileNotFoundError, match=r"policy\.npz: no such file.*o80_table_tennis\.train"
-    ):
+    with pytest.raises(FileNotFoundError, match=r"policy\.npz.*o80_table_tennis\.train"):
         LearnedPolicy.load(tmp_path / "policy")
 
 

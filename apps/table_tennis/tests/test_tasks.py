@@ -158,10 +158,3 @@ class TestReach:
         environment = TableTennisEnvironment(task=TaskSettings(task="reach"))
         with closing(environment), pytest.raises(ValueError, match="ball; reset knows no option"):
             environment.reset(options={"ball": 1})
-
-
-def test_what_is_no_task_is_refused() -> None:
-    with pytest.raises(ValueError, match="unknown task 'smsh'; there are: return, smash, hit"):
-        TaskSettings(task="smsh")
-    with pytest.raises(TypeError, match=r"or an object with .* has no low, high, plays_ball"):
-        TaskSettings(task=3)  # type: ignore[arg-type]

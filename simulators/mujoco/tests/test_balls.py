@@ -1,5 +1,6 @@
 """The laws of balls for Python: those of the simulation, and estimates that rest on them."""
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -117,32 +118,23 @@ def test_wrong_arguments_are_refused() -> None:
     each, seen = made_filter(2), np.zeros((2, 6))
     with pytest.raises(IndexError, match="which"):
         each.begin(seen, np.array([0, 2]))
-    with pytest.raises(ValueError, match="one measurement for each ball"):
-        each.step(seen, np.zeros(1, np.bool_))
-    with pytest.raises(ValueError, match="one for each ball"):
-        path(BALL[None], 0.01, 1, AIR, np.zeros(2))
-    with pytest.raises(ValueError, match="count"):
-        path(BALL[None], 0.01, -1, AIR)
-    with pytest.raises(ValueError, match="9 numbers"):
-        predicted_flight(BALL[:6], AIR, PLATFORM, 1.0, 0.02)
-    with pytest.raises(ValueError, match="at most 1000000 steps"):
-        predicted_flight(BALL, AIR, PLATFORM, 1.0, 0.0)
-    with pytest.raises(ValueError, match="more than a million"):
-        predicted_flight(np.eye(9)[2] + np.eye(9)[1], Air(), PLATFORM, 1e7, 1e3)
-    with pytest.raises(ValueError, match="gains"):
-        BallFilter(
-            count=1,
-            air=AIR,
-            platform=PLATFORM,
-            before=np.zeros((0, 24)),
-            after=np.zeros((1, 24)),
-            step=0.01,
-            mean_spin=0.0,
-        )
-    with pytest.raises(ValueError, match="step must be a finite number"):
-        path(BALL[None], np.nan, 1, AIR)
-    with pytest.raises(ValueError, match="normal must have the length 1"):
-        bounced(BALL, (0, 0, 2), (0, 0, 0), (1, 1, 1), radius=0.02)
+    none: dict[str, Any] = {"before": np.zeros((0, 24)), "after": np.zeros((1, 24))}
+    count: dict[str, Any] = {"count": 1, "step": 0.01, "mean_spin": 0.0}
+    far = np.eye(9)[2] + np.eye(9)[1]
+    wrong: list[tuple[Callable[[], object], str]] = [
+        (lambda: each.step(seen, np.zeros(1, np.bool_)), "one measurement for each ball"),
+        (lambda: path(BALL[None], 0.01, 1, AIR, np.zeros(2)), "one for each ball"),
+        (lambda: path(BALL[None], 0.01, -1, AIR), "count"),
+        (lambda: path(BALL[None], np.nan, 1, AIR), "step must be a finite number"),
+        (lambda: predicted_flight(BALL[:6], AIR, PLATFORM, 1.0, 0.02), "9 numbers"),
+        (lambda: predicted_flight(BALL, AIR, PLATFORM, 1.0, 0.0), "at most 1000000 steps"),
+        (lambda: predicted_flight(far, Air(), PLATFORM, 1e7, 1e3), "more than a million"),
+        (lambda: BallFilter(air=AIR, platform=PLATFORM, **count, **none), "gains"),
+        (lambda: bounced(BALL, (0, 0, 2), (0, 0, 0), (1, 1, 1), radius=0.02), "normal .* length 1"),
+    ]
+    for call, words in wrong:
+        with pytest.raises(ValueError, match=words):
+            call()
 
 
 @pytest.mark.parametrize("name", ["drag", "magnus", "spin_decay", "gravity", "saturation"])
