@@ -121,7 +121,8 @@ class Recording(Closeable):
         """False if it failed."""
         try:
             with self._lock:
-                self._recorder.catch_up()
+                if self._recorder.is_due():
+                    self._recorder.catch_up()
         except Exception as error:  # told by the next call, at the latest by close
             self._failure = error
         return self._failure is None
@@ -137,6 +138,6 @@ class Recording(Closeable):
 def _run(recording: "weakref.ref[Recording]", end: threading.Event) -> None:
     while not end.wait(BETWEEN_POLLS):
         alive = recording()
-        if alive is None or (alive._recorder.is_due() and not alive._catch_up()):
+        if alive is None or not alive._catch_up():
             return
         del alive
