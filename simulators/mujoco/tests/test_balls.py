@@ -123,7 +123,7 @@ def test_wrong_arguments_are_refused() -> None:
     far = np.eye(9)[2] + np.eye(9)[1]
     wrong: list[tuple[Callable[[], object], str]] = [
         (lambda: each.step(seen, np.zeros(1, np.bool_)), "one measurement for each ball"),
-        (lambda: path(BALL[None], 0.01, 1, AIR, np.zeros(2)), "one for each ball"),
+        (lambda: path(BALL[None], 0.01, 1, AIR, np.zeros(2)), "one value for each ball"),
         (lambda: path(BALL[None], 0.01, -1, AIR), "count"),
         (lambda: path(BALL[None], np.nan, 1, AIR), "step must be a finite number"),
         (lambda: predicted_flight(BALL[:6], AIR, PLATFORM, 1.0, 0.02), "9 numbers"),

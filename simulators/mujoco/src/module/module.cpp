@@ -116,7 +116,7 @@ Doubles path(const Rows<kNumbers>& balls, double step, std::int64_t count, const
   }
   finite(step, "step");
   const std::size_t number = balls.shape(0);
-  if (drags && drags->shape(0) != number) throw nb::value_error("drags: one for each ball");
+  if (drags && drags->shape(0) != number) throw nb::value_error("drags must have one value for each ball");
   const auto rows = static_cast<std::size_t>(count) + 1;
   double* values = nullptr;
   Doubles made = array({rows, number, kNumbers}, values);
@@ -134,7 +134,7 @@ Doubles path(const Rows<kNumbers>& balls, double step, std::int64_t count, const
 
 Doubles predicted(const Numbers& ball, const Air& air, const Platform* platform, double duration,
                   double step) {
-  if (ball.shape(0) != kNumbers) throw nb::value_error("a ball is 9 numbers");
+  if (ball.shape(0) != kNumbers) throw nb::value_error("a ball must have 9 numbers");
   if (!(step > 0) || !(duration >= 0) || duration > kMaxSteps * step) {
     throw nb::value_error("step and duration must be positive, with at most 1000000 steps");
   }
@@ -161,7 +161,7 @@ Doubles bounces(const Rows<kNumbers>& balls, const Platform& platform) {
 
 Doubles bounce(const Numbers& ball, const Three& normal, const Three& velocity,
                const Three& restitution, double friction, double radius, double inertia) {
-  if (ball.shape(0) != kNumbers) throw nb::value_error("a ball is 9 numbers");
+  if (ball.shape(0) != kNumbers) throw nb::value_error("a ball must have 9 numbers");
   if (std::abs(dot(vector(normal), vector(normal)) - 1) > 1e-6) {
     throw nb::value_error("normal must have the length 1");
   }
@@ -190,7 +190,7 @@ class Chosen {
       : which_(which ? which->data() : nullptr), count_(which ? which->shape(0) : filter.count()) {
     for (std::size_t i = 0; which_ != nullptr && i < count_; ++i) {
       if (which_[i] >= 0 && static_cast<std::size_t>(which_[i]) < filter.count()) continue;
-      throw nb::index_error("which: the filter has no ball of that number");
+      throw nb::index_error("which must name balls of the filter");
     }
   }
   std::size_t count() const { return count_; }
@@ -198,7 +198,7 @@ class Chosen {
     return which_ == nullptr ? i : static_cast<std::size_t>(which_[i]);
   }
   void expect(std::size_t rows) const {
-    if (rows != count_) throw nb::value_error("one measurement for each ball");
+    if (rows != count_) throw nb::value_error("give one measurement for each ball");
   }
 
  private:
