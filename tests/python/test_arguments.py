@@ -41,6 +41,8 @@ import o80
         (lambda arm: arm.prepared_burst(0), "at least 1, got 0"),
         (lambda arm: arm.prepared_burst(steps=0), "steps .* at least 1, got 0"),
         (lambda arm: arm.prepared_burst(each=0), "each .* at least 1, got 0"),
+        (lambda arm: arm.add_trajectory([[0, 0], [0, 9]], iterations=5), "9 .* 'elbow' .* limits"),
+        (lambda arm: arm.add_trajectory([[0, 0]], speed=0.0), "speed 0 .* positive"),
         (lambda arm: arm.add_trajectory([[0, 0]], times=[]), "one for each row"),
         (lambda arm: arm.add_trajectory([[0, 0]], times="abc"), "times .* got 'abc'"),
         (lambda arm: arm.add_command(0, 0.1, mode=None), "mode must be one of .*, got None"),
