@@ -28,6 +28,15 @@ import o80
         (lambda arm: arm.add_command(0, 0.1, every=2**62), "every must be seconds or a number"),
         (lambda arm: arm.add_command(0, 0.1, fastest=1), "fastest must be True or False, got 1"),
         (lambda arm: arm.add_command(True, 0.1), "index or its name, got True"),
+        (lambda arm: arm.add_command(1.5, 0.0), "index or its name, got 1.5"),
+        (lambda arm: arm.add_command("wrist", 0.0), "shoulder.*elbow"),
+        (lambda arm: arm.add_command(2, 0.0), "shoulder.*elbow"),
+        (lambda arm: arm.add_command(-1, 0.0), "shoulder.*elbow"),
+        (
+            lambda arm: arm.add_command(0, 0.5, duration=1.0, iterations=3),
+            "duration, speed, until, iterations and fastest",
+        ),
+        (lambda arm: arm.add_command(0, 0.5, profile="fastest"), "fastest=True"),
         (
             lambda arm: arm.add_command(0, 0.1, every=0.02, duration=1.0),
             "every is for set-points",

@@ -15,17 +15,6 @@ def test_actuators_go_by_index_or_name(arm: o80.Frontend) -> None:
     assert arm.burst(1).desired.tolist() == [0.25, 0.5]
 
 
-@pytest.mark.parametrize(
-    ("actuator", "text"),
-    [("wrist", "shoulder.*elbow"), (2, "shoulder.*elbow"), (-1, "elbow"), (1.5, "index or its")],
-)
-def test_an_unknown_actuator_is_refused_with_what_there_is(
-    arm: o80.Frontend, actuator: int | str, text: str
-) -> None:
-    with pytest.raises(o80.InvalidArgument, match=text):
-        arm.add_command(actuator, 0.0)
-
-
 @pytest.mark.parametrize("target", [3.1, float("nan"), float("inf"), "fast", None, [1, 2], {}])
 def test_a_target_that_cannot_be_followed_is_refused_when_it_is_added(
     arm: o80.Frontend, target: object
@@ -46,16 +35,6 @@ def test_every_number_is_a_target(arm: o80.Frontend, target: float) -> None:
     arm.add_command("elbow", target)
 
     assert arm.burst(1).desired[1] == float(target)
-
-
-def test_a_command_has_one_pace(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument, match="duration, speed, until, iterations and fastest"):
-        arm.add_command(0, 0.5, duration=1.0, iterations=3)
-
-
-def test_the_fastest_pace_is_no_profile_and_says_how_to_ask_for_it(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument, match="fastest=True"):
-        arm.add_command(0, 0.5, profile="fastest")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize(
