@@ -18,7 +18,11 @@ namespace o80::test {
 namespace {
 
 constexpr std::uint64_t kScriptsOfEachRun = 1000;
+#ifdef O80_TEST_SANITIZED
+constexpr std::uint64_t kPlannedScripts = 1000;
+#else
 constexpr std::uint64_t kPlannedScripts = 8000;
+#endif
 constexpr std::size_t kMaxShown = 6;
 
 std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {

@@ -266,6 +266,7 @@ std::optional<Failure> ScriptWorld::hear() {
 
 std::optional<Failure> ScriptWorld::hear_end(SentCommand& command, const StatusChange& change) {
   command.told = {change.status, change.iteration};
+  command.reason = change.reason;
   if (command.is_member && command.active_since != kNever) {
     const auto first = first_ends_.find({command.lane, command.id});
     // a member that gives way to its successor ends as overwritten

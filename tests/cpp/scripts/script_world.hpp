@@ -31,8 +31,9 @@ struct SentCommand {
   Status status = Status::queued;
   Iteration active_since = kNever;
   Iteration ended_at = kNever;
-  bool is_member = false;  // of a command of several actuators
-  Outcome told;            // the end that was told; of a member, that of all
+  bool is_member = false;        // of a command of several actuators
+  Outcome told;                  // the end that was told; of a member, that of all
+  Reason reason = Reason::none;  // of that end
 
   /// It gave the desired state of this iteration.
   bool drove(Iteration iteration) const {

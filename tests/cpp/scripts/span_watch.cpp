@@ -204,6 +204,10 @@ std::optional<Failure> SpanWatch::takes_its_time(const ScriptWorld& world,
   const Iteration took = command.ended_at - command.active_since + 1;
   const Iteration longest = std::max(plan.requested, plan.fewest + 1);
   const bool is_set_point = world.step_of(command).head.pace == Pace::direct;
+  if (took > plan.requested && plan.requested > 0 && !is_set_point &&
+      command.reason != Reason::limits) {
+    return Failure{"time of a plan", world.where(actuator, 0) + "it is late without a reason"};
+  }
   if (took <= longest && (!is_set_point || took >= plan.requested)) return std::nullopt;
   std::array<char, 160> text{};
   std::snprintf(text.data(), text.size(),

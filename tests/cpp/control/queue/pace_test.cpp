@@ -1,8 +1,6 @@
 // Paces that were not kept: speeds of integers, a speed without the first field (rule 5).
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "control/rig.hpp"
 
 namespace o80::test {

@@ -23,6 +23,11 @@ class LoopTest : public PuppetTest {
         std::make_unique<DriverInstance>(table(), options),
         BackendOptions{.segment = "puppet", .period = 200'000, .bursting = bursting});
   }
+  static std::unique_ptr<Loop> started(const OptionValues& options = {}, bool bursting = true) {
+    auto loop = make(options, bursting);
+    loop->start();
+    return loop;
+  }
 };
 
 TEST_F(LoopTest, StartsThenReadsThenIsRunning) {
@@ -37,8 +42,7 @@ TEST_F(LoopTest, StartsThenReadsThenIsRunning) {
 }
 
 TEST_F(LoopTest, WritesAndReadsOnceAnIteration) {
-  const auto loop = make();
-  loop->start();
+  const auto loop = started();
   UntypedFrontend frontend("puppet");
   add(frontend, 1, 4.0, {.pace = iterations(4)});
   frontend.start_burst(5);
@@ -93,8 +97,7 @@ TEST_P(ForkingLoop, EndsTheChildWhichTouchesNothing) {
   Puppet::on_read = [&](Reading<Puppet>& reading) {
     if (!writes || child_ == 0) fork_at(reading.iteration());
   };
-  const auto loop = make({{"finish_at", "4"}}, bursting);
-  loop->start();
+  const auto loop = started({{"finish_at", "4"}}, bursting);
   UntypedFrontend frontend("puppet");
   if (bursting) frontend.start_burst(4);
   EXPECT_TRUE(loop->run().in_order);
@@ -137,8 +140,7 @@ class LoopBreaks : public LoopFails {};
 
 TEST_P(LoopBreaks, InAnIterationAndSaysSoInTheSegmentAndStopsItsDriverOnce) {
   const auto [fails, why] = GetParam();
-  auto loop = make({{"fails", fails}});
-  loop->start();
+  auto loop = started({{"fails", fails}});
   UntypedFrontend frontend("puppet");
   std::thread runner([&] {
     const Ended ended = loop->run();
@@ -167,8 +169,7 @@ Batch poke(UntypedFrontend& frontend, std::uint32_t how) {
 }
 
 TEST_F(LoopTest, ServesRequests) {
-  const auto loop = make();
-  loop->start();
+  const auto loop = started();
   UntypedFrontend frontend("puppet");
   const Batch done = poke(frontend, 0);
   const Batch rejected = poke(frontend, 1);
@@ -186,8 +187,7 @@ TEST_F(LoopTest, ServesRequests) {
 TEST_F(LoopTest, EndsWhenARequestFailsOrThrows) {
   for (const auto& [how, why] : {std::pair(3U, "poked too hard"), std::pair(4U, "ouch")}) {
     Puppet::calls = {};
-    const auto loop = make();
-    loop->start();
+    const auto loop = started();
     UntypedFrontend frontend("puppet");
     const Batch batch = poke(frontend, how);
     EXPECT_EQ(loop->run_granted(kAll), Step::ended);
@@ -200,8 +200,7 @@ TEST_F(LoopTest, EndsWhenARequestFailsOrThrows) {
 }
 
 TEST_F(LoopTest, EndsInOrderWhenTheDriverIsDone) {
-  const auto loop = make({{"finish_at", "4"}});
-  loop->start();
+  const auto loop = started({{"finish_at", "4"}});
   UntypedFrontend frontend("puppet");
   const Burst burst = frontend.start_burst(10);
   EXPECT_EQ(loop->run_granted(kAll), Step::ended);
@@ -213,8 +212,7 @@ TEST_F(LoopTest, EndsInOrderWhenTheDriverIsDone) {
 }
 
 TEST_F(LoopTest, InterruptsWhatTheDriverSays) {
-  const auto loop = make();
-  loop->start();
+  const auto loop = started();
   UntypedFrontend frontend("puppet");
   add(frontend, 1, 9.0, {.pace = iterations(9)});
   const Batch batch = frontend.pulse_to_end();
@@ -228,8 +226,7 @@ TEST_F(LoopTest, InterruptsWhatTheDriverSays) {
 }
 
 TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
-  const auto loop = make({}, false);
-  loop->start();
+  const auto loop = started({}, false);
   UntypedFrontend frontend("puppet");
   std::thread runner([&] { EXPECT_TRUE(loop->run().in_order); });
   const std::int64_t begin = frontend.wait_for(1, kPatience).time();
@@ -242,8 +239,7 @@ TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
 }
 
 TEST_F(LoopTest, PublishesAnOverrunAndSkipsThePeriodsInsteadOfHurrying) {
-  const auto loop = make({}, false);
-  loop->start();
+  const auto loop = started({}, false);
   UntypedFrontend frontend("puppet");
   Puppet::on_write = [](const Desired<Puppet>& desired) {
     if (desired.iteration() != 5) return;

@@ -18,9 +18,7 @@ using ::testing::HasSubstr;
 
 class BurstCancelTest : public StationTest {
  protected:
-  BurstCancelTest() { station.start(); }
-
-  Station station{{.segment = "pair", .bursting = true}};
+  StartedStation station{{.segment = "pair", .bursting = true}};
 };
 
 TEST_F(BurstCancelTest, ACancelledBurstEndsAfterTheIterationUnderWay) {

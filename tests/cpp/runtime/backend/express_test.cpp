@@ -39,12 +39,11 @@ class ExpressTest : public StationTest {
     return frontends;
   }
 
-  Station station;
+  StartedStation station;
   std::vector<Batch> floods;
 };
 
 TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOtherLanes) {
-  station.start();
   UntypedFrontend one("pair");
   const Batch moving = send(one, 0, 9.0, {.pace = iterations(1000)});
   station.run(3);
@@ -74,7 +73,6 @@ TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOther
 }
 
 TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
-  station.start();
   UntypedFrontend one("pair");
   send(one, 1, 1.0);
   station.run(1);
@@ -106,7 +104,6 @@ TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
 }
 
 TEST_F(ExpressTest, TheHolderOfTheQueueIsTheLaneThatDoesMostOfTheWork) {
-  station.start();
   const UntypedFrontend reader("pair", {.access = Access::read_only});
   const SegmentView& view = reader.link()->segment.view();
   QueueWord word(station.backend.segment().view());
@@ -127,7 +124,6 @@ TEST_F(ExpressTest, TheHolderOfTheQueueIsTheLaneThatDoesMostOfTheWork) {
 }
 
 TEST_F(ExpressTest, ControlIsTakenAtOnceToo) {
-  station.start();
   UntypedFrontend one("pair");
   send(one, 1, 1.0);
   station.run(1);
@@ -145,7 +141,6 @@ TEST_F(ExpressTest, ControlIsTakenAtOnceToo) {
 }
 
 TEST_F(ExpressTest, ControlIsNotLetGoOfBeforeWhatWasSentUnderIt) {
-  station.start();
   UntypedFrontend one("pair");
   one.add_take_control();
   one.pulse();
@@ -161,7 +156,6 @@ TEST_F(ExpressTest, ControlIsNotLetGoOfBeforeWhatWasSentUnderIt) {
 }
 
 TEST_F(ExpressTest, AResumeWaitsForWhatWasSentBeforeIt) {
-  station.start();
   UntypedFrontend one("pair");
   const std::uint64_t number = one.halt("stop");
   station.run(1);
@@ -176,7 +170,6 @@ TEST_F(ExpressTest, AResumeWaitsForWhatWasSentBeforeIt) {
 }
 
 TEST_F(ExpressTest, APurgeEndsWhatWaitsForALaterIterationIfItWasSentBefore) {
-  station.start();
   UntypedFrontend one("pair");
   UntypedFrontend two("pair");
   add(one, 0, 1.0);
@@ -194,7 +187,6 @@ TEST_F(ExpressTest, APurgeEndsWhatWaitsForALaterIterationIfItWasSentBefore) {
 }
 
 TEST_F(ExpressTest, WhoMayCommandIsDecidedWhenABatchActs) {
-  station.start();
   UntypedFrontend one("pair");
   UntypedFrontend two("pair");
   one.add_take_control();
@@ -216,7 +208,6 @@ TEST_F(ExpressTest, WhoMayCommandIsDecidedWhenABatchActs) {
 // ------------------------------------------------------------------------------ refused in pulse
 
 TEST_F(ExpressTest, MoreRequestsOrOrdersThanABatchMayHaveAreRefused) {
-  station.start();
   UntypedFrontend one("pair");
   for (std::uint32_t i = 0; i < kMaxRequests + 1; ++i) add_request<Snapshot>(one);
   EXPECT_THAT(message_of<InvalidArgument>([&] { one.pulse(); }),
@@ -228,7 +219,6 @@ TEST_F(ExpressTest, MoreRequestsOrOrdersThanABatchMayHaveAreRefused) {
 }
 
 TEST_F(ExpressTest, MoreBatchesThanMayWaitForLaterIterationsAreRefused) {
-  station.start();
   UntypedFrontend one("pair");
   const auto pulse_at = [&](Iteration at) {
     add(one, 0, 1.0);
@@ -251,7 +241,6 @@ TEST_F(ExpressTest, MoreBatchesThanMayWaitForLaterIterationsAreRefused) {
 }
 
 TEST_F(ExpressTest, ABackendRejectsWhatASenderPutsIntoItsScheduleBeyondThat) {
-  station.start();
   Liar liar;
   std::vector<CommandId> ids;
   for (std::uint32_t i = 0; i < kMaxScheduledAt + 1; ++i) {
@@ -270,7 +259,6 @@ TEST_F(ExpressTest, ABackendRejectsWhatASenderPutsIntoItsScheduleBeyondThat) {
 }
 
 TEST_F(ExpressTest, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayBe) {
-  station.start();
   UntypedFrontend one("pair");
   const auto flood_at = [&](UntypedFrontend& frontend, PulseOptions::Late late) {
     std::vector<Batch> batches;
@@ -289,7 +277,6 @@ TEST_F(ExpressTest, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayBe) {
 }
 
 TEST_F(ExpressTest, WhatMayBeLateActsInOrderInTheIterationsThatFollow) {
-  station.start();
   UntypedFrontend one("pair");
   std::vector<Batch> batches;
   for (std::uint32_t i = 0; i < 6; ++i) {

@@ -57,10 +57,9 @@ TEST_F(GroupCommandTest, ATrajectoryIsOneToo) {
 }
 
 TEST_F(GroupCommandTest, IsRefusedWholeWithTheReason) {
-  Station station({.segment = "pair"}, [](Schema& schema) {
+  StartedStation station({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.minimum = -1, .maximum = 1, .speed = 10});
   });
-  station.start();
   UntypedFrontend frontend("pair");
   const auto refusal = [&](std::vector<std::uint32_t> actuators, std::vector<double> targets,
                            const CommandOptions& options = {.pace = iterations(2)}) {
@@ -81,10 +80,9 @@ TEST_F(GroupCommandTest, IsRefusedWholeWithTheReason) {
 }
 
 TEST_F(GroupCommandTest, MovesSmoothlyIfOneOfItsActuatorsDoesByDefault) {
-  Station station({.segment = "pair"}, [](Schema& schema) {
+  StartedStation station({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.speed = 1e6, .acceleration = 1e9});
   });
-  station.start();
   UntypedFrontend frontend("pair");
   add_both(frontend, 1.0, 1.0, {.pace = iterations(4)});
   frontend.pulse();

@@ -245,9 +245,8 @@ TEST_F(HaltTest, AStatusBearsNoReasonOfALaterHalt) {
 }
 
 TEST_F(HaltTest, ARobotThatIsNotWhereItShouldBeHalts) {
-  Station station({.segment = "pair"},
-                  [](Schema& schema) { schema.actuator(1).limits({.error = 0.25}); });
-  station.start();
+  StartedStation station({.segment = "pair"},
+                         [](Schema& schema) { schema.actuator(1).limits({.error = 0.25}); });
   UntypedFrontend frontend("pair");
   station.before_publish = [&] {
     if (station.backend.iteration() == 3) station.now[1] = 0.75;  // it hit something
@@ -264,9 +263,8 @@ TEST_F(HaltTest, ARobotThatIsNotWhereItShouldBeHalts) {
 }
 
 TEST_F(HaltTest, AReadingThatIsNoNumberHaltsWhereThereIsAnErrorLimit) {
-  Station station({.segment = "pair"},
-                  [](Schema& schema) { schema.actuator(1).limits({.error = 1e9}); });
-  station.start();
+  StartedStation station({.segment = "pair"},
+                         [](Schema& schema) { schema.actuator(1).limits({.error = 1e9}); });
   station.before_publish = [&] { station.now[1] = std::nan(""); };
   station.run(2);
   EXPECT_TRUE(UntypedFrontend("pair").halted());

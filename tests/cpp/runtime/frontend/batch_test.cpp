@@ -10,9 +10,8 @@ using ::testing::HasSubstr;
 class BatchTest : public StationTest {};
 
 TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
-  Station station({.segment = "pair"},
-                  [](Schema& schema) { schema.actuator(1).limits({.speed = 1000}); });
-  station.start();
+  StartedStation station({.segment = "pair"},
+                         [](Schema& schema) { schema.actuator(1).limits({.speed = 1000}); });
   UntypedFrontend frontend("pair");
   add(frontend, 0, 1.0, {.pace = iterations(2)});
   add(frontend, 0, 2.0, {.pace = iterations(2)});

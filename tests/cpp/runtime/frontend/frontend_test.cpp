@@ -16,10 +16,9 @@ class FrontendTest : public StationTest {};
 // ------------------------------------------------------------------------------ adding
 
 TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
-  Station station({.segment = "pair"}, [](Schema& schema) {
+  StartedStation station({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.minimum = -1, .maximum = 1, .speed = 10});
   });
-  station.start();
   UntypedFrontend frontend("pair");
   const auto refusal = [&](auto&& call) { return message_of<InvalidArgument>(call); };
   EXPECT_THAT(refusal([&] { add(frontend, 1, 1.5); }), HasSubstr("elbow"));
@@ -41,8 +40,8 @@ TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
 }
 
 TEST_F(FrontendTest, TheLastStateOfATrajectoryIsNoDirectValue) {
-  Station station({.segment = "pair"}, [](Schema& schema) { schema.actuator(0).rests_at("", 0); });
-  station.start();
+  StartedStation station({.segment = "pair"},
+                         [](Schema& schema) { schema.actuator(0).rests_at("", 0); });
   UntypedFrontend frontend("pair");
   const std::array<double, 2> rows{1, 2};
   frontend.add_trajectory(0, 2, std::as_bytes(std::span(rows)), {.mode = Mode::overwrite});

@@ -234,11 +234,10 @@ TEST_F(PreviewTest, IsWhatTheBackendThenDoesBitForBit) {
 }
 
 TEST_F(PreviewTest, IsExactForACommandThatOverwritesAPlannedMotion) {
-  Station station({.segment = "pair"}, [](Schema& schema) {
+  StartedStation station({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(0).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
     schema.actuator(1).limits({.speed = 3.0, .acceleration = 30.0});
   });
-  station.start();
   UntypedFrontend frontend("pair");
   Dice dice(7);
   const std::array<std::uint32_t, 2> both{0, 1};
@@ -260,10 +259,9 @@ TEST_F(PreviewTest, IsExactForACommandThatOverwritesAPlannedMotion) {
 }
 
 TEST_F(PreviewTest, BeginsAtRestAfterAFreshStart) {
-  Station station({.segment = "pair"}, [](Schema& schema) {
+  StartedStation station({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(0).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
   });
-  station.start();
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0, {.pace = iterations(500)});
   station.run(200);
@@ -282,10 +280,9 @@ TEST_F(PreviewTest, BeginsAtRestAfterAFreshStart) {
 }
 
 TEST_F(PreviewTest, SaysByHowMuchLaterAndWhy) {
-  Station station({.segment = "pair"}, [](Schema& schema) {
+  StartedStation station({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
   });
-  station.start();
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
   const std::uint32_t elbow = 1;
   const double target = 0.1;
@@ -317,9 +314,9 @@ TEST_F(PreviewTest, BeginsAfterTheRowThatIsGiven) {
 }
 
 TEST_F(PreviewTest, RefusesWhatAddRefusesAndWhatItCannotCompute) {
-  Station station({.segment = "pair"},
-                  [](Schema& schema) { schema.actuator(1).limits({.maximum = 1, .speed = 1}); });
-  station.start();
+  StartedStation station({.segment = "pair"}, [](Schema& schema) {
+    schema.actuator(1).limits({.maximum = 1, .speed = 1});
+  });
   station.run(3);
   UntypedFrontend frontend("pair");
   const auto refusal = [&](double target, const PaceSpec& pace) {
