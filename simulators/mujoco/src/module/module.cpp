@@ -116,7 +116,8 @@ Doubles path(const Rows<kNumbers>& balls, double step, std::int64_t count, const
   }
   finite(step, "step");
   const std::size_t number = balls.shape(0);
-  if (drags && drags->shape(0) != number) throw nb::value_error("drags must have one value for each ball");
+  if (drags && drags->shape(0) != number)
+    throw nb::value_error("drags must have one value for each ball");
   const auto rows = static_cast<std::size_t>(count) + 1;
   double* values = nullptr;
   Doubles made = array({rows, number, kNumbers}, values);
