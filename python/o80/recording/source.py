@@ -164,9 +164,10 @@ class Source:
             if known.journal is None:
                 self._journal.add_channel(self._file, note)
         self._has_told_end = False
-        self._tell(
-            self._next, INFO, f"run {note.number} of '{note.segment}' ({note.robot}) is recorded"
-        )
+        if known.channel is None:
+            self._tell(
+                self._next, INFO, f"run {note.number} of {note.robot} is recorded from here on"
+            )
 
     def _refuse_other_format(self, known: Written) -> None:
         """A journal is continued in the format in which it was begun."""
