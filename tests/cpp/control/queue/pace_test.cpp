@@ -34,6 +34,29 @@ void expect_ten_in_a_second(Kind kind) {
   EXPECT_EQ(rig.desired_as<T>(0), T{10}) << "and it gets somewhere";
 }
 
+void blend_both(void* out, const void* from, const void* to, double share) {
+  for (int i = 0; i < 2; ++i) {
+    const double begin = static_cast<const double*>(from)[i];
+    static_cast<double*>(out)[i] = begin + share * (static_cast<const double*>(to)[i] - begin);
+  }
+}
+
+TEST(Pace, AStateThatBlendsByItselfGoesFromItsBeginToItsTarget) {
+  Schema schema = plain_robot(1, 2);
+  schema.hooks[0].blend = blend_both;
+  Rig rig(std::move(schema));
+  for (const std::vector<double>& target : {std::vector{1.0, -2.0}, std::vector{4.0, 2.0}}) {
+    const std::array begin{rig.desired(0), rig.desired(1)};
+    rig.add(0, over(8), target);
+    rig.pulse();
+    for (int i = 1; i <= 8; ++i) {
+      rig.step();
+      EXPECT_DOUBLE_EQ(rig.desired(0), begin[0] + i / 8.0 * (target[0] - begin[0])) << i;
+      EXPECT_DOUBLE_EQ(rig.desired(1), begin[1] + i / 8.0 * (target[1] - begin[1])) << i;
+    }
+  }
+}
+
 TEST(Pace, TheSpeedLimitOfAnIntegerIsKept) {
   expect_ten_in_a_second<std::int8_t>(Kind::int8);
   expect_ten_in_a_second<std::uint16_t>(Kind::uint16);
