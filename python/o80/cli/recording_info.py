@@ -23,10 +23,12 @@ COLUMNS = (
     Column("run", right=True),
     Column("robot"),
     Column("recorded at", spare=1),
+    Column("from row", right=True, spare=3),
     Column("rows", right=True),
     Column("length", right=True),
     Column("missing", right=True),
     Column("decisions", spare=2),
+    Column("end"),
 )
 
 
@@ -102,10 +104,12 @@ def _row(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
         str(number),
         plain(fields["robot"]),
         time.strftime("%Y-%m-%d %H:%M:%S", local),
+        str(fields["first_row"]),
         str(fields["rows"]),
         age_text(fields["seconds"]) if epoch.rows else "-",
         str(fields["missing"]),
         _decisions(epoch.journal_codec),
+        fields["end"].partition(":")[0] or "not recorded",
     ]
 
 
@@ -122,12 +126,21 @@ def _summary(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
         "run": number,
         "robot": epoch.schema["robot"],
         "recorded_at": epoch.recorded_at,
+        "first_row": epoch.first_row,
         "rows": epoch.rows,
         "seconds": (end - begin) * 1e-9,
         "missing": sum(last - first + 1 for first, last in epoch.gaps),
         "decisions": epoch.has_journal,
         "journal_codec": epoch.journal_codec,
+        "end": _end(epoch),
     }
+
+
+def _end(epoch: RecordedEpoch) -> str:
+    """Empty also for a journal of a newer o80."""
+    if epoch.journal_codec is None or epoch.journal_codec > _core.JOURNAL_CODEC:
+        return ""
+    return epoch.end
 
 
 def _fields(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:

@@ -126,10 +126,10 @@ def entries_in(file: IO[bytes], found: Scan, channel: int) -> "Iterator[Entries]
                 yield Entries.of(message, codec)
 
 
-def last_entry_in(file: IO[bytes], found: Scan, channel: int) -> int:
-    """The number after the last entry of a journal in a file; 0: none."""
+def last_entries_in(file: IO[bytes], found: Scan, channel: int) -> Entries | None:
+    """The last part of a journal in a file. Raises ValueError if it is damaged."""
     for chunk in reversed(found.chunks):
         if channel in chunk.message_index_offsets:
             *_, last = messages_of(file, chunk, channel)
-            return Entries.of(last, 0).next
-    return 0
+            return Entries.of(last, codec_of(found, channel))
+    return None

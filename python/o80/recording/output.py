@@ -14,7 +14,7 @@ from o80.recording.cdr import ENCAPSULATION
 from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.file_writer import USUAL, FileWriter, Form
 from o80.recording.journal_channel import CONTENT as JOURNAL
-from o80.recording.journal_channel import last_entry_in
+from o80.recording.journal_channel import last_entries_in
 from o80.recording.reader import RecordingFile, files_of
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, content_of, has_end, index_of, scan
 
@@ -172,6 +172,7 @@ def _last_row(path: Path, found: Scan, channel: int) -> tuple[int, int] | None:
 def _last_entry(path: Path, found: Scan, channel: int) -> int:
     try:
         with path.open("rb") as stream:
-            return last_entry_in(stream, found, channel)
+            last = last_entries_in(stream, found, channel)
+            return 0 if last is None else last.next
     except ValueError as error:
         raise RecordingError(f"{path}: {error}") from error

@@ -17,7 +17,7 @@ from o80.base.machine import Machine
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import GAP, EpochNote
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
-from o80.recording.journal_channel import Entries, codec_of, entries_in
+from o80.recording.journal_channel import Entries, codec_of, entries_in, last_entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import Scan, attachment_of, content_of, index_of
@@ -271,6 +271,33 @@ class RecordedEpoch:
                 if messages.shape[1] != size:
                     raise ValueError(f"rows of '{self._note.segment}' have another size")
                 yield messages
+
+    @property
+    def first_row(self) -> int:
+        """Iteration of the first row that was recorded."""
+        return self._note.begin
+
+    @property
+    def end(self) -> str:
+        """How the run ended, "stopped" or "failed: " and why; empty: the recording does not say.
+
+        Then it was killed, was recorded no further, or had no journal. Raises RecordingError.
+        """
+        part = next((part for part in reversed(self._parts) if part.journal is not None), None)
+        if part is None or part.journal is None:
+            return ""
+        with part.reading() as file:
+            last = last_entries_in(file, part.found, part.journal)
+        if last is None:
+            return ""
+        journal = _core.RecordedJournal(self.description, 0)
+        try:
+            entries = journal.decode(last.content, last.codec)
+        except InvalidArgument as error:
+            raise RecordingError(f"{part.path}: {error}") from error
+        if not entries or entries[-1].kind != "ended":
+            return ""
+        return f"failed: {entries[-1].text}" if entries[-1].text else "stopped"
 
     # ------------------------------------------------------------------ journal
 
