@@ -86,7 +86,7 @@ class Fields(Record):
     __slots__ = ()
 
     def __getitem__(self, name: str) -> Any:
-        value = super().__getitem__(name)
+        value: Any = super().__getitem__(name)
         return value.item() if isinstance(value, np.generic) else value
 
 
