@@ -19,6 +19,8 @@ COMMANDS = {
     "record": "record.record",
     "save": "save.save",
     "repair": "save.repair",
+    "cut": "cut.cut",
+    "merge": "cut.merge",
     "play": "play.play",
     "plot": "plot.plot",
     "view": "view.view",

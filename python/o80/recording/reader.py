@@ -43,6 +43,22 @@ class RecordingFile:
         return all(found.finished for _, found in self._files)
 
     @property
+    def scans(self) -> "list[tuple[Path, Scan]]":
+        """Its files and their contents, in their order."""
+        return self._files
+
+    @property
+    def time_range(self) -> tuple[int, int]:
+        """First and last time on the wall clock [ns since 1970]. Raises RecordingError: empty."""
+        chunks = [chunk for _, found in self._files for chunk in found.chunks]
+        if not chunks:
+            raise RecordingError(f"{self.path} holds no message")
+        return (
+            min(chunk.message_start_time for chunk in chunks),
+            max(chunk.message_end_time for chunk in chunks),
+        )
+
+    @property
     def size(self) -> int:
         """Size of its files [bytes]."""
         return sum(path.stat().st_size for path, _ in self._files)

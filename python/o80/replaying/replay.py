@@ -269,6 +269,9 @@ class _RunReplay:
             if found != expected:
                 self._gap = f"rows {expected} to {found - 1} are missing"
                 break
+            jumps = np.flatnonzero(np.diff(block.iteration) != 1)
+            if len(jumps):  # thinned
+                block = block[: int(jumps[0]) + 1]
             expected = int(block.iteration[-1]) + 1
             whole = block if held is None else _joined(held, block)
             held = None

@@ -1,0 +1,84 @@
+"""``o80 cut`` and ``o80 merge``: recordings made of others."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from o80.recording.part import Selection
+
+_Output = Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")]
+_TIME = "10:02 or 10:02:30.5 (clock of this computer), or 12.5 (seconds from its begin)"
+
+
+def cut(
+    recording: Annotated[Path, typer.Argument(help="A recording, or a folder of --split.")],
+    output: _Output,
+    begin: Annotated[str, typer.Option("--from", help=f"First time: {_TIME}.")] = "",
+    end: Annotated[str, typer.Option("--to", help="Last time, in the same ways.")] = "",
+    segment: Annotated[
+        list[str] | None, typer.Option(help="Keep this segment only; may be repeated.")
+    ] = None,
+    every: Annotated[
+        int, typer.Option(min=1, help="Keep every nth row only, and all decisions.")
+    ] = 1,
+) -> None:
+    """Write a part of a recording into a new file."""
+    from o80.base.errors import InvalidArgument
+    from o80.recording.part import Selection
+    from o80.recording.reader import open as open_recording
+
+    found = open_recording(recording)
+    first, last = found.time_range
+    for name in segment or ():
+        if name not in found.segments:
+            there = ", ".join(found.segments) or "none"
+            raise InvalidArgument(f"no segment '{name}' in {recording}; there are: {there}")
+    selection = Selection(
+        _time(begin, first, first, "--from"),
+        _time(end, first, last, "--to"),
+        frozenset(segment) if segment else None,
+        every,
+    )
+    if selection.begin > selection.end:
+        raise InvalidArgument(f"--from must be before --to, got {begin} and {end}")
+    _write([recording], output, selection)
+
+
+def merge(
+    recordings: Annotated[list[Path], typer.Argument(help="Recordings, at least two.")],
+    output: _Output,
+) -> None:
+    """Write several recordings into one file; rows that several have are kept once."""
+    from o80.recording.part import Selection
+
+    _write(recordings, output, Selection())
+
+
+def _write(recordings: list[Path], output: Path, selection: Selection) -> None:
+    from o80.recording.part import write_part
+
+    rows = write_part(recordings, output, selection)
+    for name, (count, first, last) in rows.items():
+        print(f"{name}: {count} rows, {first} to {last}")
+    print(f"{'written to' if rows else 'no row lies there: no rows in'} {output}")
+
+
+def _time(text: str, first: int, default: int, option: str) -> int:
+    """A log time [ns]."""
+    if not text:
+        return default
+    try:
+        if ":" not in text:
+            return first + round(float(text) * 1e9)
+        hours, minutes, seconds = (*text.split(":"), "0")[:3]
+        day = time.localtime(first * 1e-9)
+        midnight = time.mktime((day.tm_year, day.tm_mon, day.tm_mday, 0, 0, 0, 0, 0, -1))
+        passed = int(hours) * 3600 + int(minutes) * 60 + float(seconds)
+        return round((midnight + passed) * 1e9)
+    except ValueError:
+        raise typer.BadParameter(f"write {_TIME}, not '{text}'", param_hint=option) from None

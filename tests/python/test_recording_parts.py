@@ -1,0 +1,106 @@
+"""Recordings made of others: `o80 cut` and `o80 merge`."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from published_rows import topic_of
+from rosbags.highlevel import AnyReader
+
+import o80
+from o80.cli.cut import cut, merge
+
+
+@pytest.fixture
+def day(segment: str, tmp_path: Path) -> Path:
+    """Two robots, 3 s; the first at rest in the middle, with a mark each second."""
+    path = tmp_path / "day.mcap"
+    load = o80.robots.load("two_joints").inline
+    with load(segment) as arm, load(f"{segment}-b") as other:
+        recording = o80.Recording(path, [arm, other])
+        for second in range(3):
+            recording.mark("second", number=second)
+            for robot in (arm, other):
+                robot.add_command("elbow", 0.1 * second, iterations=100)
+                robot.burst(500)
+            recording.flush()
+            for robot in (arm, other):
+                robot.burst(500)
+            recording.flush()
+        recording.close()
+    return path
+
+
+def test_a_stretch_of_time_is_cut_and_replayed(day: Path, segment: str, tmp_path: Path) -> None:
+    part = tmp_path / "part.mcap"
+    cut(day, part, "0.7", "2.6")
+    whole, read = o80.open(day), o80.open(part)
+    first = whole.time_range[0]
+    for name in whole:
+        epoch = whole[name].epochs[0]
+        begin, end = (first + round(s * 1e9) - epoch.wall_offset for s in (0.7, 2.6))
+        expected = epoch.history(from_time=begin, to_time=end)
+        assert read[name].history().rows.tobytes() == expected.rows.tobytes()
+        assert read[name].schema == whole[name].schema
+        assert read[name].epochs[0].first_row == expected.iteration[0]
+        assert read[name].epochs[0].provenance == epoch.provenance
+    assert [mark.values["number"] for mark in read.marks] == [1, 2]
+    report = o80.replay(part, driver=False)
+    assert report.difference is None
+    assert all(run.rows > 1000 for run in report), report
+    with AnyReader([part]) as reader:
+        topics = [each.topic for each, _, _ in reader.messages()]
+    assert topics.count(topic_of(segment)) == topics.count(topic_of(segment, "joint_states"))
+
+
+def test_segments_are_chosen_and_rows_are_thinned(day: Path, segment: str, tmp_path: Path) -> None:
+    part = tmp_path / "part.mcap"
+    cut(day, part, segment=[segment], every=10)
+    read = o80.open(part)
+    assert [*read] == [segment]
+    assert read[segment].history().iteration.tolist() == [*range(0, 3001, 10)]
+    assert len(read[segment].epochs[0].journal()) == len(o80.open(day)[segment].epochs[0].journal())
+    report = o80.replay(part)
+    assert not report.identical
+    assert "missing" in str(report)
+    with pytest.raises(o80.InvalidArgument, match=segment):
+        cut(day, tmp_path / "other.mcap", segment=["leg"])
+
+
+def test_parts_that_overlap_are_merged_to_the_whole(day: Path, tmp_path: Path) -> None:
+    parts = [tmp_path / f"{i}.mcap" for i in range(3)]
+    for i, part in enumerate(parts):
+        cut(day, part, f"{i - 0.2}" if i else "", f"{i + 1.1}")
+    merged = tmp_path / "merged.mcap"
+    merge([parts[1], parts[2], parts[0]], merged)
+    whole, read = o80.open(day), o80.open(merged)
+    for name in whole:
+        assert len(read[name].epochs) == 1
+        assert read[name].history().rows.tobytes() == whole[name].history().rows.tobytes()
+        assert repr(read[name].epochs[0].journal()) == repr(whole[name].epochs[0].journal())
+    assert o80.replay(merged).identical
+
+
+def test_runs_of_several_recordings_are_numbered_anew(segment: str, tmp_path: Path) -> None:
+    paths = [tmp_path / f"{i}.mcap" for i in range(2)]
+    robots = o80.robots.load("two_joints"), o80.robots.load("two_joints")
+    for i, (robot, path) in enumerate(zip(robots, paths, strict=True)):
+        with robot.inline(segment) as arm, o80.Recording(path, arm):
+            arm.burst(100 * (i + 1))
+    merged = tmp_path / "merged.mcap"
+    merge(paths[::-1], merged)
+    epochs = o80.open(merged)[segment].epochs
+    assert [epoch.rows for epoch in epochs] == [101, 201]
+    assert np.array_equal(epochs[1].history().iteration, np.arange(201))
+    assert all(run.identical for run in o80.replay(merged))
+
+
+def test_a_stretch_without_rows_says_so(
+    day: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    cut(day, tmp_path / "none.mcap", "100", "200")
+    assert "no row" in capsys.readouterr().out
+    with pytest.raises(o80.InvalidArgument, match="--from must be before --to"):
+        cut(day, tmp_path / "other.mcap", "2", "1")
+    with pytest.raises(o80.RecordingError, match="exists"):
+        cut(day, day, "0", "1")
