@@ -4,11 +4,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from published_rows import topic_of
 from rosbags.highlevel import AnyReader
 
 import o80
 from o80.cli.cut import cut, merge
+from o80.recording.epoch import topic_of
 
 
 @pytest.fixture
