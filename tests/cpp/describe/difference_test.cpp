@@ -117,7 +117,7 @@ TEST(Difference, OfHelpsAloneIsSaidToo) {
   const Schema expected = schema_of<MixedRobot>();
   Schema found = expected;
   found.requests[0].help = HelpText("goes home");
-  EXPECT_THAT(difference(expected, found), HasSubstr("helps"));
+  EXPECT_THAT(difference(expected, found), HasSubstr("help texts"));
 }
 
 }  // namespace
