@@ -34,6 +34,7 @@ from o80.view.curves import Panels
 
 WAIT = 30.0  # [s] longer than any wait should take
 Columns = dict[str, NDArray[Any]]
+PREFIXES = {"": 1.0, "k": 1e3, "M": 1e6, "G": 1e9, "m": 1e-3, "\u00b5": 1e-6, "n": 1e-9}
 
 
 def drawn(random: np.random.Generator, described: Any, lead: tuple[int, ...] = ()) -> Any:
@@ -261,8 +262,13 @@ class Readers:
                 assert curve == packed(values.astype(np.float64)), column
                 text = texts[part].replace("\u202f", "")
                 if values.dtype.kind == "f":
-                    assert float(text) == pytest.approx(float(values[4]), rel=1e-3), column
+                    number, *unit = text.split(" ")
+                    unit_there = panels.columns[name][part].unit
+                    prefix = "".join(unit).removesuffix(unit_there.replace(" ", ""))
+                    value = float(number) * PREFIXES[prefix]
+                    assert value == pytest.approx(float(values[4]), rel=1e-3), column
                 else:
+                    text = text.split(" ")[0]
                     assert text == str(values[4]) or (str(values[4]), text) in labels
 
 
