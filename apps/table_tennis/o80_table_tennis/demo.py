@@ -197,14 +197,20 @@ def _advance(progress: Progress, bar: Any) -> Callable[[EpisodeSummary], None]:
 
     def advance(summary: EpisodeSummary) -> None:
         nonlocal returns
+        if _signals:  # came while a destructor ran, from which nothing is raised
+            sys.exit(128 + _signals[0])
         returns += summary.returned
         progress.update(bar, advance=1, returns=f"{returns} returned")
 
     return advance
 
 
+_signals: list[int] = []  # that have come
+
+
 def _end_in_order(number: int, _frame: FrameType | None) -> None:
     """SIGTERM unwinds the stack, so that no process and no segment remains."""
+    _signals.append(number)
     sys.exit(128 + number)
 
 
