@@ -169,7 +169,7 @@ def test_interrupted_it_leaves_nothing_behind(tmp_path: Path, sent: signal.Signa
             time.sleep(0.05)
         # as a terminal does: to all of its processes
         os.killpg(process.pid, sent)
-        assert process.wait(20) != 0
+        assert process.wait(STARTING) != 0
     finally:
         if process.poll() is None:
             process.kill()
