@@ -1,4 +1,6 @@
 #include "o80/runtime/backend.hpp"
+#include <optional>
+#include <utility>
 
 #include "runtime/station.hpp"
 
@@ -294,7 +296,7 @@ TEST_F(BackendTest, ItsPhaseFollowsStepPublishBrakeAndEnd) {
 }
 
 TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {
-  auto station = std::make_unique<Station>();
+  std::optional<Station> station(std::in_place);
   station->start();
   UntypedFrontend frontend("pair");
   add_request<Break>(frontend);

@@ -1,6 +1,8 @@
 #include "o80/runtime/frontend.hpp"
 
 #include <atomic>
+#include <optional>
+#include <utility>
 
 #include "runtime/station.hpp"
 
@@ -262,7 +264,7 @@ TEST_F(FrontendTest, AReaderThatIsOvertakenAllTheTimeStillReadsTrueRowsInOrder) 
 }
 
 TEST_F(FrontendTest, WaitsEndWithAnErrorThatSaysWhatBecameOfTheBackend) {
-  auto station = std::make_unique<Station>();
+  std::optional<Station> station(std::in_place);
   station->start();
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(50)});
