@@ -45,6 +45,10 @@ inline constexpr Timeout kPatience = std::chrono::seconds(60);
 /// A backend driven by hand, iteration after iteration, with no clock.
 class Station : private RequestServer {
  public:
+  virtual ~Station() = default;
+  Station(const Station&) = delete;
+  Station& operator=(const Station&) = delete;
+
   explicit Station(const BackendOptions& options = {.segment = "pair"},
                    const std::function<void(Schema&)>& describe = {})
       : backend(schema_of(describe), options, this) {}
