@@ -20,9 +20,18 @@ constexpr std::int64_t kShortStop = 4;
 
 struct Done {
   std::uint64_t value;
-  std::int64_t iteration;
+  std::int64_t iteration;  // the last one, if it stood there
   std::uint32_t actuator;
+  std::int64_t first;
 };
+
+/// Of several visits to a place, the one at this iteration: within limits of acceleration, places
+/// of the way there and back may be the same.
+void keep_at(std::int64_t iteration, std::vector<Done>& done) {
+  std::erase_if(
+      done, [&](const Done& each) { return iteration < each.first || iteration > each.iteration; });
+  for (Done& each : done) each.iteration = iteration;
+}
 
 /// What a driver did, by value.
 class Deeds {
@@ -33,11 +42,11 @@ class Deeds {
       const JournalRow& row = life.journal[static_cast<std::size_t>(k)];
       for (std::uint32_t i = 0; i < kActuators; ++i)
         if ((row.active >> i & 1) != 0)
-          done_.push_back({std::bit_cast<std::uint64_t>(row.desired[i]), k, i});
+          done_.push_back({std::bit_cast<std::uint64_t>(row.desired[i]), k, i, k});
     }
     for (std::uint32_t i = 0; i < life.served; ++i) {
       const ServedRequest& request = life.requests[i];
-      done_.push_back({request.mark, request.iteration, 0});
+      done_.push_back({request.mark, request.iteration, 0, request.iteration});
       fresh_start_ = fresh_start_ || request.mark >> 63 != 0;
     }
     std::stable_sort(done_.begin(), done_.end(),
@@ -52,7 +61,7 @@ class Deeds {
       if (i->actuator != command.actuator) continue;
       // a minimum jerk that fades out on its target stands there until its last iteration
       if (!found.empty() && found.back().iteration + 1 == i->iteration) {
-        found.back() = *i;
+        found.back().iteration = i->iteration;
       } else {
         found.push_back(*i);
       }
@@ -146,10 +155,8 @@ class Judge {
     if (kind != SentKind::command && kind != SentKind::mark && kind != SentKind::look) return;
     const Generation& life = round_.lives[batch.generation];
     std::vector<Done> done = deeds(batch.generation).of(command);
-    // within limits of acceleration, places of the way there and back may be the same
     const std::int64_t end = has_ended(command.told) ? command.told_at : command.found_at;
-    if (is_limited(batch, command))
-      std::erase_if(done, [&](const Done& each) { return each.iteration != end; });
+    if (is_limited(batch, command)) keep_at(end, done);
     const auto sent = static_cast<Sent>(batch.sent.load());
     if (done.size() > 1)
       return add(Fault::doubled, slot, batch, command,
@@ -199,8 +206,7 @@ class Judge {
     for (std::uint32_t i = 0; i < kActuators; ++i) {
       const SentCommand member = member_of(group, i);
       std::vector<Done> done = deeds(batch.generation).of(member);
-      if (is_limited(batch, member))
-        std::erase_if(done, [&](const Done& each) { return each.iteration != at; });
+      if (is_limited(batch, member)) keep_at(at, done);
       const std::string name = "member " + std::to_string(i) + " of a group: ";
       if (done.size() > 1)
         return add(Fault::doubled, slot, batch, group,
@@ -273,7 +279,7 @@ class Judge {
         return add(Fault::falsely_told, slot, batch, command,
                    "never done; the driver saw " +
                        std::to_string(round_.lives[batch.generation].rows) + " rows" +
-                       around(round_.lives[batch.generation], {0, at, command.actuator}) +
+                       around(round_.lives[batch.generation], {0, at, command.actuator, at}) +
                        told_of(slot, batch));
       if (command.kind == SentKind::command && done[0].iteration != at)
         add(Fault::falsely_told, slot, batch, command,
