@@ -235,6 +235,27 @@ def test_rosbags_reads_marks_and_what_happened_in_words(arm: o80.Frontend, tmp_p
             assert stamp == times[int(row[1])] + epoch.wall_offset
 
 
+def test_decisions_that_cannot_be_told_in_words_are_recorded_all_the_same(
+    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def newer(*_: Any) -> str:
+        raise LookupError("request 999")
+
+    monkeypatch.setattr("o80.rows.journal_text.JournalText.text", newer)
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm):
+        arm.add_command("elbow", 0.5, iterations=20)
+        arm.burst(30)
+    assert repr(o80.open(path)[arm.segment].epochs[0].journal()) == repr(arm.journal())
+    with AnyReader([path]) as reader:
+        lines: list[Any] = [
+            reader.deserialize(raw, each.msgtype)
+            for each, _, raw in reader.messages()
+            if each.topic == "/rosout"
+        ]
+    assert any("cannot be told in words: request 999" in line.msg for line in lines)
+
+
 def test_names_with_one_topic_are_not_recorded_together(segment: str, tmp_path: Path) -> None:
     near = segment.replace("-", "_")
     load = o80.robots.load("two_joints").inline

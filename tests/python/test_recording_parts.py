@@ -78,6 +78,7 @@ def test_parts_that_overlap_are_merged_to_the_whole(day: Path, tmp_path: Path) -
         assert len(read[name].epochs) == 1
         assert read[name].history().rows.tobytes() == whole[name].history().rows.tobytes()
         assert repr(read[name].epochs[0].journal()) == repr(whole[name].epochs[0].journal())
+    assert read.marks == whole.marks
     assert o80.replay(merged).identical
 
 

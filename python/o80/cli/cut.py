@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from o80.recording.part import Selection
 
 _Output = Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")]
+DAY = 86_400 * 10**9  # [ns]
 _TIME = "10:02 or 10:02:30.5 (clock of this computer), or 12.5 (seconds from its begin)"
 
 
@@ -39,8 +40,8 @@ def cut(
             there = ", ".join(found.segments) or "none"
             raise InvalidArgument(f"no segment '{name}' in {recording}; there are: {there}")
     selection = Selection(
-        _time(begin, first, first, "--from"),
-        _time(end, first, last, "--to"),
+        _time(begin, first, last, "--from") if begin else first,
+        _time(end, first, last, "--to") if end else last,
         frozenset(segment) if segment else None,
         every,
     )
@@ -68,10 +69,8 @@ def _write(recordings: list[Path], output: Path, selection: Selection) -> None:
     print(f"{'written to' if rows else 'no row lies there: no rows in'} {output}")
 
 
-def _time(text: str, first: int, default: int, option: str) -> int:
-    """A log time [ns]."""
-    if not text:
-        return default
+def _time(text: str, first: int, last: int, option: str) -> int:
+    """A log time [ns]; first and last: those of the recording, which may be of several days."""
     try:
         if ":" not in text:
             return first + round(float(text) * 1e9)
@@ -79,6 +78,7 @@ def _time(text: str, first: int, default: int, option: str) -> int:
         day = time.localtime(first * 1e-9)
         midnight = time.mktime((day.tm_year, day.tm_mon, day.tm_mday, 0, 0, 0, 0, 0, -1))
         passed = int(hours) * 3600 + int(minutes) * 60 + float(seconds)
-        return round((midnight + passed) * 1e9)
+        at = round((midnight + passed) * 1e9)
+        return at + DAY if at < first and at + DAY <= last else at
     except ValueError:
         raise typer.BadParameter(f"write {_TIME}, not '{text}'", param_hint=option) from None

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import o80._core as _core
+from o80.base.errors import Error
 from o80.base.words import Status
 from o80.recording.blocks import Messages
 from o80.recording.cdr import CdrWriter
@@ -44,7 +45,7 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
-MAX_BYTES = 4096  # of a journal between two polls; of more, only the notable entries are told
+MAX_BYTES = 1 << 16  # of a journal between two polls; of more, only notable entries are told
 MAX_ENDS = 20  # of commands that are told one by one in a poll
 _SILENT = {"taken", "scheduled", "burst", "burst_ended"}
 _LEVELS = {
@@ -94,7 +95,8 @@ class JournalLog:
     """Tells the entries of a journal while they are recorded."""
 
     def __init__(self, frontend: Frontend) -> None:
-        self._native = _core.RecordedJournal(frontend._description, 0)
+        self._description = frontend._description
+        self._native = _core.RecordedJournal(self._description, 0)
         self._decoder = EntryDecoder(frontend.schema)
         self._text = JournalText()
 
@@ -104,8 +106,17 @@ class JournalLog:
         notable: there are others among the entries than batches, bursts and ends of commands.
         """
         many = len(entries.content) > MAX_BYTES
+        if many:  # what it knows of open commands would only grow
+            self._native = _core.RecordedJournal(self._description, 0)
+            self._text = JournalText()
         if many and not notable:
             return []
+        try:
+            return self._lines(entries, many)
+        except (Error, LookupError, ValueError) as error:  # of a newer o80, or damaged
+            return [(-1, WARN, f"decisions that cannot be told in words: {error}")]
+
+    def _lines(self, entries: Entries, many: bool) -> list[tuple[int, int, str]]:
         natives = self._native.decode(entries.content, entries.codec)
         if many:
             natives = [each for each in natives if each.kind not in {*_SILENT, "status"}]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import struct
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from o80.base.errors import RecordingError
+from o80.base.unwritable import reason
 from o80.recording import joint_states
 from o80.recording.blocks import Messages
 from o80.recording.cdr import ENCAPSULATION
@@ -57,9 +59,13 @@ def write_part(
             with found.opened(path) as content:
                 try:
                     writer.add(content, found)
-                except ValueError as error:
-                    raise RecordingError(f"{path}: {error}") from error
+                except (ValueError, LookupError, struct.error) as error:
+                    raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
         file.finish()
+    except OSError as error:
+        file.close()
+        output.unlink(missing_ok=True)
+        raise RecordingError(f"{output} cannot be written: {reason(output, error)}") from error
     except BaseException:
         file.close()
         output.unlink(missing_ok=True)
@@ -74,6 +80,7 @@ class _PartWriter:
         self._channels: dict[object, int] = {}
         self._numbers: dict[Run, int] = {}  # of runs in the new file
         self._next: dict[int, int] = {}  # by new channel: what comes next, so nothing comes twice
+        self._seen: set[tuple[str, int, bytes]] = set()
         self._is_over: set[int] = set()  # journals that have what lies behind the end
 
     def add(self, content: IO[bytes], found: Scan) -> None:
@@ -104,8 +111,13 @@ class _PartWriter:
                 messages = self._entries(channel, messages)
             elif channel.metadata.get("content") == joint_states.CONTENT and run in kept:
                 messages = [each for each in messages if each[0] in kept[run]]
-            else:
-                messages = [each for each in messages if self._selection.holds(each[0])]
+            else:  # marks and the log; recordings of the same time have them twice
+                messages = [
+                    each
+                    for each in messages
+                    if self._selection.holds(each[0]) and (channel.topic, *each) not in self._seen
+                ]
+                self._seen.update((channel.topic, *each) for each in messages)
             if messages:
                 yield Messages(self._channel(channel), [*messages])
 
@@ -176,10 +188,10 @@ class _PartWriter:
             texts = channel.metadata if run is None else self._texts(channel)
             if begin is not None:
                 texts = texts | {"begin": str(begin)}
-            schema = self._found.schemas[channel.schema_id]
-            number = self._file.add_schema(
-                schema.name, schema.data.decode(), encoding=schema.encoding
-            )
+            number, schema = 0, self._found.schemas.get(channel.schema_id)
+            if schema is not None:
+                text = schema.data.decode(errors="replace")
+                number = self._file.add_schema(schema.name, text, encoding=schema.encoding)
             self._channels[key] = self._file.add_channel(
                 channel.topic, number, texts, encoding=channel.message_encoding
             )

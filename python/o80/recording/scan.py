@@ -74,6 +74,17 @@ class Scan:
         None  #: of a foreign file, as o80 writes one: what this is a scan of
     )
 
+    def take(self, opcode: int, stream: ReadDataStream) -> None:
+        """Notes a header, a schema or a channel; nothing else."""
+        if opcode == Opcode.HEADER:
+            self.library = Header.read(stream).library
+        elif opcode == Opcode.SCHEMA:
+            schema = Schema.read(stream)
+            self.schemas[schema.id] = schema
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(stream)
+            self.channels[channel.id] = channel
+
     def opened(self, path: Path) -> IO[bytes]:
         """The file that this is a scan of. Raises OSError."""
         return (path if self.copy is None else self.copy.path).open("rb")
@@ -151,13 +162,8 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
             found.chunks.append(_chunk_index(data, begin))
             continue
         stream = ReadDataStream(BytesIO(data[begin:at]))
-        if opcode == Opcode.SCHEMA:
-            schema = Schema.read(stream)
-            found.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(stream)
-            found.channels[channel.id] = channel
-        elif opcode == Opcode.ATTACHMENT_INDEX:
+        found.take(opcode, stream)
+        if opcode == Opcode.ATTACHMENT_INDEX:
             found.attachments.append(AttachmentIndex.read(stream))
         elif opcode == Opcode.METADATA_INDEX:
             found.metadata_places.append(MetadataIndex.read(stream))
@@ -183,8 +189,8 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
         file.seek(place.offset + HEAD.size)
         found.metadata.append(Metadata.read(ReadDataStream(BytesIO(file.read(place.length)))))
     file.seek(len(MAGIC))
-    _, length = HEAD.unpack(file.read(HEAD.size))
-    found.library = Header.read(ReadDataStream(BytesIO(file.read(length)))).library
+    opcode, length = HEAD.unpack(file.read(HEAD.size))
+    found.take(opcode, ReadDataStream(BytesIO(file.read(length))))
     return found
 
 
@@ -292,15 +298,8 @@ class _Scanner:
             return self._begin_chunk(at, length)
         stream = ReadDataStream(BytesIO(self._file.read(length)))
         scan = self._scan
-        if opcode == Opcode.HEADER:
-            scan.library = Header.read(stream).library
-        elif opcode == Opcode.SCHEMA:
-            schema = Schema.read(stream)
-            scan.schemas[schema.id] = schema
-        elif opcode == Opcode.CHANNEL:
-            channel = Channel.read(stream)
-            scan.channels[channel.id] = channel
-        elif opcode == Opcode.ATTACHMENT:
+        scan.take(opcode, stream)
+        if opcode == Opcode.ATTACHMENT:
             self._take_attachment(Attachment.read(stream), at, after - at)
         elif opcode == Opcode.MESSAGE:
             scan.foreign = True
