@@ -10,11 +10,11 @@ WAIT = 60.0
 def test_a_burst_can_be_cancelled(bursting: o80.robots.Process) -> None:
     with bursting.frontend() as arm:
         burst = arm.burst(10**15, wait=False)
-        arm.wait_for_next(timeout=WAIT)
+        seen = arm.wait_for_next(timeout=WAIT).iteration
         burst.cancel()
         last = burst.wait(WAIT).iteration
 
-        assert last >= 3
+        assert last >= seen
         assert burst.done
         assert arm.burst(1, timeout=WAIT).iteration == last + 1
 
