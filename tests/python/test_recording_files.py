@@ -3,6 +3,7 @@
 import json
 import re
 import resource
+import tracemalloc
 from pathlib import Path
 from typing import IO, Any
 
@@ -13,10 +14,13 @@ from mcap.writer import CompressionType, IndexType, Writer
 from rosbags.highlevel import AnyReader
 
 import o80
+from o80.base import progress
+from o80.recording.blocks import Messages
 from o80.recording.epoch import topic_of
 from o80.recording.file_writer import FileWriter, Form
 from o80.recording.recorder import Recorder
 from o80.recording.scan import scan
+from o80.rows.journal import command_ends
 
 CUTS = 60
 
@@ -333,6 +337,78 @@ def test_a_damaged_chunk_is_named(recorded: tuple[Path, o80.History], arm: o80.F
 
     with pytest.raises(o80.RecordingError, match=f"chunk at byte {place} is damaged"):
         o80.open(path)[arm.segment].history()
+
+
+def test_the_last_rows_and_decisions_are_read_from_the_last_chunks(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment])
+    for i in range(10):
+        if i in (2, 4, 5):
+            arm.add_command("shoulder" if i == 4 else "elbow", 0.1, iterations=70)
+        arm.burst(20)
+        recorder.poll()
+    recorder.finish()
+    rows, journal, data = arm.history(), arm.journal(), bytearray(path.read_bytes())
+    for chunk in scan(path).chunks[:4]:
+        data[chunk.chunk_start_offset + 60] ^= 0xFF
+    path.write_bytes(data)
+
+    epoch = o80.open(path)[arm.segment].epochs[0]
+    assert epoch.history(50).rows.tobytes() == rows[-50:].rows.tobytes()
+    last = epoch.history(seconds=0.05)
+    assert last.rows.tobytes() == rows.select(seconds=0.05).rows.tobytes()
+    ends = [each for each in command_ends(journal) if each.iteration >= last.iteration[0]]
+    found = command_ends(epoch.journal_since_row(int(last.iteration[0])))
+    assert ends
+    assert [each for each in found if each.iteration >= last.iteration[0]] == ends
+    with pytest.raises(o80.RecordingError, match="damaged"):
+        epoch.history(len(rows))
+
+
+def test_a_long_scan_is_told(
+    recorded: tuple[Path, o80.History],
+    arm: o80.Frontend,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    path, history = recorded
+    path.write_bytes(path.read_bytes()[:-100])
+    monkeypatch.setattr(progress, "AFTER", 0.0)
+    monkeypatch.setattr("o80.recording.scan.BETWEEN_FIGURES", 5)
+    with pytest.warns(RuntimeWarning, match="has no summary .* o80 repair") as told:
+        assert len(o80.open(path)[arm.segment].history()) == len(history)
+    assert len(told) == 1
+    monkeypatch.setattr(progress, "of_a_command", True)
+    monkeypatch.setattr(progress, "BETWEEN", 0.0)
+    o80.open(path)
+    assert capsys.readouterr().err.count("has no summary") == 1
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    o80.open(path)
+    figures = [int(each) for each in re.findall(r"(\d+)%", capsys.readouterr().err)]
+    assert len(figures) > 2
+    assert 0 < figures[0] < figures[-1] <= 100
+    assert figures == sorted(figures)
+
+
+def test_a_chunk_takes_little_memory_of_its_recorder(tmp_path: Path) -> None:
+    writer = FileWriter(tmp_path / "run.mcap", Form("none"))
+    channels = [writer.add_channel(f"/{i}", 0, {}) for i in range(12)]
+    blocks = [Messages(channel, [(1, b"row")]) for channel in channels]
+    writer.add_chunk(blocks)
+    tracemalloc.start()
+    for _ in range(200):
+        writer.add_chunk(blocks)
+    before, most = tracemalloc.get_traced_memory()
+    tracemalloc.reset_peak()
+    writer.finish()
+    after = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert before < 200 * 400
+    assert after - before < 50_000  # its end is not copied
+    assert most < 200 * 400 + 50_000
+    assert len(scan(tmp_path / "run.mcap").chunks) == 201
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 something else"])

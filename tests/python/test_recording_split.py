@@ -202,3 +202,83 @@ def test_the_command_writes_a_folder(arm: o80.Frontend, tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     assert f"in {path}" in done.stderr
     assert o80.open(path)[arm.segment].epochs[0].rows == 1
+
+
+def bytes_in(folder: Path) -> int:
+    return sum(file.stat().st_size for file in folder.iterdir())
+
+
+def test_the_oldest_files_without_a_mark_are_deleted(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k", keep="220k")
+    play(arm, recorder, 12)
+    marked = recorder.file.path
+    recorder.mark("of the program")
+    play(arm, recorder, 12)
+    arm.mark("of a frontend")
+    for _ in range(60):
+        play(arm, recorder, 1)
+        assert bytes_in(path) <= 220_000
+    recorder.finish()
+    read = o80.open(path)
+    assert bytes_in(path) <= 220_000
+    assert marked.exists()
+    assert not (path / "0000.mcap").exists()
+    assert [mark.name for mark in read.marks] == ["of the program", "of a frontend"]
+    newest = read[arm.segment].history(60)
+    assert newest.rows.tobytes() == arm.history(60).rows.tobytes()
+
+
+def test_a_recorder_that_may_delete_nothing_stops(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k")
+    play(arm, recorder, 10)
+    recorder.finish()
+    there = {file: file.read_bytes() for file in path.iterdir()}
+    recorder = Recorder(path, [arm.segment], proceed=True, split="8k", keep="220k")
+
+    def record() -> None:
+        for i in range(1000):
+            recorder.mark("here", number=i)
+            play(arm, recorder, 1)
+
+    with pytest.raises(o80.RecordingError, match=r"lacks .* have marks or are of another recorder"):
+        record()
+    recorder.finish()
+    assert bytes_in(path) <= 220_000
+    *others, _ = sorted(there)  # the last one was continued
+    assert all(file.read_bytes() == there[file] for file in others)
+    read = o80.open(path)
+    assert read.finished
+    assert np.all(np.diff(read[arm.segment].history().iteration) == 1)
+
+
+@pytest.mark.parametrize(
+    ("split", "keep", "cure"),
+    [
+        (None, "1G", "keep needs split"),
+        ("1M", "10min", "a size such as 50G"),
+        ("1M", "1M", "at least two files"),
+    ],
+)
+def test_what_cannot_be_kept_is_refused(
+    split: str | None, keep: str, cure: str, arm: o80.Frontend, tmp_path: Path
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=cure):
+        o80.Recording(tmp_path / "run.mcap", arm, split=split, keep=keep)
+    assert not [*tmp_path.iterdir()]
+
+
+def test_files_are_read_by_their_numbers(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k")
+    play(arm, recorder, 5)
+    recorder.finish()
+    for i, file in enumerate(sorted(path.iterdir())[::-1]):
+        file.rename(path / f"{9999 - i}.mcap")
+    for _ in range(2):
+        recorder = Recorder(path, [arm.segment], proceed=True, split="8k")
+        play(arm, recorder, 15)
+        recorder.finish()
+    assert (path / "10001.mcap").exists()
+    assert o80.open(path)[arm.segment].history().rows.tobytes() == arm.history().rows.tobytes()

@@ -81,6 +81,8 @@ def plain(text: str) -> str:
 
 def bytes_text(size: float) -> str:
     """A number of bytes with its unit."""
+    if size >= 1e9:
+        return f"{size / 1e9:.1f} GB"
     return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
 
 

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 import o80._core as _core
-from o80.base import installation
+from o80.base import installation, progress
 
 COMMANDS = {
     "run": "run.run",
@@ -71,6 +71,7 @@ def run_app(words: list[str]) -> None:
 
     Only the module of that command is imported: others need what takes long to import.
     """
+    progress.of_a_command = True
     named = words[0] if words else ""
     for name in [named] if named in COMMANDS else COMMANDS:
         module, function = COMMANDS[name].split(".")

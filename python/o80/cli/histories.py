@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from o80.base.errors import BackendGone, InvalidArgument
@@ -49,5 +50,7 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
     for name in [only] if only is not None else list(recording):
         epochs, of_run = recording[name].epochs, recording.marks_by_run(name)
         for number, epoch in enumerate(epochs):
-            history = epoch.history(seconds=seconds)
-            yield Named(name, number, history, epoch.wall_offset, epoch.journal, of_run[number])
+            history, journal = epoch.history(seconds=seconds), epoch.journal
+            if seconds is not None and len(history):
+                journal = partial(epoch.journal_since_row, int(history.iteration[0]))
+            yield Named(name, number, history, epoch.wall_offset, journal, of_run[number])

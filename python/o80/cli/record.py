@@ -70,6 +70,12 @@ def record(
             help="Go on in a new file after this size or time: 500M, 2G, 600s, 10min, 1h."
         ),
     ] = None,
+    keep: Annotated[
+        str | None,
+        typer.Option(
+            help="With --split: delete the oldest files without marks, to hold no more than this."
+        ),
+    ] = None,
     proceed: Annotated[
         bool, typer.Option("--continue", help="Append to the file, also to one that was cut.")
     ] = False,
@@ -98,7 +104,9 @@ def record(
     form = Form(compression, joint_states == "on")
     most = _size(size)
     end = StopRequest()
-    recorder = Recorder(output, names, proceed=proceed, from_now=from_now, split=split, form=form)
+    recorder = Recorder(
+        output, names, proceed=proceed, from_now=from_now, split=split, keep=keep, form=form
+    )
     report = _Report(recorder, from_now)
     begin = time.monotonic()
     try:

@@ -29,8 +29,9 @@ from mcap.records import (
 
 import o80._core as _core
 from o80.base.errors import InvalidArgument, RecordingError
+from o80.recording.chunks import HEAD
 from o80.recording.locked_file import LockedFile, reserve
-from o80.recording.scan import HEAD, MAGIC, Scan, scan
+from o80.recording.scan import MAGIC, Scan, scan
 from o80.recording.summary import bytes_of, end_of_file, room_for_end
 
 PROFILE = "ros2"
@@ -120,6 +121,8 @@ class FileWriter:
         self.path = path
         self.form = form
         self.size = 0  #: [bytes]
+        self.make_room: Callable[[int], None] = lambda length: None
+        """Is called before so many bytes are written, the end of the file included."""
         self._compress = _COMPRESS[form.compression]()
         try:
             self._file: LockedFile = LockedFile(path, flags)
@@ -226,19 +229,24 @@ class FileWriter:
             counts = self._found.counts
             counts[block.channel] = counts.get(block.channel, 0) + block.count
 
-    def _append(self, data: bytes, *, last: bool = False) -> None:
+    def _append(self, *pieces: bytes | bytearray, last: bool = False) -> None:
         """Writes a group whole, or restores the file and raises OSError."""
+        end = self.size
         try:
             if not last:
-                reserve(self._file.descriptor, self.size, len(data) + room_for_end(self._found))
-            written = 0
-            while written < len(data):
-                written += os.pwrite(self._file.descriptor, data[written:], self.size + written)
+                room = sum(map(len, pieces)) + room_for_end(self._found)
+                self.make_room(room)
+                reserve(self._file.descriptor, end, room)
+            for piece in pieces:
+                rest = memoryview(piece)
+                while rest:
+                    written = os.pwrite(self._file.descriptor, rest, end)
+                    rest, end = rest[written:], end + written
         except OSError:
             with contextlib.suppress(OSError):
                 os.ftruncate(self._file.descriptor, self.size)
             raise
-        self.size += len(data)
+        self.size = end
 
     # ------------------------------------------------------------------ the end
 
@@ -248,7 +256,7 @@ class FileWriter:
         Raises OSError: then the file is closed, and complete up to its last chunk.
         """
         try:
-            self._append(end_of_file(self._found, self.size), last=True)
+            self._append(*end_of_file(self._found, self.size), last=True)
             self._found.finished = True
         finally:
             self.close()

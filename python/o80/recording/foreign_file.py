@@ -7,6 +7,7 @@ from mcap.records import Attachment, Channel, Message, Metadata, Schema
 from mcap.stream_reader import StreamReader
 
 from o80.base.errors import RecordingError
+from o80.base.progress import Progress
 from o80.recording.blocks import Messages
 from o80.recording.file_writer import FileWriter, Form
 from o80.recording.scan import CopiedFile, Scan, scan
@@ -39,10 +40,14 @@ class _Copier:
         self._bytes = 0
 
     def copy(self, path: Path) -> None:
-        with path.open("rb") as file:
+        size = path.stat().st_size
+        told = Progress(f"{path} was written by another program: it is copied to be read")
+        with path.open("rb") as file, told:
             try:
                 for record in StreamReader(file).records:
                     self._take(record)
+                    if not self._waiting:  # some were written
+                        told.at(file.tell() / size)
             except EndOfFile:
                 pass
             except Exception as error:  # each compression has exceptions of its own

@@ -117,19 +117,17 @@ def codec_of(found: Scan, channel: int) -> int:
     return codec
 
 
-def entries_in(file: IO[bytes], found: Scan, channel: int) -> "Iterator[Entries]":
-    """All parts of a journal, in their order. Raises ValueError if one is damaged."""
+def entries_in(
+    file: IO[bytes], found: Scan, channel: int, *, newest_first: bool = False
+) -> "Iterator[Entries]":
+    """All parts of a journal. Raises ValueError if one is damaged."""
     codec = codec_of(found, channel)
-    for chunk in found.chunks:
-        if channel in chunk.message_index_offsets:
-            for message in messages_of(file, chunk, channel):
-                yield Entries.of(message, codec)
+    for chunk in found.chunks.having(channel, newest_first=newest_first):
+        messages = [*messages_of(file, chunk, channel)]
+        for message in reversed(messages) if newest_first else messages:
+            yield Entries.of(message, codec)
 
 
 def last_entries_in(file: IO[bytes], found: Scan, channel: int) -> Entries | None:
     """The last part of a journal in a file. Raises ValueError if it is damaged."""
-    for chunk in reversed(found.chunks):
-        if channel in chunk.message_index_offsets:
-            *_, last = messages_of(file, chunk, channel)
-            return Entries.of(last, codec_of(found, channel))
-    return None
+    return next(entries_in(file, found, channel, newest_first=True), None)

@@ -112,14 +112,21 @@ def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Messages
 
 def marks_in(file: IO[bytes], found: Scan) -> list[Mark]:
     """All marks of a file, in their order."""
-    channels = [each for each in found.channels.values() if each.topic == TOPIC]
+    channels = {each.id: each for each in found.channels.values() if each.topic == TOPIC}
     return [
-        Mark.of(message, channel.message_encoding)
-        for chunk in found.chunks
-        for channel in channels
-        if channel.id in chunk.message_index_offsets
-        for message in messages_of(file, chunk, channel.id)
+        Mark.of(message, channels[number].message_encoding)
+        for chunk in found.chunks.having(*channels)
+        for number in channels
+        if number in chunk.message_index_offsets
+        for message in messages_of(file, chunk, number)
     ]
+
+
+def has_marks(found: Scan) -> bool:
+    """Whether a file holds a mark."""
+    return any(
+        each.topic == TOPIC and found.counts.get(each.id, 0) for each in found.channels.values()
+    )
 
 
 def _channel_in(found: Scan) -> int | None:

@@ -15,10 +15,8 @@ from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.file_writer import USUAL, FileWriter, Form
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import last_entries_in
-from o80.recording.reader import RecordingFile, files_of
+from o80.recording.reader import RecordingFile, files_of, in_order
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, content_of, has_end, index_of, scan
-
-FILES = "*.mcap"
 
 
 @dataclass(frozen=True)
@@ -74,7 +72,7 @@ def opened_in(folder: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
         folder.mkdir(exist_ok=True)
     except OSError as error:
         raise RecordingError(f"{folder} cannot be written: {reason(folder, error)}") from error
-    files = sorted(folder.glob(FILES)) or [folder / "0000.mcap"]
+    files = in_order(folder) or [folder / "0000.mcap"]
     last = opened(files[-1], form, proceed=True)  # locks the folder
     for file in files:
         if file != last.path and not has_end(file):
@@ -84,7 +82,7 @@ def opened_in(folder: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
 
 def unfinished_in(path: Path) -> list[Path]:
     """The files of a recording that were cut. Raises RecordingError."""
-    begun = [] if not path.is_dir() else [file for file in path.glob(FILES) if not _has_begun(file)]
+    begun = [file for file in in_order(path) if not _has_begun(file)]  # of a folder
     cut = [file for file in files_of(path) if not RecordingFile(file).finished]
     return sorted(begun + cut)
 
@@ -155,17 +153,16 @@ def _is_known(epoch: Written) -> bool:
 
 def _last_row(path: Path, found: Scan, channel: int) -> tuple[int, int] | None:
     """Iteration and log time of the last row of a channel."""
-    for chunk in reversed(found.chunks):
-        if channel in chunk.message_index_offsets:
-            try:
-                with path.open("rb") as stream:
-                    index = index_of(stream, chunk, channel)
-                    messages = messages_in(content_of(stream, chunk), index)
-            except ValueError as error:
-                raise RecordingError(f"{path}: {error}") from error
-            begin = len(ENCAPSULATION)  # the iteration is the first member
-            iteration = messages[-1, begin : begin + 8].copy().view(np.int64)[0]
-            return int(iteration), int(index[-1, 0])
+    for chunk in found.chunks.having(channel, newest_first=True):
+        try:
+            with path.open("rb") as stream:
+                index = index_of(stream, chunk, channel)
+                messages = messages_in(content_of(stream, chunk), index)
+        except ValueError as error:
+            raise RecordingError(f"{path}: {error}") from error
+        begin = len(ENCAPSULATION)  # the iteration is the first member
+        iteration = messages[-1, begin : begin + 8].copy().view(np.int64)[0]
+        return int(iteration), int(index[-1, 0])
     return None
 
 

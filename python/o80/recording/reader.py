@@ -50,13 +50,10 @@ class RecordingFile:
     @property
     def time_range(self) -> tuple[int, int]:
         """First and last time on the wall clock [ns since 1970]. Raises RecordingError: empty."""
-        chunks = [chunk for _, found in self._files for chunk in found.chunks]
-        if not chunks:
+        files = [found.chunks for _, found in self._files if found.chunks]
+        if not files:
             raise RecordingError(f"{self.path} holds no message")
-        return (
-            min(chunk.message_start_time for chunk in chunks),
-            max(chunk.message_end_time for chunk in chunks),
-        )
+        return min(chunks.start for chunks in files), max(chunks.end for chunks in files)
 
     @property
     def size(self) -> int:
@@ -117,10 +114,18 @@ def files_of(path: Path) -> list[Path]:
     """
     if not path.is_dir():
         return [path]
-    files = [file for file in sorted(path.glob("*.mcap")) if file.stat().st_size >= len(MAGIC)]
+    files = [file for file in in_order(path) if file.stat().st_size >= len(MAGIC)]
     if not files:
         raise RecordingError(f"the folder {path} holds no recording (NAME.mcap)")
     return files
+
+
+def in_order(folder: Path) -> list[Path]:
+    """The files NAME.mcap of a folder; those that a recorder has numbered by their number."""
+    return sorted(
+        folder.glob("*.mcap"),
+        key=lambda file: (int(file.stem) if file.stem.isdecimal() else -1, file.name),
+    )
 
 
 def _scanned(path: Path) -> Scan:

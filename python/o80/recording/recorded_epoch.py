@@ -1,11 +1,11 @@
 """One run of a backend in a recording: its rows and its journal, as from a live frontend."""
 
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, Any, TypeVar
+from typing import IO, TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -21,10 +21,13 @@ from o80.recording.journal_channel import Entries, codec_of, entries_in, last_en
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 from o80.recording.scan import Scan, attachment_of, content_of, index_of
-from o80.rows.history import History
+from o80.rows.history import History, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
 from o80.rows.layout import decoder_of
 from o80.rows.provenance import Provenance
+
+if TYPE_CHECKING:
+    from mcap.records import ChunkIndex
 
 T = TypeVar("T")
 
@@ -59,10 +62,10 @@ class EpochPart:
     @property
     def log_times(self) -> tuple[int, int]:
         """Log times of the first and the last row [ns]. There must be rows."""
-        chunks = [each for each in self.found.chunks if self.channel in each.message_index_offsets]
+        chunks, channel = self.found.chunks, self.channel
         with self.reading() as file:
-            first = index_of(file, chunks[0], self.channel)[0, 0]
-            last = index_of(file, chunks[-1], self.channel)[-1, 0]
+            first = index_of(file, next(chunks.having(channel)), channel)[0, 0]
+            last = index_of(file, next(chunks.having(channel, newest_first=True)), channel)[-1, 0]
         return int(first), int(last)
 
     @property
@@ -87,6 +90,8 @@ class EpochPart:
         try:
             with self.found.opened(self.path) as file:
                 yield file
+        except OSError as error:
+            raise RecordingError(f"{self.path} cannot be read: {error.strerror}") from error
         except (ValueError, struct.error) as error:
             raise RecordingError(f"{self.path}: {error}") from error
 
@@ -126,8 +131,7 @@ class RecordedEpoch:
                 chunk.message_end_time - self.wall_offset,
             )
             for part in self._parts
-            for chunk in part.found.chunks
-            if part.channel in chunk.message_index_offsets
+            for chunk in part.found.chunks.having(part.channel)
         ]
 
     @property
@@ -213,8 +217,15 @@ class RecordedEpoch:
 
         Raises RecordingError if the file is damaged there.
         """
-        history = History._joined(self._decoder, self._blocks(from_time, to_time))
-        return history.select(
+        wanted = Selection.checked(n, since, until, seconds, from_time, to_time)
+        blocks: Iterable[History]
+        if wanted.n is not None:
+            blocks = self._last_blocks(wanted.n)
+        elif wanted.duration is not None and self.rows:
+            blocks = self._blocks(self.time_range[1] - wanted.duration, None)
+        else:
+            blocks = self._blocks(from_time, to_time)
+        return History._joined(self._decoder, blocks).select(
             n, since=since, until=until, seconds=seconds, from_time=from_time, to_time=to_time
         )
 
@@ -244,28 +255,39 @@ class RecordedEpoch:
         """When its recording began, on the wall clock [ns since 1970]."""
         return self._parts[0].began_at
 
-    def _blocks(self, from_time: int | None, to_time: int | None) -> Iterator[History]:
+    def _blocks(
+        self, from_time: int | None, to_time: int | None, *, newest_first: bool = False
+    ) -> Iterator[History]:
         """The rows of each chunk that may have rows of these times."""
         layout = self._decoder.layout
         plan = MessagePlan(row_type(layout), layout.size)
-        for part in self._parts:
-            for messages in self._messages(part, plan.size, from_time, to_time):
+        offset = self.wall_offset
+        start = 0 if from_time is None else from_time + offset
+        end = 2**64 if to_time is None else to_time + offset
+        for part in reversed(self._parts) if newest_first else self._parts:
+            chunks = part.found.chunks.having(
+                part.channel, start=start, end=end, newest_first=newest_first
+            )
+            for messages in self._messages(part, plan.size, chunks):
                 raw = np.ascontiguousarray(plan.decode(messages))
                 yield History(self._decoder, raw.view(layout.row).reshape(len(raw)))
 
+    def _last_blocks(self, n: int) -> list[History]:
+        """The rows of the last chunks, which have n rows, if there are so many."""
+        blocks: list[History] = []
+        for block in self._blocks(None, None, newest_first=True):
+            if n <= 0:
+                break
+            blocks.append(block)
+            n -= len(block)
+        return blocks[::-1]
+
     def _messages(
-        self, part: EpochPart, size: int, from_time: int | None, to_time: int | None
+        self, part: EpochPart, size: int, chunks: "Iterator[ChunkIndex]"
     ) -> Iterator[Any]:
-        """The messages (n, size) of each chunk that may have rows of these times."""
-        offset = self.wall_offset
+        """The messages (n, size) of each of these chunks."""
         with part.reading() as file:
-            for chunk in part.found.chunks:
-                if part.channel not in chunk.message_index_offsets:
-                    continue
-                if from_time is not None and chunk.message_end_time < from_time + offset:
-                    continue
-                if to_time is not None and chunk.message_start_time > to_time + offset:
-                    continue
+            for chunk in chunks:
                 index = index_of(file, chunk, part.channel)
                 messages = messages_in(content_of(file, chunk), index)
                 if messages.shape[1] != size:
@@ -290,11 +312,7 @@ class RecordedEpoch:
             last = last_entries_in(file, part.found, part.journal)
         if last is None:
             return ""
-        journal = _core.RecordedJournal(self.description, 0)
-        try:
-            entries = journal.decode(last.content, last.codec)
-        except InvalidArgument as error:
-            raise RecordingError(f"{part.path}: {error}") from error
+        entries = self._decoded(_core.RecordedJournal(self.description, 0), last)
         if not entries or entries[-1].kind != "ended":
             return ""
         return f"failed: {entries[-1].text}" if entries[-1].text else "stopped"
@@ -320,11 +338,8 @@ class RecordedEpoch:
         rests: with the rows from which on nothing acts, for a replay.
         """
         native = _core.RecordedJournal(self.description, whole(since, "since", 0), rests)
-        try:
-            for entries in self.journal_parts():
-                yield from native.decode(entries.content, entries.codec)
-        except (InvalidArgument, ValueError, LookupError) as error:
-            raise RecordingError(f"{self._parts[0].path}: {error}") from error
+        for part in self.journal_parts():
+            yield from self._decoded(native, part)
 
     @property
     def has_journal(self) -> bool:
@@ -344,15 +359,41 @@ class RecordedEpoch:
                     codecs.append(codec_of(part.found, part.journal))
         return max(codecs, default=None)
 
-    def journal_parts(self) -> Iterator[Entries]:
+    def journal_since_row(self, first: int) -> list[JournalEntry]:
+        """The decisions from this iteration on, and so many before them that of each command that
+        ended since then the batch is there, if it was recorded. Raises RecordingError.
+        """
+        decoder = EntryDecoder(self.schema)
+        blocks: list[list[JournalEntry]] = []
+        ended: set[tuple[int | None, int | None]] = set()  # lane and id
+        begun: set[tuple[int | None, int | None]] = set()
+        for part in self.journal_parts(newest_first=True):
+            native = _core.RecordedJournal(self.description, 0)
+            block = [decoder.entry(each) for each in self._decoded(native, part)]
+            for each in block:
+                begun.update((each.lane, command.id) for command in each.commands)
+                if each.iteration >= first and each.kind == "status":
+                    ended.add((each.lane, each.id))
+            blocks.append(block)
+            if block and block[0].iteration < first and ended <= begun:
+                break
+        return [each for block in reversed(blocks) for each in block]
+
+    def journal_parts(self, *, newest_first: bool = False) -> Iterator[Entries]:
         """The entries of the journal as the files hold them, for `_core.RecordedJournal`.
 
         Raises RecordingError if the file is damaged there.
         """
-        for part in self._parts:
+        for part in reversed(self._parts) if newest_first else self._parts:
             if part.journal is not None:
                 with part.reading() as file:
-                    yield from entries_in(file, part.found, part.journal)
+                    yield from entries_in(file, part.found, part.journal, newest_first=newest_first)
+
+    def _decoded(self, native: _core.RecordedJournal, part: Entries) -> list[_core.JournalEntry]:
+        try:
+            return native.decode(part.content, part.codec)
+        except (InvalidArgument, ValueError, LookupError) as error:
+            raise RecordingError(f"{self._parts[0].path}: {error}") from error
 
     def __repr__(self) -> str:
         return f"<epoch of {self._note.segment}: {self.rows} rows>"

@@ -12,14 +12,16 @@ from pathlib import Path
 from typing import Any
 
 from o80.base.errors import Error, InvalidArgument, RecordingError
+from o80.base.screen import bytes_text
 from o80.frontend.segments import segments
 from o80.recording.epoch import topic_of
 from o80.recording.file_writer import USUAL, Form
 from o80.recording.log_channel import INFO, Line, added_lines
-from o80.recording.marks import Mark, added_marks
+from o80.recording.marks import Mark, added_marks, has_marks
 from o80.recording.output import Predecessor, next_file, opened, opened_in
 from o80.recording.reader import files_of
 from o80.recording.source import Source
+from o80.recording.summary import room_for_end
 
 BETWEEN_SEARCHES = 0.5  # for segments that match a pattern [s]
 FIRST_SECONDS = 5.0  # in which chunks are short
@@ -42,29 +44,35 @@ class Recorder:
         proceed: bool = False,
         from_now: bool = False,
         split: str | None = None,
+        keep: str | None = None,
         form: Form = USUAL,
     ) -> None:
         """names: of segments, or patterns such as "arm*". proceed: continue an existing file.
         from_now: begin with the newest rows instead of the oldest that the segments hold.
 
         path: ends in .mcap. split: go on in a new file after this size or time, see Split; `path`
-        is a folder of files then. Raises RecordingError, InvalidArgument: then no new file is left.
+        is a folder of files then. keep: the most that the folder may hold, such as "50G": the
+        oldest files of this recorder that have no mark are deleted. Raises RecordingError,
+        InvalidArgument: then no new file is left.
         """
         if not names:
             raise InvalidArgument("give the name of at least one segment to record")
         self.path = path = Path(path)
         self._split = None if split is None else Split.of(split)
+        self._keep = math.inf if keep is None else _most(keep, self._split)
+        self._removable: list[tuple[Path, int]] = []  # own complete files without marks, and sizes
         if path.suffix != ".mcap":
             raise RecordingError(
                 f"the name of a recording must end in .mcap, got '{path}': o80 plot, export and "
                 f"diff know a recording by it"
             )
         self._patterns = [name for name in names if any(sign in name for sign in "*?[")]
-        new = not path.exists()
+        self._file_is_own = new = not path.exists()
         open_file = opened if self._split is None else opened_in
         self.file = open_file(path, form, proceed=proceed)
         before = [each for each in files_of(path) if each != self.file.path]
         self._bytes_before = sum(each.stat().st_size for each in before)
+        self.file.make_room = self._make_room
         self._file_begun = time.monotonic()
         self.sources: dict[str, Source] = {}
         self._search_at = 0.0
@@ -199,12 +207,33 @@ class Recorder:
         """Another recorder that continues finds one of the two files locked at any moment."""
         full, self.file = self.file, next_file(self.file)
         self._file_begun = time.monotonic()
+        not_finished = full.size + room_for_end(full.found)
+        self._bytes_before += not_finished
+        self.file.make_room = self._make_room
         try:
             for source in self.sources.values():
                 source.go_on_in(self.file)
         finally:
             full.finish()
-            self._bytes_before += full.size
+            self._bytes_before += full.size - not_finished
+            if self._file_is_own and not has_marks(full.found):
+                self._removable.append((full.path, full.size))
+            self._file_is_own = True
+
+    def _make_room(self, length: int) -> None:
+        """Deletes files before so many bytes are written, if the folder would become too large."""
+        while self.size + length > self._keep:
+            if not self._removable:
+                raise RecordingError(
+                    f"{self.path} may hold {bytes_text(self._keep)} (keep) and lacks "
+                    f"{bytes_text(self.size + length - self._keep)}, but no file can be deleted: "
+                    f"{bytes_text(self._bytes_before)} have marks or are of another recorder, and "
+                    f"{self.file.path.name} is being written. What was recorded until now is in "
+                    f"it: keep more, move files away, or split into smaller ones"
+                )
+            oldest, size = self._removable.pop(0)
+            oldest.unlink(missing_ok=True)
+            self._bytes_before -= size
 
     def _add(self, name: str, from_now: bool) -> None:
         """Raises RecordingError for a name that others would take for one that is recorded."""
@@ -234,6 +263,23 @@ class Recorder:
                         raise
                     self._left_out.add(segment.name)  # the others go on
                     warnings.warn(f"not recorded: {error}", RuntimeWarning, stacklevel=3)
+
+
+def _most(keep: str, split: "Split | None") -> float:
+    """Bytes of "50G". Raises InvalidArgument."""
+    if split is None:
+        raise InvalidArgument("keep needs split: it deletes whole files, such as with --split 1G")
+    try:
+        most = Split.of(keep).bytes
+    except InvalidArgument:
+        most = math.inf
+    if most == math.inf:
+        raise InvalidArgument(f"keep must be a size such as 50G, got '{keep}'")
+    if split.bytes < math.inf and most < 2 * split.bytes:
+        raise InvalidArgument(
+            f"keep must be at least two files of {bytes_text(split.bytes)} (split), got '{keep}'"
+        )
+    return most
 
 
 @dataclass(frozen=True)

@@ -30,6 +30,8 @@ class Recording(Closeable):
     from_now: begin with the newest rows; robots that start later are recorded from their first.
     split: go on in a new file after a size ("500M", "2G") or a time ("600s", "10min", "1h"): `path`
         is then a folder of complete files, which `o80.open` reads as one recording.
+    keep: with `split`, the most that this folder holds ("50G"): the oldest files of this recording
+        are deleted, but none with a mark.
     compression: "zstd", "lz4" or "none".
     joint_states: whether rows of robots with joints are also written as sensor_msgs/JointState.
 
@@ -45,6 +47,7 @@ class Recording(Closeable):
         proceed: bool = False,
         from_now: bool = False,
         split: str | None = None,
+        keep: str | None = None,
         compression: str = "zstd",
         joint_states: bool = True,
     ) -> None:
@@ -52,7 +55,7 @@ class Recording(Closeable):
         names = [each.segment if isinstance(each, Frontend) else each for each in several]
         form = Form(compression, joint_states)
         self._recorder = Recorder(
-            path, names, proceed=proceed, from_now=from_now, split=split, form=form
+            path, names, proceed=proceed, from_now=from_now, split=split, keep=keep, form=form
         )
         self._lock = threading.Lock()
         self._end = threading.Event()

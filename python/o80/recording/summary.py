@@ -2,14 +2,15 @@
 
 import struct
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterator
 from typing import Any
 
 from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
 from mcap.records import DataEnd, McapRecord, Statistics, SummaryOffset
 
-from o80.recording.scan import HEAD, MAGIC, Scan
+from o80.recording.chunks import HEAD
+from o80.recording.scan import MAGIC, Scan
 
 OF_A_CHUNK = 128  # most bytes of the summary that a chunk adds, with one channel
 OF_THE_REST = 65536
@@ -23,53 +24,47 @@ def bytes_of(*records: McapRecord) -> bytes:
     return bytes(builder.end())
 
 
-def end_of_file(found: Scan, size: int) -> bytes:
-    """All that follows the data of a file, which has this size [bytes]."""
+def end_of_file(found: Scan, size: int) -> Iterator[bytes | bytearray]:
+    """All that follows the data of a file, which has this size [bytes], in pieces."""
     data_end = bytes_of(DataEnd(0))
-    summary_start = size + len(data_end)
-    summary = bytearray()
-    offsets = bytearray()
-    for opcode, records in _groups(found):
-        begin = summary_start + len(summary)
-        group = bytes_of(*records)
+    yield data_end
+    at = begin = size + len(data_end)
+    offsets, checksum = b"", 0
+    for opcode, group in _groups(found):
         if group:
-            summary += group
-            offsets += bytes_of(SummaryOffset(opcode, begin, len(group)))
-    offset_start = summary_start + len(summary)
-    footer = _footer(bytes(summary + offsets), summary_start, offset_start)
-    return bytes(data_end + summary + offsets + footer + MAGIC)
+            yield group
+            offsets += bytes_of(SummaryOffset(opcode, at, len(group)))
+            checksum = zlib.crc32(group, checksum)
+            at += len(group)
+    footer = HEAD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", begin, at)
+    checksum = zlib.crc32(offsets + footer, checksum)
+    yield offsets + footer + struct.pack("<I", checksum) + MAGIC
 
 
 def room_for_end(found: Scan) -> int:
     """More bytes than the end takes after one more chunk."""
     texts = sum(len(each.data) for each in found.schemas.values())
-    per_chunk = OF_A_CHUNK + 10 * len(found.channels)
     rest = 512 * len(found.channels) + 256 * (len(found.metadata) + len(found.attachments))
-    return OF_THE_REST + texts + rest + per_chunk * (1 + len(found.chunks))
+    next_chunk = OF_A_CHUNK + 10 * len(found.channels)
+    return OF_THE_REST + texts + rest + len(found.chunks.records) + next_chunk
 
 
-def _groups(found: Scan) -> Iterable[tuple[Opcode, Sequence[McapRecord]]]:
+def _groups(found: Scan) -> Iterator[tuple[Opcode, bytes | bytearray]]:
     chunks = found.chunks
-    yield Opcode.SCHEMA, list(found.schemas.values())
-    yield Opcode.CHANNEL, list(found.channels.values())
+    yield Opcode.SCHEMA, bytes_of(*found.schemas.values())
+    yield Opcode.CHANNEL, bytes_of(*found.channels.values())
     statistics = Statistics(
         attachment_count=len(found.attachments),
         channel_count=len(found.channels),
         channel_message_counts=found.counts,
         chunk_count=len(chunks),
         message_count=sum(found.counts.values()),
-        message_end_time=max((chunk.message_end_time for chunk in chunks), default=0),
-        message_start_time=min((chunk.message_start_time for chunk in chunks), default=0),
+        message_end_time=chunks.end,
+        message_start_time=chunks.start if chunks else 0,
         metadata_count=len(found.metadata),
         schema_count=len(found.schemas),
     )
-    yield Opcode.STATISTICS, [statistics]
-    yield Opcode.CHUNK_INDEX, chunks
-    yield Opcode.ATTACHMENT_INDEX, found.attachments
-    yield Opcode.METADATA_INDEX, found.metadata_places
-
-
-def _footer(summary: bytes, summary_start: int, offset_start: int) -> bytes:
-    """The footer record; its checksum covers the summary and itself up to the checksum."""
-    head = HEAD.pack(Opcode.FOOTER, 20) + struct.pack("<QQ", summary_start, offset_start)
-    return head + struct.pack("<I", zlib.crc32(head, zlib.crc32(summary)))
+    yield Opcode.STATISTICS, bytes_of(statistics)
+    yield Opcode.CHUNK_INDEX, chunks.records
+    yield Opcode.ATTACHMENT_INDEX, bytes_of(*found.attachments)
+    yield Opcode.METADATA_INDEX, bytes_of(*found.metadata_places)

@@ -1,0 +1,48 @@
+"""How far a long reading of a file is, for those who wait: on stderr, or as a warning."""
+
+import sys
+import time
+import warnings
+from typing import Self
+
+from o80.base.screen import complain
+
+AFTER = 1.0  # from when on it is told [s]
+BETWEEN = 0.2  # two figures on a terminal [s]
+of_a_command = False
+"""Whether this process is a command (`o80 info`); else a program that uses o80."""
+
+
+class Progress:
+    """One reading; used in a `with` block, in which `at` is called again and again."""
+
+    def __init__(self, text: str) -> None:
+        """text: what takes long, told once."""
+        self._text = text
+        self._next = time.monotonic() + AFTER
+        self._told = False
+
+    def at(self, share: float) -> None:
+        """share: from 0 to 1."""
+        now = time.monotonic()
+        if now < self._next:
+            return
+        self._next = now + BETWEEN
+        if not self._told:
+            self._told = True
+            if of_a_command:
+                complain(self._text)
+            else:
+                warnings.warn(self._text, RuntimeWarning, stacklevel=2)
+        self._show(f"{share:.0%}")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        if self._told:
+            self._show("")
+
+    def _show(self, figure: str) -> None:
+        if of_a_command and sys.stderr.isatty():
+            print(f"\r\033[K{figure}", end="", file=sys.stderr, flush=True)
