@@ -3,7 +3,8 @@
 import base64
 import math
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -314,6 +315,94 @@ def test_a_backend_in_python_names_a_model_and_what_moves_it(segment: str, tmp_p
             pose = pose_of(looks_at(segment)())
         assert pose[0, 3:] == pytest.approx(turn_about_y(0.5), abs=1e-6)
         assert pose[1, 3:] == pytest.approx(turn_about_y(-0.25), abs=1e-6)
+
+
+MODEL = "<mujoco><worldbody>{}</worldbody></mujoco>"
+BASE = "<geom name='floor' type='plane' size='1 1 1'/><body name='base' pos='0 {} 1'>"
+TABLE = BASE.format("0") + "<joint name='turn'/><geom size='0.1'/></body><geom size='1 1 1'/>"
+TWIN = TABLE.replace("size='1 1 1'/>", "size='2 2 2'/>")
+ELSEWHERE = TABLE.replace("0 0 1", "0 5 1")
+
+
+@contextmanager
+def robots(segment: str, *models: str) -> Iterator[list[o80.Backend]]:
+    """Robots whose models are these, each with one row; "" is a sensor that sees a ball."""
+    with ExitStack() as running:
+        backends = []
+        for number, model in enumerate(models):
+            options: dict[str, Any] = {"model": MODEL.format(model), "joints": {"turn": "turn"}}
+            if not model:
+                options = {"extended": {"ball": {"position": (float, 3)}}}
+                options["units"] = {"position": "m"}
+            backend = o80.Backend(f"{segment}-{number}", ["turn"], **options)
+            backends.append(running.enter_context(backend))
+            backend.publish([0.1 * number], None if model else {"ball": {"position": [1, 2, 3]}})
+        yield backends
+
+
+def has_poses(*names: str) -> Callable[[dict[str, Any]], bool]:
+    return lambda answer: all("pose" in answer["others"].get(name, {}) for name in names)
+
+
+def test_robots_that_have_a_thing_at_one_place_stand_in_one_scene(segment: str) -> None:
+    with robots(segment, TABLE, TWIN, ELSEWHERE, "", TABLE) as backends:
+        names = [f"{segment}-{number}" for number in range(5)]
+        look = looks_at(*names)
+        of_others = wait_for(look, has_poses(names[1], names[3]))["others"]
+        shares = {name: each["shares"] for name, each in of_others.items()}
+        assert shares == dict(zip(names[1:], (True, False, True, False), strict=True))
+        assert "pose" not in of_others[names[2]]
+        assert pose_of(of_others[names[1]])[0, 3:] == pytest.approx(
+            [math.cos(0.05), 0, 0, math.sin(0.05)]
+        )
+        assert pose_of(of_others[names[3]])[0, :3] == pytest.approx([1, 2, 3])
+        assert len(of_others[names[1]]["scene"]["geoms"]) == 3
+        # what the page has is not sent again; what the user wants is there
+        known = {name: each["key"] for name, each in of_others.items()}
+        seen = {names[1]: False, names[2]: True}
+        of_others = wait_for(look, has_poses(names[2]), known=known, seen=seen)["others"]
+        assert "pose" not in of_others[names[1]]
+        assert "scene" not in of_others[names[3]]
+        # a ball that is not seen is not drawn
+        backends[3].step()
+        backends[3].publish([0.0], {"ball": {"position": [math.nan] * 3}})
+        assert np.isnan(pose_of(look()["others"][names[3]])).all()
+        # another one is chosen: of the copies it is the one
+        of_others = look(source=names[4])["others"]
+        assert not of_others[names[0]]["shares"]
+        assert of_others[names[1]]["shares"]
+        # what no model stands for is seen in the world of the first
+        assert look(source=names[3])["others"][names[0]]["shares"]
+
+
+def test_in_simulated_time_marks_say_which_rows_belong_together(
+    segment: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    load = o80.robots.load("two_joints")
+    names = [f"{segment}-{number}" for number in range(2)]
+    with (
+        load.inline(names[0]) as arm,
+        load.inline(names[1]) as twin,
+        o80.Recording(path, [arm, twin]) as recording,
+    ):
+        arm.burst(500)  # the twin stands
+        recording.mark("begin")
+        for robot in (arm, twin):
+            robot.add_command("shoulder", 1.0, iterations=1000)
+            robot.burst(1000)
+        recording.mark("end")
+        arm.burst(500)
+        live = looks_at(*names)
+        live()
+    look, seen = looks_at(str(path)), {names[1]: True}  # a copy of the arm
+    of_twin = o80.open(path)[names[1]].history().observed[:, 0]
+    for at, row in ((0.3, 0), (0.7, 200), (1.2, 700), (1.8, 1000)):  # [s] of the arm
+        twin_there = wait_for(look, has_poses(names[1]), at=at, seen=seen)["others"][names[1]]
+        assert pose_of(twin_there)[0, 3:] == pytest.approx(turn_about_y(of_twin[row]), abs=1e-6)
+    # live it is only known what belongs together now
+    twin_there = wait_for(live, has_poses(names[1]), at=1.6, seen=seen)["others"][names[1]]
+    assert pose_of(twin_there)[0, 3:] == pytest.approx(turn_about_y(of_twin[600]), abs=1e-6)
 
 
 @pytest.mark.parametrize(

@@ -1,5 +1,6 @@
 """Page of `o80 view`, in a real browser."""
 
+import math
 import os
 import signal
 import time
@@ -121,6 +122,47 @@ def test_the_halt_button_halts_and_the_resume_button_resumes(
         page.close()
 
 
+WORLD = """<mujoco><worldbody><geom type="plane" size="{0} {0} 1"/>
+<geom name="table" type="box" pos="1 0 0.5" size="0.3 0.3 0.5" rgba="0 0 1 1"/>
+<body name="base" pos="0 {1} 0.5"><joint name="turn" axis="0 1 0"/>
+<geom type="capsule" fromto="0 0 0 0 0 0.5" size="0.05"/></body></worldbody></mujoco>"""
+
+
+def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str) -> None:
+    first, second = f"{segment}-1", f"{segment}-2"
+    drawn = "page.scene.geoms.map((geom) => geom.shape).sort().join()"
+    box = (
+        "[...document.querySelectorAll('#segments .row')].find(r => r.innerText.includes('{0}'))"
+        ".querySelector('.eye')"
+    )
+    with (
+        o80.Backend(first, ["turn"], model=WORLD.format(2, 0), joints={"turn": "turn"}) as backend,
+        o80.Backend(second, ["turn"], model=WORLD.format(3, 1), joints={"turn": "turn"}) as other,
+        page_server([first, second]) as server,
+    ):
+        backend.publish([0.2])
+        other.publish([-0.4])
+        page = browser.page(server.url)
+        page.wait_for("page.scene.robots.size === 2")
+        assert page.value(drawn) == "box,capsule,capsule,plane", "the table and a floor once"
+        assert page.value("page.scene.geoms.find((geom) => geom.shape === 'plane').size[0]") == 3
+        assert page.value(f"page.scene.robots.get('{second}').pose[5]") == pytest.approx(
+            math.sin(-0.2)
+        )
+        assert not page.value(f"page.scene.robots.get('{second}').ghost")
+        assert page.value(f"document.getElementById('halt').textContent === 'Halt {first}'")
+        page.value(f"{box.format(first)}.click()")
+        page.wait_for("page.scene.robots.size === 1")
+        assert page.value(drawn) == "box,capsule,plane"
+        page.value(f"page.choose('{second}')")
+        page.wait_for(f"document.getElementById('halt').textContent === 'Halt {second}'")
+        page.wait_for(f"page.scene.robots.get('{second}').ghost")
+        assert page.value("page.scene.robots.size") == 1, "what was hidden stays so"
+        page.value(f"{box.format(first)}.click()")
+        page.wait_for("page.scene.robots.size === 2")
+        page.close()
+
+
 @pytest.mark.parametrize("dark", [False, True])
 def test_on_a_phone_nothing_runs_out_and_the_halt_button_is_large(
     browser: Chromium, process: o80.robots.Process, dark: bool
@@ -230,6 +272,9 @@ def test_a_recording_is_played_and_scrubbed(
         scrub(page, 1.0)
         page.wait_for("page.answer.iteration === 1000")
         assert page.value("page.answer.values.elbow.desired") == "0.5 rad"
+        page.value(
+            "document.getElementById('speed').value = '0.1'"
+        )  # so that a slow computer sees it
         click(page, "play")
         page.wait_for("page.answer.iteration > 1100")
         click(page, "play")

@@ -134,6 +134,24 @@ class RecordedEpoch:
             for chunk in part.found.chunks.having(part.channel)
         ]
 
+    def overlaps(self, other: "RecordedEpoch") -> bool:
+        """Whether another run of the same recording was recorded at the same time, by the places
+        of their rows in its files: simulated time says nothing of it.
+        """
+        (first, last), (begin, end) = self._places, other._places
+        return first <= end and begin <= last
+
+    @cached
+    def _places(self) -> tuple[tuple[Path, int], tuple[Path, int]]:
+        """Where the first and the last chunk with rows begin: file, and offset in it [bytes]."""
+        places = [
+            (part.path, chunk.chunk_start_offset)
+            for part in self._parts
+            for chunk in part.found.chunks
+            if part.channel in chunk.message_index_offsets
+        ]
+        return (places[0], places[-1]) if places else ((Path(), 0), (Path(), 0))
+
     @property
     def model(self) -> str:
         """The model (MJCF) that draws the robot; empty if its driver names none."""

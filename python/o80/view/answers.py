@@ -3,11 +3,13 @@
 import math
 import threading
 import time
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Callable, Hashable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from typing import Any
 
 import numpy as np
 
+from o80._core import Observation
 from o80.base.errors import Error, InvalidArgument, ReadOnly
 from o80.frontend.frontend import Frontend
 from o80.frontend.stopping import halt as halt_backend
@@ -16,10 +18,13 @@ from o80.view.curves import Panels
 from o80.view.scene import Scene
 from o80.view.source import NothingToShow, Source
 from o80.view.source_list import SourceList
+from o80.view.world import Standing
 
 LONGEST_WINDOW = 60.0  # [s]
 LONGEST_REASON = 80  # of a halt
 MAX_MARKS = 50  # in a chart
+MAKERS = 2  # threads that read models
+SLACK = 1_000_000_000  # a robot is drawn so long before its first and after its last row [ns]
 
 
 class Answers:
@@ -28,33 +33,71 @@ class Answers:
     def __init__(self, sources: SourceList, *, control: bool) -> None:
         self._sources = sources
         self._control = control
-        self._shown: dict[str, _Shown] = {}
+        self._shown: dict[str, tuple[str, Future[_Shown]]] = {}  # by label, with the key
+        self._makers = ThreadPoolExecutor(MAKERS)
         self._lock = threading.Lock()
 
     def look(self, query: dict[str, Any]) -> dict[str, Any]:
         """The list of segments, and what is asked about one of them at one time."""
         sources = self._sources.now()
+        of_world = sorted(sources, key=lambda source: not source.alive)
         answer: dict[str, Any] = {
             "control": self._control,
             "list": [source.state() for source in sources],
             "waiting": self._sources.waiting,
         }
-        chosen = _chosen(sources, query.get("source"))
+        chosen = _chosen(of_world, query.get("source"))
         if chosen is not None:
             answer["source"] = chosen.label
             try:
-                answer |= self._row(chosen, query)
+                row, at = self._row_of(chosen, query)
+                answer |= self._row(chosen, query, row, at)
+                answer["others"] = self._others(chosen, of_world, query, row, now=at is None)
             except NothingToShow as error:
                 answer["problem"] = str(error)
         return answer
 
-    def _row(self, source: Source, query: dict[str, Any]) -> dict[str, Any]:
-        shown = self._shown_of(source)
-        first, last = source.extent()
+    def _row_of(self, source: Source, query: dict[str, Any]) -> tuple[Observation, int | None]:
+        """The row that is shown, and the time that is asked for [ns]; None: now."""
         at = _time_query(source, query)
         if at is None and not source.live and query.get("key") != source.key:
-            at = first  # a page begins at the begin of a recording
-        row = source.row(at)
+            at = source.extent()[0]  # a page begins at the begin of a recording
+        return source.row(at), at
+
+    def _others(
+        self,
+        chosen: Source,
+        sources: Sequence[Source],
+        query: dict[str, Any],
+        of_chosen: Observation,
+        *,
+        now: bool,
+    ) -> dict[str, Any]:
+        """By other source: whether it shares the world of the chosen one, and the poses of its
+        bodies when the chosen one published a row; or those of now.
+
+        The query says which of them the user wants to see or not (`seen`), and which scenes the
+        page knows (`known`: keys). A scene that is not ready is made meanwhile.
+        """
+        wanted, known = _mapping(query, "seen"), _mapping(query, "known")
+        found: dict[str, Any] = {}
+        for source, row, shares in others_of(chosen, sources, of_chosen, now=now):
+            found[source.label] = {"shares": shares, "key": source.key}
+            if not wanted.get(source.label, shares):
+                continue
+            shown = self._shown_of(source, wait=False)
+            if shown is not None and shown.scene is not None:
+                found[source.label]["pose"] = shown.scene.poses(_bytes_of(row), row.active)["pose"]
+                if known.get(source.label) != source.key:
+                    found[source.label]["scene"] = shown.scene.geometry
+        return found
+
+    def _row(
+        self, source: Source, query: dict[str, Any], row: Observation, at: int | None
+    ) -> dict[str, Any]:
+        shown = self._shown_of(source)
+        assert shown is not None
+        first, last = source.extent()
         answer: dict[str, Any] = {
             "key": source.key,
             "live": source.live,
@@ -77,13 +120,15 @@ class Answers:
             answer["curves"] = shown.curves(source, panels, _window(query), at)
         return answer
 
-    def _shown_of(self, source: Source) -> "_Shown":
+    def _shown_of(self, source: Source, *, wait: bool = True) -> "_Shown | None":
+        """None: not ready, and not to be waited for."""
         schema = source.schema  # NothingToShow, if there is no row
         with self._lock:
-            shown = self._shown.get(source.label)
-            if shown is None or shown.key != source.key:
-                shown = self._shown[source.label] = _Shown(source, schema)
-            return shown
+            key, made = self._shown.get(source.label, ("", None))
+            if made is None or key != source.key:
+                key, made = source.key, self._makers.submit(_Shown, source, schema)
+                self._shown[source.label] = key, made
+        return made.result() if wait or made.done() else None
 
     def halt(self, query: dict[str, Any]) -> dict[str, Any]:
         """Halts a live segment."""
@@ -115,14 +160,13 @@ class _Shown:
     """Results that are worked out once for a run of a robot."""
 
     def __init__(self, source: Source, schema: dict[str, Any]) -> None:
-        self.key = source.key
         self.panels = Panels(schema)
         self.scene: Scene | None = None
         self.no_scene = "The driver of this robot names no model, so there is no 3D view."
         self._kept = AnswerCache()
-        if "model" in schema:
+        if source.drawn is not None:
             try:
-                self.scene = Scene(schema, source.model, trusted=source.trusted)
+                self.scene = Scene(schema, source.drawn)
             except Error as error:
                 self.no_scene = str(error)
 
@@ -181,17 +225,50 @@ def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
     for source in sources:
         if source.label == label:
             return source
-    for source in sources:
-        if source.key and _has_model(source):
-            return source
-    return sources[0] if sources else None
+    models = [source for source in sources if source.drawn is not None]
+    standing = [source for source in models if source.drawn and not source.drawn.standing.floats]
+    return next(iter([*standing, *models, *sources]), None)
 
 
-def _has_model(source: Source) -> bool:
+_ANY = Standing(floats=True)
+
+
+def others_of(
+    chosen: Source, sources: Sequence[Source], of_chosen: Observation, *, now: bool
+) -> Iterator[tuple[Source, Observation, bool]]:
+    """Other sources with a model, their rows when the chosen one published its row, or of now, and
+    whether they stand in its world.
+
+    The world is that of the first model that stands; robots with the same model are copies, of
+    which the world has one: the chosen one, else the first.
+    """
+    others = [source for source in sources if source is not chosen]
+    rows: list[tuple[Source, Observation | None]] = [(chosen, None)]
+    rows += [(source, _row_with(source, chosen, of_chosen, now=now)) for source in others]
+    models = [(source, row, drawn) for source, row in rows if (drawn := source.drawn) is not None]
+    world = next((each.standing for *_, each in models if not each.standing.floats), _ANY)
+    copies: set[str] = set()
+    for source, row, drawn in models:
+        shares = drawn.standing.shares(world) and drawn.mjcf not in copies
+        if shares and not drawn.standing.floats and (row is not None or source is chosen):
+            copies.add(drawn.mjcf)
+        if row is not None:
+            yield source, row, shares
+
+
+def _row_with(
+    source: Source, chosen: Source, of_chosen: Observation, *, now: bool
+) -> Observation | None:
+    """The row of a source when another one published its row, or of now; None: there is none."""
     try:
-        return "model" in source.schema
+        if now and source.live and chosen.live:
+            return source.row(None)
+        first, last = source.extent()
+        time = source.time_with(chosen, of_chosen)
+        within = time is not None and first - SLACK <= time <= last + SLACK
+        return source.row(time) if within else None
     except Error:
-        return False
+        return None
 
 
 def _time_query(source: Source, query: dict[str, Any]) -> int | None:
@@ -202,6 +279,13 @@ def _time_query(source: Source, query: dict[str, Any]) -> int | None:
     if not math.isfinite(seconds) or abs(seconds) > 1e9:
         raise ValueError(f"at must be a time in seconds, got {at}")
     return source.nanoseconds(seconds)
+
+
+def _mapping(query: dict[str, Any], name: str) -> dict[str, Any]:
+    found = query.get(name) or {}
+    if not isinstance(found, dict):
+        raise TypeError(f"{name} must be a mapping from segments, got {found!r:.60}")
+    return found
 
 
 def _window(query: dict[str, Any]) -> float:

@@ -8,6 +8,7 @@ with limits.
 import os
 import subprocess
 import sys
+from functools import lru_cache
 from typing import Any
 from xml.etree import ElementTree
 
@@ -34,8 +35,9 @@ sys.stdout.buffer.write(content.tobytes())
 """
 
 
+@lru_cache(maxsize=8)
 def compiled(mjcf: str, mujoco: Any) -> Any:
-    """The model. Raises Error."""
+    """The model, which nobody changes. Raises Error."""
     text = without_files(mjcf)
     try:
         done = subprocess.run(

@@ -57,6 +57,11 @@ class LiveSource(Source):
             # the former frontend is not closed: another thread may be reading with it
 
     @property
+    def alive(self) -> bool:
+        frontend = self._frontend
+        return frontend is not None and frontend.alive
+
+    @property
     def _attached(self) -> Frontend:
         if self._frontend is None:
             raise NothingToShow(self._problem or f"waiting for segment '{self.name}'")
@@ -94,6 +99,14 @@ class LiveSource(Source):
     def rows(self, begin: int, end: int) -> History:
         return self._attached.history(from_time=begin, to_time=end)
 
+    def time_with(self, other: Source, row: Observation) -> int | None:
+        if not other.live:
+            return None
+        if self.schema["clock"] == other.schema["clock"] == "monotonic":
+            return row.time
+        # of simulated time only that of now is known: both are taken to have run alike
+        return self.extent()[1] - (other.extent()[1] - row.time)
+
     def marks(self) -> Sequence[tuple[str, int]]:
         with self._lock:
             journal, more = self._journal, True
@@ -114,7 +127,7 @@ class LiveSource(Source):
         if frontend is None:
             return line
         loop = _core.loop_state(frontend)
-        alive = frontend.alive
+        alive = self.alive
         halt = frontend.halted if alive else None
         rate = "bursting" if loop.bursting else rate_text(loop.rate, loop.frequency)
         return line | {

@@ -1,7 +1,8 @@
 """One epoch of a recording as the source of a page."""
 
 import threading
-from collections.abc import Sequence
+from bisect import bisect
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from o80.rows.history import History
 from o80.view.source import NothingToShow, Source
 
 AHEAD = 3_000_000_000  # [ns]: rows before and after the ones that are asked for
+SAME_CLOCK = 500_000_000  # offsets to the wall clock that differ by less are of one clock [ns]
+
+Moment = tuple[str, int]  # name of a mark, and how many of this name came before
 
 
 class RecordedSource(Source):
@@ -26,15 +30,19 @@ class RecordedSource(Source):
         number: int,
         epoch: RecordedEpoch,
         marks: Sequence[tuple[str, int]] = (),
+        moments: Mapping[Moment, tuple[int, int]] | None = None,
         *,
         model_files: bool = False,
     ) -> None:
+        """moments: of this run, iteration and wall-clock time [ns] of each mark."""
         self.trusted = model_files
         self.name = name
         self.label = f"{name}, run {number + 1}" if number else name
         self.key = f"recorded {name} {number} {epoch.epoch}"
         self._epoch = epoch
         self._marks = marks
+        self._moments = moments or {}
+        self._times: dict[Moment, int] = {}
         self._chunks = epoch.chunk_times
         self._lock = threading.Lock()
         self._kept: tuple[int, int, History] | None = None
@@ -93,6 +101,36 @@ class RecordedSource(Source):
                 if len(found):
                     return found[-1]
         raise NothingToShow(f"the recording has no row of '{self.label}' there")
+
+    def time_with(self, other: Source, row: Observation) -> int | None:
+        if not isinstance(other, RecordedSource) or not self._epoch.overlaps(other._epoch):
+            return None
+        clocks = self.schema["clock"], other.schema["clock"]
+        shift = other._epoch.wall_offset - self._epoch.wall_offset
+        if clocks == ("monotonic", "monotonic"):
+            return row.time if abs(shift) < SAME_CLOCK else row.time + shift
+        # simulated time passes while its robot is burst; marks of both say when that was
+        both = [(other._moments[each][0], each) for each in self._moments if each in other._moments]
+        both.sort()
+        past = bisect(both, row.iteration, key=lambda each: each[0])
+        if past:
+            mark = both[past - 1][1]
+            found = self._time_of(mark) + row.time - other._time_of(mark)
+        else:
+            found = row.time if clocks == ("simulated", "simulated") else row.time + shift
+        return min(found, self._time_of(both[past][1])) if past < len(both) else found
+
+    def _time_of(self, moment: Moment) -> int:
+        """The time [ns] of the row that a mark names."""
+        iteration, wall = self._moments[moment]
+        if self.schema["clock"] == "simulated":
+            return iteration * int(self.schema["period"])
+        if moment not in self._times:
+            at = wall - self._epoch.wall_offset
+            rows = self._epoch.history(from_time=at - AHEAD, to_time=at + AHEAD)
+            place = int(np.searchsorted(rows.iteration, iteration))
+            self._times[moment] = int(rows.time[place]) if place < len(rows) else at
+        return self._times[moment]
 
     def marks(self) -> Sequence[tuple[str, int]]:
         return self._marks

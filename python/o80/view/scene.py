@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from o80.base.errors import Error, MissingExtra
 from o80.view.base64_arrays import packed, packed_indices
 from o80.view.foreign_model import compiled
+from o80.view.world import Drawn
 
 SHAPES = {0: "plane", 2: "sphere", 3: "capsule", 4: "ellipsoid", 5: "cylinder", 6: "box", 7: "mesh"}
 DRAWN_GROUPS = 3  # geoms of groups 0 to 2; the others are shapes for collisions
@@ -20,15 +21,14 @@ USUAL_COLOUR = (0.5, 0.5, 0.5, 1.0)  # of a geom that has none
 class Scene:
     """Draws one model. May be used from several threads."""
 
-    def __init__(self, schema: dict[str, Any], mjcf: str, *, trusted: bool) -> None:
-        """trusted: the files that the model names may be read.
-
-        Raises Error if the model cannot be read, MissingExtra without mujoco.
-        """
-        described = schema["model"]
+    def __init__(self, schema: dict[str, Any], drawn: Drawn) -> None:
+        """Raises Error if the model cannot be read, MissingExtra without mujoco."""
+        described = drawn.described
         self._mujoco = _mujoco()
         self._model = (
-            self._compiled(mjcf, described["file"]) if trusted else compiled(mjcf, self._mujoco)
+            self._compiled(drawn.mjcf, described["file"])
+            if drawn.trusted
+            else compiled(drawn.mjcf, self._mujoco)
         )
         self._data = self._mujoco.MjData(self._model)
         self._lock = threading.Lock()
@@ -40,6 +40,8 @@ class Scene:
         ]
         weld = self._model.body_weldid
         self._moving = [body for body in range(self._model.nbody) if weld[body] != 0]
+        # bodies that float are there only while a row says where, as a ball that is tracked
+        self._floats = not any(weld[body] == 0 for body in self._model.geom_bodyid)
         self._has_ghost = any(value["from"] == "states" for value in described["values"])
         self.geometry = self._geometry()
 
@@ -71,7 +73,8 @@ class Scene:
         desired = observed if extended else row["desired"] + value["offset"]
         address = int(self._model.jnt_qposadr[found])
         follows = None if extended else _following(schema, value["offset"])
-        return _Place(value["name"], address, 1 if joint else 3, observed, desired, follows)
+        body = int(self._model.jnt_bodyid[found])
+        return _Place(value["name"], body, address, 1 if joint else 3, observed, desired, follows)
 
     def poses(self, row: bytes, active: NDArray[np.bool_]) -> dict[str, Any]:
         """Positions and quaternions of the moving bodies (bodies, 7), observed and desired.
@@ -89,15 +92,19 @@ class Scene:
 
     def _pose(self, row: bytes, offsets: list[int], not_finite: list[str]) -> NDArray[np.float32]:
         self._data.qpos[:] = self._start
+        lost = []
         for place, offset in zip(self._places, offsets, strict=True):
             numbers = np.frombuffer(row, np.float64, place.count, offset)
             if np.isfinite(numbers).all():
                 self._data.qpos[place.address : place.address + place.count] = numbers
+            elif self._floats:
+                lost.append(self._moving.index(place.body))
             else:
                 not_finite.append(place.name)
         self._mujoco.mj_kinematics(self._model, self._data)
         moving = self._moving
         poses = np.hstack([self._data.xpos[moving], self._data.xquat[moving]])
+        poses[lost] = np.nan
         return poses.astype(np.float32)
 
     def _geometry(self) -> dict[str, Any]:
@@ -163,6 +170,7 @@ class _Place:
     """Where a value lies in a row, and where it goes in qpos."""
 
     name: str
+    body: int
     address: int
     count: int
     observed: int

@@ -7,6 +7,7 @@ from typing import Any
 from o80._core import Observation
 from o80.base.errors import Error
 from o80.rows.history import History
+from o80.view.world import Drawn, drawn
 
 NANOSECONDS = 1e9
 
@@ -25,6 +26,12 @@ class Source(ABC):
     zero: int = 0  #: [ns]
     #: False: it may come from a stranger, and files that its model names are not read
     trusted: bool = False
+    _drawn: tuple[str, Drawn | None] = "", None
+
+    @property
+    def alive(self) -> bool:
+        """Whether its backend runs."""
+        return False
 
     @property
     @abstractmethod
@@ -35,6 +42,18 @@ class Source(ABC):
     @abstractmethod
     def model(self) -> str:
         """Text of the model (MJCF) that draws the robot; empty: none."""
+
+    @property
+    def drawn(self) -> Drawn | None:
+        """The model with what moves it; None: there is none."""
+        key, found = self._drawn
+        if key != self.key or not key:
+            try:
+                found = drawn(self.schema, self.model, trusted=self.trusted)
+            except Error:
+                return None
+            self._drawn = self.key, found
+        return found
 
     @abstractmethod
     def refresh(self) -> None:
@@ -58,6 +77,13 @@ class Source(ABC):
     @abstractmethod
     def marks(self) -> Sequence[tuple[str, int]]:
         """Text and iteration of the marks of this run, in their order."""
+
+    @abstractmethod
+    def time_with(self, other: "Source", row: Observation) -> int | None:
+        """The time [ns] of this source when another published a row; None: they never ran together.
+
+        Raises NothingToShow.
+        """
 
     @abstractmethod
     def state(self) -> dict[str, Any]:

@@ -1,16 +1,27 @@
-// The list of segments, and the list of fields that can be drawn.
+// The list of segments, each with a box that shows it in the scene or hides it, and the list of fields that can be drawn.
 
 class SegmentList {
   constructor(box, choose) {
     this.box = box;
     this.choose = choose;
     this.rows = new Map();
+    this.seen = {}; // what the user has chosen to see in the scene, or not
   }
 
-  show(lines, chosen, waiting) {
+  // drawn: by name, whether a robot is in the scene unless the user decides
+  show(lines, chosen, waiting, drawn) {
     const names = lines.map((line) => line.name);
     if (names.join("\n") !== [...this.rows.keys()].join("\n")) this.build(names, waiting);
-    for (const line of lines) this.fill(this.rows.get(line.name), line, line.name === chosen);
+    for (const line of lines) {
+      const { button, eye } = this.rows.get(line.name);
+      this.fill(button, line, line.name === chosen);
+      eye.style.visibility = drawn[line.name] === undefined ? "hidden" : "visible";
+      eye.checked = this.sees(line.name, drawn[line.name]);
+    }
+  }
+
+  sees(name, unlessTold) {
+    return this.seen[name] ?? unlessTold;
   }
 
   build(names, waiting) {
@@ -18,9 +29,16 @@ class SegmentList {
     for (const name of names) {
       const button = element("button", "", "segment");
       button.addEventListener("click", () => this.choose(name));
-      this.rows.set(name, button);
+      const eye = element("input", "", "eye");
+      eye.type = "checkbox";
+      eye.title = `${name} in the scene`;
+      eye.addEventListener("change", () => { this.seen[name] = eye.checked; });
+      const row = element("div", "", "row");
+      row.append(eye, button);
+      this.rows.set(name, { button, eye, row });
     }
-    this.box.replaceChildren(...(names.length ? this.rows.values() : [element("p", waiting)]));
+    const rows = [...this.rows.values()].map(({ row }) => row);
+    this.box.replaceChildren(...(names.length ? rows : [element("p", waiting)]));
   }
 
   fill(button, line, chosen) {

@@ -60,7 +60,8 @@ class Page {
     const now = performance.now();
     const curves = now - this.curvesAt >= BETWEEN_CURVES;
     if (curves) this.curvesAt = now;
-    const asked = { source: this.source, key: this.key, at: this.timeline.next(), curves, window: Number(byId("window").value) };
+    const asked = { source: this.source, key: this.key, at: this.timeline.next(), curves, window: Number(byId("window").value), seen: this.segments.seen };
+    asked.known = Object.fromEntries([...this.scene.robots].map(([name, { key }]) => [name, key]));
     if (this.key !== null) asked.panels = this.fields.chosen;
     const source = this.source;
     const answer = await this.post("/look", asked);
@@ -72,16 +73,35 @@ class Page {
   show(answer) {
     this.answer = answer;
     this.source = answer.source ?? null;
-    this.segments.show(answer.list, this.source, answer.waiting);
     if (answer.new) this.introduce(answer);
+    this.showSegments(answer);
     if (answer.at !== undefined) {
       this.timeline.show(answer);
-      this.scene.show(answer.pose, answer.ghost);
       byId("ghost-legend").hidden = !this.scene.ghosts().size;
       this.showCurves(answer);
     }
     this.showButtons();
     this.notice(this.problem(answer));
+  }
+
+  // the robots of one world in one scene: the chosen one, with its ghost, and the others
+  showSegments(answer) {
+    const others = answer.others ?? {};
+    const drawn = Object.fromEntries(Object.entries(others).map(([name, { shares }]) => [name, shares]));
+    if (answer.pose) drawn[this.source] = true;
+    this.segments.show(answer.list, this.source, answer.waiting, drawn);
+    const poses = { ...others, [this.source]: { pose: answer.pose, scene: this.geometry, key: this.key } };
+    const seen = Object.keys(drawn).filter((name) => this.segments.sees(name, drawn[name]));
+    this.scene.keep(seen);
+    for (const name of seen) {
+      const { pose, scene, key } = poses[name];
+      const known = this.scene.robots.get(name);
+      if (scene && known?.key !== key) this.scene.load(name, scene, key);
+      else if (known && known.key !== key) this.scene.remove(name);
+      this.scene.show(name, pose, name === this.source && answer.ghost);
+    }
+    this.scene.choose(this.source);
+    byId("no-scene").hidden = this.scene.geoms.length > 0;
   }
 
   introduce(answer) {
@@ -91,7 +111,7 @@ class Page {
     const lost = answer.new.scene && !this.scene.gl ? "This browser has no WebGL 2, so there is no 3D view." : "";
     byId("no-scene").textContent = lost || answer.new.no_scene;
     this.timeline.load(answer);
-    this.scene.load(answer.new.scene);
+    this.geometry = answer.new.scene;
     [this.units, this.charts] = [answer.new.units, []];
     this.fields.load(answer.new.panels, answer.new.first_panels);
     this.curvesAt = 0;
@@ -118,6 +138,7 @@ class Page {
   showButtons() {
     const line = this.line();
     const halt = byId("halt");
+    halt.hidden = line.live === false;
     halt.disabled = !(line.live && line.alive);
     halt.textContent = line.live ? `Halt ${line.name}` : "Halt";
     byId("resume").hidden = !(this.answer.control && line.halt);
@@ -156,7 +177,7 @@ class Page {
   choose(name) {
     document.body.classList.remove("list");
     [this.source, this.key, this.said] = [name, null, ""];
-    this.scene.load(null); // nothing of another robot stays, also if this one is waited for
+    this.geometry = null;
     this.charts = [];
     byId("charts").replaceChildren();
     byId("robot").textContent = name;

@@ -40,10 +40,9 @@ class Scene {
   constructor(canvas) {
     this.canvas = canvas;
     this.gl = canvas.getContext("webgl2", { antialias: true, stencil: true, alpha: true });
-    this.geoms = [];
-    this.bodies = [];
-    this.pose = null; // of the moving bodies, 7 numbers each
-    this.ghost = null;
+    this.robots = new Map(); // by name of the source
+    this.chosen = null; // name of the one with a ghost
+    this.geoms = []; // what is drawn, of all
     this.frames = 0;
     if (this.gl) this.prepare();
     this.listen();
@@ -67,34 +66,84 @@ class Scene {
       this.place[name] = gl.getUniformLocation(program, name);
     }
     gl.enable(gl.DEPTH_TEST);
+    gl.polygonOffset(1, 4);
     gl.enable(gl.BLEND);
     gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
   }
 
-  load(geometry) {
-    for (const geom of this.geoms) this.gl.deleteVertexArray(geom.array);
-    this.geoms = [];
-    this.pose = this.ghost = null;
-    this.canvas.hidden = !geometry;
-    if (!geometry || !this.gl) return;
-    this.moving = geometry.moving;
-    this.extent = Math.max(geometry.extent, 1e-3);
+  get pose() {
+    return this.robots.get(this.chosen)?.pose;
+  }
+
+  // the robot with the ghost, whose surfaces lie before those that others share with it
+  choose(name) {
+    if (name === this.chosen) return;
+    this.chosen = name;
+    this.arrange();
+  }
+
+  // the only robots that are drawn
+  keep(names) {
+    const gone = [...this.robots.keys()].filter((name) => !names.includes(name));
+    for (const name of gone) this.remove(name);
+  }
+
+  remove(name) {
+    for (const geom of this.robots.get(name)?.geoms ?? []) this.gl.deleteVertexArray(geom.array);
+    if (this.robots.delete(name)) this.arrange();
+  }
+
+  // the model of a robot, which has no pose yet
+  load(name, geometry, key) {
+    this.remove(name);
+    if (!geometry || !this.gl) return this.arrange();
+    const moves = new Set(geometry.moving);
     const bodies = floats(geometry.bodies);
-    this.bodies = Array.from({ length: bodies.length / 7 }, (_, i) => this.bodyMatrix(bodies, i));
-    const moves = new Set(this.moving);
-    this.geoms = geometry.geoms.map((geom) => ({
+    const robot = { key, moving: geometry.moving, extent: Math.max(geometry.extent, 1e-3), centre: geometry.centre, pose: null, ghost: null };
+    robot.bodies = Array.from({ length: bodies.length / 7 }, (_, i) => this.bodyMatrix(bodies, i));
+    robot.geoms = geometry.geoms.map((geom) => ({
       ...geom,
-      ...this.upload(Shapes.of(geom, geometry.meshes, this.extent)),
+      ...this.upload(Shapes.of(geom, geometry.meshes, robot.extent)),
       local: Mat.rigid(geom.pos, geom.quat),
       moves: moves.has(geom.body),
+      robot,
     }));
+    this.robots.set(name, robot);
+    this.arrange();
+  }
+
+  // what is drawn: what stands in several models is drawn once, and of floors of one height the largest
+  arrange() {
+    const first = this.robots.get(this.chosen);
+    const robots = [...this.robots.values()].sort((a, b) => (b === first) - (a === first));
+    const area = ({ size: [x, y] }) => (x > 0 && y > 0 ? x * y : Infinity);
+    const found = new Map();
+    for (const geom of robots.flatMap((robot) => robot.geoms)) {
+      const place = geom.moves ? [] : Mat.multiply(geom.robot.bodies[geom.body], geom.local).map((number) => number.toFixed(3));
+      const plane = geom.shape === "plane";
+      const same = plane ? [place.slice(8, 11), place[14]] : [geom.shape, geom.size.map((number) => number.toFixed(4)), place];
+      const key = geom.moves || geom.shape === "mesh" ? geom : JSON.stringify(same);
+      const other = found.get(key);
+      if (!other || (plane && area(geom) > area(other))) found.set(key, geom);
+    }
+    this.geoms = [...found.values()];
+    this.canvas.hidden = !this.geoms.length;
+    this.dirty = true;
+    if (robots.length) this.fit(robots.reduce((a, b) => (b.extent > a.extent ? b : a)));
+    else this.moved = false;
     const floor = this.geoms.find((geom) => geom.shape === "plane" && !geom.moves);
-    this.floor = floor && Math.abs(floor.quat[0]) > 0.999 ? this.bodies[floor.body][14] + floor.pos[2] : null;
-    this.target = geometry.centre.slice();
-    this.distance = 2.1 * this.extent;
+    this.floor = floor && Math.abs(floor.quat[0]) > 0.999 ? floor.robot.bodies[floor.body][14] + floor.pos[2] : null;
+  }
+
+  // the camera looks at the largest robot, until the user turns or moves it
+  fit({ extent, centre }) {
+    this.extent = extent;
+    if (this.moved) return;
+    this.target = centre.slice();
+    const shape = this.canvas.clientWidth / Math.max(this.canvas.clientHeight, 1);
+    this.distance = 2.1 * extent * Math.max(1, 1.2 / (shape || 1.2));
     this.azimuth = -0.9;
     this.elevation = 0.38;
-    this.dirty = true;
   }
 
   bodyMatrix(numbers, i) {
@@ -119,27 +168,29 @@ class Scene {
   }
 
   // poses as the server packs them; null: none
-  show(pose, ghost) {
-    this.pose = pose && floats(pose);
-    this.ghost = ghost && floats(ghost);
-    if (!this.pose || !this.gl) return;
-    this.moving.forEach((body, i) => {
-      this.bodies[body] = this.bodyMatrix(this.pose, i);
+  show(name, pose, ghost) {
+    const robot = this.robots.get(name);
+    if (!robot || !pose) return;
+    robot.pose = floats(pose);
+    robot.ghost = ghost && floats(ghost);
+    robot.moving.forEach((body, i) => {
+      robot.bodies[body] = this.bodyMatrix(robot.pose, i);
     });
     this.dirty = true;
   }
 
-  // moving bodies whose desired pose differs visibly from the observed one
+  // moving bodies of the chosen robot whose desired pose differs visibly from the observed one
   ghosts() {
-    if (!this.ghost || !this.pose) return new Map();
+    const robot = this.robots.get(this.chosen);
+    if (!robot?.ghost) return new Map();
     const found = new Map();
-    this.moving.forEach((body, i) => {
+    robot.moving.forEach((body, i) => {
       let difference = 0;
       let turn = 0;
-      for (let k = 0; k < 3; ++k) difference += (this.ghost[7 * i + k] - this.pose[7 * i + k]) ** 2;
-      for (let k = 3; k < 7; ++k) turn += this.ghost[7 * i + k] * this.pose[7 * i + k];
-      if (Math.sqrt(difference) > 0.002 * this.extent || Math.abs(turn) < 0.9999) {
-        found.set(body, this.bodyMatrix(this.ghost, i));
+      for (let k = 0; k < 3; ++k) difference += (robot.ghost[7 * i + k] - robot.pose[7 * i + k]) ** 2;
+      for (let k = 3; k < 7; ++k) turn += robot.ghost[7 * i + k] * robot.pose[7 * i + k];
+      if (Math.sqrt(difference) > 0.002 * robot.extent || Math.abs(turn) < 0.9999) {
+        found.set(body, this.bodyMatrix(robot.ghost, i));
       }
     });
     return found;
@@ -178,13 +229,17 @@ class Scene {
     gl.uniform1f(this.place.reach, 8 * this.extent);
     const planes = this.geoms.filter((geom) => geom.shape === "plane");
     const solid = this.geoms.filter((geom) => geom.shape !== "plane");
-    for (const geom of planes) this.drawGeom(geom, this.bodies[geom.body], geom.colour, this.extent / 6);
+    for (const geom of planes) this.drawGeom(geom, this.bodyOf(geom), geom.colour, this.extent / 6);
     this.drawShadows(solid);
-    for (const geom of solid) if (geom.colour[3] >= 1) this.drawGeom(geom, this.bodies[geom.body], geom.colour, 0);
+    for (const geom of solid) if (geom.colour[3] >= 1) this.drawGeom(geom, this.bodyOf(geom), geom.colour, 0);
     gl.depthMask(false);
-    for (const geom of solid) if (geom.colour[3] < 1) this.drawGeom(geom, this.bodies[geom.body], geom.colour, 0);
+    for (const geom of solid) if (geom.colour[3] < 1) this.drawGeom(geom, this.bodyOf(geom), geom.colour, 0);
     gl.depthMask(true);
     this.drawGhosts(solid);
+  }
+
+  bodyOf(geom) {
+    return geom.robot.bodies[geom.body];
   }
 
   // flat shadows on the floor; the stencil lets each pixel be darkened once
@@ -196,7 +251,7 @@ class Scene {
     gl.stencilFunc(gl.EQUAL, 0, 255);
     gl.stencilOp(gl.KEEP, gl.KEEP, gl.INCR);
     for (const geom of solid) {
-      this.drawGeom(geom, Mat.multiply(flat, this.bodies[geom.body]), [0, 0, 0, 0.16 * geom.colour[3]], -1);
+      this.drawGeom(geom, Mat.multiply(flat, this.bodyOf(geom)), [0, 0, 0, 0.16 * geom.colour[3]], -1);
     }
     gl.disable(gl.STENCIL_TEST);
   }
@@ -206,12 +261,11 @@ class Scene {
     const gl = this.gl;
     const ghosts = this.ghosts();
     gl.enable(gl.POLYGON_OFFSET_FILL); // behind the surfaces that it shares with the robot
-    gl.polygonOffset(1, 4);
     for (const pass of [false, true]) {
       gl.colorMask(pass, pass, pass, pass);
       gl.depthFunc(pass ? gl.LEQUAL : gl.LESS);
       for (const geom of solid) {
-        const pose = ghosts.get(geom.body);
+        const pose = geom.robot === this.robots.get(this.chosen) && ghosts.get(geom.body);
         if (pose) this.drawGeom(geom, pose, [0.91, 0.45, 0.05, 0.42], 0);
       }
     }
@@ -220,12 +274,15 @@ class Scene {
   }
 
   drawGeom(geom, body, colour, tile) {
+    if (Number.isNaN(body[12])) return; // not seen, as a ball that no camera sees
     const gl = this.gl;
+    if (geom.robot !== this.robots.get(this.chosen)) gl.enable(gl.POLYGON_OFFSET_FILL); // behind what it shares with the chosen one
     gl.uniformMatrix4fv(this.place.model, false, Mat.multiply(body, geom.local));
     gl.uniform4fv(this.place.colour, colour);
     gl.uniform1f(this.place.tile, tile);
     gl.bindVertexArray(geom.array);
     gl.drawElements(gl.TRIANGLES, geom.count, gl.UNSIGNED_INT, 0);
+    if (geom.robot !== this.robots.get(this.chosen)) gl.disable(gl.POLYGON_OFFSET_FILL);
   }
 
   listen() {
@@ -239,13 +296,13 @@ class Scene {
         this.azimuth -= 0.006 * event.movementX;
         this.elevation = Math.min(1.55, Math.max(-1.5, this.elevation + 0.006 * event.movementY));
       }
-      this.dirty = true;
+      this.dirty = this.moved = true;
     });
     canvas.addEventListener("wheel", (event) => {
       event.preventDefault();
       if (!this.target) return;
       this.distance *= Math.exp(0.001 * event.deltaY);
-      this.dirty = true;
+      this.dirty = this.moved = true;
     }, { passive: false });
   }
 
