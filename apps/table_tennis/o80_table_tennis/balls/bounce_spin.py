@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..physics.aerodynamics import AERODYNAMICS
 from ..physics.impact import bounced
-
-FloatArray = NDArray[np.float64]
 
 
 def spin_after(velocity: FloatArray, turn: FloatArray, spin: FloatArray | None) -> FloatArray:

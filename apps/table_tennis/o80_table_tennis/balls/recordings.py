@@ -11,12 +11,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from .frame_stamps import FRAME_PERIOD, frames_of, new_frames
 from .trajectories import BallTrajectory, require_enough_rows
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

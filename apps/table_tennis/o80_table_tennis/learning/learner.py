@@ -16,13 +16,14 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecNormalize
 
+from o80.base.arrays import Float32Array
 from o80.learning.rollouts import Collector
 from o80.learning.rollouts.ppo import CollectorEnv, RolloutPPO
 
 from ..players.network import CLIP, Network
 from .copies import Stopwatch, timed_copies
 from .settings import LearningSettings
-from .visible_numbers import Float32Array, visible_numbers
+from .visible_numbers import visible_numbers
 
 INFOS = ("touched", "returned")
 """Entries of an episode's last info that a training counts."""

@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from functools import cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import path, predicted_flight
 
 from ..world.table import TABLE
 from ..world.timing import STEP
 from .aerodynamics import AERODYNAMICS
 from .impact import platform
-
-FloatArray = NDArray[np.float64]
 
 TYPICAL = (0.46, 2.95, 1.37, 0.24, -4.14, 2.28, 30.0)
 """Position, velocity and top spin of the launch of the recorded ball gun, with less spin."""

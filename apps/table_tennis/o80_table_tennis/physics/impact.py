@@ -12,16 +12,14 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import Platform
 from o80_mujoco.balls import bounced as bounced_off
 
 from ..world.ball import BALL_INERTIA, BALL_RADIUS
 from ..world.materials import Restitution
 from ..world.table import TABLE, Table
-
-FloatArray = NDArray[np.float64]
 
 
 class Leaving(NamedTuple):

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import predicted_flight
 
 from ..world.ball import NO_SPIN
@@ -17,7 +17,6 @@ from .aerodynamics import AERODYNAMICS, Aerodynamics
 from .impact import platform
 from .interpolation import along_path
 
-FloatArray = NDArray[np.float64]
 Numbers = Sequence[float] | FloatArray
 
 STEP = 0.02

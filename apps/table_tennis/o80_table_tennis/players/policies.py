@@ -8,9 +8,11 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array
+
 from ..rig.arm_numbers import ArmNumbers
 from ..task.actions import COARSE
-from ..task.observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS, Float32Array
+from ..task.observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS
 from ..world.arm import MUSCLES
 from .found_parameters import found_settings
 from .hitting_policy import HittingPolicy

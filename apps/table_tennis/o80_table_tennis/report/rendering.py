@@ -13,16 +13,13 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, Image
 from o80.base.extras import needed
 
 from ..world.arm import JOINT_NAMES
 from ..world.ball import BALL_RADIUS
 from ..world.scene import MODEL
-
-Image = NDArray[np.uint8]
-FloatArray = NDArray[np.float64]
 
 CAMERAS = ("side", "behind", "close")
 SIZE = (640, 480)

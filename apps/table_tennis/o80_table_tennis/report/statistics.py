@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..rig.rig import Rig
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass

@@ -11,9 +11,9 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 from o80.learning import EVERY
 
 from ..settings import Pacing, RigSettings
@@ -22,8 +22,6 @@ from ..world.timing import ITERATIONS
 from .arm import Arm
 from .robot_options import arm_options, twin_options
 from .twin import TIMEOUT, Flights, Twin
-
-FloatArray = NDArray[np.float64]
 
 NUMBERS = count(1)
 

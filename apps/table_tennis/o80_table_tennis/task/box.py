@@ -8,6 +8,8 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array, FloatArray
+
 
 class Bounded(Protocol):
     """Anything with bounds: a task, or another observation."""
@@ -21,10 +23,6 @@ class Bounded(Protocol):
     def high(self) -> NDArray[np.float32]:
         """(M,)"""
         ...
-
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 class ObservationBox:

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import Float32Array, FloatArray
 
 from ..world.arm import MUSCLES
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 class Part(NamedTuple):

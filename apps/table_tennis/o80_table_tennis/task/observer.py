@@ -11,7 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
+
+from o80.base.arrays import Float32Array, FloatArray, IntArray
 
 from .ball_play import ReturnTask
 from .box import Bounded, ObservationBox
@@ -21,10 +22,6 @@ from .noise import NO_NOISE, NoiseSettings
 from .perception import Perceived, Perceiving, Perception
 from .state import State
 from .task import Task
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 EVERY = slice(None)
 

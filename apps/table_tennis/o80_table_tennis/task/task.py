@@ -12,10 +12,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from .state import State
+from o80.base.arrays import Float32Array, FloatArray
 
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
+from .state import State
 
 
 @runtime_checkable

@@ -8,10 +8,11 @@ from typing import Any
 import gymnasium
 import numpy as np
 
+from o80.base.arrays import Float32Array
+
 from ...players.conditions import Conditions
 from ...registration import ACCELERATED, register_environments
 from ..episodes import EpisodeOutcome, Shares, shares
-from .motions import Float32Array
 
 BALL_SEED = 800_001
 """Seed of the shots of evaluations, which no training plays."""

@@ -10,11 +10,13 @@ import torch
 from gymnasium import spaces
 from stable_baselines3.common.logger import Logger
 
+from o80.base.arrays import Float32Array
+
 from ...world.arm import MUSCLES
 from .buffer import MotionBuffer
 from .fast_sac import FastSac
 from .hindsight import Transitions
-from .motions import Float32Array, Motion
+from .motions import Motion
 from .settings import SacSettings
 
 CLIP = 10.0

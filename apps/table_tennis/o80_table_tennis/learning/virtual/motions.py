@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array, FloatArray
 from o80.learning import EVERY
 
 from ...balls.sources import balls_from
@@ -27,8 +28,6 @@ from ...task.outcome import returned
 from ...task.state import State
 from ...world.arm import MUSCLES
 
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Whole = NDArray[np.int64]
 Policy = Callable[[Float32Array], Float32Array]

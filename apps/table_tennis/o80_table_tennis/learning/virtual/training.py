@@ -8,12 +8,14 @@ from contextlib import closing
 
 import numpy as np
 
+from o80.base.arrays import Float32Array
+
 from ...world.arm import MUSCLES
 from .curves import Point
 from .evaluation import Evaluation
 from .hindsight import transitions
 from .learner import Learner
-from .motions import Float32Array, Motions, Policy
+from .motions import Motions, Policy
 from .settings import WAYS, VirtualSettings
 
 Told = Callable[[Point], None]
