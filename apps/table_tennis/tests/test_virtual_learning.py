@@ -21,6 +21,7 @@ from stable_baselines3.common.logger import Logger
 from typer.testing import CliRunner
 
 import o80
+from o80_table_tennis.learning import curve
 from o80_table_tennis.learning.virtual import __main__ as command
 from o80_table_tennis.learning.virtual import curves
 from o80_table_tennis.learning.virtual.comparison import PICTURE, run
@@ -113,15 +114,15 @@ def test_curves_are_written_whole_and_read_again(tmp_path: Path) -> None:
     path = curves.file_of(tmp_path, "none", 3)
     points = [Point(50, 0.25, 0.125, -0.5, 1000, 0, 0.75), Point(100, 0.5, 0.25, 0.5, 2000, 9, 1.5)]
     for point in points:
-        curves.append(path, point)
+        curve.append(path, point)
     assert curves.read(path) == points
     other = curves.file_of(tmp_path, "none", 4)
-    curves.append(other, points[1])
+    curve.append(other, points[1])
     found = curves.found(tmp_path, "none")
     assert curves.common_motions(found) == [100]
     assert curves.column(found, "returned").tolist() == [[0.25], [0.25]]
     path.write_text("something else\n")
-    with pytest.raises(ValueError, match=r"none-3.csv: not a curve of this version"):
+    with pytest.raises(ValueError, match=r"none-3.csv: not a learning curve of this version"):
         curves.read(path)
 
 
@@ -133,7 +134,7 @@ def test_a_comparison_goes_on_where_it_was_stopped_and_draws_what_is_there(
         lambda way, seed, **rest: replace(SMALL, way=way, seed=seed, **rest),
     )
     done = curves.file_of(tmp_path, "none", 1)
-    curves.append(done, Point(4, 0.5, 0.5, 0.5, 1, 1, 1.0))
+    curve.append(done, Point(4, 0.5, 0.5, 0.5, 1, 1, 1.0))
     before = done.read_bytes()
     done.with_name("all-1.part").write_text("of a training that was killed\n")
     run(["none", "all"], [1], tmp_path, Console(), motions=4)

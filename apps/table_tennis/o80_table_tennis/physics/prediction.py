@@ -102,24 +102,6 @@ def predict_crossing(
     return _crossing(nodes[first : first + 2], axis, at)
 
 
-def predict_landing(
-    position: Numbers,
-    velocity: Numbers,
-    *,
-    duration: float = 2.0,
-    spin: Numbers = NO_SPIN,
-    aerodynamics: Aerodynamics = AERODYNAMICS,
-    table: Table = TABLE,
-) -> Crossing | None:
-    """The first touch of the table, with the velocity before it; None if the ball misses it."""
-    nodes = flight_nodes(position, velocity, spin, duration, aerodynamics, table)
-    bounced = np.flatnonzero(nodes[:, BOUNCED])
-    if not len(bounced):
-        return None
-    touching = nodes[bounced[0] - 1]
-    return Crossing(float(touching[TIME]), touching[STATE][:3], touching[STATE][3:])
-
-
 def flight_nodes(
     position: Numbers,
     velocity: Numbers,

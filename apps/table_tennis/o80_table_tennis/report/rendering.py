@@ -7,15 +7,14 @@ import importlib
 import os
 import sys
 from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
 
 from o80.base.arrays import FloatArray, Image
 from o80.base.extras import needed
+from o80.base.lifecycle import Closeable
 
 from ..world.arm import JOINT_NAMES
 from ..world.ball import BALL_RADIUS
@@ -34,7 +33,7 @@ OTHER_BALL = (0.95, 0.95, 0.92, 0.8)
 """Colour of the balls beside the one that is played."""
 
 
-class Scene(AbstractContextManager["Scene"]):
+class Scene(Closeable):
     """Draws the scene with any number of balls, without a screen.
 
     Needs the extra `rendering`, and EGL or OSMesa; MUJOCO_GL chooses between them. Raises
@@ -54,14 +53,6 @@ class Scene(AbstractContextManager["Scene"]):
         self._balls = [self._free_joint(ball) for ball in range(balls)]
         self._arm = [int(self._model.joint(name).qposadr[0]) for name in JOINT_NAMES]
         self._renderer = mujoco.Renderer(self._model, size[1], size[0])
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Gives the renderer back; may be called twice."""

@@ -64,9 +64,14 @@ class FullObservation:
 
     @property
     def high(self) -> Float32Array:
-        """(M,) fresh; the least observation is minus this."""
+        """(M,) largest observation, a fresh array."""
         bounds = [part.bound for part in self.parts() for _ in part.centres]
         return np.array(bounds, dtype=np.float32)
+
+    @property
+    def low(self) -> Float32Array:
+        """(M,) least observation, a fresh array."""
+        return -self.high
 
     @property
     def centres(self) -> FloatArray:

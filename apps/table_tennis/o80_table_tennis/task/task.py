@@ -65,19 +65,7 @@ class Task(Protocol):
         ...
 
 
-TASK_MEMBERS = (
-    "low",
-    "high",
-    "plays_ball",
-    "begin",
-    "observe",
-    "eventful",
-    "end",
-    "reward",
-    "info",
-)
-
-
 def missing_members(task: object) -> list[str]:
     """The members that an object lacks to be a task."""
-    return [name for name in TASK_MEMBERS if not hasattr(task, name)]
+    members = [name for name in vars(Task) if not name.startswith("_")]
+    return [name for name in members if not hasattr(task, name)]
