@@ -27,9 +27,9 @@ from .players.learned_policy import shipped_policy
 from .players.policies import BASELINES, DEFAULT_FACTOR, Policy, default_policy
 from .playing import play
 from .report.episode_summary import EpisodeSummary
-from .report.played import Played
 from .report.recorded_episodes import RecordedEpisode, recorded_episodes
 from .report.report import Report, write_report
+from .report.statistics import Played
 from .rig.arm_numbers import ArmNumbers
 from .settings import Pacing, RigSettings, TaskSettings
 
@@ -126,7 +126,8 @@ def _play(
     balls = (number % available for number in range(episodes))
     with TableTennisEnvironment(rig=rig, task=task, record=record) as environment:
         moved_on = _advance(progress, bar)
-        return play(environment, policy, balls, seed=settings.seed, after_each=moved_on)
+        played = play(environment, policy, balls, seed=settings.seed, after_each=moved_on)
+    return played
 
 
 def _compared(

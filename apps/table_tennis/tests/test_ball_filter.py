@@ -8,8 +8,7 @@ import pytest
 from o80.base.arrays import FloatArray
 from o80_table_tennis.balls.launches import WIDE
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
-from o80_table_tennis.physics.ball_filter import ball_filter
-from o80_table_tennis.physics.filter_gains import PLACES, FilterSettings, gains
+from o80_table_tennis.physics.ball_filter import PLACES, FilterSettings, ball_filter, gains
 from o80_table_tennis.physics.prediction import predict, predict_crossing
 from o80_table_tennis.world.table import TABLE
 

@@ -20,8 +20,8 @@ from o80.base.arrays import FloatArray
 from o80_mujoco.balls import path
 
 from ..physics.aerodynamics import AERODYNAMICS
+from ..physics.impact import spin_after
 from ..physics.interpolation import along_path
-from .bounce_spin import spin_after
 
 STEP = 0.05
 """Step of the integration [s]; the error stays below 1 um."""

@@ -17,8 +17,8 @@ from o80.base.arrays import FloatArray
 from o80_mujoco.balls import path
 
 from ..physics.aerodynamics import AERODYNAMICS
+from ..physics.impact import spin_after
 from ..physics.interpolation import along_path
-from .bounce_spin import spin_after
 from .flight_fit import ANCHOR_NOISE, FAR, POSITION_NOISE, FlightFit
 
 STEP = 0.02

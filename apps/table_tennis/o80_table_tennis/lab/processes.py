@@ -109,13 +109,13 @@ class Processes(Closeable):
             )
         self._ran.add(part.name)
 
-    def wait_until_running(self, timeout: float, names: Iterable[str] | None = None) -> None:
-        """Waits for the segments, or the words, of processes; None: of all that were started.
+    def wait_until_running(self, timeout: float) -> None:
+        """Waits for the segments, or the words, of all processes that were started.
 
         Raises PartEndedError if one ends meanwhile, o80.TimeoutError with those that do not run.
         """
         end = time.monotonic() + timeout
-        missing = set(self._running if names is None else names)
+        missing = set(self._running)
         while missing := {name for name in missing if not self.runs(name)}:
             if time.monotonic() > end:
                 raise o80.TimeoutError(self._why_not_running(missing, timeout))

@@ -26,7 +26,6 @@ from .learner import (
     set_exploration,
     training_environments,
 )
-from .restarts import stuck
 from .settings import LearningSettings
 from .validation import Validation
 
@@ -125,8 +124,7 @@ class Training(Closeable):
 
     def judge(self) -> None:
         """Notes whether the network has got stuck."""
-        self._stuck = stuck(
-            self.settings,
+        self._stuck = self.settings.stuck(
             begun=self._network_begun,
             decisions=self.model.num_timesteps,
             touched=self._counter.shares.touched,

@@ -6,8 +6,7 @@ import numpy as np
 
 from o80.base.arrays import FloatArray, IntArray
 
-from ..physics.ball_filter import ball_filter
-from ..physics.filter_gains import FilterSettings
+from ..physics.ball_filter import FilterSettings, ball_filter
 from ..world.arm import MUSCLES
 from .full_observation import FullObservation
 from .noise import NoiseSettings
