@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_devices.ball_tracking import Reason, Tracker, four_cameras
 from o80_devices.ball_tracking.flight_track import Tracked
 from o80_devices.ball_tracking.tracker import TrackerOptions
 from o80_devices.cameras.scene import Scene
 from o80_devices.cameras.throws import FLIGHT, PAUSE, FlyingBall, Throws
 
-FloatArray = NDArray[np.float64]
 RATE = 180.0
 RIG = four_cameras()
 BALLS = 8

@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 from o80.drivers import Reading
 from o80_devices.ball_tracking import Rig, four_cameras
 from o80_devices.calibration import calibrate
@@ -26,7 +27,6 @@ from o80_devices.cameras.scene import Scene
 
 pytestmark = pytest.mark.check  # needs OpenCV, which only `make check` installs
 
-FloatArray = NDArray[np.float64]
 LENS = without_place(four_cameras().cameras[0])
 # four cameras with one lens, so that its pictures need to be drawn once
 RIG = Rig(

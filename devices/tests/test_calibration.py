@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 from o80_devices.ball_tracking import Rig, four_cameras
 from o80_devices.calibration.bundle import triangulated, without_place
 from o80_devices.calibration.extrinsics import Calibrated, places_from_ball, reprojection
 
 pytestmark = pytest.mark.check  # needs OpenCV, which only `make check` installs
 
-FloatArray = NDArray[np.float64]
 RIG = four_cameras()
 
 

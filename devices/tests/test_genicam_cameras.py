@@ -5,11 +5,12 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from device_rows import WAIT, row_where
 from exclusive import alone_with
 
 import o80
@@ -20,7 +21,6 @@ from o80_devices.cameras.newest_image import CameraReason, NewestImage
 from o80_devices.cameras.pixel_formats import PixelFormat, rgb_of
 from o80_devices.cameras.rig import Rig, RigCamera
 
-WAIT = 60.0  # [s] longer than anything here takes
 ROBOT = o80.robots.load(GenicamCameras)
 WIRE = "127.0.0.1"
 
@@ -56,17 +56,6 @@ def wire_camera(request: pytest.FixtureRequest) -> Iterator[WireCamera]:
         camera = WireCamera(*getattr(request, "param", ()))
         yield camera
         camera.die()
-
-
-def row_where(cameras: Any, condition: Callable[[Any], Any]) -> Any:
-    end = time.monotonic() + WAIT
-    while time.monotonic() < end:
-        cameras.burst(1)
-        row = cameras.latest().extended
-        if condition(row):
-            return row
-        time.sleep(0.001)
-    raise AssertionError(f"no such row within {WAIT} s; reasons: {row.reasons}")
 
 
 @pytest.mark.check  # needs OpenCV

@@ -6,10 +6,10 @@ import struct
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
 
 import numpy as np
 import pytest
+from device_rows import WAIT, row_where
 from hypothesis import example, given
 from hypothesis import strategies as st
 
@@ -40,7 +40,6 @@ from o80_devices.motion_capture.qualisys_packets import (
 )
 from o80_devices.motion_capture.sensor import Reason
 
-WAIT = 60.0  # [s] longer than anything here takes
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 WHOLE = data_packet(5, 7, 3 * [BODY.pack(1.0, 2.0, 3.0, *UNTURNED, 0.1)])[HEADER.size :]
 
@@ -171,17 +170,6 @@ def test_two_drivers_read_one_server(segment: str) -> None:
     ):
         for system in (one, two, one):
             row_where(system, lambda row: row.reason == Reason.SEEN)
-
-
-def row_where(device: Any, condition: Callable[[Any], Any]) -> Any:
-    end = time.monotonic() + WAIT
-    while time.monotonic() < end:
-        device.burst(1)
-        row = device.latest().extended
-        if condition(row):
-            return row
-        time.sleep(0.001)
-    raise AssertionError(f"no such row within {WAIT} s; the last one: {row}")
 
 
 # ---------------------------------------------------------------------- messages of a tracker

@@ -1,10 +1,8 @@
 """Balls of the fake launcher, tracked: the launch decides what the tracking server publishes."""
 
-import time
-from typing import Any
-
 import numpy as np
 import pytest
+from device_rows import row_where
 
 import o80
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL
@@ -14,7 +12,6 @@ from o80_devices.cameras.rig import Table
 from o80_devices.fakes.ball_launcher import PLACE, YAW
 from o80_devices.fakes.launched_balls import SECOND, LaunchedBalls, TrackedLauncher
 
-WAIT = 60.0  # [s] longer than anything here takes
 BALL = LAUNCH_MODEL.launch(0.5, 0.5, (1800.0, 1800.0, 400.0))
 
 
@@ -56,21 +53,10 @@ def test_the_driver_of_a_tracking_server_sees_the_launched_ball(segment: str) ->
         TrackedLauncher("tcp://127.0.0.1:0", LaunchedBalls(PLACE, YAW)) as tracked,
         robot.inline(segment, address=tracked.address) as server,
     ):
-        row_where(server, ServerReason.not_seen)
+        row_where(server, lambda row: row.reason == ServerReason.not_seen)
         tracked.launched(BALL)
-        row = row_where(server, ServerReason.seen)
+        row = row_where(server, lambda row: row.reason == ServerReason.seen)
         flown = BALL.placed(PLACE, YAW)
         assert np.linalg.norm(row.measured - flown.position) < 3.0
         assert row.measured[0] == pytest.approx(flown.position[0], abs=0.1)
         assert row.ball == 1
-
-
-def row_where(system: Any, reason: ServerReason) -> Any:
-    end = time.monotonic() + WAIT
-    while time.monotonic() < end:
-        system.burst(1)
-        row = system.latest().extended
-        if row.reason == reason:
-            return row
-        time.sleep(0.001)
-    raise AssertionError(f"no row with {reason!r}; the last one: {row}")

@@ -3,11 +3,12 @@
 import math
 import socket
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from device_rows import WAIT, row_where
 
 import o80
 from o80_devices.fakes.qualisys import FakeQualisys
@@ -23,7 +24,6 @@ from o80_devices.motion_capture.qualisys_packets import (
 )
 from o80_devices.motion_capture.sensor import Reason
 
-WAIT = 60.0  # [s] longer than anything here takes
 ROBOT = o80.robots.load(Qualisys)
 
 
@@ -38,18 +38,6 @@ def system(server: FakeQualisys, segment: str) -> Iterator[o80.Frontend]:
     """The driver inside this process: each burst reads what has arrived."""
     with ROBOT.inline(segment, frequency=1000, port=server.port) as frontend:
         yield frontend
-
-
-def row_where(system: Any, condition: Callable[[Any], bool]) -> Any:
-    """The sensor values of the first row that meets a condition."""
-    end = time.monotonic() + WAIT
-    while time.monotonic() < end:
-        system.burst(1)
-        row = system.latest().extended
-        if condition(row):
-            return row
-        time.sleep(0.001)
-    raise AssertionError(f"no such row within {WAIT} s; the last one: {row}")
 
 
 def is_seen(row: Any) -> bool:

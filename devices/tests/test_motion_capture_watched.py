@@ -4,13 +4,13 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from device_rows import WAIT, row_where
 from exclusive import alone_with
 
 import o80
@@ -21,7 +21,6 @@ from o80_devices.motion_capture.watched import CHILD, Watched
 from o80_devices.motion_capture.watched_child import bodies_of
 
 PORT = 22223
-WAIT = 60.0  # [s] longer than anything here takes
 ROBOT = o80.robots.load(Watched)
 
 
@@ -32,17 +31,6 @@ def matrix_of_angles(roll: float, pitch: float, yaw: float) -> tuple[float, ...]
     about_y = np.array([[b.real, 0, b.imag], [0, 1, 0], [-b.imag, 0, b.real]])
     about_z = np.array([[c.real, -c.imag, 0], [c.imag, c.real, 0], [0, 0, 1]])
     return tuple((about_x @ about_y @ about_z).ravel().tolist())
-
-
-def row_where(system: Any, condition: Callable[[Any], bool]) -> Any:
-    end = time.monotonic() + WAIT
-    while time.monotonic() < end:
-        system.burst(1)
-        row = system.latest().extended
-        if condition(row):
-            return row
-        time.sleep(0.001)
-    raise AssertionError(f"no such row within {WAIT} s; the last one: {row}")
 
 
 def clients() -> list[int]:

@@ -103,7 +103,7 @@ void bind_batch(nb::module_& m) {
           "iteration", [](const Handle& self) { return known(self.iteration); },
           "The iteration in which the status changed; None while it is queued.")
       .def_ro("late", &Handle::late,
-              "With the reason limits: by how many iterations it takes longer than asked.")
+              "With the reason limits: by how many iterations it takes longer than requested.")
       .def_ro("text", &Handle::text, "The reason in words.")
       .def_ro("progress", &Handle::progress, "The driver's text about a running request.")
       .def_prop_ro(

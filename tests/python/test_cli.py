@@ -6,13 +6,11 @@ import os
 import pty
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-
-O80 = str(Path(sys.executable).parent / "o80")
+from processes import O80
 
 
 @pytest.fixture

@@ -5,18 +5,14 @@ import os
 import pty
 import signal
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from enum import IntEnum
-from pathlib import Path
 
 import pytest
+from processes import O80, WAIT, run_o80
 
 import o80
-
-WAIT = 60.0  # [s] longer than any answer should take
-O80 = str(Path(sys.executable).parent / "o80")
 
 
 class Gear(IntEnum):
@@ -41,11 +37,7 @@ def backend(segment: str) -> Iterator[o80.Backend]:
 
 def echo(segment: str, *words: str, fails: bool = False) -> str:
     """Output of `o80 echo`; its errors if it should fail."""
-    done = subprocess.run(
-        [O80, "echo", segment, *words], capture_output=True, text=True, timeout=WAIT, check=False
-    )
-    assert (done.returncode != 0) == fails, done.stdout + done.stderr
-    assert "Traceback" not in done.stderr
+    done = run_o80("echo", segment, *words, code=int(fails))
     return done.stderr if fails else done.stdout
 
 

@@ -2,32 +2,26 @@
 
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
+from processes import O80, WAIT, run_o80
 
 import o80
 
-WAIT = 60.0  # [s] longer than any command should take
-
-
-def o80_command(*words: str | Path) -> list[str]:
-    return [str(Path(sys.executable).parent / "o80"), *map(str, words)]
-
 
 def run(*words: str | Path, code: int = 0) -> str:
-    done = subprocess.run(o80_command(*words), capture_output=True, text=True, timeout=WAIT)
-    assert done.returncode == code, done.stdout + done.stderr
+    done = run_o80(*words, code=code)
     return done.stdout + done.stderr
 
 
 @contextmanager
 def playing(*words: str | Path) -> Iterator[subprocess.Popen[str]]:
     """o80 play, which Ctrl-C ends in order."""
-    with subprocess.Popen(o80_command("play", *words), stderr=subprocess.PIPE, text=True) as player:
+    command = [O80, "play", *map(str, words)]
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as player:
         try:
             yield player
             player.send_signal(signal.SIGINT)
@@ -87,9 +81,8 @@ def test_a_name_that_is_taken_is_refused(recorded: Path, segment: str) -> None:
     ],
 )
 def test_wrong_options_are_named(recorded: Path, words: list[str], said: str) -> None:
-    done = subprocess.run(
-        o80_command("play", recorded, *words), capture_output=True, text=True, timeout=WAIT
-    )
+    command = [O80, "play", str(recorded), *words]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT)
     assert done.returncode != 0
     assert said in " ".join(done.stderr.split())
 

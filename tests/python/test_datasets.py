@@ -1,8 +1,6 @@
 """Episodes of recordings as data sets for learning, read by what reads them."""
 
 import json
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +8,7 @@ import numpy as np
 import pandas
 import pyarrow.parquet
 import pytest
+from processes import run_o80
 
 import o80
 from o80.datasets import lerobot, minari
@@ -242,9 +241,6 @@ def test_minari_reads_its_data_set(recorded: Path, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("form", ["lerobot", "minari"])
 def test_the_command_writes_a_data_set(form: str, recorded: Path, tmp_path: Path) -> None:
-    command = [str(Path(sys.executable).parent / "o80"), "export", str(recorded)]
-    command += ["-o", str(tmp_path / "set"), "--format", form, "--every", "10"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-
-    assert done.returncode == 0, done.stderr
-    assert "3 episodes, 7 steps at 100 a second" in done.stdout
+    options = ("-o", tmp_path / "set", "--format", form, "--every", 10)
+    said = run_o80("export", recorded, *options).stdout
+    assert "3 episodes, 7 steps at 100 a second" in said

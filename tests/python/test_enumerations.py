@@ -5,8 +5,6 @@ import itertools
 import json
 import os
 import pickle
-import subprocess
-import sys
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -19,6 +17,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from mixed_robots import ROBOTS
 from numpy.typing import NDArray
+from processes import run_o80
 
 import o80
 from o80.datasets.export import write
@@ -265,8 +264,7 @@ def test_info_lists_the_labels(segment: str) -> None:
 
     with o80.Backend(segment, ["elbow"], extended={"status": Status}) as backend:
         backend.publish([0.0], {"status": Status.OK})
-        command = [str(Path(sys.executable).parent / "o80"), "info", segment]
-        said = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+        said = run_o80("info", segment).stdout
 
     assert "enumerations\n  status: OK 0, LOST -2\n" in said
 

@@ -1,8 +1,6 @@
 """Rows in formats of other tools, and as plots."""
 
 import csv
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mixed_robots import GROUPS, ROBOTS, SENSORS, Mode, recorded
+from processes import run_o80
 
 import o80
 from o80.cli.histories import histories
@@ -165,10 +164,7 @@ def test_the_commands_write_files(arm: o80.Frontend, tmp_path: Path) -> None:
         (["plot", arm.segment, "--seconds", "0.005", "-o", tmp_path / "live.png"], "5 rows"),
         (["export", tmp_path / "run.mcap", "-o", tmp_path / "run.npz"], "21 rows"),
     ):
-        command = [str(Path(sys.executable).parent / "o80"), *map(str, words)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=60)
-        assert done.returncode == 0, done.stderr
-        assert said in done.stdout
+        assert said in run_o80(*words).stdout
 
     assert (tmp_path / "run.png").read_bytes().startswith(b"\x89PNG")
     assert (tmp_path / "live.png").stat().st_size > 1000
@@ -255,10 +251,7 @@ def test_recordings_made_one_after_the_other_share_an_axis(segment: str, tmp_pat
             o80.Recording(tmp_path / f"{name}.mcap", arm),
         ):
             arm.burst(20)
-    o80_plot = [str(Path(sys.executable).parent / "o80"), "plot"]
-    files = [str(tmp_path / "a.mcap"), str(tmp_path / "b.mcap"), "-o", str(tmp_path / "run.png")]
-    done = subprocess.run([*o80_plot, *files], capture_output=True, text=True, timeout=60)
+    done = run_o80("plot", tmp_path / "a.mcap", tmp_path / "b.mcap", "-o", tmp_path / "run.png")
 
-    assert done.returncode == 0, done.stderr
     assert "different times" not in done.stderr  # recorded within ten seconds
     assert "42 rows" in done.stdout

@@ -1,18 +1,15 @@
 """Texts of `o80 list` and `o80 info` about robots whose driver hangs or is late."""
 
 import subprocess
-import sys
 import sysconfig
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from processes import O80, WAIT
 
 import o80
-
-WAIT = 60.0  # [s] longer than any wait should take
-O80 = str(Path(sys.executable).parent / "o80")
 
 DRIVER = """
 #include <unistd.h>

@@ -1,14 +1,13 @@
 """The delay between two segments that see the same motion."""
 
 import re
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from processes import run_o80
 
 import o80
 
@@ -93,9 +92,7 @@ def test_wrong_arguments_are_named(segment: str) -> None:
 
 
 def command(*words: str | Path, code: int = 0) -> str:
-    program = [str(Path(sys.executable).parent / "o80"), "latency", *map(str, words)]
-    done = subprocess.run(program, capture_output=True, text=True, timeout=60.0)
-    assert done.returncode == code, done.stdout + done.stderr
+    done = run_o80("latency", *words, code=code)
     return done.stdout + done.stderr
 
 

@@ -102,7 +102,7 @@ def test_a_command_that_takes_longer_than_asked_says_by_how_much_and_why(loop: L
     assert begun.iteration is not None
     assert ended.iteration is not None
     assert ended.late == ended.iteration - begun.iteration + 1 - 100
-    assert ended.text.startswith(f"{ended.late} iterations later than asked, because of its")
+    assert ended.text.startswith(f"{ended.late} iterations later than requested, because of its")
     assert begun.text == ended.text
 
 

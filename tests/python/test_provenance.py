@@ -4,8 +4,9 @@ import hashlib
 import json
 import os
 import subprocess
-import sys
 from pathlib import Path
+
+from processes import run_o80
 
 import o80
 from o80.base.installation import prefix
@@ -68,12 +69,7 @@ def test_keeps_texts_that_are_not_utf_8(segment: str, tmp_path: Path) -> None:
     try:
         with o80.Frontend(segment, timeout=30, read_only=True) as arm:
             found = arm.provenance
-        told = subprocess.run(
-            [Path(sys.executable).parent / "o80", "info", segment],
-            capture_output=True,
-            text=True,
-            check=True,
-        ).stdout
+        told = run_o80("info", segment).stdout
     finally:
         popen.communicate()
     assert Path(found.library) == library
@@ -83,13 +79,8 @@ def test_keeps_texts_that_are_not_utf_8(segment: str, tmp_path: Path) -> None:
 
 def test_info_shows_it(segment: str) -> None:
     with o80.robots.load("two_joints").inline(segment, reach=2.5):
-        command = Path(sys.executable).parent / "o80"
-        told = subprocess.run(
-            [command, "info", segment], capture_output=True, text=True, check=True
-        ).stdout
-        described = subprocess.run(
-            [command, "info", segment, "--json"], capture_output=True, text=True, check=True
-        ).stdout
+        told = run_o80("info", segment).stdout
+        described = run_o80("info", segment, "--json").stdout
     assert "reach=2.5" in told
     assert "frequency=1000" in told
     assert f"{o80.version()}, sources " in told

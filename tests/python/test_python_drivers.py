@@ -15,20 +15,18 @@ from typing import Any, cast
 import numpy as np
 import pytest
 import room_sensor
+from processes import WAIT, run_o80
 from room_sensor import Joint, Paced, RoomSensor
 
 import o80
 from o80.drivers import Reading
 
-WAIT = 60.0  # [s] longer than anything here takes
 HERE = Path(__file__).parent
 
 
 def command(*words: str, code: int = 0) -> str:
     """Runs the program o80 in the folder of the drivers."""
-    program = [str(Path(sys.executable).parent / "o80"), *words]
-    done = subprocess.run(program, cwd=HERE, capture_output=True, text=True, timeout=WAIT)
-    assert done.returncode == code, done.stdout + done.stderr
+    done = run_o80(*words, code=code, cwd=HERE)
     return done.stdout + done.stderr
 
 

@@ -11,12 +11,11 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+from processes import O80, WAIT, run_o80
 
 import o80
 
-WAIT = 60.0  # [s] longer than any wait should take
 ROOT = Path(__file__).resolve().parents[2]
-O80 = str(Path(sys.executable).parent / "o80")
 
 
 def until(true: Callable[[], object]) -> None:
@@ -263,28 +262,20 @@ def test_what_a_handler_of_a_halt_returns_is_checked(
 # ------------------------------------------------------------------------------ the program o80
 
 
-def program(*words: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([O80, *words], capture_output=True, text=True, timeout=WAIT)
-
-
 def test_the_program_halts_shows_and_resumes(process: o80.robots.Process, segment: str) -> None:
-    said = program("halt", segment, "lunch break")
-    assert said.returncode == 0, said.stderr
-    assert f"o80 resume {segment} 1" in said.stdout
+    assert f"o80 resume {segment} 1" in run_o80("halt", segment, "lunch break").stdout
     with process.frontend() as arm:
         until(lambda: arm.latest().halted)
     for words in (["list"], ["info", segment]):
-        assert "lunch break" in program(*words).stdout
-    assert "HALTED" in program("echo", segment, "--count", "1").stdout
-    assert "resumed" in program("resume", segment).stdout
-    assert "not halted" in program("resume", segment).stdout
-    assert "lunch break" not in program("list").stdout
+        assert "lunch break" in run_o80(*words).stdout
+    assert "HALTED" in run_o80("echo", segment, "--count", "1").stdout
+    assert "resumed" in run_o80("resume", segment).stdout
+    assert "not halted" in run_o80("resume", segment).stdout
+    assert "lunch break" not in run_o80("list").stdout
 
 
 def test_the_program_says_who_is_not_there(segment: str) -> None:
-    said = program("halt", segment)
-    assert said.returncode == 1
-    assert segment in said.stderr
+    assert segment in run_o80("halt", segment, code=1).stderr
 
 
 # ------------------------------------------------------------------------------ the page

@@ -3,8 +3,6 @@
 import ast
 import importlib.util
 import os
-import subprocess
-import sys
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -14,12 +12,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from mixed_robots import GROUPS, ROBOTS, SENSORS
+from processes import run_o80
 from test_typing import mypy
 
 import o80
 from o80.frontend.robot_stub import digest_of, module_of
-
-O80 = str(Path(sys.executable).parent / "o80")
 
 
 class Gear(IntEnum):
@@ -205,21 +202,16 @@ def test_a_robot_may_be_called_as_what_its_module_uses(name: str, segment: str) 
 def test_the_command_writes_the_module_of_a_robot_or_a_segment(
     arm: o80.Frontend, tmp_path: Path
 ) -> None:
-    def run(*words: str) -> str:
-        return subprocess.run([O80, *words], capture_output=True, text=True, check=True).stdout
-
-    printed = run("stub", "two_joints")
-    run("stub", arm.segment, "-o", str(tmp_path / "mine.py"))
+    printed = run_o80("stub", "two_joints").stdout
+    run_o80("stub", arm.segment, "-o", tmp_path / "mine.py")
 
     assert "Literal['shoulder', 'elbow']" in printed
     with imported(tmp_path / "mine.py").attach() as frontend:
         assert frontend.segment == arm.segment
         frontend.add_command("elbow", np.float64(0.1))
         frontend.forget_added()
-    unknown = subprocess.run([O80, "stub", "two_joint"], capture_output=True, text=True)
-    assert unknown.returncode != 0
-    assert "Did you mean" in unknown.stderr
-    nowhere = subprocess.run([O80, "stub", "pam", "-o", "/no/x.py"], capture_output=True, text=True)
+    assert "Did you mean" in run_o80("stub", "two_joint", code=1).stderr
+    nowhere = run_o80("stub", "pam", "-o", "/no/x.py", code=1)
     assert nowhere.stderr == "o80: /no/x.py cannot be written: there is no folder /no\n"
 
 

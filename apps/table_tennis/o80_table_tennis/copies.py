@@ -33,7 +33,6 @@ from .task.state import State
 from .world.arm import MUSCLES
 from .world.timing import ITERATIONS
 
-FloatArray = NDArray[np.float64]
 Numbers = NDArray[np.intp]
 
 TEXTS = np.array([end.text for end in End], object)

@@ -7,14 +7,11 @@ inline. Prints rates, lateness and returns; writes a recording, plots, a film an
 
 from __future__ import annotations
 
-import signal
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
-from contextlib import closing
 from dataclasses import dataclass, replace
 from pathlib import Path
-from types import FrameType
 from typing import Annotated, Any
 
 import typer
@@ -24,15 +21,15 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 import o80
 
 from .balls.sources import balls_from
+from .ending import raise_if_terminated, unwind_on_sigterm
 from .environment import TableTennisEnvironment
-from .players.baselines import BASELINES
 from .players.learned_policy import shipped_policy
-from .players.policies import DEFAULT_FACTOR, default_policy
+from .players.policies import BASELINES, DEFAULT_FACTOR, Policy, default_policy
 from .playing import play
 from .report.episode_summary import EpisodeSummary
-from .report.played import Played
 from .report.recorded_episodes import RecordedEpisode, recorded_episodes
 from .report.report import Report, write_report
+from .report.statistics import Played
 from .rig.arm_numbers import ArmNumbers
 from .settings import Pacing, RigSettings, TaskSettings
 
@@ -82,17 +79,22 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
     settings.output.mkdir(parents=True, exist_ok=True)
     for recording in (settings.recording, settings.learned_recording):
         recording.unlink(missing_ok=True)
-    available = len(balls_from(settings.task().balls))
     modes: dict[Pacing, Played] = {}
     with _progress(console) as progress:
         for pacing in (Pacing.REAL_TIME, Pacing.PROCESSES, Pacing.INLINE):
-            episodes = settings.episodes_of(pacing)
-            if episodes == 0:
-                continue
-            bar = progress.add_task(pacing.value, total=episodes, returns="0 returned")
-            modes[pacing] = _play_mode(settings, pacing, available, _advance(progress, bar))
-
-        policies = _compared(settings, modes, available, progress)
+            if episodes := settings.episodes_of(pacing):
+                rig = settings.rig(pacing)
+                modes[pacing] = _play(
+                    settings,
+                    pacing.value,
+                    default_policy(ArmNumbers.of_rig(rig)),
+                    rig,
+                    settings.task(),
+                    progress,
+                    episodes=episodes,
+                    record=settings.recording,
+                )
+        policies = _compared(settings, modes, progress)
         bar = progress.add_task("plots and film", total=1, returns="")
         report = write_report(
             settings.output,
@@ -107,66 +109,54 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
     return report
 
 
-def _play_mode(
+def _play(
     settings: DemoSettings,
-    pacing: Pacing,
-    available: int,
-    after_each: Callable[[EpisodeSummary], None],
+    name: str,
+    policy: Policy,
+    rig: RigSettings,
+    task: TaskSettings,
+    progress: Progress,
+    *,
+    episodes: int,
+    record: Path | None = None,
 ) -> Played:
-    """Episodes of one mode, added to the recording."""
-    environment = TableTennisEnvironment(
-        rig=settings.rig(pacing), task=settings.task(), record=settings.recording
-    )
-    with closing(environment):
-        balls = (number % available for number in range(settings.episodes_of(pacing)))
-        policy = default_policy(ArmNumbers.of(environment.rig.arm.frontend))
-        return play(environment, policy, balls, seed=settings.seed, after_each=after_each)
+    """Episodes with the first balls, added to a recording."""
+    bar = progress.add_task(name, total=episodes, returns="0 returned")
+    available = len(balls_from(task.balls))
+    balls = (number % available for number in range(episodes))
+    with TableTennisEnvironment(rig=rig, task=task, record=record) as environment:
+        moved_on = _advance(progress, bar)
+        played = play(environment, policy, balls, seed=settings.seed, after_each=moved_on)
+    return played
 
 
 def _compared(
-    settings: DemoSettings, modes: Mapping[Pacing, Played], available: int, progress: Progress
+    settings: DemoSettings, modes: Mapping[Pacing, Played], progress: Progress
 ) -> dict[str, Played]:
-    """All policies and the baselines on the same balls, as fast as they can."""
+    """All policies and the baselines on the same balls, as fast as they can.
+
+    The learned policy plays on the arm and in the noise that it knows, in a recording of its own.
+    """
     scripted = modes.get(Pacing.INLINE) or modes[Pacing.REAL_TIME]
-    episodes = len(scripted.episodes)
+    learned, episodes = shipped_policy(), len(scripted.episodes)
+    task = replace(learned.conditions.task(fly_out=False), balls=settings.task().balls)
     compared = {
         "scripted": scripted,
-        "learned": _play_learned(settings, episodes, available, progress),
+        "learned": _play(
+            settings,
+            "learned",
+            learned,
+            learned.conditions.rig(),
+            task,
+            progress,
+            episodes=episodes,
+            record=settings.learned_recording,
+        ),
     }
-    for name, baseline in BASELINES.items():
-        bar = progress.add_task(name, total=episodes, returns="0 returned")
-        task = replace(settings.task(), factor=baseline.factor)
-        environment = TableTennisEnvironment(rig=settings.rig(Pacing.INLINE), task=task)
-        with closing(environment):
-            balls = (number % available for number in range(episodes))
-            compared[name] = play(
-                environment,
-                baseline.made(),
-                balls,
-                seed=settings.seed,
-                after_each=_advance(progress, bar),
-            )
+    for name, (make, factor) in BASELINES.items():
+        rig, task = settings.rig(Pacing.INLINE), replace(settings.task(), factor=factor)
+        compared[name] = _play(settings, name, make(), rig, task, progress, episodes=episodes)
     return compared
-
-
-def _play_learned(
-    settings: DemoSettings, episodes: int, available: int, progress: Progress
-) -> Played:
-    """The policy that was learned, with the same balls, on the arm and in the noise that it knows.
-
-    Its rows go to a recording of their own.
-    """
-    policy = shipped_policy()
-    bar = progress.add_task("learned", total=episodes, returns="0 returned")
-    task = replace(policy.conditions.task(fly_out=False), balls=settings.task().balls)
-    environment = TableTennisEnvironment(
-        rig=policy.conditions.rig(), task=task, record=settings.learned_recording
-    )
-    with closing(environment):
-        balls = (number % available for number in range(episodes))
-        return play(
-            environment, policy, balls, seed=settings.seed, after_each=_advance(progress, bar)
-        )
 
 
 def _recorded(
@@ -197,21 +187,11 @@ def _advance(progress: Progress, bar: Any) -> Callable[[EpisodeSummary], None]:
 
     def advance(summary: EpisodeSummary) -> None:
         nonlocal returns
-        if _signals:  # came while a destructor ran, from which nothing is raised
-            sys.exit(128 + _signals[0])
+        raise_if_terminated()
         returns += summary.returned
         progress.update(bar, advance=1, returns=f"{returns} returned")
 
     return advance
-
-
-_signals: list[int] = []  # that have come
-
-
-def _end_in_order(number: int, _frame: FrameType | None) -> None:
-    """SIGTERM unwinds the stack, so that no process and no segment remains."""
-    _signals.append(number)
-    sys.exit(128 + number)
 
 
 def main(
@@ -227,7 +207,7 @@ def main(
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/demo"),
 ) -> None:
     """Plays table tennis in real time, then accelerated; reports rates, lateness and returns."""
-    signal.signal(signal.SIGTERM, _end_in_order)
+    unwind_on_sigterm()
     console = Console()
     settings = DemoSettings(
         balls=balls,

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from .balls.draw import NO_BALLS, DrawnBalls, draw_balls
 from .balls.sources import Flights
 from .task.task import Task
-
-FloatArray = NDArray[np.float64]
 
 SEEDS = 2**32
 

@@ -5,11 +5,9 @@ Every policy plays the same balls. Prints a table and draws where the balls land
 
 from __future__ import annotations
 
-import signal
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from types import FrameType
 from typing import Annotated, Any
 
 import typer
@@ -18,6 +16,7 @@ from rich.progress import Progress
 
 import o80
 
+from .ending import unwind_on_sigterm
 from .learning.contestants import contestant
 from .learning.evaluation import VERDICT_BALLS, VERDICT_SEED, Evaluation, evaluate
 from .learning.paired import Paired
@@ -57,7 +56,7 @@ def main(
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/evaluate"),
 ) -> None:
     """Plays the same balls with each policy, and compares."""
-    signal.signal(signal.SIGTERM, _end_in_order)
+    unwind_on_sigterm()
     console = Console()
     match = Match(balls, preset, count, seed)
     pacings = [Pacing.INLINE, Pacing.REAL_TIME] if real_time else [Pacing.INLINE]
@@ -112,11 +111,6 @@ def _write(
     figures |= {f"{name}, paired": each.as_json() for name, each in paired.items()}
     write_report(output / "evaluation.json", figures)
     console.print(f"landings.png, evaluation.json: {output}", soft_wrap=True)
-
-
-def _end_in_order(number: int, _frame: FrameType | None) -> None:
-    """SIGTERM unwinds the stack, so that no process and no segment remains."""
-    sys.exit(128 + number)
 
 
 if __name__ == "__main__":

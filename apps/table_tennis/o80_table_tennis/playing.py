@@ -11,7 +11,7 @@ import gymnasium
 from .environment import TableTennisEnvironment
 from .players.policies import Policy
 from .report.episode_summary import EpisodeSummary
-from .report.played import Played
+from .report.statistics import Played
 
 
 def play(

@@ -7,11 +7,9 @@ Writes the learning curve, checkpoints, the policy and a report; needs the extra
 from __future__ import annotations
 
 import math
-import signal
 import sys
 from dataclasses import replace
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -19,6 +17,8 @@ from rich.console import Console
 
 import o80
 from o80.base.extras import needed
+
+from .ending import unwind_on_sigterm
 
 if TYPE_CHECKING:
     from .learning.settings import LearningSettings
@@ -52,7 +52,7 @@ def main(
     resume: Annotated[bool, typer.Option(help="Go on from the checkpoint in the folder.")] = False,
 ) -> None:
     """Learns to return balls, and says how well."""
-    signal.signal(signal.SIGTERM, _end_in_order)
+    unwind_on_sigterm()
     console = Console()
     try:
         for module in ("torch", "stable_baselines3"):
@@ -93,11 +93,6 @@ def chosen(
         minutes=math.inf if minutes is None else minutes,
         **given,
     )
-
-
-def _end_in_order(number: int, _frame: FrameType | None) -> None:
-    """SIGTERM unwinds the stack, so that a checkpoint is written and no segment remains."""
-    sys.exit(128 + number)
 
 
 if __name__ == "__main__":

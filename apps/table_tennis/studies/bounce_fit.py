@@ -11,14 +11,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_table_tennis.balls.flight_fit import FlightFit
 from o80_table_tennis.physics.aerodynamics import AERODYNAMICS, Aerodynamics
 from o80_table_tennis.physics.impact import bounced
 from o80_table_tennis.world.table import TABLE, Table
-
-FloatArray = NDArray[np.float64]
 
 SPEED_ERROR = 0.1
 """Expected error of a velocity after a bounce [m/s]."""

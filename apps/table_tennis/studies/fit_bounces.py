@@ -14,15 +14,13 @@ from typing import Annotated
 
 import numpy as np
 import typer
-from numpy.typing import NDArray
 
 from bounce_fit import Law, RecordedBounce, errors, fitted
+from o80.base.arrays import FloatArray
 from o80_table_tennis.balls.recordings import load_trajectories
 from o80_table_tennis.balls.trajectories import BallTrajectory
 from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
 from o80_table_tennis.world.table import TABLE
-
-FloatArray = NDArray[np.float64]
 
 SPINLESS = Law(
     air=replace(AERODYNAMICS, lift_coefficient=1e9, lift_saturation=0.0),

@@ -11,14 +11,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_table_tennis.balls.flight_fit import FlightFit
 from o80_table_tennis.balls.launches import Launch
 from o80_table_tennis.balls.trajectories import BallTrajectory
 from o80_table_tennis.physics.prediction import predict, predict_crossing
-
-FloatArray = NDArray[np.float64]
 
 PLANE = 0.3
 """y of the plane that the racket reaches [m]."""

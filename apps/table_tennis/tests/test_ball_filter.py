@@ -4,16 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_table_tennis.balls.launches import WIDE
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
-from o80_table_tennis.physics.ball_filter import ball_filter
-from o80_table_tennis.physics.filter_gains import PLACES, FilterSettings, gains
+from o80_table_tennis.physics.ball_filter import PLACES, FilterSettings, ball_filter, gains
 from o80_table_tennis.physics.prediction import predict, predict_crossing
 from o80_table_tennis.world.table import TABLE
 
-FloatArray = NDArray[np.float64]
 SETTINGS = FilterSettings()
 SHOTS, STEPS, PLANE = 40, 75, 0.3
 SIGMAS = np.repeat([SETTINGS.position, SETTINGS.velocity], 3)

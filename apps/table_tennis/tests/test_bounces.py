@@ -5,7 +5,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from recorded_rows import DATA, ball_gun_shots
 from typer.testing import CliRunner
 
@@ -19,7 +18,6 @@ from o80_table_tennis.world.ball import BALL_GUN_SPIN, BALL_RADIUS
 from o80_table_tennis.world.materials import TABLE_RESTITUTION, Restitution
 from o80_table_tennis.world.table import TABLE, Table
 
-FloatArray = NDArray[np.float64]
 SETS = ("ball_gun_2019", "spin_2022/mn5008_no_spin.hdf5", "spin_2022/mn5008_topspin.hdf5")
 
 

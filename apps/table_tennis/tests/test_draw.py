@@ -3,10 +3,8 @@
 from contextlib import closing
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 import pytest
-from opened_environment import opened
 from recorded_rows import write_shots
 
 from o80_table_tennis.balls.draw import USERS_OWN, draw_balls
@@ -70,15 +68,3 @@ def test_balls_are_named_or_read_from_a_path(tmp_path: Path) -> None:
     assert len(balls_from(file)) == 1
     with pytest.raises(ValueError, match="ball_count=3 is for simulated shots"):
         balls_from(file, count=3)
-
-
-def test_extra_balls_are_other_shots() -> None:
-    with opened(extra_balls=8) as environment:
-        _, info = environment.reset(seed=3)
-        assert len(set(info["virtual"]["balls"].tolist())) == 8
-
-
-def test_gymnasium_makes_the_environment_with_wide_shots() -> None:
-    with gymnasium.make("o80/TableTennis-v0", task=TaskSettings(balls="wide")) as environment:
-        environment.reset(seed=1)
-        environment.step(environment.action_space.sample())

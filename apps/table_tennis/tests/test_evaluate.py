@@ -74,12 +74,6 @@ def test_a_wrong_name_is_one_line_that_says_what_to_give(
         assert words in result.output
 
 
-def test_conditions_of_a_file_are_those_that_were_written() -> None:
-    conditions = Conditions(preset="standard", repeat=3)
-    assert Conditions.of_json(conditions.as_json()) == conditions
-    assert replace(conditions, repeat=2) != conditions
-
-
 def test_the_same_balls_are_compared_accelerated_and_in_real_time(
     runner: tuple[CliRunner, typer.Typer], tmp_path: Path
 ) -> None:

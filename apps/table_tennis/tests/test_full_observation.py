@@ -16,7 +16,6 @@ from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.full_observation import FullObservation
 from o80_table_tennis.task.noise import NoiseSettings
 
-FloatArray = NDArray[np.float64]
 FULL = FullObservation()
 PLACES = FULL.places()
 NOISY = NoiseSettings(0.005, 0.1, missed_frames=0.1, latency=0.012, pressure=0.01)

@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from o80_table_tennis.report.interval import wilson
+from o80_table_tennis.report.statistics import wilson
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,7 @@ sys.path.insert(0, {tests!r})
 from test_lab_processes import ASLEEP, WAITING, robot
 from o80_table_tennis.lab.parts import o80_command as command
 from o80_table_tennis.lab.processes import Processes
-from o80_table_tennis.lab.ending import ends_in_order
+from o80_table_tennis.ending import ends_in_order
 
 with ends_in_order(), Processes([robot("arm"), ASLEEP], Path({folder!r})) as processes:
     processes.start()

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from recorded_rows import ball_gun_shots
 
 from launch_fit import (
@@ -14,10 +13,10 @@ from launch_fit import (
     recorded_numbers,
     simulated_numbers,
 )
+from o80.base.arrays import FloatArray
 from o80_table_tennis.balls.launches import NARROW
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
 
-FloatArray = NDArray[np.float64]
 UNLIKELY = 0.001
 """The drawn sample is fixed: 18 comparisons rarely fall below this by chance."""
 AFTER_BOUNCE = ("crossing time", "crossing vx", "crossing vy")

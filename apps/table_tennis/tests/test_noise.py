@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from opened_environment import PUSH, STILL, opened
 
+from o80.base.arrays import FloatArray
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
 from o80_table_tennis.physics.prediction import predict
 from o80_table_tennis.settings import TaskSettings
@@ -16,7 +17,6 @@ from o80_table_tennis.task.noise import NoiseSettings
 from o80_table_tennis.task.perception import BLOCK, Perception
 from o80_table_tennis.task.state import State
 
-FloatArray = NDArray[np.float64]
 STEPS = 2 * BLOCK + 10
 
 

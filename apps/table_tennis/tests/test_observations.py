@@ -12,8 +12,8 @@ from recorded_rows import DATA
 from o80_table_tennis.task import observations
 from o80_table_tennis.task.ball_play import ReturnTask
 from o80_table_tennis.task.ball_record import BallRecord
-from o80_table_tennis.task.box import ObservationBox
 from o80_table_tennis.task.observations import ObservationBounds, observe_ball
+from o80_table_tennis.task.observer import Observer, Observing
 from o80_table_tennis.task.state import State
 
 
@@ -41,12 +41,12 @@ def test_many_episodes_are_observed_at_once() -> None:
 @settings(deadline=None)
 @given(arrays(np.float64, (3, 22), elements=st.floats(-1e6, 1e6)))
 def test_a_clipped_observation_lies_in_the_box(rows: np.ndarray) -> None:
-    box, bounds = ObservationBox(ReturnTask()), ObservationBounds()
-    clipped = box.clip(rows)
+    observer, bounds = Observer(ReturnTask(), Observing(), 1), ObservationBounds()
+    clipped = observer.clip(rows)
 
     assert clipped.dtype == np.float32
     assert np.all((clipped >= bounds.low) & (clipped <= bounds.high))
-    assert all(row in box.space for row in clipped)
+    assert all(row in observer.space for row in clipped)
     inside = (rows > bounds.low) & (rows < bounds.high)
     np.testing.assert_array_equal(clipped[inside], rows[inside].astype(np.float32))
 

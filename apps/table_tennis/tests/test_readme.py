@@ -35,8 +35,8 @@ def named() -> dict[str, set[str]]:
             package = heading[1]
             continue
         for name in re.findall(r"`(\w+)`", cell):
-            # the settings of the environments stand beside the packages, among those of the rig
-            home = "" if (package, name) == ("rig", "settings") else package
+            # these stand beside the packages, and the layers below them do not use them
+            home = "" if (package, name) in {("rig", "settings"), ("rig", "ending")} else package
             found.setdefault(home, set()).add(name)
     return found
 

@@ -9,7 +9,7 @@ import pytest
 from recorded_rows import frames_of_a_reader, rows_seen, write_ball_gun, write_shots
 
 from o80_table_tennis.balls.frame_stamps import FRAME_PERIOD
-from o80_table_tennis.balls.recordings import BALL_GUN_FRAME, load_trajectories
+from o80_table_tennis.balls.recordings import LAUNCHER_FRAME, load_trajectories
 from o80_table_tennis.balls.simulated_shots import simulated_shot
 
 
@@ -26,32 +26,19 @@ def test_a_json_file_is_read_into_the_world_with_stamps(tmp_path: Path) -> None:
     np.testing.assert_allclose(shot.stamps, (frames - frames[0]) * FRAME_PERIOD)
 
 
-def test_the_frame_of_a_file_can_be_given(tmp_path: Path) -> None:
-    rng = np.random.default_rng(3)
-    rows = rows_seen(rng, frames_of_a_reader(rng, 1.25), noise=0.0, lag=0.0)
-    file = write_ball_gun(tmp_path / "shot.json", rows)
-
-    (usual,) = load_trajectories(file)
-    (moved,) = load_trajectories(file, frame_offset=(1.0, 2.0, 3.0), frame_yaw=np.pi / 2)
-
-    raw = usual.positions - BALL_GUN_FRAME.offset
-    turned = np.column_stack([-raw[:, 1], raw[:, 0], raw[:, 2]])
-    expected = turned + np.array([1.0, 2.0, 3.0])
-    np.testing.assert_allclose(moved.positions, expected, atol=1e-12)
-    np.testing.assert_allclose(moved.velocities[:, 0], -usual.velocities[:, 1], atol=1e-12)
-    with pytest.raises(ValueError, match="three numbers"):
-        load_trajectories(file, frame_offset=(1.0, 2.0))
-
-
 def test_the_shots_of_an_hdf5_file_come_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     shots = {str(i): simulated_shot(np.random.default_rng(i)) for i in (10, 2, 1)}
     file = write_shots(tmp_path / "shots.hdf5", shots)
 
-    read = load_trajectories(file, frame_offset=(0.0, 0.0, 0.0), frame_yaw=0.0)
+    read = load_trajectories(file)
 
     assert [shot.name for shot in read] == ["shots/1", "shots/2", "shots/10"]
-    np.testing.assert_array_equal(read[2].positions, shots["10"].positions)
-    np.testing.assert_array_equal(read[2].velocities, shots["10"].velocities)
+    for seen, there, offset in (
+        (read[2].positions, shots["10"].positions, LAUNCHER_FRAME.offset),
+        (read[2].velocities, shots["10"].velocities, 0.0),
+    ):
+        turned = np.column_stack([there[:, 1], -there[:, 0], there[:, 2]])  # by -90 degrees
+        np.testing.assert_allclose(seen, turned + np.array(offset), atol=1e-12)
     np.testing.assert_array_equal(read[2].stamps, shots["10"].stamps)
 
 

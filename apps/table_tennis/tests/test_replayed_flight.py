@@ -4,7 +4,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from recorded_rows import DATA, ball_gun_shots
 
 from o80_mujoco.balls import accelerations
@@ -15,7 +14,6 @@ from o80_table_tennis.balls.trajectories import BallTrajectory
 from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
 from o80_table_tennis.physics.prediction import predict
 
-FloatArray = NDArray[np.float64]
 SPIN_SETS = ("mn5008_no_spin.hdf5", "mn5008_topspin.hdf5")
 
 

@@ -10,7 +10,6 @@ import torch
 from o80_table_tennis.learning import curve
 from o80_table_tennis.learning.curve import CURVE
 from o80_table_tennis.learning.learner import begin_anew
-from o80_table_tennis.learning.restarts import stuck
 from o80_table_tennis.learning.settings import WAYS, LearningSettings, PpoSettings, RestartSettings
 from o80_table_tennis.learning.training import Training
 
@@ -53,8 +52,8 @@ def test_a_network_is_judged_once_and_only_if_a_new_one_has_time(
 ) -> None:
     settings = LearningSettings(decisions=3_000_000)
     judged = {"begun": begun, "decisions": decisions, "touched": touched}
-    assert stuck(settings, **judged) is expected  # type: ignore[arg-type]
-    assert not stuck(replace(settings, blind=True), **judged)  # type: ignore[arg-type]
+    assert settings.stuck(**judged) is expected  # type: ignore[arg-type]
+    assert not replace(settings, blind=True).stuck(**judged)  # type: ignore[arg-type]
 
 
 def test_the_published_way_replaces_no_network() -> None:

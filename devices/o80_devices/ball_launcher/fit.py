@@ -20,15 +20,13 @@ from functools import partial
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.recorded_shots import Setting, Shot, recorded_shots
 from o80_devices.cameras.rig import Rig, Table
-
-FloatArray = NDArray[np.float64]
 
 TABLE = Table(middle=(1.38, 0.0, 0.742), half=(1.37, 0.7625))
 """In the frame of the launcher; its height is that of the recorded bounces."""

@@ -13,9 +13,8 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from o80.base.arrays import FloatArray
 
 HALF_CHORD = math.sin(math.radians(60.0))
 """How far the upper wheels touch the ball to the side, in radii of the ball."""

@@ -12,11 +12,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, Image
 from o80_devices import _vision
 from o80_devices.cameras.rig import Rig
-
-FloatArray = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 STEP = 3
 """Step of a search of a whole image [px]."""

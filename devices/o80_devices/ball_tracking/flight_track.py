@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_devices import _vision
 from o80_devices.ball_tracking.ball_row import Reason
-
-FloatArray = NDArray[np.float64]
 
 NANOSECOND = 1e-9
 FASTEST = 20.0

@@ -12,14 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, IntArray
 from o80.errors import InvalidArgument
 from o80_devices.ball_tracking.server_messages import Message
 from o80_devices.clock import ClockMap
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 UNSEEN = -1
 

@@ -13,14 +13,13 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_devices.ball_tracking.ball_row import Reason
 from o80_devices.ball_tracking.flight_track import FlightTrack, Tracked
 from o80_devices.cameras.rig import four_cameras
 from o80_devices.clock import Capture, ClockMap
 
-FloatArray = NDArray[np.float64]
 SECOND = 1_000_000_000  # [ns]
 LARGEST_STAMP = 2**62
 LARGEST_MESSAGE = 1 << 16

@@ -8,15 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, Image
 from o80_devices import _vision
 from o80_devices.ball_tracking import colour
 from o80_devices.ball_tracking.ball_row import Reason
 from o80_devices.ball_tracking.detection import Detector
 from o80_devices.ball_tracking.flight_track import FlightTrack, Tracked
 from o80_devices.cameras.rig import Rig
-
-FloatArray = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, Image
 from o80.base.extras import needed
 from o80.errors import InvalidArgument
 from o80_devices.cameras.rig import RigCamera
 
-FloatArray = NDArray[np.float64]
-Image = NDArray[np.uint8]
 PURPOSE = "the calibration of cameras"
 MIN_PICTURES = 8
 """Pictures in which the board is found, for one lens."""

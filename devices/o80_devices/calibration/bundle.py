@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80.base.extras import needed
 from o80.errors import InvalidArgument
 from o80_devices import _vision
 from o80_devices.calibration.board import PURPOSE
 from o80_devices.cameras.rig import RigCamera
 
-FloatArray = NDArray[np.float64]
 MIN_SHARED = 20
 """Moments in which two cameras must see the waved ball together."""
 

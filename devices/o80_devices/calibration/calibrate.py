@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import o80
+from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument, TimeoutError
 from o80_devices.ball_tracking import colour
 from o80_devices.calibration import board as boards
@@ -158,7 +159,7 @@ def calibrate_places(given: argparse.Namespace) -> None:
     print(f"written: {given.output}")
 
 
-def tell_places(placed: extrinsics.Calibrated, held_out: extrinsics.FloatArray) -> None:
+def tell_places(placed: extrinsics.Calibrated, held_out: FloatArray) -> None:
     print("camera                x [m]    y [m]    z [m]")
     for camera in placed.cameras:
         print("{:16} {:8.3f} {:8.3f} {:8.3f}".format(camera.name, *camera.place))
@@ -175,9 +176,7 @@ def tell_places(placed: extrinsics.Calibrated, held_out: extrinsics.FloatArray) 
         print(f"    (mean; 95 % are below {most:.1f} mm)")
 
 
-def tell_corners(
-    cameras: Sequence[RigCamera], known: extrinsics.FloatArray, pixels: extrinsics.FloatArray
-) -> None:
+def tell_corners(cameras: Sequence[RigCamera], known: FloatArray, pixels: FloatArray) -> None:
     seen = bundle.triangulated(cameras, np.moveaxis(pixels, 0, 1))
     there = np.isfinite(seen).all(1)
     away = 1e3 * np.linalg.norm(seen - known, axis=1)[there]

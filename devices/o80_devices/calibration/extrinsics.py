@@ -13,13 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument
 from o80_devices.calibration.bundle import adjusted, first_places, triangulated
 from o80_devices.calibration.waved_ball import check_motion
 from o80_devices.calibration.world_frame import in_world
 from o80_devices.cameras.rig import RigCamera
 
-FloatArray = NDArray[np.float64]
 MIN_DEPTH = 0.02
 """Extent of the waved ball's places in their thinnest direction, as a share of the widest."""
 

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument, TimeoutError
 from o80_devices.calibration.board import (
     MIN_PICTURES,
@@ -24,7 +24,6 @@ from o80_devices.cameras.image_source import ImageSource
 from o80_devices.cameras.rig import RigCamera
 
 FORMAT = "o80-ball-lenses-1"
-FloatArray = NDArray[np.float64]
 EVERY = 4
 """Every fourth picture is held out."""
 MIN_FOUND = 11

@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument
 from o80_devices.cameras.rig import Table, vector
 
-FloatArray = NDArray[np.float64]
 EXAMPLE = '{"corners": {"camera_0": [[102.5, 300], [420, 310.5], [400, 120], null], ...}}'
 
 

@@ -11,14 +11,13 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, Image
 from o80.errors import InvalidArgument, TimeoutError
 from o80_devices import _vision
 from o80_devices.ball_tracking import colour
 from o80_devices.cameras.image_source import ImageSource
 from o80_devices.cameras.rig import RigCamera
 
-FloatArray = NDArray[np.float64]
-Image = NDArray[np.uint8]
 NEW_PLACE = 6.0
 """How far the ball has moved in some image when it is counted again [px]."""
 SECOND_BEST = 0.5

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument
 from o80_devices.cameras.rig import RigCamera
 
-FloatArray = NDArray[np.float64]
 WORST_FIT = 0.02
 """Distance of a point from where it is known to be, as a share of the size of all points."""
 FLAT = 1e-6

@@ -22,11 +22,10 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import Image
 from o80.errors import DriverError
 
-Image = NDArray[np.uint8]
 LIBRARIES = ("libaravis-0.8.so.0", "libgobject-2.0.so.0", "libglib-2.0.so.0")
 BUFFERS = 8
 """Images that may wait; more arrivals are underruns."""

@@ -7,12 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import Image
 from o80_devices.cameras.rig import Rig, RigCamera
-
-Image = NDArray[np.uint8]
 
 RETRY = 0.1
 """Between two attempts to attach to a segment that is not there [s]."""

@@ -7,15 +7,12 @@ import time
 from dataclasses import dataclass
 from enum import IntEnum
 
-import numpy as np
-from numpy.typing import NDArray
-
+from o80.base.arrays import Image
 from o80_devices.cameras import aravis
 from o80_devices.cameras.pixel_formats import rgb_of
 from o80_devices.clock import Capture, ClockMap
 from o80_devices.trouble import Trouble
 
-Image = NDArray[np.uint8]
 WAIT = 0.05
 """For an image, before the thread looks whether it is to stop [s]."""
 SILENCE = 1.0

@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80.errors import InvalidArgument
 from o80_devices import _vision
 
 FORMAT = "o80-ball-rig-1"
 Vector = tuple[float, float, float]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

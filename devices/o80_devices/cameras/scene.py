@@ -7,12 +7,9 @@ pixels, the lens bends it, light comes from above. The background with its noise
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, Image
 from o80_devices.cameras.rig import Rig, Table
-
-FloatArray = NDArray[np.float64]
-Image = NDArray[np.uint8]
 
 BALL = np.array([245.0, 130.0, 35.0])
 FLOOR = np.array([[112.0, 104.0, 96.0], [124.0, 117.0, 108.0]])

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_devices.cameras.rig import Rig, Table
-
-FloatArray = NDArray[np.float64]
 
 FLIGHT = 1.1
 """How long a ball is in the air [s]."""

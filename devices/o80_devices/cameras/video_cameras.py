@@ -8,14 +8,13 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import Image
 from o80.base.extras import needed
 from o80.drivers import Reading, option
 from o80.errors import InvalidArgument
 from o80_devices.trouble import Trouble
 
-Image = NDArray[np.uint8]
 AGAIN = 0.5  # between two attempts to open a camera [s]
 KERNEL_ERROR = 1_000_000  # of its stamps: the end of the transfer, or the begin, by the driver [ns]
 

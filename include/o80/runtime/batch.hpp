@@ -23,7 +23,7 @@ struct Handle {
   Status status = Status::none;
   Reason reason = Reason::none;
   Iteration iteration = -1;  // at which the status changed; -1 while it is queued
-  /// With Reason::limits: by how many iterations it takes longer than asked, at most 65535.
+  /// With Reason::limits: by how many iterations it takes longer than requested, at most 65535.
   std::int64_t late = 0;
   std::string text;      // the reason in words
   std::string progress;  // of a running request: the driver's text

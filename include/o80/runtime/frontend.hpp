@@ -100,9 +100,9 @@ class UntypedFrontend {
                              std::span<const std::byte> states, const CommandOptions& options = {},
                              std::span<const std::uint64_t> masks = {});
   /// Computes what the command of add_commands would do if it began after the newest row: how many
-  /// iterations it takes, later than asked by how many and why, and the desired states in each of
-  /// them, bit for bit, because the loop's own code computes them here. Sends nothing and needs no
-  /// lane.
+  /// iterations it takes, later than requested by how many and why, and the desired states in each
+  /// of them, bit for bit, because the loop's own code computes them here. Sends nothing and needs
+  /// no lane.
   ///
   /// It begins at the desired states of that row; doubles with acceleration limits also with the
   /// velocity and acceleration of the last three rows, other numbers at rest. Commands that run or

@@ -14,7 +14,7 @@ struct Preview {
   /// Number of iterations that the command takes.
   std::int64_t iterations() const { return static_cast<std::int64_t>(rows.count); }
 
-  /// By how many iterations it takes longer than asked, at most 65535.
+  /// By how many iterations it takes longer than requested, at most 65535.
   std::int64_t late = 0;
   std::string text;  // why, as Handle::text says it; empty if it is not late
   /// The desired states of all actuators in each of these iterations. `rows.first` is the iteration

@@ -81,7 +81,7 @@ class Commander(Reader):
                 number of iterations. On actuators with acceleration limits the motion then takes
                 twice that, or longer, so that a stream moves smoothly.
 
-            Every command ends at its target. If the limits make it longer than asked, it is
+            Every command ends at its target. If the limits make it longer than requested, it is
             completed later, with the reason "limits".
 
             Returns its place in the batch: `arm.pulse()[place]` is its handle.

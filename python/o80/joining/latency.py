@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
+from o80.base.arrays import FloatArray
 from o80.base.errors import Error, InvalidArgument
 from o80.joining.row_selection import NANOSECOND
 from o80.joining.sources import Timed, timed
@@ -21,7 +22,6 @@ if TYPE_CHECKING:
 
     Signal = str | Callable[[History], Any]
 
-FloatArray = NDArray[np.float64]
 
 BLOCKS = 10  # of the jackknife
 MIN_ROWS = 50

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -13,6 +12,7 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
+from o80.base.lifecycle import Closeable
 from o80.learning import episodes, infos
 from o80.learning.batches import checked_actions, put, rows
 from o80.learning.environment import checked_render_mode
@@ -26,7 +26,7 @@ StepResult = tuple[Any, NDArray[np.float64], Mask, Mask, infos.Info]
 _NOBODY: Numbers = np.zeros(0, np.intp)
 
 
-class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
+class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Closeable):
     """All copies of a task as one vector environment.
 
     It gives, bit for bit, what Gymnasium's SyncVectorEnv gives of as many single `Environment`s in
@@ -205,17 +205,6 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]]):
     def close_extras(self, **_: Any) -> None:
         """Closes the task."""
         self.task.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
 
 def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:

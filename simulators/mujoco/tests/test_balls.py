@@ -5,8 +5,8 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import (
     Air,
     BallFilter,
@@ -17,7 +17,6 @@ from o80_mujoco.balls import (
     predicted_flight,
 )
 
-FloatArray = NDArray[np.float64]
 AIR = Air(drag=0.11, magnus=0.01, spin_decay=0.5, saturation=0.06)
 PLATFORM = Platform(
     height=0.78,

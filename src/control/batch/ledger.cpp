@@ -27,7 +27,7 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, const Outcome& outcome
   taken.end = Status::rejected;
   taken.reason = outcome.reason;
   taken.detail = outcome.detail;
-  taken.told_as = outcome.status;
+  taken.reported_as = outcome.status;
   taken.told = 0;
   tell(lane, taken.id, {Status::rejected, outcome.reason, outcome.detail}, iteration,
        StatusChange::Of::batch);
@@ -123,7 +123,7 @@ std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
           taken.end == Status::rejected ? StatusChange::Of::of_rejected : StatusChange::Of::record;
       for (; taken.told < taken.records && budget > 0; ++taken.told, --taken.open, --budget) {
         tell(taken.lane, record_id(taken.id, taken.told),
-             {taken.told_as, taken.reason, taken.detail}, taken.taken_at, of);
+             {taken.reported_as, taken.reason, taken.detail}, taken.taken_at, of);
       }
       // keeps the batch open until all are reported
       if (taken.told < taken.records) return most;

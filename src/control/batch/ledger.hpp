@@ -46,7 +46,7 @@ class Ledger {
   void reject(std::uint32_t lane, BlockIndex batch, const Outcome& outcome,
               Iteration iteration) noexcept;
 
-  /// A command, or a member of a group, has begun. Reason::limits: it takes longer than asked.
+  /// A command, or a member of a group, has begun. Reason::limits: it takes longer than requested.
   void activate(BlockIndex record, Iteration iteration,
                 const Outcome& outcome = {Status::active}) noexcept;
   /// A record has ended; reported at once. A group is reported when its last member has ended, with
@@ -87,7 +87,7 @@ class Ledger {
     BlockIndex next_group = kNoBlock;
     std::uint32_t lane = 0;
     BlockChain spare;
-    Status told_as = Status::rejected;  // end status of the records without blocks
+    Status reported_as = Status::rejected;  // end status of the records without blocks
   };
   static_assert(sizeof(TakenBatch) <= kBlockBytes);
   /// A list of records with a common end.

@@ -11,7 +11,7 @@ struct Outcome {
   Status status = Status::completed;  // of a request that ends later, active
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
-  std::int64_t late = 0;  // for `limits`: iterations more than asked
+  std::int64_t late = 0;  // for `limits`: iterations more than requested
 };
 
 /// A change of the status of a record or a batch.
@@ -27,7 +27,7 @@ struct StatusChange {
   std::uint8_t detail = 0;  // for `exclusive`: the lane that has control
   Iteration iteration = 0;
   Of of = Of::record;
-  std::uint16_t late = 0;  // for `limits`: iterations more than asked, at most 65535
+  std::uint16_t late = 0;  // for `limits`: iterations more than requested, at most 65535
 };
 
 /// Receives status changes from the controller, and decides whether a follower may begin.

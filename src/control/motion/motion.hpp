@@ -121,7 +121,7 @@ class Motion {
     const auto found = std::ranges::find(numbers_, offset, &Number::offset);
     return found == numbers_.end() ? 0.0 : found->motion.difference(order);
   }
-  /// The limit because of which propose() gave more iterations than asked.
+  /// The limit because of which propose() gave more iterations than requested.
   Limited slowest() const noexcept { return slowest_; }
   /// The command has ended, at its target if that is `arrived`.
   void end(bool arrived = false) noexcept {

@@ -262,7 +262,7 @@ class ActuatorQueue {
   bool planned_ = false;             // plan_with_others() has planned its next waypoint
   std::int64_t row_iterations_ = 1;  // iterations of the planned waypoint
   std::int64_t requested_ = 0;       // of these, those that were asked for; 0: none
-  std::int64_t late_ = 0;            // iterations more than asked
+  std::int64_t late_ = 0;            // iterations more than requested
   Limited reason_;                   // for these
   std::int64_t time_ = 0;            // end time of the last waypoint [ns]
   Cursor times_;

@@ -48,7 +48,7 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
 void Controller::step_groups(Iteration iteration, const std::byte* observed,
                              std::uint32_t& late_budget) noexcept {
   // end dropped members first, so that the others of their group do not wait for them
-  told_ = ledger_.report_ends(kStatusesPerIteration);
+  reported_ = ledger_.report_ends(kStatusesPerIteration);
   if (ledger_.undecided_groups() == 0) return;
   const auto each_busy = [&](auto&& visit) {
     for (std::size_t word = 0; word < busy_.size(); ++word) {
@@ -69,7 +69,7 @@ void Controller::step_groups(Iteration iteration, const std::byte* observed,
 
 void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
   std::uint32_t late_budget = kStatusesPerIteration;
-  told_ = 0;
+  reported_ = 0;
   if (ledger_.open_groups() > 0) step_groups(iteration, observed, late_budget);
   const bool gives = given_.acts(iteration);
   if (gives) step_given(iteration, observed);
@@ -99,7 +99,7 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
     clamped_mask_[word] = clamped;
     braking_mask_[word] = braking;
   }
-  told_ += kStatusesPerIteration - late_budget;
+  reported_ += kStatusesPerIteration - late_budget;
 }
 
 /// The targets of this iteration => desired.

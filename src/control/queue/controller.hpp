@@ -160,9 +160,9 @@ class Controller {
   /// Reports the end statuses of dropped commands, at most kStatusesPerIteration minus those that
   /// the last step() has reported. False if some are left.
   bool finish_pending() noexcept {
-    const std::uint32_t told = std::exchange(told_, 0);
+    const std::uint32_t reported = std::exchange(reported_, 0);
     if (!ledger_.pending()) return true;
-    ledger_.report_ends(kStatusesPerIteration - std::min(told, kStatusesPerIteration));
+    ledger_.report_ends(kStatusesPerIteration - std::min(reported, kStatusesPerIteration));
     return !ledger_.pending();
   }
 
@@ -275,9 +275,9 @@ class Controller {
   Mask stepped_;  // has its desired state from given_ already
   Mask follow_;   // follows the observed state when idle
   DirectTargets given_;
-  Mask dropped_;            // no longer gets its targets
-  bool was_given_ = false;  // the first target of given_
-  std::uint32_t told_ = 0;  // statuses reported by the last step()
+  Mask dropped_;                // no longer gets its targets
+  bool was_given_ = false;      // the first target of given_
+  std::uint32_t reported_ = 0;  // statuses reported by the last step()
 };
 
 }  // namespace o80

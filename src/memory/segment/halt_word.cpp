@@ -50,7 +50,7 @@ std::string_view to_text(HaltCause cause) noexcept {
   return index < std::size(kTexts) ? kTexts[index] : "unknown";
 }
 
-std::uint64_t ask_for_halt(const SegmentView& view, HaltCause cause, std::string_view who,
+std::uint64_t request_halt(const SegmentView& view, HaltCause cause, std::string_view who,
                            std::string_view text) noexcept {
   Bell& bell = view.bell();
   O80_CRASH_POINT("halt.before_count");

@@ -20,7 +20,7 @@ namespace o80 {
 /// Writer:   any thread of any process that maps the bell for writing, also in a signal handler.
 /// Readers:  HaltLatch.
 /// Realtime: yes; a system call if the backend sleeps.
-std::uint64_t ask_for_halt(const SegmentView& view, HaltCause cause, std::string_view who,
+std::uint64_t request_halt(const SegmentView& view, HaltCause cause, std::string_view who,
                            std::string_view text) noexcept;
 
 /// Sets the counter to the number of a recorded halt, with its reason: for a replay, whose backend

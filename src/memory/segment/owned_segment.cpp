@@ -116,7 +116,7 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
 
   const auto inherit = [&](const Predecessor& former) {
     if (!spec.inherits_halt || !(former.was_halted || former.died_acting)) return;
-    ask_for_halt(view, HaltCause::predecessor, {},
+    request_halt(view, HaltCause::predecessor, {},
                  former.was_halted ? "the former backend was halted and not resumed"
                                    : "the former backend was killed while commands were active");
   };

@@ -28,7 +28,7 @@ void UntypedBackend::Body::ask_to_halt(HaltCause cause, std::string_view text) n
   const std::uint64_t print = fingerprint(text);
   if (last.exchange(print, std::memory_order_relaxed) == print) return;
   if (recorded_ != nullptr) return recorded_->ask_to_halt(cause, text);
-  ask_for_halt(segment.view(), cause, {}, text);
+  request_halt(segment.view(), cause, {}, text);
 }
 
 void UntypedBackend::Body::complete_reason() noexcept {

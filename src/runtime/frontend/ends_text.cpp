@@ -67,7 +67,7 @@ std::string late_text(std::uint8_t packed, std::int64_t late) {
   const unsigned number = packed >> 3U;
   const std::string text = kLimits[limit < std::size(kLimits) ? limit : 0];
   return std::to_string(late) + (late == 1 ? " iteration" : " iterations") +
-         " later than asked, because of " + text +
+         " later than requested, because of " + text +
          (number == 0 ? "" : " (number " + std::to_string(number) + " of its state)");
 }
 

@@ -20,8 +20,8 @@ std::vector<std::string> names_of(const Schema& schema, std::span<const SentComm
 std::string end_text(const Schema& schema, std::span<const SentCommand> command,
                      const Handle& handle);
 
-/// Why a command takes longer than asked: "2 iterations later than asked, because of its jerk
-/// limit". `packed` as in Limited::packed().
+/// Why a command takes longer than requested: "2 iterations later than requested, because of its
+/// jerk limit". `packed` as in Limited::packed().
 std::string late_text(std::uint8_t packed, std::int64_t late);
 
 /// The text of NotCompleted, from those of `records` records that did not complete.

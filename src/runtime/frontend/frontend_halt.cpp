@@ -24,7 +24,7 @@ std::uint64_t UntypedFrontend::halt(std::string_view reason) {
   refuse_if_played(link_->segment);
   link_->segment.throw_if_gone();
   const std::uint64_t number =
-      ask_for_halt(link_->segment.view(), HaltCause::frontend, own_process(), reason);
+      request_halt(link_->segment.view(), HaltCause::frontend, own_process(), reason);
   // A successor inherits this halt, or it had marked the segment as superseded before: then throw.
   // See ARCHITECTURE.md, How a backend takes a name.
   link_->segment.throw_if_gone();
@@ -127,7 +127,7 @@ std::uint64_t halt(const std::string& segment, std::string_view reason, Timeout 
         AttachedSegment::attach(segment, Access::read_write, deadline, options);
     refuse_if_played(attached);
     const std::uint64_t number =
-        ask_for_halt(attached.view(), HaltCause::frontend, own_process(), reason);
+        request_halt(attached.view(), HaltCause::frontend, own_process(), reason);
     // a successor is taking the name: halt that one
     if (attached.life() == Life::superseded) continue;
     attached.throw_if_gone();

@@ -179,9 +179,9 @@ void PlayedSegment::show_halt(Iteration k, bool halted) {
   if (!halted || halts_.acts()) return;
   if (recorded.number > 0) {
     segment_.view().bell().halts.store(recorded.number - 1, std::memory_order_seq_cst);
-    ask_for_halt(segment_.view(), recorded.cause, recorded.who_text(), recorded.reason());
+    request_halt(segment_.view(), recorded.cause, recorded.who_text(), recorded.reason());
   } else {
-    ask_for_halt(segment_.view(), HaltCause::none, {}, {});
+    request_halt(segment_.view(), HaltCause::none, {}, {});
   }
   halts_.look();
   halts_.show(recorded.number > 0 ? recorded.iteration : k);

@@ -80,7 +80,7 @@ void TimeWatch::begin(const ScriptWorld& world, std::size_t actuator) {
   }
 }
 
-/// Limits can make a command longer than asked, of several actuators those of any.
+/// Limits can make a command longer than requested, of several actuators those of any.
 bool TimeWatch::may_be_late(const ScriptWorld& world, const SentCommand& command) {
   const auto has_rates = [](const ActuatorSpec& actuator) {
     return std::ranges::any_of(actuator.numbers, [](const NumberSpec& number) {

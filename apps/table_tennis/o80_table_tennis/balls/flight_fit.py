@@ -15,15 +15,13 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import path
 
 from ..physics.aerodynamics import AERODYNAMICS
+from ..physics.impact import spin_after
 from ..physics.interpolation import along_path
-from .bounce_spin import spin_after
-
-FloatArray = NDArray[np.float64]
 
 STEP = 0.05
 """Step of the integration [s]; the error stays below 1 um."""

@@ -16,6 +16,8 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, IntArray
+
 from .flight_fit import (
     BELIEFS,
     POSITION_NOISE,
@@ -26,9 +28,6 @@ from .flight_fit import (
     meeting,
     sloped,
 )
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 FRAME_PERIOD = 1 / 180
 """Between two frames of the vision system [s]; slope of stamps over frames where both are known."""

@@ -10,15 +10,14 @@ from functools import cached_property
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..physics.prediction import predict
 from ..world.scene import Vector
 from .frame_stamps import FRAME_PERIOD
 from .sampled_flight import SampledFlight
 from .trajectories import BallTrajectory
-
-FloatArray = NDArray[np.float64]
 
 DURATION = 1.28
 """Duration of a simulated shot as cameras would see it: the mean of the recorded ones [s]."""

@@ -6,16 +6,13 @@ from collections.abc import Sequence
 from enum import Enum
 from itertools import pairwise
 
-import numpy as np
-from numpy.typing import NDArray
+from o80.base.arrays import FloatArray
 
 from ..physics.prediction import BOUNCED, STATE, STEP, TIME, flight_nodes
 from ..world.arm import FOREARM, SHOULDER, UPPER_ARM
 from ..world.ball import BALL_RADIUS
 from ..world.table import NET_HEIGHT, TABLE
 from .launches import Launch
-
-FloatArray = NDArray[np.float64]
 
 REACH = UPPER_ARM + FOREARM + 0.063
 """How near to the shoulder a ball must come [m]: the recorded shots of the ball gun, which can all

@@ -5,18 +5,16 @@ from __future__ import annotations
 import json
 import math
 import sys
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from .frame_stamps import FRAME_PERIOD, frames_of, new_frames
 from .trajectories import BallTrajectory, require_enough_rows
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -67,49 +65,26 @@ def recording_files(path: Path) -> list[Path]:
     return files
 
 
-def load_trajectories(
-    path: str | Path,
-    *,
-    frame_offset: Sequence[float] | None = None,
-    frame_yaw: float | None = None,
-) -> list[BallTrajectory]:
+def load_trajectories(path: str | Path) -> list[BallTrajectory]:
     """The trajectories of a file, or of all files of a folder, in the order of their names.
 
     Read are JSON files of a ball gun (`.json`, time stamps reconstructed), HDF5 files of shots
-    (`.hdf5`, `.h5`). The world frame is the rows turned by `frame_yaw` [rad] about z, then shifted
-    by `frame_offset` (3,) [m]; by default as known for the format.
+    (`.hdf5`, `.h5`).
 
     Raises FileNotFoundError or ValueError, naming the file and the cure.
     """
-    return [
-        trajectory
-        for file in recording_files(Path(path))
-        for trajectory in read_recording(file, frame_offset=frame_offset, frame_yaw=frame_yaw)
-    ]
+    files = recording_files(Path(path))
+    return [trajectory for file in files for trajectory in _read(file)]
 
 
-def read_recording(
-    file: Path,
-    *,
-    frame_offset: Sequence[float] | None = None,
-    frame_yaw: float | None = None,
-) -> list[BallTrajectory]:
-    """The trajectories of one file; None means the frame of the format."""
+def _read(file: Path) -> list[BallTrajectory]:
     readers = {".json": _read_ball_gun, ".hdf5": _read_shots, ".h5": _read_shots}
     if file.suffix not in readers:
         raise ValueError(f"{file}: unknown format; can read {', '.join(FORMATS)}")
-    usual = BALL_GUN_FRAME if file.suffix == ".json" else LAUNCHER_FRAME
-    offset = usual.offset if frame_offset is None else tuple(float(v) for v in frame_offset)
-    if len(offset) != 3:
-        raise ValueError(f"frame_offset must be three numbers [m], got {frame_offset}")
-    frame = Frame(
-        offset=(offset[0], offset[1], offset[2]),
-        yaw=usual.yaw if frame_yaw is None else frame_yaw,
-    )
-    return readers[file.suffix](file, frame)
+    return readers[file.suffix](file)
 
 
-def _read_ball_gun(file: Path, frame: Frame) -> list[BallTrajectory]:
+def _read_ball_gun(file: Path) -> list[BallTrajectory]:
     """One shot: {"ob": rows of x, y, z [m], vx, vy, vz [m/s]}, no stamps."""
     every_row = _ball_gun_rows(file)
     numbers = np.flatnonzero(new_frames(every_row[:, :3]))
@@ -120,8 +95,8 @@ def _read_ball_gun(file: Path, frame: Frame) -> list[BallTrajectory]:
     trajectory = BallTrajectory(
         name=str(file),
         stamps=frames.astype(np.float64) * FRAME_PERIOD,
-        positions=frame.point(rows[:, :3]),
-        velocities=frame.direction(rows[:, 3:]),
+        positions=BALL_GUN_FRAME.point(rows[:, :3]),
+        velocities=BALL_GUN_FRAME.direction(rows[:, 3:]),
     )
     return [trajectory.named(file.stem)]
 
@@ -150,7 +125,7 @@ def _ball_gun_rows(file: Path) -> FloatArray:
     return rows
 
 
-def _read_shots(file: Path, frame: Frame) -> list[BallTrajectory]:
+def _read_shots(file: Path) -> list[BallTrajectory]:
     """Shots originals/<i>/{positions, velocities (N, 3), time_stamps (N)}, in order of i."""
     import h5py
 
@@ -165,10 +140,10 @@ def _read_shots(file: Path, frame: Frame) -> list[BallTrajectory]:
                 "expected originals/<i>/positions, velocities, time_stamps"
             )
         shots = content["originals"]
-        return [_read_shot(file, shots[key], frame) for key in sorted(shots, key=_number)]
+        return [_read_shot(file, shots[key]) for key in sorted(shots, key=_number)]
 
 
-def _read_shot(file: Path, shot: Any, frame: Frame) -> BallTrajectory:
+def _read_shot(file: Path, shot: Any) -> BallTrajectory:
     name = f"{file}{shot.name}"
     missing = [key for key in ("positions", "velocities", "time_stamps") if key not in shot]
     if missing:
@@ -186,8 +161,8 @@ def _read_shot(file: Path, shot: Any, frame: Frame) -> BallTrajectory:
     trajectory = BallTrajectory(
         name=name,
         stamps=stamps,
-        positions=frame.point(positions),
-        velocities=frame.direction(velocities),
+        positions=LAUNCHER_FRAME.point(positions),
+        velocities=LAUNCHER_FRAME.direction(velocities),
     )
     return trajectory.named(f"{file.stem}/{shot.name.rsplit('/', 1)[-1]}")
 

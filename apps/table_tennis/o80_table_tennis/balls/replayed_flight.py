@@ -12,16 +12,14 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import path
 
 from ..physics.aerodynamics import AERODYNAMICS
+from ..physics.impact import spin_after
 from ..physics.interpolation import along_path
-from .bounce_spin import spin_after
 from .flight_fit import ANCHOR_NOISE, FAR, POSITION_NOISE, FlightFit
-
-FloatArray = NDArray[np.float64]
 
 STEP = 0.02
 """Step of the integration [s]."""

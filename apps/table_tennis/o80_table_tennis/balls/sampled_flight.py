@@ -5,11 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..world.ball import BALL_GUN_SPIN
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

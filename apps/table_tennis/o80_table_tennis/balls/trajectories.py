@@ -6,14 +6,13 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..world.timing import PERIOD
 from .flight_fit import FlightFit, fit_flight
 from .replayed_flight import ReplayedFlights, replayed
 from .sampled_flight import SampledFlight
-
-FloatArray = NDArray[np.float64]
 
 SHORTEST = 8
 """Rows below which a trajectory cannot be fitted."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..environment import TableTennisEnvironment
 from ..playing import play
-from ..report.played import Played
+from ..report.statistics import Played
 from ..settings import Pacing
 from .bursting import LockStepTracking, TrueBall, tracked_environment
 from .parts import LabSettings
@@ -64,12 +64,11 @@ class Comparison:
 def compare(
     settings: LabSettings,
     *,
-    pacing: Pacing = Pacing.INLINE,
     after_each: Callable[[object], None] = lambda _: None,
 ) -> Comparison:
     """Plays the first balls of the policy's own source both ways."""
     policy = policy_of(settings)
-    rig, task = settings.rig.paced(pacing), task_of(settings, policy)
+    rig, task = settings.rig.paced(Pacing.INLINE), task_of(settings, policy)
     numbers = range(settings.balls)
     with tracked_environment(rig, task, seed=settings.seed) as (environment, tracking):
         tracked = play(environment, policy, numbers, seed=settings.seed, after_each=after_each)

@@ -17,10 +17,9 @@ import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 import o80
+from o80.base.lifecycle import Closeable
 
 LOOK = 0.01
 """Between two looks at what a process that starts has done [s]; its end is noticed at once."""
@@ -69,7 +68,7 @@ def how_it_ended(code: int) -> str:
         return f"was killed by signal {-code}"
 
 
-class Processes:
+class Processes(Closeable):
     """The processes of the lab. Leaving a `with` block ends all.
 
     Start processes from the main thread: the kernel takes the end of the thread that started a
@@ -86,17 +85,6 @@ class Processes:
         self._ran: set[str] = set()
         self.started_at: dict[str, int] = {}
         """When each was started the last time [ns, monotonic]."""
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     # ------------------------------------------------------------------ start
 
@@ -121,13 +109,13 @@ class Processes:
             )
         self._ran.add(part.name)
 
-    def wait_until_running(self, timeout: float, names: Iterable[str] | None = None) -> None:
-        """Waits for the segments, or the words, of processes; None: of all that were started.
+    def wait_until_running(self, timeout: float) -> None:
+        """Waits for the segments, or the words, of all processes that were started.
 
         Raises PartEndedError if one ends meanwhile, o80.TimeoutError with those that do not run.
         """
         end = time.monotonic() + timeout
-        missing = set(self._running if names is None else names)
+        missing = set(self._running)
         while missing := {name for name in missing if not self.runs(name)}:
             if time.monotonic() > end:
                 raise o80.TimeoutError(self._why_not_running(missing, timeout))

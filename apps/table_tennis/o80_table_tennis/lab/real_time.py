@@ -9,8 +9,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
-from dataclasses import dataclass
-from types import TracebackType
+from pathlib import Path
 from typing import Any, Self
 
 from rich.console import Console
@@ -18,8 +17,9 @@ from rich.live import Live
 from rich.table import Table
 
 import o80
+from o80.base.lifecycle import Closeable
 
-from .ending import ends_in_order
+from ..ending import ends_in_order
 from .environment_row import Phase
 from .loops import Loop, loop_of
 from .parts import COUNTERPARTS, ENVIRONMENT, LabSettings, lab_parts
@@ -33,23 +33,14 @@ SHOWN_EVERY = 0.5
 """The table [s]."""
 
 
-@dataclass
-class Events:
-    """Log of the processes: a file of JSON lines, and the lines themselves."""
+class Events(Closeable):
+    """Log of the processes: a file of JSON lines in a folder, which is there."""
 
-    settings: LabSettings
+    def __init__(self, folder: Path) -> None:
+        self._file = (folder / "events.jsonl").open("w")
 
-    def __enter__(self) -> Self:
-        self.settings.folder.mkdir(parents=True, exist_ok=True)
-        self._file = (self.settings.folder / "events.jsonl").open("w")
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Closes the file."""
         self._file.close()
 
     def add(self, part: str, what: str) -> None:
@@ -59,7 +50,7 @@ class Events:
         self._file.flush()
 
 
-class Lab:
+class Lab(Closeable):
     """The running processes, and how their loops keep up. A context manager."""
 
     def __init__(self, settings: LabSettings, *, restart: bool = False) -> None:
@@ -71,35 +62,30 @@ class Lab:
             for part in self.processes.parts.values()
             if part.segment is not None and part.name != COUNTERPARTS
         }
-        self.events = Events(settings)
+        self.events = Events(settings.folder)
         self._row: Any = None
         self.ended: list[str] = []
         """Processes that have ended by themselves and were started again."""
 
     def __enter__(self) -> Self:
-        self.events.__enter__()
         try:
             self.processes.start()
             self.processes.wait_until_running(STARTS_WITHIN)
         except BaseException:
-            self.__exit__(None, None, None)
+            self.close()
             raise
         for name in self.processes.running:
             self.events.add(name, "runs")
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def close(self) -> None:
+        """Ends all processes; may be called twice."""
         try:
             for observer in self._observers.values():
                 observer.close()
             self.processes.close()
         finally:
-            self.events.__exit__(kind, error, trace)
+            self.events.close()
 
     def look(self, timeout: float) -> bool:
         """Waits so long for a process to end; False: the environment has played all balls.

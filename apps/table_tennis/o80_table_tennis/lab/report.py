@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import IntArray
 
 from ..world.timing import ITERATIONS, PERIOD
 from .environment_row import Phase
@@ -29,8 +30,6 @@ from .parts import (
     WORLD,
     LabSettings,
 )
-
-IntArray = NDArray[np.int64]
 
 REPORT = "report.json"
 BURSTING = "bursting"

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 from o80_devices.ball_tracking.ball_row import Reason
 
 from ..balls.launches import WIDE
@@ -21,7 +22,6 @@ from ..physics.prediction import STATE, flight_nodes
 from ..task.perception import EVERY, Perceived
 from ..task.state import State
 
-FloatArray = NDArray[np.float64]
 STEP = 0.005
 """Time step of the predicted flight from image to row [s]."""
 OLDEST = 0.15

@@ -56,10 +56,3 @@ def training_copies(conditions: Conditions, *, count: int, ball_seed: int) -> Ve
         threads=1,
         autoreset_mode=AutoresetMode.SAME_STEP,
     )
-
-
-def timed_copies(
-    conditions: Conditions, *, count: int, ball_seed: int, watch: Stopwatch
-) -> VectorEnv[Any, Any, Any]:
-    """The same, measured."""
-    return Timed(training_copies(conditions, count=count, ball_seed=ball_seed), watch)

@@ -5,10 +5,12 @@ from __future__ import annotations
 import csv
 from dataclasses import astuple, dataclass, fields
 from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
 
 CURVE = "curve.csv"
 """The file in the folder of a training."""
 NOT_EVALUATED = float("nan")
+Point = TypeVar("Point")
 
 
 @dataclass(frozen=True)
@@ -44,35 +46,37 @@ class CurvePoint:
         return self.evaluated_returned == self.evaluated_returned  # false for NaN
 
 
-NAMES = [each.name for each in fields(CurvePoint)]
-_WHOLE = ("decisions", "episodes", "motions", "restarts")
+def names_of(kind: type[Any]) -> list[str]:
+    """Names of the numbers of a kind of points, a dataclass."""
+    return [each.name for each in fields(kind)]
 
 
-def append(path: Path, point: CurvePoint) -> None:
+def append(path: Path, point: Any) -> None:
     """Adds a row; a file that does not exist begins with the names."""
     new = not path.exists()
     with path.open("a", newline="") as file:
         writer = csv.writer(file)
         if new:
-            writer.writerow(NAMES)
+            writer.writerow(names_of(type(point)))
         writer.writerow(
             f"{value:.6g}" if isinstance(value, float) else value for value in astuple(point)
         )
 
 
 def read(path: Path) -> list[CurvePoint]:
-    """All rows. Raises ValueError for a file of another version."""
+    """All points of a training. Raises ValueError for a file of another version."""
+    return points(path, CurvePoint)
+
+
+def points(path: Path, kind: type[Point]) -> list[Point]:
+    """All rows of a file of such points. Raises ValueError for a file of another version."""
     with path.open(newline="") as file:
         rows = list(csv.reader(file))
-    if not rows or rows[0] != NAMES:
+    if not rows or rows[0] != names_of(kind):
         raise ValueError(f"{path}: not a learning curve of this version")
+    types = get_type_hints(kind)
     return [
-        CurvePoint(
-            **{  # type: ignore[arg-type]
-                name: int(text) if name in _WHOLE else float(text)
-                for name, text in zip(NAMES, row, strict=True)
-            }
-        )
+        kind(**{name: types[name](text) for name, text in zip(rows[0], row, strict=True)})
         for row in rows[1:]
     ]
 
@@ -81,7 +85,7 @@ def cut(path: Path, decisions: int) -> None:
     """Drops the rows after so many decisions: a training resumes there."""
     if not path.exists():
         return  # it was stopped before its first update
-    points = [point for point in read(path) if point.decisions <= decisions]
+    kept = [point for point in read(path) if point.decisions <= decisions]
     path.unlink()
-    for point in points:
+    for point in kept:
         append(path, point)

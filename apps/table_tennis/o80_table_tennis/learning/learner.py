@@ -7,7 +7,6 @@ for a whole rollout at once.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,13 +15,14 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.logger import Logger
 from stable_baselines3.common.vec_env import VecNormalize
 
+from o80.base.arrays import Float32Array
 from o80.learning.rollouts import Collector
 from o80.learning.rollouts.ppo import CollectorEnv, RolloutPPO
 
 from ..players.network import CLIP, Network
-from .copies import Stopwatch, timed_copies
+from .copies import Stopwatch, Timed, training_copies
 from .settings import LearningSettings
-from .visible_numbers import Float32Array, visible_numbers
+from .visible_numbers import visible_numbers
 
 INFOS = ("touched", "returned")
 """Entries of an episode's last info that a training counts."""
@@ -30,14 +30,12 @@ INFOS = ("touched", "returned")
 
 def training_environments(settings: LearningSettings, watch: Stopwatch) -> VecNormalize:
     """The environments of a training, normalised; `watch` measures them."""
-    make = partial(
-        timed_copies,
-        settings.conditions,
-        count=settings.ppo.environments,
-        ball_seed=settings.seed,
-        watch=watch,
-    )
-    collector = Collector(make, seed=settings.seed, infos=INFOS)
+
+    def made() -> Timed:
+        count, seed = settings.ppo.environments, settings.seed
+        return Timed(training_copies(settings.conditions, count=count, ball_seed=seed), watch)
+
+    collector = Collector(made, seed=settings.seed, infos=INFOS)
     return VecNormalize(
         CollectorEnv(collector),
         norm_obs=True,

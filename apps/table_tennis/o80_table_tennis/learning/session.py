@@ -21,7 +21,6 @@ from .landing_plot import plot_landings
 from .settings import LearningSettings
 from .training import Training
 from .verdict import REPORT, baselines, print_table, write_report
-from .verdict import recorded as with_recorded
 
 
 class Session:
@@ -61,7 +60,7 @@ class Session:
             "environment_share": environment,
         }
         if recorded is not None:
-            conditions = with_recorded(settings.conditions, recorded)
+            conditions = settings.conditions.playing(str(recorded))
             shots = evaluate(f"{name}, recorded balls", policy, conditions, balls=None)
             evaluations.append(shots)
             told["returned_recorded"] = shots.returned

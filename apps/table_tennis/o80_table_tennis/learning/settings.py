@@ -59,7 +59,7 @@ class PpoSettings:
 
 @dataclass(frozen=True)
 class RestartSettings:
-    """When a network that has got stuck is replaced by a new one, see `restarts`."""
+    """When a network that has got stuck is replaced, see `LearningSettings.stuck`."""
 
     after: int = 600_000
     """A network is judged once, after so many decisions of its own."""
@@ -97,6 +97,25 @@ class LearningSettings:
             whole(getattr(self, name), name, 1)
         if not self.minutes > 0:
             raise ValueError(f"minutes must be positive, got {self.minutes}")
+
+    def stuck(self, *, begun: int, decisions: int, touched: float) -> bool:
+        """Whether a network that began at the decision `begun` should be replaced now.
+
+        Some networks learn early to return the balls that fly to one side, and never learn the
+        others. Longer training does not help them, see docs/results/learning.md. A low share of
+        touched balls shows this before half of the training is over.
+
+        A network is judged once, in the first update after `restart.after` decisions. It is kept
+        if a new network could not be judged before the end of the training. A blind network is
+        always kept, because it cannot touch so many balls.
+
+        touched: share of the last balls, with exploration.
+        """
+        restart, age = self.restart, decisions - begun
+        update = self.ppo.steps * self.ppo.environments
+        judged = restart.after <= age < restart.after + update
+        enough_left = self.decisions - decisions >= restart.after
+        return judged and enough_left and not self.blind and touched < restart.touched
 
 
 WAYS: Mapping[str, LearningSettings] = {

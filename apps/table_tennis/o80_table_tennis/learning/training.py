@@ -11,6 +11,7 @@ from typing import Any
 from stable_baselines3.common.callbacks import BaseCallback
 
 import o80
+from o80.base.lifecycle import Closeable
 
 from ..players.learned_policy import LearnedPolicy
 from . import checkpoint, curve
@@ -25,7 +26,6 @@ from .learner import (
     set_exploration,
     training_environments,
 )
-from .restarts import stuck
 from .settings import LearningSettings
 from .validation import Validation
 
@@ -35,7 +35,7 @@ POLICY = "policy.npz"
 Told = Callable[[CurvePoint], None]
 
 
-class Training:
+class Training(Closeable):
     """Learns in `output`, and resumes there if asked to. Close it."""
 
     def __init__(self, settings: LearningSettings, output: Path, *, resume: bool = False) -> None:
@@ -47,7 +47,7 @@ class Training:
         output.mkdir(parents=True, exist_ok=True)
         self._watch = Stopwatch()
         self._environments = training_environments(settings, self._watch)
-        self._validation = Validation(settings)
+        self._validation = Validation(settings.conditions, settings.evaluated)
         self.model = new_model(settings, self._environments)
         if resume and folder is not None:
             self._begun = checkpoint.load(folder, self.model, self._environments)
@@ -59,12 +59,6 @@ class Training:
         self._evaluating = 0.0
         self._restarts, self._network_begun = self._begun.restarts, self._begun.begun
         self._stuck = self._begun.stuck
-
-    def __enter__(self) -> Training:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Ends the environments."""
@@ -130,8 +124,7 @@ class Training:
 
     def judge(self) -> None:
         """Notes whether the network has got stuck."""
-        self._stuck = stuck(
-            self.settings,
+        self._stuck = self.settings.stuck(
             begun=self._network_begun,
             decisions=self.model.num_timesteps,
             touched=self._counter.shares.touched,
@@ -160,7 +153,7 @@ class Training:
         if evaluate:
             network = network_of(self.model, self._environments, self.settings)
             begun = time.process_time()
-            seen = self._validation.play(network)
+            seen = self._validation.play(network.act)
             self._evaluating += time.process_time() - begun
             evaluated = {f"evaluated_{name}": value for name, value in seen._asdict().items()}
         return CurvePoint(

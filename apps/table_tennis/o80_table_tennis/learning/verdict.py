@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +25,6 @@ def baselines(conditions: Conditions, *, balls: int = VERDICT_BALLS) -> list[Eva
         evaluate("still arm", StillPolicy(), conditions, balls=balls),
         evaluate("random actions", RandomPolicy(), conditions, balls=balls),
     ]
-
-
-def recorded(conditions: Conditions, balls: Path) -> Conditions:
-    """The same with recorded balls."""
-    return replace(conditions, balls=str(balls))
 
 
 def print_table(evaluations: Sequence[Evaluation], console: Console) -> None:

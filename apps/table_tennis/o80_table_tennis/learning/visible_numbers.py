@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import Float32Array
 
 from ..players.conditions import Conditions
 from ..task.full_observation import full_observation
-
-Float32Array = NDArray[np.float32]
 
 BALL_PARTS = (
     *("ball_position", "ball_velocity", "spin"),

@@ -1,19 +1,74 @@
 """An estimate of flying balls from noisy measurements: position, velocity and top spin.
 
 After each measurement the estimate is the last one flown on for a step, by the laws of flight and
-bounce, plus gain times what the measurement adds (`filter_gains`). Where a ball was not seen, its
-estimate flies on alone. A velocity that no flight and no bounce explains (a racket has met the
-ball) makes the filter begin anew. One ball and many get the same bits.
+bounce, plus gain times what the measurement adds. Where a ball was not seen, its estimate flies on
+alone. A velocity that no flight and no bounce explains (a racket has met the ball) makes the filter
+begin anew. One ball and many get the same bits.
+
+The gains are those of an extended Kalman filter along a typical shot. What a spin does to a flight
+depends on its velocity, and the velocities of all shots are alike, so that the gains do not depend
+on the shot: they are computed once, before the first ball flies.
 """
 
 from __future__ import annotations
 
-from o80_mujoco.balls import BallFilter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+
+import numpy as np
+
+from o80.base.arrays import FloatArray
+from o80_mujoco.balls import BallFilter, path, predicted_flight
 
 from ..world.table import TABLE
+from ..world.timing import STEP
 from .aerodynamics import AERODYNAMICS
-from .filter_gains import FilterSettings, gains
 from .impact import platform
+
+TYPICAL = (0.46, 2.95, 1.37, 0.24, -4.14, 2.28, 30.0)
+"""Position, velocity and top spin of the launch of the recorded ball gun, with less spin."""
+STEPS_AFTER = 40
+"""Measurements after the bounce for which there are gains of their own; then the last ones go on.
+"""
+
+_ALONG_X = ((0, 0), (0, 3), (3, 0), (3, 3))
+_ALONG_YZ = tuple((row, column) for row in (1, 2, 4, 5, 6) for column in (1, 2, 4, 5))
+PLACES = _ALONG_X + _ALONG_YZ
+"""Row in the estimate (7) and column in the measurement (6) of each gain; the others are 0: what is
+seen across the table says nothing about the flight along it."""
+
+
+@dataclass(frozen=True)
+class FilterSettings:
+    """Standard deviations that the filter expects of the measurements and of the ball."""
+
+    step: float = STEP
+    """From one measurement to the next [s]."""
+    position: float = 0.005
+    """Standard deviation of a measured position [m]."""
+    velocity: float = 0.1
+    """Standard deviation of a measured velocity [m/s]."""
+    spin: float = 45.0
+    """Standard deviation of the spin of a shot before it is seen [rad/s]."""
+    mean_spin: float = 20.0
+    """[rad/s]"""
+    force: float = 0.3
+    """Standard deviation of an acceleration that no law explains, in each step [m/s^2]."""
+    bounce_velocity: float = 0.1
+    """Standard deviation of the law of the bounce [m/s]."""
+    bounce_spin: float = 10.0
+    """[rad/s]"""
+
+
+@dataclass(frozen=True, eq=False)
+class Gains:
+    """One row for each measurement since the ball was first seen, or since its bounce."""
+
+    before: FloatArray
+    """(steps, 24), in the order of `PLACES`"""
+    after: FloatArray
+    """(STEPS_AFTER, 24)"""
 
 
 def ball_filter(settings: FilterSettings, count: int) -> BallFilter:
@@ -28,3 +83,73 @@ def ball_filter(settings: FilterSettings, count: int) -> BallFilter:
         step=settings.step,
         mean_spin=settings.mean_spin,
     )
+
+
+@cache
+def gains(settings: FilterSettings) -> Gains:
+    """The gains for these settings."""
+    s = settings
+    measured = np.diag([s.position**2] * 3 + [s.velocity**2] * 3)
+    moved = np.zeros((7, 7))
+    for axis in range(3):
+        move = np.array([s.step**2 / 2, s.step])
+        moved[np.ix_([axis, axis + 3], [axis, axis + 3])] = s.force**2 * np.outer(move, move)
+    moved[6, 6] = 1.0
+    bounce = np.diag([1e-6] * 3 + [s.bounce_velocity**2] * 3 + [s.bounce_spin**2])
+
+    ball, covariance = np.array(TYPICAL), np.diag([*np.diag(measured), s.spin**2])
+    before, bounced = [_gain(covariance, measured)], False
+    after: list[FloatArray] = []
+    while len(after) < STEPS_AFTER:
+        slope = _slopes(partial(_flown, step=s.step), ball)
+        before_step, ball = ball, _flown(ball[None], step=s.step)[0]
+        covariance = slope @ covariance @ slope.T + moved
+        if not bounced and ball[2] < TABLE.bounce_height:
+            bounced = True
+            slope = _slopes(_bounced, ball)
+            ball = _past_table(before_step, step=s.step)
+            covariance = slope @ covariance @ slope.T + bounce
+        gain = _gain(covariance, measured)
+        covariance = (np.eye(7) - gain @ np.eye(6, 7)) @ covariance
+        (after if bounced else before).append(gain)
+    return Gains(_table(before), _table(after))
+
+
+def _gain(covariance: FloatArray, measured: FloatArray) -> FloatArray:
+    """(7, 6) of an estimate and a measurement with these covariances."""
+    gain: FloatArray = covariance[:, :6] @ np.linalg.inv(covariance[:6, :6] + measured)
+    return gain
+
+
+def _slopes(move: Callable[[FloatArray], FloatArray], ball: FloatArray) -> FloatArray:
+    """(7, 7) change of a moved ball with the ball."""
+    small = 1e-5
+    moved = move(ball + np.vstack([np.zeros(7), small * np.eye(7)]))
+    slopes: FloatArray = (moved[1:] - moved[0]).T / small
+    return slopes
+
+
+def _flown(balls: FloatArray, *, step: float) -> FloatArray:
+    """Balls (n, 7) after a step [s] of free flight."""
+    return path(_whole(balls), step, 1, AERODYNAMICS.air)[1, :, :7]
+
+
+def _bounced(balls: FloatArray) -> FloatArray:
+    """Balls (n, 7) at the table after its touch."""
+    return platform(TABLE).bounced(_whole(balls))[:, :7]
+
+
+def _past_table(ball: FloatArray, *, step: float) -> FloatArray:
+    """A ball (7,) that touches the table within a step [s], after the step."""
+    whole = _whole(ball[None])[0]
+    return predicted_flight(whole, AERODYNAMICS.air, platform(TABLE), step, step)[-1, 1:8]
+
+
+def _whole(balls: FloatArray) -> FloatArray:
+    """Balls (n, 7) with top spin only, as (n, 9)."""
+    return np.hstack([balls, np.zeros((len(balls), 2))])
+
+
+def _table(rows: Sequence[FloatArray]) -> FloatArray:
+    """(rows, 24), in the order of `PLACES`."""
+    return np.array([[row[place] for place in PLACES] for row in rows])

@@ -12,16 +12,15 @@ from functools import cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import Platform
 from o80_mujoco.balls import bounced as bounced_off
 
 from ..world.ball import BALL_INERTIA, BALL_RADIUS
 from ..world.materials import Restitution
 from ..world.table import TABLE, Table
-
-FloatArray = NDArray[np.float64]
+from .aerodynamics import AERODYNAMICS
 
 
 class Leaving(NamedTuple):
@@ -57,6 +56,17 @@ def bounced(velocity: FloatArray, spin: FloatArray, table: Table = TABLE) -> Lea
     ball = np.concatenate([np.zeros(3), velocity, spin])[np.newaxis]
     after = platform(table).bounced(ball)[0]
     return Leaving(after[3:6], after[6:])
+
+
+def spin_after(velocity: FloatArray, turn: FloatArray, spin: FloatArray | None) -> FloatArray:
+    """Spin (3,) [rad/s] after a bounce, by the law of the bounce.
+
+    `velocity` (1, 3) [m/s] and `turn` (3,) [1/s] are those before it, as is `spin` (3,) [rad/s];
+    None: what the turn says.
+    """
+    if spin is None:
+        spin = AERODYNAMICS.spins(turn, np.linalg.norm(velocity, axis=1))[0]
+    return bounced(velocity[0], spin).spin
 
 
 def leaving(

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import predicted_flight
 
 from ..world.ball import NO_SPIN
@@ -17,7 +17,6 @@ from .aerodynamics import AERODYNAMICS, Aerodynamics
 from .impact import platform
 from .interpolation import along_path
 
-FloatArray = NDArray[np.float64]
 Numbers = Sequence[float] | FloatArray
 
 STEP = 0.02
@@ -101,24 +100,6 @@ def predict_crossing(
         return None
     first = int(np.argmax(crossed))
     return _crossing(nodes[first : first + 2], axis, at)
-
-
-def predict_landing(
-    position: Numbers,
-    velocity: Numbers,
-    *,
-    duration: float = 2.0,
-    spin: Numbers = NO_SPIN,
-    aerodynamics: Aerodynamics = AERODYNAMICS,
-    table: Table = TABLE,
-) -> Crossing | None:
-    """The first touch of the table, with the velocity before it; None if the ball misses it."""
-    nodes = flight_nodes(position, velocity, spin, duration, aerodynamics, table)
-    bounced = np.flatnonzero(nodes[:, BOUNCED])
-    if not len(bounced):
-        return None
-    touching = nodes[bounced[0] - 1]
-    return Crossing(float(touching[TIME]), touching[STATE][:3], touching[STATE][3:])
 
 
 def flight_nodes(

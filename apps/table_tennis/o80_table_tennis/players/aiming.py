@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80_mujoco.balls import path
 
 from ..physics.aerodynamics import Aerodynamics
 from ..world.scene import Vector
-
-FloatArray = NDArray[np.float64]
 
 
 def velocity_to_land(

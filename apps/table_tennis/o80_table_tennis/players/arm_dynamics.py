@@ -10,12 +10,11 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..world.arm import FOREARM, JOINT_DAMPING, UPPER_ARM, PointMass, mass_of
 from ..world.ball import GRAVITY
-
-FloatArray = NDArray[np.float64]
 
 
 def _joined(*parts: tuple[PointMass, float]) -> PointMass:

@@ -11,14 +11,13 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..world.arm import JOINTS
 from ..world.timing import STEP
 from .arm_dynamics import ArmModel
 from .pressure_control import MusclePair, PressureLag
-
-FloatArray = NDArray[np.float64]
 
 INTEGRATION_STEP = 0.0025
 """Longest one of the model [s]."""

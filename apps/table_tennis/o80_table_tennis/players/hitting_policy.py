@@ -13,6 +13,8 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array, FloatArray
+
 from ..physics.impact import bounced
 from ..rig.arm_numbers import ArmNumbers
 from ..task.actions import COARSE
@@ -22,7 +24,6 @@ from ..task.observations import (
     JOINT_POSITIONS,
     JOINT_VELOCITIES,
     PRESSURES,
-    Float32Array,
 )
 from ..world.arm import JOINT_LIMIT, JOINTS
 from ..world.scene import Vector
@@ -33,8 +34,6 @@ from .arm_prediction import ArmPredictor, ArmState
 from .interception import ComingBall, InterceptionSettings, Strike, StrikePlanner, coming_ball
 from .pressure_control import MusclePair, PressureActions, PressureLag
 from .swing import JointMotion, Swing
-
-FloatArray = NDArray[np.float64]
 
 WRIST = 3
 """Index of joint 4."""

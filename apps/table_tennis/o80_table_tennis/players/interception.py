@@ -11,7 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..physics.aerodynamics import AERODYNAMICS, Aerodynamics
 from ..physics.impact import Leaving, leaving
@@ -23,8 +24,6 @@ from ..world.scene import Vector
 from ..world.table import TABLE, TARGET, Table
 from .aiming import velocity_to_land
 from .inverse_kinematics import posture_towards
-
-FloatArray = NDArray[np.float64]
 
 PATH_PERIOD = 0.01
 """Period of the rows of a predicted path [s]."""

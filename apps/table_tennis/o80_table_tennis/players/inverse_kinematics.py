@@ -5,12 +5,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..world.arm import FOREARM, JOINT_LIMIT, SHOULDER, UPPER_ARM
 from ..world.scene import Vector
-
-FloatArray = NDArray[np.float64]
 
 
 def posture_towards(point: Vector, wrist: float) -> FloatArray:

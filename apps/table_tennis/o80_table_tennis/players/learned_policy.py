@@ -9,12 +9,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import Float32Array
 
 from .conditions import Conditions
 from .network import Network
-
-Float32Array = NDArray[np.float32]
 
 FORMAT = 1
 SHIPPED = Path(__file__).with_name("learned")

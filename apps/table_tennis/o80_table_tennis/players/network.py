@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-Float32Array = NDArray[np.float32]
+from o80.base.arrays import Float32Array
 
 CLIP = 10.0
 """Normalised observations lie within plus or minus this."""

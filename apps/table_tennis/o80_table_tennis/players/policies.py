@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array
+
 from ..rig.arm_numbers import ArmNumbers
-from ..task.actions import COARSE
-from ..task.observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS, Float32Array
+from ..task.actions import COARSE, FINE
+from ..task.observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS
 from ..world.arm import MUSCLES
 from .found_parameters import found_settings
 from .hitting_policy import HittingPolicy
@@ -80,6 +83,15 @@ class SweepPolicy:
         if swinging:
             action[0], action[1] = self.direction, -self.direction
         return action
+
+
+BASELINES: Mapping[str, tuple[Callable[[], Policy], float]] = {
+    "still arm": (StillPolicy, FINE),
+    "random, fine": (RandomPolicy, FINE),
+    "random, coarse": (RandomPolicy, COARSE),
+}
+"""Baselines that a policy must beat, and the factors of their actions; each plays the same in every
+run."""
 
 
 def default_policy(arm: ArmNumbers | None = None) -> Policy:

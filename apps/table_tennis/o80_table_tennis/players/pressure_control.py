@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
+
 from ..task.actions import COARSE, changed_pressures
 from ..world.arm import JOINTS, MUSCLES
 
-FloatArray = NDArray[np.float64]
 PerJoint = float | tuple[float, ...]
 PerMuscle = tuple[tuple[float, float], ...]
 

@@ -24,16 +24,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import Float32Array
 
 from ..rig.rig import Rig
 from ..settings import TaskSettings
 from ..world.timing import ITERATIONS
 from .episode_summary import EpisodeSummary
-
-Float32Array = NDArray[np.float32]
 
 ENVIRONMENT, EPISODE, EPISODE_END = "environment", "episode", "episode_end"
 """Names of the marks."""

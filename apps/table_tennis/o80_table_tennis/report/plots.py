@@ -10,13 +10,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..world.table import NET_HEIGHT, TABLE
 from .episode_summary import EpisodeSummary
 from .recorded_episodes import RecordedEpisode
-
-FloatArray = NDArray[np.float64]
 
 RESOLUTION = 110
 """[dots per inch]"""

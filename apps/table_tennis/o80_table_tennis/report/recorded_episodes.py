@@ -11,11 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 
 from .episode_recorder import ENVIRONMENT, EPISODE, EPISODE_END, unpacked
 from .episode_summary import EpisodeSummary
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,22 +7,18 @@ import importlib
 import os
 import sys
 from collections.abc import Iterable, Mapping
-from contextlib import AbstractContextManager
 from pathlib import Path
-from types import TracebackType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, Image
 from o80.base.extras import needed
+from o80.base.lifecycle import Closeable
 
 from ..world.arm import JOINT_NAMES
 from ..world.ball import BALL_RADIUS
 from ..world.scene import MODEL
-
-Image = NDArray[np.uint8]
-FloatArray = NDArray[np.float64]
 
 CAMERAS = ("side", "behind", "close")
 SIZE = (640, 480)
@@ -31,13 +27,16 @@ HALF_SIZE = (480, 360)
 """Size of each picture in a film of several."""
 TITLE_HEIGHT = 28
 """Height of the line above each of them."""
+FRAMES_PER_SECOND = 25.0
+SLOW = 2.0
+"""So many times slower than it was is what a film shows."""
 SHADOWS = 1024
 """Size of the map of shadows [pixels]: finer ones take software renderers much longer."""
 OTHER_BALL = (0.95, 0.95, 0.92, 0.8)
 """Colour of the balls beside the one that is played."""
 
 
-class Scene(AbstractContextManager["Scene"]):
+class Scene(Closeable):
     """Draws the scene with any number of balls, without a screen.
 
     Needs the extra `rendering`, and EGL or OSMesa; MUJOCO_GL chooses between them. Raises
@@ -57,14 +56,6 @@ class Scene(AbstractContextManager["Scene"]):
         self._balls = [self._free_joint(ball) for ball in range(balls)]
         self._arm = [int(self._model.joint(name).qposadr[0]) for name in JOINT_NAMES]
         self._renderer = mujoco.Renderer(self._model, size[1], size[0])
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Gives the renderer back; may be called twice."""
@@ -91,7 +82,7 @@ class Scene(AbstractContextManager["Scene"]):
         return int(self._model.joint(_ball_name(ball)).qposadr[0])
 
 
-def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float = 25.0) -> int:
+def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float) -> int:
     """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has.
 
     Needs the extra `rendering`; raises o80.MissingExtra.
@@ -117,58 +108,43 @@ def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: floa
     return frames
 
 
-def film_episode(
-    path: Path,
-    joints: FloatArray,
-    balls: FloatArray,
-    *,
-    period: float,
-    slow: float = 2.0,
-    frames_per_second: float = 25.0,
-    camera: str = "side",
-    size: tuple[int, int] = SIZE,
-) -> int:
+def film_episode(path: Path, joints: FloatArray, balls: FloatArray, *, period: float) -> int:
     """A film of rows of joints (T, 4) [rad] and balls (T, B, 3) [m], `period` [s] apart.
 
-    `slow` times slower than it was. Returns how many frames it has.
+    Half as fast as it was. Returns how many frames it has.
     """
-    step = max(1, round(1.0 / (frames_per_second * slow * period)))
-    with Scene(balls=balls.shape[1], size=size) as scene:
-        pictures = (
-            scene.draw(joints[row], balls[row], camera=camera)
-            for row in range(0, len(joints), step)
-        )
-        return write_film(path, pictures, frames_per_second=frames_per_second)
+    step = _rows_of_frame(FRAMES_PER_SECOND, period)
+    with Scene(balls=balls.shape[1]) as scene:
+        pictures = (scene.draw(joints[row], balls[row]) for row in range(0, len(joints), step))
+        return write_film(path, pictures, frames_per_second=FRAMES_PER_SECOND)
 
 
 def film_side_by_side(
-    path: Path,
-    episodes: Mapping[str, tuple[FloatArray, FloatArray]],
-    *,
-    period: float,
-    slow: float = 2.0,
-    frames_per_second: float = 12.5,
-    camera: str = "side",
+    path: Path, episodes: Mapping[str, tuple[FloatArray, FloatArray]], *, period: float
 ) -> int:
     """One film of several episodes, each of joints (T, 4) [rad] and its ball (T, 3) [m].
 
-    The name of each episode stands above its picture. All begin together; an episode that has ended
-    shows its last row. Returns the number of frames.
+    Half as fast as they were. The name of each episode stands above its picture. All begin
+    together; an episode that has ended shows its last row. Returns the number of frames.
     """
-    step = max(1, round(1.0 / (frames_per_second * slow * period)))
+    rate = FRAMES_PER_SECOND / len(episodes)
     rows = max(len(joints) for joints, _ in episodes.values())
     titles = np.hstack([_title(name, HALF_SIZE[0]) for name in episodes])
     with Scene(size=HALF_SIZE) as scene:  # drawn one after the other: a renderer costs much memory
 
         def at(row: int, joints: FloatArray, ball: FloatArray) -> Image:
             there = ball[min(row, len(ball) - 1), None]
-            return scene.draw(joints[min(row, len(joints) - 1)], there, camera=camera)
+            return scene.draw(joints[min(row, len(joints) - 1)], there)
 
         pictures = (
             np.vstack([titles, np.hstack([at(row, *each) for each in episodes.values()])])
-            for row in range(0, rows, step)
+            for row in range(0, rows, _rows_of_frame(rate, period))
         )
-        return write_film(path, pictures, frames_per_second=frames_per_second)
+        return write_film(path, pictures, frames_per_second=rate)
+
+
+def _rows_of_frame(frames_per_second: float, period: float) -> int:
+    return max(1, round(1.0 / (frames_per_second * SLOW * period)))
 
 
 def _title(text: str, width: int) -> Image:

@@ -16,9 +16,8 @@ from rich.table import Table as Grid
 
 from ..settings import Pacing
 from ..world.timing import ITERATIONS
-from .interval import wilson
-from .played import Played
 from .recorded_episodes import RecordedEpisode
+from .statistics import Played, wilson
 
 Value = float | int | bool | str | None
 PERCENTILES = (50, 90, 99, 99.9, 100)

@@ -1,15 +1,20 @@
-"""Rates and lateness of an environment, and how many of its steps were exact."""
+"""Rates and lateness of an environment, episodes that were played, how sure their shares are."""
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..rig.rig import Rig
+from .episode_summary import EpisodeSummary
 
-FloatArray = NDArray[np.float64]
+NORMAL_95 = 1.959963984540054
+"""Standard deviations within which 95 % of a normal distribution lie."""
 
 
 @dataclass
@@ -88,3 +93,41 @@ def statistics_of(counts: EpisodeCounts, rig: Rig) -> Statistics:
         arm_lateness_us=lateness,
         arm_periods_us=periods,
     )
+
+
+@dataclass(frozen=True)
+class Played:
+    """Episodes of one environment."""
+
+    episodes: Sequence[EpisodeSummary]
+    statistics: Statistics
+    seconds: float
+    """From the first reset to the last step."""
+
+    @property
+    def returns(self) -> int:
+        """Episodes in which the ball was returned, see `task.outcome`."""
+        return sum(episode.returned for episode in self.episodes)
+
+    @property
+    def touches(self) -> int:
+        """Episodes in which the racket met the ball."""
+        return sum(episode.touched for episode in self.episodes)
+
+
+def wilson(successes: int, count: int) -> tuple[float, float]:
+    """Wilson's interval of a share, which holds the true one in 95 % of all cases.
+
+    (0, 1) of nothing counted. Unlike the plus or minus of a standard deviation it stays within
+    0 and 1, and has a width where all or none succeeded.
+    """
+    if not 0 <= successes <= count:
+        raise ValueError(f"successes must lie between 0 and {count}, got {successes}")
+    if count == 0:
+        return 0.0, 1.0
+    share, z2 = successes / count, NORMAL_95 * NORMAL_95
+    middle = (share + z2 / (2 * count)) / (1 + z2 / count)
+    spread = math.sqrt(share * (1 - share) / count + z2 / (4 * count * count))
+    half = NORMAL_95 * spread / (1 + z2 / count)
+    # rounding must not leave the share, or 0 and 1, outside
+    return max(0.0, min(middle - half, share)), min(1.0, max(middle + half, share))

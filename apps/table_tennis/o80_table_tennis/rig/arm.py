@@ -14,14 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 from o80.learning import EVERY, Index
 from o80.rows.layout import field_view, with_padding
 
 from ..world.arm import JOINTS, MUSCLES
 from ..world.timing import ITERATIONS
 from .pressure_range import PressureRange
-
-FloatArray = NDArray[np.float64]
 
 MOTION = ("extended.joint_positions", "extended.joint_velocities")
 """Fields of a row with the angles [rad] and velocities [rad/s] of the joints, side by side."""

@@ -7,16 +7,15 @@ from typing import Any
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 
 from ..settings import RigSettings
 from ..world.arm import JOINTS, MUSCLES
 from .pressure_range import PressureRange
 from .robot_options import arm_options
 
-FloatArray = NDArray[np.float64]
 Numbers = tuple[float, ...]
 Pairs = tuple[tuple[float, float], ...]
 

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import Float32Array, FloatArray
 from o80.learning import Index
 
 from ..settings import RigSettings
@@ -17,9 +18,6 @@ from ..task.observations import BALL_POSITION, PRESSURES, SIZE
 from .arm import MOTION, Arms
 from .robot_options import arm_options, twin_options
 from .twin import Flights, Twins
-
-FloatArray = NDArray[np.float64]
-Float32Array = NDArray[np.float32]
 
 LANE_BLOCKS = 2048
 """Blocks of 64 bytes in a lane of a twin: the states of a recorded flight are one batch."""

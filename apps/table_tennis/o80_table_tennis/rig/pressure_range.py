@@ -6,11 +6,9 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80
-
-FloatArray = NDArray[np.float64]
+from o80.base.arrays import FloatArray
 
 
 class PressureRange:

@@ -7,13 +7,13 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from itertools import count
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
+from o80.base.lifecycle import Closeable
 from o80.learning import EVERY
 
 from ..settings import Pacing, RigSettings
@@ -22,8 +22,6 @@ from ..world.timing import ITERATIONS
 from .arm import Arm
 from .robot_options import arm_options, twin_options
 from .twin import TIMEOUT, Flights, Twin
-
-FloatArray = NDArray[np.float64]
 
 NUMBERS = count(1)
 
@@ -48,7 +46,7 @@ class StepCounts:
     """[rows]"""
 
 
-class Rig:
+class Rig(Closeable):
     """One arm and the twins that mirror it, in one of three ways of pacing.
 
     The task moves it as it moves a `GroupRig` with one copy.
@@ -84,17 +82,6 @@ class Rig:
         except BaseException:
             self._stack.close()
             raise
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def close(self) -> None:
         """Ends all that was started; may be called twice."""

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
+from o80.base.arrays import FloatArray
 from o80.rows.layout import field_view, with_padding
 
 from ..balls.sampled_flight import SampledFlight
@@ -20,8 +21,6 @@ from ..task.ball_record import BallRecord
 from ..world.arm import JOINT_NAMES, JOINTS
 from ..world.timing import ITERATIONS
 from .ball_records import BallRecords, ball_records, event_flags, fly_out_fields, records_of
-
-FloatArray = NDArray[np.float64]
 
 Flights = Sequence[SampledFlight]
 """Flights of the balls of a copy, the played one first; empty: they fall from their places."""

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
+
 from ..task.end import End, terminated
 from ..task.observer import Observer, Observing
 from ..task.outcome import returned
@@ -15,8 +17,6 @@ from ..task.state import State
 from ..task.task import Task
 from .ball_records import ball_records
 from .rig import Rig
-
-FloatArray = NDArray[np.float64]
 
 
 class VirtualBalls:

@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..world.arm import MUSCLES
+from o80.base.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
+from ..world.arm import MUSCLES
 
 FINE = 0.05
 """Factor of the actions in the published fine configuration."""

@@ -13,14 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array, FloatArray
+
 from .end import End, EndRule, terminated
 from .observations import ObservationBounds, observe_ball
 from .outcome import outcome
 from .rewards import OrderedReward, RewardRule
 from .state import State
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,13 +7,11 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import IntArray
 
 from .ball_record import BallRecord, Flags, Numbers
 from .outcome import beyond_net, on_top
-
-IntArray = NDArray[np.int64]
-
 
 MAX_STEPS = 300
 

@@ -12,12 +12,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import Float32Array, FloatArray
 
 from ..world.arm import MUSCLES
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 class Part(NamedTuple):
@@ -66,9 +64,14 @@ class FullObservation:
 
     @property
     def high(self) -> Float32Array:
-        """(M,) fresh; the least observation is minus this."""
+        """(M,) largest observation, a fresh array."""
         bounds = [part.bound for part in self.parts() for _ in part.centres]
         return np.array(bounds, dtype=np.float32)
+
+    @property
+    def low(self) -> Float32Array:
+        """(M,) least observation, a fresh array."""
+        return -self.high
 
     @property
     def centres(self) -> FloatArray:

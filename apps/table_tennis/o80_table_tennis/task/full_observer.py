@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..physics.ball_filter import ball_filter
-from ..physics.filter_gains import FilterSettings
+from o80.base.arrays import FloatArray, IntArray
+
+from ..physics.ball_filter import FilterSettings, ball_filter
 from ..world.arm import MUSCLES
 from .full_observation import FullObservation
 from .noise import NoiseSettings
 from .perception import Perceived
 from .state import State
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 EVERY = slice(None)
 MIN_POSITION_NOISE = 0.0005

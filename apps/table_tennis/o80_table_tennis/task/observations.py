@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import Float32Array, FloatArray
 
 from ..world.scene import Vector
 from .state import State
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 JOINT_POSITIONS = slice(0, 4)
 """[rad]"""

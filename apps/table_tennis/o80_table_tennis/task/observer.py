@@ -11,20 +11,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from gymnasium import spaces
-from numpy.typing import NDArray
+
+from o80.base.arrays import Float32Array, FloatArray, IntArray
 
 from .ball_play import ReturnTask
-from .box import Bounded, ObservationBox
 from .full_observation import FullObservation
 from .full_observer import FullObserver
 from .noise import NO_NOISE, NoiseSettings
 from .perception import Perceived, Perceiving, Perception
 from .state import State
 from .task import Task
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 EVERY = slice(None)
 
@@ -51,22 +47,23 @@ class Observer:
         self._perception: Perceiving | None = (
             Perception(noise, observing.interval, count) if noise.of_observations else None
         )
-        observed: Bounded = task if full is None else _Bounds(full)
-        self._box = ObservationBox(observed)
-        self.space: spaces.Space[Float32Array] = self._box.space
+        observed = task if full is None else full
+        self.low, self.high = observed.low, observed.high
+        """(M,) bounds of an observation."""
+        # compared as 64-bit floats, so that clipping converts only once
+        self._low, self._high = self.low.astype(np.float64), self.high.astype(np.float64)
+        self.space = spaces.Box(self.low, self.high, self.low.shape, np.float32)
         """Space of the observation of one episode."""
-        self.size = int(observed.high.size)
+        self.size = self.high.size
         """M, the numbers of an observation."""
         self.is_ball_play = (
             full is None
             and self._perception is None
             and getattr(type(task), "observe", None) is ReturnTask.observe
-            and bool(np.all(observed.low < observed.high))
+            and bool(np.all(self.low < self.high))
         )
         """Whether observations are the numbers of `observations`, in their bounds, and no more:
         then `begin` and `observe` need not be called."""
-        self.low, self.high = observed.low, observed.high
-        """(M,) bounds of an observation."""
         self._full: FullObserver | None = None
         if full is not None:
             change = observing.largest_change
@@ -95,7 +92,7 @@ class Observer:
         )
         if self._full is None:
             return self._of_task(state, seen)
-        return self._box.clip(self._full.begin(state, commanded, seen, which))
+        return self.clip(self._full.begin(state, commanded, seen, which))
 
     def observe(
         self, state: State, commanded: FloatArray, which: IntArray | slice = EVERY
@@ -105,31 +102,21 @@ class Observer:
         `state` and `asked` are theirs alone.
         """
         if self._perception is None and self._full is None:
-            return self._box.clip(self._task.observe(state))
+            return self.clip(self._task.observe(state))
         seen = (
             exactly(state) if self._perception is None else self._perception.perceive(state, which)
         )
         if self._full is None:
             return self._of_task(state, seen)
-        return self._box.clip(self._full.observe(state, commanded, seen, which))
+        return self.clip(self._full.observe(state, commanded, seen, which))
+
+    def clip(self, observations: FloatArray) -> Float32Array:
+        """Observations (..., M) within the bounds, a fresh array."""
+        within = np.minimum(np.maximum(observations, self._low), self._high)
+        return within.astype(np.float32)
 
     def _of_task(self, state: State, seen: Perceived) -> Float32Array:
-        return self._box.clip(self._task.observe(state.perceived(seen.ball, seen.pressures)))
-
-
-@dataclass(frozen=True)
-class _Bounds:
-    """The box of `full`."""
-
-    full: FullObservation
-
-    @property
-    def low(self) -> Float32Array:
-        return -self.full.high
-
-    @property
-    def high(self) -> Float32Array:
-        return self.full.high
+        return self.clip(self._task.observe(state.perceived(seen.ball, seen.pressures)))
 
 
 def exactly(state: State) -> Perceived:

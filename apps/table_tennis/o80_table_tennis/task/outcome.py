@@ -13,13 +13,12 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..world.table import NET_Y, TABLE
 from .ball_record import BallRecord, Flags
 from .state import State
-
-FloatArray = NDArray[np.float64]
 
 SMALL = 1e-6
 """A landing this far below the top of the table is still on top of it [m]."""

@@ -13,13 +13,12 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray, IntArray
+
 from ..world.arm import MUSCLES
 from ..world.ball import GRAVITY
 from .noise import NoiseSettings
 from .state import State
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int64]
 
 BLOCK = 128
 """Observations whose noise is drawn at once."""

@@ -8,13 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array, FloatArray
+
 from ..world.arm import JOINT_LIMIT, JOINTS, PLAYING_POSTURE, racket_pose
 from .end import MAX_STEPS, End
 from .observations import JOINT_POSITION_BOUND, JOINT_VELOCITY_BOUND
 from .state import State
-
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

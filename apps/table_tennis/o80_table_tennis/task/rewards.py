@@ -14,15 +14,14 @@ from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
 
 from ..world.scene import Vector
 from ..world.table import TARGET
 from .ball_record import Numbers
 from .outcome import distance, ended_at, none, returned
 from .state import State
-
-FloatArray = NDArray[np.float64]
 
 # of math, not of NumPy, which differ in the last bit: one episode and many get the same rewards
 _power = np.frompyfunc(math.pow, 2, 1)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
+
 from ..world.arm import JOINTS
 from .ball_record import BallRecord
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(slots=True)

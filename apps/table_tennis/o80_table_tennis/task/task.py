@@ -12,10 +12,9 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import NDArray
 
-from .state import State
+from o80.base.arrays import Float32Array, FloatArray
 
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
+from .state import State
 
 
 @runtime_checkable
@@ -66,19 +65,7 @@ class Task(Protocol):
         ...
 
 
-TASK_MEMBERS = (
-    "low",
-    "high",
-    "plays_ball",
-    "begin",
-    "observe",
-    "eventful",
-    "end",
-    "reward",
-    "info",
-)
-
-
 def missing_members(task: object) -> list[str]:
     """The members that an object lacks to be a task."""
-    return [name for name in TASK_MEMBERS if not hasattr(task, name)]
+    members = [name for name in vars(Task) if not name.startswith("_")]
+    return [name for name in members if not hasattr(task, name)]

@@ -9,12 +9,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
+from o80.base.arrays import FloatArray
 
 from .scene import Vector, body, element, full_size, geom, joints_of, numbers, vector
-
-FloatArray = NDArray[np.float64]
 
 _JOINTS = joints_of("shoulder")
 JOINT_NAMES = tuple(joint.attrib["name"] for joint in _JOINTS)

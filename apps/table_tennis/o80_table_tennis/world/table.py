@@ -43,12 +43,5 @@ class Table:
         """Height of the ball's centre when it touches the surface [m]."""
         return self.top + BALL_RADIUS
 
-    def carries(self, x: float, y: float) -> bool:
-        """Whether the surface lies under the point (x, y) [m]."""
-        return (
-            abs(x - self.centre[0]) <= self.size[0] / 2
-            and abs(y - self.centre[1]) <= self.size[1] / 2
-        )
-
 
 TABLE = Table()

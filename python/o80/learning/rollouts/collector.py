@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from types import TracebackType
-from typing import Any, Protocol, Self
+from typing import Any, Protocol
 
 import numpy as np
 from gymnasium import Space
@@ -14,6 +13,7 @@ from numpy.typing import NDArray
 
 from o80.base.argument_checks import whole
 from o80.base.errors import Closed, InvalidArgument
+from o80.base.lifecycle import Closeable
 from o80.learning.rollouts.recorder import EpisodeSums, Recorder
 from o80.learning.rollouts.rollout import Rollout
 
@@ -34,7 +34,7 @@ class Policy(Protocol):
         ...
 
 
-class Collector:
+class Collector(Closeable):
     """Collects the rollouts of one vector environment.
 
     All random numbers follow from (seed, number, iteration): those of the environments from the
@@ -109,17 +109,6 @@ class Collector:
         if not self._closed:
             self._closed = True
             self._environments.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        self.close()
 
     def _refuse_if_closed(self) -> None:
         if self._closed:

@@ -9,9 +9,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array
 from o80.base.errors import InvalidArgument
-
-Float32Array = NDArray[np.float32]
 
 
 @dataclass(frozen=True, eq=False)

@@ -28,7 +28,7 @@ TEST_F(HaltWordTest, NoHaltActsAtFirst) {
 
 TEST_F(HaltWordTest, AHaltIsLatchedAndShownWithWhoAndWhy) {
   const AttachedSegment frontend = attach();
-  EXPECT_EQ(ask_for_halt(frontend.view(), HaltCause::frontend, "pid 7 (python)", "it smokes"), 1U);
+  EXPECT_EQ(request_halt(frontend.view(), HaltCause::frontend, "pid 7 (python)", "it smokes"), 1U);
   ASSERT_TRUE(latch_.look());
   EXPECT_TRUE(latch_.show(12));
   EXPECT_FALSE(latch_.look());
@@ -43,10 +43,10 @@ TEST_F(HaltWordTest, AHaltIsLatchedAndShownWithWhoAndWhy) {
 
 TEST_F(HaltWordTest, ANewerHaltThanTheOneThatWasSeenIsNotCleared) {
   const AttachedSegment frontend = attach();
-  ask_for_halt(frontend.view(), HaltCause::frontend, "a", "first");
+  request_halt(frontend.view(), HaltCause::frontend, "a", "first");
   ASSERT_TRUE(latch_.look());
   latch_.show(1);
-  ask_for_halt(frontend.view(), HaltCause::frontend, "b", "second");
+  request_halt(frontend.view(), HaltCause::frontend, "b", "second");
   EXPECT_FALSE(latch_.clear());
   EXPECT_TRUE(latch_.acts());
   ASSERT_TRUE(latch_.look());
@@ -59,7 +59,7 @@ TEST_F(HaltWordTest, ANewerHaltThanTheOneThatWasSeenIsNotCleared) {
 
 TEST_F(HaltWordTest, TextsThatAreTooLongAreCut) {
   const std::string long_text(1000, 'x');
-  ask_for_halt(segment_.view(), HaltCause::driver, long_text, long_text);
+  request_halt(segment_.view(), HaltCause::driver, long_text, long_text);
   ASSERT_TRUE(latch_.look());
   EXPECT_TRUE(latch_.show(0));
   EXPECT_EQ(latch_.halt().who_text(), std::string(63, 'x'));
@@ -71,7 +71,7 @@ TEST_F(HaltWordTest, AHaltNeedsNoLane) {
   const AttachedSegment second = attach();
   const LaneSender one(first);
   const LaneSender two(second);  // that is all of them
-  ask_for_halt(attach().view(), HaltCause::frontend, "", "");
+  request_halt(attach().view(), HaltCause::frontend, "", "");
   EXPECT_TRUE(latch_.look());
 }
 
@@ -94,7 +94,7 @@ TEST_F(HaltWordTest, AHaltWakesABackendThatStandsStill) {
       if (latch_.acts()) break;
     }
   });
-  ask_for_halt(attach().view(), HaltCause::frontend, "", "");
+  request_halt(attach().view(), HaltCause::frontend, "", "");
   backend.join();
   EXPECT_TRUE(latch_.acts());
 }
@@ -109,7 +109,7 @@ TEST_F(HaltWordTest, EachHaltThatIsShownHasItsOwnReason) {
     threads.emplace_back([&] {
       const AttachedSegment frontend = attach();
       for (int n = 0; n < kEach; ++n)
-        ask_for_halt(frontend.view(), HaltCause::frontend, "me", "why");
+        request_halt(frontend.view(), HaltCause::frontend, "me", "why");
       --asking;
     });
   threads.emplace_back([&] {
@@ -138,7 +138,7 @@ TEST_F(HaltWordTest, EachHaltThatIsShownHasItsOwnReason) {
 TEST_F(HaltWordTest, AForkedChildMayHalt) {
   const AttachedSegment frontend = attach();
   ChildProcess child([&](const ChildProcess::Ready&) {
-    ask_for_halt(frontend.view(), HaltCause::frontend, "the child", "");
+    request_halt(frontend.view(), HaltCause::frontend, "the child", "");
   });
   EXPECT_EQ(child.wait(), 0);
   ASSERT_TRUE(latch_.look());
@@ -148,7 +148,7 @@ TEST_F(HaltWordTest, AForkedChildMayHalt) {
 
 TEST_F(HaltWordTest, TheHaltOfAKilledProcessStands) {
   StandingProcess child([&](const StandingProcess::Stand& stand) {
-    ask_for_halt(attach().view(), HaltCause::frontend, "gone", "last word");
+    request_halt(attach().view(), HaltCause::frontend, "gone", "last word");
     stand();
   });
   child.kill_now();
@@ -159,7 +159,7 @@ TEST_F(HaltWordTest, TheHaltOfAKilledProcessStands) {
 
 // killed between the count and the reason: it halts, and says nothing of itself
 TEST_F(HaltWordTest, AHaltWithoutItsReasonActs) {
-  ask_for_halt(segment_.view(), HaltCause::frontend, "before", "");
+  request_halt(segment_.view(), HaltCause::frontend, "before", "");
   segment_.view().bell().halts.fetch_add(1);
   ASSERT_TRUE(latch_.look());
   EXPECT_FALSE(latch_.show(3));

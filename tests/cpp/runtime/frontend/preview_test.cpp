@@ -290,7 +290,7 @@ TEST_F(PreviewTest, SaysByHowMuchLaterAndWhy) {
                                         {.pace = iterations(100)});
   EXPECT_EQ(preview.late, preview.iterations() - 100);
   EXPECT_EQ(preview.text, std::to_string(preview.late) +
-                              " iterations later than asked, because of its jerk limit");
+                              " iterations later than requested, because of its jerk limit");
   EXPECT_EQ(unpack<double>(preview.rows.row(preview.rows.count - 1).data() + 8), target);
   EXPECT_EQ(frontend.published(), 0) << "nothing was sent";
 }

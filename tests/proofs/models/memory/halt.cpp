@@ -45,7 +45,7 @@ struct Halts : rl::test_suite<Halts, 2 + kAskers> {
     for (int i = 0; i < kEach; ++i)
       // the cause tells who asked: it must come together with a number of that asker's
       asked[index - 2][i] =
-          o80::ask_for_halt(segment.view, static_cast<o80::HaltCause>(10 * index), "", "");
+          o80::request_halt(segment.view, static_cast<o80::HaltCause>(10 * index), "", "");
   }
 
   void latch() {

@@ -6,10 +6,8 @@ that several commands can share the work. Needs the extra `learn`.
 
 from __future__ import annotations
 
-import signal
 import sys
 from pathlib import Path
-from types import FrameType
 from typing import Annotated
 
 import typer
@@ -17,6 +15,8 @@ from rich.console import Console
 
 import o80
 from o80.base.extras import needed
+
+from ...ending import unwind_on_sigterm
 
 OUTPUT = Path("build/virtual_balls")
 SEEDS = [1, 2, 3]
@@ -32,7 +32,7 @@ def main(
     plot_only: Annotated[bool, typer.Option(help="Draw the curves that are there.")] = False,
 ) -> None:
     """Learns to return balls in each way, and draws the curves."""
-    signal.signal(signal.SIGTERM, _end_in_order)
+    unwind_on_sigterm()
     console = Console()
     try:
         for module in ("torch", "stable_baselines3"):
@@ -47,11 +47,6 @@ def main(
     except (ValueError, o80.Error) as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
-
-
-def _end_in_order(number: int, _frame: FrameType | None) -> None:
-    """SIGTERM unwinds the stack, so that no segment remains."""
-    sys.exit(128 + number)
 
 
 if __name__ == "__main__":

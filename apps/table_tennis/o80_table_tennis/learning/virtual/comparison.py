@@ -11,6 +11,7 @@ import torch
 from rich.console import Console
 from rich.table import Table
 
+from ..curve import append
 from . import curves
 from .curves import Point
 from .plot import plot
@@ -41,7 +42,7 @@ def run(
         unfinished.unlink(missing_ok=True)
 
         def tell(point: Point, settings: VirtualSettings = settings, to: Path = unfinished) -> None:
-            curves.append(to, point)
+            append(to, point)
             console.print(
                 f"{settings.way}, seed {settings.seed}: {point.motions} motions, "
                 f"touched {point.touched:.2f}, returned {point.returned:.2f}, "

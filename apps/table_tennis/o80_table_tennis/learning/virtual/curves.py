@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Sequence
-from dataclasses import astuple, dataclass, fields
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..curve import points
 
 
 @dataclass(frozen=True)
@@ -28,42 +29,14 @@ class Point:
     processor_minutes: float
 
 
-NAMES = [each.name for each in fields(Point)]
-_WHOLE = ("motions", "transitions", "gradient_steps")
-
-
 def file_of(folder: Path, way: str, seed: int) -> Path:
     """The curve of a training."""
     return folder / f"{way}-{seed}.csv"
 
 
-def append(path: Path, point: Point) -> None:
-    """Adds a row; a file that does not exist begins with the names."""
-    new = not path.exists()
-    with path.open("a", newline="") as file:
-        writer = csv.writer(file)
-        if new:
-            writer.writerow(NAMES)
-        writer.writerow(
-            f"{value:.6g}" if isinstance(value, float) else value for value in astuple(point)
-        )
-
-
 def read(path: Path) -> list[Point]:
-    """All rows. Raises ValueError for a file of another version."""
-    with path.open(newline="") as file:
-        rows = list(csv.reader(file))
-    if not rows or rows[0] != NAMES:
-        raise ValueError(f"{path}: not a curve of this version")
-    return [
-        Point(
-            **{  # type: ignore[arg-type]
-                name: int(text) if name in _WHOLE else float(text)
-                for name, text in zip(NAMES, row, strict=True)
-            }
-        )
-        for row in rows[1:]
-    ]
+    """All points of a training. Raises ValueError for a file of another version."""
+    return points(path, Point)
 
 
 def found(folder: Path, way: str) -> list[list[Point]]:

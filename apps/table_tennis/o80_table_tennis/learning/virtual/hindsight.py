@@ -13,7 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .motions import Float32Array, Motion
+from o80.base.arrays import Float32Array
+
+from .motions import Motion
 
 Balls = NDArray[np.intp]
 Selection = Callable[[Motion], Balls]

@@ -13,6 +13,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Float32Array, FloatArray
+from o80.base.lifecycle import Closeable
 from o80.learning import EVERY
 
 from ...balls.sources import balls_from
@@ -27,8 +29,6 @@ from ...task.outcome import returned
 from ...task.state import State
 from ...world.arm import MUSCLES
 
-Float32Array = NDArray[np.float32]
-FloatArray = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Whole = NDArray[np.int64]
 Policy = Callable[[Float32Array], Float32Array]
@@ -67,7 +67,7 @@ class Motion:
         return total
 
 
-class Motions:
+class Motions(Closeable):
     """One arm and one twin with N balls, inline. Close it, or leave its `with` block."""
 
     def __init__(self, balls: int, *, rig: RigSettings, task: TaskSettings) -> None:
@@ -84,12 +84,6 @@ class Motions:
         self._observer = Observer(self._task, task.observing(rig.step), balls)
         self._pressures = np.zeros((1, MUSCLES))
         self._rig = Rig(replace(task.start_of(rig), extra_balls=balls - 1), delay=task.delay)
-
-    def __enter__(self) -> Motions:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self.close()
 
     def close(self) -> None:
         """Ends arm and twin; may be called twice."""

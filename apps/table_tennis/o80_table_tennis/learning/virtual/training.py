@@ -8,13 +8,18 @@ from contextlib import closing
 
 import numpy as np
 
+from o80.base.arrays import Float32Array
+
 from ...world.arm import MUSCLES
+from ..validation import Validation
 from .curves import Point
-from .evaluation import Evaluation
 from .hindsight import transitions
 from .learner import Learner
-from .motions import Float32Array, Motions, Policy
+from .motions import Motions, Policy
 from .settings import WAYS, VirtualSettings
+
+BALL_SEED = 800_001
+"""Seed of the shots of evaluations, which no training plays."""
 
 Told = Callable[[Point], None]
 
@@ -25,14 +30,14 @@ def train(settings: VirtualSettings, told: Told = lambda point: None) -> list[Po
     task = conditions.task(ball_seed=settings.seed)
     begin, points = time.process_time(), []
     with (
-        closing(Evaluation(conditions, settings.evaluated)) as evaluation,
+        closing(Validation(conditions, settings.evaluated, BALL_SEED)) as validation,
         Motions(1 + way.virtual_balls, rig=conditions.rig(), task=task) as motions,
     ):
         practice = _Practice(settings, motions)
         for motion in range(1, settings.motions + 1):
             practice.once(motion)
             if motion % settings.evaluate_every == 0:
-                shares = evaluation.play(practice.learner.act)
+                shares = validation.play(practice.learner.act)
                 minutes = (time.process_time() - begin) / 60
                 points.append(Point(motion, *shares, practice.seen, practice.steps, minutes))
                 told(points[-1])

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM end the lab in order: they unwind the stack, which ends all processes."""
+"""Signals that end a program in order: the stack unwinds, and no process or segment remains."""
 
 from __future__ import annotations
 
@@ -7,6 +7,24 @@ import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+
+_came: list[int] = []
+
+
+def unwind_on_sigterm() -> None:
+    """From now on SIGTERM raises SystemExit."""
+    signal.signal(signal.SIGTERM, _unwind)
+
+
+def _unwind(number: int, _frame: FrameType | None) -> None:
+    _came.append(number)
+    sys.exit(128 + number)
+
+
+def raise_if_terminated() -> None:
+    """Raises SystemExit again: one that was raised while a destructor ran is lost."""
+    if _came:
+        sys.exit(128 + _came[0])
 
 
 @contextmanager
