@@ -5,10 +5,12 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from o80.base.errors import BackendGone, InvalidArgument
 from o80.cli.attach import attach
+from o80.recording.epoch import OVERWRITTEN, Gap, Interruption
 from o80.rows.history import History
 from o80.rows.journal import JournalEntry, marks_in
 
@@ -23,6 +25,8 @@ class Named:
     wall_offset: int | None  #: wall clock less row time [ns]; None: not known
     journal: Callable[[], list[JournalEntry]]  #: what its backend decided, as far as known
     marks: list[tuple[str, int]] = field(default_factory=list)  #: name and iteration
+    gaps: Callable[[], list[Gap]] = list  #: rows that are missing
+    interruption: Interruption | None = None
 
 
 def histories(source: str, only: str | None, *, seconds: float | None = None) -> Iterator[Named]:
@@ -38,7 +42,11 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
             real_time = frontend.schema["clock"] == "monotonic"
             offset = time.time_ns() - time.monotonic_ns() if real_time else None
             entries = frontend.journal()
-            yield Named(source, 0, history, offset, lambda: entries, marks_in(entries))
+            oldest = int(history.iteration[0])
+            gaps = [Gap(0, oldest - 1, OVERWRITTEN)] if oldest > 0 and seconds is None else []
+            yield Named(
+                source, 0, history, offset, lambda: entries, marks_in(entries), lambda: gaps
+            )
         return
     from o80.recording.reader import open as open_recording
 
@@ -50,4 +58,13 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
         epochs, of_run = recording[name].epochs, recording.marks_by_run(name)
         for number, epoch in enumerate(epochs):
             history = epoch.history(seconds=seconds)
-            yield Named(name, number, history, epoch.wall_offset, epoch.journal, of_run[number])
+            yield Named(
+                name,
+                number,
+                history,
+                epoch.wall_offset,
+                epoch.journal,
+                of_run[number],
+                partial(getattr, epoch, "gaps"),
+                epoch.interruption,
+            )

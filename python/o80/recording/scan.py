@@ -42,6 +42,8 @@ from o80.base.errors import RecordingError
 from o80.recording.blocks import LENGTH_ENDS_AT, MESSAGE_HEAD
 
 MAGIC = b"\x89MCAP0\r\n"
+CUT = "o80.cut"
+"""Name of the metadata record behind the last whole chunk that a killed recorder has left."""
 HEAD = struct.Struct("<BQ")
 CHUNK_HEAD = struct.Struct("<QQQIL")
 FOOTER_LENGTH = HEAD.size + 20 + len(MAGIC)
