@@ -234,7 +234,8 @@ nb::dict tables_of(const Schema& schema) {
   found["bursting"] = schema.head.bursting != 0;
   found["silence"] = schema.head.silence;
   found["stale"] = text(name_of(schema.head.stale));
-  found["of_the_world"] = schema.head.of_the_world != 0;
+  found["of_the_world"] = schema.head.of_the_world == 1;
+  found["simulated"] = schema.head.of_the_world == 2;
   if (schema.head.gap != 0) found["gap"] = schema.head.gap * 1e-6;
   found["row"] = of_row(row_layout(schema));
   found["groups"] = list_of(schema.groups, [&](const GroupRow& group) {

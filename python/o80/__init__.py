@@ -85,6 +85,9 @@ if TYPE_CHECKING:
     from o80.joining.latency import latency as latency
     from o80.playing.playback import Playback as Playback
     from o80.playing.playback import play as play
+    from o80.recording.catalogue import FoundRecording as FoundRecording
+    from o80.recording.catalogue import FoundRun as FoundRun
+    from o80.recording.catalogue import recordings as recordings
     from o80.recording.reader import RecordingFile as RecordingFile
     from o80.recording.reader import open as open
     from o80.recording.recording import Recording as Recording
@@ -125,6 +128,7 @@ else:  # a type checker that read this would accept every name
         "groups.group_burst": "GroupBurst GroupRequest",
         "rows.provenance": "Provenance ProvenanceFile",
         "rows.record": "Record States",
+        "recording.catalogue": "FoundRecording FoundRun recordings",
         "recording.reader": "RecordingFile open",
         "recording.recording": "Recording",
         "replaying.replay": "replay",

@@ -49,7 +49,8 @@ def check_robot(
 
     The robot is moved at random inside its limits; numbers without a minimum and a maximum stay
     where they begin. So robots that may be hardware are not started: those that read the world, and
-    those that do not serve the requests snapshot and restore, unless `simulated` is given.
+    those that neither say that they are simulations (in Python of_the_world = False) nor serve the
+    requests snapshot and restore, unless `simulated` is given.
 
     robot: name, library, file or class, as for `o80.robots.load`.
     options: of the robot.

@@ -225,7 +225,7 @@ def test_a_recording_says_under_which_motion_rules_it_was_made(
     assert epoch.provenance.motion_rules == _core.MOTION_RULES
     assert f"motion rules {_core.MOTION_RULES}" in o80_command("info", path)[1]
     code, said = o80_command("replay", path)
-    assert (code, "21 rows, identical" in said) == (0, True)
+    assert (code, "21 rows, no driver was started: desired states identical" in said) == (0, True)
     assert "motion rules" not in said
 
 
@@ -244,7 +244,7 @@ def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_c
     assert f"command of lift, which motion rules {now} may move otherwise" in run.gap
     code, said = o80_command("replay", path)
     assert code == 2
-    assert "11 rows, identical up to row 10; then row 11 begins a command of lift" in said
+    assert "states identical up to row 10; then row 11 begins a command of lift" in said
     assert f"note: it moved by motion rules {other}, this o80 has motion rules {now}" in said
 
 

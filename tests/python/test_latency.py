@@ -10,6 +10,7 @@ import pytest
 from processes import run_o80
 
 import o80
+from o80.rows.columns import columns_of
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "time.md"
 
@@ -35,22 +36,64 @@ def motion(rng: np.random.Generator) -> Callable[[Any], Any]:
     return lambda t: np.sin(2 * np.pi * np.multiply.outer(t, rates) + phases).sum(axis=-1)
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_a_known_delay_is_found_within_its_uncertainty(seed: int, segment: str) -> None:
-    rng = np.random.default_rng(seed)
-    delay = rng.uniform(-0.1, 0.1)
-    f = motion(rng)
-    t = np.arange(3000) * PERIOD * 1e-9
-    slower = np.arange(1100) * 5_400_000
-    seen = f(slower * 1e-9 - delay) + rng.normal(0, 0.1, len(slower))
-    found = o80.latency(
-        (signal(segment, f(t)), "extended.value"),
-        (signal(segment, seen, period=5_400_000), "extended.value"),
-        most=0.2,
-    )
-    assert found.uncertainty < 0.002
-    assert abs(found.seconds - delay) < 5 * found.uncertainty + 1e-4
-    assert found.correlation > 0.9
+def with_rows(like: o80.History, times: np.ndarray, values: np.ndarray) -> o80.History:
+    """Rows with a value each, captured at any times [s]."""
+    rows = np.repeat(like.rows[:1], len(times))
+    kept = {"extended.capture_time": 10**9 + np.rint(times * 1e9), "extended.value": values}
+    for column in columns_of(like.schema):
+        if column.name in kept:
+            place = np.ndarray((len(rows),), column.dtype, rows, column.offset, rows.strides)
+            place[:] = kept[column.name]
+    return o80.History(like._decoder, rows)
+
+
+@pytest.mark.parametrize(
+    ("noise", "jitter", "gaps", "period"),
+    [(0.1, 0.0, 0, 0.0054), (0.2, 0.0, 0, 0.002), (0.1, 0.003, 0, 0.01), (0.1, 0.0, 3, 0.0054)],
+)
+def test_the_true_delay_lies_within_the_uncertainty_as_often_as_it_says(
+    noise: float, jitter: float, gaps: int, period: float, segment: str
+) -> None:
+    """40 drawn motions each; stamps jitter, and both signals are lost for 0.4 s at times."""
+    like = signal(segment, np.zeros(2))
+    errors, uncertainties = [], []
+    for seed in range(100, 140):
+        rng = np.random.default_rng(seed)
+        delay = rng.uniform(-0.1, 0.1)
+        f = motion(rng)
+        sources = []
+        for step, late in ((0.002, 0.0), (period, delay)):
+            at = np.arange(0.0, 6.0, step)
+            values = f(at - late) + rng.normal(0, noise, len(at))
+            stamps = np.sort(at + rng.uniform(-jitter, jitter, len(at)))
+            kept = np.full(len(at), True)
+            for begin in rng.uniform(0.0, 5.6, gaps):
+                kept &= (at < begin) | (at > begin + 0.4)
+            sources.append(with_rows(like, stamps[kept], values[kept]))
+        one, other = ((source, "extended.value") for source in sources)
+        found = o80.latency(one, other, most=0.2)
+        errors.append(found.seconds - delay)
+        uncertainties.append(found.uncertainty)
+    shares = np.abs(errors) / uncertainties
+    assert np.mean(shares < 2) >= 0.9
+    assert 0.5 <= np.mean(shares < 1) <= 0.85
+    assert np.sqrt(np.mean(np.square(uncertainties))) < 0.01 * max(noise, 0.2)
+
+
+def test_stated_errors_of_capture_times_are_in_the_uncertainty(segment: str) -> None:
+    f, t = motion(np.random.default_rng(4)), np.arange(2000) * PERIOD * 1e-9
+    one = signal(segment, f(t)), "extended.value"
+    extended = {"capture_time": np.int64, "capture_error": np.int64, "value": np.float64}
+    with o80.Backend(segment, 0, extended=extended, history=2000, lanes=1) as backend:
+        for number, value in enumerate(f(t - 0.01)):
+            if number:
+                backend.step()
+            row = {"capture_time": 1 + number * PERIOD, "capture_error": 3_000_000, "value": value}
+            backend.publish(None, row)
+        with o80.Frontend(segment) as reader:
+            found = o80.latency(one, (reader.history(), "extended.value"), most=0.2)
+    assert found.uncertainty == pytest.approx(0.003, rel=0.01)
+    assert found.seconds == pytest.approx(0.01, abs=1e-5)
 
 
 def test_a_function_of_fields_may_be_compared(segment: str) -> None:

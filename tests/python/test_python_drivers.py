@@ -478,7 +478,8 @@ def test_a_recording_cannot_name_a_class_to_import(segment: str, tmp_path: Path)
             o80.Recording(tmp_path / file, [segment]),
         ):
             joint.burst(5)
-    assert o80.replay(tmp_path / "run.mcap").identical  # by its readings, without the driver
+    by_readings = o80.replay(tmp_path / "run.mcap")
+    assert str(by_readings) == f"{segment}: 6 rows, no driver was started: desired states identical"
     with pytest.raises(o80.DriverError, match="joint"):
         o80.replay(tmp_path / "simulated.mcap")
 
@@ -520,9 +521,14 @@ class Cart:
 """
 
 
-def test_a_simulation_in_python_is_replayed_from_its_segment(segment: str, tmp_path: Path) -> None:
-    file = tmp_path / "cart_of_the_replay.py"
-    file.write_text(CART)
+@pytest.mark.parametrize("has_snapshots", [True, False])
+def test_a_simulation_in_python_is_replayed_from_its_segment(
+    has_snapshots: bool, segment: str, tmp_path: Path
+) -> None:
+    file = tmp_path / f"cart_of_the_replay_{has_snapshots}.py"
+    kept = (line for line in CART.splitlines() if has_snapshots or "np.uint32" not in line)
+    text = "\n".join(kept)
+    file.write_text(text if has_snapshots else text.split("    def on_snapshot")[0])
     cart = o80.robots.load(f"{file}:Cart")
     with cart.inline(segment) as frontend:
         frontend.request("reset", seed=3)  # a number of Python, as random.Random wants it

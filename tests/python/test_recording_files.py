@@ -3,7 +3,10 @@
 import json
 import re
 import resource
+import shutil
+import subprocess
 import tracemalloc
+from datetime import datetime
 from pathlib import Path
 from typing import IO, Any
 
@@ -15,9 +18,11 @@ from rosbags.highlevel import AnyReader
 
 import o80
 from o80.base import progress
+from o80.cli.cut import cut
 from o80.recording.blocks import Messages
 from o80.recording.epoch import topic_of
 from o80.recording.file_writer import FileWriter, Form
+from o80.recording.reader import files_of
 from o80.recording.recorder import Recorder
 from o80.recording.scan import scan
 from o80.rows.journal import command_ends
@@ -239,6 +244,163 @@ def test_rosbags_reads_marks_and_what_happened_in_words(arm: o80.Frontend, tmp_p
             assert stamp == times[int(row[1])] + epoch.wall_offset
 
 
+FORMS = [("zstd", None), ("lz4", "10k"), ("none", "20k")]
+
+
+@pytest.fixture(params=FORMS, ids=str)
+def everything(request: pytest.FixtureRequest, segment: str, tmp_path: Path) -> Path:
+    """Two robots, one with two runs: commands, halts, a reset, marks of both kinds, transforms."""
+    load = o80.robots.load("two_joints").inline
+    path, second = tmp_path / "run.mcap", f"{segment}-b"
+    compression, split = request.param
+    form = {"compression": compression, "split": split}
+    with load(segment) as arm, o80.Recording(path, [segment, second], **form) as recording:
+        for run in range(2):
+            with load(second) as other:
+                for part in range(3):
+                    recording.mark("episode", number=part, gains=[0.5, 1.0])
+                    for robot in (arm, other):
+                        robot.mark(f"part {part}")
+                        robot.add_command("elbow", 0.1 * part + run, iterations=20)
+                        robot.burst(30)
+                        while recording._recorder.newest[robot.segment] != robot.published:
+                            recording.flush()
+                    recording.flush()
+                other.request("reset", seed=run)
+                arm.halt("the ball is on the floor")
+                recording.flush()
+                arm.resume()
+                arm.burst(5)
+            recording.flush()
+            recording._recorder.sources[second]._look_at = 0.0  # now
+    o80.clean(second)
+    cut(path, tmp_path / "shown.mcap", transforms=60.0)
+    return path
+
+
+def rows_of(path: Path) -> dict[str, list[tuple[int, Any]]]:
+    """Log times and rows of each segment, as o80 reads them."""
+    recording = o80.open(path)
+    found: dict[str, list[tuple[int, Any]]] = {}
+    for name in recording:
+        for epoch in recording[name].epochs:
+            history = epoch.history()
+            times = (history.time + epoch.wall_offset).tolist()
+            found.setdefault(name, []).extend(zip(times, history, strict=True))
+    return found
+
+
+def test_all_that_a_recording_holds_is_read_by_others(everything: Path) -> None:
+    expected = rows_of(everything)
+    recording = o80.open(everything)
+    for path in (everything, everything.with_name("shown.mcap")):
+        read: dict[str, list[tuple[int, Any]]] = {}
+        counts: dict[str, int] = {}
+        for file in files_of(path):
+            with file.open("rb") as content:
+                reader = make_reader(content, validate_crcs=True)
+                for _, channel, _ in reader.iter_messages():
+                    counts[channel.topic] = counts.get(channel.topic, 0) + 1
+            with AnyReader([file]) as bag:
+                for each, time, raw in bag.messages():
+                    message = bag.deserialize(raw, each.msgtype)
+                    read.setdefault(each.topic, []).append((time, message))
+        assert counts == {topic: len(found) for topic, found in read.items()}
+        for name, rows in expected.items():
+            found = read[topic_of(name)]
+            assert [time for time, _ in found] == [time for time, _ in rows]
+            joints = read[topic_of(name, "joint_states")]
+            for (time, row), (_, message), (_, joint) in zip(rows, found, joints, strict=True):
+                assert (message.iteration, message.time) == (row.iteration, row.time)
+                for part in ("desired", "observed"):
+                    states = getattr(message, part)
+                    assert [states.shoulder, states.elbow] == getattr(row, part).tolist()
+                assert message.extended.effort.tolist() == row.extended.effort.tolist()
+                assert joint.name == ["shoulder", "elbow"]
+                assert joint.position.tolist() == row.observed.tolist()
+                stamp = joint.header.stamp
+                assert stamp.sec * 10**9 + stamp.nanosec == time
+            journal = read[topic_of(name, "journal")]
+            assert [(each.first, each.next, bytes(each.entries)) for _, each in journal] == [
+                (part.first, part.next, part.content)
+                for epoch in recording[name].epochs
+                for part in epoch.journal_parts()
+            ]
+        of_rows = {time for rows in expected.values() for time, _ in rows}
+        marks = sorted((mark.name, mark.time) for mark in recording.marks)
+        assert sorted((mark.name, mark.time) for _, mark in read["/o80/marks"]) == marks
+        assert {time for time, _ in read["/o80/marks"]} <= of_rows
+        texts = "\n".join(line.msg for _, line in read["/rosout"])
+        assert texts.count("the ball is on the floor") == 2
+        assert texts.count("elbow to 1.2 in 20 iterations: completed") == 2
+        for time, line in read["/rosout"]:
+            assert line.stamp.sec * 10**9 + line.stamp.nanosec == time
+        assert ("/tf" in read) == (path != everything)
+
+
+def columns_of_rerun(text: str, wanted: str) -> list[tuple[int, list[str]]]:
+    """Log time and last cells of the rows of tables with such a column, which `rerun` prints."""
+    found, has_it = [], False
+    for line in text.splitlines():
+        cells = [cell.strip(" │") for cell in line.split("┆")]
+        if "RowId" in cells[0]:
+            has_it = wanted in cells
+        elif has_it and cells[0].startswith("row_"):
+            moment, _, fraction = cells[1].partition(".")
+            seconds = datetime.fromisoformat(f"{moment}+00:00").timestamp()
+            found.append((int(seconds) * 10**9 + int(fraction.ljust(9, "0")), cells[2:]))
+    return found
+
+
+@pytest.mark.check
+@pytest.mark.timeout(300)
+def test_all_that_a_recording_holds_is_read_by_rerun(everything: Path, tmp_path: Path) -> None:
+    rerun = shutil.which("rerun")
+    if rerun is None:
+        pytest.skip("rerun-sdk is not installed")
+    expected = rows_of(everything)
+    recording = o80.open(everything)
+    shown = everything.with_name("shown.mcap")
+
+    def run(*words: str | Path) -> str:
+        done = subprocess.run(
+            [rerun, *words], capture_output=True, text=True, check=True, timeout=100
+        )
+        assert "ERROR" not in done.stderr, done.stderr
+        assert "multiple MCAP metadata records" not in done.stderr, done.stderr
+        return done.stdout
+
+    read = ""
+    for number, file in enumerate([*files_of(everything), shown]):
+        run("mcap", "convert", file, "-o", tmp_path / f"{number}.rrd")
+        said = run("rrd", "print", "-vvv", tmp_path / f"{number}.rrd")
+        read = said if file == shown else read + said
+        if file != files_of(everything)[-1] and file != shown:
+            continue
+        positions = sorted(
+            (time, [float(number) for number in re.findall(r"[-+.\de]+", cells[-2])])
+            for time, cells in columns_of_rerun(read, "Scalars:scalars")
+            if cells[-1] == "[shoulder, elbow]"
+        )
+        assert positions
+        observed = {time: row.observed.tolist() for rows in expected.values() for time, row in rows}
+        assert {time for time, _ in positions} == set(observed)
+        near = [values == observed[time] for time, values in positions]
+        assert sum(near) >= len(observed)
+        lines = columns_of_rerun(read, "TextLog:text")
+        said = "\n".join(text for _, cells in lines for text in cells)
+        assert said.count("the ball is on the floor") == 2
+        marks = columns_of_rerun(read, "o80.msg.Mark:message")
+        names = [re.search(r"name: ([^,]*), time: (\d+)", cells[-1]) for _, cells in marks]
+        assert sorted((each[1], int(each[2])) for each in names if each) == sorted(
+            (mark.name, mark.time) for mark in recording.marks
+        )
+    transforms = columns_of_rerun(read, "Transform3D:translation")
+    assert {cells[1] for _, cells in transforms} == {
+        f"[{name}/{body}]" for name in expected for body in ("upper", "lower")
+    }
+
+
 def test_decisions_that_cannot_be_told_in_words_are_recorded_all_the_same(
     arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -299,16 +461,16 @@ def test_wherever_it_is_cut_whole_chunks_are_read_and_continued(
     whole = path.read_bytes()
     groups = {0, *(each.chunk_start_offset for each in scan(path).chunks), len(whole) - 1}
     chance = np.random.default_rng(3)
-    for cut in [*groups, *chance.integers(0, len(whole), CUTS)]:
-        path.write_bytes(whole[: int(cut)])
+    for place in [*groups, *chance.integers(0, len(whole), CUTS)]:
+        path.write_bytes(whole[: int(place)])
         recorder = Recorder(path, [arm.segment], proceed=True)
         recorder.catch_up()
         recorder.finish()
 
         segment = o80.open(path)[arm.segment]
         read = segment.history()
-        assert read.rows.tobytes() == history.rows.tobytes(), f"cut at {cut}"
-        assert repr(segment.epochs[0].journal()) == repr(arm.journal()), f"cut at {cut}"
+        assert read.rows.tobytes() == history.rows.tobytes(), f"cut at {place}"
+        assert repr(segment.epochs[0].journal()) == repr(arm.journal()), f"cut at {place}"
         with path.open("rb") as file:
             assert rows_in(file, arm) == len(read)
 

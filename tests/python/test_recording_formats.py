@@ -77,7 +77,8 @@ def test_a_replay_of_an_earlier_version_says_how_far_it_goes(name: str) -> None:
     assert not report.difference
     for run in report:
         assert f"which motion rules {_core.MOTION_RULES} may move otherwise" in run.gap
-        assert f"{run.name}: 1 row, identical up to row 0; then row " in str(run)
+        assert f"{run.name}: 1 row, no driver was started: desired states " in str(run)
+        assert " identical up to row 0; then row " in str(run)
     with pytest.raises(o80.InvalidArgument) as raised:
         o80.replay(path, segment="joints")
     text = str(raised.value)

@@ -90,6 +90,6 @@ def test_nothing_is_lost_and_nothing_is_written_twice(split: str | None, tmp_pat
     assert split is None or len(list(path.iterdir())) > KILLS // 50
     assert np.array_equal(recorded.iteration, np.arange(first, last + 1))
     assert recorded.rows.tobytes() == there.rows.tobytes()
-    assert epoch.gaps == epoch.journal_gaps == []
+    assert (epoch.gaps, epoch.journal_gaps) == ([], [])
     assert len(journal) > KILLS
     assert list(map(repr, journal)) == list(map(repr, decisions[: len(journal)]))

@@ -1,7 +1,9 @@
 """Recordings made of others: `o80 cut` and `o80 merge`."""
 
 from pathlib import Path
+from typing import Any
 
+import mujoco
 import numpy as np
 import pytest
 from rosbags.highlevel import AnyReader
@@ -9,6 +11,7 @@ from rosbags.highlevel import AnyReader
 import o80
 from o80.cli.cut import cut, merge
 from o80.recording.epoch import topic_of
+from o80.recording.marks import Mark
 
 
 @pytest.fixture
@@ -31,6 +34,15 @@ def day(segment: str, tmp_path: Path) -> Path:
     return path
 
 
+def log_time(recording: o80.RecordingFile, mark: Mark) -> int:
+    """The log time of the newest row when a mark was made [ns]."""
+    epochs = {name: recording[name].epochs[0] for name in mark.rows}
+    return max(
+        int(epochs[name].history(since=row, until=row).time[0]) + epochs[name].wall_offset
+        for name, row in mark.rows.items()
+    )
+
+
 def test_a_stretch_of_time_is_cut_and_replayed(day: Path, segment: str, tmp_path: Path) -> None:
     part = tmp_path / "part.mcap"
     cut(day, part, "0.7", "2.6")
@@ -45,16 +57,9 @@ def test_a_stretch_of_time_is_cut_and_replayed(day: Path, segment: str, tmp_path
         assert read[name].epochs[0].first_row == expected.iteration[0]
         assert read[name].epochs[0].provenance == epoch.provenance
     begin, end = (first + round(s * 1e9) for s in (0.7, 2.6))
-    newest = [  # log times of the marks: the robots did not start together
-        max(
-            int(whole[name].history().time[row]) + whole[name].epochs[0].wall_offset
-            for name, row in mark.rows.items()
-        )
-        for mark in whole.marks
-    ]
-    assert read.marks == [
-        mark for mark, time in zip(whole.marks, newest, strict=True) if begin <= time <= end
-    ]
+    numbers = [m.values["number"] for m in whole.marks if begin <= log_time(whole, m) <= end]
+    assert [mark.values["number"] for mark in read.marks] == numbers
+    assert 1 in numbers
     report = o80.replay(part, driver=False)
     assert report.difference is None
     assert all(run.rows > 1000 for run in report), report
@@ -115,3 +120,64 @@ def test_a_stretch_without_rows_says_so(
         cut(day, tmp_path / "other.mcap", "2", "1")
     with pytest.raises(o80.RecordingError, match="exists"):
         cut(day, day, "0", "1")
+
+
+def test_poses_of_bodies_are_added_as_transforms(arm: o80.Frontend, tmp_path: Path) -> None:
+    path, shown, segment = tmp_path / "run.mcap", tmp_path / "shown.mcap", arm.segment
+    with o80.Recording(path, arm):
+        arm.add_command(["shoulder", "elbow"], [0.5, -1.0], iterations=900)
+        arm.burst(1000)
+    cut(path, shown, transforms=60.0)
+    (epoch,) = o80.open(shown)[segment].epochs
+    rows = epoch.history()
+    assert rows.rows.tobytes() == o80.open(path)[segment].history().rows.tobytes()
+    model = mujoco.MjModel.from_xml_string(epoch.model)
+    data = mujoco.MjData(model)
+    bodies = [model.body(number).name for number in range(1, model.nbody)]
+    with AnyReader([shown]) as reader:
+        found: list[tuple[int, Any]] = [
+            (time, reader.deserialize(raw, each.msgtype))
+            for each, time, raw in reader.messages()
+            if each.topic == "/tf"
+        ]
+    seconds = (rows.time[-1] - rows.time[0]) * 1e-9
+    assert abs(len(found) - 60 * seconds) <= 2
+    for time, message in found:
+        row = rows.at_time(time - epoch.wall_offset)
+        for name, angle in zip(("shoulder", "elbow"), row.observed, strict=True):
+            data.joint(name).qpos = angle
+        mujoco.mj_kinematics(model, data)
+        names = [each.child_frame_id for each in message.transforms]
+        assert names == [f"{segment}/{body}" for body in bodies]
+        for each, body in zip(message.transforms, bodies, strict=True):
+            stamp = each.header.stamp
+            assert stamp.sec * 10**9 + stamp.nanosec == time
+            assert each.header.frame_id == "world"
+            at, turn = each.transform.translation, each.transform.rotation
+            assert (at.x, at.y, at.z) == tuple(data.body(body).xpos)
+            assert (turn.w, turn.x, turn.y, turn.z) == tuple(data.body(body).xquat)
+    again = tmp_path / "again.mcap"
+    cut(shown, again, transforms=10.0)
+    with AnyReader([again]) as reader:
+        count = sum(each.topic == "/tf" for each, _, _ in reader.messages())
+    assert abs(count - 10 * seconds) <= 2
+    cut(shown, tmp_path / "kept.mcap")
+    with AnyReader([tmp_path / "kept.mcap"]) as reader:
+        kept = sum(each.topic == "/tf" for each, _, _ in reader.messages())
+    assert kept == len(found)
+
+
+def test_a_robot_without_a_model_gets_no_transforms(
+    segment: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    for model in ("", "<mujoco><nothing/></mujoco>"):
+        path, shown = tmp_path / f"run{bool(model)}.mcap", tmp_path / f"shown{bool(model)}.mcap"
+        given: dict[str, Any] = {"model": model, "joints": {"elbow": "a"}} if model else {}
+        with o80.Backend(segment, ["a"], **given) as backend:
+            backend.publish([0.0])
+            o80.Recording(path, segment).close()
+        cut(path, shown, transforms=60.0)
+        with AnyReader([shown]) as reader:
+            assert "/tf" not in reader.topics
+        complained = f"no transforms of '{segment}': the model" in capsys.readouterr().err
+        assert complained == bool(model)

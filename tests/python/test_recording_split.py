@@ -46,7 +46,7 @@ def test_a_folder_of_complete_files_is_read_as_one(arm: o80.Frontend, tmp_path: 
     assert recording.finished
     assert epoch.history().rows.tobytes() == arm.history().rows.tobytes()
     assert texts(epoch.journal()) == texts(arm.journal())
-    assert epoch.gaps == epoch.journal_gaps == []
+    assert (epoch.gaps, epoch.journal_gaps) == ([], [])
     assert sum(o80.open(file)[arm.segment].epochs[0].rows for file in files) == epoch.rows == 601
 
 

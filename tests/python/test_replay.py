@@ -120,7 +120,8 @@ def test_a_history_without_row_0_begins_at_a_reset_or_a_snapshot(segment: str, s
         run_bursts(arm, seed + 20, 10)
 
         (run,) = o80.replay(arm)
-        assert run.identical, run
+        assert (run.difference, run.gap) == (None, "")
+        assert run.missing == (f"rows before {run.first} were not compared",)
         assert any("the replay begins with the" in note for note in run.notes)
         fresh = arm.history().iteration[arm.history().rows["fresh"] != 0]
         began = set()
@@ -255,7 +256,8 @@ def test_a_robot_that_may_be_hardware_is_not_started(segment: str) -> None:
         backend.publish()
         with o80.Frontend(segment) as frontend:
             (run,) = o80.replay(frontend)
-    assert (run.identical, run.rows) == (True, 1)
+    assert (run.identical, run.rows, run.driver) == (True, 1, False)
+    assert str(run) == f"{segment}: 1 row, no driver was started: desired states identical"
     assert any("the robot may be hardware" in note for note in run.notes)
 
 

@@ -201,7 +201,7 @@ struct SchemaHead {
   Clock clock = Clock::monotonic;
   std::uint8_t bursting = 0;
   Stale stale = Stale::hold;
-  std::uint8_t of_the_world = 0;  // 1: all that the robot observes comes from the world
+  std::uint8_t of_the_world = 0;  // 1: all it observes comes from the world; 2: it is simulated
   std::uint32_t gap = 0;     // longest time between two rows that does not halt [us]; 0: by default
   std::int64_t silence = 0;  // iterations without a sign of life until `stale`; 0: no watchdog
   bool operator==(const SchemaHead&) const = default;

@@ -21,6 +21,7 @@ COMMANDS = {
     "repair": "save.repair",
     "cut": "cut.cut",
     "merge": "cut.merge",
+    "recordings": "recordings.recordings",
     "play": "play.play",
     "plot": "plot.plot",
     "view": "view.view",

@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import time
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from o80.base.errors import Error, MissingExtra
+from o80.base.screen import complain
+
 if TYPE_CHECKING:
     from o80.recording.part import Selection
+    from o80.recording.recorded_epoch import RecordedEpoch
+    from o80.view.scene import Scene
 
 _Output = Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")]
 DAY = 86_400 * 10**9  # [ns]
@@ -27,6 +33,15 @@ def cut(
     every: Annotated[
         int, typer.Option(min=1, help="Keep every nth row only, and all decisions.")
     ] = 1,
+    transforms: Annotated[
+        float,
+        typer.Option(
+            min=0, help="Add poses of the robots' bodies for ROS tools and Foxglove [Hz], as 60."
+        ),
+    ] = 0.0,
+    model_files: Annotated[
+        bool, typer.Option("--model-files", help="Read files that the recorded models name.")
+    ] = False,
 ) -> None:
     """Write a part of a recording into a new file."""
     from o80.base.errors import InvalidArgument
@@ -44,10 +59,25 @@ def cut(
         _time(end, first, last, "--to") if end else last,
         frozenset(segment) if segment else None,
         every,
+        transforms,
     )
     if selection.begin > selection.end:
         raise InvalidArgument(f"--from must be before --to, got {begin} and {end}")
-    _write([recording], output, selection)
+    _write([recording], output, selection, model_files=model_files)
+
+
+def _poses(name: str, epoch: RecordedEpoch, *, model_files: bool) -> Scene | None:
+    from o80.view.scene import Scene
+
+    if "model" not in epoch.schema:
+        return None
+    try:
+        return Scene(epoch.schema, epoch.model, trusted=model_files)
+    except MissingExtra:
+        raise
+    except Error as error:
+        complain(f"no transforms of '{name}': {error}")
+        return None
 
 
 def merge(
@@ -60,10 +90,12 @@ def merge(
     _write(recordings, output, Selection())
 
 
-def _write(recordings: list[Path], output: Path, selection: Selection) -> None:
+def _write(
+    recordings: list[Path], output: Path, selection: Selection, *, model_files: bool = False
+) -> None:
     from o80.recording.part import write_part
 
-    rows = write_part(recordings, output, selection)
+    rows = write_part(recordings, output, selection, partial(_poses, model_files=model_files))
     for name, (count, first, last) in rows.items():
         print(f"{name}: {count} rows, {first} to {last}")
     print(f"{'written to' if rows else 'no row lies there: no rows in'} {output}")

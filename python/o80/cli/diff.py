@@ -5,11 +5,14 @@ from __future__ import annotations
 import math
 from typing import Annotated
 
+import numpy as np
 import typer
 
 from o80.base.errors import InvalidArgument
 from o80.cli.histories import Named, histories
 from o80.rows.history import History
+
+GAPS = 10  # that are listed for each run
 
 
 def _tolerances(texts: list[str] | None) -> dict[str, float]:
@@ -41,7 +44,10 @@ def diff(
         typer.Option(help="FIELD=NUMBER: differences up to this number count as equal."),
     ] = None,
 ) -> None:
-    """Compare two recordings row by row, bit for bit; exit code 1 if they differ.
+    """Compare two recordings row by row, bit for bit.
+
+    Exit code 0: they are identical. 1: they differ. 2: no row differs, but one of them lacks rows
+    or the end of a run, which are named.
 
     Times and counts of late iterations are left out for robots that ran in real time.
     """
@@ -52,19 +58,40 @@ def diff(
     pairs = _pairs(list(histories(one, segment)), list(histories(other, segment)))
     if not pairs:
         raise InvalidArgument(f"{one} and {other} hold no segment")
-    different = False
-    for name, mine, others in pairs:
+    is_different = is_missing = False
+    for name, ours, theirs in pairs:
+        mine, others = _comparable(ours, theirs), _comparable(theirs, ours)
         found = first_difference(mine, others, ignore=left_out, tolerances=tolerances)
         print(f"{name}: {found or f'{len(mine)} rows, identical'}")
-        different = different or found is not None
-    if different:
+        is_different = is_different or found is not None
+        for source, named in ((one, ours), (other, theirs)):
+            missing = [*filter(None, [named.interruption]), *named.gaps()]
+            for each in missing[:GAPS]:
+                print(f"  {source}: {each}")
+            if len(missing) > GAPS:
+                print(f"  {source}: and {len(missing) - GAPS} more gaps")
+            is_missing = is_missing or bool(missing)
+    if is_different:
         raise typer.Exit(1)
+    if is_missing:
+        raise typer.Exit(2)
 
 
-def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, History, History]]:
+def _comparable(one: Named, other: Named) -> History:
+    """The rows that the other one has, or would have if it had no gaps."""
+    history = one.history
+    iteration = history.iteration
+    lacks = np.zeros(len(history), bool)
+    for gap in other.gaps():
+        lacks |= (iteration >= gap.first) & (gap.last is None or iteration <= gap.last)
+    lacks &= ~np.isin(iteration, other.history.iteration)
+    return History(history._decoder, history.rows[~lacks]) if lacks.any() else history
+
+
+def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, Named, Named]]:
     """The same runs of the same segments; two single ones may have different names."""
     if len(ours) == len(theirs) == 1:
-        return [(ours[0].name, ours[0].history, theirs[0].history)]
+        return [(ours[0].name, ours[0], theirs[0])]
     there = {(each.name, each.number): each for each in theirs}
     lacking = {(each.name, each.number) for each in ours} ^ set(there)
     if lacking:
@@ -73,8 +100,8 @@ def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, History, H
     return [
         (
             each.name if each.number == 0 else f"{each.name}/{each.number}",
-            each.history,
-            there[each.name, each.number].history,
+            each,
+            there[each.name, each.number],
         )
         for each in ours
     ]

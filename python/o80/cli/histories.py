@@ -10,6 +10,7 @@ from pathlib import Path
 
 from o80.base.errors import BackendGone, InvalidArgument
 from o80.cli.attach import attach
+from o80.recording.epoch import OVERWRITTEN, Gap, Interruption
 from o80.rows.history import History
 from o80.rows.journal import JournalEntry, marks_in
 
@@ -24,6 +25,8 @@ class Named:
     wall_offset: int | None  #: wall clock less row time [ns]; None: not known
     journal: Callable[[], list[JournalEntry]]  #: what its backend decided, as far as known
     marks: list[tuple[str, int]] = field(default_factory=list)  #: name and iteration
+    gaps: Callable[[], list[Gap]] = list  #: rows that are missing
+    interruption: Interruption | None = None
 
 
 def histories(source: str, only: str | None, *, seconds: float | None = None) -> Iterator[Named]:
@@ -39,7 +42,11 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
             real_time = frontend.schema["clock"] == "monotonic"
             offset = time.time_ns() - time.monotonic_ns() if real_time else None
             entries = frontend.journal()
-            yield Named(source, 0, history, offset, lambda: entries, marks_in(entries))
+            oldest = int(history.iteration[0])
+            gaps = [Gap(0, oldest - 1, OVERWRITTEN)] if oldest > 0 and seconds is None else []
+            yield Named(
+                source, 0, history, offset, lambda: entries, marks_in(entries), lambda: gaps
+            )
         return
     from o80.recording.reader import open as open_recording
 
@@ -53,4 +60,13 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
             history, journal = epoch.history(seconds=seconds), epoch.journal
             if seconds is not None and len(history):
                 journal = partial(epoch.journal_since_row, int(history.iteration[0]))
-            yield Named(name, number, history, epoch.wall_offset, journal, of_run[number])
+            yield Named(
+                name,
+                number,
+                history,
+                epoch.wall_offset,
+                journal,
+                of_run[number],
+                partial(getattr, epoch, "gaps"),
+                epoch.interruption,
+            )

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from o80.recording.recorded_epoch import RecordedEpoch
 
 MARKS_AT_ENDS = 10  # listed at the beginning and at the end
+GAPS = 10  # listed for each run
 COLUMNS = (
     Column("segment"),
     Column("run", right=True),
@@ -49,6 +50,8 @@ def recording_info(path: Path, *, as_json: bool = False) -> None:
     if runs:
         print()
         print_table(COLUMNS, [_row(name, number, epoch) for name, number, epoch in runs])
+    for line in [line for run in runs for line in _missing(*run)]:
+        print(plain(line))
     _print_marks(recording.marks)
     _print_starts(runs)
 
@@ -99,6 +102,7 @@ def _first_line(recording: RecordingFile) -> str:
 def _row(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
     fields = _summary(name, number, epoch)
     local = time.localtime(epoch.recorded_at * 1e-9)
+    is_cut = any(gap.last is None for gap in epoch.gaps)
     return [
         plain(name),
         str(number),
@@ -109,7 +113,7 @@ def _row(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
         age_text(fields["seconds"]) if epoch.rows else "-",
         str(fields["missing"]),
         _decisions(epoch.journal_codec),
-        fields["end"].partition(":")[0] or "not recorded",
+        fields["end"].partition(":")[0] or ("missing" if is_cut else "not recorded"),
     ]
 
 
@@ -129,25 +133,28 @@ def _summary(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
         "first_row": epoch.first_row,
         "rows": epoch.rows,
         "seconds": (end - begin) * 1e-9,
-        "missing": sum(last - first + 1 for first, last in epoch.gaps),
+        "missing": epoch.missing,
         "decisions": epoch.has_journal,
         "journal_codec": epoch.journal_codec,
-        "end": _end(epoch),
+        "end": epoch.end,
     }
 
 
-def _end(epoch: RecordedEpoch) -> str:
-    """Empty also for a journal of a newer o80."""
-    if epoch.journal_codec is None or epoch.journal_codec > _core.JOURNAL_CODEC:
-        return ""
-    return epoch.end
+def _missing(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
+    """Gaps and their reasons, a line each; of many the first ones."""
+    of_run = name if number == 0 else f"{name}/{number}"
+    lines = [f"{of_run}: {epoch.interruption}"] if epoch.interruption else []
+    lines += [f"{of_run}: {gap}" for gap in epoch.gaps[:GAPS]]
+    more = len(epoch.gaps) - GAPS
+    return [*lines, f"{of_run}: and {more} more gaps, see --json"] if more > 0 else lines
 
 
 def _fields(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
     """For tools."""
     return {
         **_summary(name, number, epoch),
-        "gaps": epoch.gaps,
+        "gaps": [gap._asdict() for gap in epoch.gaps],
+        "interruption": str(epoch.interruption or ""),
         "schema": epoch.schema,
         "provenance": asdict(epoch.provenance),
     }

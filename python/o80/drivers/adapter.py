@@ -61,8 +61,7 @@ class Adapter:
         writer.set_idle(self._told("when_idle", "hold"))
         joints = mapping(self._told("joints"), "joints", "joints to what moves them")
         writer.set_model(self._told("model"), joints)
-        if self._told("of_the_world", True):
-            writer.builder.of_the_world()
+        writer.builder.of_the_world(bool(self._told("of_the_world", True)))
         if (gap := self._told("gap")) is not None:
             if not isinstance(gap, (int, float)) or not 1e-6 <= gap <= 3600:
                 raise InvalidArgument(f"gap must be from 0.000001 to 3600 s, got {gap!r}")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,7 +13,7 @@ import o80._core as _core
 from o80.base.arrays import FloatArray
 from o80.base.errors import Error, InvalidArgument
 from o80.joining.row_selection import NANOSECOND
-from o80.joining.sources import Timed, timed
+from o80.joining.sources import CAPTURE_ERROR, Timed, timed
 from o80.rows.columns import Column, columns_of
 from o80.rows.history import History, values_of
 
@@ -23,7 +23,10 @@ if TYPE_CHECKING:
     Signal = str | Callable[[History], Any]
 
 
-BLOCKS = 10  # of the jackknife
+BLOCKS = 20  # of the jackknife
+WIDTH = 1.5  # of the smoothing, in periods
+STEPS = 4  # in this width
+MIN_WEIGHT = 0.5  # of rows around a time, of that where no row is missing
 MIN_ROWS = 50
 MIN_CORRELATION = 0.5
 
@@ -35,7 +38,8 @@ class Latency:
     seconds: float
     """Delay of the second signal behind the first [s]; negative if it is ahead."""
     uncertainty: float
-    """Standard error, from a jackknife over ten parts of the time [s]."""
+    """Standard error: a jackknife over 20 parts of the time, and the errors of capture times that
+    devices state (`capture_error`) [s]."""
     correlation: float
     """Correlation of the two signals at this delay, at most 1."""
     samples: int
@@ -62,27 +66,38 @@ def latency(
     most: longest delay to look for, either way [s].
     seconds: only the last seconds of both.
 
-    Both signals are interpolated at the smaller of their periods, and compared by their
-    correlation coefficient for each delay. The motion must not repeat itself within `most`.
+    Both signals are smoothed alike, over 1.5 periods of the slower one, and compared by their
+    correlation coefficient for each delay. Times at which one of them has no rows are left out.
+    The motion must not repeat itself within `most`.
     Raises InvalidArgument, and Error if the signals show no common motion.
     """
     (one_source, one_signal), (other_source, other_signal) = first, second
     found = timed({"first": one_source, "second": other_source}, seconds=seconds)
     one, other = found["first"], found["second"]
-    step, grid = _grid(one, other, most)
-    lags = int(most / (step * NANOSECOND))
-    x = _sampled(one, one_signal, grid)
-    y = _sampled(other, other_signal, grid)
-    if len(grid) < 2 * lags + MIN_ROWS:
+    begin, end, width = _extent(one, other, most)
+    x = _smooth(one, one_signal, begin, end, width)
+    y = _smooth(other, other_signal, begin, end, width)
+    step = width / STEPS * NANOSECOND
+    lags = int(most / step)
+    if len(x) < 2 * lags + 2 * BLOCKS:
         raise InvalidArgument(
-            f"both sources have rows for {len(grid) * step * NANOSECOND:.3g} s only, too little "
+            f"both sources have rows for {(end - begin) * NANOSECOND:.3g} s only, too little "
             f"for delays up to {most:g} s: record longer, or give a smaller most"
         )
-    return _estimate(x, y, lags, step * NANOSECOND)
+    found_at = _estimate(x, y, lags, step)
+    captured = sum(_capture_error(source) ** 2 for source in (one, other))
+    samples = round(found_at.samples * width / STEPS / _period(one, other))
+    uncertainty = float(np.hypot(found_at.uncertainty, np.sqrt(captured)))
+    return replace(found_at, uncertainty=uncertainty, samples=samples)
 
 
-def _grid(one: Timed, other: Timed, most: float) -> tuple[int, NDArray[np.int64]]:
-    """Period [ns] and times while both sources have rows."""
+def _period(one: Timed, other: Timed) -> int:
+    """The larger of both periods [ns]."""
+    return int(max(np.median(np.diff(source.times)) for source in (one, other)))
+
+
+def _extent(one: Timed, other: Timed, most: float) -> tuple[int, int, float]:
+    """First and last time of both, and the width of the smoothing [ns]."""
     if not 0 < most < 1e6:
         raise InvalidArgument(f"most must be a positive number of seconds, got {most!r}")
     for name, source in (("first", one), ("second", other)):
@@ -90,14 +105,43 @@ def _grid(one: Timed, other: Timed, most: float) -> tuple[int, NDArray[np.int64]
             raise InvalidArgument(
                 f"the {name} source has {len(source.times)} rows, at least {MIN_ROWS} are needed"
             )
-    step = int(min(np.median(np.diff(source.times)) for source in (one, other)))
     begin = max(int(one.times[0]), int(other.times[0]))
     end = min(int(one.times[-1]), int(other.times[-1]))
-    return step, np.arange(begin, end + 1, step, dtype=np.int64)
+    return begin, end, WIDTH * _period(one, other)
 
 
-def _sampled(source: Timed, signal: Signal, grid: NDArray[np.int64]) -> FloatArray:
-    """A signal at times, without its mean and its trend."""
+def _smooth(source: Timed, signal: Signal, begin: int, end: int, width: float) -> FloatArray:
+    """A signal at uniform times, NaN where it has no rows.
+
+    A mean of the rows around, weighted by a Gaussian of this width: so noise has no frequencies
+    for which it matters where between two rows the signal is looked at.
+    """
+    values, times = _numbers(source, signal)
+    step = width / STEPS
+    count = max(int((end - begin) // step) + 1, 1)
+    place = (times - begin) / step
+    inside = (place >= 0) & (place < count - 1)
+    place, values = place[inside], values[inside]
+    left = place.astype(np.intp)
+    share = place - left
+    middle = values.mean() if len(values) else 0.0
+    sums, weights = np.zeros(count), np.zeros(count)
+    for at, weight in ((left, 1 - share), (left + 1, share)):
+        sums += np.bincount(at, weight * (values - middle), count)
+        weights += np.bincount(at, weight, count)
+    offsets = np.arange(-3 * STEPS, 3 * STEPS + 1) / STEPS
+    kernel = np.exp(-0.5 * offsets**2)
+    sums = np.convolve(sums, kernel)[3 * STEPS : 3 * STEPS + count]
+    weights = np.convolve(weights, kernel)[3 * STEPS : 3 * STEPS + count]
+    usual = float(np.median(weights))
+    smooth: FloatArray = np.full(count, np.nan)
+    has_rows = weights > MIN_WEIGHT * usual
+    smooth[has_rows] = sums[has_rows] / weights[has_rows]
+    return smooth
+
+
+def _numbers(source: Timed, signal: Signal) -> tuple[FloatArray, NDArray[np.int64]]:
+    """The numbers of a signal that are finite, and their times [ns]."""
     history = source.history
     if callable(signal):
         values = np.asarray(signal(history), np.float64)
@@ -112,14 +156,15 @@ def _sampled(source: Timed, signal: Signal, grid: NDArray[np.int64]) -> FloatArr
     whole = np.isfinite(values)
     if whole.sum() < MIN_ROWS:
         raise InvalidArgument(f"the signal has only {whole.sum()} numbers that are finite")
-    begin = source.times[0]
-    sampled: FloatArray = np.interp(grid - begin, source.times[whole] - begin, values[whole])
-    if len(sampled) < 2:
-        return sampled
-    place = np.arange(len(sampled), dtype=np.float64)
-    slope, middle = np.polyfit(place, sampled, 1)
-    rest: FloatArray = sampled - (slope * place + middle)
-    return rest
+    return values[whole], source.times[whole]
+
+
+def _capture_error(source: Timed) -> float:
+    """How much the times of capture may all be wrong, as the device says [s]."""
+    if CAPTURE_ERROR not in source.history.extended:
+        return 0.0
+    errors = np.asarray(getattr(source.history.extended, CAPTURE_ERROR))[source.rows]
+    return float(np.median(errors)) * NANOSECOND
 
 
 def _column(history: History, path: str) -> Column:
@@ -134,22 +179,18 @@ def _column(history: History, path: str) -> Column:
 
 def _estimate(x: FloatArray, y: FloatArray, lags: int, period: float) -> Latency:
     """y is compared with x from `lags` samples earlier to `lags` later."""
-    middle = np.arange(lags, len(x) - lags)
-    blocks = np.array_split(middle, BLOCKS)
-    shifts = np.arange(-lags, lags + 1)
-    moments = np.empty((BLOCKS, len(shifts), 6))
-    for number, block in enumerate(blocks):
-        mine = x[block]
-        for place, shift in enumerate(shifts):
-            others = y[block[0] + shift : block[-1] + 1 + shift]
-            moments[number, place] = (
-                len(block),
-                mine.sum(),
-                others.sum(),
-                mine @ mine,
-                others @ others,
-                mine @ others,
-            )
+    count = len(x) - 2 * lags
+    begins = np.linspace(0, count, BLOCKS, endpoint=False).astype(np.intp)
+    has_x, has_y = np.isfinite(x)[lags : lags + count], np.isfinite(y)
+    x, y = np.nan_to_num(x)[lags : lags + count], np.nan_to_num(y)
+    time = np.linspace(-1.0, 1.0, count)
+    moments = np.empty((BLOCKS, 2 * lags + 1, 10))
+    for place in range(2 * lags + 1):
+        other, has_both = y[place : place + count], has_x & has_y[place : place + count]
+        t, mine, theirs = time * has_both, x * has_both, other * has_both
+        products = [has_both, t, t * time, mine, t * x, theirs, t * other]
+        products += [mine * x, theirs * other, mine * other]
+        moments[:, place] = np.add.reduceat(np.array(products, np.float64), begins, axis=1).T
     total = moments.sum(axis=0)
     correlation, best = _peak(total)
     if correlation < MIN_CORRELATION or abs(best - lags) > lags - 1:
@@ -157,20 +198,38 @@ def _estimate(x: FloatArray, y: FloatArray, lags: int, period: float) -> Latency
             "the two signals show no common motion within the longest delay (correlation "
             f"{correlation:.2f}): move more, compare other fields, or give a larger most"
         )
-    without = np.array([_peak(total - each)[1] for each in moments])
-    spread = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((without - without.mean()) ** 2))
+    filled = [each for each in moments if each[:, 0].any()]
+    without = np.array([_peak(total - each)[1] for each in filled])
+    spread = np.sqrt((len(filled) - 1) / len(filled) * np.sum((without - without.mean()) ** 2))
     return Latency(
-        float((best - lags) * period), float(spread * period), float(correlation), len(middle)
+        float((best - lags) * period),
+        float(spread * period),
+        float(correlation),
+        int(total[round(best), 0]),
     )
 
 
 def _peak(moments: FloatArray) -> tuple[float, float]:
-    """The largest correlation, and its place, between samples by a parabola."""
-    n, sum_x, sum_y, xx, yy, xy = moments.T
-    variance = np.maximum((n * xx - sum_x**2) * (n * yy - sum_y**2), 0)
-    share = np.divide(
-        n * xy - sum_x * sum_y, np.sqrt(variance), out=np.zeros_like(xy), where=variance > 0
-    )
+    """The largest correlation, and its place, between samples by a parabola.
+
+    The line that fits each of the two best, at this delay, counts as no motion.
+    """
+    n, t, tt, x, tx, y, ty, xx, yy, xy = moments.T
+    det = n * tt - t * t
+    det = np.where(det > 0, det, np.inf)
+
+    def without_line(
+        square: FloatArray, a: FloatArray, ta: FloatArray, b: FloatArray, tb: FloatArray
+    ) -> FloatArray:
+        line: FloatArray = (tt * a * b - t * (a * tb + ta * b) + n * ta * tb) / det
+        return square - line
+
+    of_x = np.maximum(without_line(xx, x, tx, x, tx), 0)
+    of_y = np.maximum(without_line(yy, y, ty, y, ty), 0)
+    both = without_line(xy, x, tx, y, ty)
+    norm = np.sqrt(of_x * of_y)
+    moving = norm > 1e-9 * np.sqrt(xx * yy)
+    share = np.divide(both, norm, out=np.zeros_like(xy), where=moving)
     best = int(np.argmax(share))
     if not 0 < best < len(share) - 1:
         return float(share[best]), float(best)

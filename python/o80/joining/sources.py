@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 
 CAPTURE_TIME = "capture_time"
 """Extended field of a device: when it captured the row, on the clock of the rows [ns]; 0: never."""
+CAPTURE_ERROR = "capture_error"
+"""Extended field of a device: by how much its capture time may be wrong [ns]."""
 SAME_CLOCK = (
     5_000_000  # clocks of one boot differ by less, although the wall clock is adjusted [ns]
 )

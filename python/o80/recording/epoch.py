@@ -3,7 +3,8 @@
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from datetime import datetime
+from typing import TYPE_CHECKING, NamedTuple
 
 from o80.base.errors import RecordingError
 
@@ -14,10 +15,40 @@ if TYPE_CHECKING:
 DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""
 GAP = "o80.gap"
-"""Name of the metadata record of rows that were overwritten before they were read."""
+"""Name of the metadata record of rows that are missing, such as those that were overwritten."""
+OVERWRITTEN = "overwritten before the recorder read them"
 
 # as src/memory/segment/segment_name.cpp allows
 _NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
+
+
+class Gap(NamedTuple):
+    """Rows of a run that a recording lacks."""
+
+    first: int  #: iteration
+    last: int | None  #: iteration; None: the last one of the run, which is not known
+    reason: str
+
+    def __str__(self) -> str:
+        if self.last is None:
+            return f"rows from {self.first} on are missing: {self.reason}"
+        if self.first == self.last:
+            return f"row {self.first} is missing: {self.reason}"
+        return f"rows {self.first} to {self.last} are missing: {self.reason}"
+
+
+class Interruption(NamedTuple):
+    """Time before a run in which nothing of its segment was recorded: runs may be missing."""
+
+    since: int  #: log time of the last row before [ns]
+    until: int  #: of the first row of the run
+
+    def __str__(self) -> str:
+        begin, end = (datetime.fromtimestamp(each * 1e-9) for each in self)
+        return (
+            f"runs before this one may be missing: nothing was recorded from "
+            f"{begin:%Y-%m-%d %H:%M:%S} to {end:%Y-%m-%d %H:%M:%S}"
+        )
 
 
 @dataclass(frozen=True)
@@ -76,6 +107,16 @@ class EpochNote:
     def provenance(self) -> str:
         """Name of the metadata record that says how the backend was started."""
         return f"{self.segment}/{self.number}/provenance"
+
+    @property
+    def end(self) -> str:
+        """Name of the metadata record that says how the run ended and which row was its last."""
+        return f"{self.segment}/{self.number}/end"
+
+    @property
+    def interruption(self) -> str:
+        """Name of the metadata record if nothing of the segment was recorded before the run."""
+        return f"{self.segment}/{self.number}/interruption"
 
     def not_before(self, first_time: int, log_time: int) -> "EpochNote":
         """The same; the log time of a row at `first_time` is later than `log_time`."""

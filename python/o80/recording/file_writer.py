@@ -31,7 +31,7 @@ import o80._core as _core
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.chunks import HEAD
 from o80.recording.locked_file import LockedFile, reserve
-from o80.recording.scan import MAGIC, Scan, scan
+from o80.recording.scan import CUT, MAGIC, Scan, scan
 from o80.recording.summary import bytes_of, end_of_file, room_for_end
 
 PROFILE = "ros2"
@@ -116,6 +116,9 @@ class FileWriter:
             )
         self.size = found.end
         os.ftruncate(self._file.descriptor, self.size)
+        if found.chunks and not found.finished:
+            with contextlib.suppress(OSError):  # also on a full disk it can be finished
+                self.add_metadata(CUT, {})
 
     def _open(self, path: Path, form: Form, flags: int) -> None:
         self.path = path

@@ -2,29 +2,34 @@
 
 from __future__ import annotations
 
+import math
 import struct
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import chain
 from pathlib import Path
 from typing import IO, TYPE_CHECKING
 
 from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
 from o80.recording import joint_states
-from o80.recording.blocks import Messages
+from o80.recording.blocks import Block, Messages
 from o80.recording.cdr import ENCAPSULATION
-from o80.recording.epoch import GAP, EpochNote
+from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries
 from o80.recording.output import opened
 from o80.recording.reader import RecordingFile
 from o80.recording.scan import attachment_of, index_of, messages_of
+from o80.recording.transforms import TOPIC as TRANSFORMS
+from o80.recording.transforms import Poses, TransformWriter
 
 if TYPE_CHECKING:
     from mcap.records import Channel, ChunkIndex
 
-    from o80.recording.file_writer import FileWriter
+    from o80.recording.file_writer import FileWriter, MessageBlock
+    from o80.recording.recorded_epoch import RecordedEpoch
     from o80.recording.scan import Scan
 
 Run = tuple[str, int]  # segment and epoch
@@ -38,29 +43,44 @@ class Selection:
     end: int = 2**63
     segments: frozenset[str] | None = None  #: None: all
     every: int = 1  #: keep rows whose iteration is a multiple of it; decisions are kept all
+    transforms: float = 0.0  #: messages with poses of the bodies to add [Hz]; 0: none
 
     def holds(self, time: int) -> bool:
         return self.begin <= time <= self.end
 
 
 def write_part(
-    recordings: Sequence[Path], output: Path, selection: Selection
+    recordings: Sequence[Path],
+    output: Path,
+    selection: Selection,
+    poses: Callable[[str, RecordedEpoch], Poses | None] = lambda name, epoch: None,
 ) -> dict[str, tuple[int, int, int]]:
     """Writes a new file. Returns number, first and last iteration of the rows of each segment.
 
+    poses: gives those of the bodies of a run, of which transforms are added, or None.
     Raises RecordingError: then no new file is left.
     """
-    sources = [each for path in recordings for each in RecordingFile(path).scans if each[1].chunks]
-    sources.sort(key=lambda source: source[1].chunks[0].message_start_time)
+    read = [RecordingFile(path) for path in recordings]
+    sources = [[each for each in recording.scans if each[1].chunks] for recording in read]
+    # those of one recording in their order, which may not be that of time: robots have own clocks
+    in_order = sorted((each for each in sources if each), key=_begin_of)
     file = opened(output, proceed=False)
     try:
         writer = _PartWriter(file, selection)
-        for path, found in sources:
+        for recording in read if selection.transforms else ():
+            for name in recording:
+                for epoch in recording[name].epochs:
+                    writer.add_poses((name, epoch.epoch), epoch, poses(name, epoch))
+        for path, found in chain.from_iterable(in_order):
             with found.opened(path) as content:
                 try:
                     writer.add(content, found)
                 except (ValueError, LookupError, struct.error) as error:
                     raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
+        for recording in read:
+            for name in recording:
+                for epoch in recording[name].epochs:
+                    writer.add_end((name, epoch.epoch), epoch)
         file.finish()
     except OSError as error:
         file.close()
@@ -73,6 +93,10 @@ def write_part(
     return writer.rows
 
 
+def _begin_of(files: list[tuple[Path, Scan]]) -> int:
+    return min(chunk.message_start_time for _, found in files for chunk in found.chunks)
+
+
 class _PartWriter:
     def __init__(self, file: FileWriter, selection: Selection) -> None:
         self.rows: dict[str, tuple[int, int, int]] = {}
@@ -80,7 +104,10 @@ class _PartWriter:
         self._channels: dict[object, int] = {}
         self._numbers: dict[Run, int] = {}  # of runs in the new file
         self._next: dict[int, int] = {}  # by new channel: what comes next, so nothing comes twice
+        self._row_channels: dict[Run, int] = {}
         self._seen: set[tuple[str, int, bytes]] = set()
+        self._poses: dict[Run, tuple[RecordedEpoch, Poses]] = {}
+        self._transforms: dict[Run, TransformWriter] = {}
         self._is_over: set[int] = set()  # journals that have what lies behind the end
 
     def add(self, content: IO[bytes], found: Scan) -> None:
@@ -92,13 +119,44 @@ class _PartWriter:
                 if blocks:
                     self._file.add_chunk(blocks)
 
-    def _blocks(self, chunk: ChunkIndex) -> Iterator[Messages]:
+    def add_poses(self, run: Run, epoch: RecordedEpoch, poses: Poses | None) -> None:
+        """Adds transforms of a run while its rows are added."""
+        if poses is not None and poses.bodies:
+            self._poses[run] = epoch, poses
+
+    def _transforms_of(self, run: Run, rows: Sequence[tuple[int, bytes]]) -> Block | None:
+        if run not in self._poses:
+            return None
+        if run not in self._transforms:
+            epoch, poses = self._poses[run]
+            self._transforms[run] = TransformWriter(
+                self._file, run[0], epoch.layout, poses, self._selection.transforms
+            )
+        return self._transforms[run].block(rows)
+
+    def add_end(self, run: Run, epoch: RecordedEpoch) -> None:
+        """Adds how a run ended, that its end is missing, or that it was left out."""
+        kept = self._next.get(self._row_channels.get(run, 0), 0)
+        if kept == 0 or kept > epoch.next_row:  # nothing is kept, or another recording goes on
+            return
+        texts = {"last": str(kept - 1)}
+        if epoch.next_row - kept < self._selection.every:
+            texts = epoch.end_record[1] or texts
+            if epoch.gaps and epoch.gaps[-1].last is None:
+                texts = {"last": str(kept - 1), "reason": epoch.gaps[-1].reason}
+        name = f"{run[0]}/{self._numbers[run]}/end"
+        self._file.add_metadata(name, texts | self._run_texts(run))
+
+    def _blocks(self, chunk: ChunkIndex) -> Iterator[MessageBlock]:
         found, content = self._found, self._content
         kept: dict[Run, set[int]] = {}  # log times of rows
+        transforms: list[Block] = []
         for number in sorted(chunk.message_index_offsets):
             channel = found.channels[number]
             note, run = EpochNote.of(channel.metadata), _run_of(channel)
             if run is not None and run[0] not in (self._selection.segments or {run[0]}):
+                continue
+            if channel.topic == TRANSFORMS and self._selection.transforms:
                 continue
             times = [int(time) for time in index_of(content, chunk, number)[:, 0]]
             messages: Iterable[tuple[int, bytes]] = zip(
@@ -107,6 +165,8 @@ class _PartWriter:
             if note is not None and run is not None:
                 messages = self._rows(channel, note, messages)
                 kept[run] = {time for time, _ in messages}
+                if (block := self._transforms_of(run, messages)) is not None:
+                    transforms.append(block)
             elif channel.metadata.get("content") == JOURNAL and run is not None:
                 messages = self._entries(channel, messages)
             elif channel.metadata.get("content") == joint_states.CONTENT and run in kept:
@@ -120,6 +180,7 @@ class _PartWriter:
                 self._seen.update((channel.topic, *each) for each in messages)
             if messages:
                 yield Messages(self._channel(channel), [*messages])
+        yield from transforms
 
     def _rows(
         self, channel: Channel, note: EpochNote, messages: Iterable[tuple[int, bytes]]
@@ -131,7 +192,13 @@ class _PartWriter:
             if not self._selection.holds(time) or iteration % self._selection.every:
                 continue
             new = self._channel(channel, iteration)
-            if iteration >= self._next.get(new, 0):
+            after = self._next.get(new, iteration)
+            if iteration >= after:
+                if iteration > after and self._every(channel) == 1:
+                    texts = self._run_texts((note.segment, note.epoch))
+                    texts |= {"first": str(after), "last": str(iteration - 1)}
+                    self._file.add_metadata(GAP, texts | {"reason": self._reason(note, after)})
+                self._row_channels[note.segment, note.epoch] = new
                 self._next[new] = iteration + 1
                 kept.append((time, message))
                 count, first, _ = self.rows.get(note.segment, (0, iteration, iteration))
@@ -177,7 +244,10 @@ class _PartWriter:
             run = each.metadata.get("segment"), each.metadata.get("number")
             if each.name == note.provenance:
                 self._file.add_metadata(new.provenance, each.metadata)
-            elif each.name in (GAP, JOURNAL_GAP) and run == (note.segment, str(note.number)):
+            elif each.name == note.interruption:
+                texts = each.metadata | {"number": str(number)}
+                self._file.add_metadata(new.interruption, texts)
+            elif each.name == JOURNAL_GAP and run == (note.segment, str(note.number)):
                 self._file.add_metadata(each.name, each.metadata | {"number": str(number)})
 
     def _channel(self, channel: Channel, begin: int | None = None) -> int:
@@ -187,7 +257,7 @@ class _PartWriter:
         if key not in self._channels:
             texts = channel.metadata if run is None else self._texts(channel)
             if begin is not None:
-                texts = texts | {"begin": str(begin)}
+                texts = texts | {"begin": str(begin), "every": str(self._every(channel))}
             number, schema = 0, self._found.schemas.get(channel.schema_id)
             if schema is not None:
                 text = schema.data.decode(errors="replace")
@@ -208,6 +278,23 @@ class _PartWriter:
                     self._begin_run(note)
                     break
         return channel.metadata | {"number": str(self._numbers.get(run, 0))}
+
+    def _run_texts(self, run: Run) -> dict[str, str]:
+        return {"segment": run[0], "epoch": str(run[1]), "number": str(self._numbers[run])}
+
+    def _every(self, channel: Channel) -> int:
+        """Every so manieth row of a channel is kept, of one that was thinned before too."""
+        text = channel.metadata.get("every", "")
+        return math.lcm(self._selection.every, int(text) if text.isdecimal() else 1)
+
+    def _reason(self, note: EpochNote, first: int) -> str:
+        """Why rows from this one on are missing in what is merged."""
+        for each in self._found.metadata:
+            texts = each.metadata
+            run = texts.get("segment"), texts.get("number"), texts.get("first")
+            if each.name == GAP and run == (note.segment, str(note.number), str(first)):
+                return texts.get("reason", OVERWRITTEN)
+        return "no recording that was merged has them"
 
 
 def _run_of(channel: Channel) -> Run | None:

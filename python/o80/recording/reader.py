@@ -33,7 +33,7 @@ class RecordingFile:
                 epochs = parts.setdefault(part.note.segment, {})
                 epochs.setdefault((part.note.number, part.note.epoch), []).append(part)
         self.segments: dict[str, RecordedSegment] = {
-            name: RecordedSegment(name, [RecordedEpoch(each) for each in epochs.values()])
+            name: RecordedSegment(name, [*_epochs_of([*epochs.values()])])
             for name, epochs in parts.items()
         }
 
@@ -159,6 +159,11 @@ def _parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
         if note is not None:
             journal = journals.get((note.segment, note.number))
             yield EpochPart(path, found, channel.id, note, journal)
+
+
+def _epochs_of(runs: list[list[EpochPart]]) -> Iterator[RecordedEpoch]:
+    for i, parts in enumerate(runs):
+        yield RecordedEpoch(parts, is_followed=i + 1 < len(runs))
 
 
 class RecordedSegment:

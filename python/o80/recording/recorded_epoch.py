@@ -15,15 +15,16 @@ from o80.base.cached import cached
 from o80.base.errors import InvalidArgument, RecordingError, SegmentError
 from o80.base.machine import Machine
 from o80.recording.blocks import messages_in
-from o80.recording.epoch import GAP, EpochNote
+from o80.recording.cdr import ENCAPSULATION
+from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote, Gap, Interruption
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of, entries_in, last_entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
-from o80.recording.scan import Scan, attachment_of, content_of, index_of
+from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of
 from o80.rows.history import History, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
-from o80.rows.layout import decoder_of
+from o80.rows.layout import Layout, decoder_of
 from o80.rows.provenance import Provenance
 
 if TYPE_CHECKING:
@@ -47,17 +48,53 @@ class EpochPart:
         """Number of rows."""
         return self.found.counts.get(self.channel, 0)
 
-    def gaps(self, name: str) -> Iterator[tuple[int, int]]:
-        """First and last number of what is missing. Raises RecordingError."""
+    def records(self, name: str, *numbers: str) -> Iterator[tuple[tuple[int, ...], dict[str, str]]]:
+        """The metadata records of this run with this name: numbers and texts.
+
+        Raises RecordingError.
+        """
         run = (self.note.segment, str(self.note.number))
         for each in self.found.metadata:
             texts = each.metadata
             if each.name != name or (texts.get("segment"), texts.get("number")) != run:
                 continue
             try:
-                yield int(texts["first"]), int(texts["last"])
+                yield tuple(int(texts[number]) for number in numbers), texts
             except (KeyError, ValueError) as error:
                 raise RecordingError(f"{self.path}: a record {name} is damaged") from error
+
+    @property
+    def every(self) -> int:
+        """Every so manieth row was kept when the recording was thinned; 1: all."""
+        text = self.found.channels[self.channel].metadata.get("every", "")
+        return int(text) if text.isdecimal() else 1
+
+    @property
+    def last_row(self) -> int:
+        """Iteration of the last row. There must be rows."""
+        chunk = next(
+            each
+            for each in reversed(self.found.chunks)
+            if self.channel in each.message_index_offsets
+        )
+        with self.reading() as file:
+            messages = messages_in(content_of(file, chunk), index_of(file, chunk, self.channel))
+        begin = len(ENCAPSULATION)  # the iteration is the first member
+        return int.from_bytes(messages[-1, begin : begin + 8].tobytes(), "little", signed=True)
+
+    @property
+    def why_cut(self) -> str:
+        """Why the file may lack the end of the run; empty if its recorder was told to end."""
+        if not self.found.finished:
+            return "the recorder still runs, or was killed"
+        of_run = (
+            each.chunk_start_offset
+            for each in self.found.chunks
+            if self.channel in each.message_index_offsets
+        )
+        last = max(of_run, default=0)
+        places = (each for each in self.found.metadata_places if each.name == CUT)
+        return "the recorder was killed" if any(each.offset > last for each in places) else ""
 
     @property
     def log_times(self) -> tuple[int, int]:
@@ -99,9 +136,10 @@ class EpochPart:
 class RecordedEpoch:
     """The rows and the journal of one run of a backend."""
 
-    def __init__(self, parts: list[EpochPart]) -> None:
-        """parts: in their order, at least one."""
+    def __init__(self, parts: list[EpochPart], *, is_followed: bool = False) -> None:
+        """parts: in their order, at least one. is_followed: a later run was recorded."""
         self._parts = parts
+        self._is_followed = is_followed
         self._note = parts[0].note
 
     @property
@@ -158,15 +196,81 @@ class RecordedEpoch:
         mjcf: str = self._decoder.layout.model
         return mjcf
 
+    @cached
+    def gaps(self) -> list[Gap]:
+        """The rows that are missing, each with the reason: first and last iteration, reason.
+
+        The last is None if the end of the run is missing, and nobody knows which row was its last.
+        Rows behind the end of a recording that was told to end are not missing. Raises
+        RecordingError.
+        """
+        found, after = self._before_end
+        last, texts = self.end_record
+        why = texts.get("reason") or self._parts[-1].why_cut
+        if last >= after:
+            return [*found, Gap(after, last, "the recorder ended before it had read them")]
+        if (why or (self._is_followed and not texts)) and not self.end:
+            return [*found, Gap(after, None, why or "a later run follows")]
+        return found
+
     @property
-    def gaps(self) -> list[tuple[int, int]]:
-        """First and last iteration of rows that are missing, because the recorder was too late."""
-        return [gap for part in self._parts for gap in part.gaps(GAP)]
+    def next_row(self) -> int:
+        """Iteration after the last row. Raises RecordingError."""
+        return self._before_end[1]
+
+    @cached
+    def _before_end(self) -> tuple[list[Gap], int]:
+        """The gaps before the last row, and the iteration after it."""
+        found: list[Gap] = []
+        after = 0
+        for part in self._parts:
+            if part.note.begin > after:
+                late = after == 0
+                reason = "recording began later" if late else "a file is missing, or was cut"
+                found.append(Gap(after, part.note.begin - 1, reason))
+            after = part.note.begin + part.rows
+            for (first, last), texts in part.records(GAP, "first", "last"):
+                reason = texts.get("reason", OVERWRITTEN)
+                found.append(Gap(first, last, reason))
+                after += last - first + 1
+            if part.every > 1 and part.rows:
+                after = part.last_row + 1
+                reason = f"every {part.every}th row was kept"
+                found.append(Gap(part.note.begin + 1, after - 1, reason))
+        return found, after
+
+    @property
+    def missing(self) -> int:
+        """Number of rows that are missing, as far as it is known. Raises RecordingError."""
+        kept = sum(part.rows - 1 for part in self._parts if part.every > 1 and part.rows)
+        ranges = ((gap.first, gap.last) for gap in self.gaps if gap.last is not None)
+        return sum(last - first + 1 for first, last in ranges) - kept
+
+    @property
+    def interruption(self) -> Interruption | None:
+        """Time before this run in which nothing of its segment was recorded, if there is one.
+
+        Other runs may have come and gone then. Raises RecordingError.
+        """
+        for part in self._parts:
+            for (since,), _ in part.records(part.note.interruption, "since"):
+                return Interruption(since, part.log_times[0] if part.rows else self.recorded_at)
+        return None
 
     @property
     def journal_gaps(self) -> list[tuple[int, int]]:
-        """First and last number of journal entries that are missing for the same reason."""
-        return [gap for part in self._parts for gap in part.gaps(JOURNAL_GAP)]
+        """First and last number of journal entries that were overwritten before they were read."""
+        return [
+            (first, last)
+            for part in self._parts
+            for (first, last), _ in part.records(JOURNAL_GAP, "first", "last")
+        ]
+
+    @property
+    def layout(self) -> Layout:
+        """Where everything lies in a row."""
+        layout: Layout = self._decoder.layout
+        return layout
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -319,12 +423,23 @@ class RecordedEpoch:
 
     @property
     def end(self) -> str:
-        """How the run ended, "stopped" or "failed: " and why; empty: the recording does not say.
+        """How the run ended: "stopped", "killed", "superseded", or "failed: " and why.
 
-        Then it was killed, was recorded no further, or had no journal. Raises RecordingError.
+        Empty: the recording does not say, for example because it was told to end before the run.
+        Raises RecordingError.
         """
+        return self._end_in_journal() or self.end_record[1].get("how", "")
+
+    @property
+    def end_record(self) -> tuple[int, dict[str, str]]:
+        """Note of the recorder about the end: the last row, -1 for nothing, and texts."""
+        found = [each for part in self._parts for each in part.records(part.note.end, "last")]
+        return (found[-1][0][0], found[-1][1]) if found else (-1, {})
+
+    def _end_in_journal(self) -> str:
         part = next((part for part in reversed(self._parts) if part.journal is not None), None)
-        if part is None or part.journal is None:
+        codec = self.journal_codec
+        if part is None or part.journal is None or codec is None or codec > _core.JOURNAL_CODEC:
             return ""
         with part.reading() as file:
             last = last_entries_in(file, part.found, part.journal)

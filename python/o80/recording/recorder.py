@@ -171,7 +171,8 @@ class Recorder:
         """Writes a note with the newest iteration of each segment. Raises TypeError."""
         with self.writing():
             now, newest = time.time_ns(), self.newest
-            log_times = (self.sources[each].log_time(row) for each, row in newest.items())
+            there = [each for each, row in newest.items() if row >= 0]
+            log_times = (self.sources[each].log_time(newest[each]) for each in there)
             mark = Mark(name, now, newest, values)
             log_time = max(log_times, default=now)
             line = Line("", log_time, INFO, f"mark {name}")

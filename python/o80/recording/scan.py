@@ -44,6 +44,8 @@ from o80.recording.blocks import LENGTH_ENDS_AT, MESSAGE_HEAD
 from o80.recording.chunks import HEAD, Chunks
 
 MAGIC = b"\x89MCAP0\r\n"
+CUT = "o80.cut"
+"""Name of the metadata record behind the last whole chunk that a killed recorder has left."""
 CHUNK_HEAD = struct.Struct("<QQQIL")
 FOOTER_LENGTH = HEAD.size + 20 + len(MAGIC)
 DATA_END_LENGTH = HEAD.size + 4

@@ -43,6 +43,7 @@ class Source:
         self._journal: JournalRecorder | None = None
         self._journal_log: JournalLog | None = None
         self._has_told_end = False
+        self._was_interrupted = bool(written)
         self._next = 0
         self._last_log_time = max((each.last_log_time for each in written.values()), default=0)
         self._look_at = 0.0
@@ -110,9 +111,10 @@ class Source:
             return []
         assert self._frontend is not None
         blocks = self._read(self._frontend)
-        if not blocks and not self._frontend.alive:
-            blocks = self._read(self._frontend)  # what was published just before its end
-            self._tell_death(self._frontend)
+        if not self._frontend.alive:
+            blocks = blocks or self._read(self._frontend)  # what was published just before its end
+            if self.has_read(self.position):
+                self._note_end(self._frontend)
             if not blocks and self._attach():
                 blocks = self._read(self._frontend)
         return blocks
@@ -164,6 +166,10 @@ class Source:
             if known.journal is None:
                 self._journal.add_channel(self._file, note)
         self._has_told_end = False
+        if self._was_interrupted and known.last < 0:  # other runs may have come between
+            texts = note.run_texts() | {"since": str(self._last_log_time)}
+            self._file.add_metadata(note.interruption, texts)
+        self._was_interrupted = False
         if known.channel is None:
             self._tell(
                 self._next, INFO, f"run {note.number} of {note.robot} is recorded from here on"
@@ -243,11 +249,16 @@ class Source:
         time = self._last_log_time or time_ns()
         return Messages(self._journal.channel, [(time, entries.message())])
 
-    def _tell_death(self, frontend: Frontend) -> None:
+    def _note_end(self, frontend: Frontend) -> None:
         """A backend that was killed could not write its end into the journal."""
-        if not self._has_told_end and frontend.life in ("killed", "superseded"):
+        if self._has_told_end or self._writer is None:
+            return
+        self._has_told_end = True
+        texts = {"how": frontend.life, "last": str(frontend.published)}
+        note = self._writer.note
+        self._file.add_metadata(note.end, note.run_texts() | texts)
+        if frontend.life in ("killed", "superseded"):
             self._tell(frontend.published, ERROR, f"the backend was {frontend.life}")
-            self._has_told_end = True
 
     def _tell(self, iteration: int, level: int, text: str) -> None:
         """Adds a line to the log."""

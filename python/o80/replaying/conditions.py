@@ -13,11 +13,13 @@ def reads_the_world(schema: dict[str, Any]) -> str:
     """Why a robot must not be started for a replay, because it may be hardware; else empty."""
     if schema.get("of_the_world"):
         return "the robot reads the world (its driver says so), which no replay can repeat"
+    if schema.get("simulated"):
+        return ""
     served = {request["name"] for request in schema["requests"]}
     if lacking := {"snapshot", "restore"} - served:
         return (
-            f"the robot may be hardware: it does not serve the requests of a simulation "
-            f"({', '.join(sorted(lacking))})"
+            f"the robot may be hardware: it does not say that it is a simulation (in Python "
+            f"of_the_world = False), nor serves the requests of one ({', '.join(sorted(lacking))})"
         )
     return ""
 

@@ -54,6 +54,10 @@ class RecordedRun(Protocol):
     def rows(self) -> int:
         """Number of rows, for a progress bar."""
 
+    @property
+    def missing(self) -> list[str]:
+        """Texts about an end of the run, or runs before it, that are missing."""
+
     def blocks(self) -> Iterator[History]:
         """Rows in their order, a few thousand at a time."""
 
@@ -96,6 +100,10 @@ class LiveRun:
     @property
     def rows(self) -> int:
         return self.frontend.published + 1 - self.frontend.oldest
+
+    @property
+    def missing(self) -> list[str]:
+        return []
 
     def blocks(self) -> Iterator[History]:
         last = self.frontend.published
@@ -145,6 +153,13 @@ class FileRun:
     @property
     def rows(self) -> int:
         return self.epoch.rows
+
+    @property
+    def missing(self) -> list[str]:
+        return [
+            *map(str, filter(None, [self.epoch.interruption])),
+            *(str(gap) for gap in self.epoch.gaps if gap.first >= self.epoch.next_row),
+        ]
 
     def blocks(self) -> Iterator[History]:
         for block in self.epoch.blocks():

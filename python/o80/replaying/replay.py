@@ -71,11 +71,11 @@ def replay(
     driver: False starts no robot, as for hardware.
     progress: called with the name of a run, its rows compared, and all its rows.
 
-    Only simulations are started: robots that serve the requests snapshot and restore and do not say
-    that they read the world. Of all others, and with driver=False, only the backend runs: it reads
-    the recorded observed and extended values, obeys the recorded halts, interrupts and fresh starts
-    of the driver too, and its desired states are compared. No hardware is touched. Notes in the
-    report say so.
+    Only simulations are started: robots that say so (in Python of_the_world = False), and those
+    that serve the requests snapshot and restore and do not say that they read the world. Of all
+    others, and with driver=False, only the backend runs: it reads the recorded observed and
+    extended values, obeys the recorded halts, interrupts and fresh starts of the driver too, and
+    its desired states are compared. No hardware is touched. The report says so.
 
     Raises InvalidArgument, RecordingError, DriverError.
     """
@@ -157,14 +157,24 @@ class _RunReplay:
         return RunReport(
             segment=self._run.segment,
             number=self._run.number,
+            first=self._start.row,
             rows=self._rows,
             difference=difference,
             gap="" if difference else self._gap,
+            missing=tuple(self._missing() if difference is None else ()),
+            driver=not self._no_driver,
             unused=bool(self._no_driver and (self._robot or self._options)),
             notes=tuple(self._notes),
             seconds=time.monotonic() - begin,
             recorded_seconds=(self._times[1] - self._times[0]) * 1e-9,
         )
+
+    def _missing(self) -> Iterator[str]:
+        """Texts about rows that are not compared although the caller left nothing out."""
+        if self._rows and self._start.row > 0 and self._since is None:
+            yield f"rows before {self._start.row} were not compared"
+        if not self._gap:
+            yield from self._run.missing
 
     def _compare(self) -> Difference | None:
         start = self._found_start()

@@ -12,9 +12,12 @@ class RunReport:
 
     segment: str
     number: int = 0  #: of the run in the recording, from 0
-    rows: int = 0  #: compared rows, from row 0 on
+    first: int = 0  #: iteration of the first row
+    rows: int = 0  #: number of rows that were compared, from this one on
     difference: Difference | None = None  #: the first one; values: recorded and replayed
     gap: str = ""  #: why later rows were not replayed; empty: all were
+    missing: tuple[str, ...] = ()  #: of the run in the recording, or before where it began
+    driver: bool = True  #: it was started; else desired states were compared, and no readings
     unused: bool = False  #: a robot or options were given, but none was started
     notes: tuple[str, ...] = ()  #: what differs between then and now
     seconds: float = 0.0  #: that the replay took
@@ -28,15 +31,18 @@ class RunReport:
     @property
     def identical(self) -> bool:
         """Every row of the run was compared, and none differs."""
-        return self.difference is None and not self.gap
+        return self.difference is None and not self.gap and not self.missing
 
     def __str__(self) -> str:
         if self.difference is not None:
             return f"{self.name}: {self.difference}"
         if not self.rows:
             return f"{self.name}: not replayed: {self.gap}"
-        text = f"{self.name}: {self.rows} row{'' if self.rows == 1 else 's'}, identical"
-        return f"{text} up to row {self.rows - 1}; then {self.gap}" if self.gap else text
+        text = f"{self.name}: {self.rows} row{'' if self.rows == 1 else 's'}, "
+        text += "identical" if self.driver else "no driver was started: desired states identical"
+        if self.gap:
+            text += f" up to row {self.first + self.rows - 1}; then {self.gap}"
+        return "; ".join([text, *self.missing])
 
 
 @dataclass(frozen=True)

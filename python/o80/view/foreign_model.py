@@ -75,8 +75,8 @@ def without_files(mjcf: str) -> str:
             if name.lower().startswith("file") and value:
                 raise Error(
                     f"The model names a file, {value[:200]!r}, which is not read: the recording "
-                    f"may come from a stranger. To read the files of models that you trust, start "
-                    f"the view with --model-files."
+                    f"may come from a stranger. To read the files of models that you trust, give "
+                    f"--model-files."
                 )
         waiting += [(child, depth + 1) for child in element]
     return ElementTree.tostring(root, encoding="unicode")

@@ -151,8 +151,7 @@ class RecordedSource(Source):
         line |= {"state": "recording", "problem": self._problem}
         if self._extent is None:
             return line
-        gaps = self._epoch.gaps
-        missing = sum(last - first + 1 for first, last in gaps)
+        missing = self._epoch.missing
         return line | {
             "robot": self.schema["robot"],
             "rate": f"{1e9 / self.schema['period']:g} Hz",

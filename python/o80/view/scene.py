@@ -84,13 +84,25 @@ class Scene:
         found: dict[str, Any] = {"pose": None, "ghost": None, "not_finite": []}
         with self._lock:
             observed = [place.observed for place in self._places]
-            found["pose"] = packed(self._pose(row, observed, found["not_finite"]))
+            pose = self._pose(row, observed, found["not_finite"])
+            found["pose"] = packed(pose.astype(np.float32))
             if self._has_ghost:
                 desired = [place.wanted(active) for place in self._places]
-                found["ghost"] = packed(self._pose(row, desired, []))
+                found["ghost"] = packed(self._pose(row, desired, []).astype(np.float32))
         return found
 
-    def _pose(self, row: bytes, offsets: list[int], not_finite: list[str]) -> NDArray[np.float32]:
+    @property
+    def bodies(self) -> list[str]:
+        """Names of the moving bodies; of one without a name, its number."""
+        names = (self._model.body(body).name for body in self._moving)
+        return [name or f"body_{body}" for name, body in zip(names, self._moving, strict=True)]
+
+    def observed(self, row: bytes) -> NDArray[np.float64]:
+        """Observed positions and quaternions of the moving bodies (bodies, 7)."""
+        with self._lock:
+            return self._pose(row, [place.observed for place in self._places], [])
+
+    def _pose(self, row: bytes, offsets: list[int], not_finite: list[str]) -> NDArray[np.float64]:
         self._data.qpos[:] = self._start
         lost = []
         for place, offset in zip(self._places, offsets, strict=True):
@@ -105,7 +117,7 @@ class Scene:
         moving = self._moving
         poses = np.hstack([self._data.xpos[moving], self._data.xquat[moving]])
         poses[lost] = np.nan
-        return poses.astype(np.float32)
+        return poses
 
     def _geometry(self) -> dict[str, Any]:
         self._mujoco.mj_kinematics(self._model, self._data)

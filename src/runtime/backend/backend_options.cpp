@@ -172,7 +172,7 @@ std::int64_t longest_gap(const Schema& schema, const BackendOptions& options) {
   constexpr std::int64_t kMin = 100'000'000;
   if (options.bursting) return 0;
   if (options.gap >= 0) return options.gap;
-  const bool moves = schema.head.of_the_world != 0 && !schema.actuators.empty();
+  const bool moves = schema.head.of_the_world == 1 && !schema.actuators.empty();
   const std::int64_t least = moves ? std::max(kPeriods * schema.head.period, kMin) : 0;
   const std::int64_t own = schema.head.gap * std::int64_t{1000};
   return own > 0 && (least == 0 || own < least) ? own : least;

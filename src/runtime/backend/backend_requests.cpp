@@ -73,7 +73,7 @@ Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noe
   auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
   // a simulator may be put anywhere, a robot of the world cannot
-  const bool judges = schema.head.of_the_world != 0 && recorded_ == nullptr && has_begun();
+  const bool judges = schema.head.of_the_world == 1 && recorded_ == nullptr && has_begun();
   if (judges) {
     if (!halts.acts()) {
       readings_.begin(reading.observed);

@@ -1,0 +1,252 @@
+"""The recordings below a folder: what each holds, found again quickly.
+
+What was found is kept in a SQLite file in the folder. It is only a copy: whatever happens to it, it
+is made anew. A recording is read again if its size or its time of change differs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import os
+import sqlite3
+import struct
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import asdict, dataclass
+from datetime import datetime, timedelta
+from pathlib import Path
+from typing import Any
+
+from o80.base.errors import InvalidArgument, RecordingError
+from o80.recording.reader import RecordingFile
+
+INDEX = ".o80-recordings.sqlite"
+VERSION = 1  # of what the index holds
+MARKS = 200  # that are kept of each recording
+_DAMAGED = (RecordingError, OSError, ValueError, LookupError, TypeError, struct.error)
+
+Progress = Callable[[int, int], None]
+Stamp = tuple[int, int]  # size [bytes] and time of the last change [ns]
+
+
+@dataclass(frozen=True)
+class FoundRun:
+    """One run of a robot in a recording."""
+
+    segment: str
+    number: int  #: among the runs of the segment in the recording, from 0
+    robot: str
+    begin: int  #: wall clock of the first row [ns since 1970]
+    end: int  #: of the last row
+    rows: int
+    missing: int  #: rows, as far as it is known
+    ended: str  #: as `RecordedEpoch.end`; "missing" if the end of the run is missing
+
+
+@dataclass(frozen=True)
+class FoundRecording:
+    """Contents of a recording, as `o80.recordings` gives them."""
+
+    path: Path
+    size: int  #: [bytes]
+    problem: str  #: why it cannot be read; empty: it can
+    finished: bool  #: its recorder ended in order
+    runs: tuple[FoundRun, ...]
+    marks: tuple[tuple[str, int, str], ...]  #: name, wall clock [ns], values as JSON; of many some
+    mark_count: int
+
+    @property
+    def begin(self) -> int:
+        """Wall clock of the first row [ns since 1970]; 0: there is none."""
+        return min((run.begin for run in self.runs if run.rows), default=0)
+
+    @property
+    def end(self) -> int:
+        """Wall clock of the last row [ns since 1970]; 0: there is none."""
+        return max((run.end for run in self.runs if run.rows), default=0)
+
+    def has(self, text: str) -> bool:
+        """Whether its path, a segment, a robot or a mark holds a text; case does not matter."""
+        texts = [str(self.path)]
+        texts += [each for run in self.runs for each in (run.segment, run.robot)]
+        texts += [each for name, _, values in self.marks for each in (name, values)]
+        return any(text.casefold() in each.casefold() for each in texts)
+
+
+def recordings(
+    folder: str | os.PathLike[str],
+    *,
+    begin: datetime | None = None,
+    end: datetime | None = None,
+    text: str = "",
+    progress: Progress | None = None,
+) -> list[FoundRecording]:
+    """The recordings in a folder and below it, the oldest first.
+
+    begin, end: only those with rows between these times. text: only those in whose path, segments,
+        robots or marks it occurs, whatever its case. progress: called with the number of recordings
+        that were read and that must be read.
+
+    A recording that cannot be read has a `problem`. Writes a file `.o80-recordings.sqlite` into the
+    folder, with which the next call is quick; where that is not possible, a RuntimeWarning says so.
+    Raises InvalidArgument if there is no such folder.
+    """
+    root = Path(folder)
+    if not root.is_dir() or root.suffix == ".mcap":
+        raise InvalidArgument(f"{root} is not a folder of recordings")
+    known = _read(root)
+    there = dict(_stamps(root))
+    new = [name for name, stamp in there.items() if name not in known or known[name][0] != stamp]
+    texts = {}
+    for number, name in enumerate(new, 1):
+        texts[name] = _summary(root / name)
+        known[name] = there[name], _found(root / name, there[name], texts[name])
+        if progress is not None:
+            progress(number, len(new))
+    gone = known.keys() - there.keys()
+    if new or gone:
+        _write(root, [(name, *there[name], texts[name]) for name in new], gone)
+    first = 0 if begin is None else int(begin.timestamp() * 1e9)
+    last = 2**63 if end is None else int(end.timestamp() * 1e9)
+    kept = [
+        each
+        for each in (known[name][1] for name in sorted(there))
+        if each.has(text) and (each.problem or (each.begin <= last and each.end >= first))
+    ]
+    return sorted(kept, key=lambda each: each.begin)
+
+
+def time_of(text: str, *, is_end: bool = False) -> datetime:
+    """A time of this computer's clock: "2026-11-24", "2026-11-24 10:02" or "10:02" (today).
+
+    is_end: a day means its end. Raises InvalidArgument.
+    """
+    try:
+        if ":" in text and "-" not in text:
+            text = f"{datetime.now():%Y-%m-%d} {text.zfill(5)}"
+        found = datetime.fromisoformat(text)
+    except ValueError:
+        raise InvalidArgument(
+            f"write 2026-11-24, '2026-11-24 10:02' or 10:02 (today), not '{text}'"
+        ) from None
+    return found + timedelta(days=1, microseconds=-1) if is_end and ":" not in text else found
+
+
+def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
+    """Path below the root and stamp of each recording; a folder NAME.mcap is one."""
+    waiting = [root]
+    while waiting:
+        folder = waiting.pop()
+        try:
+            entries = [*os.scandir(folder)]
+        except OSError:
+            continue
+        for entry in entries:
+            with contextlib.suppress(OSError):  # removed meanwhile
+                name = str(Path(entry.path).relative_to(root))
+                is_folder = entry.is_dir(follow_symlinks=False)
+                if is_folder and not entry.name.endswith(".mcap"):
+                    waiting.append(Path(entry.path))
+                elif is_folder:
+                    files = [each.stat() for each in os.scandir(entry)]
+                    changed = max((each.st_mtime_ns for each in files), default=0)
+                    yield name, (sum(each.st_size for each in files), changed + len(files))
+                elif entry.name.endswith(".mcap"):
+                    status = entry.stat()
+                    yield name, (status.st_size, status.st_mtime_ns)
+
+
+def _summary(path: Path) -> str:
+    """Contents of a recording as JSON."""
+    try:
+        recording = RecordingFile(path)
+        runs = [
+            asdict(_run(name, number, epoch))
+            for name in recording
+            for number, epoch in enumerate(recording[name].epochs)
+        ]
+        every = recording.marks
+        skipped = max(len(every) - MARKS, 0)
+        marks = [
+            (mark.name, mark.time, json.dumps(mark.values)[:1000])
+            for mark in (every[: MARKS // 2] + every[MARKS // 2 + skipped :])
+        ]
+        found = {"finished": recording.finished, "runs": runs, "marks": marks}
+        return json.dumps(found | {"mark_count": len(every), "problem": ""})
+    except _DAMAGED as error:
+        nothing = {"finished": False, "runs": [], "marks": [], "mark_count": 0}
+        return json.dumps(nothing | {"problem": str(error) or repr(error)})
+
+
+def _run(segment: str, number: int, epoch: Any) -> FoundRun:
+    begin, end = epoch.time_range if epoch.rows else (0, 0)
+    is_cut = any(gap.last is None for gap in epoch.gaps)
+    return FoundRun(
+        segment=segment,
+        number=number,
+        robot=epoch.schema["robot"],
+        begin=begin + epoch.wall_offset,
+        end=end + epoch.wall_offset,
+        rows=epoch.rows,
+        missing=epoch.missing,
+        ended=epoch.end or ("missing" if is_cut else ""),
+    )
+
+
+def _found(path: Path, stamp: Stamp, text: str) -> FoundRecording:
+    read = json.loads(text)
+    return FoundRecording(
+        path=path,
+        size=stamp[0],
+        problem=read["problem"],
+        finished=read["finished"],
+        runs=tuple(FoundRun(**run) for run in read["runs"]),
+        marks=tuple((name, time, values) for name, time, values in read["marks"]),
+        mark_count=read["mark_count"],
+    )
+
+
+# ---------------------------------------------------------------------- the index
+
+
+def _read(root: Path) -> dict[str, tuple[Stamp, FoundRecording]]:
+    """Contents of the index, by path. One of another version, or a damaged one, is removed."""
+    index = root / INDEX
+    if not index.exists():
+        return {}
+    try:
+        place = f"{index.absolute().as_uri()}?mode=ro"
+        with contextlib.closing(sqlite3.connect(place, uri=True)) as db:
+            (version,) = db.execute("PRAGMA user_version").fetchone()
+            if version != VERSION:
+                raise ValueError("another version")
+            return {
+                name: ((size, changed), _found(root / name, (size, changed), text))
+                for name, size, changed, text in db.execute("SELECT * FROM recordings")
+            }
+    except (sqlite3.Error, ValueError, TypeError, LookupError):
+        for path in (index, index.with_name(f"{INDEX}-journal")):
+            with contextlib.suppress(OSError):
+                path.unlink(missing_ok=True)
+        return {}
+
+
+def _write(root: Path, new: list[tuple[str, int, int, str]], gone: set[str]) -> None:
+    try:
+        with contextlib.closing(sqlite3.connect(root / INDEX)) as db, db:
+            db.execute("PRAGMA synchronous = OFF")  # it can be made anew
+            db.execute(f"PRAGMA user_version = {VERSION}")
+            db.execute(
+                "CREATE TABLE IF NOT EXISTS recordings"
+                "(name TEXT PRIMARY KEY, size INTEGER, changed INTEGER, found TEXT)"
+            )
+            db.executemany("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", new)
+            db.executemany("DELETE FROM recordings WHERE name = ?", ((name,) for name in gone))
+    except sqlite3.Error as error:
+        warnings.warn(
+            f"{root / INDEX} cannot be written ({error}): the next call reads these recordings "
+            f"again",
+            RuntimeWarning,
+            stacklevel=3,
+        )
