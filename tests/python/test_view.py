@@ -12,9 +12,12 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import numpy as np
 import pytest
 
 import o80
+from o80.view import page_file
+from o80.view.page_file import write_page
 
 TIMEOUT = 60.0
 
@@ -115,6 +118,47 @@ def test_the_command_prints_the_address_that_is_bound(arm: o80.Frontend) -> None
         assert look(running.stdout.readline().strip())["source"] == arm.segment
         running.send_signal(signal.SIGINT)
         assert running.wait(TIMEOUT) == 0
+
+
+def test_a_page_in_a_file_is_refused_with_a_cure(
+    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run, path = tmp_path / "run.mcap", tmp_path / "run.html"
+    with o80.Recording(run, arm):
+        arm.burst(1000)
+    with pytest.raises(o80.InvalidArgument, match="o80 record arm"):
+        write_page(["arm"], path)
+    with monkeypatch.context() as changed:
+        changed.setattr(page_file, "LARGEST", 1000)
+        with pytest.raises(o80.InvalidArgument, match=r"about \d+ MB, .* `o80 cut"):
+            write_page([str(run)], path)
+    assert not path.exists()
+    assert write_page([str(run)], path) == path.stat().st_size
+    with pytest.raises(o80.InvalidArgument, match="exists"):
+        write_page([str(run)], path)
+    empty = tmp_path / "empty.mcap"
+    with o80.Backend("none-yet", ["lift"]), o80.Recording(empty, "none-yet"):
+        pass
+    with pytest.raises(o80.RecordingError, match=r"empty\.mcap"):
+        write_page([str(empty)], tmp_path / "empty.html")
+
+
+def test_a_curve_in_a_file_has_the_extremes_and_gaps_of_all_rows() -> None:
+    values = np.random.default_rng(1).standard_normal(500)
+    values[100], values[200:230] = 50.0, np.nan
+    recorded = page_file._Recorded.__new__(page_file._Recorded)
+    recorded.ticks = np.arange(0, 500, 17)
+    kept = recorded._kept(values)
+    assert set(recorded.ticks) <= set(kept)
+    assert np.nanmax(values[kept]) == 50.0
+    for begin in recorded.ticks:
+        of_all, drawn = (
+            values[begin : begin + 17],
+            values[kept[(kept >= begin) & (kept < begin + 17)]],
+        )
+        assert np.fmin.reduce(of_all) == pytest.approx(np.fmin.reduce(drawn), nan_ok=True)
+        assert np.fmax.reduce(of_all) == pytest.approx(np.fmax.reduce(drawn), nan_ok=True)
+        assert np.isnan(of_all).any() == np.isnan(drawn).any()
 
 
 def test_the_program_of_the_page_runs(tmp_path: Path) -> None:

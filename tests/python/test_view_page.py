@@ -11,7 +11,7 @@ import pytest
 
 import o80
 from chromium import Chromium, Page
-from o80.view.curves import readable
+from o80.view.page_file import write_page
 from o80.view.serve import page_server
 
 pytestmark = pytest.mark.check
@@ -205,7 +205,7 @@ def test_the_slider_goes_back_through_the_ring_and_live_returns(
         scrub(page, first + (row.time - int(rows.time[0])) * 1e-9 + 1e-6)
         page.wait_for("page.timeline.at !== null && page.answer.last - page.answer.at > 0.01")
         shown = arm.history(since=page.value("page.answer.iteration"))[0]
-        assert page.value("page.answer.values.elbow.observed") == readable(shown.observed[1], "rad")
+        assert page.value("page.answer.values.elbow.observed") == shown.observed[1]
         assert "s ago" in page.text()
         before = page.value("page.answer.last")
         page.wait_for(f"page.answer.last > {before}")  # the robot goes on
@@ -271,7 +271,7 @@ def test_a_recording_is_played_and_scrubbed(
         page.wait_for("!page.timeline.playing")
         scrub(page, 1.0)
         page.wait_for("page.answer.iteration === 1000")
-        assert page.value("page.answer.values.elbow.desired") == "0.5 rad"
+        assert page.value("page.answer.values.elbow.desired") == 0.5
         page.value(
             "document.getElementById('speed').value = '0.1'"
         )  # so that a slow computer sees it
@@ -280,6 +280,77 @@ def test_a_recording_is_played_and_scrubbed(
         click(page, "play")
         page.wait_for("!page.timeline.playing")
         assert page.value("page.answer.iteration") < 4000
+        page.close()
+
+
+def test_a_recording_in_a_file_needs_no_server_and_shows_the_same(
+    browser: Chromium, segment: str, tmp_path: Path
+) -> None:
+    run, path = tmp_path / "run.mcap", tmp_path / "run.html"
+    first, second = f"{segment}-1", f"{segment}-2"
+    load = o80.robots.load("two_joints").inline
+    with (
+        load(first) as arm,
+        load(second) as other,
+        o80.Recording(run, [arm, other]) as recording,
+    ):
+        for robot in (arm, other):
+            robot.add_command(["shoulder", "elbow"], [0.4, 1.0], iterations=2000)
+            robot.burst(1000)
+        recording.mark("<b>half</b>")
+        for robot in (arm, other):
+            robot.burst(2000)
+    write_page([str(run)], path)
+    rows = o80.open(run)[first].history()
+    page = browser.page("about:blank")
+    page.call("Network.enable")
+    page.call(
+        "Network.emulateNetworkConditions",
+        offline=True,
+        latency=0,
+        downloadThroughput=0,
+        uploadThroughput=0,
+    )
+    errors = """window.errors = []; console.error = (...each) => errors.push(each.join());
+    addEventListener('error', (event) => errors.push(event.message));
+    addEventListener('unhandledrejection', (event) => errors.push(String(event.reason)));
+    addEventListener('securitypolicyviolation', (event) => errors.push(event.blockedURI));"""
+    page.call("Page.addScriptToEvaluateOnNewDocument", source=errors)
+    page.call("Page.navigate", url=path.as_uri())
+    page.wait_for(SHOWN)
+    click(page, "play")
+    assert not page.value("document.getElementById('halt')")
+    for seconds in (0.0, 0.7, 1.5, 2.9):
+        scrub(page, seconds)
+        page.wait_for(f"Math.abs(page.answer.at - {seconds}) < 0.02 && page.answer.curves")
+        row = rows[int(page.value("page.answer.iteration"))]
+        shoulder, elbow = (float(angle) for angle in row.observed)
+        assert page.value("page.answer.at") == pytest.approx((row.time - rows.time[0]) * 1e-9)
+        assert page.value("page.answer.values.elbow.observed") == pytest.approx(elbow, abs=1e-6)
+        assert page.value(f"{POSE}[12]") == pytest.approx(
+            math.sin((shoulder + elbow) / 2), abs=1e-6
+        )
+    page.wait_for("page.answer.curves.marks.length === 1")
+    assert page.value("page.answer.curves.marks[0][1]") == "<b>half</b>"
+    page.value("document.querySelectorAll('#segments .eye')[1].click()")  # a copy of the first
+    page.wait_for("page.scene.robots.size === 2")
+    assert page.value("performance.getEntriesByType('resource').length") == 0
+    assert page.value("window.errors") == []
+    page.close()
+
+
+def test_numbers_are_readable_and_have_their_unit(browser: Chromium, arm: o80.Frontend) -> None:
+    with page_server([arm.segment]) as server:
+        page = browser.page(server.url)
+        page.wait_for("page.looks > 0")
+        numbers = (
+            "[[15710, 'Pa'], [0.5, 'rad'], [-0.00042, 'm'], [15710.4, ''], [0, 'm'],"
+            "['nan', 'm'], [2e12, 'kg'], [1.5e-7, '']]"
+        )
+        assert page.value(f"{numbers}.map((each) => readable(...each))") == [
+            *("15.71 kPa", "0.5 rad", "-420 \u00b5m", "15\u202f710", "0 m", "nan", "2e+12 kg"),
+            "1.5e-7",
+        ]
         page.close()
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -26,6 +27,13 @@ def view(
     browser: Annotated[
         bool | None, typer.Option(help="Open the page (default: if there is a screen).")
     ] = None,
+    html: Annotated[
+        Path | None,
+        typer.Option(
+            "--html",
+            help="Write recordings into this file, which any browser opens without o80; no server.",
+        ),
+    ] = None,
     model_files: Annotated[
         bool,
         typer.Option(
@@ -38,6 +46,12 @@ def view(
 
     The page can always halt a robot. Its address holds a secret token: share it with care.
     """
+    if html is not None:
+        from o80.view.page_file import write_page
+
+        size = write_page(names or [], html, model_files=model_files)
+        print(f"written to {html}, {size / 1e6:.1f} MB: open it in a browser")
+        return
     from o80.view.browser import has_screen, open_browser
     from o80.view.guard import is_loopback
     from o80.view.serve import page_server, wait_for_end

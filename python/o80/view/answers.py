@@ -33,7 +33,7 @@ class Answers:
     def __init__(self, sources: SourceList, *, control: bool) -> None:
         self._sources = sources
         self._control = control
-        self._shown: dict[str, tuple[str, Future[_Shown]]] = {}  # by label, with the key
+        self._shown: dict[str, tuple[str, Future[Shown]]] = {}  # by label, with the key
         self._makers = ThreadPoolExecutor(MAKERS)
         self._lock = threading.Lock()
 
@@ -120,13 +120,13 @@ class Answers:
             answer["curves"] = shown.curves(source, panels, _window(query), at)
         return answer
 
-    def _shown_of(self, source: Source, *, wait: bool = True) -> "_Shown | None":
+    def _shown_of(self, source: Source, *, wait: bool = True) -> "Shown | None":
         """None: not ready, and not to be waited for."""
         schema = source.schema  # NothingToShow, if there is no row
         with self._lock:
             key, made = self._shown.get(source.label, ("", None))
             if made is None or key != source.key:
-                key, made = source.key, self._makers.submit(_Shown, source, schema)
+                key, made = source.key, self._makers.submit(Shown, source, schema)
                 self._shown[source.label] = key, made
         return made.result() if wait or made.done() else None
 
@@ -156,7 +156,7 @@ class Answers:
         raise InvalidArgument(f"this view does not show a segment {query.get('segment')!r}")
 
 
-class _Shown:
+class Shown:
     """Results that are worked out once for a run of a robot."""
 
     def __init__(self, source: Source, schema: dict[str, Any]) -> None:
@@ -178,6 +178,7 @@ class _Shown:
             "clock": schema["clock"],
             "panels": self.panels.names,
             "units": self.panels.units,
+            "labels": self.panels.labels,
             "first_panels": self.panels.first,
             "scene": None if self.scene is None else self.scene.geometry,
             "no_scene": "" if self.scene is not None else self.no_scene,

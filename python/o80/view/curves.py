@@ -1,4 +1,4 @@
-"""Curves of rows with as many points as a page can show, and numbers as a person reads them."""
+"""Curves of rows with as many points as a page can show."""
 
 import math
 from typing import Any
@@ -13,10 +13,8 @@ from o80.view.base64_arrays import packed
 
 STRETCHES = 400  # of a curve, about one for each pixel of its width
 MAX_PANELS = 12
+EXACT = 2**53  # integers below are exact in a browser
 FIRST_PANELS = 3  # shown before the user chooses
-_PREFIXES = {9: "G", 6: "M", 3: "k", 0: "", -3: "m", -6: "\u00b5", -9: "n"}
-# units that take a prefix
-_PREFIXED = {"Pa", "N", "Nm", "m", "m/s", "rad", "rad/s", "s", "V", "A", "W", "J", "Hz"}
 
 
 class Panels:
@@ -70,11 +68,21 @@ class Panels:
         units = {panel: next(iter(of.values())).unit for panel, of in self.columns.items()}
         return {panel: unit for panel, unit in units.items() if unit}
 
-    def values(self, row: Observation, panels: list[str]) -> dict[str, dict[str, str]]:
-        """The numbers of one row as text, by panel and part."""
+    @property
+    def labels(self) -> dict[str, dict[int, str]]:
+        """The words for the numbers of each panel that has them."""
+        labels = {panel: next(iter(of.values())).labels for panel, of in self.columns.items()}
+        return {
+            panel: {number: label for label, number in of.items()}
+            for panel, of in labels.items()
+            if of is not None
+        }
+
+    def values(self, row: Observation, panels: list[str]) -> dict[str, dict[str, float | str]]:
+        """The numbers of one row, by panel and part; as text, what JSON cannot hold as a number."""
         return {
             panel: {
-                part: _text(value_of(row, column), column)
+                part: _value(value_of(row, column), column)
                 for part, column in self.columns[panel].items()
             }
             for panel in panels[:MAX_PANELS]
@@ -94,26 +102,9 @@ def drawn_rows(values: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.unique(np.concatenate([starts, *extremes, ends]))
 
 
-def _text(value: Any, column: Column) -> str:
+def _value(value: Any, column: Column) -> float | str:
     if column.labels is not None:
         labels = {number: label for label, number in column.labels.items()}
         return labels.get(int(value), str(int(value)))
-    if column.dtype.kind == "f":
-        return readable(float(value), column.unit)
-    return f"{value.item()} {column.unit}".strip()
-
-
-def readable(value: float, unit: str) -> str:
-    """A number with four digits, without powers of ten where a prefix or groups of digits do."""
-    if not math.isfinite(value) or value == 0:
-        return f"{value:g} {unit}".strip()
-    power = math.floor(math.log10(abs(value)))
-    prefix = ""
-    if unit in _PREFIXED and not -3 <= power <= 3:
-        thousands = min(max(power // 3 * 3, -9), 9)
-        value, power, prefix = value / 10.0**thousands, power - thousands, _PREFIXES[thousands]
-    if not -4 <= power <= 9:
-        return f"{value:.4g} {prefix}{unit}".strip()
-    text = f"{value:,.{max(0, 3 - power)}f}"
-    text = text.rstrip("0").rstrip(".") if "." in text else text
-    return f"{text} {prefix}{unit}".replace(",", "\u202f").strip()
+    number: float = value.item()
+    return number if math.isfinite(number) and abs(number) < EXACT else str(number)

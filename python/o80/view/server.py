@@ -103,7 +103,10 @@ def _why_not(host: str, port: int, error: Exception) -> str:
     return f"cannot listen on {host}, port {port}: {getattr(error, 'strerror', None) or error}"
 
 
-SCRIPTS = ("vectors.js", "shapes.js", "scene.js", "curves.js", "lists.js", "timeline.js", "main.js")
+SCRIPTS = (
+    *("vectors.js", "shapes.js", "scene.js", "curves.js", "lists.js", "timeline.js"),
+    *("file.js", "main.js"),
+)
 
 
 @dataclass(frozen=True)
@@ -115,8 +118,8 @@ class Page:
 
 
 @cache
-def page_text() -> Page:
-    """The page of `o80 view`."""
+def page_text(recording: str = "") -> Page:
+    """The page of `o80 view`; or, with a recording, a page that needs no server."""
     folder = files("o80.view") / "page"
     script = "".join((folder / name).read_text() for name in SCRIPTS)
     script = f'"use strict";\n{script}'
@@ -125,9 +128,17 @@ def page_text() -> Page:
     html = html.replace("/* style */", style).replace("/* script */", script)
     policy = (
         f"default-src 'none'; connect-src 'self'; img-src data:; script-src '{_hash(script)}'; "
-        f"style-src '{_hash(style)}'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        f"style-src '{_hash(style)}'; base-uri 'none'; form-action 'none'"
     )
-    return Page(html.encode(), policy)
+    if recording:
+        policy = policy.replace("'self'", "'none'")
+        buttons = ('id="halt"', 'id="resume"')
+        lines = [line for line in html.split("\n") if not any(each in line for each in buttons)]
+        meta = f'<meta http-equiv="Content-Security-Policy" content="{policy}">'
+        data = f'<script id="recording" type="text/plain">{recording}</script>'
+        html = "\n".join(lines).replace("<title>", f"{meta}\n<title>")
+        html = html.replace('<script>"use', f'{data}\n<script>"use')
+    return Page(html.encode(), f"{policy}; frame-ancestors 'none'")
 
 
 def _hash(text: str) -> str:

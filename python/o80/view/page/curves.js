@@ -24,7 +24,7 @@ class Chart {
   values(texts) {
     this.head.replaceChildren(element("b", this.unit ? `${this.name} [${this.unit}]` : this.name));
     for (const [part, text] of Object.entries(texts || {})) {
-      this.head.append(element("span", `${part === "extended" ? "" : `${part} `}${text}`, part));
+      this.head.append(element("span", `${part === "extended" ? "" : `${part} `}${readable(text, this.unit ?? "")}`, part));
     }
   }
 
@@ -146,6 +146,23 @@ class Chart {
 function grouped(value) {
   if (Math.abs(value) >= 1e9) return value.toExponential();
   return value.toLocaleString("en", { maximumSignificantDigits: 6 }).replaceAll(",", "\u202f");
+}
+
+const PREFIXES = { 9: "G", 6: "M", 3: "k", 0: "", "-3": "m", "-6": "\u00b5", "-9": "n" };
+const PREFIXED = ["Pa", "N", "Nm", "m", "m/s", "rad", "rad/s", "s", "V", "A", "W", "J", "Hz"]; // units that take one
+
+// a number with four digits, without powers of ten where a prefix or groups of digits do; or a word
+function readable(value, unit) {
+  if (typeof value !== "number" || value === 0) return `${value} ${typeof value === "number" ? unit : ""}`.trim();
+  let power = Math.floor(Math.log10(Math.abs(value)));
+  let prefix = "";
+  if (PREFIXED.includes(unit) && !(power >= -3 && power <= 3)) {
+    const thousands = Math.min(Math.max(Math.floor(power / 3) * 3, -9), 9);
+    [value, power, prefix] = [value / 10 ** thousands, power - thousands, PREFIXES[thousands]];
+  }
+  const short = power < -4 || power > 9 ? value.toExponential(3).replace(/\.?0+e/, "e") : null;
+  const digits = { maximumFractionDigits: Math.max(0, 3 - power) };
+  return `${short ?? value.toLocaleString("en", digits).replaceAll(",", "\u202f")} ${prefix}${unit}`.trim();
 }
 
 // round numbers between two ends

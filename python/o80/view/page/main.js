@@ -1,4 +1,4 @@
-// Asks the server, shows the answer, asks again: there is never more than one answer on its way.
+// Asks the server, or the recording inside this file, shows the answer, asks again: there is never more than one answer on its way.
 
 const BETWEEN_LOOKS = 40; // [ms]
 const BETWEEN_CURVES = 110; // [ms]
@@ -21,13 +21,14 @@ class Page {
     this.looks = 0;
     this.curvesAt = 0;
     this.said = ""; // what a button answered
-    byId("halt").addEventListener("click", () => this.command("/halt", {}));
-    byId("resume").addEventListener("click", () => this.command("/resume", { number: this.line().halt?.number }));
+    byId("halt")?.addEventListener("click", () => this.command("/halt", {}));
+    byId("resume")?.addEventListener("click", () => this.command("/resume", { number: this.line().halt?.number }));
     byId("window").addEventListener("change", () => { this.curvesAt = 0; });
     byId("list").addEventListener("click", () => document.body.classList.toggle("list"));
   }
 
   async post(path, body) {
+    if (this.file) return this.file.look(body);
     const answer = await fetch(path, {
       method: "POST",
       headers: { Authorization: `Bearer ${token}` },
@@ -41,6 +42,8 @@ class Page {
   }
 
   async run() {
+    const recording = byId("recording");
+    if (recording) this.file = await RecordingInFile.read(recording.textContent);
     for (;;) {
       const begin = performance.now();
       try {
@@ -138,6 +141,7 @@ class Page {
   showButtons() {
     const line = this.line();
     const halt = byId("halt");
+    if (!halt) return; // a recording in a file
     halt.hidden = line.live === false;
     halt.disabled = !(line.live && line.alive);
     halt.textContent = line.live ? `Halt ${line.name}` : "Halt";
@@ -161,7 +165,7 @@ class Page {
   lost(error) {
     const gone = error instanceof TypeError || error.name === "TimeoutError";
     this.notice(gone ? "No answer: o80 view has ended or is stopped. Trying again." : error.message);
-    byId("halt").disabled = gone && !this.answer;
+    if (!this.file) byId("halt").disabled = gone && !this.answer;
   }
 
   async command(path, body) {

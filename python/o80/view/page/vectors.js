@@ -59,5 +59,5 @@ function bytesOf(text) {
   for (let i = 0; i < binary.length; ++i) bytes[i] = binary.charCodeAt(i);
   return bytes;
 }
-const floats = (text) => new Float32Array(bytesOf(text).buffer);
+const floats = (text) => (typeof text === "string" ? new Float32Array(bytesOf(text).buffer) : text);
 const indices = (text) => new Uint32Array(bytesOf(text).buffer);
