@@ -71,6 +71,13 @@ void bind_replay(nb::module_& m) {
           },
           "times"_a, nb::sig("def run(self, times: numpy.typing.NDArray[numpy.int64]) -> bool"))
       .def(
+          "begin_at_rest",
+          [](WithDriver& self, std::int64_t first, const nb::bytes& before, std::uint32_t slot) {
+            const auto* row = reinterpret_cast<const std::byte*>(before.c_str());
+            self.open().begin_at_rest(first, {row, before.size()}, slot);
+          },
+          "first"_a, "before"_a, "slot"_a)
+      .def(
           "load_snapshot",
           [](WithDriver& self, std::uint32_t slot, const nb::bytes& bytes) {
             const auto* state = reinterpret_cast<const std::byte*>(bytes.c_str());

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 import o80
 from o80 import _core
 from o80.base.machine import this_machine
+from o80.recording.recorder import Recorder
 from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
 from o80.replaying.replay import replay_runs
 from o80.rows.columns import columns_of
@@ -329,6 +330,50 @@ def test_a_recording_in_several_files_repeats(segment: str, tmp_path: Path) -> N
     assert len(list(path.glob("*.mcap"))) > 1
     done = o80_replay(str(path))
     assert f"{segment}: {rows} rows, identical" in done.stdout, done.stdout + done.stderr
+
+
+@pytest.mark.filterwarnings("ignore:no snapshot is recorded:RuntimeWarning")  # it often moves
+@pytest.mark.parametrize("seed", range(3))
+def test_a_recording_whose_beginning_is_missing_is_replayed_from_a_snapshot(
+    segment: str, seed: int, tmp_path: Path
+) -> None:
+    paths, rows = [tmp_path / "with.mcap", tmp_path / "without.mcap"], []
+    for path in paths:
+        choose = random.Random(seed)
+        snapshots = 1e-6 if path is paths[0] else None
+        with o80.robots.load("two_joints").inline(segment) as arm:
+            arm.add_command("elbow", 0.3, iterations=50)
+            arm.burst(80)
+            recorder = Recorder(
+                path, [segment], from_now=True, split="8k", keep="300k", snapshots=snapshots
+            )
+            for _ in range(60):
+                for _ in range(choose.randrange(3)):
+                    iterations = choose.randrange(1, 40)
+                    arm.add_command(choose.choice(NAMES), choose.random(), iterations=iterations)
+                arm.burst(choose.randrange(1, 60))
+                recorder.poll()
+            recorder.finish()
+            rows.append(arm.history())
+    (run,) = o80.replay(paths[0])
+    assert run.identical, run
+    assert run.rows > 100
+    assert any("begins with the snapshot of row" in note for note in run.notes)
+    assert not (paths[0] / "0000.mcap").exists()
+    assert not o80.replay(paths[1]).identical
+    for column in ("desired", "observed", "active"):  # snapshots disturb nothing
+        assert np.array_equal(getattr(rows[0], column), getattr(rows[1], column))
+
+
+def test_a_robot_without_snapshots_is_told(segment: str, tmp_path: Path) -> None:
+    with o80.Backend(segment, 1) as backend:
+        backend.publish([0.0])
+        recorder = Recorder(tmp_path / "run.mcap", [segment], snapshots=60.0)
+        with pytest.warns(RuntimeWarning, match="serves no request snapshot"):
+            recorder.poll()
+        recorder.finish()
+    with pytest.raises(o80.InvalidArgument, match="snapshots must be a positive number"):
+        Recorder(tmp_path / "other.mcap", [segment], snapshots=-1.0)
 
 
 def test_the_command_says_when_rows_are_missing(segment: str) -> None:

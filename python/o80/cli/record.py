@@ -76,6 +76,13 @@ def record(
             help="With --split: delete the oldest files without marks, to hold no more than this."
         ),
     ] = None,
+    snapshots: Annotated[
+        float | None,
+        typer.Option(
+            callback=_seconds,
+            help="Ask simulations for a snapshot in this time [s], from which a replay can begin.",
+        ),
+    ] = None,
     proceed: Annotated[
         bool, typer.Option("--continue", help="Append to the file, also to one that was cut.")
     ] = False,
@@ -105,7 +112,14 @@ def record(
     most = _size(size)
     end = StopRequest()
     recorder = Recorder(
-        output, names, proceed=proceed, from_now=from_now, split=split, keep=keep, form=form
+        output,
+        names,
+        proceed=proceed,
+        from_now=from_now,
+        split=split,
+        keep=keep,
+        snapshots=snapshots,
+        form=form,
     )
     report = _Report(recorder, from_now)
     begin = time.monotonic()

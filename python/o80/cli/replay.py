@@ -38,7 +38,8 @@ def replay(
     since: Annotated[
         int | None,
         typer.Option(
-            help="Begin at the first reset or restored snapshot in this iteration or later."
+            help="Begin at the first reset or snapshot (restored, or at rest) of this iteration "
+            "or later."
         ),
     ] = None,
     without_driver: Annotated[

@@ -20,6 +20,7 @@ from o80.recording.log_channel import INFO, Line, added_lines
 from o80.recording.marks import Mark, added_marks, has_marks
 from o80.recording.output import Predecessor, next_file, opened, opened_in
 from o80.recording.reader import files_of
+from o80.recording.snapshots import interval
 from o80.recording.source import Source
 from o80.recording.summary import room_for_end
 
@@ -45,6 +46,7 @@ class Recorder:
         from_now: bool = False,
         split: str | None = None,
         keep: str | None = None,
+        snapshots: float | None = None,
         form: Form = USUAL,
     ) -> None:
         """names: of segments, or patterns such as "arm*". proceed: continue an existing file.
@@ -52,12 +54,13 @@ class Recorder:
 
         path: ends in .mcap. split: go on in a new file after this size or time, see Split; `path`
         is a folder of files then. keep: the most that the folder may hold, such as "50G": the
-        oldest files of this recorder that have no mark are deleted. Raises RecordingError,
-        InvalidArgument: then no new file is left.
+        oldest files of this recorder that have no mark are deleted. snapshots: ask simulations for
+        one in this time [s]. Raises RecordingError, InvalidArgument: then no new file is left.
         """
         if not names:
             raise InvalidArgument("give the name of at least one segment to record")
         self.path = path = Path(path)
+        self._snapshots = None if snapshots is None else interval(snapshots)
         self._split = None if split is None else Split.of(split)
         self._keep = math.inf if keep is None else _most(keep, self._split)
         self._removable: list[tuple[Path, int]] = []  # own complete files without marks, and sizes
@@ -246,7 +249,9 @@ class Recorder:
                     f"another file"
                 )
         written = self._before.written(name) if self._before else {}
-        self.sources[name] = Source(name, self.file, written, from_now=from_now)
+        self.sources[name] = Source(
+            name, self.file, written, from_now=from_now, snapshots=self._snapshots
+        )
 
     def _search(self, from_now: bool = False, *, new: bool = False) -> None:
         """Adds segments that match a pattern and are not recorded yet."""

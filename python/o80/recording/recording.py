@@ -32,6 +32,7 @@ class Recording(Closeable):
         is then a folder of complete files, which `o80.open` reads as one recording.
     keep: with `split`, the most that this folder holds ("50G"): the oldest files of this recording
         are deleted, but none with a mark.
+    snapshots: ask simulations for a snapshot in this time [s], from which a replay can begin.
     compression: "zstd", "lz4" or "none".
     joint_states: whether rows of robots with joints are also written as sensor_msgs/JointState.
 
@@ -48,6 +49,7 @@ class Recording(Closeable):
         from_now: bool = False,
         split: str | None = None,
         keep: str | None = None,
+        snapshots: float | None = None,
         compression: str = "zstd",
         joint_states: bool = True,
     ) -> None:
@@ -55,7 +57,14 @@ class Recording(Closeable):
         names = [each.segment if isinstance(each, Frontend) else each for each in several]
         form = Form(compression, joint_states)
         self._recorder = Recorder(
-            path, names, proceed=proceed, from_now=from_now, split=split, keep=keep, form=form
+            path,
+            names,
+            proceed=proceed,
+            from_now=from_now,
+            split=split,
+            keep=keep,
+            snapshots=snapshots,
+            form=form,
         )
         self._lock = threading.Lock()
         self._end = threading.Event()

@@ -16,6 +16,7 @@ from o80.recording.journal_channel import JournalRecorder, codec_of
 from o80.recording.log_channel import ERROR, INFO, JournalLog, Line
 from o80.recording.output import Written
 from o80.recording.row_writer import RowWriter
+from o80.recording.snapshots import SnapshotRequests
 
 LARGEST_BLOCK = 4 << 20  # of the rows read at once [bytes]
 BETWEEN_LOOKS = 0.05  # for a backend that is not there [s]
@@ -25,9 +26,17 @@ class Source:
     """Reads rows and journal of a segment by name. Not for several threads."""
 
     def __init__(
-        self, name: str, file: FileWriter, written: Mapping[int, Written], *, from_now: bool
+        self,
+        name: str,
+        file: FileWriter,
+        written: Mapping[int, Written],
+        *,
+        from_now: bool,
+        snapshots: float | None = None,
     ) -> None:
-        """written: by epoch, at least the newest. from_now: begin with the newest row."""
+        """written: by epoch, at least the newest. from_now: begin with the newest row. snapshots:
+        ask for one in this time [s].
+        """
         self.name = name
         self.rows = 0  #: recorded so far
         self.missed = 0  #: overwritten before they were read
@@ -44,6 +53,7 @@ class Source:
         self._journal_log: JournalLog | None = None
         self._has_told_end = False
         self._was_interrupted = bool(written)
+        self._snapshots = None if snapshots is None else SnapshotRequests(snapshots)
         self._next = 0
         self._last_log_time = max((each.last_log_time for each in written.values()), default=0)
         self._look_at = 0.0
@@ -91,6 +101,8 @@ class Source:
 
     def close(self) -> None:
         """Detaches."""
+        if self._snapshots is not None:
+            self._snapshots.close()
         if self._frontend is not None:
             self._frontend.close()
             self._frontend = None
@@ -111,6 +123,8 @@ class Source:
             return []
         assert self._frontend is not None
         blocks = self._read(self._frontend)
+        if self._snapshots is not None:
+            self._snapshots.poll(self._frontend)
         if not self._frontend.alive:
             blocks = blocks or self._read(self._frontend)  # what was published just before its end
             if self.has_read(self.position):

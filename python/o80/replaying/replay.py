@@ -29,7 +29,15 @@ from o80.replaying.entry_feed import EntryFeed, MotionRules
 from o80.replaying.recorded_run import ROWS_AT_ONCE, LiveRun, RecordedRun, runs_in
 from o80.replaying.report import ReplayReport, RunReport
 from o80.replaying.runner import OtherRobot, Runner, with_driver, without_driver
-from o80.replaying.start import Requests, SlotsKept, Start, find_fresh_start, find_rest, find_start
+from o80.replaying.start import (
+    Requests,
+    SlotsKept,
+    Start,
+    find_fresh_start,
+    find_kept,
+    find_rest,
+    find_start,
+)
 from o80.rows.columns import columns_of
 
 if TYPE_CHECKING:
@@ -65,9 +73,9 @@ def replay(
     tolerances, ignore: by column, as for `o80 diff`. None: bit for bit, but with a tolerance if
         another build of o80, C library or processor recorded the run; a note in the report says so.
         {}: bit for bit.
-    since: begin at the first reset or restored snapshot in this iteration or later. None: at row 0,
-        or at the first of these that the recording holds. Without a driver: at the first row in
-        which nothing acts, or at the first fresh start.
+    since: begin at the first reset, restored snapshot or snapshot at rest in this iteration or
+        later. None: at row 0, or at the first of these that the recording holds. Without a driver:
+        at the first row in which nothing acts, or at the first fresh start.
     driver: False starts no robot, as for hardware.
     progress: called with the name of a run, its rows compared, and all its rows.
 
@@ -183,6 +191,8 @@ class _RunReplay:
         self._start = start
         if start.row > 0:
             begins = "at rest in" if start.is_at_rest else f"with the {start.request} of"
+            if start.before:
+                begins = "with the snapshot of"
             self._notes.append(f"the replay begins {begins} row {start.row}")
         # without a driver, a restored snapshot is read as any other row
         known = Start() if self._no_driver else start
@@ -246,16 +256,15 @@ class _RunReplay:
         return found
 
     def _first_start(self, since: int) -> Start | None:
-        if not self._no_driver:
-            return find_start(self._run, since)
-        found = (find(self._run, since) for find in (find_rest, find_fresh_start))
+        ways = (find_rest, find_fresh_start) if self._no_driver else (find_start, find_kept)
+        found = (find(self._run, since) for find in ways)
         return min((each for each in found if each), key=lambda each: each.row, default=None)
 
     def _beginnings(self, between: str) -> str:
         begins = (
             ["row at rest", "reset", "resume"]
             if self._no_driver
-            else ["reset", "restored snapshot"]
+            else ["reset", "restored snapshot", "snapshot at rest"]
         )
         return between.join(begins)
 

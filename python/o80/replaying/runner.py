@@ -38,14 +38,16 @@ class Runner:
         """Begins at this row."""
         if start.row == 0:
             return
-        if start.is_at_rest:
-            assert isinstance(self.native, _core.DriverlessReplay)
-            self.native.begin_at_rest(start.row)
-            return
-        self.native.begin_at(start.row)
         if isinstance(self.native, _core.Replay):
             for slot, state in start.snapshots.items():
                 self.native.load_snapshot(slot, state)
+            if start.is_at_rest:
+                self.native.begin_at_rest(start.row, start.before, start.slot)
+                return
+        elif start.is_at_rest:
+            self.native.begin_at_rest(start.row)
+            return
+        self.native.begin_at(start.row)
 
     def run(self, block: History, start: Start) -> bool:
         """Runs one iteration for each row; False if the robot or its backend has ended."""

@@ -1,4 +1,5 @@
-"""Where a replay can begin: at row 0, at a reset, or at a restored snapshot that is recorded.
+"""Where a replay can begin: at row 0, at a reset, at a restored snapshot that is recorded, or at a
+snapshot that was taken while nothing acted.
 
 Without a driver: at row 0, at a fresh start, or at a row in which nothing acts.
 """
@@ -27,7 +28,9 @@ class Start:
     entry: int = 0  #: number of the first entry of the journal to obey
     request: str = ""  #: that began it: "reset" or "restore"; empty at row 0 and at rest
     snapshots: dict[int, bytes] = field(default_factory=dict)  #: by slot
-    is_at_rest: bool = False  #: nothing acts in this row
+    is_at_rest: bool = False  #: nothing acts in this row; with a driver, in the row before
+    slot: int = 0  #: at rest, with a driver: of the snapshot
+    before: bytes = b""  #: at rest, with a driver: the row before
 
 
 class Requests:
@@ -123,6 +126,49 @@ def find_start(run: RecordedRun, since: int) -> Start | None:
                 return Start(entry.iteration, entry.number, first[0], snapshots)
             sent.update((entry.lane, number) for _, _, number in named)
     return None
+
+
+def find_kept(run: RecordedRun, since: int) -> Start | None:
+    """The first snapshot, in row `since` or later, that was taken where nothing acted, or None.
+
+    It is the state after the row before, which has the desired states that go on.
+    """
+    requests, purges = Requests(run.schema), Purges(run.entries())
+    found: dict[int, tuple[int, int]] = {}  # by iteration: number of the first and the last entry
+    ends: _core.JournalEntry | None = None  # the batch that ended a stretch in which nothing acts
+    began: _core.JournalEntry | None = None
+    for entry in run.entries():
+        if entry.missed or entry.kind in _ACTS:
+            began = ends = None
+        if entry.kind == "at_rest":
+            began = entry
+        elif entry.kind == "taken" and (entry.records or entry.records_lost):
+            if began is not None and began.iteration < entry.iteration:
+                ends = entry
+            began = None
+            others = any(name != "snapshot" for name, _, _ in requests.of(entry))
+            if ends and (ends.iteration != entry.iteration or others or entry.records_lost):
+                ends = None
+        elif entry.kind == "snapshot" and ends is not None and ends.iteration == entry.iteration:
+            reaches = purges.reach_past(ends.number)
+            if entry.iteration >= since and not reaches:
+                found[entry.iteration] = ends.number, entry.number
+    for block in run.blocks():
+        usual = (block.rows["fresh"] == 0) & (block.rows["halted"] == 0)
+        for row in block.iteration[usual & np.isin(block.iteration + 1, [*found])]:
+            before = block.select(since=int(row), until=int(row)).rows.tobytes()
+            return _kept_at(run, int(row) + 1, found[int(row) + 1], before)
+    return None
+
+
+def _kept_at(run: RecordedRun, row: int, numbers: tuple[int, int], before: bytes) -> Start:
+    kept: dict[int, bytes] = {}
+    for entry in run.entries():
+        if entry.kind == "snapshot":
+            kept[entry.slot] = entry.kept
+        if entry.number == numbers[1]:
+            break
+    return Start(row, numbers[0], "", kept, is_at_rest=True, slot=entry.slot, before=before)
 
 
 def find_fresh_start(run: RecordedRun, since: int) -> Start | None:

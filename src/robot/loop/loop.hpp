@@ -55,11 +55,16 @@ class Loop final : public RequestServer {
   /// driver failed.
   Step replay(Iteration last) noexcept;
   /// Replay only: makes this the first iteration, instead of 0. Call it before `start`.
-  void begin_at(Iteration first) noexcept { backend_.begin_at(first); }
+  void begin_at(Iteration first, const std::byte* desired = nullptr) noexcept {
+    backend_.begin_at(first, desired);
+  }
   /// Fills a slot of the driver for snapshots; false if it refuses.
   bool load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept {
     return robot_->load_snapshot(slot, bytes);
   }
+  /// Serves the request `restore` without a fresh start: what was asked goes on. Call it between
+  /// two iterations; false if the driver refuses.
+  bool restore(std::uint32_t slot) noexcept;
   /// Cancels the rest of the current burst.
   void cut_burst() noexcept { backend_.cut_burst(); }
   /// Stops the robot and ends the backend. Called by run() and the destructor.

@@ -55,6 +55,15 @@ Served Loop::serve(std::uint32_t request, std::span<const std::byte> payload) no
   return served;
 }
 
+bool Loop::restore(std::uint32_t slot) noexcept {
+  for (std::uint32_t i = 0; i < backend_.schema().requests.size(); ++i) {
+    if (backend_.schema().requests[i].name.view() != "restore") continue;
+    const Served served = serve(i, std::as_bytes(std::span(&slot, 1)));
+    return served.kind == Served::Kind::start_afresh;
+  }
+  return false;
+}
+
 KeptState Loop::kept_state(std::uint32_t request, std::span<const std::byte> payload) noexcept {
   if (request != snapshot_ || payload.size() < sizeof(std::uint32_t)) return {};
   KeptState kept;

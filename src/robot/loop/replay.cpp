@@ -41,6 +41,15 @@ Replay::Replay(std::unique_ptr<DriverInstance> robot, BackendOptions options)
 
 void Replay::begin_at(Iteration first) noexcept { loop_.begin_at(first - 1); }
 
+void Replay::begin_at_rest(Iteration first, std::span<const std::byte> before, std::uint32_t slot) {
+  const RowLayout& layout = loop_.backend().layout();
+  if (before.size() != layout.size) throw InvalidArgument("the rows have another size");
+  const auto desired = before.subspan(layout.desired, layout.block);
+  desired_.assign(desired.begin(), desired.end());
+  restored_ = slot;
+  loop_.begin_at(first - 1, desired_.data());
+}
+
 void Replay::load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) {
   if (loop_.load_snapshot(slot, bytes)) return;
   throw DriverError("the robot cannot take the recorded snapshot of slot " + std::to_string(slot) +
@@ -56,7 +65,10 @@ bool Replay::run(std::span<const std::int64_t> times) {
   if (times.empty()) return true;
   const auto last = next() + static_cast<Iteration>(times.size()) - 1;
   recorded_.set_times(next(), times);
-  if (!std::exchange(started_, true)) loop_.start();
+  if (!std::exchange(started_, true)) {
+    loop_.start();
+    if (restored_ && !loop_.restore(*restored_)) return false;
+  }
   return loop_.replay(last) == Step::run;
 }
 

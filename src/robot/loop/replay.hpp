@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "o80/runtime/journal.hpp"
 #include "robot/driver/driver_instance.hpp"
@@ -28,6 +29,9 @@ class Replay {
   /// shows the start state, and obeys the decisions of this iteration and later ones. Call it
   /// before `add` and `run`.
   void begin_at(Iteration first) noexcept;
+  /// The same where nothing acts: with the desired states of the recorded row before it, and the
+  /// state of the robot that `load_snapshot` put into this slot. Throws InvalidArgument.
+  void begin_at_rest(Iteration first, std::span<const std::byte> before, std::uint32_t slot);
   /// Fills a slot of the driver with a recorded snapshot. Throws DriverError if it refuses.
   void load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes);
   /// Adds the next entry of the recorded journal. Add all of an iteration before it runs. Throws
@@ -49,6 +53,8 @@ class Replay {
   std::uint32_t lanes_;
   RecordedDecisions recorded_;
   Loop loop_;
+  std::vector<std::byte> desired_;
+  std::optional<std::uint32_t> restored_;  // the slot that is loaded before the first iteration
   bool started_ = false;
 };
 
