@@ -137,7 +137,10 @@ FAULTS: dict[str, tuple[dict[str, str | tuple[str, str] | None], str, str, str]]
         "busy neighbours", "'yes (1) {}', thread 77", "sudo taskset -pc 0-2 77",
     ),
     "interrupt storm": (
-        {"proc/interrupts": (interrupts(5), interrupts(90_005))},
+        {
+            "proc/interrupts": (interrupts(5), interrupts(90_005)),
+            "proc/77/task/77/stat": (thread("irq/30-eth0", 3, 100), thread("irq/30-eth0", 3, 280)),
+        },
         "interrupts", "45000 a second of eth0", "echo 0-2 | sudo tee /proc/irq/30/",
     ),
     "governor": (
@@ -198,6 +201,19 @@ def test_each_fault_alone_is_the_one_finding(tmp_path: Path, fault: str) -> None
     assert finding.name == name
     assert seen in finding.seen
     assert cure in finding.cure
+
+
+def test_settings_that_delay_nothing_are_no_findings(tmp_path: Path) -> None:
+    computer = recorded("preempt_rt", tmp_path)
+    computer.change("sys/fs/cgroup/user.slice/cpu.max", "400000 100000\n")  # all four
+    computer.change("sys/fs/cgroup/cpu.max", "max 100000\n")
+    computer.change("proc/sys/kernel/sched_rt_runtime_us", "1000000\n")
+    computer.change("proc/self/limits", LIMITS.format("unlimited", "unlimited", 81, 81))
+    computer.change("proc/self/mountinfo", MOUNT.format("/dev/shm", ",size=1g"))
+    computer.change("proc/interrupts", interrupts(5), interrupts(5))
+    computer.change("proc/77/task/77/stat", thread("ls", 3, 100), thread("ls", 3, 130))
+    computer.change(f"{CLOCK}/current_clocksource", "kvm-clock\n")
+    assert computer.examine(2000).findings == ()
 
 
 def test_every_check_is_reached_by_a_fault() -> None:

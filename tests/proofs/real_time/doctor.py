@@ -21,6 +21,7 @@ EXPECTED: dict[str, list[str]] = {
     "throttling": ["throttling of real-time threads"],
     "priority limit 0": ["priority limit"],
     "locked memory 64 kB": ["locked memory limit"],
+    "limits cured": [],
     "busy on the isolated processor": ["busy neighbours"],
     "swap": ["swap"],
     "small shared memory": ["size of /dev/shm"],

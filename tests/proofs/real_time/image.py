@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 # dynamic programs of Debian that come with their libraries
-GUESTS = ("cyclictest", "chrt")
+GUESTS = ("cyclictest", "chrt", "prlimit")
 
 
 def libraries(program: Path) -> set[Path]:

@@ -57,7 +57,8 @@ class Evidence:
             if then is None or not self.seconds:
                 continue
             share = (now.ticks - then.ticks) / 100 / self.seconds
-            if share >= BUSY:
+            # the thread of an interrupt goes where the interrupt goes
+            if share >= BUSY and not now.name.startswith("irq/"):
                 found.append((share, number, now.processor, now.name))
         return sorted(found, reverse=True)
 
@@ -311,10 +312,12 @@ class Quota(Check):
                 at.computer.note(file, f"'{text[:20]}' is not a quota")
                 continue
             quota, period = map(int, words)
+            if quota >= period * len(at.computer.processors):
+                continue
             yield self.found(
                 at, f"{quota / max(period, 1):.2g} processors, in /{folder}", text=text, file=file,
                 period=period / 1e3, period_us=period, remark=at.real_time,
-                delay=max(period - quota / max(len(at.computer.processors), 1), 0) / 1e6 or 1e-3,
+                delay=(period - quota / len(at.computer.processors)) / 1e6,
             )  # fmt: skip
 
 
