@@ -11,6 +11,7 @@
 #include "loop_options.hpp"
 #include "o80/base/error.hpp"
 #include "robot/driver/library.hpp"
+#include "robot/driver/machine_limits.hpp"
 #include "robot/group/inline_robot.hpp"
 #include "waiting.hpp"
 
@@ -99,6 +100,17 @@ void bind_robots(nb::module_& m) {
     for (const o80::RobotFile& file : o80::find_robots()) found.emplace_back(file.name, file.path);
     return found;
   });
+  m.def(
+      "machine_limits",
+      [] {
+        const auto texts = [](const o80::MachineLimit& limit) {
+          return nb::make_tuple(limit.at_once, limit.for_good, limit.undo);
+        };
+        return nb::make_tuple(texts(o80::kPriorityLimit), texts(o80::kMemoryLimit));
+      },
+      nb::sig("def machine_limits() -> tuple[tuple[str, str, str], tuple[str, str, str]]"),
+      "The commands that raise the limits of priority and locked memory: in this shell, for good, "
+      "and the one that undoes the second.");
   m.def(
       "loop_options", &described_loop_options,
       nb::sig("def loop_options() -> list[tuple[str, str, str, str, str, bool, bool, bool, bool]]"),

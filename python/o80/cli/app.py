@@ -12,6 +12,7 @@ from o80.base import installation, progress
 
 COMMANDS = {
     "run": "run.run",
+    "doctor": "doctor.doctor",
     "list": "list_segments.list_segments",
     "info": "info.info",
     "stub": "stub.stub",

@@ -9,6 +9,7 @@
 #include <cstring>
 
 #include "o80/base/error.hpp"
+#include "robot/driver/machine_limits.hpp"
 
 namespace o80 {
 
@@ -23,8 +24,8 @@ TrustedLibrary::TrustedLibrary(const std::string& path) : path_(path) {
     throw DriverError("the robot library '" + path +
                       "' is not loaded: this program has privileges of its own (set-user-ID or "
                       "`setcap`), and users other than root can write the library. Remove the "
-                      "privileges (`chmod u-s`, `setcap -r`) and allow real-time priorities by a "
-                      "line `@robot - rtprio 99` in /etc/security/limits.conf");
+                      "privileges (`chmod u-s`, `setcap -r`) and allow real-time priorities by `" +
+                      kPriorityLimit.for_good + "`");
   }
   path_ = "/proc/self/fd/" + std::to_string(descriptor_);
 }

@@ -51,7 +51,8 @@ std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t 
       rows * 1e9 / static_cast<double>(std::max<std::int64_t>(row.time - before.time, 1));
   return late_text(row.overruns - before.overruns, rows, rate, period_) + ", " +
          std::to_string(row.skipped - before.skipped) +
-         " periods were skipped. See docs/real_time.md, or lower --frequency";
+         " periods were skipped. `o80 doctor` says what is in the way on this computer; see "
+         "docs/real_time.md, or lower --frequency";
 }
 
 std::optional<std::string> HangReport::look(const LoopState& loop, std::int64_t now) {

@@ -9,15 +9,18 @@
 #include <cstring>
 
 #include "memory/segment/liveness.hpp"
+#include "robot/driver/machine_limits.hpp"
 
 namespace o80 {
 
 namespace {
 
 constexpr int kPage = 4096;
-constexpr const char* kAllowPriority =
-    "Allow it with `ulimit -r 99`, for good with a line `@robot - rtprio 99` in "
-    "/etc/security/limits.conf";
+
+std::string allowed_by(const MachineLimit& limit) {
+  return std::string("Allow it in this shell with `") + limit.at_once + "`, for good with `" +
+         limit.for_good + "`";
+}
 
 /// Touches the pages of the stack, so that the loop causes no page fault there.
 __attribute__((noinline)) void touch_stack(std::size_t bytes) {
@@ -39,7 +42,7 @@ void set_policy(const RealTimeOptions& options, std::vector<std::string>& refuse
   parameter.sched_priority = options.priority;
   if (sched_setscheduler(0, policy, &parameter) != 0) {
     refused.push_back("real-time priority " + std::to_string(options.priority) + " was refused (" +
-                      std::strerror(errno) + "). " + kAllowPriority);
+                      std::strerror(errno) + "). " + allowed_by(kPriorityLimit));
     return;
   }
   // the liveness helper must not wait for this loop or another one: it gets a higher priority
@@ -50,7 +53,7 @@ void set_policy(const RealTimeOptions& options, std::vector<std::string>& refuse
                     std::strerror(why) +
                     "): while real-time threads leave no processor free, "
                     "deaths are noticed late. " +
-                    kAllowPriority);
+                    allowed_by(kPriorityLimit));
 }
 
 bool is_in(int processor, const cpu_set_t& set) {
@@ -80,8 +83,8 @@ void set_processors(const RealTimeOptions& options, std::vector<std::string>& re
 
 void lock_memory(std::vector<std::string>& refused) {
   if (mlockall(MCL_CURRENT | MCL_FUTURE) == 0) return;
-  refused.push_back(std::string("locked memory was refused (") + std::strerror(errno) +
-                    "). Allow it with `ulimit -l unlimited` (limits.conf: memlock)");
+  refused.push_back(std::string("locked memory was refused (") + std::strerror(errno) + "). " +
+                    allowed_by(kMemoryLimit));
 }
 
 }  // namespace

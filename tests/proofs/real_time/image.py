@@ -6,7 +6,7 @@ import subprocess
 from pathlib import Path
 
 # dynamic programs of Debian that come with their libraries
-GUESTS = ("cyclictest", "chrt")
+GUESTS = ("cyclictest", "chrt", "prlimit")
 
 
 def libraries(program: Path) -> set[Path]:
@@ -15,17 +15,19 @@ def libraries(program: Path) -> set[Path]:
     return {Path(path) for path in re.findall(r"(/\S+) \(0x", listed.stdout)}
 
 
-def stage(root: Path, programs: list[Path]) -> None:
-    """Lays all out in a folder as the machine will see it."""
+def stage(root: Path, programs: list[Path], init: str = "init.sh") -> None:
+    """Lays all out in a folder as the machine will see it. init: script of its first process."""
     shutil.rmtree(root, ignore_errors=True)
     for folder in ("bin", "dev", "etc", "o80", "proc", "sys", "tmp"):
         (root / folder).mkdir(parents=True)
-    (root / "etc/passwd").write_text("root:x:0:0:root:/:/bin/sh\n")
+    (root / "etc/passwd").write_text(
+        "root:x:0:0:root:/:/bin/sh\nnobody:x:65534:65534:nobody:/:/bin/sh\n"
+    )
     busybox = shutil.which("busybox")
     assert busybox is not None, "tools/setup.sh installs busybox-static"
     shutil.copy(busybox, root / "bin/busybox")
     (root / "bin/sh").symlink_to("busybox")
-    shutil.copy(Path(__file__).with_name("init.sh"), root / "init")
+    shutil.copy(Path(__file__).with_name(init), root / "init")
     (root / "init").chmod(0o755)
     for program in programs:
         subprocess.run(["strip", "-o", root / "o80" / program.name, program], check=True)
@@ -39,9 +41,9 @@ def stage(root: Path, programs: list[Path]) -> None:
             shutil.copy(library.resolve(), place)
 
 
-def make_image(image: Path, programs: list[Path]) -> None:
+def make_image(image: Path, programs: list[Path], init: str = "init.sh") -> None:
     """Packs the folder beside it that bears its name."""
-    stage(image.with_suffix(""), programs)
+    stage(image.with_suffix(""), programs, init)
     pack(image)
 
 

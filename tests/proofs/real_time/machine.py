@@ -24,12 +24,24 @@ class Console:
         )
 
 
-def boot(kernel: Path, image: Path, words: dict[str, str], timeout: float, log: Path) -> Console:
-    """Runs the machine until it powers off; it is ended after so many seconds."""
+def boot(
+    kernel: Path, image: Path, words: dict[str, str], timeout: float, log: Path, more: str = ""
+) -> Console:
+    """Runs the machine until it powers off; it is ended after so many seconds.
+
+    more: words of the kernel's command line.
+    """
     # the kernel's own threads go before the tests, and a slow host is no stall
     own = ["rcutree.kthread_prio=50", "rcupdate.rcu_cpu_stall_suppress=1"]
     line = " ".join(
-        ["console=ttyS0", "panic=-1", "quiet", *own, *(f"o80.{key}={words[key]}" for key in words)]
+        [
+            "console=ttyS0",
+            "panic=-1",
+            "quiet",
+            *own,
+            *more.split(),
+            *(f"o80.{key}={words[key]}" for key in words),
+        ]
     )
     machine = subprocess.Popen(
         ["setpriv", "--pdeathsig", "KILL", "qemu-system-x86_64",

@@ -13,6 +13,7 @@ import time
 from pathlib import Path
 
 from checkout import ROOT
+from real_time.doctor import faults_of_the_doctor
 from real_time.image import make_image
 from real_time.kernel import NoKernelError, obtain_kernel
 from real_time.machine import boot
@@ -95,17 +96,13 @@ def main() -> int:
     parser.add_argument(
         "--short", action="store_true", help=f"only {', '.join(SHORT)}, and 1000 iterations"
     )
+    parser.add_argument("--doctor", action="store_true", help="only the faults it has to find")
     arguments = parser.parse_args()
-    if arguments.build is None:
+    if arguments.build is None and arguments.doctor:
+        arguments.build = ROOT / "build" / "rt"
+    elif arguments.build is None:
         arguments.build = build(SHORT if arguments.short else ("o80-core-tests",))
 
-    tests = sorted((arguments.build / "bin").glob("o80_test_*"))
-    programs = [arguments.build / "bin" / name for name in LOOP]
-    if arguments.short:
-        tests = [test for test in tests if test.name in SHORT]
-    left_out = LEFT_OUT + LEFT_OUT_OF_SHORT * arguments.short
-    if not tests or not all(program.exists() for program in programs):
-        parser.error(f"{arguments.build} holds no programs: leave out --build to have them built")
     machine = arguments.build / "machine"
     try:
         kernel = arguments.kernel or obtain_kernel(machine)
@@ -115,10 +112,29 @@ def main() -> int:
             return 0
         print(error, file=sys.stderr)
         return 1
+    begin = time.monotonic()
+    wrong = [] if arguments.short else [*faults_of_the_doctor(kernel, machine, arguments.timeout)]
+    if not arguments.doctor:
+        wrong += wrong_in_tests(arguments, kernel)
+    for each in wrong:
+        print(f"WRONG: {each}")
+    seconds = time.monotonic() - begin
+    print(f"{'failed' if wrong else 'all held'} on a PREEMPT_RT kernel, in {seconds:.0f} s")
+    return int(bool(wrong))
+
+
+def wrong_in_tests(arguments: argparse.Namespace, kernel: Path) -> list[str]:
+    """Runs tests and a loop in the machine, and prints what they did; what is wrong."""
+    machine = arguments.build / "machine"
+    tests = sorted((arguments.build / "bin").glob("o80_test_*"))
+    programs = [arguments.build / "bin" / name for name in LOOP]
+    if arguments.short:
+        tests = [test for test in tests if test.name in SHORT]
+    left_out = LEFT_OUT + LEFT_OUT_OF_SHORT * arguments.short
+    if not tests or not all(program.exists() for program in programs):
+        return [f"{arguments.build} holds no programs: leave out --build to have them built"]
     image = machine / "root.cpio"
     make_image(image, tests + programs)
-
-    begin = time.monotonic()
     words = {
         "limit": f"{arguments.limit:.0f}",
         "frequency": str(arguments.frequency),
@@ -126,7 +142,6 @@ def main() -> int:
         "tests": f"{arguments.filter}-{':'.join(left_out)}",
     }
     console = boot(kernel, image, words, arguments.timeout, machine / "console.log")
-    seconds = time.monotonic() - begin
     findings = Findings.read(console)
     (machine / "passed").write_text("\n".join(findings.all("ok")))
     wrong = list(faults(console, findings, [test.name for test in tests]))
@@ -134,10 +149,7 @@ def main() -> int:
         print(console.without_findings())
     print(*report(findings), sep="\n")
     show_slowest(findings)
-    for each in wrong:
-        print(f"WRONG: {each}")
-    print(f"{'failed' if wrong else 'all held'} on a PREEMPT_RT kernel, in {seconds:.0f} s")
-    return int(bool(wrong))
+    return wrong
 
 
 if __name__ == "__main__":

@@ -154,6 +154,8 @@ def play_in_real_time(
             wanted = found.get("wanted", f"at most {found.get('most')}")
             missed = "" if found["reached"] else ": not reached"
             console.print(f"{what}: {found['measured']} ({wanted}){missed}", highlight=False)
+        if not all(found["reached"] for found in report["wanted"].values()):
+            console.print("`o80 doctor --frequency 500` says what is in the way on this computer")
         for sentence in report["not_measured"]:
             console.print(sentence, highlight=False)
         console.print(f"report: {settings.folder / 'report.json'}")

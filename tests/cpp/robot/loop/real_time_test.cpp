@@ -122,7 +122,7 @@ TEST(RealTime, SaysHowToGetWhatTheMachineRefuses) {
   options.policy = RealTimeOptions::Policy::fifo;
   options.priority = 1000;  // which no machine grants
   EXPECT_THAT(set_up(options), ElementsAre(AllOf(HasSubstr("real-time priority 1000 was refused"),
-                                                 HasSubstr("ulimit -r 99"))));
+                                                 HasSubstr("--rtprio=99"))));
 }
 
 TEST(RealTime, SaysThatNoHigherPriorityThanTheLoopsIsLeftForTheHelper) {

@@ -240,8 +240,8 @@ TEST_F(RunTest, WithoutAnyPrivilegeItSaysHowToGetThemAndRunsOn) {
   const Outcome outcome = program.end();
   EXPECT_EQ(outcome.code, 0);
   EXPECT_THAT(outcome.err,
-              AllOf(HasSubstr("o80: real-time priority 42 was refused"), HasSubstr("ulimit -r 99"),
-                    HasSubstr("o80: locked memory was refused"), HasSubstr("ulimit -l unlimited"),
+              AllOf(HasSubstr("o80: real-time priority 42 was refused"), HasSubstr("--rtprio=99"),
+                    HasSubstr("o80: locked memory was refused"), HasSubstr("--memlock=unlimited"),
                     HasSubstr("o80: processors 1000 were refused (the others are used)")));
 }
 

@@ -1,0 +1,76 @@
+"""``o80 doctor``: whether this computer can serve a robot at a rate."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from o80.base.screen import plain, print_json, style
+
+if TYPE_CHECKING:
+    from o80.robots.doctor.checks import Finding
+    from o80.robots.doctor.doctor import Report
+
+
+def doctor(
+    frequency: Annotated[
+        float, typer.Option(help="Iterations a second of the robot.", min=0.1, max=1e5)
+    ] = 1000.0,
+    seconds: Annotated[
+        float, typer.Option(help="Seconds to measure a loop; 0: only look.", min=0.0, max=3600.0)
+    ] = 2.0,
+    as_json: Annotated[bool, typer.Option("--json", help="For tools.")] = False,
+) -> None:
+    """Say whether this computer can serve a robot at a rate, and if not, why.
+
+    Each finding names what is in the way, the command that cures it and the one that undoes it.
+    Nothing is changed. The exit status is 0 if nothing is in the way, else 1.
+    """
+    from o80.robots.doctor.computer import Computer
+    from o80.robots.doctor.doctor import examine
+    from o80.robots.doctor.wake_ups import measure
+
+    if math.isnan(frequency) or math.isnan(seconds):
+        raise typer.BadParameter("--frequency and --seconds must be numbers, got nan")
+    report = examine(
+        Computer(),
+        frequency,
+        lambda computer: measure(frequency, seconds, computer.isolated) if seconds else None,
+    )
+    if as_json:
+        print_json(report.as_dict())
+    else:
+        _print(report)
+    if not report.serves:
+        raise typer.Exit(1)
+
+
+def _print(report: Report) -> None:
+    print(style(report.verdict, "green" if report.serves else "bold"))
+    for number, finding in enumerate(report.culprits, 1):
+        print(f"\n{number}. {_text(finding)}")
+    remarks = [finding for finding in report.findings if finding.remark]
+    if remarks:
+        print("\nWorth knowing:")
+    for finding in remarks:
+        print(f"\n- {_text(finding)}")
+    print()
+    if report.measured is not None:
+        print(plain(str(report.measured)))
+    for path, reason in report.unread.items():
+        print(f"could not be read: {plain(path)} ({plain(reason)})")
+    about = report.computer
+    parts = [about["system"], f"kernel {about['kernel']}", f"{len(about['processors'])} processors"]
+    parts += [f"container ({about['container']})"] if about["container"] else []
+    print(plain(", ".join(part for part in parts if part)))
+
+
+def _text(finding: Finding) -> str:
+    lines = [f"{style(finding.name, 'bold')}: {plain(finding.seen)}", f"   {plain(finding.effect)}"]
+    for head, commands in (("cure:", finding.cure), ("undo:", finding.undo)):
+        for line in commands.splitlines():
+            lines.append(f"   {head} {plain(line)}")
+            head = "     "
+    return "\n".join(lines)
