@@ -113,7 +113,7 @@ class FileWriter:
             raise RecordingError(
                 f"{self.path} was written by another program: record to another file"
             )
-        self.size = found.end
+        self.kept = self.size = found.end
         os.ftruncate(self._file.descriptor, self.size)
         if found.chunks and not found.finished:
             with contextlib.suppress(OSError):  # also on a full disk it can be finished
@@ -123,6 +123,7 @@ class FileWriter:
         self.path = path
         self.form = form
         self.size = 0  #: [bytes]
+        self.kept = 0  #: of what was there when it was continued [bytes]
         self._compress = _COMPRESS[form.compression]()
         try:
             self._file: LockedFile = LockedFile(path, flags)
