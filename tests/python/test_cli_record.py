@@ -145,14 +145,16 @@ def test_repair_finishes_a_cut_file_once(arm: o80.Frontend, tmp_path: Path) -> N
     with o80.Recording(path, arm) as recording:
         arm.burst(20)
         recording.flush()
-    whole = path.read_bytes()
-    path.write_bytes(whole[: scan(path).end + 5])
+    whole, end = path.read_bytes(), scan(path).end
+    path.write_bytes(whole[: end + 5])
 
     assert not o80.open(path).finished
     assert "5 bytes behind them removed" in run("repair", path)
-    assert path.read_bytes() == whole
+    repaired = path.read_bytes()
+    assert repaired[:end] == whole[:end]  # then it says that it was cut
+    assert o80.open(path).finished
     assert "is complete" in run("repair", path)
-    assert path.read_bytes() == whole
+    assert path.read_bytes() == repaired
 
 
 def test_repair_refuses_what_is_no_recording(tmp_path: Path) -> None:

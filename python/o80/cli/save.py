@@ -44,6 +44,6 @@ def repair(
     for each in unfinished:
         size = each.stat().st_size
         file = opened(each, proceed=True)
-        kept = file.size
+        kept = file.kept
         file.finish()
         print(f"{each} is complete now: {kept} bytes kept, {size - kept} bytes behind them removed")

@@ -114,7 +114,7 @@ class FileWriter:
             raise RecordingError(
                 f"{self.path} was written by another program: record to another file"
             )
-        self.size = found.end
+        self.kept = self.size = found.end
         os.ftruncate(self._file.descriptor, self.size)
         if found.chunks and not found.finished:
             with contextlib.suppress(OSError):  # also on a full disk it can be finished
@@ -126,6 +126,7 @@ class FileWriter:
         self.size = 0  #: [bytes]
         self.make_room: Callable[[int], None] = lambda length: None
         """Is called before so many bytes are written, the end of the file included."""
+        self.kept = 0  #: of what was there when it was continued [bytes]
         self._compress = _COMPRESS[form.compression]()
         try:
             self._file: LockedFile = LockedFile(path, flags)
