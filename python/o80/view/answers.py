@@ -51,8 +51,9 @@ class Answers:
             answer["source"] = chosen.label
             try:
                 row, at = self._row_of(chosen, query)
-                answer |= self._row(chosen, query, row, at)
-                answer["others"] = self._others(chosen, of_world, query, row, now=at is None)
+                self._shown_of(chosen, wait=False)  # the models are read at the same time
+                others = self._others(chosen, of_world, query, row, now=at is None)
+                answer |= self._row(chosen, query, row, at) | {"others": others}
             except NothingToShow as error:
                 answer["problem"] = str(error)
         return answer

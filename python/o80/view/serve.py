@@ -10,6 +10,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from types import FrameType
 
+from o80.base.errors import Error
 from o80.view.answers import Answers
 from o80.view.server import PageServer
 from o80.view.source_list import SourceList
@@ -39,6 +40,12 @@ def page_server(
     )
     thread = threading.Thread(target=server.serve, daemon=True)
     thread.start()
+
+    def prepare() -> None:
+        with contextlib.suppress(Error):
+            answers.look({})  # reads the models while the browser opens the page
+
+    threading.Thread(target=prepare, daemon=True).start()
     try:
         yield server
     finally:
