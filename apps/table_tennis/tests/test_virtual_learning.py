@@ -1,4 +1,4 @@
-"""SAC with virtual balls: whole trainings, small ones."""
+"""SAC with virtual balls: the fast update, and whole trainings, small ones."""
 
 import math
 import signal
@@ -7,11 +7,17 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import gymnasium
+import numpy as np
 import pytest
 import torch
 import typer
+from gymnasium import spaces
 from rich.console import Console
+from stable_baselines3 import SAC
+from stable_baselines3.common.logger import Logger
 from typer.testing import CliRunner
 
 import o80
@@ -20,6 +26,7 @@ from o80_table_tennis.learning.virtual import __main__ as command
 from o80_table_tennis.learning.virtual import curves
 from o80_table_tennis.learning.virtual.comparison import PICTURE, run
 from o80_table_tennis.learning.virtual.curves import Point
+from o80_table_tennis.learning.virtual.fast_sac import FastSac
 from o80_table_tennis.learning.virtual.settings import WAYS, SacSettings, VirtualSettings
 from o80_table_tennis.learning.virtual.training import train
 
@@ -37,6 +44,50 @@ SMALL = VirtualSettings(
 @pytest.fixture(autouse=True)
 def one_thread() -> None:
     torch.set_num_threads(1)
+
+
+class Spaces(gymnasium.Env[Any, Any]):
+    observation_space = spaces.Box(-1, 1, (5,), np.float32)
+    action_space = spaces.Box(-1, 1, (8,), np.float32)
+
+
+def learned(kind: type[SAC], updates: int, **optimizer: Any) -> SAC:
+    """After updates on the same random transitions."""
+    sac = kind(
+        "MlpPolicy",
+        Spaces(),
+        buffer_size=500,
+        learning_rate=1e-3,
+        ent_coef="auto_0.1",
+        policy_kwargs={"net_arch": [16, 16], "optimizer_kwargs": optimizer},
+        seed=1,
+        device="cpu",
+    )
+    sac.set_logger(Logger(None, []))
+    buffer: Any = sac.replay_buffer
+    generator = np.random.default_rng(0)
+    for name in ("observations", "next_observations", "rewards", "actions"):
+        array = getattr(buffer, name)
+        array[:] = generator.uniform(-1, 1, array.shape)
+    buffer.dones[:] = generator.random(buffer.dones.shape) < 0.3
+    buffer.full = True
+    sac.train(updates, 64)
+    return sac
+
+
+def parameters(sac: SAC) -> list[torch.Tensor]:
+    assert sac.log_ent_coef is not None
+    return [*sac.policy.state_dict().values(), sac.log_ent_coef.detach()]
+
+
+def test_the_fast_update_is_that_of_stable_baselines3() -> None:
+    slow, fast = learned(SAC, 30), learned(FastSac, 30, fused=True)
+    start = learned(FastSac, 0)
+    for theirs, ours, before in zip(
+        parameters(slow), parameters(fast), parameters(start), strict=True
+    ):
+        assert not torch.equal(ours, before)
+        torch.testing.assert_close(ours, theirs, rtol=1e-4, atol=1e-5)
 
 
 @pytest.mark.parametrize("way", WAYS)

@@ -8,13 +8,13 @@ import gymnasium
 import numpy as np
 import torch
 from gymnasium import spaces
-from stable_baselines3 import SAC
 from stable_baselines3.common.logger import Logger
 
 from o80.base.arrays import Float32Array
 
 from ...world.arm import MUSCLES
 from .buffer import MotionBuffer
+from .fast_sac import FastSac
 from .hindsight import Transitions
 from .motions import Motion
 from .settings import SacSettings
@@ -38,7 +38,7 @@ class Learner:
         self._scale = 1.0 / np.maximum(seen.std(axis=0), MIN_SPREAD)
         box = spaces.Box(-CLIP, CLIP, self._mean.shape, np.float32)
         self._settings = settings
-        self._sac = SAC(
+        self._sac = FastSac(
             "MlpPolicy",
             _Spaces(box),
             buffer_size=1,
