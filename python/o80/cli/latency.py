@@ -27,7 +27,9 @@ def latency(
     recording: Annotated[
         str | None, typer.Option(help="A recording that holds both, instead of running robots.")
     ] = None,
-    most: Annotated[float, typer.Option(help="Longest delay to look for, either way [s].")] = 0.5,
+    most: Annotated[
+        float, typer.Option(help="Longest delay to look for, either way, in seconds.")
+    ] = 0.5,
     seconds: Annotated[float | None, typer.Option(help="Only the last seconds.")] = None,
 ) -> None:
     """Estimate how much later B shows a motion than A, by cross-correlation.

@@ -80,7 +80,7 @@ def record(
         float | None,
         typer.Option(
             callback=_seconds,
-            help="Ask simulations for a snapshot in this time [s], from which a replay can begin.",
+            help="Seconds between two snapshots of a simulation: a replay can begin there.",
         ),
     ] = None,
     proceed: Annotated[
