@@ -16,6 +16,8 @@ import o80.recording.catalogue as catalogue
 from o80.cli.recordings import recordings as command
 from o80.recording.catalogue import INDEX, time_of
 
+NAMES = ("a.mcap", "monday/b.mcap", "c.mcap")
+
 
 @pytest.fixture
 def folder(segment: str, tmp_path: Path) -> Path:
@@ -23,7 +25,7 @@ def folder(segment: str, tmp_path: Path) -> Path:
     root = tmp_path / "lab"
     (root / "monday").mkdir(parents=True)
     load = o80.robots.load("two_joints").inline
-    for path, split in (("a.mcap", None), ("monday/b.mcap", None), ("c.mcap", "1k")):
+    for path, split in zip(NAMES, (None, None, "1k"), strict=True):
         with o80.Recording(root / path, [segment], split=split) as recording:
             for _ in range(2 if path == "monday/b.mcap" else 1):
                 with load(segment) as arm:
@@ -141,9 +143,47 @@ def test_damaged_and_strange_files_are_listed_with_their_reason(
     assert "gone.mcap" not in found
     command(folder)
     said = capsys.readouterr().out
-    assert "notes.mcap: damaged: " in said
+    assert "notes.mcap: not read: " in said
     assert "Changed" not in said
     assert " missing " in said
+
+
+def test_links_pipes_and_names_of_any_bytes_are_no_obstacle(folder: Path, tmp_path: Path) -> None:
+    (folder / "c.mcap").rename(tmp_path / "c.mcap")
+    (folder / "c.mcap").symlink_to(tmp_path / "c.mcap")
+    (folder / "circle").symlink_to(folder)
+    os.mkfifo(folder / "pipe.mcap")
+    strange = folder / os.fsdecode(b"\xff.mcap")
+    shutil.copy(folder / "a.mcap", strange)
+    found = o80.recordings(folder)
+    assert found == o80.recordings(folder)
+    assert {each.path for each in found} == {strange, *map(folder.joinpath, NAMES)}
+    assert found[-1].size == sum(file.stat().st_size for file in folder.glob("c.mcap/*"))
+    strange.unlink()
+    min(folder.glob("c.mcap/*")).unlink()  # the link is as it was
+    fewer = o80.recordings(folder)
+    assert [each.path.name for each in fewer] == ["a.mcap", "b.mcap", "c.mcap"]
+    assert fewer[-1].runs[0].rows < found[-1].runs[0].rows
+
+
+def test_what_one_user_may_not_read_others_read(
+    folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def refused(path: Path) -> Any:
+        raise o80.RecordingError(f"{path} cannot be read: Permission denied")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(catalogue, "RecordingFile", refused)
+        patch.setattr(os, "access", lambda *words: False)
+        assert all("Permission" in each.problem for each in o80.recordings(folder))
+    assert not any(each.problem for each in o80.recordings(folder))
+
+    def scandir(path: Path) -> Any:
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(os, "scandir", scandir)
+    with pytest.warns(RuntimeWarning, match="lab cannot be read .* is not listed"):
+        assert o80.recordings(folder) == []
 
 
 def test_a_folder_that_cannot_be_written_works_and_says_so_once(

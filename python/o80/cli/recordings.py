@@ -70,7 +70,7 @@ def recordings(
         print_table(COLUMNS, rows)
     for each in found:
         if each.problem:
-            print(plain(f"{each.path.relative_to(folder)}: damaged: {each.problem}"))
+            print(plain(f"{each.path.relative_to(folder)}: not read: {each.problem}"))
     if not found:
         chosen = " is of this time and text" if begin or end or text else ""
         print(f"no recording in {folder}{chosen}")

@@ -22,7 +22,7 @@ from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.reader import RecordingFile
 
 INDEX = ".o80-recordings.sqlite"
-VERSION = 1  # of what the index holds
+VERSION = 2  # of what the index holds
 MARKS = 200  # that are kept of each recording
 _DAMAGED = (RecordingError, OSError, ValueError, LookupError, TypeError, struct.error)
 
@@ -106,15 +106,16 @@ def recordings(
             progress(number, len(new))
     gone = known.keys() - there.keys()
     if new or gone:
-        _write(root, [(name, *there[name], texts[name]) for name in new], gone)
+        kept = (name for name in new if not known[name][1].problem or _is_readable(root / name))
+        _write(root, [(name, *there[name], texts[name]) for name in kept], gone)
     first = 0 if begin is None else int(begin.timestamp() * 1e9)
     last = 2**63 if end is None else int(end.timestamp() * 1e9)
-    kept = [
+    chosen = [
         each
         for each in (known[name][1] for name in sorted(there))
         if each.has(text) and (each.problem or (each.begin <= last and each.end >= first))
     ]
-    return sorted(kept, key=lambda each: each.begin)
+    return sorted(chosen, key=lambda each: each.begin)
 
 
 def time_of(text: str, *, is_end: bool = False) -> datetime:
@@ -140,21 +141,31 @@ def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
         folder = waiting.pop()
         try:
             entries = [*os.scandir(folder)]
-        except OSError:
+        except OSError as error:
+            warnings.warn(
+                f"{folder} cannot be read ({error.strerror}): what it holds is not listed",
+                RuntimeWarning,
+                stacklevel=3,
+            )
             continue
         for entry in entries:
             with contextlib.suppress(OSError):  # removed meanwhile
                 name = str(Path(entry.path).relative_to(root))
-                is_folder = entry.is_dir(follow_symlinks=False)
-                if is_folder and not entry.name.endswith(".mcap"):
-                    waiting.append(Path(entry.path))
-                elif is_folder:
+                if not entry.name.endswith(".mcap"):
+                    if entry.is_dir(follow_symlinks=False):  # links may form a circle
+                        waiting.append(Path(entry.path))
+                elif entry.is_dir():
                     files = [each.stat() for each in os.scandir(entry)]
                     changed = max((each.st_mtime_ns for each in files), default=0)
                     yield name, (sum(each.st_size for each in files), changed + len(files))
-                elif entry.name.endswith(".mcap"):
+                elif entry.is_file():  # reading a pipe could last for ever
                     status = entry.stat()
                     yield name, (status.st_size, status.st_mtime_ns)
+
+
+def _is_readable(path: Path) -> bool:
+    """Whether this user may read a recording; who may not must not tell others that it is bad."""
+    return all(os.access(each, os.R_OK) for each in (path, *path.glob("*")))
 
 
 def _summary(path: Path) -> str:
@@ -222,7 +233,10 @@ def _read(root: Path) -> dict[str, tuple[Stamp, FoundRecording]]:
             if version != VERSION:
                 raise ValueError("another version")
             return {
-                name: ((size, changed), _found(root / name, (size, changed), text))
+                os.fsdecode(name): (
+                    (size, changed),
+                    _found(root / os.fsdecode(name), (size, changed), text),
+                )
                 for name, size, changed, text in db.execute("SELECT * FROM recordings")
             }
     except (sqlite3.Error, ValueError, TypeError, LookupError):
@@ -239,10 +253,12 @@ def _write(root: Path, new: list[tuple[str, int, int, str]], gone: set[str]) -> 
             db.execute(f"PRAGMA user_version = {VERSION}")
             db.execute(
                 "CREATE TABLE IF NOT EXISTS recordings"
-                "(name TEXT PRIMARY KEY, size INTEGER, changed INTEGER, found TEXT)"
+                "(name BLOB PRIMARY KEY, size INTEGER, changed INTEGER, found TEXT)"
             )
-            db.executemany("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", new)
-            db.executemany("DELETE FROM recordings WHERE name = ?", ((name,) for name in gone))
+            rows = ((os.fsencode(name), *rest) for name, *rest in new)  # of any bytes
+            db.executemany("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", rows)
+            names = ((os.fsencode(name),) for name in gone)
+            db.executemany("DELETE FROM recordings WHERE name = ?", names)
     except sqlite3.Error as error:
         warnings.warn(
             f"{root / INDEX} cannot be written ({error}): the next call reads these recordings "
