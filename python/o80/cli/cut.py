@@ -68,11 +68,13 @@ def cut(
 
 def _poses(name: str, epoch: RecordedEpoch, *, model_files: bool) -> Scene | None:
     from o80.view.scene import Scene
+    from o80.view.world import drawn
 
     if "model" not in epoch.schema:
         return None
     try:
-        return Scene(epoch.schema, epoch.model, trusted=model_files)
+        model = drawn(epoch.schema, epoch.model, trusted=model_files)
+        return None if model is None else Scene(epoch.schema, model)
     except MissingExtra:
         raise
     except Error as error:
