@@ -14,7 +14,7 @@ from o80.cli.diff import diff
 from o80.cli.info import info
 from o80.cli.replay import replay
 from o80.cli.save import repair
-from o80.recording.epoch import OVERWRITTEN, Gap
+from o80.recording.epoch import EARLIER_FILE, OVERWRITTEN, Gap
 from o80.recording.recorder import Recorder
 
 KILLED = "the recorder was killed"
@@ -87,7 +87,7 @@ def test_a_repaired_recording_lacks_its_end(
     cut(cut_off, parts[0], "", "0.01")
     cut(cut_off, parts[1], "0.02", "")
     assert o80.open(parts[0])[segment].epochs[0].gaps == []  # was told to end there
-    late = Gap(0, 19, LATE)
+    late = Gap(0, 19, "cut away")
     assert o80.open(parts[1])[segment].epochs[0].gaps == [late, Gap(31, None, KILLED)]
     merge([*parts], tmp_path / "both.mcap")
     (both,) = o80.open(tmp_path / "both.mcap")[segment].epochs
@@ -146,6 +146,9 @@ def test_a_file_that_is_missing_in_a_folder_is_a_gap(arm: o80.Frontend, tmp_path
     lost = begins[1], begins[2] - 1
     assert epoch.gaps == [Gap(*lost, "a file is missing, or was cut")]
     assert epoch.missing == lost[1] - lost[0] + 1
+    whole._parts[0].path.unlink()  # as with keep
+    (epoch,) = o80.open(path)[arm.segment].epochs
+    assert epoch.gaps == [Gap(0, lost[1], EARLIER_FILE)]
 
 
 def test_a_backend_that_was_killed_is_recorded_to_its_end(segment: str, tmp_path: Path) -> None:

@@ -10,7 +10,7 @@ from rosbags.highlevel import AnyReader
 
 import o80
 from o80.cli.cut import cut, merge
-from o80.recording.epoch import topic_of
+from o80.recording.epoch import Gap, topic_of
 from o80.recording.marks import Mark
 
 
@@ -55,6 +55,7 @@ def test_a_stretch_of_time_is_cut_and_replayed(day: Path, segment: str, tmp_path
         assert read[name].history().rows.tobytes() == expected.rows.tobytes()
         assert read[name].schema == whole[name].schema
         assert read[name].epochs[0].first_row == expected.iteration[0]
+        assert read[name].epochs[0].gaps == [Gap(0, expected.iteration[0] - 1, "cut away")]
         assert read[name].epochs[0].provenance == epoch.provenance
     begin, end = (first + round(s * 1e9) for s in (0.7, 2.6))
     numbers = [m.values["number"] for m in whole.marks if begin <= log_time(whole, m) <= end]

@@ -16,6 +16,8 @@ DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""
 GAP = "o80.gap"
 """Name of the metadata record of rows that are missing, such as those that were overwritten."""
+LATE = "recording began later"
+EARLIER_FILE = "the file before is missing"
 OVERWRITTEN = "overwritten before the recorder read them"
 
 # as src/memory/segment/segment_name.cpp allows
@@ -62,6 +64,7 @@ class EpochNote:
     begin: int  #: iteration of the first row to record
     wall_offset: int  #: log time less row time [ns]
     clock: str  #: monotonic or simulated
+    before: str = LATE  #: why rows before `begin` are missing, if they are
 
     def texts(self) -> dict[str, str]:
         return {name: str(value) for name, value in vars(self).items()}
@@ -86,6 +89,7 @@ class EpochNote:
                 begin=int(texts["begin"]),
                 wall_offset=int(texts["wall_offset"]),
                 clock=texts["clock"],
+                before=texts.get("before", LATE),
             )
         except (KeyError, ValueError):
             return None

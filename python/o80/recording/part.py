@@ -258,6 +258,8 @@ class _PartWriter:
             texts = channel.metadata if run is None else self._texts(channel)
             if begin is not None:
                 texts = texts | {"begin": str(begin), "every": str(self._every(channel))}
+                if begin - int(channel.metadata["begin"]) >= self._every(channel):
+                    texts |= {"before": "cut away"}
             number, schema = 0, self._found.schemas.get(channel.schema_id)
             if schema is not None:
                 text = schema.data.decode(errors="replace")

@@ -225,8 +225,7 @@ class RecordedEpoch:
         after = 0
         for part in self._parts:
             if part.note.begin > after:
-                late = after == 0
-                reason = "recording began later" if late else "a file is missing, or was cut"
+                reason = "a file is missing, or was cut" if after else part.note.before
                 found.append(Gap(after, part.note.begin - 1, reason))
             after = part.note.begin + part.rows
             for (first, last), texts in part.records(GAP, "first", "last"):

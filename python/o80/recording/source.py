@@ -8,7 +8,7 @@ import o80._core as _core
 from o80.base.errors import BackendGone, RecordingError, SegmentError, TimeoutError
 from o80.frontend.frontend import Frontend
 from o80.recording.blocks import Block, Messages
-from o80.recording.epoch import GAP, note_of
+from o80.recording.epoch import EARLIER_FILE, GAP, note_of
 from o80.recording.file_writer import FileWriter, MessageBlock
 from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
@@ -166,6 +166,8 @@ class Source:
             self._written[frontend.epoch] = known
         self._next = max(known.last + 1, known.note.begin)
         note = replace(known.note, begin=self._next)
+        if known.last >= 0:
+            note = replace(note, before=EARLIER_FILE)
         if known.channel is None:
             self._writer = RowWriter.added_to(self._file, frontend, note)
         else:
@@ -205,7 +207,7 @@ class Source:
         self._file = file
         if self._frontend is None or self._writer is None:
             return
-        note = replace(self._writer.note, begin=self._next)
+        note = replace(self._writer.note, begin=self._next, before=EARLIER_FILE)
         self._writer = RowWriter.added_to(file, self._frontend, note)
         if self._journal is not None:
             self._journal.add_channel(file, note)
