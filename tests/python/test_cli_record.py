@@ -77,7 +77,7 @@ def test_a_robot_that_runs_is_recorded_from_row_0_and_replays(
     assert report.identical, report
     assert report.runs[0].rows > 300
     from_now = recorded(process.segment, tmp_path / "now.mcap", "--from-now")
-    assert "(--from-now): a replay begins at the next reset or restored snapshot, or" in from_now
+    assert "(--from-now): a replay begins at the next reset, restored snapshot or snap" in from_now
     first = int(o80.open(tmp_path / "now.mcap")[process.segment].history().iteration[0])
     assert first > 300
     assert f"is recorded from row {first} " in from_now
@@ -95,8 +95,20 @@ def test_a_recording_that_cannot_be_replayed_says_why(segment: str, tmp_path: Pa
         assert said.endswith("cannot be replayed: it was started without a journal")
     with o80.Backend(segment, actuators=["knee"]) as backend:
         backend.publish([0.0])
-        said = recorded(segment, tmp_path / "world.mcap")
+        said = recorded(segment, tmp_path / "world.mcap", "--snapshots", "1")
+        assert said == f"o80: no snapshot is recorded: '{segment}' serves no request snapshot"
+        said = recorded(segment, tmp_path / "alone.mcap")
         assert said.endswith("the recording can be replayed without its driver")
+
+
+def test_a_recorder_that_continues_says_where_it_goes_on(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm, split="1k") as recording:
+        for _ in range(3):
+            arm.burst(20)
+            recording.flush()
+    said = recorded(arm.segment, path, "--split", "1k", "--continue")
+    assert f"'{arm.segment}' goes on with row 61; `o80 info` shows" in said
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import sys
 import time
+import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -111,6 +112,7 @@ def record(
     form = Form(compression, joint_states == "on")
     most = _size(size)
     end = StopRequest()
+    warnings.showwarning = _say_warning
     recorder = Recorder(
         output,
         names,
@@ -142,12 +144,18 @@ def record(
     report.show(last=True)
 
 
+def _say_warning(message: Warning | str, *_: object) -> None:
+    complain(str(message))
+
+
 def _replay_text(source: Source, frontend: Frontend, from_now: bool) -> str:
     """From which row on a run is recorded, and from where it can be replayed."""
     from o80.replaying.conditions import reads_the_world
 
     if source.journal_begin is None:
         return "cannot be replayed: it was started without a journal"
+    if source.begin > 0 and source.goes_on_at is not None:
+        return f"goes on with row {source.goes_on_at}; `o80 info` shows what the recording holds"
     alone = " without its driver" if reads_the_world(frontend.schema) else ""
     if source.begin == 0 and source.journal_begin == 0:
         return f"is recorded from row 0: the recording can be replayed{alone}"
@@ -166,8 +174,8 @@ def _replay_text(source: Source, frontend: Frontend, from_now: bool) -> str:
     if alone:
         return f"{why}: a replay without its driver begins at the first row in which nothing acts"
     return (
-        f"{why}: a replay begins at the next reset or restored snapshot, or, with "
-        f"--without-driver, at the first row in which nothing acts"
+        f"{why}: a replay begins at the next reset, restored snapshot or snapshot at rest "
+        f"(--snapshots), or, with --without-driver, at the first row in which nothing acts"
     )
 
 

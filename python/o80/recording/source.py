@@ -95,6 +95,13 @@ class Source:
         return -1 if self._frontend is None else self._written[self._frontend.epoch].note.begin
 
     @property
+    def goes_on_at(self) -> int | None:
+        """The row with which this recorder goes on; None: the file has the first recorded one."""
+        if self._writer is None or self._writer.note.before != EARLIER_FILE:
+            return None
+        return self._writer.note.begin
+
+    @property
     def journal_begin(self) -> int | None:
         """Number of the first decision of this run that was read; None: there is no journal."""
         return None if self._journal is None else self._journal.begin
