@@ -154,8 +154,10 @@ def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str)
         page.value(f"{box.format(first)}.click()")
         page.wait_for("page.scene.robots.size === 1")
         assert page.value(drawn) == "box,capsule,plane"
-        page.value(f"page.choose('{second}')")
-        page.wait_for(f"document.getElementById('halt').textContent === 'Halt {second}'")
+        bears = "document.getElementById('halt').textContent"
+        chosen = page.value(f"(page.choose('{second}'), {bears})")
+        assert chosen == f"Halt {second}", "at once, before any answer: it halts the chosen one"
+        page.wait_for(f"{bears} === 'Halt {second}'")
         page.wait_for(f"page.scene.robots.get('{second}').ghost")
         assert page.value("page.scene.robots.size") == 1, "what was hidden stays so"
         page.value(f"{box.format(first)}.click()")
