@@ -268,6 +268,17 @@ def test_a_recording_is_shown_like_a_robot(recording: Path, segment: str) -> Non
         assert pose_of(answer)[1, 3:] == pytest.approx(turn_about_y(angle), abs=1e-6)
 
 
+def test_segments_of_one_name_are_told_apart_by_their_file(
+    recording: Path, segment: str, tmp_path: Path
+) -> None:
+    copy = tmp_path / "copy.mcap"
+    copy.write_bytes(recording.read_bytes())
+    look = looks_at(str(recording), str(copy), segment)
+    names = [line["name"] for line in look()["list"]]
+    assert names == [segment, f"{segment} of {recording}", f"{segment} of {copy}"]
+    assert look(source=names[2])["source"] == names[2]
+
+
 def test_a_recording_that_was_cut_is_shown_up_to_its_last_whole_chunk(
     recording: Path, segment: str, tmp_path: Path
 ) -> None:

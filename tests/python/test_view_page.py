@@ -154,8 +154,10 @@ def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str)
         page.value(f"{box.format(first)}.click()")
         page.wait_for("page.scene.robots.size === 1")
         assert page.value(drawn) == "box,capsule,plane"
-        page.value(f"page.choose('{second}')")
-        page.wait_for(f"document.getElementById('halt').textContent === 'Halt {second}'")
+        bears = "document.getElementById('halt').textContent"
+        chosen = page.value(f"(page.choose('{second}'), {bears})")
+        assert chosen == f"Halt {second}", "at once, before any answer: it halts the chosen one"
+        page.wait_for(f"{bears} === 'Halt {second}'")
         page.wait_for(f"page.scene.robots.get('{second}').ghost")
         assert page.value("page.scene.robots.size") == 1, "what was hidden stays so"
         page.value(f"{box.format(first)}.click()")
@@ -337,6 +339,29 @@ def test_a_recording_in_a_file_needs_no_server_and_shows_the_same(
     assert page.value("performance.getEntriesByType('resource').length") == 0
     assert page.value("window.errors") == []
     page.close()
+
+
+def test_a_file_opens_on_the_robot_that_a_page_opens_on(
+    browser: Chromium, segment: str, tmp_path: Path
+) -> None:
+    run, path = tmp_path / "run.mcap", tmp_path / "run.html"
+    ball, arm = f"{segment}-1", f"{segment}-2"
+    seen = {"ball": {"position": (float, 3)}}
+    with (
+        o80.Backend(ball, ["turn"], extended=seen, units={"position": "m"}) as tracker,
+        o80.Backend(arm, ["turn"], model=WORLD.format(2, 0), joints={"turn": "turn"}) as backend,
+    ):
+        tracker.publish([0.0], {"ball": {"position": [1, 2, 3]}})
+        backend.publish([0.2])
+        with o80.Recording(run, [ball, arm]):
+            pass
+    write_page([str(run)], path)
+    with page_server([str(run)]) as server:
+        for url in (server.url, path.as_uri()):
+            page = browser.page(url)
+            page.wait_for("page.scene.frames > 0")
+            assert page.value("page.source") == arm
+            page.close()
 
 
 def test_numbers_are_readable_and_have_their_unit(browser: Chromium, arm: o80.Frontend) -> None:

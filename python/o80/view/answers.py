@@ -227,6 +227,11 @@ def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
     for source in sources:
         if source.label == label:
             return source
+    return first_of(sources)
+
+
+def first_of(sources: Sequence[Source]) -> Source | None:
+    """The source that a page opens on: one with a model, best one that stands."""
     models = [source for source in sources if source.drawn is not None]
     standing = [source for source in models if source.drawn and not source.drawn.standing.floats]
     return next(iter([*standing, *models, *sources]), None)

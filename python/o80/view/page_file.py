@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from o80.base.errors import Error, InvalidArgument, RecordingError
 from o80.rows.columns import columns_of
 from o80.rows.history import values_of
-from o80.view.answers import SLACK, Shown, others_of
+from o80.view.answers import SLACK, Shown, first_of, others_of
 from o80.view.server import page_text
 from o80.view.source import Source
 from o80.view.source_list import SourceList
@@ -107,7 +107,11 @@ class _Numbers:
 def _packed_sources(sources: Sequence[Source]) -> str:
     numbers = _Numbers()
     drawn = {source.label: _Recorded(source) for source in sources}
-    whole = [drawn[source.label].described(numbers, drawn) for source in sources]
+    opened = first_of(sources)
+    whole = [
+        drawn[source.label].described(numbers, drawn) | {"opened": source is opened}
+        for source in sources
+    ]
     head = json.dumps(whole).encode()
     content = len(head).to_bytes(4, "little") + head + numbers.content
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()

@@ -31,9 +31,13 @@ class SourceList:
         self._recorded: list[Source] = []
         self._names: list[str] = []
         self._patterns: list[str] = []
-        for name in dict.fromkeys(names):
+        distinct = dict.fromkeys(names)
+        for name in distinct:
             if name.endswith(".mcap") or Path(name).is_dir():
-                self._recorded += _runs_of(name, model_files)
+                runs = _runs_of(name, model_files)
+                for run in runs if len(distinct) > 1 else []:
+                    run.label += f" of {name}"  # others may hold a segment of the same name
+                self._recorded += runs
             elif any(character in name for character in "*?["):
                 self._patterns.append(name)
             else:

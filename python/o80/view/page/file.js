@@ -51,7 +51,7 @@ class RecordingInFile {
   }
 
   look(query) {
-    const source = this.sources.get(query.source) ?? [...this.sources.values()].find((each) => each.pose) ?? [...this.sources.values()][0];
+    const source = this.sources.get(query.source) ?? [...this.sources.values()].find((each) => each.opened);
     const at = query.at ?? (query.key === source.key ? source.last : source.first);
     const tick = placeOf(source.tickTimes, Math.min(Math.max(at, source.first), source.last));
     const panels = query.panels ?? source.new.first_panels;

@@ -76,6 +76,7 @@ class Page {
   show(answer) {
     this.answer = answer;
     this.source = answer.source ?? null;
+    this.showButtons(); // first: whatever fails below, they name the robot that they command
     if (answer.new) this.introduce(answer);
     this.showSegments(answer);
     if (answer.at !== undefined) {
@@ -83,7 +84,6 @@ class Page {
       byId("ghost-legend").hidden = !this.scene.ghosts().size;
       this.showCurves(answer);
     }
-    this.showButtons();
     this.notice(this.problem(answer));
   }
 
@@ -187,6 +187,7 @@ class Page {
     byId("robot").textContent = name;
     byId("no-scene").textContent = "";
     document.title = `${name} - o80 view`;
+    this.showButtons();
   }
 }
 
