@@ -116,7 +116,9 @@ class FileWriter:
             )
         self.kept = self.size = found.end
         os.ftruncate(self._file.descriptor, self.size)
-        if found.chunks and not found.finished:
+        last_chunk = max((each.chunk_start_offset for each in found.chunks), default=0)
+        noted = any(each.name == CUT for each in found.metadata_places if each.offset > last_chunk)
+        if found.chunks and not (found.finished or noted):
             with contextlib.suppress(OSError):  # also on a full disk it can be finished
                 self.add_metadata(CUT, {})
 

@@ -45,12 +45,14 @@ def page_server(
         with contextlib.suppress(Error):
             answers.look({})  # reads the models while the browser opens the page
 
-    threading.Thread(target=prepare, daemon=True).start()
+    preparing = threading.Thread(target=prepare, daemon=True)
+    preparing.start()
     try:
         yield server
     finally:
         server.close()
         thread.join()
+        preparing.join()  # what it imports must not outlive the interpreter
 
 
 def allow_descriptors(wanted: int) -> None:
