@@ -155,12 +155,19 @@ def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
                     if entry.is_dir(follow_symlinks=False):  # links may form a circle
                         waiting.append(Path(entry.path))
                 elif entry.is_dir():
-                    files = [each.stat() for each in os.scandir(entry)]
+                    files = [*_statuses(entry)]
                     changed = max((each.st_mtime_ns for each in files), default=0)
                     yield name, (sum(each.st_size for each in files), changed + len(files))
                 elif entry.is_file():  # reading a pipe could last for ever
                     status = entry.stat()
                     yield name, (status.st_size, status.st_mtime_ns)
+
+
+def _statuses(folder: os.DirEntry[str]) -> Iterator[os.stat_result]:
+    """Those of its files, without those that a recorder (keep) deletes meanwhile."""
+    for each in os.scandir(folder):
+        with contextlib.suppress(FileNotFoundError):
+            yield each.stat()
 
 
 def _is_readable(path: Path) -> bool:

@@ -21,7 +21,7 @@ from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of, entries_in, last_entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
-from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of
+from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of, unreadable
 from o80.rows.history import History, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
 from o80.rows.layout import Layout, decoder_of
@@ -128,7 +128,7 @@ class EpochPart:
             with self.found.opened(self.path) as file:
                 yield file
         except OSError as error:
-            raise RecordingError(f"{self.path} cannot be read: {error.strerror}") from error
+            raise RecordingError(unreadable(self.path, error)) from error
         except (ValueError, struct.error) as error:
             raise RecordingError(f"{self.path}: {error}") from error
 
