@@ -12,7 +12,7 @@ from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.foreign_file import copied
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.marks import Mark, Marks, marks_in
-from o80.recording.recorded_epoch import EpochPart, RecordedEpoch
+from o80.recording.recorded_epoch import UNFINISHED, EpochPart, RecordedEpoch
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan, unreadable
 from o80.rows.history import History
 
@@ -33,9 +33,16 @@ class RecordingFile:
                 epochs = parts.setdefault(part.note.segment, {})
                 epochs.setdefault((part.note.number, part.note.epoch), []).append(part)
         self.segments: dict[str, RecordedSegment] = {
-            name: RecordedSegment(name, [*_epochs_of([*epochs.values()])])
+            name: RecordedSegment(name, [*_epochs_of([*epochs.values()], self._cut_at)])
             for name, epochs in parts.items()
         }
+
+    @property
+    def _cut_at(self) -> Path | None:
+        """The last file with rows, if its recorder was killed as it began the next one."""
+        files = in_order(self.path) if self.path.is_dir() else []
+        begun = [file for file, found in self._files if found.channels]
+        return begun[-1] if begun and files and begun[-1] != files[-1] else None
 
     @property
     def finished(self) -> bool:
@@ -181,9 +188,11 @@ def _parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
             yield EpochPart(path, found, channel.id, note, journal)
 
 
-def _epochs_of(runs: list[list[EpochPart]]) -> Iterator[RecordedEpoch]:
+def _epochs_of(runs: list[list[EpochPart]], cut_at: Path | None) -> Iterator[RecordedEpoch]:
     for i, parts in enumerate(runs):
-        yield RecordedEpoch(parts, is_followed=i + 1 < len(runs))
+        after = "a later run follows" if i + 1 < len(runs) else ""
+        killed = UNFINISHED if parts[-1].path == cut_at else ""
+        yield RecordedEpoch(parts, after or killed)
 
 
 class RecordedSegment:

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from mcap.records import ChunkIndex
 
 T = TypeVar("T")
+UNFINISHED = "the recorder still runs, or was killed"
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class EpochPart:
     def why_cut(self) -> str:
         """Why the file may lack the end of the run; empty if its recorder was told to end."""
         if not self.found.finished:
-            return "the recorder still runs, or was killed"
+            return UNFINISHED
         of_run = (
             each.chunk_start_offset
             for each in self.found.chunks
@@ -136,10 +137,10 @@ class EpochPart:
 class RecordedEpoch:
     """The rows and the journal of one run of a backend."""
 
-    def __init__(self, parts: list[EpochPart], *, is_followed: bool = False) -> None:
-        """parts: in their order, at least one. is_followed: a later run was recorded."""
+    def __init__(self, parts: list[EpochPart], lacks_end: str = "") -> None:
+        """parts: in their order, at least one. lacks_end: why, if no record says how it ended."""
         self._parts = parts
-        self._is_followed = is_followed
+        self._lacks_end = lacks_end
         self._note = parts[0].note
 
     @property
@@ -209,8 +210,9 @@ class RecordedEpoch:
         why = texts.get("reason") or self._parts[-1].why_cut
         if last >= after:
             return [*found, Gap(after, last, "the recorder ended before it had read them")]
-        if (why or (self._is_followed and not texts)) and not self.end:
-            return [*found, Gap(after, None, why or "a later run follows")]
+        why = why or ("" if texts else self._lacks_end)
+        if why and not self.end:
+            return [*found, Gap(after, None, why)]
         return found
 
     @property
