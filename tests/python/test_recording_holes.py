@@ -15,7 +15,9 @@ from o80.cli.info import info
 from o80.cli.replay import replay
 from o80.cli.save import repair
 from o80.recording.epoch import EARLIER_FILE, OVERWRITTEN, Gap
+from o80.recording.recorded_epoch import UNFINISHED
 from o80.recording.recorder import Recorder
+from o80.recording.scan import MAGIC
 
 KILLED = "the recorder was killed"
 LATE = "recording began later"
@@ -141,6 +143,13 @@ def test_a_file_that_is_missing_in_a_folder_is_a_gap(arm: o80.Frontend, tmp_path
     assert whole.gaps == []
     begins = [part.note.begin for part in whole._parts]
     assert len(begins) >= 3
+    with (path / f"{len(begins):04}.mcap").open("wb") as next_file:
+        for content in (b"", MAGIC):  # its recorder was killed as it began this file
+            next_file.write(content)
+            next_file.flush()
+            (cut,) = o80.open(path)[arm.segment].epochs
+            assert cut.gaps == [Gap(61, None, UNFINISHED)]
+    Path(next_file.name).unlink()
     whole._parts[1].path.unlink()
     (epoch,) = o80.open(path)[arm.segment].epochs
     lost = begins[1], begins[2] - 1

@@ -10,6 +10,8 @@ import pytest
 from mcap.reader import make_reader
 
 import o80
+import o80.recording.reader as reader
+from o80.recording.reader import files_of
 from o80.recording.recorder import Recorder
 
 O80 = Path(sys.executable).parent / "o80"
@@ -227,6 +229,27 @@ def test_the_oldest_files_without_a_mark_are_deleted(arm: o80.Frontend, tmp_path
     assert [mark.name for mark in read.marks] == ["of the program", "of a frontend"]
     newest = read[arm.segment].history(60)
     assert newest.rows.tobytes() == arm.history(60).rows.tobytes()
+
+
+def test_files_that_are_deleted_while_they_are_read_do_no_harm(
+    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = tmp_path / "run.mcap"
+    recorder = Recorder(path, [arm.segment], split="8k")
+    play(arm, recorder, 12)
+    arm.mark("of a frontend")
+    recorder.finish()
+    read = o80.open(path)
+    files = files_of(path)
+    files[0].unlink()
+    for use in (read[arm.segment].history, lambda: read.marks):
+        with pytest.raises(o80.RecordingError, match=r"0000.mcap was deleted .* again"):
+            use()
+    assert read.size == bytes_in(path)
+    monkeypatch.setattr(reader, "in_order", lambda folder: files)  # listed before
+    assert [file for file, _ in o80.open(path).scans] == files[1:]
+    monkeypatch.setattr(reader, "files_of", lambda folder: files)  # deleted even later
+    assert [file for file, _ in o80.open(path).scans] == files[1:]
 
 
 def test_a_recorder_that_may_delete_nothing_stops(arm: o80.Frontend, tmp_path: Path) -> None:

@@ -218,8 +218,11 @@ def test_the_command_lists_filters_and_gives_json(
     assert "no recording in" in capsys.readouterr().out
     assert time_of(today, is_end=True) - time_of(today) == timedelta(days=1, microseconds=-1)
     assert time_of("9:05") == time_of(f"{today} 09:05")
-    with pytest.raises(o80.InvalidArgument, match="2026-11-24"):
-        command(folder, begin="noon")
+    assert time_of(f"{today} 10", is_end=True) == time_of("10:00")
+    assert len(o80.recordings(folder, begin=datetime.min, end=datetime.max)) == len(lines) - 2
+    for wrong in ("noon", "10:2"):
+        with pytest.raises(o80.InvalidArgument, match=f"2026-11-24.* not '{wrong}'"):
+            command(folder, begin=wrong)
     for path in (folder / "a.mcap", folder / "c.mcap", folder / "nowhere"):
         with pytest.raises(o80.InvalidArgument, match="is not a folder of recordings"):
             o80.recordings(path)

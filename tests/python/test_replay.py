@@ -105,6 +105,7 @@ def test_a_history_without_row_0_is_not_replayed(segment: str) -> None:
     assert not report.identical
     assert report.difference is None
     assert "the first recorded row is row 31: a replay begins at row 0" in str(report)
+    assert "without --from-now, or with --snapshots 60" in str(report)
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -87,7 +87,7 @@ class _Lines:
         said = self._text.text(entry)
         parts = [style(f"{entry.iteration:>8}", "bold"), said]
         if entry.missed:
-            parts.insert(0, f"({entry.missed} entries were overwritten before they were read)\n")
+            parts.insert(0, f"({entry.missed} entries before this one are missing)\n")
         return " ".join(parts)
 
 

@@ -108,8 +108,8 @@ def recordings(
     if new or gone:
         kept = (name for name in new if not known[name][1].problem or _is_readable(root / name))
         _write(root, [(name, *there[name], texts[name]) for name in kept], gone)
-    first = 0 if begin is None else int(begin.timestamp() * 1e9)
-    last = 2**63 if end is None else int(end.timestamp() * 1e9)
+    first = 0 if begin is None else _nanoseconds(begin)
+    last = 2**63 if end is None else _nanoseconds(end)
     chosen = [
         each
         for each in (known[name][1] for name in sorted(there))
@@ -123,15 +123,25 @@ def time_of(text: str, *, is_end: bool = False) -> datetime:
 
     is_end: a day means its end. Raises InvalidArgument.
     """
+    today = ":" in text and "-" not in text
     try:
-        if ":" in text and "-" not in text:
-            text = f"{datetime.now():%Y-%m-%d} {text.zfill(5)}"
-        found = datetime.fromisoformat(text)
+        found = datetime.fromisoformat(
+            f"{datetime.now():%Y-%m-%d} {text.zfill(5)}" if today else text
+        )
     except ValueError:
         raise InvalidArgument(
             f"write 2026-11-24, '2026-11-24 10:02' or 10:02 (today), not '{text}'"
         ) from None
-    return found + timedelta(days=1, microseconds=-1) if is_end and ":" not in text else found
+    is_day = len(text) <= len("2026-11-24") and not today
+    return found + timedelta(days=1, microseconds=-1) if is_end and is_day else found
+
+
+def _nanoseconds(time: datetime) -> int:
+    """Since 1970; of a year that no clock has, such as that of `datetime.min`, 0 or very many."""
+    try:
+        return int(time.timestamp() * 1e9)
+    except (ValueError, OverflowError):
+        return 0 if time.year < 1970 else 2**63
 
 
 def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
@@ -155,12 +165,19 @@ def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
                     if entry.is_dir(follow_symlinks=False):  # links may form a circle
                         waiting.append(Path(entry.path))
                 elif entry.is_dir():
-                    files = [each.stat() for each in os.scandir(entry)]
+                    files = [*_statuses(entry)]
                     changed = max((each.st_mtime_ns for each in files), default=0)
                     yield name, (sum(each.st_size for each in files), changed + len(files))
                 elif entry.is_file():  # reading a pipe could last for ever
                     status = entry.stat()
                     yield name, (status.st_size, status.st_mtime_ns)
+
+
+def _statuses(folder: os.DirEntry[str]) -> Iterator[os.stat_result]:
+    """Those of its files, without those that a recorder (keep) deletes meanwhile."""
+    for each in os.scandir(folder):
+        with contextlib.suppress(FileNotFoundError):
+            yield each.stat()
 
 
 def _is_readable(path: Path) -> bool:

@@ -12,8 +12,8 @@ from o80.recording.epoch import EpochNote, channels_of
 from o80.recording.foreign_file import copied
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.marks import Mark, Marks, marks_in
-from o80.recording.recorded_epoch import EpochPart, RecordedEpoch
-from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan
+from o80.recording.recorded_epoch import UNFINISHED, EpochPart, RecordedEpoch
+from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan, unreadable
 from o80.rows.history import History
 
 
@@ -26,16 +26,23 @@ class RecordingFile:
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
         self.path = Path(path)
-        self._files = [(file, _scanned(file)) for file in files_of(self.path)]
+        self._files = [*_scans_of(self.path)]
         parts: dict[str, dict[tuple[int, int], list[EpochPart]]] = {}
         for file, found in self._files:
             for part in _parts_of(file, found):
                 epochs = parts.setdefault(part.note.segment, {})
                 epochs.setdefault((part.note.number, part.note.epoch), []).append(part)
         self.segments: dict[str, RecordedSegment] = {
-            name: RecordedSegment(name, [*_epochs_of([*epochs.values()])])
+            name: RecordedSegment(name, [*_epochs_of([*epochs.values()], self._cut_at)])
             for name, epochs in parts.items()
         }
+
+    @property
+    def _cut_at(self) -> Path | None:
+        """The last file with rows, if its recorder was killed as it began the next one."""
+        files = in_order(self.path) if self.path.is_dir() else []
+        begun = [file for file, found in self._files if found.channels]
+        return begun[-1] if begun and files and begun[-1] != files[-1] else None
 
     @property
     def finished(self) -> bool:
@@ -58,7 +65,7 @@ class RecordingFile:
     @property
     def size(self) -> int:
         """Size of its files [bytes]."""
-        return sum(path.stat().st_size for path, _ in self._files)
+        return sum(_size(path) for path, _ in self._files)
 
     @property
     def marks(self) -> list[Mark]:
@@ -68,6 +75,8 @@ class RecordingFile:
             try:
                 with found.opened(path) as file:
                     marks += marks_in(file, found)
+            except OSError as error:
+                raise RecordingError(unreadable(path, error)) from error
             except (ValueError, TypeError, RecursionError, struct.error) as error:
                 raise RecordingError(f"{path}: {error}") from error
         return marks
@@ -114,7 +123,7 @@ def files_of(path: Path) -> list[Path]:
     """
     if not path.is_dir():
         return [path]
-    files = [file for file in in_order(path) if file.stat().st_size >= len(MAGIC)]
+    files = [file for file in in_order(path) if _size(file) >= len(MAGIC)]
     if not files:
         raise RecordingError(f"the folder {path} holds no recording (NAME.mcap)")
     return files
@@ -128,6 +137,24 @@ def in_order(folder: Path) -> list[Path]:
     )
 
 
+def _size(path: Path) -> int:
+    """Size of a file [bytes]; 0: its recorder (keep) has deleted it meanwhile."""
+    try:
+        return path.stat().st_size
+    except FileNotFoundError:
+        return 0
+
+
+def _scans_of(path: Path) -> Iterator[tuple[Path, Scan]]:
+    """The files of a recording, without those that its recorder (keep) deletes meanwhile."""
+    for file in files_of(path):
+        try:
+            yield file, _scanned(file)
+        except RecordingError:
+            if file == path or file.exists():
+                raise
+
+
 def _scanned(path: Path) -> Scan:
     try:
         found = scan(path)
@@ -137,7 +164,7 @@ def _scanned(path: Path) -> Scan:
     except FileNotFoundError:
         raise RecordingError(_no_such_file(path)) from None
     except OSError as error:
-        raise RecordingError(f"{path} cannot be read: {error.strerror}") from error
+        raise RecordingError(unreadable(path, error)) from error
 
 
 def _no_such_file(path: Path) -> str:
@@ -161,9 +188,11 @@ def _parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
             yield EpochPart(path, found, channel.id, note, journal)
 
 
-def _epochs_of(runs: list[list[EpochPart]]) -> Iterator[RecordedEpoch]:
+def _epochs_of(runs: list[list[EpochPart]], cut_at: Path | None) -> Iterator[RecordedEpoch]:
     for i, parts in enumerate(runs):
-        yield RecordedEpoch(parts, is_followed=i + 1 < len(runs))
+        after = "a later run follows" if i + 1 < len(runs) else ""
+        killed = UNFINISHED if parts[-1].path == cut_at else ""
+        yield RecordedEpoch(parts, after or killed)
 
 
 class RecordedSegment:

@@ -21,7 +21,7 @@ from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of, entries_in, last_entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
-from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of
+from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of, unreadable
 from o80.rows.history import History, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
 from o80.rows.layout import Layout, decoder_of
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from mcap.records import ChunkIndex
 
 T = TypeVar("T")
+UNFINISHED = "the recorder still runs, or was killed"
 
 
 @dataclass(frozen=True)
@@ -86,7 +87,7 @@ class EpochPart:
     def why_cut(self) -> str:
         """Why the file may lack the end of the run; empty if its recorder was told to end."""
         if not self.found.finished:
-            return "the recorder still runs, or was killed"
+            return UNFINISHED
         of_run = (
             each.chunk_start_offset
             for each in self.found.chunks
@@ -128,7 +129,7 @@ class EpochPart:
             with self.found.opened(self.path) as file:
                 yield file
         except OSError as error:
-            raise RecordingError(f"{self.path} cannot be read: {error.strerror}") from error
+            raise RecordingError(unreadable(self.path, error)) from error
         except (ValueError, struct.error) as error:
             raise RecordingError(f"{self.path}: {error}") from error
 
@@ -136,10 +137,10 @@ class EpochPart:
 class RecordedEpoch:
     """The rows and the journal of one run of a backend."""
 
-    def __init__(self, parts: list[EpochPart], *, is_followed: bool = False) -> None:
-        """parts: in their order, at least one. is_followed: a later run was recorded."""
+    def __init__(self, parts: list[EpochPart], lacks_end: str = "") -> None:
+        """parts: in their order, at least one. lacks_end: why, if no record says how it ended."""
         self._parts = parts
-        self._is_followed = is_followed
+        self._lacks_end = lacks_end
         self._note = parts[0].note
 
     @property
@@ -209,8 +210,9 @@ class RecordedEpoch:
         why = texts.get("reason") or self._parts[-1].why_cut
         if last >= after:
             return [*found, Gap(after, last, "the recorder ended before it had read them")]
-        if (why or (self._is_followed and not texts)) and not self.end:
-            return [*found, Gap(after, None, why or "a later run follows")]
+        why = why or ("" if texts else self._lacks_end)
+        if why and not self.end:
+            return [*found, Gap(after, None, why)]
         return found
 
     @property

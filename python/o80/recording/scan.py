@@ -122,6 +122,13 @@ def scan(path: str | os.PathLike[str]) -> Scan:
     return found
 
 
+def unreadable(path: Path, error: OSError) -> str:
+    """Text of an error about a file of a recording."""
+    if isinstance(error, FileNotFoundError):
+        return f"{path} was deleted after it had been opened: open the recording again"
+    return f"{path} cannot be read: {error.strerror}"
+
+
 def has_end(path: str | os.PathLike[str]) -> bool:
     """Whether a file ends with a summary and a footer. Raises OSError."""
     with Path(path).open("rb") as file:

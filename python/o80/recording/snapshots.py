@@ -40,7 +40,7 @@ class SnapshotRequests:
             elif not reader.latest().active.any():
                 self._send(reader)
             elif monotonic() >= self._at + self._seconds:
-                self._say(f"'{reader.segment}' moves all the time")
+                self._say(f"'{reader.segment}' moved whenever one was due")
 
     def close(self) -> None:
         """Gives the lane back."""

@@ -246,7 +246,8 @@ class _RunReplay:
             self._gap = (
                 f"the first recorded row is row {first}: a replay begins at row 0, at a "
                 f"{self._beginnings(', or at a ')}, and none is recorded. Record before the "
-                f"robot overwrites its first rows (--history), and without --from-now"
+                f"robot overwrites its first rows (--history) and without --from-now, or with "
+                f"--snapshots 60"
             )
         if found is None and not self._no_driver:
             self._gap += (
