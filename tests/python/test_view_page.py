@@ -376,6 +376,19 @@ def test_numbers_are_readable_and_have_their_unit(browser: Chromium, arm: o80.Fr
             *("15.71 kPa", "0.5 rad", "-420 \u00b5m", "15\u202f710", "0 m", "nan", "2e+12 kg"),
             "1.5e-7",
         ]
+        page.wait_for(SHOWN)
+        drawn = page.value(
+            "(() => { const texts = []; const fillText = (text, x, y) => texts.push([text, y]);"
+            "const pen = new Proxy({ fillText }, { get: (own, name) => own[name] ?? (() => {}) });"
+            "const chart = Object.assign(page.charts[0], { begin: 0, end: 0.002 });"
+            "chart.axes(pen, { low: 0, high: 1, left: 46, bottom: 96, width: 346, length: 0.002,"
+            "x: (seconds) => 46 + 150000 * seconds, y: (value) => 4 + 88 * (1 - value) });"
+            "return texts; })()"
+        )
+        texts = [text for text, _ in drawn]
+        assert {"0.5", "0.0005 s", "0.001 s", "0.0015 s"} <= set(texts)
+        assert len(set(texts)) == len(texts), "each tick its own time"
+        assert min(y for _, y in drawn) >= 8, "no number is cut off at the top"
         page.close()
 
 
