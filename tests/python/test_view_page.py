@@ -384,6 +384,12 @@ def test_numbers_are_readable_and_have_their_unit(browser: Chromium, arm: o80.Fr
             *("15.71 kPa", "0.5 rad", "-420 \u00b5m", "15\u202f710", "0 m", "nan", "2e+12 kg"),
             "1.5e-7",
         ]
+        head = (
+            "(() => { const chart = new Chart('turn', 'rad or m'); chart.values({ observed: 0.5 });"
+        )
+        assert page.value(f"{head} return chart.head.textContent; }})()") == (
+            "turn [rad or m]observed 0.5"
+        )
         page.wait_for(SHOWN)
         drawn = page.value(
             "(() => { const texts = []; const fillText = (text, x, y) => texts.push([text, y]);"

@@ -23,8 +23,9 @@ class Chart {
 
   values(texts) {
     this.head.replaceChildren(element("b", this.unit ? `${this.name} [${this.unit}]` : this.name));
+    const unit = this.unit?.includes(" ") ? "" : this.unit; // "rad or m" stands in the head only
     for (const [part, text] of Object.entries(texts || {})) {
-      this.head.append(element("span", `${part === "extended" ? "" : `${part} `}${readable(text, this.unit ?? "")}`, part));
+      this.head.append(element("span", `${part === "extended" ? "" : `${part} `}${readable(text, unit ?? "")}`, part));
     }
   }
 
