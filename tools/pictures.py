@@ -114,7 +114,9 @@ def draw_view(path: Path) -> None:
         twin.burst(200)
         page = browser.page(view.url, *VIEW_SIZE)
         page.wait_for("page.scene.frames > 0 && page.charts.length")
-        page.value("Object.assign(page.scene, {azimuth: -0.75, elevation: 0.36, distance: 4.8})")
+        page.value(
+            "void Object.assign(page.scene, {azimuth: -0.75, elevation: 0.36, distance: 4.8})"
+        )
         page.value("page.scene.dirty = true")
         looks = page.value("page.looks")
         page.wait_for(f"page.looks > {looks} + 8 && page.charts[2].parts.observed")

@@ -88,12 +88,15 @@ def test_of_a_segment_that_is_waited_for_nothing_of_another_robot_is_shown(
         page = browser.page(server.url)
         page.wait_for(SHOWN)
         looks = page.value("page.looks")
+        page.value("document.getElementById('ghost-legend').hidden = false")
         page.value("page.choose('not-there')")
         page.wait_for(f"page.looks > {looks + 2}")
         shown = page.value("document.getElementById('robot').textContent")
         assert shown == "not-there"
         assert page.value("page.charts.length") == 0
         assert page.value("page.scene.geoms.length") == 0
+        assert page.value("document.getElementById('ghost-legend').hidden")
+        assert page.value("document.getElementById('time').textContent") == ""
         assert page.value("document.getElementById('halt').disabled")
         page.value(f"page.choose('{process.segment}')")
         page.wait_for(SHOWN)
@@ -129,7 +132,7 @@ WORLD = """<mujoco><worldbody><geom type="plane" size="{0} {0} 1"/>
 
 
 def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str) -> None:
-    first, second = f"{segment}-1", f"{segment}-2"
+    first, second, plain = f"{segment}-1", f"{segment}-2", f"{segment}-3"
     drawn = "page.scene.geoms.map((geom) => geom.shape).sort().join()"
     box = (
         "[...document.querySelectorAll('#segments .row')].find(r => r.innerText.includes('{0}'))"
@@ -138,10 +141,12 @@ def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str)
     with (
         o80.Backend(first, ["turn"], model=WORLD.format(2, 0), joints={"turn": "turn"}) as backend,
         o80.Backend(second, ["turn"], model=WORLD.format(3, 1), joints={"turn": "turn"}) as other,
-        page_server([first, second]) as server,
+        o80.Backend(plain, ["lift"]) as without_model,
+        page_server([first, second, plain]) as server,
     ):
         backend.publish([0.2])
         other.publish([-0.4])
+        without_model.publish([0.0])
         page = browser.page(server.url)
         page.wait_for("page.scene.robots.size === 2")
         assert page.value(drawn) == "box,capsule,capsule,plane", "the table and a floor once"
@@ -162,6 +167,9 @@ def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str)
         assert page.value("page.scene.robots.size") == 1, "what was hidden stays so"
         page.value(f"{box.format(first)}.click()")
         page.wait_for("page.scene.robots.size === 2")
+        page.value(f"page.choose('{plain}')")
+        page.wait_for("document.body.innerText.includes('so it is not drawn')")
+        assert page.value("page.scene.robots.size") == 2, "others are, and the page says so"
         page.close()
 
 
@@ -376,6 +384,25 @@ def test_numbers_are_readable_and_have_their_unit(browser: Chromium, arm: o80.Fr
             *("15.71 kPa", "0.5 rad", "-420 \u00b5m", "15\u202f710", "0 m", "nan", "2e+12 kg"),
             "1.5e-7",
         ]
+        head = (
+            "(() => { const chart = new Chart('turn', 'rad or m'); chart.values({ observed: 0.5 });"
+        )
+        assert page.value(f"{head} return chart.head.textContent; }})()") == (
+            "turn [rad or m]observed 0.5"
+        )
+        page.wait_for(SHOWN)
+        drawn = page.value(
+            "(() => { const texts = []; const fillText = (text, x, y) => texts.push([text, y]);"
+            "const pen = new Proxy({ fillText }, { get: (own, name) => own[name] ?? (() => {}) });"
+            "const chart = Object.assign(page.charts[0], { begin: 0, end: 0.002 });"
+            "chart.axes(pen, { low: 0, high: 1, left: 46, bottom: 96, width: 346, length: 0.002,"
+            "x: (seconds) => 46 + 150000 * seconds, y: (value) => 4 + 88 * (1 - value) });"
+            "return texts; })()"
+        )
+        texts = [text for text, _ in drawn]
+        assert {"0.5", "0.0005 s", "0.001 s", "0.0015 s"} <= set(texts)
+        assert len(set(texts)) == len(texts), "each tick its own time"
+        assert min(y for _, y in drawn) >= 8, "no number is cut off at the top"
         page.close()
 
 

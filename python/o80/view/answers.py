@@ -163,7 +163,7 @@ class Shown:
     def __init__(self, source: Source, schema: dict[str, Any]) -> None:
         self.panels = Panels(schema)
         self.scene: Scene | None = None
-        self.no_scene = "The driver of this robot names no model, so there is no 3D view."
+        self.no_scene = "The driver of this robot names no model, so it is not drawn."
         self._kept = AnswerCache()
         if source.drawn is not None:
             try:

@@ -23,8 +23,9 @@ class Chart {
 
   values(texts) {
     this.head.replaceChildren(element("b", this.unit ? `${this.name} [${this.unit}]` : this.name));
+    const unit = this.unit?.includes(" ") ? "" : this.unit; // "rad or m" stands in the head only
     for (const [part, text] of Object.entries(texts || {})) {
-      this.head.append(element("span", `${part === "extended" ? "" : `${part} `}${readable(text, this.unit ?? "")}`, part));
+      this.head.append(element("span", `${part === "extended" ? "" : `${part} `}${readable(text, unit ?? "")}`, part));
     }
   }
 
@@ -113,12 +114,12 @@ class Chart {
       pen.moveTo(left, y(value));
       pen.lineTo(width - 4, y(value));
       pen.stroke();
-      pen.fillText(grouped(+value.toPrecision(6)), left - 4, y(value) + 3);
+      pen.fillText(grouped(+value.toPrecision(6)), left - 4, Math.max(y(value) + 3, 8));
     }
     pen.textAlign = "center";
     for (const seconds of ticks(this.begin, this.end, 5)) {
       const at = x(seconds - this.begin);
-      if (at > left + 12 && at < width - 14) pen.fillText(`${+seconds.toFixed(3)} s`, at, bottom + 12);
+      if (at > left + 12 && at < width - 14) pen.fillText(`${+seconds.toFixed(6)} s`, at, bottom + 12);
     }
   }
 

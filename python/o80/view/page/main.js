@@ -81,7 +81,6 @@ class Page {
     this.showSegments(answer);
     if (answer.at !== undefined) {
       this.timeline.show(answer);
-      byId("ghost-legend").hidden = !this.scene.ghosts().size;
       this.showCurves(answer);
     }
     this.notice(this.problem(answer));
@@ -104,7 +103,8 @@ class Page {
       this.scene.show(name, pose, name === this.source && answer.ghost);
     }
     this.scene.choose(this.source);
-    byId("no-scene").hidden = this.scene.geoms.length > 0;
+    byId("no-scene").classList.toggle("above", this.scene.geoms.length > 0);
+    byId("ghost-legend").hidden = !this.scene.ghosts().size;
   }
 
   introduce(answer) {
@@ -185,7 +185,7 @@ class Page {
     this.charts = [];
     byId("charts").replaceChildren();
     byId("robot").textContent = name;
-    byId("no-scene").textContent = "";
+    byId("no-scene").textContent = byId("time").textContent = "";
     document.title = `${name} - o80 view`;
     this.showButtons();
   }
