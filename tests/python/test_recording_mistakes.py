@@ -12,9 +12,10 @@ import pytest
 
 import o80
 from o80.recording import source
+from o80.recording.chunks import HEAD
 from o80.recording.output import opened
 from o80.recording.recorder import Recorder
-from o80.recording.scan import HEAD, scan
+from o80.recording.scan import scan
 
 O80 = Path(sys.executable).parent / "o80"
 
