@@ -219,6 +219,8 @@ def test_the_command_lists_filters_and_gives_json(
     assert time_of(today, is_end=True) - time_of(today) == timedelta(days=1, microseconds=-1)
     assert time_of("9:05") == time_of(f"{today} 09:05")
     assert time_of(f"{today} 10", is_end=True) == time_of("10:00")
+    with pytest.raises(o80.RecordingError, match=r"`o80 recordings .*` lists them"):
+        o80.open(folder)
     assert len(o80.recordings(folder, begin=datetime.min, end=datetime.max)) == len(lines) - 2
     for wrong in ("noon", "10:2"):
         with pytest.raises(o80.InvalidArgument, match=f"2026-11-24.* not '{wrong}'"):

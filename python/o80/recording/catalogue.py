@@ -174,7 +174,7 @@ def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
 
 
 def _statuses(folder: os.DirEntry[str]) -> Iterator[os.stat_result]:
-    """Those of its files, without those that a recorder (keep) deletes meanwhile."""
+    """Sizes and times of its files, without those that a recorder (keep) deletes meanwhile."""
     for each in os.scandir(folder):
         with contextlib.suppress(FileNotFoundError):
             yield each.stat()

@@ -123,7 +123,12 @@ def files_of(path: Path) -> list[Path]:
     """
     if not path.is_dir():
         return [path]
-    files = [file for file in in_order(path) if _size(file) >= len(MAGIC)]
+    there = in_order(path)
+    if any(file.is_dir() for file in there):
+        raise RecordingError(
+            f"{path} is a folder of several recordings: `o80 recordings {path}` lists them"
+        )
+    files = [file for file in there if _size(file) >= len(MAGIC)]
     if not files:
         raise RecordingError(f"the folder {path} holds no recording (NAME.mcap)")
     return files
