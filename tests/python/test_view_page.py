@@ -194,6 +194,11 @@ def test_on_a_phone_nothing_runs_out_and_the_halt_button_is_large(
         click(page, "list")
         assert page.value("document.getElementById('segments').offsetWidth") > 300
         assert page.value("document.getElementById('halt').offsetHeight") >= 48
+        assert page.value(
+            "(() => { const line = document.querySelector('#segments .segment');"
+            "line.querySelector('b').textContent = '/path'.repeat(30);"
+            "return line.scrollWidth <= line.clientWidth; })()"
+        ), "a long name is broken"
         light = page.value("getComputedStyle(document.body).backgroundColor.match(/\\d+/)[0]")
         assert (int(light) < 64) == dark
         page.close()

@@ -20,6 +20,7 @@ from o80_table_tennis.lab.parts import (
     LAUNCHER,
     NINE,
     RATES,
+    WORLD,
     LabSettings,
     lab_parts,
 )
@@ -105,6 +106,11 @@ def test_balls_are_played_and_reported(tmp_path: Path) -> None:
         assert found or any(said.startswith(f"{name}: no row") for said in report["not_measured"])
         assert found or report["processes"][ARM]["missed_percent"] > 1.0, "this machine kept up"
     assert SUPERVISOR in report["processor_percent"]
+    marks = {(mark.name, *mark.rows) for mark in o80.open(tmp_path / "run.mcap").marks}
+    launches = {name for name, _ in marks}
+    assert len(launches) == 2
+    both = {(name, f"{prefix}-{part}") for name in launches for part in (ARM, WORLD)}
+    assert marks == both, "the view brings arm and world together there"
     assert not [each.name for each in o80.segments() if each.name.startswith(prefix)]
 
 

@@ -194,6 +194,8 @@ class EnvironmentProcess:
         self._policy.reset()
         self._set(Phase.playing)
         self.row["launch"] = self._launching.number
+        for robot in (environment.rig.arm, environment.rig.twin):  # one moment of both clocks
+            robot.frontend.mark(f"launch {self._launching.number}")
         over = False
         while not over:
             observation, _, terminated, truncated, info = environment.step(
