@@ -183,7 +183,7 @@ def test_info_describes_a_recording(tmp_path: Path) -> None:
             o80.robots.load("two_joints").inline("arm", gain=gain) as arm,
             o80.Recording(path, arm, proceed=path.exists()) as recording,
         ):
-            recording.mark("episode", gain=gain)
+            recording.mark("episode", gain=gain, targets=[0.25] * 40)
             arm.burst(100)
 
     said = run("info", path)
@@ -193,9 +193,10 @@ def test_info_describes_a_recording(tmp_path: Path) -> None:
     assert "arm, run 2: started with" in said
     assert "gain=15" in said
     marks = said[said.index("3 marks") :].splitlines()[1:4]
-    assert [mark.split()[1:] for mark in marks] == [
-        ["episode", f"gain={gain}"] for gain in (13.0, 13.0, 15.0)
+    assert [mark.split()[1:3] for mark in marks] == [
+        ["episode", f"gain={gain},"] for gain in (13.0, 13.0, 15.0)
     ]
+    assert all(mark.endswith("...") for mark in marks)  # that a value goes on is said
     told = json.loads(run("info", path, "--json"))
     assert [each["rows"] for each in told] == [each.rows for each in o80.open(path)["arm"].epochs]
 

@@ -15,7 +15,7 @@ from o80.cli.info import info
 from o80.cli.replay import replay
 from o80.cli.save import repair
 from o80.recording.epoch import EARLIER_FILE, OVERWRITTEN, Gap
-from o80.recording.recorded_epoch import UNFINISHED
+from o80.recording.epoch_part import UNFINISHED
 from o80.recording.recorder import Recorder
 from o80.recording.scan import MAGIC
 

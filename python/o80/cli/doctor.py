@@ -10,7 +10,7 @@ import typer
 from o80.base.screen import plain, print_json, style
 
 if TYPE_CHECKING:
-    from o80.robots.doctor.checks import Finding
+    from o80.robots.doctor.check import Finding
     from o80.robots.doctor.doctor import Report
 
 

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from o80.recording.recorded_epoch import RecordedEpoch
 
 MARKS_AT_ENDS = 10  # listed at the beginning and at the end
+LONGEST_VALUE = 60  # of a mark, in characters
 GAPS = 10  # listed for each run
 COLUMNS = (
     Column("segment"),
@@ -56,6 +57,11 @@ def recording_info(path: Path, *, as_json: bool = False) -> None:
     _print_starts(runs)
 
 
+def _brief(value: object) -> str:
+    text = repr(value)
+    return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
+
+
 def _print_marks(marks: list[Mark]) -> None:
     """Prints marks with time and values; of many only the first and the last ones."""
     if not marks:
@@ -69,7 +75,7 @@ def _print_marks(marks: list[Mark]) -> None:
             continue
         local = time.localtime(mark.time * 1e-9)
         clock = f"{time.strftime('%H:%M:%S', local)}.{mark.time // 10**6 % 1000:03d}"
-        values = ", ".join(f"{name}={value!r:.60}" for name, value in mark.values.items())
+        values = ", ".join(f"{name}={_brief(value)}" for name, value in mark.values.items())
         print(plain(f"  {clock}  {mark.name}  {values}").rstrip())
 
 

@@ -116,7 +116,7 @@ class FileWriter:
             )
         self.kept = self.size = found.end
         os.ftruncate(self._file.descriptor, self.size)
-        last_chunk = max((each.chunk_start_offset for each in found.chunks), default=0)
+        last_chunk = found.chunks[-1].chunk_start_offset if found.chunks else 0
         noted = any(each.name == CUT for each in found.metadata_places if each.offset > last_chunk)
         if found.chunks and not (found.finished or noted):
             with contextlib.suppress(OSError):  # also on a full disk it can be finished

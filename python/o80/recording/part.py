@@ -94,7 +94,7 @@ def write_part(
 
 
 def _begin_of(files: list[tuple[Path, Scan]]) -> int:
-    return min(chunk.message_start_time for _, found in files for chunk in found.chunks)
+    return min(found.chunks.start for _, found in files)
 
 
 class _PartWriter:

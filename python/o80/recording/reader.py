@@ -9,10 +9,11 @@ from typing import Any
 
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.epoch import EpochNote, channels_of
+from o80.recording.epoch_part import UNFINISHED, EpochPart
 from o80.recording.foreign_file import copied
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.marks import Mark, Marks, marks_in
-from o80.recording.recorded_epoch import UNFINISHED, EpochPart, RecordedEpoch
+from o80.recording.recorded_epoch import RecordedEpoch
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan, unreadable
 from o80.rows.history import History
 

@@ -1,11 +1,8 @@
 """One run of a backend in a recording: its rows and its journal, as from a live frontend."""
 
-import struct
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -15,13 +12,13 @@ from o80.base.cached import cached
 from o80.base.errors import InvalidArgument, RecordingError, SegmentError
 from o80.base.machine import Machine
 from o80.recording.blocks import messages_in
-from o80.recording.cdr import ENCAPSULATION
-from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote, Gap, Interruption
+from o80.recording.epoch import GAP, OVERWRITTEN, Gap, Interruption
+from o80.recording.epoch_part import EpochPart
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of, entries_in, last_entries_in
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
-from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of, unreadable
+from o80.recording.scan import content_of, index_of
 from o80.rows.history import History, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
 from o80.rows.layout import Layout, decoder_of
@@ -31,107 +28,6 @@ if TYPE_CHECKING:
     from mcap.records import ChunkIndex
 
 T = TypeVar("T")
-UNFINISHED = "the recorder still runs, or was killed"
-
-
-@dataclass(frozen=True)
-class EpochPart:
-    """Part of a run that one file holds."""
-
-    path: Path
-    found: Scan
-    channel: int  #: of the rows
-    note: EpochNote
-    journal: int | None  #: the channel of the journal
-
-    @property
-    def rows(self) -> int:
-        """Number of rows."""
-        return self.found.counts.get(self.channel, 0)
-
-    def records(self, name: str, *numbers: str) -> Iterator[tuple[tuple[int, ...], dict[str, str]]]:
-        """The metadata records of this run with this name: numbers and texts.
-
-        Raises RecordingError.
-        """
-        run = (self.note.segment, str(self.note.number))
-        for each in self.found.metadata:
-            texts = each.metadata
-            if each.name != name or (texts.get("segment"), texts.get("number")) != run:
-                continue
-            try:
-                yield tuple(int(texts[number]) for number in numbers), texts
-            except (KeyError, ValueError) as error:
-                raise RecordingError(f"{self.path}: a record {name} is damaged") from error
-
-    @property
-    def every(self) -> int:
-        """Every so manieth row was kept when the recording was thinned; 1: all."""
-        text = self.found.channels[self.channel].metadata.get("every", "")
-        return int(text) if text.isdecimal() else 1
-
-    @property
-    def last_row(self) -> int:
-        """Iteration of the last row. There must be rows."""
-        chunk = next(
-            each
-            for each in reversed(self.found.chunks)
-            if self.channel in each.message_index_offsets
-        )
-        with self.reading() as file:
-            messages = messages_in(content_of(file, chunk), index_of(file, chunk, self.channel))
-        begin = len(ENCAPSULATION)  # the iteration is the first member
-        return int.from_bytes(messages[-1, begin : begin + 8].tobytes(), "little", signed=True)
-
-    @property
-    def why_cut(self) -> str:
-        """Why the file may lack the end of the run; empty if its recorder was told to end."""
-        if not self.found.finished:
-            return UNFINISHED
-        of_run = (
-            each.chunk_start_offset
-            for each in self.found.chunks
-            if self.channel in each.message_index_offsets
-        )
-        last = max(of_run, default=0)
-        places = (each for each in self.found.metadata_places if each.name == CUT)
-        return "the recorder was killed" if any(each.offset > last for each in places) else ""
-
-    @property
-    def log_times(self) -> tuple[int, int]:
-        """Log times of the first and the last row [ns]. There must be rows."""
-        chunks, channel = self.found.chunks, self.channel
-        with self.reading() as file:
-            first = index_of(file, next(chunks.having(channel)), channel)[0, 0]
-            last = index_of(file, next(chunks.having(channel, newest_first=True)), channel)[-1, 0]
-        return int(first), int(last)
-
-    @property
-    def began_at(self) -> int:
-        """When its recording began, on the wall clock [ns since 1970]."""
-        for place in self.found.attachments:
-            if place.name == self.note.attachment:
-                return place.create_time
-        return 0
-
-    def table(self) -> bytes:
-        """The description of the robot. Raises RecordingError."""
-        for place in self.found.attachments:
-            if place.name == self.note.attachment:
-                with self.reading() as file:
-                    return attachment_of(file, place).data
-        raise RecordingError(f"{self.path} lacks the description of '{self.note.segment}'")
-
-    @contextmanager
-    def reading(self) -> Iterator[IO[bytes]]:
-        """The file; errors in its content are RecordingError and name it."""
-        try:
-            with self.found.opened(self.path) as file:
-                yield file
-        except OSError as error:
-            raise RecordingError(unreadable(self.path, error)) from error
-        except (ValueError, struct.error) as error:
-            raise RecordingError(f"{self.path}: {error}") from error
 
 
 class RecordedEpoch:
@@ -183,13 +79,13 @@ class RecordedEpoch:
     @cached
     def _places(self) -> tuple[tuple[Path, int], tuple[Path, int]]:
         """Where the first and the last chunk with rows begin: file, and offset in it [bytes]."""
-        places = [
+        chunks = [
             (part.path, chunk.chunk_start_offset)
             for part in self._parts
-            for chunk in part.found.chunks
-            if part.channel in chunk.message_index_offsets
+            for chunk in (next(part.found.chunks.having(part.channel), None), part.last_chunk)
+            if chunk is not None
         ]
-        return (places[0], places[-1]) if places else ((Path(), 0), (Path(), 0))
+        return (chunks[0], chunks[-1]) if chunks else ((Path(), 0), (Path(), 0))
 
     @property
     def model(self) -> str:

@@ -5,7 +5,8 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from o80.robots.doctor.checks import CHECKS, MATTERS, Evidence, Finding
+from o80.robots.doctor.check import MATTERS, Evidence, Finding
+from o80.robots.doctor.checks import CHECKS
 from o80.robots.doctor.computer import Computer
 from o80.robots.doctor.wake_ups import WakeUps
 

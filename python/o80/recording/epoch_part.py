@@ -1,0 +1,116 @@
+"""Part of a run that one file holds."""
+
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from o80.base.errors import RecordingError
+from o80.recording.blocks import messages_in
+from o80.recording.cdr import ENCAPSULATION
+from o80.recording.epoch import EpochNote
+from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of, unreadable
+
+if TYPE_CHECKING:
+    from mcap.records import ChunkIndex
+
+UNFINISHED = "the recorder still runs, or was killed"
+
+
+@dataclass(frozen=True)
+class EpochPart:
+    """Part of a run that one file holds."""
+
+    path: Path
+    found: Scan
+    channel: int  #: of the rows
+    note: EpochNote
+    journal: int | None  #: the channel of the journal
+
+    @property
+    def rows(self) -> int:
+        """Number of rows."""
+        return self.found.counts.get(self.channel, 0)
+
+    def records(self, name: str, *numbers: str) -> Iterator[tuple[tuple[int, ...], dict[str, str]]]:
+        """The metadata records of this run with this name: numbers and texts.
+
+        Raises RecordingError.
+        """
+        run = (self.note.segment, str(self.note.number))
+        for each in self.found.metadata:
+            texts = each.metadata
+            if each.name != name or (texts.get("segment"), texts.get("number")) != run:
+                continue
+            try:
+                yield tuple(int(texts[number]) for number in numbers), texts
+            except (KeyError, ValueError) as error:
+                raise RecordingError(f"{self.path}: a record {name} is damaged") from error
+
+    @property
+    def every(self) -> int:
+        """Distance of the rows that a thinned recording keeps: 10 is every tenth; 1 is all."""
+        text = self.found.channels[self.channel].metadata.get("every", "")
+        return int(text) if text.isdecimal() else 1
+
+    @property
+    def last_row(self) -> int:
+        """Iteration of the last row. There must be rows."""
+        chunk = self.last_chunk
+        assert chunk is not None
+        with self.reading() as file:
+            messages = messages_in(content_of(file, chunk), index_of(file, chunk, self.channel))
+        begin = len(ENCAPSULATION)  # the iteration is the first member
+        return int.from_bytes(messages[-1, begin : begin + 8].tobytes(), "little", signed=True)
+
+    @property
+    def last_chunk(self) -> "ChunkIndex | None":
+        """The last chunk with rows of this run."""
+        return next(self.found.chunks.having(self.channel, newest_first=True), None)
+
+    @property
+    def why_cut(self) -> str:
+        """Why the file may lack the end of the run; empty if its recorder was told to end."""
+        if not self.found.finished:
+            return UNFINISHED
+        last = self.last_chunk.chunk_start_offset if self.last_chunk else 0
+        places = (each for each in self.found.metadata_places if each.name == CUT)
+        return "the recorder was killed" if any(each.offset > last for each in places) else ""
+
+    @property
+    def log_times(self) -> tuple[int, int]:
+        """Log times of the first and the last row [ns]. There must be rows."""
+        chunks, channel = self.found.chunks, self.channel
+        with self.reading() as file:
+            first = index_of(file, next(chunks.having(channel)), channel)[0, 0]
+            last = index_of(file, next(chunks.having(channel, newest_first=True)), channel)[-1, 0]
+        return int(first), int(last)
+
+    @property
+    def began_at(self) -> int:
+        """When its recording began, on the wall clock [ns since 1970]."""
+        for place in self.found.attachments:
+            if place.name == self.note.attachment:
+                return place.create_time
+        return 0
+
+    def table(self) -> bytes:
+        """The description of the robot. Raises RecordingError."""
+        for place in self.found.attachments:
+            if place.name == self.note.attachment:
+                with self.reading() as file:
+                    return attachment_of(file, place).data
+        raise RecordingError(f"{self.path} lacks the description of '{self.note.segment}'")
+
+    @contextmanager
+    def reading(self) -> Iterator[IO[bytes]]:
+        """The file; errors in its content are RecordingError and name it."""
+        try:
+            with self.found.opened(self.path) as file:
+                yield file
+        except OSError as error:
+            raise RecordingError(unreadable(self.path, error)) from error
+        except (ValueError, struct.error) as error:
+            raise RecordingError(f"{self.path}: {error}") from error

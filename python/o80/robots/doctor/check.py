@@ -1,0 +1,124 @@
+"""A check, what it finds, and the evidence by which it judges."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+from o80.robots.doctor.computer import SYS_NICE, Computer, Sample
+
+PRIORITY = 81  # of `o80 run` without --priority, and one more for the helper thread
+BUSY = 0.25  # share of a processor from which a thread is a neighbour to name
+MATTERS = 0.1  # share of a period from which a delay is worth a finding
+SHORTEST = 0.2  # [s] between samples: the kernel counts in ticks of 10 ms
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A thing that delays a loop on this computer."""
+
+    name: str
+    seen: str  #: the figure
+    effect: str
+    cure: str  #: a command, or a sentence if there is none
+    undo: str  #: a command; empty: nothing was changed
+    delay: float  #: of an iteration, when it happens [s]
+    remark: bool  #: it happens only under conditions that `effect` names, so it does not count
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """State of a computer before and after a measurement, for all checks."""
+
+    computer: Computer
+    frequency: float
+    before: Sample
+    after: Sample
+    refused: tuple[str, ...] = ()  #: lines of a robot about real-time settings
+    free_memory: int | None = None  #: in /dev/shm [bytes]
+
+    @property
+    def seconds(self) -> float:
+        """Time between the samples; 0 if it is too short for figures a second."""
+        passed = self.after.uptime - self.before.uptime
+        return passed if passed >= SHORTEST else 0.0
+
+    def busy(self) -> list[tuple[float, int, int, str]]:
+        """Busy threads: share of a processor, thread, processor, name; the busiest first."""
+        found = []
+        for number, now in self.after.threads.items():
+            then = self.before.threads.get(number)
+            if then is None or not self.seconds:
+                continue
+            share = (now.ticks - then.ticks) / 100 / self.seconds
+            # the thread of an interrupt goes where the interrupt goes
+            if share >= BUSY and not now.name.startswith("irq/"):
+                found.append((share, number, now.processor, now.name))
+        return sorted(found, reverse=True)
+
+    def interrupts(self) -> Iterator[tuple[float, int, str, str]]:
+        """Interrupts of devices: a second, processor, number, device."""
+        columns = self.computer.processors
+        for number, now in self.after.interrupts.items():
+            then = self.before.interrupts.get(number)
+            if then is None or not self.seconds:
+                continue
+            for i, count in enumerate(now.counts[: len(columns)]):
+                came = count - then.counts[i] if i < len(then.counts) else 0
+                if came > 0:
+                    yield came / self.seconds, columns[i], number, now.device
+
+    @property
+    def real_time(self) -> bool:
+        """Whether `o80 run` gets its priority here."""
+        limit = self.computer.limit("Max realtime priority")
+        may = self.computer.may(SYS_NICE) or limit is None or limit >= PRIORITY
+        return may and not any("real-time priority" in line for line in self.refused)
+
+
+class Check:
+    """A thing that may delay a loop."""
+
+    name: ClassVar[str]
+    delay: ClassVar[float]  #: it may add to an iteration [s]
+    effect: ClassVar[str]
+    cure: ClassVar[str] = ""
+    undo: ClassVar[str] = ""
+    of_host: ClassVar[bool] = True  #: in a container, the host has to be changed
+
+    def look(self, at: Evidence) -> Iterator[Finding]:
+        """Findings on a computer, whatever the rate of the loop."""
+        raise NotImplementedError
+
+    def found(
+        self,
+        at: Evidence,
+        seen: str,
+        *,
+        delay: float | None = None,
+        remark: bool = False,
+        effect: str | None = None,
+        cure: str | None = None,
+        undo: str | None = None,
+        **values: object,
+    ) -> Finding:
+        """Finding with the texts of this check, filled with `values`, unless others are given."""
+        cure = self.cure.format(**values) if cure is None else cure
+        undo = self.undo.format(**values) if undo is None else undo
+        if self.of_host and at.computer.container:
+            cure, undo = on_host(cure), on_host(undo)
+        return Finding(
+            self.name,
+            seen,
+            self.effect.format(**values) if effect is None else effect,
+            cure,
+            undo,
+            self.delay if delay is None else delay,
+            remark,
+        )
+
+
+def on_host(commands: str) -> str:
+    """Commands with the remark that they are for the host of a container."""
+    first, newline, rest = commands.partition("\n")
+    remark = ", on the container's host" if "  # " in first else "  # on the container's host"
+    return commands and first + remark + newline + rest
