@@ -36,7 +36,9 @@ class Chromium:
         assert program is not None, "install Debian's package chromium"
         self._folder = tempfile.mkdtemp(prefix="o80-chromium-")
         home = {**os.environ, "HOME": self._folder}
-        command = [program, *FLAGS, f"--user-data-dir={self._folder}", "about:blank"]
+        # it ends with this program, however that ends
+        command = ["setpriv", "--pdeathsig=KILL", program, *FLAGS]
+        command += [f"--user-data-dir={self._folder}", "about:blank"]
         quiet = subprocess.DEVNULL
         self._popen = subprocess.Popen(
             command, stdout=quiet, stderr=quiet, env=home, start_new_session=True

@@ -2,13 +2,18 @@
 
 import math
 import os
+import select
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
 
+import chromium
 import o80
 from chromium import Chromium, Page
 from o80.view.page_file import write_page
@@ -52,6 +57,18 @@ def scrub(page: Page, seconds: float) -> None:
 
 def click(page: Page, button: str) -> None:
     page.value(f"document.getElementById('{button}').click()")
+
+
+def test_a_browser_does_not_outlive_a_killed_test() -> None:
+    program = "import chromium, time; print(chromium.Chromium().pid, flush=True); time.sleep(1000)"
+    environment = {**os.environ, "PYTHONPATH": str(Path(chromium.__file__).parent)}
+    command = [sys.executable, "-c", program]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as process:
+        assert process.stdout is not None
+        end = os.pidfd_open(int(process.stdout.readline()))
+        process.kill()
+    assert select.select([end], [], [], 60.0)[0]
+    os.close(end)
 
 
 def test_a_page_shows_the_robot_its_curves_and_its_state(browser: Chromium, segment: str) -> None:
@@ -142,11 +159,13 @@ def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str)
         o80.Backend(first, ["turn"], model=WORLD.format(2, 0), joints={"turn": "turn"}) as backend,
         o80.Backend(second, ["turn"], model=WORLD.format(3, 1), joints={"turn": "turn"}) as other,
         o80.Backend(plain, ["lift"]) as without_model,
-        page_server([first, second, plain]) as server,
+        ExitStack() as stack,
     ):
         backend.publish([0.2])
         other.publish([-0.4])
         without_model.publish([0.0])
+        # after the rows: a page opens on a robot that has one
+        server = stack.enter_context(page_server([first, second, plain]))
         page = browser.page(server.url)
         page.wait_for("page.scene.robots.size === 2")
         assert page.value(drawn) == "box,capsule,capsule,plane", "the table and a floor once"
