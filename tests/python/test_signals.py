@@ -445,6 +445,12 @@ def test_what_an_interrupt_left_is_given_back_with_its_exception(
         for error in at_every_moment(lambda: take(there, tmp_path), step):
             del error
             end = time.monotonic() + WAIT
-            while [entry.name for entry in o80.segments()] != [other]:
+            while [entry.name for entry in o80.segments()] != [other] or records():
                 assert time.monotonic() < end, o80.segments()
-                time.sleep(0.001)  # a robot's process ends when its pipe is closed
+                # a robot's process ends when its pipe is closed, a recording's thread that reads
+                # at this moment when it has read
+                time.sleep(0.001)
+
+
+def records() -> bool:
+    return any(thread.name == "o80-recording" for thread in threading.enumerate())
