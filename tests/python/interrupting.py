@@ -1,15 +1,35 @@
 """Interrupts at every moment at which Python can raise one."""
 
+import dis
 import itertools
 import sys
 import threading
 from collections.abc import Callable, Iterator
-from types import FrameType
+from functools import cache
+from types import CodeType, FrameType
 from typing import Any
 
 
+@cache
+def moments_of(code: CodeType) -> frozenset[int]:
+    """Instructions before which Python looks for signals: after a call, at the begin of a loop.
+
+    Elsewhere an interrupt may leave what a signal cannot, such as an exception that is handled for
+    ever.
+    """
+    looked = set()
+    after = False
+    for each in dis.get_instructions(code):
+        if after:
+            looked.add(each.offset)
+        after = each.opname.startswith("CALL") or each.opname == "RESUME"
+        if "JUMP_BACKWARD" in each.opname:
+            looked.add(each.argval)
+    return frozenset(looked)
+
+
 def interrupted(block: Callable[[], object], moment: int) -> BaseException | None:
-    """Calls it, interrupted before its instruction of that number; None if it ended before.
+    """Calls it, interrupted at the moment of that number; None if it ended before.
 
     Python's own modules may raise another exception instead, such as a lock that is not locked.
     Not in `threading`: between the last instruction of a `with` and its end, where no signal is
@@ -20,7 +40,7 @@ def interrupted(block: Callable[[], object], moment: int) -> BaseException | Non
     def trace(frame: FrameType, event: str, _: object) -> Any:
         nonlocal left
         frame.f_trace_opcodes = frame.f_code.co_filename != threading.__file__
-        left -= event == "opcode"
+        left -= event == "opcode" and frame.f_lasti in moments_of(frame.f_code)
         if left == 0:
             raise KeyboardInterrupt
         return trace
@@ -39,7 +59,7 @@ def interrupted(block: Callable[[], object], moment: int) -> BaseException | Non
 
 
 def at_every_moment(block: Callable[[], object], step: int = 1) -> Iterator[BaseException | None]:
-    """The interrupts of calls of it, each so many instructions later than the last."""
+    """The interrupts of calls of it, each so many moments later than the last."""
     block()  # imports what it needs, for an interrupted import leaves Python's lock of it taken
     for moment in itertools.count(1, step):
         errors = [interrupted(block, moment)]  # not a variable, which would keep the exception

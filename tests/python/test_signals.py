@@ -303,7 +303,7 @@ def test_an_interrupt_at_any_moment_gives_control_back(process: o80.robots.Proce
             moments += 1
             with other.control(WAIT):  # also while the traceback keeps the frames
                 assert isinstance(error, KeyboardInterrupt)
-        assert moments > 20
+        assert moments > 5
 
 
 TWICE = """
@@ -432,7 +432,7 @@ def test_what_was_interrupted_before_it_had_anything_is_dropped(kind: Any) -> No
 )
 @pytest.mark.parametrize(
     ("take", "step"),
-    [(inline, 31), (embedded, 17), (commanding, 3), (recording, 131), (in_a_process, 131)],
+    [(inline, 5), (embedded, 3), (commanding, 1), (recording, 17), (in_a_process, 17)],
 )
 def test_what_an_interrupt_left_is_given_back_with_its_exception(
     segment: str, tmp_path: Path, take: Callable[[str, Path], None], step: int
