@@ -1,6 +1,7 @@
 #include "batch.hpp"
 
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
@@ -127,6 +128,12 @@ void bind_batch(nb::module_& m) {
                    "A handle for each command, request and purge, in the order they were added.")
       .def_prop_ro("statuses", &statuses_of, nb::sig("def statuses(self) -> list[Status]"),
                    "The status of each, in the order they were added.")
+      .def_prop_ro("_shift",
+                   [](const Batch& self) {
+                     const auto shift = self.shift();
+                     return shift ? std::optional(std::pair(shift->iterations, shift->stood))
+                                  : std::nullopt;
+                   })
       .def_prop_ro("ended", &Batch::ended, "True if all of them have ended.")
       .def_prop_ro(
           "taken", [](const Batch& self) { return self.first_iteration() >= 0; },

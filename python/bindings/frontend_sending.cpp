@@ -16,6 +16,7 @@
 #include "control/batch/batch_builder.hpp"
 #include "control/batch/command_check.hpp"
 #include "control/batch/record.hpp"
+#include "control/motion/number_plan.hpp"
 #include "control/motion/state_layout.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
@@ -252,6 +253,53 @@ Batch send_alone(const Frontend& self, Fill&& fill) {
   return frontend->pulse(batch);
 }
 
+/// Sends a chunk. `due`: for each row an uint32, iterations after the anchor.
+Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators,
+                        nb::handle due, nb::handle states, const std::vector<std::uint64_t>& mask,
+                        o80::Iteration anchor, std::uint64_t plan, std::uint32_t ease,
+                        std::uint32_t first, bool fixed, bool reject_late, nb::handle profile) {
+  const Bytes iterations(due);
+  std::vector<std::uint32_t> ends(iterations.span().size() / sizeof(std::uint32_t));
+  if (!ends.empty()) std::memcpy(ends.data(), iterations.span().data(), iterations.span().size());
+  const o80::ChunkOptions options{.anchor = anchor,
+                                  .plan = plan,
+                                  .ease = ease,
+                                  .first = first,
+                                  .fixed = fixed,
+                                  .reject_late = reject_late,
+                                  .profile = profile_of_rows(profile)};
+  const Bytes all(states);
+  return send_alone(self, [&](o80::BatchBuilder& batch) {
+    self.untyped().add_chunk(batch, actuators, ends, all.span(), options, mask);
+  });
+}
+
+/// Places and slopes of the plan of a chunk, in each iteration from its begin: of one number, from
+/// this place and slope. `ends`: the last iteration of the way to each row, counted from its begin.
+std::pair<std::vector<double>, std::vector<double>> plan_of_rows(
+    double place, double slope, const std::vector<double>& rows,
+    const std::vector<std::int64_t>& ends, nb::handle profile) {
+  const o80::Profile shape = profile_of_rows(profile);
+  std::pair<std::vector<double>, std::vector<double>> plan;
+  o80::NumberPlan way;
+  way.stand(place, slope);
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const std::int64_t count = ends[i] - (i == 0 ? 0 : ends[i - 1]);
+    const bool is_last = i + 1 == rows.size();
+    if (shape == o80::Profile::hold) way.line(rows[i], rows[i]);
+    if (shape == o80::Profile::linear) way.line_on(rows[i], count);
+    if (shape == o80::Profile::cubic) {
+      way.curve_on(rows[i], count, is_last ? rows[i] : rows[i + 1],
+                   is_last ? 0 : ends[i + 1] - ends[i]);
+    }
+    for (std::int64_t k = 0; k < count; ++k) {
+      plan.first.push_back(way.next());
+      plan.second.push_back(way.slope());
+    }
+  }
+  return plan;
+}
+
 std::uint16_t purged(const Frontend& self, nb::handle actuator) {
   return actuator.is_none() ? o80::kEveryActuator
                             : static_cast<std::uint16_t>(self.actuator(actuator));
@@ -287,6 +335,7 @@ std::uint32_t add_request(const Frontend& self, nb::handle name, const nb::kwarg
 }  // namespace
 
 void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
+  m.def("plan_of_rows", &plan_of_rows, "place"_a, "slope"_a, "rows"_a, "ends"_a, "profile"_a);
   const auto all = "actuator"_a = nb::none();
   def_verb(frontend, "add_command", verbs::add_command, &add_command, "actuator"_a.none(),
            "target"_a.none(), nb::kw_only(), "duration"_a = nb::none(), "speed"_a = nb::none(),
@@ -332,6 +381,8 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
       .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a, "mask"_a,
            "times"_a.none(), "speed"_a.none(), "iterations"_a.none(), "mode"_a.none(),
            "profile"_a.none(), "start"_a.none())
+      .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "mask"_a, "anchor"_a,
+           "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "profile"_a)
       .def("_purge_own",
            [](const Frontend& self) {
              return send_alone(

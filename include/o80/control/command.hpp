@@ -13,8 +13,9 @@ inline constexpr std::uint16_t kEveryActuator = 0xFFFF;
 inline constexpr Iteration kNow = -1;
 
 enum class Mode : std::uint8_t { queue, overwrite };
-enum class Pace : std::uint8_t { direct, duration, speed, until, iterations, fastest };
-enum class Profile : std::uint8_t { linear, minimum_jerk, as_sent };
+enum class Pace : std::uint8_t { direct, duration, speed, until, iterations, fastest, chunk };
+/// `cubic` and `hold` are for the rows of a chunk.
+enum class Profile : std::uint8_t { linear, minimum_jerk, as_sent, cubic, hold };
 /// Which state a command starts from.
 enum class Start : std::uint8_t { desired, observed };
 
@@ -71,6 +72,18 @@ struct PulseOptions {
   enum class Late : std::uint8_t { reject, now };
   Iteration at = kNow;
   Late late = Late::reject;
+};
+
+/// How rows of targets are played, each in a fixed iteration (docs/chunks.md).
+struct ChunkOptions {
+  Iteration anchor = 0;     ///< Of the observation that the rows answer.
+  std::uint64_t epoch = 0;  ///< Of its backend.
+  std::uint64_t plan = 0;   ///< Of one plan of a frontend, an older anchor is rejected.
+  std::uint32_t ease = 1;   ///< Iterations of the take-over.
+  std::uint32_t first = 0;  ///< Rows before this one are what was planned before, not played.
+  bool fixed = false;       ///< Rows keep their iterations also where the actuators stand still.
+  bool reject_late = false;  ///< Rejects it if row `first` is late, instead of skipping rows.
+  Profile profile = Profile::cubic;  ///< Or linear, or hold.
 };
 
 }  // namespace o80

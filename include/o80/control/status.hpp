@@ -40,9 +40,10 @@ enum class Reason : std::uint8_t {
   stopped,
   halted,
   full,    // the lane has too many batches that wait for a later iteration
-  reading  // the robot cannot be where it was read
+  reading,  // the robot cannot be where it was read
+  older     // the chunk answers an older observation than the one before it
 };
-inline constexpr std::size_t kReasons = static_cast<std::size_t>(Reason::reading) + 1;
+inline constexpr std::size_t kReasons = static_cast<std::size_t>(Reason::older) + 1;
 
 std::string_view to_text(Status status) noexcept;
 std::string_view to_text(Reason reason) noexcept;

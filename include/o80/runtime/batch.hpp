@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -52,6 +53,13 @@ class Batch {
   bool ended() const;
   /// The iteration in which the batch was taken; -1 if it was not taken yet.
   Iteration first_iteration() const;
+  /// By how many iterations the rows of its chunk, if it has one, are later than they were sent for,
+  /// because the actuators stood still; nothing before it was taken. `stood`: whether they did.
+  struct Shift {
+    std::int64_t iterations = 0;
+    bool stood = false;
+  };
+  std::optional<Shift> shift() const;
   /// The iteration in which the last of its records ended; -1 if some have not ended.
   Iteration last_iteration() const;
   /// The reason, in words, why the whole batch was rejected; empty if it was not.

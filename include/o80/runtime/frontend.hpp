@@ -133,6 +133,18 @@ class UntypedFrontend {
   /// in force. `states` as in add_trajectories().
   void add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                       std::span<const std::byte> states, Mode mode = Mode::queue);
+  /// Adds a chunk (docs/chunks.md): rows that are due in fixed iterations, which overwrite what the
+  /// actuators do. `due`: iterations after the anchor, rising from 1, one for each row. `states` and
+  /// `mask` as in add_trajectories(). Throws InvalidArgument.
+  std::uint32_t add_chunk(std::span<const std::uint32_t> actuators,
+                          std::span<const std::uint32_t> due, std::span<const std::byte> states,
+                          const ChunkOptions& options, std::span<const std::uint64_t> mask = {}) {
+    return add_chunk(own_builder(), actuators, due, states, options, mask);
+  }
+  /// The same, for a batch of its own.
+  std::uint32_t add_chunk(BatchBuilder& batch, std::span<const std::uint32_t> actuators,
+                          std::span<const std::uint32_t> due, std::span<const std::byte> states,
+                          const ChunkOptions& options, std::span<const std::uint64_t> mask);
   std::uint32_t add_purge(std::uint32_t actuator = kEveryActuator);
   /// Drops only what this frontend sent.
   std::uint32_t add_purge_own();
@@ -253,6 +265,7 @@ class UntypedFrontend {
   std::shared_ptr<Link> link() const { return link_; }
 
  private:
+  BatchBuilder& own_builder();
   RecordHead checked_command(std::uint32_t actuator, std::span<const std::byte> state,
                              const CommandOptions& options,
                              std::span<const std::uint64_t> mask) const;

@@ -45,6 +45,9 @@ struct JournalRecord {
   Start start = Start::desired;
   std::uint32_t rows = 1;               // above 1: a trajectory
   std::vector<std::int64_t> row_times;  // of a trajectory with its own times [ns]
+  // of a chunk; the rows are due so many iterations after its anchor
+  ChunkOptions chunk;
+  std::vector<std::uint32_t> due;
   std::vector<Target> targets;          // more than one: a command of several actuators
   // of a purge
   std::uint16_t actuator = kEveryActuator;

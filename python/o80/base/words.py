@@ -20,6 +20,8 @@ class Profile(StrEnum):
     LINEAR = "linear"
     MINIMUM_JERK = "minimum_jerk"
     AS_SENT = "as_sent"  #: no interpolation: each target in its iteration, where limits allow
+    CUBIC = "cubic"  #: of a chunk: through its rows, without overshoot
+    HOLD = "hold"  #: of a chunk: each row from the iteration after the one before it
 
 
 class Start(StrEnum):
@@ -61,6 +63,7 @@ class Reason(StrEnum):
     HALTED = "halted"
     FULL = "full"  #: too many batches of its frontend wait for later iterations
     READING = "reading"  #: the robot cannot be where it was read
+    OLDER = "older"  #: the chunk answers an older observation than the one before it
 
 
 class CommandEnd(NamedTuple):
@@ -75,6 +78,7 @@ class CommandEnd(NamedTuple):
 
 ModeWord: TypeAlias = Mode | Literal["queue", "overwrite"]
 ProfileWord: TypeAlias = Profile | Literal["linear", "minimum_jerk", "as_sent"]
+RowsWord: TypeAlias = Literal["cubic", "linear", "hold"]
 StartWord: TypeAlias = Start | Literal["desired", "observed"]
 LateWord: TypeAlias = Literal["reject", "now"]
 OnErrorWord: TypeAlias = Literal["purge", "continue"]

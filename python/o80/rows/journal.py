@@ -36,12 +36,18 @@ class JournalCommand:
     #: For each actuator its target: a number, or a dictionary of the fields that were given. For a
     #: trajectory arrays, with a row for each waypoint.
     targets: tuple[Any, ...] = ()
-    pace: str = ""  #: direct, duration, speed, until, iterations or fastest
+    pace: str = ""  #: direct, duration, speed, until, iterations, fastest or chunk
     amount: float | None = None  #: duration [s], iterations, the iteration of until, or the speed
     mode: str = ""
     profile: str = ""
     start: str = ""
     times: tuple[float, ...] = ()  #: of a trajectory with its own times [s]
+    #: Of a chunk: the iteration of the observation that it answers, when each row is due if the
+    #: actuators do not stand still, the iterations of its take-over, the first row that is played.
+    anchor: int | None = None
+    due: tuple[int, ...] = ()
+    ease: int | None = None
+    first: int | None = None
     only_own: bool = False  #: of a purge: only commands of its frontend
     request: str = ""  #: the name of the request
     fields: dict[str, Any] | None = None  #: its values
@@ -162,6 +168,7 @@ class EntryDecoder:
     def _command(self, native: _core.JournalRecord) -> JournalCommand:
         kind = native.kind
         if kind == "command":
+            is_chunk = native.pace == "chunk"
             return JournalCommand(
                 kind=kind,
                 id=native.id,
@@ -173,6 +180,10 @@ class EntryDecoder:
                 profile=native.profile,
                 start=native.start,
                 times=tuple(time * 1e-9 for time in native.row_times),
+                anchor=native.anchor if is_chunk else None,
+                due=tuple(native.anchor + due for due in native.due),
+                ease=native.ease if is_chunk else None,
+                first=native.first if is_chunk else None,
             )
         if kind == "purge":
             every = native.actuator >= len(self._names)

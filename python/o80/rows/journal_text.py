@@ -114,11 +114,15 @@ def command_text(command: JournalCommand) -> str:
         f"{name} to {_target(target)}"
         for name, target in zip(command.actuators, command.targets, strict=True)
     ]
-    overwrite = ", overwriting" if command.mode == "overwrite" else ""
+    overwrites = command.mode == "overwrite" and command.pace != "chunk"
+    overwrite = ", overwriting" if overwrites else ""
     return f"{', '.join(parts)}{_pace(command)}{overwrite}"
 
 
 def _pace(command: JournalCommand) -> str:
+    if command.due:
+        first, last = command.due[command.first or 0], command.due[-1]
+        return f" in a chunk due {first} to {last}, which answers iteration {command.anchor}"
     if command.times:
         return f" in {command.times[-1]:g} s"
     amount = command.amount

@@ -1,5 +1,6 @@
 #include "control/batch/batch_builder.hpp"
 
+#include <algorithm>
 #include <cassert>
 #include <cstring>
 #include <limits>
@@ -32,29 +33,82 @@ std::uint32_t BatchBuilder::add(const RecordHead& head, std::span<const std::byt
   return records_ - 1;
 }
 
-std::uint32_t BatchBuilder::group(std::span<const Member> members,
-                                  std::span<const std::int64_t> times, std::uint32_t rows) {
-  assert(!members.empty());
+/// Calls add(), which adds a group and its members; if it throws, nothing is added.
+template <class Add>
+std::uint32_t BatchBuilder::add_group(Add&& add) {
   const std::size_t before = blocks_.size();
   const auto counts = counts_;
-  RecordHead head = members.front().head;
-  head.kind = RecordKind::group;
-  head.actuator = 0;
-  head.masked = 0;
-  head.rows = static_cast<std::uint32_t>(members.size());
-  add(head);
+  const std::uint32_t records = records_;
   try {
-    for (const Member& member : members) {
-      add_command(member, RecordKind::member, times, rows);
-    }
+    add();
   } catch (...) {
-    // remove the incomplete group
     blocks_.resize(before);
     counts_ = counts;
-    --records_;
+    records_ = records;
     throw;
   }
   return records_ - 1;
+}
+
+void BatchBuilder::open_group(const Member& first, std::size_t members,
+                              std::span<const std::byte> payload) {
+  RecordHead head = first.head;
+  head.kind = RecordKind::group;
+  head.actuator = 0;
+  head.masked = 0;
+  head.rows = static_cast<std::uint32_t>(members);
+  add(head, payload);
+}
+
+std::uint32_t BatchBuilder::group(std::span<const Member> members,
+                                  std::span<const std::int64_t> times, std::uint32_t rows) {
+  assert(!members.empty());
+  return add_group([&] {
+    open_group(members.front(), members.size(), {});
+    for (const Member& member : members) {
+      add_command(member, RecordKind::member, times, rows);
+    }
+  });
+}
+
+std::uint32_t BatchBuilder::chunk(std::span<const Member> members, const ChunkHead& chunk,
+                                  std::span<const std::uint32_t> due,
+                                  std::span<const StateLayout* const> layouts) {
+  assert(!members.empty() && members.size() == layouts.size());
+  std::array<std::byte, kChunkGroupBytes> payload{};
+  ChunkHead written = chunk;
+  written.rows = static_cast<std::uint32_t>(due.size());
+  std::memcpy(payload.data() + payload.size() - sizeof written, &written, sizeof written);
+  return add_group([&] {
+    for (std::size_t i = 0; i < members.size(); ++i) {
+      Member member = members[i];
+      member.head.mode = Mode::overwrite;
+      member.head.pace = Pace::chunk;
+      if (i == 0) open_group(member, members.size(), payload);
+      add_rows(member, due, *layouts[i]);
+    }
+  });
+}
+
+void BatchBuilder::add_rows(const Member& member, std::span<const std::uint32_t> due,
+                            const StateLayout& layout) {
+  RecordHead head = member.head;
+  head.kind = RecordKind::member;
+  head.masked = member.mask.empty() ? 0 : 1;
+  head.rows = static_cast<std::uint32_t>(due.size());
+  const ChunkPlaces places(head.rows, layout, head.masked != 0);
+  assert(member.states.size() == due.size() * layout.size());
+  std::byte* const bytes = open(head, places.payload_bytes);
+  if (!member.mask.empty()) std::memcpy(bytes, member.mask.data(), member.mask.size_bytes());
+  std::byte* const blocks = bytes - sizeof head;
+  std::byte* const notes = blocks + std::size_t{places.blocks_before_notes()} * kBlockBytes;
+  for (std::size_t first = 0; first < due.size(); first += RowNote::kRows) {
+    const auto of_note = due.subspan(first, std::min<std::size_t>(RowNote::kRows, due.size() - first));
+    std::byte* const note = notes + first / RowNote::kRows * places.blocks_of_note * kBlockBytes;
+    std::memcpy(note + offsetof(RowNote, due), of_note.data(), of_note.size_bytes());
+  }
+  std::memcpy(blocks + std::size_t{places.blocks_before_rows()} * kBlockBytes, member.states.data(),
+              member.states.size());
 }
 
 void BatchBuilder::add_command(const Member& member, RecordKind kind,

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "control/batch/chunk.hpp"
 #include "control/batch/record.hpp"
 
 namespace o80 {
@@ -40,6 +41,12 @@ class BatchBuilder {
   /// Adds one command for several actuators, whose heads (as above) differ only in the actuator.
   std::uint32_t group(std::span<const Member> members, std::span<const std::int64_t> times = {},
                       std::uint32_t rows = 1);
+  /// Adds a chunk, of one actuator or several; their heads have actuator and profile. `chunk` has
+  /// what a frontend gives, but `rows`. `due`: iterations after the anchor, rising, for each row.
+  /// `layouts`: of the states of the members.
+  std::uint32_t chunk(std::span<const Member> members, const ChunkHead& chunk,
+                      std::span<const std::uint32_t> due,
+                      std::span<const StateLayout* const> layouts);
   std::uint32_t purge(std::uint16_t actuator_or_every) {
     return add(head_of(RecordKind::purge, actuator_or_every));
   }
@@ -94,6 +101,11 @@ class BatchBuilder {
   }
   std::byte* open(const RecordHead& head, std::uint64_t payload_bytes);
   std::uint32_t add(const RecordHead& head, std::span<const std::byte> payload = {});
+  void open_group(const Member& first, std::size_t members, std::span<const std::byte> payload);
+  template <class Add>
+  std::uint32_t add_group(Add&& add);
+  void add_rows(const Member& member, std::span<const std::uint32_t> due,
+                const StateLayout& layout);
   void add_command(const Member& member, RecordKind kind, std::span<const std::int64_t> times,
                    std::uint32_t rows);
   std::uint32_t of(RecordKind kind) const noexcept {

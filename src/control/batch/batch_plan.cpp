@@ -5,12 +5,15 @@
 #include <cstddef>
 #include <utility>
 
+#include "control/batch/chunk.hpp"
+
 namespace o80 {
 namespace {
 
 // work of a batch and of a step; copying a block is 1
 constexpr std::uint32_t kBatchWork = 6;
 constexpr std::uint32_t kStepWork = 2;
+constexpr std::uint32_t kChunkWork = 16;    // for each member: finds its rows
 constexpr std::uint32_t kRequestWork = 16;  // plus 1 for each actuator: it may make a fresh start
 
 /// The plan of a checked batch, stored over the end of its record, which is not needed any more.
@@ -124,7 +127,7 @@ struct BatchPlanner::Lane : Batch {
       group = cursor;
       first_member = kNoBlock;
       members_left = head.rows;
-      group_blocks = 1;
+      group_blocks = record_blocks;
     } else {
       put(cursor, valid ? 0 : record_blocks);
     }
@@ -203,7 +206,9 @@ struct BatchPlanner::Lane : Batch {
     const RecordHead& of = pool.head(group);
     const bool is_new = std::exchange(target(head.actuator).group, group) != group;
     const bool is_first = first_member == kNoBlock;
-    const bool same_rows = is_first || head.rows == pool.head(first_member).rows;
+    const bool same_rows =
+        is_first ? !is_chunk(head) || !is_chunk(of) || head.rows == chunk_of(pool, group).rows
+                 : head.rows == pool.head(first_member).rows;
     return is_new && same_rows && head.mode == of.mode && head.pace == of.pace &&
            head.profile == of.profile && head.start == of.start && head.amount == of.amount;
   }
@@ -218,6 +223,7 @@ struct BatchPlanner::Lane : Batch {
 
     // the members of a complete group go to their queues like other commands
     CommandGroups(pool).begin(group);
+    if (is_chunk(pool.head(group))) return add_chunk();
     for (BlockIndex member = first_member; member != kNoBlock;) {
       const BlockIndex record = member;
       member = std::exchange(pool.head(record).own[Own::kNextStep], kNoBlock);
@@ -226,6 +232,23 @@ struct BatchPlanner::Lane : Batch {
     }
     group = kNoBlock;
     ++plan.effort.groups;
+    ++place;
+  }
+
+  /// A chunk is one step: its members wait, linked, until it begins.
+  void add_chunk() noexcept {
+    std::uint32_t work = 0;
+    for (BlockIndex member = first_member; member != kNoBlock; work += kChunkWork) {
+      RecordHead& head = pool.head(member);
+      member = head.own[Own::kNext] = std::exchange(head.own[Own::kNextStep], kNoBlock);
+      spend(1);
+    }
+    pool.head(group).own[Own::kNext] = first_member;
+    plan.effort.express = 0;
+    plan.effort.moves = 1;
+    ++plan.effort.groups;
+    end_part();
+    add_step(std::exchange(group, kNoBlock), work);
     ++place;
   }
 

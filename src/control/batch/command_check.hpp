@@ -67,6 +67,7 @@ class CommandCheck {
   std::uint32_t actuator(std::string_view name) const;
   /// The same index, if there is such an actuator.
   std::uint32_t actuator(std::int64_t index) const;
+  const StateLayout& layout(std::uint32_t actuator) const { return targets_.layout(actuator); }
   /// Number of 64-bit words of a mask for this actuator.
   std::size_t words_of_mask(std::uint32_t actuator) const {
     return targets_.layout(actuator).mask_words();

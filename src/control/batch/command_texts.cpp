@@ -20,11 +20,11 @@ std::string_view text_of(Enum value, const std::string_view (&texts)[count]) noe
 std::string_view to_text(Mode mode) noexcept { return text_of(mode, {"queue", "overwrite"}); }
 
 std::string_view to_text(Pace pace) noexcept {
-  return text_of(pace, {"direct", "duration", "speed", "until", "iterations", "fastest"});
+  return text_of(pace, {"direct", "duration", "speed", "until", "iterations", "fastest", "chunk"});
 }
 
 std::string_view to_text(Profile profile) noexcept {
-  return text_of(profile, {"linear", "minimum_jerk", "as_sent"});
+  return text_of(profile, {"linear", "minimum_jerk", "as_sent", "cubic", "hold"});
 }
 
 std::string_view to_text(Start start) noexcept { return text_of(start, {"desired", "observed"}); }
@@ -36,7 +36,7 @@ std::string_view to_text(Status status) noexcept {
 
 std::string_view to_text(Reason reason) noexcept {
   return text_of(reason, {"none", "late", "exclusive", "invalid", "limits", "driver", "fresh_start",
-                          "dead_frontend", "silence", "stopped", "halted", "full", "reading"});
+                          "dead_frontend", "silence", "stopped", "halted", "full", "reading", "older"});
 }
 
 }  // namespace o80

@@ -43,7 +43,7 @@ void Ledger::activate(BlockIndex record, Iteration iteration, const Outcome& out
     if (groups_.at(group).active != 0) return;
     groups_.at(group).active = 1;
     id = pool_.head(group).id;
-    if (head.rows == 1) {
+    if (head.rows == 1 || head.pace == Pace::chunk) {
       groups_.at(group).decided = 1;
       --undecided_groups_;
     }

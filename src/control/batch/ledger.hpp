@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <new>
 
+#include "control/batch/chunk.hpp"
 #include "control/batch/command_group.hpp"
 #include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
@@ -49,6 +50,12 @@ class Ledger {
   /// A command, or a member of a group, has begun. Reason::limits: it takes longer than requested.
   void activate(BlockIndex record, Iteration iteration,
                 const Outcome& outcome = {Status::active}) noexcept;
+  /// Tells what was decided of a chunk, by the active status of its batch (TakenChunk).
+  void note_decided(BlockIndex record, const TakenChunk& chunk, Iteration iteration) noexcept {
+    const TakenBatch& of = batch(pool_.head(record).own[Own::kBatch]);
+    tell(of.lane, of.id, {Status::active, Reason::none, chunk.detail(), chunk.shift & 0xFFFF},
+         iteration, StatusChange::Of::chunk);
+  }
   /// A record has ended; reported at once. A group is reported when its last member has ended, with
   /// the first end status that is not completed.
   void end(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept;

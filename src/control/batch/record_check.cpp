@@ -22,6 +22,14 @@ bool sane_pace(const RecordHead& head) noexcept {
   }
 }
 
+/// True for the options of a member of a chunk.
+bool suits_chunk(const RecordHead& head) noexcept {
+  const bool plays_rows = head.profile == Profile::cubic || head.profile == Profile::linear ||
+                          head.profile == Profile::hold;
+  return head.kind == RecordKind::member && plays_rows && head.mode == Mode::overwrite &&
+         head.start == Start::desired && head.rows <= kMaxChunkRows;
+}
+
 }  // namespace
 
 RecordCheck::RecordCheck(const Schema& schema, const Layouts& layouts) : targets_(schema, layouts) {
@@ -39,7 +47,7 @@ RecordCheck::RecordCheck(const Schema& schema, const Layouts& layouts) : targets
   mask_.resize(words);
 }
 
-RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
+RecordCheck::Verdict RecordCheck::begin(BlockPool& pool, BlockIndex block,
                                         Progress& progress) noexcept {
   const auto verdict = [](bool valid) { return valid ? Verdict::valid : Verdict::invalid; };
   const RecordHead& head = pool.head(block);
@@ -49,7 +57,10 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
     case RecordKind::member:
       return begin_command(head, progress);
     case RecordKind::group:
-      return verdict(head.payload_bytes == 0 && head.rows > 0 && head.rows <= targets_.actuators());
+      return verdict(head.rows > 0 && head.rows <= targets_.actuators() &&
+                     (is_chunk(head) ? head.payload_bytes == kChunkGroupBytes &&
+                                           is_sane(chunk_of(pool, block))
+                                     : head.payload_bytes == 0));
     case RecordKind::request:
       return verdict(is_request(head, progress.payload));
     case RecordKind::purge:
@@ -70,9 +81,10 @@ RecordCheck::Verdict RecordCheck::begin(const BlockPool& pool, BlockIndex block,
 RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
   const bool as_sent = head.profile == Profile::as_sent;
-  const bool is_known = head.mode <= Mode::overwrite && head.pace <= Pace::fastest &&
-                        head.profile <= Profile::as_sent && head.start <= Start::observed &&
-                        head.masked <= 1;
+  const bool of_chunk = is_chunk(head);
+  const bool is_known = head.mode <= Mode::overwrite && head.pace <= Pace::chunk &&
+                        head.start <= Start::observed && head.masked <= 1 &&
+                        (of_chunk ? suits_chunk(head) : head.profile <= Profile::as_sent);
   if (head.actuator >= targets_.actuators() || head.rows == 0 || !is_known || !sane_pace(head) ||
       (as_sent && (head.pace != Pace::direct || head.rows > 1))) {
     return Verdict::invalid;
@@ -82,7 +94,9 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   const std::uint64_t mask_bytes = head.masked != 0 ? 8 * layout.mask_words() : 0;
   const std::uint64_t time_bytes = timed ? 8 * std::uint64_t{head.rows} : 0;
   const std::uint64_t row_bytes = std::uint64_t{head.rows} * layout.size();
-  if (head.payload_bytes != mask_bytes + time_bytes + row_bytes) return Verdict::invalid;
+  const std::uint64_t wanted = of_chunk ? ChunkPlaces(head.rows, layout, head.masked != 0).payload_bytes
+                                        : mask_bytes + time_bytes + row_bytes;
+  if (head.payload_bytes != wanted) return Verdict::invalid;
 
   // no bit of the mask is beyond the last number
   const std::uint64_t* mask = head.masked != 0 ? mask_.data() : nullptr;
@@ -100,7 +114,7 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   return Verdict::unfinished;
 }
 
-RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block, Progress& progress,
+RecordCheck::Verdict RecordCheck::go_on(BlockPool& pool, BlockIndex block, Progress& progress,
                                         std::uint32_t& budget) noexcept {
   const RecordHead& head = pool.head(block);
   const StateLayout& layout = targets_.layout(head.actuator);
@@ -109,6 +123,7 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
     Cursor(pool, block, sizeof(RecordHead), head.payload_bytes)
         .read(mask_.data(), 8 * layout.mask_words());
   }
+  if (is_chunk(head)) return go_on_with_chunk(pool, block, progress, budget, mask);
   // payload in the block of the head is free
   constexpr std::int64_t kWithHead = kBlockBytes - sizeof(RecordHead);
   auto bytes_left = static_cast<std::int64_t>(std::uint64_t{budget} * kBlockBytes) + kWithHead;
@@ -132,6 +147,33 @@ RecordCheck::Verdict RecordCheck::go_on(const BlockPool& pool, BlockIndex block,
   budget = std::min(
       budget, static_cast<std::uint32_t>(std::max<std::int64_t>(bytes_left, 0) / kBlockBytes));
   return progress.rows_left > 0 ? Verdict::unfinished : Verdict::valid;
+}
+
+/// Walks to the rows, notes them, and joins the notes from the last one on.
+RecordCheck::Verdict RecordCheck::go_on_with_chunk(BlockPool& pool, BlockIndex block,
+                                                   Progress& progress, std::uint32_t& budget,
+                                                   const std::uint64_t* mask) noexcept {
+  const RecordHead& head = pool.head(block);
+  const StateLayout& layout = targets_.layout(head.actuator);
+  ChunkRows rows(pool, block, layout);
+  ChunkRows::Notes& notes = progress.notes;
+  auto* state = reinterpret_cast<std::byte*>(state_.data());
+  for (; !rows.is_walked(notes) && budget > 0; --budget) {
+    if (!rows.walk(notes)) return Verdict::invalid;
+    if (!rows.is_walked(notes)) continue;
+    progress.payload =
+        Cursor(pool, pool.next(notes.at), 0, std::uint64_t{head.rows} * layout.size());
+  }
+  const std::uint32_t cost = 1 + layout.size() / static_cast<std::uint32_t>(kBlockBytes);
+  for (; rows.is_walked(notes) && progress.rows_left > 0 && budget > 0; --progress.rows_left) {
+    const Cursor at = progress.payload;
+    progress.payload.read(state, layout.size());
+    if (!targets_.admit(head.actuator, state, mask)) return Verdict::invalid;
+    rows.add(notes, at, state);
+    budget -= std::min(budget, cost);
+  }
+  for (; progress.rows_left == 0 && notes.not_joined > 0 && budget > 0; --budget) rows.join(notes);
+  return progress.rows_left > 0 || notes.not_joined > 0 ? Verdict::unfinished : Verdict::valid;
 }
 
 }  // namespace o80

@@ -3,6 +3,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "control/batch/chunk.hpp"
 #include "control/batch/command_check.hpp"
 #include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
@@ -42,17 +43,20 @@ class RecordCheck {
     std::uint32_t rows_left = 0;
     std::int64_t time = 0;  // end time of the row before [ns]
     Cursor rows{};          // position of the first row
+    ChunkRows::Notes notes{};
   };
 
   /// Checks the record at `block` except for its times and rows. All its blocks must be in the
   /// pool. The planner walks over what was not read of a payload.
-  Verdict begin(const BlockPool& pool, BlockIndex block, Progress& progress) noexcept;
+  Verdict begin(BlockPool& pool, BlockIndex block, Progress& progress) noexcept;
   /// Continues with times and rows for about `budget` blocks, and reduces `budget` by them.
-  Verdict go_on(const BlockPool& pool, BlockIndex block, Progress& progress,
+  Verdict go_on(BlockPool& pool, BlockIndex block, Progress& progress,
                 std::uint32_t& budget) noexcept;
 
  private:
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
+  Verdict go_on_with_chunk(BlockPool& pool, BlockIndex block, Progress& progress,
+                           std::uint32_t& budget, const std::uint64_t* mask) noexcept;
   bool is_request(const RecordHead& head, Cursor& payload) noexcept {
     if (head.actuator >= requests_.size()) return false;
     const StateLayout* layout = requests_[head.actuator];

@@ -104,6 +104,10 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   requested_by_speed_ = longest;
   for (Number& each : numbers_) {
     if (!each.is_commanded) continue;
+    if (course.of_chunk) {
+      to_row(each, course);
+      continue;
+    }
     Requested requested = course;
     requested.target = layout_.number(each.number, target());
     const bool at_published = observed != nullptr || !each.is_limited || !(first_row || !is_row_);
@@ -124,6 +128,17 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
     slowest_ = {each.motion.plan().slowest(), each.number};
   }
   return longest;
+}
+
+/// The way of one number to the next row of a chunk.
+void Motion::to_row(Number& number, const Course& course) noexcept {
+  const double row = layout_.number(number.number, target());
+  if (course.profile == Profile::hold) return number.motion.jump_on(row);
+  if (course.profile == Profile::linear) return number.motion.line_on(row, course.iterations);
+  const bool is_last = course.next_iterations == 0;
+  number.motion.curve_on(row, course.iterations,
+                         is_last ? row : layout_.number(number.number, course.next),
+                         course.next_iterations);
 }
 
 /// Types that blend by themselves: by the share of the time, from rest to rest.

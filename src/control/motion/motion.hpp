@@ -36,20 +36,39 @@ class Motion {
   struct Course : Requested {
     std::uint32_t first = 0;  // the number that the cruising speed is for
     bool is_row = false;      // of a trajectory in straight lines: it has `iterations`
+    bool of_chunk = false;    // a row of a chunk; the row after it, so many iterations later
+    const std::byte* next = nullptr;
+    std::int64_t next_iterations = 0;  // 0: it is the last row
   };
 
   /// The target of the next propose(); fill it before. Numbers of `mask` (null: all) move to it.
   std::byte* target() noexcept { return from() + stride_; }
   /// A command begins.
   void begin(const std::uint64_t* mask) noexcept {
-    begun_ = true;
-    observed_ = nullptr;
-    follows_rows_ = false;
+    begin(mask, [](Number& each) { each.motion.begin(); });
+  }
+  /// A chunk begins: its rows are followed from the plan of the chunk before it.
+  void take_over(const std::uint64_t* mask) noexcept {
+    begin(mask, [](Number& each) {
+      each.is_commanded ? each.motion.take_over() : each.motion.begin();
+    });
+  }
+  /// What is followed reaches from one place to the other.
+  void widen(std::uint32_t number, const Span& range) noexcept {
     for (Number& each : numbers_) {
-      each.is_commanded = masked(mask, each.number);
-      each.motion.begin();
+      if (each.number != number || !each.is_commanded) continue;
+      each.motion.widen(range.low);
+      each.motion.widen(range.high);
     }
   }
+  /// Numbers of `mask` that switch become those of this row, not those of the target.
+  void switch_to(const std::byte* row, const std::uint64_t* mask) noexcept {
+    for (const std::uint32_t i : switches_) {
+      const NumberPlace& place = layout_.numbers()[i];
+      if (masked(mask, i)) copy_number(target() + place.offset, row + place.offset, place.size);
+    }
+  }
+  bool has_switches() const noexcept { return !switches_.empty(); }
   /// The last target is where the next row begins.
   void next_row() noexcept { layout_.copy(from(), target()); }
   /// The next plan starts at rest at these values, not where the actuator is.
@@ -194,6 +213,16 @@ class Motion {
     bool is_commanded = true;
   };
 
+  template <class Begin>
+  void begin(const std::uint64_t* mask, Begin&& begin) noexcept {
+    begun_ = true;
+    observed_ = nullptr;
+    follows_rows_ = false;
+    for (Number& each : numbers_) {
+      each.is_commanded = masked(mask, each.number);
+      begin(each);
+    }
+  }
   template <class Predicate>
   bool all(Predicate&& predicate) const noexcept {
     return std::ranges::all_of(numbers_, predicate, &Number::motion);
@@ -203,6 +232,7 @@ class Motion {
     return std::ranges::any_of(numbers_, predicate, &Number::motion);
   }
   std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
+  void to_row(Number& number, const Course& course) noexcept;
   void blend(Iteration now, std::byte* state) noexcept;
   void publish(const Number& number, std::byte* state) noexcept;
 

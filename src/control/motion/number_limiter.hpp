@@ -72,6 +72,10 @@ class NumberLimiter {
   void begin(const Span& span) noexcept {
     wanted_ = now_.position;
     scale_ = std::abs(now_.position);
+    reach(span);
+  }
+  /// What it follows goes on in another way: inside the bounds and inside `span`.
+  void reach(const Span& span) noexcept {
     span_ = {std::max(bounds_.low, span.low), std::min(bounds_.high, span.high)};
   }
   /// The same, inside the bounds only.

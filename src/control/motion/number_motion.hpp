@@ -49,7 +49,7 @@ class NumberMotion {
   /// Sets the position, at rest.
   void restart(double position) noexcept {
     guard_.restart(position);
-    planned_ = follows_ = held_ = leaves_ = held_back_ = stands_ = false;
+    planned_ = follows_ = of_chunk_ = held_ = leaves_ = held_back_ = stands_ = false;
     difference_ = former_difference_ = 0.0;
   }
   /// One iteration of a motion that was made elsewhere.
@@ -84,6 +84,31 @@ class NumberMotion {
     plan_.line(start, target);
   }
   void line_for(std::int64_t iterations) noexcept { plan_.line_for(iterations); }
+  /// The rows of a chunk begin: from the plan of the chunk before it, whatever limits made of that;
+  /// else from the motion of this number.
+  void take_over() noexcept {
+    const bool goes_on = planned_ && of_chunk_;
+    const double place = goes_on ? plan_.place() : guard_.position();
+    const double slope = goes_on ? plan_.slope() : guard_.moment().speed;
+    begin();
+    plan_.stand(place, slope);
+    Span span = guard_.stop();
+    span.include(place);
+    goes_on ? guard_.reach(span) : guard_.begin(span);
+    planned_ = follows_ = of_chunk_ = true;
+  }
+  /// Then the plan to the next row, as NumberPlan has it.
+  void line_on(double target, std::int64_t iterations) noexcept {
+    plan_.line_on(target, iterations);
+  }
+  void curve_on(double target, std::int64_t iterations, double next,
+                std::int64_t next_iterations) noexcept {
+    plan_.curve_on(target, iterations, next, next_iterations);
+    widen(plan_.hull().low);
+    widen(plan_.hull().high);
+  }
+  /// To the row in the first of its iterations.
+  void jump_on(double target) noexcept { plan_.line(target, target); }
   /// Goes to the target within the limits, whatever they keep it from (Profile::as_sent).
   void follow_as_sent(double target) noexcept {
     if (!planned_) guard_.begin();
@@ -109,7 +134,7 @@ class NumberMotion {
       former_ = plan_;
       leaves_ = true;
     }
-    planned_ = follows_ = false;
+    planned_ = follows_ = of_chunk_ = false;
     guard_.follow_within_bounds();
     // a jump is no speed
     if (arrived && !accelerates()) guard_.rest();
@@ -148,6 +173,7 @@ class NumberMotion {
   NumberPlan plan_;
   bool planned_ = false;  // a command moves it by `plan_`
   bool follows_ = false;  // `plan_` may break limits
+  bool of_chunk_ = false;  // `plan_` is that of rows of a chunk
   bool held_ = false;
   bool jumps_at_once_ = false;  // propose() needed no plan
   Requested requested_;         // then

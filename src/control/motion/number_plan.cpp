@@ -13,6 +13,21 @@ constexpr double kStride = 1.15;
 constexpr int kMaxStrides = 8;
 constexpr int kMaxHalvings = 10;
 
+/// The slope at a place of a curve that does not overshoot: M. Steffen, A simple method for
+/// monotonic interpolation in one dimension, Astron. Astrophys. 239 (1990). The places before and
+/// after it are so many iterations away.
+double slope_at(double before, double iterations, double place, double next_iterations,
+                double after) noexcept {
+  const double a = place / iterations - before / iterations;
+  const double b = after / next_iterations - place / next_iterations;
+  if (!((a > 0.0 && b > 0.0) || (a < 0.0 && b < 0.0))) return 0.0;
+  const double both = iterations + next_iterations;
+  const double mean =
+      std::abs(a * (next_iterations / both) + b * (iterations / both)) / 2.0;
+  const double slope = 2.0 * std::min({std::abs(a), std::abs(b), mean});
+  return std::isfinite(slope) ? std::copysign(slope, a) : 0.0;
+}
+
 /// The fraction `share` between `from` and `to`, never outside, despite rounding and overflow.
 double between(double from, double to, double share) noexcept {
   const double distance = to - from;
@@ -157,19 +172,61 @@ void NumberPlan::settle(std::int64_t iterations) noexcept {
 double NumberPlan::next() noexcept {
   ++done_;
   if (done_ >= iterations_) return task_.target;
-  const auto i = static_cast<double>(done_);
+  return shape_ == Shape::fastest ? fastest_.next() : at(done_);
+}
+
+/// The position after so many iterations, fewer than there are, of any shape but the fastest.
+double NumberPlan::at(std::int64_t done) const noexcept {
+  const auto i = static_cast<double>(done);
+  const double share = i / static_cast<double>(iterations_);
   switch (shape_) {
-    case Shape::line:
-      return between(task_.line_start, task_.target, i / static_cast<double>(iterations_));
     case Shape::smooth:
-      return done_ < smooth_for_ ? smooth_.position(i) : task_.target;
+      return done < smooth_for_ ? smooth_.position(i) : task_.target;
     case Shape::stop_first:
-      return done_ <= stop_ ? to_stop_.position(i)
-                            : smooth_.position(static_cast<double>(done_ - stop_));
+      return done <= stop_ ? to_stop_.position(i)
+                           : smooth_.position(static_cast<double>(done - stop_));
+    case Shape::curve: {
+      // in the basis of Hermite; where a sum overflows, a straight line
+      const double rest = 1.0 - share;
+      const double n = static_cast<double>(iterations_);
+      const double place = from_.place * ((1.0 + 2.0 * share) * rest * rest) +
+                           to_.place * (share * share * (3.0 - 2.0 * share)) +
+                           from_.slope * (n * share * rest * rest) -
+                           to_.slope * (n * share * share * rest);
+      return std::clamp(std::isfinite(place) ? place : between(from_.place, to_.place, share),
+                        hull_.low, hull_.high);
+    }
+    case Shape::line:
     case Shape::fastest:
       break;
   }
-  return fastest_.next();
+  return between(task_.line_start, task_.target, share);
+}
+
+void NumberPlan::curve_on(double target, std::int64_t iterations, double next,
+                          std::int64_t next_iterations) noexcept {
+  from_ = {place(), slope()};
+  line(from_.place, target);
+  line_for(iterations);
+  shape_ = Shape::curve;
+  const auto n = static_cast<double>(iterations);
+  to_ = {target, 0.0};
+  if (next_iterations > 0) to_.slope = slope_at(from_.place, n, target, static_cast<double>(next_iterations), next);
+  const double bend = from_.place + n * from_.slope / 3.0;
+  hull_ = {target, target};
+  hull_.include(from_.place);
+  if (std::isfinite(bend)) hull_.include(bend);
+}
+
+double NumberPlan::slope() const noexcept {
+  if (shape_ != Shape::curve || done_ >= iterations_) return done_ > iterations_ ? 0.0 : to_.slope;
+  const double share = static_cast<double>(done_) / static_cast<double>(iterations_);
+  const double n = static_cast<double>(iterations_);
+  const double rest = 1.0 - share;
+  const double slope = (to_.place - from_.place) * (6.0 * share * rest / n) +
+                       from_.slope * (rest * (1.0 - 3.0 * share)) +
+                       to_.slope * (share * (3.0 * share - 2.0));
+  return std::isfinite(slope) ? slope : 0.0;
 }
 
 }  // namespace o80

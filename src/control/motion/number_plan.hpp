@@ -81,6 +81,28 @@ class NumberPlan {
     done_ = 0;
   }
 
+  /// Rows of a chunk: the plan is at this place, with this slope [1/iteration].
+  void stand(double place, double slope) noexcept {
+    line(place, place);
+    done_ = iterations_;
+    to_.slope = slope;
+  }
+  /// Then to the next row on a straight line,
+  void line_on(double target, std::int64_t iterations) noexcept {
+    line(place(), target);
+    line_for(iterations);
+    to_.slope = target / static_cast<double>(iterations) - task_.line_start / static_cast<double>(iterations);
+  }
+  /// or on a cubic, from its slope to that at the row, which is 0 at the last row, and otherwise that
+  /// of Steffen: it does not overshoot. `next`: the row after that, so many iterations later.
+  void curve_on(double target, std::int64_t iterations, double next,
+                std::int64_t next_iterations) noexcept;
+  /// The place of the last iteration, and the slope there [1/iteration].
+  double place() const noexcept { return done_ >= iterations_ ? task_.target : at(done_); }
+  double slope() const noexcept;
+  /// Places between which the way to the row stays.
+  const Span& hull() const noexcept { return hull_; }
+
   /// The position in the next iteration; from the last one on the exact target.
   double next() noexcept;
   const PlanTask& task() const noexcept { return task_; }
@@ -101,8 +123,13 @@ class NumberPlan {
   }
 
  private:
-  enum class Shape : std::uint8_t { line, smooth, stop_first, fastest };
+  enum class Shape : std::uint8_t { line, smooth, stop_first, fastest, curve };
+  struct Knot {
+    double place = 0.0;
+    double slope = 0.0;  // [1/iteration]
+  };
 
+  double at(std::int64_t done) const noexcept;
   std::int64_t fewest() noexcept;
   std::int64_t fewest_smooth(std::int64_t least) noexcept;
   bool smooth(std::int64_t iterations) noexcept;
@@ -119,6 +146,9 @@ class NumberPlan {
   SmoothMotion to_stop_;
   SmoothMotion smooth_;
   FastestMotion fastest_;
+  Knot from_;  // of a row of a chunk
+  Knot to_;
+  Span hull_;
 };
 
 }  // namespace o80

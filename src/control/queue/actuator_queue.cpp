@@ -30,7 +30,7 @@ ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
       queue_(pool, lanes),
       mask_(layout.mask_words()),
       next_mask_(mask_.size()),
-      scratch_((layout.size() + 7) / 8) {}
+      scratch_(2 * ((layout.size() + 7) / 8)) {}
 
 void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
   const bool is_overwritten = outcome.status == Status::overwritten;
@@ -71,6 +71,7 @@ ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
     ahead_.read(scratch(), layout_->size());
     motion_.widen(scratch());
   }
+  if (pace_ == Pace::chunk && switch_row_ < row_) switch_passed_rows(iteration);
   const Limited limited = motion_.step(iteration, desired_);
   if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
   if (iteration >= motion_.last() && rows_left_ == 0) {
@@ -81,7 +82,7 @@ ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
       end(record, {Status::interrupted, Reason::limits, limited.packed()}, iteration);
     } else if (motion_.arrived()) {
       end_running(iteration);
-    } else if (runs_ == Runs::queued && pool_->head(record_).rows > 1) {
+    } else if (runs_ == Runs::queued && (pool_->head(record_).rows > 1 || pace_ == Pace::chunk)) {
       take_out();
     }
   }
@@ -149,6 +150,7 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
     same_mask = same_mask && mask_ == next_mask_;
     mask_.swap(next_mask_);
   }
+  if (is_chunk(head)) return begin_chunk();
   const SetPoint next{head.profile, head.start, head.amount};
   keeps_plan_ = same_mask && head.pace == Pace::direct && is_in_force(next) && is_next_row_target();
   // targets of a generator are one motion
@@ -176,10 +178,41 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   if (head.start == Start::observed) motion_.start_at(observed);
 }
 
+void ActuatorQueue::begin_chunk() noexcept {
+  const RecordHead& head = pool_->head(record_);
+  const ChunkRows rows(*pool_, record_, *layout_);
+  row_ = chunk().row;
+  rows_ = rows.cursor(row_);
+  pace_ = head.pace;
+  rows_left_ = head.rows - row_;
+  ahead_left_ = 0;
+  runs_ = Runs::queued;
+  begun_ = keeps_plan_ = in_force_ = false;
+  late_ = 0;
+  reason_ = {};
+  motion_.hold(false);
+  motion_.take_over(mask());
+  rows.ranges_from(row_, scratch(), [&](std::uint32_t number, const Span& range) {
+    motion_.widen(number, range);
+  });
+  switch_row_ = motion_.has_switches() ? chunk().late : row_;
+}
+
+/// Numbers that switch do not wait for the end of a take-over.
+void ActuatorQueue::switch_passed_rows(Iteration iteration) noexcept {
+  const ChunkRows rows(*pool_, record_, *layout_);
+  const std::int64_t passed = iteration - chunk().anchor - chunk().shift;
+  while (switch_row_ < chunk().row && rows.due(switch_row_) < passed) ++switch_row_;
+  if (switch_row_ > chunk().row) return;
+  rows.cursor(switch_row_).read(scratch(), layout_->size());
+  motion_.switch_to(scratch(), mask());
+  if (switch_row_ == chunk().row) ++switch_row_;
+}
+
 void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* observed) noexcept {
   const RecordHead* head = next_member();
   // set-points of each iteration go each by itself
-  if (head == nullptr || (head->pace == Pace::direct && head->rows > 1)) return;
+  if (head == nullptr || (head->pace == Pace::direct && head->rows > 1) || is_chunk(*head)) return;
   if (runs_ == Runs::queued) {
     if (iteration <= motion_.last() || rows_left_ == 0) return;
   } else {
@@ -283,11 +316,34 @@ Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration
     case Pace::speed:
       next.cruise = head.speed * period_;
       break;
+    case Pace::chunk:
+      to_next_row(next, iteration);
+      break;
     case Pace::duration:
       next.iterations = is_timed(head) ? row_of_own_time() : carry_.iterations(head.amount);
       break;
   }
   return next;
+}
+
+/// The way to the row of a chunk that was read last.
+void ActuatorQueue::to_next_row(Motion::Course& course, Iteration iteration) noexcept {
+  const ChunkHead& of = chunk();
+  const ChunkRows rows(*pool_, record_, *layout_);
+  const std::uint32_t row = row_++;
+  Iteration due = of.anchor + of.shift + rows.due(row);
+  // the last row, if it would be due before the end of the take-over
+  if (row == of.row && course.profile != Profile::hold) {
+    due = std::max<Iteration>(due, iteration + of.ease - 1);
+  }
+  course.is_row = course.of_chunk = true;
+  course.iterations = std::max<std::int64_t>(1, due - iteration + 1);
+  if (rows_left_ == 0) return;
+  Cursor after = rows_;
+  std::byte* const next = scratch() + scratch_.size() / 2 * sizeof scratch_.front();
+  after.read(next, layout_->size());
+  course.next = next;
+  course.next_iterations = rows.due(row + 1) - rows.due(row);
 }
 
 /// Skips waypoints that end before the next iteration; the iterations of the first that does not.

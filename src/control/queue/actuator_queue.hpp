@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "control/batch/chunk.hpp"
 #include "control/batch/ledger.hpp"
 #include "control/batch/pool.hpp"
 #include "control/motion/duration.hpp"
@@ -81,6 +82,17 @@ class ActuatorQueue {
     return goes_on || begin(iteration, observed, late_budget) ? advance(iteration)
                                                               : come_to_rest(observed);
   }
+  /// It has moved, or had a command, in this iteration.
+  void acted(Iteration iteration) noexcept { acted_last_ = iteration; }
+  Iteration acted_last() const noexcept { return acted_last_; }
+  /// The chunk that was taken last, to know older ones.
+  struct LastChunk {
+    std::uint32_t lane = 0;
+    std::uint64_t plan = 0;
+    Iteration anchor = kNone;
+    static constexpr Iteration kNone = -(Iteration{1} << 62);
+  };
+  LastChunk last_chunk;
   /// True if no command or given target is running or queued.
   bool empty() const noexcept { return has_no_command() && runs_ == Runs::nothing; }
   bool has_no_command() const noexcept { return queue_.empty() && !has_record(); }
@@ -177,6 +189,8 @@ class ActuatorQueue {
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
   void give_way(Iteration iteration) noexcept { end(leave(), {Status::overwritten}, iteration); }
   void begin_command(const std::byte* observed) noexcept;
+  void begin_chunk() noexcept;
+  void switch_passed_rows(Iteration iteration) noexcept;
   bool is_in_force(const SetPoint& next) const noexcept {
     return in_force_ && !motion_.was_held_back() && next == set_point_;
   }
@@ -199,6 +213,11 @@ class ActuatorQueue {
   }
   Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
   std::int64_t row_of_own_time() noexcept;
+  void to_next_row(Motion::Course& course, Iteration iteration) noexcept;
+  /// The chunk that runs.
+  const ChunkHead& chunk() const noexcept {
+    return chunk_of(*pool_, CommandGroups::head_of(pool_->head(record_)));
+  }
   Moved advance(Iteration iteration) noexcept;
   /// Without a command the motion brakes within its limits, and fields with a rest value go to it.
   Moved come_to_rest(const std::byte* observed) noexcept {
@@ -267,11 +286,15 @@ class ActuatorQueue {
   std::int64_t time_ = 0;            // end time of the last waypoint [ns]
   Cursor times_;
   Cursor rows_;
+  // of a chunk: the next row, and while it takes over the row that numbers that switch are at
+  std::uint32_t row_ = 0;
+  std::uint32_t switch_row_ = 0;
   Cursor ahead_;  // next row of a trajectory whose span is not known yet
   std::uint32_t ahead_left_ = 0;
   std::vector<std::uint64_t> mask_;
   std::vector<std::uint64_t> next_mask_;
-  std::vector<std::uint64_t> scratch_;  // space for a state
+  std::vector<std::uint64_t> scratch_;  // space for two states
+  Iteration acted_last_ = -1;
 };
 
 }  // namespace o80

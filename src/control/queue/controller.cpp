@@ -33,6 +33,7 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
     mask->resize(words);
   }
   actuators_.reserve(count);
+  waiting_.reserve(kMaxWaiting);
   auto* block = reinterpret_cast<std::byte*>(desired_.data());
   for (std::uint32_t i = 0; i < count; ++i) {
     const ActuatorRow& row = schema.actuators[i];
@@ -70,6 +71,11 @@ void Controller::step_groups(Iteration iteration, const std::byte* observed,
 void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
   std::uint32_t late_budget = kStatusesPerIteration;
   reported_ = 0;
+  while (!waiting_.empty() && waiting_.front().begins <= iteration) {
+    const Waiting begun = waiting_.front();
+    waiting_.erase(waiting_.begin());
+    begin_chunk(begun.group, begun.lane, iteration);
+  }
   if (ledger_.open_groups() > 0) step_groups(iteration, observed, late_budget);
   const bool gives = given_.acts(iteration);
   if (gives) step_given(iteration, observed);
@@ -91,6 +97,7 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
       // the queue is not empty if late commands have used up their budget
       if (moved == Moved::idle && queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
       if (moved == Moved::idle) return;
+      queue.acted(iteration);
       active |= bit;
       if (moved == Moved::braking) braking |= bit;
       if (moved == Moved::clamped) clamped |= bit;
@@ -119,6 +126,7 @@ void Controller::step_given(Iteration iteration, const std::byte* observed) noex
     if (actuators_[i].go_to(iteration, of(i, observed), target) == ActuatorQueue::Moved::clamped) {
       set(clamped_mask_, i);
     }
+    actuators_[i].acted(iteration);
     set(stepped_, i);
     set(busy_, i);
   }
@@ -152,6 +160,8 @@ void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& 
     case RecordKind::overwriter_overwritten:
     case RecordKind::overwriter_purged:
       return take_commands(from, record, now);
+    case RecordKind::group:
+      return take_chunk(from, record, handler);
     case RecordKind::purge: {
       const bool own = head.only_own != 0;
       purge_tickets_.raise(own ? from.lane : PurgeTickets::kEveryLane, head.actuator, from.ticket);
@@ -196,6 +206,7 @@ void Controller::take_commands(const Taking& from, BlockIndex first, Iteration i
   ActuatorQueue& queue = actuators_[head.actuator];
   if (head.mode == Mode::overwrite) {
     O80_COUNT(queue_dropped);
+    drop_waiting(kEveryLane, head.actuator, {Status::overwritten}, iteration);
     queue.drop({Status::overwritten}, iteration);
   }
   if (head.kind != RecordKind::command) {
@@ -204,6 +215,94 @@ void Controller::take_commands(const Taking& from, BlockIndex first, Iteration i
   }
   queue.append(first, planner_.tail(first), from.lane);
   set(busy_, head.actuator);
+}
+
+// ------------------------------------------------------------------------------ chunks
+
+/// Decides on a chunk: it waits, begins, or is rejected.
+void Controller::take_chunk(const Taking& from, BlockIndex group, BatchHandler& handler) noexcept {
+  const Iteration now = handler.iteration();
+  const std::uint64_t epoch = handler.epoch();
+  const bool is_foreign = epoch != 0 && chunk_of(pool_, group).epoch != epoch;
+  const Outcome outcome = is_foreign ? Outcome{Status::rejected, Reason::invalid} : decide(from, group, now);
+  if (outcome.status != Status::active) {
+    return each_member(group, [&](BlockIndex member) { ledger_.end(member, outcome, now); });
+  }
+  const ChunkHead& chunk = chunk_of(pool_, group);
+  ledger_.note_decided(group, {chunk.shift, chunk.stood != 0}, now);
+  each_member(group, [&](BlockIndex member) {
+    const std::uint32_t actuator = pool_.head(member).actuator;
+    actuators_[actuator].last_chunk = {from.lane, chunk.plan, chunk.anchor};
+    drop_waiting(kEveryLane, actuator, {Status::overwritten}, now, chunk.begins);
+  });
+  const Waiting waiting{group, from.lane, chunk.begins};
+  if (waiting.begins == now) return begin_chunk(group, from.lane, now);
+  waiting_.insert(std::ranges::upper_bound(waiting_, waiting.begins, {}, &Waiting::begins), waiting);
+}
+
+Outcome Controller::decide(const Taking& from, BlockIndex group, Iteration now) noexcept {
+  ChunkHead& chunk = chunk_of(pool_, group);
+  const auto reject = [](Reason reason) { return Outcome{Status::rejected, reason}; };
+  ChunkSurroundings at{.now = now, .stand = true};
+  bool is_older = false;
+  bool is_purged = false;
+  each_member(group, [&](BlockIndex member) {
+    const std::uint32_t actuator = pool_.head(member).actuator;
+    const ActuatorQueue& queue = actuators_[actuator];
+    const ActuatorQueue::LastChunk& last = queue.last_chunk;
+    is_older = is_older || (last.lane == from.lane && last.plan == chunk.plan && chunk.anchor < last.anchor);
+    is_purged = is_purged || purge_tickets_.cover(from.lane, actuator, from.ticket);
+    at.stand = at.stand && queue.empty() && !waits(actuator);
+    at.acted_last = std::max(at.acted_last, queue.acted_last());
+    at.eases = pool_.head(member).profile != Profile::hold;
+  });
+  if (is_purged) return {Status::purged};
+  if (is_older) return reject(Reason::older);
+  if (chunk.anchor < fresh_row_) return reject(Reason::fresh_start);
+  if (waiting_.size() == kMaxWaiting) return reject(Reason::full);
+  const BlockIndex first = pool_.head(group).own[Own::kNext];
+  const ActuatorQueue& queue = actuators_[pool_.head(first).actuator];
+  const Reason reason = judge(chunk, ChunkRows(pool_, first, queue.layout()), at);
+  return reason == Reason::none ? Outcome{Status::active} : reject(reason);
+}
+
+void Controller::begin_chunk(BlockIndex group, std::uint32_t lane, Iteration iteration) noexcept {
+  each_member(group, [&](BlockIndex member) {
+    pool_.head(member).own[Own::kNext] = kNoBlock;
+    const std::uint32_t actuator = pool_.head(member).actuator;
+    O80_COUNT(queue_dropped);
+    actuators_[actuator].drop({Status::overwritten}, iteration);
+    actuators_[actuator].append(member, member, lane);
+    set(busy_, actuator);
+  });
+}
+
+bool Controller::waits(std::uint32_t actuator) noexcept {
+  bool found = false;
+  for (const Waiting& each : waiting_) {
+    each_member(each.group, [&](BlockIndex member) {
+      found = found || pool_.head(member).actuator == actuator;
+    });
+  }
+  return found;
+}
+
+void Controller::drop_waiting(std::uint32_t lane, std::uint32_t actuator, const Outcome& outcome,
+                              Iteration iteration, Iteration from) noexcept {
+  std::erase_if(waiting_, [&](const Waiting& each) {
+    if ((lane != kEveryLane && each.lane != lane) || each.begins < from) return false;
+    // the group is freed with its last member
+    BlockIndex kept = kNoBlock;
+    BlockIndex dropped = kNoBlock;
+    each_member(each.group, [&](BlockIndex member) {
+      RecordHead& head = pool_.head(member);
+      const bool ends = actuator == kEveryActuator || head.actuator == actuator;
+      head.own[Own::kNext] = std::exchange(ends ? dropped : kept, member);
+    });
+    pool_.head(each.group).own[Own::kNext] = kept;
+    ledger_.drop(dropped, outcome, iteration);
+    return kept == kNoBlock;
+  });
 }
 
 }  // namespace o80

@@ -25,6 +25,8 @@ class BatchHandler {
  public:
   /// The iteration about to run; a fresh start inside request() may increase it.
   virtual Iteration iteration() const noexcept = 0;
+  /// The epoch that chunks must be of; 0: any.
+  virtual std::uint64_t epoch() const noexcept { return 0; }
   /// Serves a request; may call `Controller::restart`. `payload` holds the whole struct. The
   /// request ends with the iteration at which it began: that of the fresh row, if it made one. If
   /// the outcome is active, `Controller::end` ends the record later.
@@ -83,10 +85,9 @@ class Controller {
   /// that is null. All commands end as purged (fresh_start) at iteration `row`.
   void restart(const std::byte* observed, const std::byte* wanted, Iteration row) noexcept {
     const std::byte* source = wanted != nullptr ? wanted : observed;
-    each(kEveryActuator, [&](std::uint32_t i) {
-      actuators_[i].drop({Status::purged, Reason::fresh_start}, row);
-      actuators_[i].restart(of(i, source));
-    });
+    drop(kEveryActuator, {Status::purged, Reason::fresh_start}, row);
+    each(kEveryActuator, [&](std::uint32_t i) { actuators_[i].restart(of(i, source)); });
+    fresh_row_ = row;
     for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_}) std::ranges::fill(*mask, 0);
   }
 
@@ -120,8 +121,9 @@ class Controller {
 
   /// True if none of these actuators has a command: give() may be called.
   bool has_no_command(std::span<const std::uint32_t> actuators) const noexcept {
-    return std::ranges::all_of(actuators,
-                               [&](std::uint32_t i) { return actuators_[i].has_no_command(); });
+    return waiting_.empty() && std::ranges::all_of(actuators, [&](std::uint32_t i) {
+             return actuators_[i].has_no_command();
+           });
   }
   /// Gives targets to the next iterations, as if a batch with a trajectory for each actuator were
   /// taken in iteration `targets.first`. Their memory must outlive these iterations or take_back().
@@ -141,6 +143,7 @@ class Controller {
   /// Ends the commands of one lane for an actuator or kEveryActuator; O(lanes) for each actuator.
   void purge_lane(std::uint32_t lane, std::uint32_t actuator, Iteration iteration,
                   Reason reason = Reason::none) noexcept {
+    drop_waiting(lane, actuator, {Status::purged, reason}, iteration);
     each(actuator, [&](std::uint32_t i) {
       actuators_[i].drop_lane(lane, {Status::purged, reason}, iteration);
     });
@@ -196,18 +199,19 @@ class Controller {
 
   /// True if a command is running or queued; O(actuators).
   bool active() const noexcept {
-    return any([](const ActuatorQueue& queue) { return !queue.empty(); });
+    return !waiting_.empty() || any([](const ActuatorQueue& queue) { return !queue.empty(); });
   }
   /// True if nothing acts, and a restart() with the desired block would change nothing later.
   bool shows_all() noexcept {
-    return !pending() && std::ranges::all_of(busy_, [](std::uint64_t word) { return word == 0; }) &&
+    return !pending() && waiting_.empty() && std::ranges::all_of(busy_, [](std::uint64_t word) { return word == 0; }) &&
            std::ranges::all_of(actuators_, &ActuatorQueue::shows_all);
   }
   /// True if a direct value keeps a number away from its rest value; O(actuators).
   bool holds() const noexcept { return any(&ActuatorQueue::holds); }
   /// True if a command of this lane runs or waits, or its direct value is held; O(actuators).
   bool acts(std::uint32_t lane) const noexcept {
-    return any([&](const ActuatorQueue& queue) { return queue.acts(lane); });
+    return std::ranges::any_of(waiting_, [&](const Waiting& each) { return each.lane == lane; }) ||
+           any([&](const ActuatorQueue& queue) { return queue.acts(lane); });
   }
   /// The first number of a block of states that is infinite or NaN, if any; O(numbers).
   std::optional<NotFinite> not_finite(const std::byte* block) const noexcept {
@@ -226,12 +230,38 @@ class Controller {
     std::uint32_t lane;
     std::uint64_t ticket;
   };
+  /// A chunk that was taken and has not begun.
+  struct Waiting {
+    BlockIndex group;
+    std::uint32_t lane;
+    Iteration begins;
+  };
+  static constexpr std::size_t kMaxWaiting = 64;
+  static constexpr std::uint32_t kEveryLane = 0xFFFFFFFF;
+  void take_chunk(const Taking& from, BlockIndex group, BatchHandler& handler) noexcept;
+  bool waits(std::uint32_t actuator) noexcept;
+  Outcome decide(const Taking& from, BlockIndex group, Iteration now) noexcept;
+  void begin_chunk(BlockIndex group, std::uint32_t lane, Iteration iteration) noexcept;
+  /// Ends members of chunks that wait, of one lane or kEveryLane; those that begin in `from` or
+  /// later.
+  void drop_waiting(std::uint32_t lane, std::uint32_t actuator, const Outcome& outcome,
+                    Iteration iteration, Iteration from = 0) noexcept;
+  /// Calls visit(member) for each member of a chunk that has not begun; it may end the member.
+  template <class Visit>
+  void each_member(BlockIndex group, Visit&& visit) noexcept {
+    for (BlockIndex next = pool_.head(group).own[Own::kNext]; next != kNoBlock;) {
+      const BlockIndex member = next;
+      next = pool_.head(member).own[Own::kNext];
+      visit(member);
+    }
+  }
   void take_step(const Taking& from, BlockIndex record, BatchHandler& handler) noexcept;
   void take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept;
   void step_groups(Iteration iteration, const std::byte* observed,
                    std::uint32_t& late_budget) noexcept;
   void step_given(Iteration iteration, const std::byte* observed) noexcept;
   void drop(std::uint32_t actuator, const Outcome& outcome, Iteration iteration) noexcept {
+    drop_waiting(kEveryLane, actuator, outcome, iteration);
     each(actuator, [&](std::uint32_t i) { actuators_[i].drop(outcome, iteration); });
   }
   const std::byte* of(std::uint32_t actuator, const std::byte* block) const noexcept {
@@ -274,6 +304,8 @@ class Controller {
   Mask busy_;     // has commands, or is not known to be at rest
   Mask stepped_;  // has its desired state from given_ already
   Mask follow_;   // follows the observed state when idle
+  std::vector<Waiting> waiting_;  // in the order in which they begin
+  Iteration fresh_row_ = 0;       // of the last fresh start
   DirectTargets given_;
   Mask dropped_;                // no longer gets its targets
   bool was_given_ = false;      // the first target of given_

@@ -87,6 +87,8 @@ std::string words_for(const Link& link, std::span<const SentCommand> commands, c
       return "its frontend gave no sign of life for longer than the watchdog (silence) allows";
     case Reason::stopped:
       return "the backend stopped";
+    case Reason::older:
+      return "it answers an older observation than the chunk of this plan that was taken before it";
     case Reason::full:
       return "too many batches of its lane wait for later iterations";
     case Reason::halted: {
@@ -166,6 +168,18 @@ bool Batch::ended() const { return records_ == 0 || is_end(ask(id_ + 1).status);
 Iteration Batch::first_iteration() const {
   if (id_ == 0) return -1;
   return ask(id_).iteration;
+}
+
+std::optional<Batch::Shift> Batch::shift() const {
+  if (id_ == 0) return std::nullopt;
+  link_->segment.check_process();
+  const LaneSender::StatusAnswer answer = lane_->status(id_);
+  if (answer.known != LaneSender::Known::yes ||
+      static_cast<Status>(answer.word.status) != Status::active) {
+    return std::nullopt;
+  }
+  const TakenChunk taken = TakenChunk::of(answer.word.detail, answer.late);
+  return Shift{taken.shift, taken.stood};
 }
 
 Iteration Batch::last_iteration() const {

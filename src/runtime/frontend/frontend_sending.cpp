@@ -37,6 +37,7 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
   switch (pace.pace) {
     case Pace::speed:
     case Pace::fastest:
+    case Pace::chunk:
       return;
     case Pace::direct:
       return check("every [ns]", 0, kLongestDuration);
@@ -79,6 +80,32 @@ void check_times(std::span<const std::int64_t> times, std::uint32_t rows) {
                             std::to_string(before) + " ns");
     }
   }
+}
+
+void check_chunk(std::span<const std::uint32_t> due, const ChunkOptions& options) {
+  const auto check = [](const char* name, std::int64_t value, std::int64_t low, std::int64_t high) {
+    if (value >= low && value <= high) return;
+    throw InvalidArgument(std::string(name) + " must be from " + std::to_string(low) + " to " +
+                          std::to_string(high) + ", got " + std::to_string(value));
+  };
+  const auto rows = static_cast<std::int64_t>(due.size());
+  check("the number of rows of a chunk", rows, 1, kMaxChunkRows);
+  check("first, whose row is the first that is played,", options.first, 0, rows - 1);
+  check("ease [iterations]", options.ease, 1, kLatestDue);
+  check("the anchor", options.anchor, -std::int64_t{kLatestDue}, kMaxIterations);
+  std::int64_t before = 0;
+  for (std::size_t i = 0; i < due.size(); before = due[i++]) {
+    if (due[i] > before && due[i] <= kLatestDue) continue;
+    throw InvalidArgument("rows of a chunk are due one after the other, after its anchor: row " +
+                          std::to_string(i) + " is due " + std::to_string(due[i]) +
+                          " iterations after it, the one before " + std::to_string(before));
+  }
+  if (options.profile == Profile::cubic || options.profile == Profile::linear ||
+      options.profile == Profile::hold) {
+    return;
+  }
+  throw InvalidArgument("the profile of a chunk is cubic, linear or hold, got " +
+                        std::string(to_text(options.profile)));
 }
 
 }  // namespace
@@ -247,6 +274,49 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
     at += size;
   }
   return link_->builder.group(link_->members, ends, rows);
+}
+
+BatchBuilder& UntypedFrontend::own_builder() { return link_->builder; }
+
+std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
+                                         std::span<const std::uint32_t> actuators,
+                                         std::span<const std::uint32_t> due,
+                                         std::span<const std::byte> states,
+                                         const ChunkOptions& options,
+                                         std::span<const std::uint64_t> mask) {
+  for (const std::uint32_t actuator : actuators) {
+    link_->command_check.actuator(std::int64_t{actuator});
+  }
+  refuse_twice(actuators);
+  check_chunk(due, options);
+  const auto rows = static_cast<std::uint32_t>(due.size());
+  const ChunkHead chunk{.epoch = epoch(),
+                        .anchor = options.anchor,
+                        .plan = options.plan,
+                        .rows = rows,
+                        .ease = options.ease,
+                        .first = options.first,
+                        .fixed = static_cast<std::uint8_t>(options.fixed),
+                        .reject_late = static_cast<std::uint8_t>(options.reject_late)};
+  std::vector<const StateLayout*> layouts;
+  const auto lock = link_->lock_to_add();
+  link_->members.clear();
+  std::size_t at = 0;
+  for (const std::uint32_t actuator : actuators) {
+    const auto of_one =
+        states.subspan(at, size_of_rows(actuator, rows, states.size() - at, actuators));
+    link_->command_check.targets(actuator, of_one, mask);
+    at += of_one.size();
+    RecordHead head;
+    head.actuator = static_cast<std::uint16_t>(actuator);
+    head.profile = options.profile;
+    layouts.push_back(&link_->command_check.layout(actuator));
+    if (of_one.size() != due.size() * layouts.back()->size()) {
+      throw InvalidArgument("a chunk of " + std::to_string(rows) + " rows needs as many states");
+    }
+    link_->members.push_back({head, mask, of_one});
+  }
+  return batch.chunk(link_->members, chunk, due, layouts);
 }
 
 void UntypedFrontend::add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,

@@ -9,7 +9,7 @@ namespace {
 
 GivesWay gives_way(const RecordHead& head) noexcept {
   if (head.pace == Pace::direct) return GivesWay::to_direct;
-  return head.rows > 1 ? GivesWay::to_any : GivesWay::to_overwrite;
+  return head.rows > 1 || head.pace == Pace::chunk ? GivesWay::to_any : GivesWay::to_overwrite;
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "control/batch/chunk.hpp"
 #include "control/batch/record.hpp"
 
 namespace o80 {
@@ -44,10 +45,50 @@ PaceSpec pace_of(const RecordHead& head) {
 
 bool has_times(const RecordHead& head) { return head.pace == Pace::duration && head.rows > 1; }
 
+/// Adds the rows of a member of a chunk; false if the payload has another size.
+bool add_rows(const Schema& schema, const Piece& piece, JournalRecord& record) {
+  const RecordHead& head = piece.head;
+  const std::uint32_t type = schema.actuators[head.actuator].type;
+  const ChunkPlaces places(head.rows, schema.types[type].size, schema.scalar_count(type),
+                           head.masked != 0);
+  if (head.rows == 0 || head.rows > kMaxChunkRows || piece.payload.size() != places.payload_bytes) {
+    return false;
+  }
+  const auto at = [](std::uint32_t block) { return block * kBlockBytes - sizeof(RecordHead); };
+  JournalRecord::Target target;
+  target.actuator = head.actuator;
+  const std::size_t words = head.masked != 0 ? mask_words(schema.scalar_count(type)) : 0;
+  target.mask = numbers_of<std::uint64_t>(piece.payload.first(8 * words));
+  const auto rows = piece.payload.subspan(at(places.blocks_before_rows()));
+  target.states.assign(rows.begin(), rows.end());
+  record.targets.push_back(std::move(target));
+  record.due.resize(head.rows);
+  for (std::uint32_t i = 0; i < head.rows; ++i) {
+    const std::uint32_t note =
+        places.blocks_before_notes() + i / RowNote::kRows * places.blocks_of_note;
+    std::memcpy(&record.due[i],
+                piece.payload.data() + at(note) + offsetof(RowNote, due) + i % RowNote::kRows * 4,
+                4);
+  }
+  return true;
+}
+
+ChunkOptions options_of(const ChunkHead& chunk, Profile profile) {
+  return {.anchor = chunk.anchor,
+          .epoch = chunk.epoch,
+          .plan = chunk.plan,
+          .ease = chunk.ease,
+          .first = chunk.first,
+          .fixed = chunk.fixed != 0,
+          .reject_late = chunk.reject_late != 0,
+          .profile = profile};
+}
+
 /// Adds the target of a command or of a member; false if the payload has another size.
 bool add_target(const Schema& schema, const Piece& piece, JournalRecord& record) {
   const RecordHead& head = piece.head;
   if (head.actuator >= schema.actuators.size()) return false;
+  if (is_chunk(head)) return add_rows(schema, piece, record);
   const std::uint64_t states =
       std::uint64_t{schema.types[schema.actuators[head.actuator].type].size} * head.rows;
   const std::uint64_t times = has_times(head) ? std::uint64_t{head.rows} * 8 : 0;
@@ -101,9 +142,16 @@ JournalRecord command_of(const RecordHead& head) {
 }
 
 /// A command of several actuators: `rows` of its head is the number of members that follow.
-std::optional<JournalRecord> take_group(const Schema& schema, const RecordHead& head,
+std::optional<JournalRecord> take_group(const Schema& schema, const Piece& piece,
                                         std::span<const std::byte>& blocks) {
+  const RecordHead& head = piece.head;
   JournalRecord record = command_of(head);
+  if (is_chunk(head)) {
+    ChunkHead chunk;
+    if (piece.payload.size() != kChunkGroupBytes) return std::nullopt;
+    std::memcpy(&chunk, piece.payload.data() + kChunkGroupBytes - sizeof chunk, sizeof chunk);
+    record.chunk = options_of(chunk, head.profile);
+  }
   for (std::uint32_t i = 0; i < head.rows; ++i) {
     const std::optional<Piece> member = take_piece(blocks);
     if (!member) return std::nullopt;
@@ -128,7 +176,7 @@ std::optional<JournalRecord> take_record(const Schema& schema, std::span<const s
       if (record.kind != Kind::unknown && !add_target(schema, *piece, record)) return std::nullopt;
       break;
     case RecordKind::group: {
-      std::optional<JournalRecord> group = take_group(schema, head, blocks);
+      std::optional<JournalRecord> group = take_group(schema, *piece, blocks);
       if (!group) return std::nullopt;
       record = std::move(*group);
       break;

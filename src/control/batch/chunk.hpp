@@ -1,0 +1,198 @@
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+
+#include "control/batch/pool.hpp"
+#include "control/batch/record.hpp"
+#include "control/motion/state_layout.hpp"
+#include "control/motion/velocity_change.hpp"
+#include "o80/control/status.hpp"
+
+namespace o80 {
+
+/// Most rows of a chunk.
+inline constexpr std::uint32_t kMaxChunkRows = 2048;
+/// The latest due iteration, from the anchor on.
+inline constexpr std::uint32_t kLatestDue = std::uint32_t{1} << 31;
+
+/// The second block of the group record of a chunk (docs/chunks.md). Its members have pace `chunk`.
+struct ChunkHead {
+  std::uint64_t epoch = 0;
+  Iteration anchor = 0;
+  std::uint64_t plan = 0;  // of one plan of a lane, an older anchor is rejected
+  std::uint32_t rows = 0;
+  std::uint32_t ease = 1;   // iterations of the take-over
+  std::uint32_t first = 0;  // rows before it are not played
+  std::uint8_t fixed = 0;
+  std::uint8_t reject_late = 0;
+  std::uint8_t stood = 0;  // by judge(): whether its actuators stood still
+  std::uint8_t unused = 0;
+  // for the backend, by judge(); values from a frontend are ignored
+  std::int64_t shift = 0;  // rows are due so much later, because the actuators stood still
+  Iteration begins = 0;
+  std::uint32_t late = 0;  // rows that were due before it was taken
+  std::uint32_t row = 0;   // the first row that is reached
+};
+static_assert(sizeof(ChunkHead) == kBlockBytes);
+/// A group record of a chunk: the state of the group, and ChunkHead.
+inline constexpr std::uint32_t kChunkGroupBytes =
+    kBlockBytes - sizeof(RecordHead) + sizeof(ChunkHead);
+
+/// True for the group record of a chunk, and for its members.
+inline bool is_chunk(const RecordHead& head) noexcept { return head.pace == Pace::chunk; }
+inline ChunkHead& chunk_of(BlockPool& pool, BlockIndex group) noexcept {
+  return *reinterpret_cast<ChunkHead*>(pool.bytes(pool.next(group)));
+}
+
+/// What is noted of kRows rows of a member: where they are, when they are due, and between which
+/// values each number stays from there to the end.
+///
+/// The sender leaves room for the notes before the rows, so that one row is found by a few blocks,
+/// however many there are.
+struct RowNote {
+  static constexpr std::uint32_t kRows = 8;
+  BlockIndex block = kNoBlock;  // of the first of these rows
+  std::uint32_t unused = 0;
+  std::array<std::uint32_t, kRows> due{};  // iterations after the anchor, rising; by the sender
+  std::uint64_t unused_too = 0;
+  Span range;  // of the first number; those of the others are in the next blocks
+};
+static_assert(sizeof(RowNote) == kBlockBytes);
+
+/// Where the parts of a member are: its head and mask, 1 block that lists the blocks of a list of
+/// notes, that list, the notes, the rows.
+struct ChunkPlaces {
+  static constexpr std::uint32_t kListed = kBlockBytes / sizeof(BlockIndex);
+  static constexpr std::uint32_t kRanges = kBlockBytes / sizeof(Span);
+
+  /// masked: whether a mask comes before.
+  ChunkPlaces(std::uint32_t rows, const StateLayout& layout, bool masked) noexcept
+      : ChunkPlaces(rows, layout.size(), static_cast<std::uint32_t>(layout.numbers().size()),
+                    masked) {}
+  /// The states have so many bytes and numbers.
+  ChunkPlaces(std::uint32_t rows, std::uint32_t bytes, std::uint32_t numbers, bool masked) noexcept
+      : size(bytes),
+        before(static_cast<std::uint32_t>(blocks_of(masked ? 8 * mask_words(numbers) : 0))),
+        notes((rows + RowNote::kRows - 1) / RowNote::kRows),
+        lists((notes + kListed - 1) / kListed),
+        blocks_of_note(1 + (numbers + kRanges - 2) / kRanges),
+        payload_bytes(std::uint64_t{blocks_before_rows()} * kBlockBytes - sizeof(RecordHead) +
+                      std::uint64_t{rows} * size) {}
+  std::uint32_t blocks_before_notes() const noexcept { return before + 1 + lists; }
+  std::uint32_t blocks_before_rows() const noexcept {
+    return blocks_before_notes() + notes * blocks_of_note;
+  }
+
+  std::uint32_t size;            // of a row [bytes]
+  std::uint32_t before;          // blocks
+  std::uint32_t notes;           // one for RowNote::kRows rows
+  std::uint32_t lists;           // blocks
+  std::uint32_t blocks_of_note;  // blocks
+  std::uint64_t payload_bytes;
+};
+
+/// The rows of a member of a chunk, in the pool.
+///
+/// Realtime: yes; finding a row visits a few blocks, whatever their number.
+class ChunkRows {
+ public:
+  ChunkRows(BlockPool& pool, BlockIndex member, const StateLayout& layout) noexcept;
+
+  std::uint32_t count() const noexcept { return rows_; }
+  /// Iterations from the anchor to where a row is due.
+  std::uint32_t due(std::uint32_t row) const noexcept {
+    return note(row / RowNote::kRows).due[row % RowNote::kRows];
+  }
+  /// The first row that is due so many iterations after the anchor or later; count(): none.
+  std::uint32_t first_due_from(std::int64_t iterations) const noexcept;
+  /// At a row; it reads to the last one.
+  Cursor cursor(std::uint32_t row) const noexcept;
+  /// Calls visit(number, range) with the range of the values of each number from a row on.
+  /// `scratch`: space for a row.
+  template <class Visit>
+  void ranges_from(std::uint32_t row, std::byte* scratch, Visit&& visit) const noexcept {
+    const std::uint32_t next = row / RowNote::kRows + 1;
+    if (next < places_.notes) {
+      for (std::uint32_t i = 0; i < layout_.numbers().size(); ++i) visit(i, range(next, i));
+    }
+    Cursor rows = cursor(row);
+    for (; row < rows_ && row < next * RowNote::kRows; ++row) {
+      rows.read(scratch, places_.size);
+      for (std::uint32_t i = 0; i < layout_.numbers().size(); ++i) {
+        const double value = layout_.number(i, scratch);
+        visit(i, Span{value, value});
+      }
+    }
+  }
+
+  /// The part of the check that fills notes and lists: go_on() until it is done.
+  struct Notes {
+    std::uint32_t walked = 0;       // blocks from the head to the rows
+    BlockIndex at = kNoBlock;       // the last one
+    std::int64_t due = 0;           // of the row before
+    std::uint32_t row = 0;          // rows whose values are noted
+    std::uint32_t not_joined = 0;   // notes whose ranges reach only to the next note
+  };
+  /// Walks one block further towards the rows; false if rows are not due one after the other.
+  bool walk(Notes& notes) noexcept;
+  bool is_walked(const Notes& notes) const noexcept {
+    return notes.walked == places_.blocks_before_rows();
+  }
+  /// Notes the values of the next row, whose first byte is at `at`.
+  void add(Notes& notes, const Cursor& at, const std::byte* row) noexcept;
+  /// Then, once for each note: extends the ranges of the last one that is left by the next one's.
+  void join(Notes& notes) noexcept;
+
+ private:
+  BlockIndex listed(BlockIndex list, std::uint32_t i) const noexcept {
+    return reinterpret_cast<const BlockIndex*>(pool_.bytes(list))[i];
+  }
+  void put(BlockIndex list, std::uint32_t i, BlockIndex block) noexcept {
+    reinterpret_cast<BlockIndex*>(pool_.bytes(list))[i] = block;
+  }
+  BlockIndex block_of(std::uint32_t note) const noexcept {
+    return listed(listed(lists_, note / ChunkPlaces::kListed), note % ChunkPlaces::kListed);
+  }
+  RowNote& note(std::uint32_t i) const noexcept {
+    return *reinterpret_cast<RowNote*>(pool_.bytes(block_of(i)));
+  }
+  Span& range(std::uint32_t of_note, std::uint32_t number) const noexcept;
+
+  BlockPool& pool_;
+  BlockIndex member_;
+  const StateLayout& layout_;
+  std::uint32_t rows_;
+  ChunkPlaces places_;
+  BlockIndex lists_;  // the block that lists the lists
+};
+
+/// True if a chunk may be taken by any backend.
+bool is_sane(const ChunkHead& chunk) noexcept;
+
+/// What the actuators of a chunk do when it is taken.
+struct ChunkSurroundings {
+  Iteration now = 0;           // the iteration that takes it
+  Iteration acted_last = -1;   // the last one in which any of them had a command or braked
+  bool stand = false;          // none of them has a command, and no chunk waits
+  bool eases = true;           // false: rows are held
+};
+/// What a status tells of a chunk that was taken: the shift in its delay and in 7 bits of its
+/// detail.
+struct TakenChunk {
+  std::int64_t shift = 0;  // at most 2^23 - 1
+  bool stood = false;
+
+  std::uint8_t detail() const noexcept {
+    const auto high = static_cast<std::uint8_t>(std::min<std::int64_t>(shift >> 16, 0x7F));
+    return static_cast<std::uint8_t>(high | (stood ? 0x80 : 0));
+  }
+  static TakenChunk of(std::uint8_t detail, std::int64_t late) noexcept {
+    return {static_cast<std::int64_t>(detail & 0x7F) << 16 | late, (detail & 0x80) != 0};
+  }
+};
+/// Decides when a chunk begins and with which row; Reason::late if all its rows are.
+Reason judge(ChunkHead& chunk, const ChunkRows& rows, const ChunkSurroundings& at) noexcept;
+
+}  // namespace o80
