@@ -51,10 +51,22 @@ class Commander:
             "mode": choose.choice(["queue", "overwrite"]),
             "start": choose.choice(["desired", "observed"]),
         }
-        if choose.random() < 0.3:
+        if choose.random() < 0.2:
+            self.chunk()
+        elif choose.random() < 0.3:
             self.arm.add_command(None, [self.target(), self.target()], **how)
         else:
             self.arm.add_command(choose.choice(["elbow", "shoulder"]), self.target(), **how)
+
+    def chunk(self) -> None:
+        choose, count = self.random, self.random.randrange(1, 12)
+        plan = self.arm.chunks(step=choose.choice([1, 5, 50 / 3]), ease=choose.choice([1, 9]))
+        plan.send(
+            [[self.target(), self.target()] for _ in range(count)],
+            seen=max(0, self.arm.published - choose.randrange(40)),
+            first=choose.randrange(count),
+            fixed=choose.random() < 0.5,
+        )
 
     def target(self) -> float:
         return self.random.uniform(-2, 2)

@@ -202,6 +202,8 @@ class Chunks:
             raise InvalidArgument(f"late must be 'skip' or 'reject', got {late!r}")
         anchor = self._anchor(seen)
         count = len(np.atleast_1d(np.asarray(rows, object)))
+        if count == 0:
+            raise InvalidArgument("a chunk needs a row")
         after = self._due(count) if due is None else np.asarray(due, np.int64) - anchor
         if len(after) != count:
             raise InvalidArgument(f"{count} rows need as many due iterations, got {len(after)}")
@@ -283,7 +285,7 @@ class Chunks:
         *,
         step: float | Fraction | None = None,
     ) -> NDArray[np.float64]:
-        """What is planned for the iterations since + step, since + 2 steps, ...: at most n rows.
+        """Planned places for the iterations since + step, since + 2 steps, ...: at most n rows.
 
         since: an iteration or an observation, such as the one that a policy sees.
         step: iterations from row to row (None: that of the plan; 1: every iteration).

@@ -24,7 +24,6 @@ from o80.base.words import (
     ModeWord,
     OnErrorWord,
     ProfileWord,
-    RowsWord,
     StartWord,
     Status,
 )
@@ -33,11 +32,8 @@ from o80.frontend.reader import Reader
 from o80.rows.targets import states_of, times_of
 
 if TYPE_CHECKING:
-    from fractions import Fraction
-
     from numpy.typing import ArrayLike
 
-    from o80.frontend.chunks import Chunks
     from o80.frontend.results import Halt, Preview, RunningRequest
 
 #: A number, a mapping from fields to numbers, or one of these for each actuator.
@@ -211,34 +207,6 @@ class Commander(Reader):
             mode,
             profile,
             start,
-        )
-
-    def chunks(
-        self,
-        actuators: int | str | Sequence[int | str] | None = None,
-        *,
-        step: float | Fraction,
-        ease: int | None = None,
-        profile: RowsWord = "cubic",
-        ensemble: float | None = None,
-    ) -> Chunks:
-        """Opens a plan for a policy that answers with rows of targets, late (docs/chunks.md).
-
-        actuators: indices or names (None: all).
-        step: iterations from row to row, whole or a fraction (50 / 3: 30 rows a second at 500 Hz).
-        ease: iterations of a take-over (None: the longer of a step and 0.1 s).
-        profile: "cubic", "linear" or "hold" between rows.
-        ensemble: mix each new row with the plan, as ACT does: share exp(-ensemble * i) of the i-th
-            answer for an iteration (None: new rows replace the plan).
-
-        with arm.chunks(["shoulder", "elbow"], step=10) as plan:
-            seen = plan.wait(lead=120)
-            plan.send(policy(seen), seen=seen)
-        """
-        from o80.frontend.chunks import Chunks
-
-        return Chunks(
-            self, actuators, step=step, ease=ease, profile=profile, ensemble=ensemble
         )
 
     def _chosen(self, actuators: int | str | Sequence[int | str] | None) -> tuple[list[int], bool]:

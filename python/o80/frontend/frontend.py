@@ -1,7 +1,7 @@
 """Frontend: opens, closes and attaches again; classes for single robots; a wait for several."""
 
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, cast
 
@@ -10,12 +10,15 @@ from o80.base import lifecycle
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument, SchemaMismatch, UsedAfterFork
 from o80.base.installation import announced
-from o80.base.words import OnErrorWord
+from o80.base.words import OnErrorWord, RowsWord
 from o80.frontend.commander import Commander
 from o80.rows.layout import Layout
 
 if TYPE_CHECKING:
+    from fractions import Fraction
+
     from o80.frontend.aio import Waits
+    from o80.frontend.chunks import Chunks
 
 GROUP = "o80.frontends"
 
@@ -93,6 +96,32 @@ class Frontend(Commander):
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
         self._is_set_up = True
         lifecycle.close_later(self)
+
+    def chunks(
+        self,
+        actuators: int | str | Sequence[int | str] | None = None,
+        *,
+        step: "float | Fraction",
+        ease: int | None = None,
+        profile: RowsWord = "cubic",
+        ensemble: float | None = None,
+    ) -> "Chunks":
+        """Opens a plan for a policy that answers with rows of targets, late (docs/chunks.md).
+
+        actuators: indices or names (None: all).
+        step: iterations from row to row, whole or a fraction (50 / 3: 30 rows a second at 500 Hz).
+        ease: iterations of a take-over (None: the longer of a step and 0.1 s).
+        profile: "cubic", "linear" or "hold" between rows.
+        ensemble: mix each new row with the plan, as ACT does: share exp(-ensemble * i) of the i-th
+            answer for an iteration (None: new rows replace the plan).
+
+        with arm.chunks(["shoulder", "elbow"], step=10) as plan:
+            seen = plan.wait(lead=120)
+            plan.send(policy(seen), seen=seen)
+        """
+        from o80.frontend.chunks import Chunks
+
+        return Chunks(self, actuators, step=step, ease=ease, profile=profile, ensemble=ensemble)
 
     @cached
     def aio(self) -> "Waits":

@@ -31,6 +31,7 @@ Make this module again when the robot has changed.
 # fmt: off
 
 from collections.abc import Iterator, Mapping, Sequence
+from fractions import Fraction
 from typing import (
     TYPE_CHECKING,
     Any,
@@ -48,7 +49,8 @@ import numpy as np
 import o80
 import o80.stub
 from numpy.typing import ArrayLike, NDArray
-from o80.stub import IdleWord, LateWord, ModeWord, OnErrorWord, ProfileWord, StartWord, Tolerance
+from o80.stub import Chunks, IdleWord, LateWord, ModeWord, OnErrorWord, ProfileWord, RowsWord
+from o80.stub import StartWord, Tolerance
 {imports}
 DESCRIBED = "{digest}"  # of what was described when this module was made
 

@@ -1,0 +1,201 @@
+"""Chunks: what is planned is what happens, and a sender is told what became of its rows."""
+
+import random
+import re
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from processes import run_o80
+
+import o80
+
+WAIT = 60.0  # [s] longer than any wait should take
+ROWS = np.array([[0.0, 0.1, 0.3, 0.3, 0.2]] * 2).T
+
+
+def rows_of(choose: random.Random, start: float, count: int) -> list[list[float]]:
+    rows = [[start, start]]
+    for _ in range(count):
+        rows.append([float(np.clip(each + choose.uniform(-0.1, 0.1), -3, 3)) for each in rows[-1]])
+    return rows[1:]
+
+
+def test_a_chunk_is_played_and_told(arm: o80.Frontend) -> None:
+    arm.burst(100)
+    with arm.chunks(step=10, ease=10) as plan:
+        sent = plan.send(ROWS, seen=100)
+        assert plan.left == 50, "inline it is decided at once"
+        seen = plan.wait(lead=20)
+        assert (seen.iteration, plan.left) == (130, 20)
+        assert (sent.late, sent.skipped, sent.first, sent.begins, sent.shift) == (0, 0, 0, 101, 0)
+        assert plan.planned(110, 16)[:, 0].tolist() == [0.1, 0.3, 0.3, 0.2]
+        assert plan.planned(115, 16)[:, 1] == pytest.approx([0.21875, 0.3, 0.25])
+        assert not plan.starved
+        plan.wait()
+        assert plan.starved
+    assert not plan.starved
+    assert arm.history().desired[[110, 120, 130, 140, 150]].tolist() == ROWS.tolist()
+    assert sent.batch.statuses == ["completed"]
+    with pytest.raises(o80.InvalidArgument, match="this plan was closed"):
+        plan.send(ROWS)
+
+
+@pytest.mark.parametrize("profile", ["cubic", "linear", "hold"])
+@pytest.mark.parametrize("seed", range(12))
+def test_what_is_planned_is_what_happens(arm: o80.Frontend, seed: int, profile: Any) -> None:
+    choose = random.Random(seed)
+    step = choose.choice([1, 4, 10, 7 / 2, 50 / 3])
+    compared = 0
+    with arm.chunks(step=step, ease=choose.choice([None, 1, 7]), profile=profile) as plan:
+        for _ in range(25):
+            arm.burst(choose.randrange(1, 40))
+            seen = max(0, arm.published - choose.randrange(60))
+            count = choose.randrange(1, 30)
+            sent = plan.send(
+                rows_of(choose, float(arm.latest().desired[0]), count),
+                seen=seen,
+                first=choose.randrange(min(count, 4)),
+                fixed=choose.random() < 0.3,
+                late=choose.choice(["skip", "reject"]),
+            )
+            arm.burst(1)
+            assert sent.decided
+            now = arm.published
+            planned = plan.planned(now, step=1)
+            if choose.random() < 0.2:
+                arm.burst(len(planned) + 3)
+            else:
+                arm.burst(min(len(planned), 5) + 1)
+            happened = arm.history(arm.published - now).desired[: len(planned)]
+            assert happened.tolist() == planned[: len(happened)].tolist()
+            compared += len(happened)
+    assert compared > 100
+
+
+def test_a_late_first_answer_begins_where_the_arm_stands(arm: o80.Frontend) -> None:
+    arm.burst(450)
+    with arm.chunks(step=10, ease=10) as plan:
+        late = plan.send(ROWS, seen=100, fixed=True)
+        arm.burst(1)
+        assert late.rejected
+        assert (late.batch[0].reason, late.late, late.begins) == ("late", None, None)
+        sent = plan.send(ROWS, seen=101, first=3)
+        plan.wait()
+    assert (sent.shift, sent.begins, sent.first) == (350, 452, 0)
+    assert arm.history().desired[[461, 471, 481, 491, 501]].tolist() == ROWS.tolist()
+
+
+def test_an_older_answer_and_one_from_before_a_fresh_start_are_rejected(arm: o80.Frontend) -> None:
+    arm.burst(100)
+    with arm.chunks(step=10) as plan:
+        plan.send(ROWS, seen=100)
+        older = plan.send(ROWS, seen=90)
+        arm.burst(1)
+        assert older.batch[0].reason == "older"
+        assert "older observation" in older.batch[0].text
+        arm.resume(arm.halt("a look"), timeout=WAIT)
+        stale = plan.send(ROWS, seen=101)
+        arm.burst(1)
+        assert stale.batch[0].reason == "fresh_start"
+
+
+def test_an_ensemble_has_the_shares_of_act(arm: o80.Frontend) -> None:
+    arm.burst(10)
+    with arm.chunks([0], step=10, ease=1, ensemble=0.01) as plan:
+        plan.send(np.zeros((6, 1)), seen=10)
+        plan.wait(lead=50)
+        plan.send(np.ones((6, 1)), seen=20)
+        plan.wait(lead=50)
+        second = plan.planned(30, 4)[:, 0]
+        plan.send(np.ones((6, 1)), seen=30)
+        plan.wait(lead=50)
+        third = plan.planned(40, 3)[:, 0]
+    assert second == pytest.approx([0.4975] * 4, abs=1e-4)
+    assert third == pytest.approx([0.4975 + (1 - 0.4975) * 0.33] * 3, abs=1e-3)
+
+
+def test_weights_are_shares_of_the_new_rows(arm: o80.Frontend) -> None:
+    arm.burst(10)
+    with arm.chunks("shoulder", step=10, ease=1) as plan:
+        plan.send(np.zeros(4), seen=10)
+        plan.wait(lead=30)
+        plan.send(np.ones(4), seen=20, weights=[0.0, 0.5, 1.0, 0.25])
+        plan.wait(lead=30)
+        assert plan.planned(20).tolist() == [0.0, 0.5, 1.0, 1.0]
+
+
+def test_in_real_time_each_answer_is_waited_for_once(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, arm.chunks(step=10) as plan:
+        asked = []
+        for i in range(5):
+            seen = plan.wait(lead=100, timeout=WAIT)
+            asked.append(seen.iteration)
+            rows = np.full((40, 2), 0.01 * (i + 1))
+            prefix = plan.planned(seen, 3)
+            rows[: len(prefix)] = prefix
+            sent = plan.send(rows, seen=seen, first=len(prefix))
+        plan.wait(timeout=WAIT)
+        assert asked == sorted(set(asked))
+        assert sent.batch.statuses == ["completed"]
+        assert arm.latest().desired.tolist() == [0.05, 0.05]
+        assert plan.wait(grid=True, timeout=WAIT).iteration % 10 == asked[-1] % 10
+
+
+def test_a_hanging_policy_is_seen(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, arm.chunks(step=5) as plan:
+        plan.send(np.zeros((4, 2)))
+        while not plan.starved:
+            arm.wait_for(arm.published + 1, WAIT)
+        with pytest.raises(o80.TimeoutError):
+            plan.send(np.zeros((1000, 2)))
+            plan.wait(timeout=0.05)
+
+
+@pytest.mark.parametrize(
+    ("send", "said"),
+    [
+        (lambda plan: plan.send([]), "a chunk needs a row"),
+        (lambda plan: plan.send(np.zeros((3, 3))), r"the targets of 2 actuators are \(T, 2\)"),
+        (lambda plan: plan.send(np.full((3, 2), 4.0)), "shoulder.*-3 to 3"),
+        (lambda plan: plan.send(np.full((3, 2), np.nan)), "nan"),
+        (lambda plan: plan.send(np.zeros((3, 2)), first=3), "first.*from 0 to 2, got 3"),
+        (lambda plan: plan.send(np.zeros((3, 2)), late="now"), "late must be 'skip' or 'reject'"),
+        (lambda plan: plan.send(np.zeros((3, 2)), due=[5, 7]), "3 rows need as many due"),
+        (lambda plan: plan.send(np.zeros((2, 2)), seen=5, due=[5, 7]), "after iteration 5"),
+        (lambda plan: plan.send(np.zeros((2, 2)), due=[9, 9]), "one after the other"),
+        (lambda plan: plan.send(np.zeros((2, 2)), weights=[1.0]), r"weights are \(2,\)"),
+        (lambda plan: plan.send(np.zeros((2, 2)), seen="now"), "seen"),
+        (lambda plan: plan.send(np.zeros((2049, 2))), "from 1 to 2048, got 2049"),
+    ],
+)
+def test_what_cannot_be_sent_is_refused_and_nothing_is_sent(
+    arm: o80.Frontend, send: Callable[[Any], object], said: str
+) -> None:
+    with arm.chunks(step=5) as plan:
+        with pytest.raises(o80.InvalidArgument, match=said):
+            send(plan)
+        arm.burst(5)
+        assert not arm.latest().active.any()
+
+
+def test_a_plan_needs_a_step_of_an_iteration_or_more(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match="step must be at least 1 iteration, got 0"):
+        arm.chunks(step=0)
+
+
+def test_the_journal_names_a_chunk(segment: str, arm: o80.Frontend) -> None:
+    arm.burst(100)
+    with arm.chunks(step=10, ease=10) as plan:
+        plan.send(ROWS, seen=100, first=1)
+        plan.wait()
+    shown = run_o80("echo", segment, "--commands", "--count", "7").stdout
+    assert re.search(r"in a chunk due 120 to 150, which answers iteration 100", shown), shown
+    assert re.search(r"chunk.*: completed", shown), shown
+    command = next(
+        command for entry in arm.journal() for command in entry.commands if command.pace == "chunk"
+    )
+    assert command.due == (110, 120, 130, 140, 150)
+    assert (command.anchor, command.ease, command.first) == (100, 10, 1)
+    assert command.targets[1].tolist() == ROWS[:, 1].tolist()
