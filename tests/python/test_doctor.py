@@ -14,7 +14,8 @@ from pathlib import Path
 import o80._core as _core
 import pytest
 
-from o80.robots.doctor.checks import CHECKS
+from o80.robots.doctor.check import Finding
+from o80.robots.doctor.checks import CHECKS, Priority
 from o80.robots.doctor.computer import MAX_BYTES, list_of, processors_of
 from o80.robots.doctor.doctor import Report
 from o80.robots.doctor.wake_ups import WakeUps, measure
@@ -260,6 +261,28 @@ def test_a_refusal_that_the_robot_met_counts_whatever_the_files_say(tmp_path: Pa
     report = recorded("preempt_rt", tmp_path).examine(1000, WakeUps(1000.0, 2.0, refused=refused))
     assert names(report) == ["priority limit", "locked memory limit"]
     assert [finding.seen.split(";")[0] for finding in report.findings] == ["refused", "refused"]
+
+
+def test_a_priority_of_realtime_kit_is_known_with_and_without_a_measurement(tmp_path: Path) -> None:
+    line = "real-time priority 80 was refused (no); RealtimeKit granted {}. Allow it in this shell"
+    computer = recorded("laptop", tmp_path)
+
+    def finding(answer: str = "") -> Finding:
+        refused = (line.format(answer),) if answer else ()
+        measured = WakeUps(1000.0, 2.0, policy="rr", refused=refused) if answer else None
+        report = computer.examine(1000, measured)
+        return next(each for each in report.findings if each.name == "priority limit")
+
+    granted = finding("20, until it runs for 100 ms")
+    assert granted.remark
+    assert granted.seen == "0; o80 run needs 81; RealtimeKit granted 20, until it runs for 100 ms"
+    assert not finding("none (not you)").remark
+    assert finding("none (not you)").seen.endswith("81; RealtimeKit granted none (not you)")
+    assert "RealtimeKit" not in finding().cure
+    computer.change(Priority.REALTIME_KIT, "[D-BUS Service]\n")
+    assert finding().cure.startswith("o80 run ROBOT --policy fifo  # asks RealtimeKit")
+    assert not finding().remark
+    assert "RealtimeKit" not in finding("none (not you)").cure
 
 
 def test_cures_of_limits_are_those_that_o80_run_says(tmp_path: Path) -> None:

@@ -194,7 +194,9 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
   if (options.until_eof) watch_input();
   std::optional<LoopReport> report(std::in_place, loop->backend().name());
   loop->start();
-  for (const std::string& refused : set_up_real_time(options.real_time)) {
+  RealTimeOptions real_time = options.real_time;
+  real_time.sleeps = !options.backend.bursting && table.paces_itself == 0;
+  for (const std::string& refused : set_up_real_time(real_time)) {
     complain(refused.c_str());
   }
   announce(table, loop->backend());

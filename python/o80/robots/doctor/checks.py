@@ -22,26 +22,38 @@ class Priority(Check):
     delay = 10e-3
     effect = "the loop is an ordinary thread, which waits up to 10 ms while other programs compute"
     of_host = False
+    REALTIME_KIT: ClassVar = "usr/share/dbus-1/system-services/org.freedesktop.RealtimeKit1.service"
 
     def look(self, at: Evidence) -> Iterator[Finding]:
-        if at.real_time:
+        if at.granted:
             return
         limit = at.computer.limit("Max realtime priority")
         refused = any("real-time priority" in line for line in at.refused)
-        seen = "refused" if limit is None or limit >= PRIORITY else str(limit)
-        if 1 < (limit or 0) < PRIORITY and not refused:
+        found = "refused" if limit is None or limit >= PRIORITY else str(limit)
+        said = f"; {at.realtime_kit}" if at.realtime_kit else ""
+        seen = f"{found}; o80 run needs {PRIORITY}{said}"
+        now, always, undo = _core.machine_limits()[0]
+        cure = f"{now}  # for this shell\n{always}  # from the next login on"
+        if at.computer.container:
+            cure = f"{at.computer.container} run --cap-add SYS_NICE --ulimit rtprio=99 ..."
+            undo = ""
+        if at.real_time:
+            yield self.found(
+                at, seen, remark=True, cure=cure, undo=undo,
+                effect="at this lower priority the loop waits for interrupt threads and for "
+                "real-time threads of the desktop",
+            )  # fmt: skip
+        elif 1 < (limit or 0) < PRIORITY and not refused:
             lower = f"o80 run ROBOT --policy fifo --priority {(limit or 0) - 1}"
             yield self.found(
-                at, f"{seen}; o80 run needs {PRIORITY}", remark=True, cure=lower,
+                at, seen, remark=True, cure=lower,
                 effect="o80 run gets no real-time priority without a lower --priority",
             )  # fmt: skip
-        elif at.computer.container:
-            cure = f"{at.computer.container} run --cap-add SYS_NICE --ulimit rtprio=99 ..."
-            yield self.found(at, f"{seen}; o80 run needs {PRIORITY}", cure=cure)
         else:
-            now, always, undo = _core.machine_limits()[0]
-            cure = f"{now}  # for this shell\n{always}  # from the next login on"
-            yield self.found(at, f"{seen}; o80 run needs {PRIORITY}", cure=cure, undo=undo)
+            if not refused and at.computer.exists(self.REALTIME_KIT):
+                ask = "o80 run ROBOT --policy fifo  # asks RealtimeKit for a lower one, at once"
+                cure = f"{ask}\n{cure}"
+            yield self.found(at, seen, cure=cure, undo=undo)
 
 
 class GroupShare(Check):

@@ -8,6 +8,8 @@ from typing import Any
 
 from o80.base.errors import Error
 
+POLICIES = {os.SCHED_FIFO: "fifo", os.SCHED_RR: "rr"}
+
 
 @dataclass(frozen=True)
 class WakeUps:
@@ -55,7 +57,7 @@ def measure(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
             ) as process, process.frontend() as frontend:  # fmt: skip
                 time.sleep(seconds)
                 rows = frontend.history(frontend.published)
-                granted = os.sched_getscheduler(process.pid) != os.SCHED_OTHER
+                granted = os.sched_getscheduler(process.pid) & ~os.SCHED_RESET_ON_FORK
         except (Error, OSError) as error:
             return WakeUps(frequency, seconds, failed=str(error))
     late = sorted(rows.lateness.tolist()) or [0]
@@ -64,7 +66,7 @@ def measure(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
         frequency,
         seconds,
         iterations=len(rows),
-        policy="fifo" if granted else "other",
+        policy=POLICIES.get(granted, "other"),
         lateness=(late[len(late) // 2] / 1e9, late[int(len(late) * 0.99)] / 1e9, late[-1] / 1e9),
         overruns=int(rows.overruns[-1]),
         skipped=int(rows.skipped[-1]),
