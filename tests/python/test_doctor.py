@@ -182,6 +182,10 @@ FAULTS: dict[str, tuple[dict[str, str | tuple[str, str] | None], str, str, str]]
         {"proc/self/mountinfo": MOUNT.format("/dev/shm", ",size=4m")},
         "size of /dev/shm", "4 MB free", "sudo mount -o remount,size=1G",
     ),
+    "read-only /dev/shm": (
+        {"proc/self/mountinfo": MOUNT.format("/dev/shm", "").replace(" rw ", " ro,nosuid ")},
+        "size of /dev/shm", "read-only", "sudo mount -o remount,rw",
+    ),
     "no /dev/shm": (
         {"proc/self/mountinfo": MOUNT.format("/tmp", "")},
         "size of /dev/shm", "not mounted", "sudo mount -t tmpfs",
@@ -264,7 +268,10 @@ def test_a_computer_that_missed_periods_does_not_serve_even_without_a_cause(tmp_
     unloaded = replace(held, failed="'arm' runs on this computer")
     assert recorded("preempt_rt", tmp_path / "f").examine(1000, held, unloaded).serves
 
-    failed = replace(missed, failed="no space left in /dev/shm")
+    failed = WakeUps(1000.0, 2.0, failed="no space left in /dev/shm")
+    report = recorded("laptop", tmp_path / "g").examine(1000, failed, missed)
+    assert "could not be measured on this computer: no space left" in report.verdict
+    assert report.loaded is None
     report = recorded("preempt_rt", tmp_path / "c").examine(1000, failed)
     assert not report.serves
     assert "could not be measured on this computer: no space left" in report.verdict
@@ -297,6 +304,16 @@ def test_a_priority_of_realtime_kit_is_known_with_and_without_a_measurement(tmp_
     assert finding().cure.startswith("o80 run ROBOT --policy fifo  # asks RealtimeKit")
     assert not finding().remark
     assert "RealtimeKit" not in finding("none (not you)").cure
+
+
+def test_a_container_of_another_kind_is_not_told_a_command_of_docker(tmp_path: Path) -> None:
+    computer = recorded("container", tmp_path)
+    for path in (".dockerenv", "run/.containerenv"):
+        computer.change(path, None)
+    computer.change("run/systemd/container", "lxc\n")
+    cures = [finding.cure for finding in computer.examine(1000).findings]
+    assert not any(cure.startswith("lxc") for cure in cures)
+    assert "start the container (lxc) with what `docker run --shm-size=1g` would give it" in cures
 
 
 def test_cures_of_limits_are_those_that_o80_run_says(tmp_path: Path) -> None:

@@ -70,7 +70,9 @@ def _print(report: Report) -> None:
     for path, reason in report.unread.items():
         print(f"could not be read: {plain(path)} ({plain(reason)})")
     about = report.computer
-    parts = [about["system"], f"kernel {about['kernel']}", f"{len(about['processors'])} processors"]
+    parts = [about["system"]]
+    parts += [f"kernel {about['kernel']}"] if about["kernel"] else []
+    parts += [f"{len(about['processors'])} processors"]
     parts += [f"container ({about['container']})"] if about["container"] else []
     print(plain(", ".join(part for part in parts if part)))
 

@@ -129,6 +129,13 @@ class Check:
         )
 
 
+def in_container(kind: str, flags: str) -> str:
+    """Command that starts a container with these flags of docker, or a sentence that says so."""
+    if kind in ("docker", "podman"):
+        return f"{kind} run {flags} ..."
+    return f"start the container ({kind}) with what `docker run {flags}` would give it"
+
+
 def on_host(commands: str) -> str:
     """Commands with the remark that they are for the host of a container."""
     first, newline, rest = commands.partition("\n")

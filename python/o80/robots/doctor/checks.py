@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 import o80._core as _core
-from o80.robots.doctor.check import MATTERS, PRIORITY, Check, Evidence, Finding
+from o80.robots.doctor.check import MATTERS, PRIORITY, Check, Evidence, Finding, in_container
 from o80.robots.doctor.computer import CPU, IPC_LOCK, Computer, list_of
 
 LOCKED = 256 << 20  # [bytes] of a robot with the default history, and half as much again
@@ -35,7 +35,7 @@ class Priority(Check):
         now, always, undo = _core.machine_limits()[0]
         cure = f"{now}  # for this shell\n{always}  # from the next login on"
         if at.computer.container:
-            cure = f"{at.computer.container} run --cap-add SYS_NICE --ulimit rtprio=99 ..."
+            cure = in_container(at.computer.container, "--cap-add SYS_NICE --ulimit rtprio=99")
             undo = ""
         if at.real_time:
             yield self.found(
@@ -89,7 +89,7 @@ class LockedMemory(Check):
             return
         seen = "refused" if limit is None else f"{limit >> 10} KiB; a robot needs 256 MiB"
         if at.computer.container:
-            cure = f"{at.computer.container} run --ulimit memlock=-1 ..."
+            cure = in_container(at.computer.container, "--ulimit memlock=-1")
             yield self.found(at, seen, cure=cure)
         else:
             now, always, undo = _core.machine_limits()[1]
@@ -455,19 +455,25 @@ class SharedMemory(Check):
             line.split()
             for line in at.computer.text("proc/self/mountinfo", needed=True).split("\n")
         ]
-        options = [words[-1] for words in mounts if len(words) > 9 and words[4] == "/dev/shm"]
-        if not options:
+        own = [words for words in mounts if len(words) > 9 and words[4] == "/dev/shm"]
+        if not own:
             if any(len(words) > 9 for words in mounts):
                 mount = "sudo mount -t tmpfs tmpfs /dev/shm"
                 yield self.found(at, "not mounted", cure=mount, undo="sudo umount /dev/shm")
             return
-        size = re.search(r"(?:^|,)size=(\d{1,18})([kmg]?)(?:,|$)", options[-1])
+        if "ro" in own[-1][5].split(","):
+            change = "sudo mount -o remount,{} /dev/shm"
+            yield self.found(
+                at, "read-only", effect="no robot starts where no file can be made",
+                cure=change.format("rw"), undo=change.format("ro"),
+            )  # fmt: skip
+        size = re.search(r"(?:^|,)size=(\d{1,18})([kmg]?)(?:,|$)", own[-1][-1])
         total = int(size[1]) * self.UNITS[size[2]] if size else None
         free = total if at.free_memory is None else at.free_memory
         container = at.computer.container
         cure, undo = "sudo mount -o remount,size=1G /dev/shm", ""
         if container:
-            cure = f"{container} run --shm-size=1g ..."
+            cure = in_container(container, "--shm-size=1g")
         elif size:
             undo = f"sudo mount -o remount,size={size[1]}{size[2]} /dev/shm"
         if free is not None and free < self.FULL:

@@ -49,6 +49,8 @@ class Report:
         """One sentence."""
         rate = f"{self.frequency:g} Hz"
         culprits = self.culprits
+        if self.measured is not None and self.measured.failed:
+            return f"A robot could not be measured on this computer: {self.measured.failed}"
         if culprits:
             worst = culprits[0]
             count = f"{len(culprits)} causes, first" if len(culprits) > 1 else "because of"
@@ -60,8 +62,6 @@ class Report:
                     f"{time_text(worst.delay)} late"
                 )
             return f"This computer {what}: {count} the {worst.name}."
-        if self.measured is not None and self.measured.failed:
-            return f"A robot could not be measured on this computer: {self.measured.failed}"
         if self._missed:
             return (
                 f"This computer {self._missed}, and no cause was found: "
@@ -92,12 +92,12 @@ def examine(
 ) -> Report:
     """Looks at a computer before and after a measurement, then measures beside a load.
 
-    A measurement of None: there was none.
+    None of the first: it was not measured.
     """
     before = computer.sample()
     measured = measure(computer)
     after = computer.sample()
-    loaded = measure_loaded(computer)
+    loaded = None if measured is None or measured.failed else measure_loaded(computer)
     refused = () if measured is None else measured.refused
     evidence = Evidence(computer, frequency, before, after, refused, free_memory(computer))
     found = [finding for check in CHECKS for finding in check.look(evidence)]
