@@ -283,6 +283,13 @@ def test_a_refusal_that_the_robot_met_counts_whatever_the_files_say(tmp_path: Pa
     assert names(report) == ["priority limit", "locked memory limit"]
     assert [finding.seen.split(";")[0] for finding in report.findings] == ["refused", "refused"]
 
+    computer = recorded("preempt_rt", tmp_path / "low")
+    computer.change("proc/self/limits", LIMITS.format("unlimited", "unlimited", 20, 20))
+    (finding,) = computer.examine(1000, WakeUps(1000.0, 2.0, refused=refused[:1])).findings
+    assert not finding.remark
+    assert finding.cure.startswith("o80 run ROBOT --policy fifo --priority 19  # within")
+    assert "--rtprio=99" in finding.cure
+
 
 def test_a_priority_of_realtime_kit_is_known_with_and_without_a_measurement(tmp_path: Path) -> None:
     line = "real-time priority 80 was refused (no); RealtimeKit granted {}. Allow it in this shell"

@@ -37,14 +37,15 @@ class Priority(Check):
         if at.computer.container:
             cure = in_container(at.computer.container, "--cap-add SYS_NICE --ulimit rtprio=99")
             undo = ""
+        low = 1 < (limit or 0) < PRIORITY
+        lower = f"o80 run ROBOT --policy fifo --priority {(limit or 0) - 1}"
         if at.real_time:
             yield self.found(
                 at, seen, remark=True, cure=cure, undo=undo,
                 effect="at this lower priority the loop waits for interrupt threads and for "
                 "real-time threads of the desktop",
             )  # fmt: skip
-        elif 1 < (limit or 0) < PRIORITY and not refused:
-            lower = f"o80 run ROBOT --policy fifo --priority {(limit or 0) - 1}"
+        elif low and not refused:
             yield self.found(
                 at, seen, remark=True, cure=lower,
                 effect="o80 run gets no real-time priority without a lower --priority",
@@ -53,6 +54,8 @@ class Priority(Check):
             if not refused and at.computer.exists(self.REALTIME_KIT):
                 ask = "o80 run ROBOT --policy fifo  # asks RealtimeKit for a lower one, at once"
                 cure = f"{ask}\n{cure}"
+            if low:
+                cure = f"{lower}  # within the limit of now\n{cure}"
             yield self.found(at, seen, cure=cure, undo=undo)
 
 
