@@ -15,6 +15,7 @@ import o80._core as _core
 import pytest
 
 import o80
+from o80.robots.doctor import wake_ups
 from o80.robots.doctor.check import Finding
 from o80.robots.doctor.checks import CHECKS, Priority
 from o80.robots.doctor.computer import MAX_BYTES, list_of, processors_of
@@ -451,12 +452,15 @@ def test_the_load_computes_on_all_processors_and_ends() -> None:
     assert not Path(f"/proc/{process}").exists()
 
 
-def test_no_load_disturbs_a_robot_that_runs(process: Process) -> None:
-    found = measure_beside_load(1000.0, 0.2, [])
-    running = [entry.name for entry in o80.segments() if entry.alive]
-    assert process.segment in running
-    assert found.failed.endswith("runs on this computer, and a load would disturb it")
-    assert found.iterations == 0
+def test_no_load_disturbs_a_robot_that_runs(
+    process: Process, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (ours,) = (entry for entry in o80.segments() if entry.name == process.segment)
+    for life, runs in (("running", "runs"), ("unknown", "may run")):
+        monkeypatch.setattr(wake_ups, "segments", lambda life=life: [replace(ours, life=life)])
+        found = measure_beside_load(1000.0, 0.2, [])
+        reason = f"'{ours.name}' {runs} on this computer, and a load would disturb it"
+        assert found == WakeUps(1000.0, 0.2, failed=reason)
 
 
 def doctor(*words: str) -> "subprocess.CompletedProcess[str]":

@@ -83,10 +83,12 @@ def measure(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
 
 def measure_beside_load(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
     """Measures while all processors compute, unless a robot runs here, which that would disturb."""
-    running = [entry.name for entry in segments() if entry.alive]
-    if running:
-        reason = f"'{running[0]}' runs on this computer, and a load would disturb it"
-        return WakeUps(frequency, seconds, failed=reason)
+    # a segment that this user may not read counts too
+    for entry in segments():
+        if entry.alive or entry.life == "unknown":
+            runs = "runs" if entry.alive else "may run"
+            reason = f"'{entry.name}' {runs} on this computer, and a load would disturb it"
+            return WakeUps(frequency, seconds, failed=reason)
     try:
         with load():
             return measure(frequency, seconds, processors)
