@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from typing import Self
 
 _count = itertools.count()
+LONGEST = 200_000  # time that a thread may run without sleep [us]
 ERROR = "org.freedesktop.DBus.Error."
 METHOD_RETURN, METHOD_ERROR = 2, 3
 ERROR_NAME, REPLY_TO, SIGNATURE = 4, 5, 8  # fields of a message's head
@@ -22,9 +23,8 @@ class RealtimeKit:
     service), late (no answer about a thread), silent (no answer at all), rude (closes at once).
     """
 
-    def __init__(self, mood: str = "grants", longest: int = 200_000) -> None:
+    def __init__(self, mood: str = "grants") -> None:
         self.mood = mood
-        self.longest = longest  #: time that a thread may run without sleep [us]
         self.asked: list[tuple[int, int]] = []  #: thread, priority
         self.callers = 0
         name = f"o80-test-bus-{os.getpid()}-{next(_count)}"
@@ -84,7 +84,7 @@ class RealtimeKit:
             return ERROR + "ServiceUnknown", "s", string("no such service")
         if member == "Get":
             if b"RTTimeUSecMax" in body:
-                return "", "v", struct.pack("<B2sxxxxxq", 1, b"x\0", self.longest)
+                return "", "v", struct.pack("<B2sxxxxxq", 1, b"x\0", LONGEST)
             return "", "v", struct.pack("<B2sxi", 1, b"i\0", 20)
         assert member == "MakeThreadRealtime"
         thread, priority = struct.unpack("<QI", body)

@@ -105,7 +105,7 @@ def test_realtime_kit_grants_what_limits_refuse(segment: str, run: Run) -> None:
 def test_a_loop_that_does_not_sleep_loses_the_priority_and_goes_on(segment: str, run: Run) -> None:
     if not may_grant():
         pytest.skip("this user may give no real-time priorities")
-    with RealtimeKit(longest=40_000) as kit:
+    with RealtimeKit() as kit:
         process = run("room_sensor:Spins", "--policy", "rr", "--priority", "7", bus=kit.address)
         with o80.Frontend(segment, WAIT) as room:
             assert room.wait_for(2, WAIT).extended.policy == GRANTED
