@@ -160,3 +160,14 @@ class Forks:
 
     def read(self, reading: Reading) -> None:
         reading.observed[0] = os.getpid()
+
+
+class Spins:
+    """Computes in iteration 3, without sleep, as long as its thread has a real-time priority."""
+
+    extended = {"policy": np.int64}  # noqa: RUF012
+
+    def read(self, reading: Reading) -> None:
+        while reading.iteration == 3 and os.sched_getparam(0).sched_priority > 0:
+            pass
+        reading.extended["policy"] = os.sched_getscheduler(0)

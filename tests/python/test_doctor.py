@@ -14,10 +14,15 @@ from pathlib import Path
 import o80._core as _core
 import pytest
 
-from o80.robots.doctor.checks import CHECKS
+import o80
+from o80.robots.doctor import wake_ups
+from o80.robots.doctor.check import Finding
+from o80.robots.doctor.checks import CHECKS, Priority
 from o80.robots.doctor.computer import MAX_BYTES, list_of, processors_of
 from o80.robots.doctor.doctor import Report
-from o80.robots.doctor.wake_ups import WakeUps, measure
+from o80.robots.doctor.load import load
+from o80.robots.doctor.wake_ups import WakeUps, measure, measure_beside_load
+from o80.robots.process import Process
 from real_time.recorded_computers import RecordedComputer, recorded
 
 CPU = "sys/devices/system/cpu"
@@ -178,6 +183,10 @@ FAULTS: dict[str, tuple[dict[str, str | tuple[str, str] | None], str, str, str]]
         {"proc/self/mountinfo": MOUNT.format("/dev/shm", ",size=4m")},
         "size of /dev/shm", "4 MB free", "sudo mount -o remount,size=1G",
     ),
+    "read-only /dev/shm": (
+        {"proc/self/mountinfo": MOUNT.format("/dev/shm", "").replace(" rw ", " ro,nosuid ")},
+        "size of /dev/shm", "read-only", "sudo mount -o remount,rw",
+    ),
     "no /dev/shm": (
         {"proc/self/mountinfo": MOUNT.format("/tmp", "")},
         "size of /dev/shm", "not mounted", "sudo mount -t tmpfs",
@@ -247,12 +256,26 @@ def test_a_computer_that_missed_periods_does_not_serve_even_without_a_cause(tmp_
     assert not report.serves
     assert "did not finish 7 of 2000 iterations in time at 1000 Hz" in report.verdict
 
-    assert recorded("preempt_rt", tmp_path / "b").examine(1000, replace(missed, overruns=0)).serves
+    held = replace(missed, overruns=0)
+    assert recorded("preempt_rt", tmp_path / "b").examine(1000, held, held).serves
 
-    failed = replace(missed, failed="no space left in /dev/shm")
+    report = recorded("preempt_rt", tmp_path / "d").examine(1000, held, missed)
+    assert not report.serves
+    assert "7 of 2000 iterations in time at 1000 Hz beside a load, and no cause" in report.verdict
+
+    report = recorded("workstation", tmp_path / "e").examine(1000, held, missed)
+    assert report.verdict.endswith(" beside a load: because of the kernel without PREEMPT_RT.")
+
+    unloaded = replace(held, failed="'arm' runs on this computer")
+    assert recorded("preempt_rt", tmp_path / "f").examine(1000, held, unloaded).serves
+
+    failed = WakeUps(1000.0, 2.0, failed="no space left in /dev/shm")
+    report = recorded("laptop", tmp_path / "g").examine(1000, failed, missed)
+    assert "could not be measured on this computer: no space left" in report.verdict
+    assert report.loaded is None
     report = recorded("preempt_rt", tmp_path / "c").examine(1000, failed)
     assert not report.serves
-    assert "could not be started on this computer: no space left" in report.verdict
+    assert "could not be measured on this computer: no space left" in report.verdict
 
 
 def test_a_refusal_that_the_robot_met_counts_whatever_the_files_say(tmp_path: Path) -> None:
@@ -260,6 +283,45 @@ def test_a_refusal_that_the_robot_met_counts_whatever_the_files_say(tmp_path: Pa
     report = recorded("preempt_rt", tmp_path).examine(1000, WakeUps(1000.0, 2.0, refused=refused))
     assert names(report) == ["priority limit", "locked memory limit"]
     assert [finding.seen.split(";")[0] for finding in report.findings] == ["refused", "refused"]
+
+    computer = recorded("preempt_rt", tmp_path / "low")
+    computer.change("proc/self/limits", LIMITS.format("unlimited", "unlimited", 20, 20))
+    (finding,) = computer.examine(1000, WakeUps(1000.0, 2.0, refused=refused[:1])).findings
+    assert not finding.remark
+    assert finding.cure.startswith("o80 run ROBOT --policy fifo --priority 19  # within")
+    assert "--rtprio=99" in finding.cure
+
+
+def test_a_priority_of_realtime_kit_is_known_with_and_without_a_measurement(tmp_path: Path) -> None:
+    line = "real-time priority 80 was refused (no); RealtimeKit granted {}. Allow it in this shell"
+    computer = recorded("laptop", tmp_path)
+
+    def finding(answer: str = "") -> Finding:
+        refused = (line.format(answer),) if answer else ()
+        measured = WakeUps(1000.0, 2.0, policy="rr", refused=refused) if answer else None
+        report = computer.examine(1000, measured)
+        return next(each for each in report.findings if each.name == "priority limit")
+
+    granted = finding("20, until it runs for 100 ms")
+    assert granted.remark
+    assert granted.seen == "0; o80 run needs 81; RealtimeKit granted 20, until it runs for 100 ms"
+    assert not finding("none (not you)").remark
+    assert finding("none (not you)").seen.endswith("81; RealtimeKit granted none (not you)")
+    assert "RealtimeKit" not in finding().cure
+    computer.change(Priority.REALTIME_KIT, "[D-BUS Service]\n")
+    assert finding().cure.startswith("o80 run ROBOT --policy fifo  # asks RealtimeKit")
+    assert not finding().remark
+    assert "RealtimeKit" not in finding("none (not you)").cure
+
+
+def test_a_container_of_another_kind_is_not_told_a_command_of_docker(tmp_path: Path) -> None:
+    computer = recorded("container", tmp_path)
+    for path in (".dockerenv", "run/.containerenv"):
+        computer.change(path, None)
+    computer.change("run/systemd/container", "lxc\n")
+    cures = [finding.cure for finding in computer.examine(1000).findings]
+    assert not any(cure.startswith("lxc") for cure in cures)
+    assert "start the container (lxc) with what `docker run --shm-size=1g` would give it" in cures
 
 
 def test_cures_of_limits_are_those_that_o80_run_says(tmp_path: Path) -> None:
@@ -370,11 +432,38 @@ def test_a_loop_is_measured(segment: str) -> None:
     assert not found.failed
     assert found.iterations > 0
     assert 0 <= found.lateness[0] <= found.lateness[1] <= found.lateness[2]
-    assert str(found).startswith(f"measured: {found.iterations} iterations at 500 Hz")
+    assert 0 < found.reader[0] <= found.reader[1] <= found.reader[2]
+    assert str(found).startswith(f"{found.iterations} iterations at 500 Hz ({found.policy}), ")
     assert "not measured: " in str(measure(500.0, 0.2, [100_000]))
+    assert (
+        measure(0.1, 0.05, []).failed
+        == "no iteration at 0.1 Hz ended within 0.05 s: raise --seconds"
+    )
 
 
-def o80(*words: str) -> "subprocess.CompletedProcess[str]":
+def test_the_load_computes_on_all_processors_and_ends() -> None:
+    with load() as process:
+        busy: set[str] = set()
+        while len(busy) < len(os.sched_getaffinity(0)):
+            for thread in Path(f"/proc/{process}/task").iterdir():
+                ticks = int((thread / "stat").read_text().rpartition(")")[2].split()[11])
+                if ticks > 0 and thread.name != str(process):
+                    busy.add(thread.name)
+    assert not Path(f"/proc/{process}").exists()
+
+
+def test_no_load_disturbs_a_robot_that_runs(
+    process: Process, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (ours,) = (entry for entry in o80.segments() if entry.name == process.segment)
+    for life, runs in (("running", "runs"), ("unknown", "may run")):
+        monkeypatch.setattr(wake_ups, "segments", lambda life=life: [replace(ours, life=life)])
+        found = measure_beside_load(1000.0, 0.2, [])
+        reason = f"'{ours.name}' {runs} on this computer, and a load would disturb it"
+        assert found == WakeUps(1000.0, 0.2, failed=reason)
+
+
+def doctor(*words: str) -> "subprocess.CompletedProcess[str]":
     program = str(Path(sys.executable).parent / "o80")
     return subprocess.run(
         [program, "doctor", *words], capture_output=True, text=True, timeout=120, check=False
@@ -382,16 +471,16 @@ def o80(*words: str) -> "subprocess.CompletedProcess[str]":
 
 
 def test_the_command_prints_json_and_its_status_says_whether_this_computer_serves() -> None:
-    done = o80("--json", "--seconds", "0", "--frequency", "1000")
+    done = doctor("--json", "--seconds", "0", "--frequency", "1000")
     report = json.loads(done.stdout)
     assert done.returncode == (0 if report["serves"] else 1)
-    assert " ".join(report) == "serves verdict frequency findings measured unread computer"
-    assert report["measured"] is None
+    assert " ".join(report) == "serves verdict frequency findings measured loaded unread computer"
+    assert report["measured"] is report["loaded"] is None
     for finding in report["findings"]:
         assert " ".join(finding) == "name seen effect cure undo delay remark"
-    text = o80("--seconds", "0", "--frequency", "1000")
+    text = doctor("--seconds", "0", "--frequency", "1000")
     assert text.returncode == done.returncode
     assert text.stdout.startswith(report["verdict"])
     assert text.stderr == done.stderr == ""
-    assert o80("--frequency", "0").returncode == 2
-    assert o80("--seconds", "nan").returncode == 2
+    assert doctor("--frequency", "0").returncode == 2
+    assert doctor("--seconds", "nan").returncode == 2

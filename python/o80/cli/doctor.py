@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -11,7 +12,8 @@ from o80.base.screen import plain, print_json, style
 
 if TYPE_CHECKING:
     from o80.robots.doctor.check import Finding
-    from o80.robots.doctor.doctor import Report
+    from o80.robots.doctor.doctor import Measure, Report
+    from o80.robots.doctor.wake_ups import WakeUps
 
 
 def doctor(
@@ -19,7 +21,12 @@ def doctor(
         float, typer.Option(help="Iterations a second of the robot.", min=0.1, max=1e5)
     ] = 1000.0,
     seconds: Annotated[
-        float, typer.Option(help="Seconds to measure a loop; 0: only look.", min=0.0, max=3600.0)
+        float,
+        typer.Option(
+            help="Seconds to measure a loop, and again beside a load; 0: only look.",
+            min=0.0,
+            max=3600.0,
+        ),
     ] = 2.0,
     as_json: Annotated[bool, typer.Option("--json", help="For tools.")] = False,
 ) -> None:
@@ -30,15 +37,15 @@ def doctor(
     """
     from o80.robots.doctor.computer import Computer
     from o80.robots.doctor.doctor import examine
-    from o80.robots.doctor.wake_ups import measure
+    from o80.robots.doctor.wake_ups import measure, measure_beside_load
 
     if math.isnan(frequency) or math.isnan(seconds):
         raise typer.BadParameter("--frequency and --seconds must be numbers, got nan")
-    report = examine(
-        Computer(),
-        frequency,
-        lambda computer: measure(frequency, seconds, computer.isolated) if seconds else None,
-    )
+
+    def measured_by(call: Callable[[float, float, list[int]], WakeUps]) -> Measure:
+        return lambda computer: call(frequency, seconds, computer.isolated) if seconds else None
+
+    report = examine(Computer(), frequency, measured_by(measure), measured_by(measure_beside_load))
     if as_json:
         print_json(report.as_dict())
     else:
@@ -57,12 +64,15 @@ def _print(report: Report) -> None:
     for finding in remarks:
         print(f"\n- {_text(finding)}")
     print()
-    if report.measured is not None:
-        print(plain(str(report.measured)))
+    for head, measured in (("alone", report.measured), ("beside a load", report.loaded)):
+        if measured is not None:
+            print(f"{head}: " + "\n".join(map(plain, str(measured).splitlines())))
     for path, reason in report.unread.items():
         print(f"could not be read: {plain(path)} ({plain(reason)})")
     about = report.computer
-    parts = [about["system"], f"kernel {about['kernel']}", f"{len(about['processors'])} processors"]
+    parts = [about["system"]]
+    parts += [f"kernel {about['kernel']}"] if about["kernel"] else []
+    parts += [f"{len(about['processors'])} processors"]
     parts += [f"container ({about['container']})"] if about["container"] else []
     print(plain(", ".join(part for part in parts if part)))
 

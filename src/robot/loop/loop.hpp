@@ -1,5 +1,6 @@
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -36,9 +37,9 @@ class Loop final : public RequestServer {
   Loop& operator=(const Loop&) = delete;
   ~Loop();
 
-  /// Starts the hardware and publishes row 0. If that fails, it stores the fault in the segment and
-  /// throws DriverError.
-  void start();
+  /// Starts the hardware, calls `set_up`, and publishes row 0, from which on the robot runs for
+  /// others. If that fails, it stores the fault in the segment and throws DriverError.
+  void start(const std::function<void()>& set_up = [] {});
   /// Iterates until the end, paced by the clock, the robot or bursts. Returns the fault of a driver
   /// instead of throwing it.
   Ended run() noexcept;

@@ -12,6 +12,7 @@
 #include "memory/os/futex.hpp"
 #include "o80/base/time.hpp"
 #include "o80/runtime/frontend.hpp"
+#include "robot/loop/realtime_kit.hpp"
 #include "robot/loop/service_manager.hpp"
 
 namespace o80 {
@@ -97,6 +98,7 @@ void LoopReport::run() noexcept {
     std::uint64_t halted = 0;
     while (stop_.load(std::memory_order_acquire) == 0) {
       const std::int64_t moment = monotonic_now();
+      if (const auto line = lost_priority()) say(*line);
       if (const auto line = hangs.look(loop_state(watcher, moment), moment)) say(*line);
       if (watcher.published() >= 0) {
         if (const auto line = overruns.look(watcher.latest().head(), moment)) say(*line);

@@ -53,10 +53,12 @@ Loop::~Loop() {
   }
 }
 
-void Loop::start() {
+void Loop::start(const std::function<void()>& set_up) {
   const bool started = calls(Verb::start, [&] { return robot_->start(); });
   if (!started) failed("start");
-  if (!started || !read_first() || !begin()) {
+  const bool begins = started && read_first();
+  if (begins) set_up();
+  if (!begins || !begin()) {
     const std::string why = fault_;
     stop();
     throw DriverError(why);

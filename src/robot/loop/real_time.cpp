@@ -10,6 +10,7 @@
 
 #include "memory/segment/liveness.hpp"
 #include "robot/driver/machine_limits.hpp"
+#include "robot/loop/realtime_kit.hpp"
 
 namespace o80 {
 
@@ -41,8 +42,10 @@ void set_policy(const RealTimeOptions& options, std::vector<std::string>& refuse
   sched_param parameter{};
   parameter.sched_priority = options.priority;
   if (sched_setscheduler(0, policy, &parameter) != 0) {
-    refused.push_back("real-time priority " + std::to_string(options.priority) + " was refused (" +
-                      std::strerror(errno) + "). " + allowed_by(kPriorityLimit));
+    std::string text = "real-time priority " + std::to_string(options.priority) + " was refused (" +
+                       std::strerror(errno) + ")";
+    if (options.sleeps) text += "; " + ask_realtime_kit(options.priority);
+    refused.push_back(text + ". " + allowed_by(kPriorityLimit));
     return;
   }
   // the liveness helper must not wait for this loop or another one: it gets a higher priority

@@ -193,10 +193,12 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
   const Running running(*loop);
   if (options.until_eof) watch_input();
   std::optional<LoopReport> report(std::in_place, loop->backend().name());
-  loop->start();
-  for (const std::string& refused : set_up_real_time(options.real_time)) {
-    complain(refused.c_str());
-  }
+  RealTimeOptions real_time = options.real_time;
+  real_time.sleeps = !options.backend.bursting && table.paces_itself == 0;
+  // whoever waits for the robot to run finds these lines in its output
+  loop->start([&] {
+    for (const std::string& refused : set_up_real_time(real_time)) complain(refused.c_str());
+  });
   announce(table, loop->backend());
   tell_service_manager("READY=1\nSTATUS=runs on segment '" + loop->backend().name() + "'");
   const Ended ended = loop->run();

@@ -42,15 +42,17 @@ class RecordedComputer:
             file.parent.mkdir(parents=True, exist_ok=True)
             file.write_text(content)
 
-    def examine(self, frequency: float, measured: WakeUps | None = None) -> Report:
-        """Report of the doctor; the measurement takes no time, and gives the later files."""
+    def examine(
+        self, frequency: float, measured: WakeUps | None = None, loaded: WakeUps | None = None
+    ) -> Report:
+        """Report of the doctor; the measurements take no time, the first gives the later files."""
         self.write(self.before)
 
         def measure(_: Computer) -> WakeUps | None:
             self.write(self.later)
             return measured
 
-        return examine(Computer(self.root), frequency, measure)
+        return examine(Computer(self.root), frequency, measure, lambda _: loaded)
 
 
 def recorded(name: str, root: Path) -> RecordedComputer:

@@ -1,5 +1,6 @@
 """A check, what it finds, and the evidence by which it judges."""
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar
@@ -68,11 +69,22 @@ class Evidence:
                     yield came / self.seconds, columns[i], number, now.device
 
     @property
-    def real_time(self) -> bool:
-        """Whether `o80 run` gets its priority here."""
+    def realtime_kit(self) -> str:
+        """Answer of RealtimeKit to the measured robot; empty: it was not asked."""
+        found = re.search(r"RealtimeKit granted .*?(?=\. Allow|$)", "\n".join(self.refused), re.M)
+        return found[0] if found else ""
+
+    @property
+    def granted(self) -> bool:
+        """Whether limits allow the priority of `o80 run`."""
         limit = self.computer.limit("Max realtime priority")
         may = self.computer.may(SYS_NICE) or limit is None or limit >= PRIORITY
         return may and not any("real-time priority" in line for line in self.refused)
+
+    @property
+    def real_time(self) -> bool:
+        """Whether `o80 run` gets a real-time priority here."""
+        return self.granted or re.match(r"RealtimeKit granted \d", self.realtime_kit) is not None
 
 
 class Check:
@@ -115,6 +127,13 @@ class Check:
             self.delay if delay is None else delay,
             remark,
         )
+
+
+def in_container(kind: str, flags: str) -> str:
+    """Command that starts a container with these flags of docker, or a sentence that says so."""
+    if kind in ("docker", "podman"):
+        return f"{kind} run {flags} ..."
+    return f"start the container ({kind}) with what `docker run {flags}` would give it"
 
 
 def on_host(commands: str) -> str:

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 from typing import ClassVar
 
 import o80._core as _core
-from o80.robots.doctor.check import MATTERS, PRIORITY, Check, Evidence, Finding
+from o80.robots.doctor.check import MATTERS, PRIORITY, Check, Evidence, Finding, in_container
 from o80.robots.doctor.computer import CPU, IPC_LOCK, Computer, list_of
 
 LOCKED = 256 << 20  # [bytes] of a robot with the default history, and half as much again
@@ -22,26 +22,41 @@ class Priority(Check):
     delay = 10e-3
     effect = "the loop is an ordinary thread, which waits up to 10 ms while other programs compute"
     of_host = False
+    REALTIME_KIT: ClassVar = "usr/share/dbus-1/system-services/org.freedesktop.RealtimeKit1.service"
 
     def look(self, at: Evidence) -> Iterator[Finding]:
-        if at.real_time:
+        if at.granted:
             return
         limit = at.computer.limit("Max realtime priority")
         refused = any("real-time priority" in line for line in at.refused)
-        seen = "refused" if limit is None or limit >= PRIORITY else str(limit)
-        if 1 < (limit or 0) < PRIORITY and not refused:
-            lower = f"o80 run ROBOT --policy fifo --priority {(limit or 0) - 1}"
+        found = "refused" if limit is None or limit >= PRIORITY else str(limit)
+        said = f"; {at.realtime_kit}" if at.realtime_kit else ""
+        seen = f"{found}; o80 run needs {PRIORITY}{said}"
+        now, always, undo = _core.machine_limits()[0]
+        cure = f"{now}  # for this shell\n{always}  # from the next login on"
+        if at.computer.container:
+            cure = in_container(at.computer.container, "--cap-add SYS_NICE --ulimit rtprio=99")
+            undo = ""
+        low = 1 < (limit or 0) < PRIORITY
+        lower = f"o80 run ROBOT --policy fifo --priority {(limit or 0) - 1}"
+        if at.real_time:
             yield self.found(
-                at, f"{seen}; o80 run needs {PRIORITY}", remark=True, cure=lower,
+                at, seen, remark=True, cure=cure, undo=undo,
+                effect="at this lower priority the loop waits for interrupt threads and for "
+                "real-time threads of the desktop",
+            )  # fmt: skip
+        elif low and not refused:
+            yield self.found(
+                at, seen, remark=True, cure=lower,
                 effect="o80 run gets no real-time priority without a lower --priority",
             )  # fmt: skip
-        elif at.computer.container:
-            cure = f"{at.computer.container} run --cap-add SYS_NICE --ulimit rtprio=99 ..."
-            yield self.found(at, f"{seen}; o80 run needs {PRIORITY}", cure=cure)
         else:
-            now, always, undo = _core.machine_limits()[0]
-            cure = f"{now}  # for this shell\n{always}  # from the next login on"
-            yield self.found(at, f"{seen}; o80 run needs {PRIORITY}", cure=cure, undo=undo)
+            if not refused and at.computer.exists(self.REALTIME_KIT):
+                ask = "o80 run ROBOT --policy fifo  # asks RealtimeKit for a lower one, at once"
+                cure = f"{ask}\n{cure}"
+            if low:
+                cure = f"{lower}  # within the limit of now\n{cure}"
+            yield self.found(at, seen, cure=cure, undo=undo)
 
 
 class GroupShare(Check):
@@ -77,7 +92,7 @@ class LockedMemory(Check):
             return
         seen = "refused" if limit is None else f"{limit >> 10} KiB; a robot needs 256 MiB"
         if at.computer.container:
-            cure = f"{at.computer.container} run --ulimit memlock=-1 ..."
+            cure = in_container(at.computer.container, "--ulimit memlock=-1")
             yield self.found(at, seen, cure=cure)
         else:
             now, always, undo = _core.machine_limits()[1]
@@ -443,19 +458,25 @@ class SharedMemory(Check):
             line.split()
             for line in at.computer.text("proc/self/mountinfo", needed=True).split("\n")
         ]
-        options = [words[-1] for words in mounts if len(words) > 9 and words[4] == "/dev/shm"]
-        if not options:
+        own = [words for words in mounts if len(words) > 9 and words[4] == "/dev/shm"]
+        if not own:
             if any(len(words) > 9 for words in mounts):
                 mount = "sudo mount -t tmpfs tmpfs /dev/shm"
                 yield self.found(at, "not mounted", cure=mount, undo="sudo umount /dev/shm")
             return
-        size = re.search(r"(?:^|,)size=(\d{1,18})([kmg]?)(?:,|$)", options[-1])
+        if "ro" in own[-1][5].split(","):
+            change = "sudo mount -o remount,{} /dev/shm"
+            yield self.found(
+                at, "read-only", effect="no robot starts where no file can be made",
+                cure=change.format("rw"), undo=change.format("ro"),
+            )  # fmt: skip
+        size = re.search(r"(?:^|,)size=(\d{1,18})([kmg]?)(?:,|$)", own[-1][-1])
         total = int(size[1]) * self.UNITS[size[2]] if size else None
         free = total if at.free_memory is None else at.free_memory
         container = at.computer.container
         cure, undo = "sudo mount -o remount,size=1G /dev/shm", ""
         if container:
-            cure = f"{container} run --shm-size=1g ..."
+            cure = in_container(container, "--shm-size=1g")
         elif size:
             undo = f"sudo mount -o remount,size={size[1]}{size[2]} /dev/shm"
         if free is not None and free < self.FULL:

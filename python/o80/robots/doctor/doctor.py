@@ -18,6 +18,7 @@ class Report:
     frequency: float
     findings: tuple[Finding, ...]  #: remarks last, else by their delay
     measured: WakeUps | None
+    loaded: WakeUps | None  #: the same, beside a load
     unread: dict[str, str]  #: path and reason
     computer: dict[str, Any]
 
@@ -29,33 +30,41 @@ class Report:
     @property
     def serves(self) -> bool:
         """Whether nothing is in the way, and no period was missed while it was measured."""
-        measured = self.measured
-        held = measured is None or (not measured.failed and measured.overruns == 0)
-        return held and not self.culprits
+        failed = self.measured is not None and self.measured.failed
+        return not failed and not self._missed and not self.culprits
+
+    @property
+    def _missed(self) -> str:
+        """Part of a sentence about missed periods, first those without a load; empty: none."""
+        for measured, beside in ((self.measured, ""), (self.loaded, " beside a load")):
+            if measured is not None and measured.overruns:
+                return (
+                    f"did not finish {measured.overruns} of {measured.iterations} iterations in "
+                    f"time at {self.frequency:g} Hz{beside}"
+                )
+        return ""
 
     @property
     def verdict(self) -> str:
         """One sentence."""
         rate = f"{self.frequency:g} Hz"
         culprits = self.culprits
+        if self.measured is not None and self.measured.failed:
+            return f"A robot could not be measured on this computer: {self.measured.failed}"
         if culprits:
             worst = culprits[0]
             count = f"{len(culprits)} causes, first" if len(culprits) > 1 else "because of"
             if worst.delay * self.frequency >= 1:
-                return (
-                    f"This computer will miss periods of a robot at {rate}: {count} the "
-                    f"{worst.name}."
+                what = f"will miss periods of a robot at {rate}"
+            else:
+                what = self._missed or (
+                    f"can serve a robot at {rate}, but iterations will be up to "
+                    f"{time_text(worst.delay)} late"
                 )
+            return f"This computer {what}: {count} the {worst.name}."
+        if self._missed:
             return (
-                f"This computer can serve a robot at {rate}, but iterations will be up to "
-                f"{time_text(worst.delay)} late: {count} the {worst.name}."
-            )
-        if self.measured is not None and self.measured.failed:
-            return f"A robot could not be started on this computer: {self.measured.failed}"
-        if self.measured is not None and self.measured.overruns:
-            return (
-                f"This computer did not finish {self.measured.overruns} of "
-                f"{self.measured.iterations} iterations in time at {rate}, and no cause was found: "
+                f"This computer {self._missed}, and no cause was found: "
                 "hwlatdetect and cyclictest of rt-tests look further."
             )
         known = ", as far as could be read" if self.unread else ""
@@ -69,6 +78,7 @@ class Report:
             "frequency": self.frequency,
             "findings": [asdict(finding) for finding in self.findings],
             "measured": self.measured and self.measured.as_dict(),
+            "loaded": self.loaded and self.loaded.as_dict(),
             "unread": self.unread,
             "computer": self.computer,
         }
@@ -77,11 +87,17 @@ class Report:
 Measure = Callable[[Computer], WakeUps | None]
 
 
-def examine(computer: Computer, frequency: float, measure: Measure) -> Report:
-    """Looks at a computer, before and after a measurement; None: it was not measured."""
+def examine(
+    computer: Computer, frequency: float, measure: Measure, measure_loaded: Measure
+) -> Report:
+    """Looks at a computer before and after a measurement, then measures beside a load.
+
+    None of the first: it was not measured.
+    """
     before = computer.sample()
     measured = measure(computer)
     after = computer.sample()
+    loaded = None if measured is None or measured.failed else measure_loaded(computer)
     refused = () if measured is None else measured.refused
     evidence = Evidence(computer, frequency, before, after, refused, free_memory(computer))
     found = [finding for check in CHECKS for finding in check.look(evidence)]
@@ -89,7 +105,7 @@ def examine(computer: Computer, frequency: float, measure: Measure) -> Report:
     found = [finding for finding in found if finding.delay * frequency >= MATTERS]
     found.sort(key=lambda finding: (finding.remark, -finding.delay))
     kind = about(computer)  # reads files too
-    return Report(frequency, tuple(found), measured, dict(computer.unread), kind)
+    return Report(frequency, tuple(found), measured, loaded, dict(computer.unread), kind)
 
 
 def free_memory(computer: Computer) -> int | None:

@@ -1,4 +1,4 @@
-"""Measurement: how late a robot's loop wakes on this computer, for a short time."""
+"""Measurement: how late a robot's loop and its reader wake on this computer, for a short time."""
 
 import os
 import time
@@ -6,18 +6,25 @@ import warnings
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from o80.base.errors import Error
+from o80.base.errors import Error, TimeoutError
+from o80.frontend.frontend import Frontend
+from o80.frontend.segments import segments
+from o80.robots.doctor.load import load
+
+POLICIES = {os.SCHED_FIFO: "fifo", os.SCHED_RR: "rr"}
+Spread = tuple[float, float, float]  # median, 99 %, largest [s]
 
 
 @dataclass(frozen=True)
 class WakeUps:
-    """Loop of a bundled robot, run as `o80 run` runs it."""
+    """Loop of a bundled robot, run as `o80 run` runs it, and a reader that waits for its rows."""
 
     frequency: float
     seconds: float
     iterations: int = 0
     policy: str = "other"  #: which the kernel granted
-    lateness: tuple[float, float, float] = (0.0, 0.0, 0.0)  #: median, 99 %, largest [s]
+    lateness: Spread = (0.0, 0.0, 0.0)
+    reader: Spread = (0.0, 0.0, 0.0)  #: time from a row until the reader has it
     overruns: int = 0
     skipped: int = 0
     refused: tuple[str, ...] = ()  #: what the machine refused
@@ -30,43 +37,83 @@ class WakeUps:
     def __str__(self) -> str:
         if self.failed:
             return f"not measured: {self.failed}"
-        median, most, largest = (1e6 * each for each in self.lateness)
         return (
-            f"measured: {self.iterations} iterations at {self.frequency:g} Hz ({self.policy}), "
-            f"{median:.0f} us late (median), {most:.0f} us (99 %), {largest:.0f} us (largest); "
-            f"{self.overruns} were not done in time, {self.skipped} periods were skipped"
+            f"{self.iterations} iterations at {self.frequency:g} Hz ({self.policy}), "
+            f"not done in time: {self.overruns}, periods skipped: {self.skipped}\n"
+            f"   the loop woke late by {_text(self.lateness)}\n"
+            f"   a reader had the row after {_text(self.reader)}"
         )
 
 
 def measure(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
-    """Runs a simulated robot for so long. Of what fails here, the text says so.
+    """Runs a simulated robot for so long. If that fails, the result says why.
 
     processors: where its loop runs; empty: anywhere.
     """
-    from o80.robots.robot import load
+    from o80.robots.robot import load as load_robot
 
     name = f"doctor-{os.getpid()}"
     with warnings.catch_warnings(record=True) as said:
         warnings.simplefilter("always")
         try:
-            with load("two_joints").start(
+            with load_robot("two_joints").start(
                 name, frequency=frequency, policy="fifo", lock_memory=True, cpus=processors or None,
                 history=max(1000, min(int(frequency * seconds) + 1, 100_000)),
             ) as process, process.frontend() as frontend:  # fmt: skip
-                time.sleep(seconds)
+                reader = _read(frontend, seconds)
                 rows = frontend.history(frontend.published)
-                granted = os.sched_getscheduler(process.pid) != os.SCHED_OTHER
+                granted = os.sched_getscheduler(process.pid) & ~os.SCHED_RESET_ON_FORK
         except (Error, OSError) as error:
             return WakeUps(frequency, seconds, failed=str(error))
-    late = sorted(rows.lateness.tolist()) or [0]
-    refused = tuple(str(each.message).partition(": ")[2] for each in said)
+    if len(rows) == 0:
+        failed = f"no iteration at {frequency:g} Hz ended within {seconds:g} s: raise --seconds"
+        return WakeUps(frequency, seconds, failed=failed)
     return WakeUps(
         frequency,
         seconds,
-        iterations=len(rows),
-        policy="fifo" if granted else "other",
-        lateness=(late[len(late) // 2] / 1e9, late[int(len(late) * 0.99)] / 1e9, late[-1] / 1e9),
+        iterations=int(rows.iteration[-1]),
+        policy=POLICIES.get(granted, "other"),
+        lateness=_spread(rows.lateness.tolist()),
+        reader=_spread(reader),
         overruns=int(rows.overruns[-1]),
         skipped=int(rows.skipped[-1]),
-        refused=refused,
+        refused=tuple(str(each.message).partition(": ")[2] for each in said),
     )
+
+
+def measure_beside_load(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
+    """Measures while all processors compute, unless a robot runs here, which that would disturb."""
+    # a segment that this user may not read counts too
+    for entry in segments():
+        if entry.alive or entry.life == "unknown":
+            runs = "runs" if entry.alive else "may run"
+            reason = f"'{entry.name}' {runs} on this computer, and a load would disturb it"
+            return WakeUps(frequency, seconds, failed=reason)
+    try:
+        with load():
+            return measure(frequency, seconds, processors)
+    except OSError as error:
+        return WakeUps(frequency, seconds, failed=str(error))
+
+
+def _read(frontend: Frontend, seconds: float) -> list[int]:
+    """Ages of the rows for which this thread waits, when it has them [ns]."""
+    ages = []
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0:
+        try:
+            row = frontend.wait_for(frontend.published + 1, left)
+        except TimeoutError:
+            break
+        ages.append(time.monotonic_ns() - row.time)
+    return ages
+
+
+def _text(spread: Spread) -> str:
+    median, most, largest = (f"{1e6 * each:.0f} us" for each in spread)
+    return f"{median} (median), {most} (99 %), {largest} (largest)"
+
+
+def _spread(times: list[int]) -> Spread:
+    late = sorted(times) or [0]
+    return late[len(late) // 2] / 1e9, late[int(len(late) * 0.99)] / 1e9, late[-1] / 1e9
