@@ -24,6 +24,7 @@ SAYS = {
     "embedded_simulation": ["iteration 300"],
     "history": ["1000 rows, observed is an array of shape (1000, 2)"],
     "learning": ["mean reward of a step: -0."],
+    "late_policy": ["late rows were skipped", "on the circle: True", "no jump: True"],
     "mirroring": ["asked for exactly what was seen: True"],
     "mujoco_control": [
         "500 Hz, as the model says; actuators: push",

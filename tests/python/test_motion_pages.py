@@ -1,4 +1,4 @@
-"""The whole programs of docs/commands.md, and those of docs/streaming.md, run."""
+"""The whole programs of docs/commands.md, docs/streaming.md and docs/chunks.md run."""
 
 import re
 from pathlib import Path
@@ -26,6 +26,14 @@ def test_the_program_about_previews_prints_what_it_says(
     exec(compile(program, "commands.md", "exec"), {"__name__": "preview"})
 
     assert capsys.readouterr().out.splitlines() == re.findall(r"print\(.*\)  # (.*)", program)
+
+
+def test_the_program_about_chunks_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    (program,) = programs("chunks.md")
+    exec(compile(program, "chunks.md", "exec"), {"__name__": "chunks"})
+
+    begins, late, skipped, shift = map(int, capsys.readouterr().out.split())
+    assert (begins > 0, late >= 0, skipped >= 0, shift >= 0) == (True, True, True, True)
 
 
 def test_the_programs_about_streaming_run(capsys: pytest.CaptureFixture[str]) -> None:
