@@ -18,7 +18,7 @@ THINKS = 0.15  # [s]
 
 
 def teacher(places):
-    """Next actions from each place (n, 2): on around the circle, and back to it; (n, actions, 2)."""
+    """Next actions from each place (n, 2): around the circle and back to it; (n, actions, 2)."""
     angle, radius = np.arctan2(places[:, 1], places[:, 0]), np.hypot(*places.T)
     ahead = np.arange(1, ACTIONS + 1)
     angles = angle[:, None] + TURN * STEP / 500 * ahead

@@ -254,10 +254,10 @@ Batch send_alone(const Frontend& self, Fill&& fill) {
 }
 
 /// Sends a chunk. `due`: for each row an uint32, iterations after the anchor.
-Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators,
-                        nb::handle due, nb::handle states, const std::vector<std::uint64_t>& mask,
-                        o80::Iteration anchor, std::uint64_t plan, std::uint32_t ease,
-                        std::uint32_t first, bool fixed, bool reject_late, nb::handle profile) {
+Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators, nb::handle due,
+                 nb::handle states, const std::vector<std::uint64_t>& mask, o80::Iteration anchor,
+                 std::uint64_t plan, std::uint32_t ease, std::uint32_t first, bool fixed,
+                 bool reject_late, nb::handle profile) {
   const Bytes iterations(due);
   std::vector<std::uint32_t> ends(iterations.span().size() / sizeof(std::uint32_t));
   if (!ends.empty()) std::memcpy(ends.data(), iterations.span().data(), iterations.span().size());

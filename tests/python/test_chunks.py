@@ -148,8 +148,8 @@ def test_a_hanging_policy_is_seen(process: o80.robots.Process) -> None:
         plan.send(np.zeros((4, 2)))
         while not plan.starved:
             arm.wait_for(arm.published + 1, WAIT)
+        plan.send(np.zeros((1000, 2)))
         with pytest.raises(o80.TimeoutError):
-            plan.send(np.zeros((1000, 2)))
             plan.wait(timeout=0.05)
 
 

@@ -76,12 +76,12 @@ struct PulseOptions {
 
 /// How rows of targets are played, each in a fixed iteration (docs/chunks.md).
 struct ChunkOptions {
-  Iteration anchor = 0;     ///< Of the observation that the rows answer.
-  std::uint64_t epoch = 0;  ///< Of its backend.
-  std::uint64_t plan = 0;   ///< Of one plan of a frontend, an older anchor is rejected.
-  std::uint32_t ease = 1;   ///< Iterations of the take-over.
-  std::uint32_t first = 0;  ///< Rows before this one are what was planned before, not played.
-  bool fixed = false;       ///< Rows keep their iterations also where the actuators stand still.
+  Iteration anchor = 0;      ///< Of the observation that the rows answer.
+  std::uint64_t epoch = 0;   ///< Of its backend.
+  std::uint64_t plan = 0;    ///< Of one plan of a frontend, an older anchor is rejected.
+  std::uint32_t ease = 1;    ///< Iterations of the take-over.
+  std::uint32_t first = 0;   ///< Rows before this one are what was planned before, not played.
+  bool fixed = false;        ///< Rows keep their iterations also where the actuators stand still.
   bool reject_late = false;  ///< Rejects it if row `first` is late, instead of skipping rows.
   Profile profile = Profile::cubic;  ///< Or linear, or hold.
 };

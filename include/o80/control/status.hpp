@@ -39,7 +39,7 @@ enum class Reason : std::uint8_t {
   silence,
   stopped,
   halted,
-  full,    // the lane has too many batches that wait for a later iteration
+  full,     // the lane has too many batches that wait for a later iteration
   reading,  // the robot cannot be where it was read
   older     // the chunk answers an older observation than the one before it
 };

@@ -53,8 +53,9 @@ class Batch {
   bool ended() const;
   /// The iteration in which the batch was taken; -1 if it was not taken yet.
   Iteration first_iteration() const;
-  /// By how many iterations the rows of its chunk, if it has one, are later than they were sent for,
-  /// because the actuators stood still; nothing before it was taken. `stood`: whether they did.
+  /// By how many iterations the rows of its chunk, if it has one, are later than they were sent
+  /// for, because the actuators stood still; nothing before it was taken. `stood`: whether they
+  /// did.
   struct Shift {
     std::int64_t iterations = 0;
     bool stood = false;

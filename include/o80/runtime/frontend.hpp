@@ -134,8 +134,8 @@ class UntypedFrontend {
   void add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                       std::span<const std::byte> states, Mode mode = Mode::queue);
   /// Adds a chunk (docs/chunks.md): rows that are due in fixed iterations, which overwrite what the
-  /// actuators do. `due`: iterations after the anchor, rising from 1, one for each row. `states` and
-  /// `mask` as in add_trajectories(). Throws InvalidArgument.
+  /// actuators do. `due`: iterations after the anchor, rising from 1, one for each row. `states`
+  /// and `mask` as in add_trajectories(). Throws InvalidArgument.
   std::uint32_t add_chunk(std::span<const std::uint32_t> actuators,
                           std::span<const std::uint32_t> due, std::span<const std::byte> states,
                           const ChunkOptions& options, std::span<const std::uint64_t> mask = {}) {

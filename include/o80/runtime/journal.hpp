@@ -48,7 +48,7 @@ struct JournalRecord {
   // of a chunk; the rows are due so many iterations after its anchor
   ChunkOptions chunk;
   std::vector<std::uint32_t> due;
-  std::vector<Target> targets;          // more than one: a command of several actuators
+  std::vector<Target> targets;  // more than one: a command of several actuators
   // of a purge
   std::uint16_t actuator = kEveryActuator;
   bool only_own = false;

@@ -103,7 +103,8 @@ void BatchBuilder::add_rows(const Member& member, std::span<const std::uint32_t>
   std::byte* const blocks = bytes - sizeof head;
   std::byte* const notes = blocks + std::size_t{places.blocks_before_notes()} * kBlockBytes;
   for (std::size_t first = 0; first < due.size(); first += RowNote::kRows) {
-    const auto of_note = due.subspan(first, std::min<std::size_t>(RowNote::kRows, due.size() - first));
+    const auto of_note =
+        due.subspan(first, std::min<std::size_t>(RowNote::kRows, due.size() - first));
     std::byte* const note = notes + first / RowNote::kRows * places.blocks_of_note * kBlockBytes;
     std::memcpy(note + offsetof(RowNote, due), of_note.data(), of_note.size_bytes());
   }

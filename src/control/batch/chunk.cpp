@@ -32,8 +32,8 @@ std::uint32_t ChunkRows::first_due_from(std::int64_t iterations) const noexcept 
 Cursor ChunkRows::cursor(std::uint32_t row) const noexcept {
   const std::uint32_t first = row - row % RowNote::kRows;
   BlockIndex block = note(row / RowNote::kRows).block;
-  std::uint64_t offset = std::uint64_t{first} * places_.size % kBlockBytes +
-                         std::uint64_t{row - first} * places_.size;
+  std::uint64_t offset =
+      std::uint64_t{first} * places_.size % kBlockBytes + std::uint64_t{row - first} * places_.size;
   for (; offset >= kBlockBytes; offset -= kBlockBytes) block = pool_.next(block);
   return {pool_, block, static_cast<std::uint32_t>(offset),
           std::uint64_t{rows_ - row} * places_.size};

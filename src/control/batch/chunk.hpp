@@ -129,11 +129,11 @@ class ChunkRows {
 
   /// The part of the check that fills notes and lists: go_on() until it is done.
   struct Notes {
-    std::uint32_t walked = 0;       // blocks from the head to the rows
-    BlockIndex at = kNoBlock;       // the last one
-    std::int64_t due = 0;           // of the row before
-    std::uint32_t row = 0;          // rows whose values are noted
-    std::uint32_t not_joined = 0;   // notes whose ranges reach only to the next note
+    std::uint32_t walked = 0;      // blocks from the head to the rows
+    BlockIndex at = kNoBlock;      // the last one
+    std::int64_t due = 0;          // of the row before
+    std::uint32_t row = 0;         // rows whose values are noted
+    std::uint32_t not_joined = 0;  // notes whose ranges reach only to the next note
   };
   /// Walks one block further towards the rows; false if rows are not due one after the other.
   bool walk(Notes& notes) noexcept;
@@ -173,10 +173,10 @@ bool is_sane(const ChunkHead& chunk) noexcept;
 
 /// What the actuators of a chunk do when it is taken.
 struct ChunkSurroundings {
-  Iteration now = 0;           // the iteration that takes it
-  Iteration acted_last = -1;   // the last one in which any of them had a command or braked
-  bool stand = false;          // none of them has a command, and no chunk waits
-  bool eases = true;           // false: rows are held
+  Iteration now = 0;          // the iteration that takes it
+  Iteration acted_last = -1;  // the last one in which any of them had a command or braked
+  bool stand = false;         // none of them has a command, and no chunk waits
+  bool eases = true;          // false: rows are held
 };
 /// What a status tells of a chunk that was taken: the shift in its delay and in 7 bits of its
 /// detail.

@@ -35,8 +35,9 @@ std::string_view to_text(Status status) noexcept {
 }
 
 std::string_view to_text(Reason reason) noexcept {
-  return text_of(reason, {"none", "late", "exclusive", "invalid", "limits", "driver", "fresh_start",
-                          "dead_frontend", "silence", "stopped", "halted", "full", "reading", "older"});
+  return text_of(reason,
+                 {"none", "late", "exclusive", "invalid", "limits", "driver", "fresh_start",
+                  "dead_frontend", "silence", "stopped", "halted", "full", "reading", "older"});
 }
 
 }  // namespace o80

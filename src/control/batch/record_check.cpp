@@ -58,9 +58,9 @@ RecordCheck::Verdict RecordCheck::begin(BlockPool& pool, BlockIndex block,
       return begin_command(head, progress);
     case RecordKind::group:
       return verdict(head.rows > 0 && head.rows <= targets_.actuators() &&
-                     (is_chunk(head) ? head.payload_bytes == kChunkGroupBytes &&
-                                           is_sane(chunk_of(pool, block))
-                                     : head.payload_bytes == 0));
+                     (is_chunk(head)
+                          ? head.payload_bytes == kChunkGroupBytes && is_sane(chunk_of(pool, block))
+                          : head.payload_bytes == 0));
     case RecordKind::request:
       return verdict(is_request(head, progress.payload));
     case RecordKind::purge:
@@ -94,8 +94,9 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   const std::uint64_t mask_bytes = head.masked != 0 ? 8 * layout.mask_words() : 0;
   const std::uint64_t time_bytes = timed ? 8 * std::uint64_t{head.rows} : 0;
   const std::uint64_t row_bytes = std::uint64_t{head.rows} * layout.size();
-  const std::uint64_t wanted = of_chunk ? ChunkPlaces(head.rows, layout, head.masked != 0).payload_bytes
-                                        : mask_bytes + time_bytes + row_bytes;
+  const std::uint64_t wanted = of_chunk
+                                   ? ChunkPlaces(head.rows, layout, head.masked != 0).payload_bytes
+                                   : mask_bytes + time_bytes + row_bytes;
   if (head.payload_bytes != wanted) return Verdict::invalid;
 
   // no bit of the mask is beyond the last number

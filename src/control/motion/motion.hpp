@@ -49,9 +49,8 @@ class Motion {
   }
   /// A chunk begins: its rows are followed from the plan of the chunk before it.
   void take_over(const std::uint64_t* mask) noexcept {
-    begin(mask, [](Number& each) {
-      each.is_commanded ? each.motion.take_over() : each.motion.begin();
-    });
+    begin(mask,
+          [](Number& each) { each.is_commanded ? each.motion.take_over() : each.motion.begin(); });
   }
   /// What is followed reaches from one place to the other.
   void widen(std::uint32_t number, const Span& range) noexcept {

@@ -171,8 +171,8 @@ class NumberMotion {
   NumberLimiter guard_;
   std::optional<double> rest_;
   NumberPlan plan_;
-  bool planned_ = false;  // a command moves it by `plan_`
-  bool follows_ = false;  // `plan_` may break limits
+  bool planned_ = false;   // a command moves it by `plan_`
+  bool follows_ = false;   // `plan_` may break limits
   bool of_chunk_ = false;  // `plan_` is that of rows of a chunk
   bool held_ = false;
   bool jumps_at_once_ = false;  // propose() needed no plan

@@ -22,8 +22,7 @@ double slope_at(double before, double iterations, double place, double next_iter
   const double b = after / next_iterations - place / next_iterations;
   if (!((a > 0.0 && b > 0.0) || (a < 0.0 && b < 0.0))) return 0.0;
   const double both = iterations + next_iterations;
-  const double mean =
-      std::abs(a * (next_iterations / both) + b * (iterations / both)) / 2.0;
+  const double mean = std::abs(a * (next_iterations / both) + b * (iterations / both)) / 2.0;
   const double slope = 2.0 * std::min({std::abs(a), std::abs(b), mean});
   return std::isfinite(slope) ? std::copysign(slope, a) : 0.0;
 }
@@ -211,7 +210,8 @@ void NumberPlan::curve_on(double target, std::int64_t iterations, double next,
   shape_ = Shape::curve;
   const auto n = static_cast<double>(iterations);
   to_ = {target, 0.0};
-  if (next_iterations > 0) to_.slope = slope_at(from_.place, n, target, static_cast<double>(next_iterations), next);
+  if (next_iterations > 0)
+    to_.slope = slope_at(from_.place, n, target, static_cast<double>(next_iterations), next);
   const double bend = from_.place + n * from_.slope / 3.0;
   hull_ = {target, target};
   hull_.include(from_.place);

@@ -91,10 +91,11 @@ class NumberPlan {
   void line_on(double target, std::int64_t iterations) noexcept {
     line(place(), target);
     line_for(iterations);
-    to_.slope = target / static_cast<double>(iterations) - task_.line_start / static_cast<double>(iterations);
+    to_.slope = target / static_cast<double>(iterations) -
+                task_.line_start / static_cast<double>(iterations);
   }
-  /// or on a cubic, from its slope to that at the row, which is 0 at the last row, and otherwise that
-  /// of Steffen: it does not overshoot. `next`: the row after that, so many iterations later.
+  /// or on a cubic, from its slope to that at the row, which is 0 at the last row, and otherwise
+  /// that of Steffen: it does not overshoot. `next`: the row after that, so many iterations later.
   void curve_on(double target, std::int64_t iterations, double next,
                 std::int64_t next_iterations) noexcept;
   /// The place of the last iteration, and the slope there [1/iteration].

@@ -192,9 +192,8 @@ void ActuatorQueue::begin_chunk() noexcept {
   reason_ = {};
   motion_.hold(false);
   motion_.take_over(mask());
-  rows.ranges_from(row_, scratch(), [&](std::uint32_t number, const Span& range) {
-    motion_.widen(number, range);
-  });
+  rows.ranges_from(row_, scratch(),
+                   [&](std::uint32_t number, const Span& range) { motion_.widen(number, range); });
   switch_row_ = motion_.has_switches() ? chunk().late : row_;
 }
 

@@ -224,7 +224,8 @@ void Controller::take_chunk(const Taking& from, BlockIndex group, BatchHandler& 
   const Iteration now = handler.iteration();
   const std::uint64_t epoch = handler.epoch();
   const bool is_foreign = epoch != 0 && chunk_of(pool_, group).epoch != epoch;
-  const Outcome outcome = is_foreign ? Outcome{Status::rejected, Reason::invalid} : decide(from, group, now);
+  const Outcome outcome =
+      is_foreign ? Outcome{Status::rejected, Reason::invalid} : decide(from, group, now);
   if (outcome.status != Status::active) {
     return each_member(group, [&](BlockIndex member) { ledger_.end(member, outcome, now); });
   }
@@ -237,7 +238,8 @@ void Controller::take_chunk(const Taking& from, BlockIndex group, BatchHandler& 
   });
   const Waiting waiting{group, from.lane, chunk.begins};
   if (waiting.begins == now) return begin_chunk(group, from.lane, now);
-  waiting_.insert(std::ranges::upper_bound(waiting_, waiting.begins, {}, &Waiting::begins), waiting);
+  waiting_.insert(std::ranges::upper_bound(waiting_, waiting.begins, {}, &Waiting::begins),
+                  waiting);
 }
 
 Outcome Controller::decide(const Taking& from, BlockIndex group, Iteration now) noexcept {
@@ -250,7 +252,8 @@ Outcome Controller::decide(const Taking& from, BlockIndex group, Iteration now) 
     const std::uint32_t actuator = pool_.head(member).actuator;
     const ActuatorQueue& queue = actuators_[actuator];
     const ActuatorQueue::LastChunk& last = queue.last_chunk;
-    is_older = is_older || (last.lane == from.lane && last.plan == chunk.plan && chunk.anchor < last.anchor);
+    is_older = is_older ||
+               (last.lane == from.lane && last.plan == chunk.plan && chunk.anchor < last.anchor);
     is_purged = is_purged || purge_tickets_.cover(from.lane, actuator, from.ticket);
     at.stand = at.stand && queue.empty() && !waits(actuator);
     at.acted_last = std::max(at.acted_last, queue.acted_last());

@@ -203,7 +203,8 @@ class Controller {
   }
   /// True if nothing acts, and a restart() with the desired block would change nothing later.
   bool shows_all() noexcept {
-    return !pending() && waiting_.empty() && std::ranges::all_of(busy_, [](std::uint64_t word) { return word == 0; }) &&
+    return !pending() && waiting_.empty() &&
+           std::ranges::all_of(busy_, [](std::uint64_t word) { return word == 0; }) &&
            std::ranges::all_of(actuators_, &ActuatorQueue::shows_all);
   }
   /// True if a direct value keeps a number away from its rest value; O(actuators).
@@ -301,9 +302,9 @@ class Controller {
   Mask braking_mask_;
   std::vector<std::uint32_t> offsets_;  // offset of each actuator in a block of states [bytes]
   std::vector<ActuatorQueue> actuators_;
-  Mask busy_;     // has commands, or is not known to be at rest
-  Mask stepped_;  // has its desired state from given_ already
-  Mask follow_;   // follows the observed state when idle
+  Mask busy_;                     // has commands, or is not known to be at rest
+  Mask stepped_;                  // has its desired state from given_ already
+  Mask follow_;                   // follows the observed state when idle
   std::vector<Waiting> waiting_;  // in the order in which they begin
   Iteration fresh_row_ = 0;       // of the last fresh start
   DirectTargets given_;

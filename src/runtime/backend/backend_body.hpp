@@ -89,7 +89,9 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   // BatchHandler: requests and orders of a batch to the backend itself
   Iteration iteration() const noexcept override { return current; }
-  std::uint64_t epoch() const noexcept override { return recorded_ == nullptr ? segment.epoch() : 0; }
+  std::uint64_t epoch() const noexcept override {
+    return recorded_ == nullptr ? segment.epoch() : 0;
+  }
   Outcome request(std::uint32_t lane, CommandId id, BlockIndex record, std::uint32_t index,
                   Cursor payload) noexcept override;
   Outcome take_control(std::uint32_t lane) noexcept override;
