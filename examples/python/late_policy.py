@@ -8,8 +8,11 @@ so it does not matter how late they come: late ones are skipped, the others show
 import time
 
 import numpy as np
+from numpy.typing import NDArray
 
 import o80
+
+Places = NDArray[np.float64]
 
 ACTIONS = 16
 STEP = 10  # iterations from action to action: 50 actions a second at 500 Hz
@@ -17,7 +20,7 @@ RADIUS, TURN = 0.4, 2.0  # [rad], [rad/s]
 THINKS = 0.15  # [s]
 
 
-def teacher(places):
+def teacher(places: Places) -> Places:
     """Next actions from each place (n, 2): around the circle and back to it; (n, actions, 2)."""
     angle, radius = np.arctan2(places[:, 1], places[:, 0]), np.hypot(*places.T)
     ahead = np.arange(1, ACTIONS + 1)
@@ -29,19 +32,21 @@ def teacher(places):
 class Network:
     """One hidden layer with random weights; the last layer is fitted to the teacher."""
 
-    def __init__(self, seed=0):
+    def __init__(self, seed: int = 0) -> None:
         random = np.random.default_rng(seed)
         self.inner = random.normal(0, 3, (2, 200)), random.uniform(-2, 2, 200)
         angles, radii = random.uniform(-np.pi, np.pi, 5000), random.uniform(0.2, 0.6, 5000)
         seen = np.stack([radii * np.cos(angles), radii * np.sin(angles)], axis=1)
         self.outer = np.linalg.lstsq(self.hidden(seen), teacher(seen).reshape(5000, -1))[0]
 
-    def hidden(self, seen):
-        return np.tanh(seen @ self.inner[0] + self.inner[1])
+    def hidden(self, seen: Places) -> Places:
+        hidden: Places = np.tanh(seen @ self.inner[0] + self.inner[1])
+        return hidden
 
-    def __call__(self, seen):
+    def __call__(self, seen: Places) -> Places:
         time.sleep(THINKS)  # as a large one would
-        return (self.hidden(seen[None]) @ self.outer).reshape(ACTIONS, 2)
+        actions: Places = self.hidden(seen[None]) @ self.outer
+        return actions.reshape(ACTIONS, 2)
 
 
 policy = Network()
@@ -51,8 +56,8 @@ with (
 ):
     arm.move_to(None, [RADIUS, 0.0], tolerance=0.01, duration=0.5)
     began = arm.published
-    for name, options in {"replaced": {}, "mixed as ACT does": {"ensemble": 0.1}}.items():
-        with arm.chunks(step=STEP, **options) as plan:
+    for name, ensemble in {"replaced": None, "mixed as ACT does": 0.1}.items():
+        with arm.chunks(step=STEP, ensemble=ensemble) as plan:
             answers = []
             for _ in range(10):
                 seen = plan.wait(lead=100, grid=True)  # 0.2 s are left: time to think again
