@@ -96,6 +96,16 @@ class Frontend : public UntypedFrontend {
     return UntypedFrontend::add_trajectory(actuator(name), static_cast<std::uint32_t>(rows.size()),
                                            bytes, options);
   }
+  /// Adds a chunk of one actuator; see UntypedFrontend::add_chunk.
+  template <Shareable State>
+  std::uint32_t add_chunk(std::string_view name, std::span<const std::uint32_t> due,
+                          std::span<const State> rows, const ChunkOptions& options) {
+    check_state<State>(actuator(name));
+    const std::uint32_t index = actuator(name);
+    std::vector<std::byte> bytes(rows.size() * sizeof(State));
+    for (std::size_t i = 0; i < rows.size(); ++i) pack(rows[i], bytes.data() + i * sizeof(State));
+    return UntypedFrontend::add_chunk({&index, 1}, due, bytes, options);
+  }
   using UntypedFrontend::move_to;
   /// Sends one actuator to a target and waits until it is observed there.
   template <Shareable State>

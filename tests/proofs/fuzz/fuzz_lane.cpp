@@ -230,7 +230,7 @@ class Liar {
 
   static void add_record(Bytes& bytes, BatchBuilder& builder) {
     RecordHead head;
-    const auto kind = bytes.below(8);
+    const auto kind = bytes.below(9);
     head.actuator = static_cast<std::uint16_t>(bytes.below(4));
     if (kind == 0) {
       builder.purge(head.actuator == 3 ? kEveryActuator : head.actuator);
@@ -241,9 +241,40 @@ class Liar {
     } else if (kind == 3) {
       const std::array<std::uint64_t, 1> payload{bytes.word()};
       builder.request(0, std::as_bytes(std::span(payload)));
+    } else if (kind == 8) {
+      add_chunk(bytes, builder);
     } else {
       add_command(bytes, head, builder);
     }
+  }
+  static void add_chunk(Bytes& bytes, BatchBuilder& builder) {
+    static const Schema schema = schema_of_robot();
+    static const StateLayout joint(schema, schema.actuators[0].type);
+    static const StateLayout hand(schema, schema.actuators[2].type);
+    const std::uint32_t rows = 1 + bytes.below(20);
+    std::vector<std::uint32_t> due;
+    for (std::uint32_t i = 0; i < rows; ++i) {
+      due.push_back((due.empty() ? 0 : due.back()) + 1 + bytes.below(5));
+    }
+    ChunkHead chunk;
+    chunk.anchor = static_cast<Iteration>(bytes.below(64));
+    chunk.ease = 1 + bytes.below(20);
+    chunk.first = bytes.below(rows);
+    chunk.fixed = static_cast<std::uint8_t>(bytes.below(2));
+    std::vector<std::vector<std::byte>> states(1 + bytes.below(2));
+    std::vector<BatchBuilder::Member> members;
+    std::vector<const StateLayout*> layouts;
+    for (std::vector<std::byte>& of_member : states) {
+      RecordHead head;
+      head.actuator = static_cast<std::uint16_t>(bytes.below(3));
+      head.profile = bytes.below(2) == 0 ? Profile::cubic : Profile::hold;
+      layouts.push_back(head.actuator < 2 ? &joint : &hand);
+      // zeros are admitted, most other bytes are not
+      of_member.resize(rows * layouts.back()->size());
+      if (bytes.below(2) == 0) of_member = add_states(bytes, head.actuator, rows);
+      members.push_back({head, {}, of_member});
+    }
+    builder.chunk(members, chunk, due, layouts);
   }
   static void add_command(Bytes& bytes, RecordHead& head, BatchBuilder& builder) {
     const std::uint32_t mode = bytes.below(4);

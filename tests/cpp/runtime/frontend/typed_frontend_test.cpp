@@ -199,5 +199,41 @@ TEST_F(TypedTest, FollowsATrajectory) {
   }
 }
 
+TEST_F(TypedTest, PlaysAChunkAndSaysWhatBecameOfIt) {
+  Backend<MixedRobot> backend({.segment = "mixed"});
+  backend.publish({});
+  Frontend<MixedRobot> frontend("mixed");
+  const std::array<Joint, 3> rows{Joint{1, 0}, Joint{2, 0}, Joint{3, 0}};
+  const std::array<std::uint32_t, 3> due{2, 5, 9};
+  frontend.add_chunk("joints_0", due, std::span<const Joint>(rows), {.anchor = 0});
+  const Batch batch = frontend.pulse();
+  EXPECT_FALSE(batch.shift());
+  for (Iteration now = 1; now <= 9; ++now) {
+    const auto desired = backend.step();
+    ASSERT_TRUE(desired);
+    const auto row = std::ranges::find(due, static_cast<std::uint32_t>(now));
+    if (row != due.end()) {
+      EXPECT_EQ(desired->joints[0].position,
+                rows[static_cast<std::size_t>(row - due.begin())].position);
+    }
+    backend.publish(*desired);
+  }
+  ASSERT_TRUE(batch.shift());
+  EXPECT_EQ(batch.shift()->iterations, 0);
+  EXPECT_EQ(batch.handle(0).status, Status::completed);
+
+  const auto refuses = [&](std::vector<std::uint32_t> wrong, const ChunkOptions& options) {
+    EXPECT_THROW(frontend.add_chunk("joints_0", wrong, std::span<const Joint>(rows), options),
+                 InvalidArgument);
+  };
+  refuses({2, 5}, {});
+  refuses({2, 2, 9}, {});
+  refuses({0, 5, 9}, {});
+  refuses({2, 5, 9}, {.ease = 0});
+  refuses({2, 5, 9}, {.first = 3});
+  refuses({2, 5, 9}, {.profile = Profile::minimum_jerk});
+  EXPECT_EQ(frontend.added(), 0U);
+}
+
 }  // namespace
 }  // namespace o80::test
