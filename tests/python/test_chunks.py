@@ -2,6 +2,8 @@
 
 import random
 import re
+import subprocess
+import sys
 from collections.abc import Callable
 from typing import Any
 
@@ -10,6 +12,7 @@ import pytest
 from processes import run_o80
 
 import o80
+from o80 import _core
 
 WAIT = 60.0  # [s] longer than any wait should take
 ROWS = np.array([[0.0, 0.1, 0.3, 0.3, 0.2]] * 2).T
@@ -151,6 +154,111 @@ def test_a_hanging_policy_is_seen(process: o80.robots.Process) -> None:
         plan.send(np.zeros((1000, 2)))
         with pytest.raises(o80.TimeoutError):
             plan.wait(timeout=0.05)
+
+
+def played(arm: o80.Frontend, sends: list[tuple[int, int, Any, int]]) -> list[list[float]]:
+    """Desired rows of a script: when each chunk is sent, what it answers, its rows, `first`."""
+    with arm.chunks(step=10, ease=20) as plan:
+        for now, seen, rows, first in sends:
+            arm.burst(now - arm.published)
+            plan.send(rows, seen=seen, first=first)
+        arm.burst(700 - arm.published)
+    return arm.history().desired.tolist()
+
+
+def test_behind_a_frozen_prefix_the_delay_of_an_answer_changes_no_bit() -> None:
+    choose = random.Random(4)
+    answers = [rows_of(choose, 0.0, 30) for _ in range(4)]
+
+    def delayed(delays: list[int]) -> list[list[float]]:
+        with o80.robots.load("two_joints").inline() as arm:
+            sends = [
+                (100 * (i + 1) + delay, 100 * (i + 1), answers[i], 0 if i == 0 else 8)
+                for i, delay in enumerate(delays)
+            ]
+            return played(arm, sends)
+
+    assert delayed([5, 3, 30, 75]) == delayed([5, 79, 12, 0])
+
+
+def test_before_a_chunk_begins_nothing_changes() -> None:
+    rows = rows_of(random.Random(5), 0.0, 30)
+    for first in (0, 4):
+        with o80.robots.load("two_joints").inline() as arm:
+            without = played(arm, [(50, 50, rows, 0)])
+        with o80.robots.load("two_joints").inline() as arm:
+            both = played(arm, [(50, 50, rows, 0), (120, 110, ROWS, first)])
+        begins = 121 if first == 0 else 151
+        assert both[:begins] == without[:begins]
+        assert both[begins] != without[begins]
+
+
+def test_due_iterations_do_not_drift(arm: o80.Frontend) -> None:
+    plan = arm.chunks(step=50 / 3)
+    exact = [(100 * j + 3) // 6 for j in range(1, 10_001)]  # 50 j / 3, halves up
+    assert plan._due(10_000).tolist() == exact
+    assert arm.chunks(step=7 / 2)._due(6).tolist() == [4, 7, 11, 14, 18, 21]
+    assert arm.chunks(step=5 / 3)._due(6).tolist() == [2, 3, 5, 7, 8, 10]
+    assert (1000 + arm.chunks(step=100 / 3)._due(4)).tolist() == [1033, 1067, 1100, 1133]
+
+
+def test_the_curve_has_the_slopes_of_a_parabola() -> None:
+    ends = [5, 12, 20, 33]
+    places, slopes = _core.plan_of_rows(0.0, 0.0, [float(e * e) for e in ends], ends, "cubic")
+    for row, end in enumerate(ends[:-1]):
+        assert places[end - 1] == float(end * end)
+        a = (end * end - (ends[row - 1] ** 2 if row else 0)) / (end - (ends[row - 1] if row else 0))
+        b = (ends[row + 1] ** 2 - end * end) / (ends[row + 1] - end)
+        if 2 * end <= 2 * min(a, b):  # where the rule against overshoot does not act
+            assert slopes[end - 1] == pytest.approx(2 * end)
+    assert slopes[-1] == 0.0
+
+
+def test_where_a_limit_acts_the_plan_stays_what_it_is() -> None:
+    class Arm:
+        """Where it was asked to be, with limits that are too low for the rows."""
+
+        actuators = ("lift",)
+        limits = {"lift": o80.Limits(speed=1.0, acceleration=5.0, jerk=50.0)}  # noqa: RUF012
+        of_the_world = False
+
+        def write(self, desired: Any) -> None:
+            self.place = np.array(desired.states)
+
+        def read(self, reading: Any) -> None:
+            reading.observed = getattr(self, "place", np.zeros(1))
+
+    with o80.robots.load(Arm).inline(frequency=500) as arm, arm.chunks(0, step=5) as plan:
+        sent = plan.send([0.3, 0.0, 0.3, 0.0, 0.3])
+        before = plan.planned(0, step=1)
+        plan.wait()
+        arm.burst(500)
+        assert plan.planned(0, step=1).tolist() == before.tolist()
+        assert before[[4, 9, 14]].tolist() != arm.history().desired[[5, 10, 15], 0].tolist()
+        assert arm.latest().desired[0] == 0.3, "it is reached all the same"
+        assert sent.batch.statuses == ["completed"]
+        assert sent.batch[0].reason == "limits"
+
+
+@pytest.mark.parametrize("stale", ["hold", "purge"])
+def test_what_a_killed_sender_left_ends_as_it_was_told(segment: str, stale: Any) -> None:
+    program = (
+        "import sys, os, signal, numpy as np, o80\n"
+        f"with o80.Frontend({segment!r}) as arm:\n"
+        "    plan = arm.chunks(step=10)\n"
+        "    plan.send(np.linspace([0, 0], [1, 1], 100))\n"
+        "    plan.wait(lead=900)\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    with (
+        o80.robots.load("two_joints").start(segment, stale=stale) as process,
+        process.frontend() as arm,
+    ):
+        subprocess.run([sys.executable, "-c", program], check=False, timeout=WAIT)
+        arm.wait_for(arm.published + 1200, WAIT)
+        row = arm.latest()
+        assert not row.active.any()
+        assert (row.desired.tolist() == [1.0, 1.0]) == (stale == "hold")
 
 
 @pytest.mark.parametrize(
