@@ -1,0 +1,283 @@
+"""A policy that answers late, played by chunks, by queues of actions, and naively.
+
+Simulated time: an arm of one joint at 500 Hz, a filtered random path as the truth, and a policy
+that knows it but for a disagreement of each answer. Delays are drawn once and are the same for all
+players, with outliers and losses; the policy is asked again when it has answered. The players:
+
+chunks: Frontend.chunks, all rows in their iterations (`fixed`).
+queue: the ActionQueue of LeRobot 0.4.4 with real-time chunking (its class where lerobot is
+    installed, else its rule): drops as many actions as the latency has steps, rounded up.
+consumed: the same with the rule of lerobot#4454: never more than were consumed meanwhile.
+naive: each answer is played from its first action on.
+
+The last three show one action a step, in straight lines between them, as LeRobot 0.6 does.
+"""
+
+import math
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+from sampling import sample
+
+Places = NDArray[np.float64]
+
+RATE = 500  # [Hz]
+LENGTH = 30 * RATE  # iterations
+HORIZON = 1.5  # of an answer [s]
+TAKE_OVER = RATE // 10  # iterations in which a take-over is looked at
+
+
+class Arm:
+    """One joint that is where it was asked to be."""
+
+    actuators = ("lift",)
+    of_the_world = False
+
+    def __init__(self) -> None:
+        self.place = np.zeros(1)
+
+    def write(self, desired: Any) -> None:
+        self.place = np.array(desired.states)
+
+    def read(self, reading: Any) -> None:
+        reading.observed = self.place
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What the policy said of the row `seen`, in iteration `at`; no actions: it was lost."""
+
+    seen: int
+    at: int
+    actions: Places
+
+
+@dataclass(frozen=True)
+class World:
+    truth: Places  # (iterations,) [rad]
+    step: int  # iterations from action to action
+    answers: list[Answer]
+
+
+@dataclass
+class Played:
+    places: Places = field(default_factory=lambda: np.zeros(LENGTH))
+    misplaced: list[float] = field(default_factory=list)  # of each action [s]
+    starved: int = 0  # iterations
+
+
+def world_of(seed: int, delay: float, disagreement: float, actions_a_second: int) -> World:
+    """delay: the median [s]. disagreement: of two answers about the same time [rad]."""
+    random = np.random.default_rng(seed)
+    noise = np.random.default_rng(0).normal(size=LENGTH + 4 * RATE)  # one truth for all
+    for _ in range(2):  # a second in each filter
+        window = np.hanning(RATE)
+        noise = np.convolve(noise, window / window.sum(), "same")
+    truth = 0.5 * noise / noise.std()
+    truth -= truth[0]
+    step = RATE // actions_a_second
+    ahead = step * np.arange(1, round(HORIZON * actions_a_second) + 1)
+    answers, seen = [], 0
+    while seen < LENGTH:
+        drawn = random.lognormal(math.log(delay), 0.15) * (2 if random.random() < 0.05 else 1)
+        at = seen + max(1, round(min(drawn, HORIZON / 2) * RATE))
+        rows = truth[np.minimum(seen + ahead, len(truth) - 1)]
+        rows = rows + random.normal(0.0, disagreement / math.sqrt(2))
+        answers.append(Answer(seen, at, rows[: 0 if random.random() < 0.02 else None]))
+        seen = at
+    return World(truth[:LENGTH], step, answers)
+
+
+def by_chunks(world: World) -> Played:
+    played = Played()
+    with o80.robots.load(Arm).inline(frequency=RATE, history=LENGTH + 10) as arm:
+        sents = []
+        with arm.chunks("lift", step=world.step) as plan:
+            for answer in world.answers:
+                arm.burst(min(answer.at, LENGTH) - 1 - arm.published)
+                if answer.at >= LENGTH:
+                    break
+                if len(answer.actions):
+                    sent = plan.send(answer.actions, seen=answer.seen, fixed=True)
+                    sents.append((answer, sent))
+        rows = arm.history()
+        played.places[1:] = rows.desired[1:LENGTH, 0]
+        begun = min(sent.begins or LENGTH for _, sent in sents)
+        played.starved = int((~rows.active[begun:LENGTH, 0]).sum())
+    ends = [sent.begins for _, sent in sents[1:]] + [LENGTH]
+    for (answer, sent), end in zip(sents, ends, strict=True):
+        if sent.begins is None or sent.first is None or sent.shift is None:
+            continue
+        for row in range(sent.first, len(answer.actions)):
+            due = answer.seen + (row + 1) * world.step + sent.shift
+            if due < min(end or LENGTH, LENGTH):
+                wrong = played.places[due] != answer.actions[row]
+                played.misplaced.append((sent.shift + int(wrong)) / RATE)
+    return played
+
+
+def queue_of_lerobot() -> Any:
+    """LeRobot's own queue; None where it is not installed."""
+    try:
+        import torch
+        from lerobot.policies.rtc.action_queue import ActionQueue
+        from lerobot.policies.rtc.configuration_rtc import RTCConfig
+    except ImportError:
+        return None
+    queue = ActionQueue(RTCConfig(enabled=True))
+
+    class Queue:
+        def merge(self, actions: Places, delay: int) -> None:
+            tensor = torch.from_numpy(np.stack([np.arange(len(actions)), actions], axis=1))
+            queue.merge(tensor, tensor, delay, None)
+
+        def get(self) -> Any:
+            action = queue.get()
+            return None if action is None else action.tolist()
+
+    return Queue()
+
+
+class Queue:
+    """The rule of LeRobot's queue."""
+
+    def __init__(self) -> None:
+        self.left: list[list[float]] = []
+
+    def merge(self, actions: Places, delay: int) -> None:
+        self.left = [[float(i), value] for i, value in enumerate(actions)][delay:]
+
+    def get(self) -> list[float] | None:
+        return self.left.pop(0) if self.left else None
+
+
+def by_queue(world: World, rule: str) -> Played:
+    """One action a step, interpolated in straight lines. rule: latency, consumed or none."""
+    played = Played()
+    queue = queue_of_lerobot() or Queue()
+    arrivals = iter([*world.answers, Answer(0, 10 * LENGTH, np.zeros(0))])
+    coming = next(arrivals)
+    newest: Answer | None = None
+    consumed = [0]  # actions until each tick
+    place = 0.0
+    for tick in range(0, LENGTH - world.step, world.step):
+        while coming.at <= tick:
+            latency = math.ceil((coming.at - coming.seen) / world.step)
+            meanwhile = consumed[-1] - consumed[min(coming.seen // world.step, len(consumed) - 1)]
+            delay = {"latency": latency, "consumed": min(latency, meanwhile), "none": 0}[rule]
+            if len(coming.actions):
+                queue.merge(coming.actions, delay)
+                newest = coming
+            coming = next(arrivals)
+        action = queue.get()
+        consumed.append(consumed[-1] + (action is not None))
+        after = tick + world.step
+        if action is None or newest is None:
+            played.starved += world.step
+            target = place
+        else:
+            number, target = action
+            due = newest.seen + (number + 1) * world.step
+            played.misplaced.append(abs(due - after) / RATE)
+        played.places[tick + 1 : after + 1] = np.linspace(place, target, world.step + 1)[1:]
+        place = target
+    played.places[after + 1 :] = place
+    return played
+
+
+PLAYERS = {
+    "chunks": by_chunks,
+    "queue": lambda world: by_queue(world, "latency"),
+    "consumed": lambda world: by_queue(world, "consumed"),
+    "naive": lambda world: by_queue(world, "none"),
+}
+
+
+def figures(world: World, played: Played) -> dict[str, float]:
+    """Without the first two seconds, in which each begins in its own way."""
+    changes = np.abs(np.diff(played.places, 2)) * RATE  # of the velocity, in an iteration [rad/s]
+    taking = np.zeros(LENGTH, bool)
+    for answer in world.answers:
+        taking[answer.at : answer.at + TAKE_OVER] = True
+    taking, later = taking[2:], np.arange(2, LENGTH) > 2 * RATE
+    error = (played.places - world.truth)[2 * RATE :]
+    rest = changes[~taking & later]
+    misplaced = np.array(played.misplaced)
+    return {
+        "error [mrad]": 1e3 * float(np.sqrt(np.mean(error**2))),
+        "take-over [rad/s]": float(changes[taking & later].max()),
+        "rest [rad/s]": float(rest.max()) if len(rest) else math.nan,
+        "starved [%]": 100.0 * played.starved / LENGTH,
+        "misplaced [ms]": 1e3 * float(misplaced.max(initial=0.0)),
+        "wrong rows [%]": 100.0 * float(np.mean(misplaced > 0.5 / RATE)),
+    }
+
+
+def cases() -> Iterator[tuple[float, float, int]]:
+    for delay in (0.08, 0.15, 0.3):
+        for disagreement in (0.005, 0.02, 0.05):
+            for actions_a_second in (20, 50):
+                yield delay, disagreement, actions_a_second
+
+
+def plot(path: str) -> None:
+    """Two seconds of each player, beside the truth."""
+    import matplotlib
+
+    matplotlib.use("Agg")
+    import matplotlib.pyplot as plt
+
+    world = world_of(1, 0.3, 0.02, 50)
+    figure, (above, below) = plt.subplots(2, 1, figsize=(9, 7), sharex=True)
+    time = np.arange(LENGTH) / RATE
+    part = slice(10 * RATE, 13 * RATE)
+    above.plot(time[part], world.truth[part], "k--", label="truth")
+    for name in ("naive", "queue", "chunks"):
+        places = PLAYERS[name](world).places
+        above.plot(time[part], places[part], label=name)
+        below.plot(time[part], np.gradient(places, 1 / RATE)[part], label=name)
+    above.set_ylabel("joint [rad]")
+    below.set_ylabel("velocity [rad/s]")
+    below.set_xlabel("time [s]")
+    above.legend()
+    figure.suptitle("Answers 0.3 s late that disagree by 20 mrad")
+    figure.tight_layout()
+    figure.savefig(path, dpi=110)
+
+
+def main() -> None:
+    if sys.argv[1:2] == ["--plot"]:
+        return plot(sys.argv[2])
+    print_table = sys.argv[1:2] == ["--table"]
+    worst = {"wrong": 0.0, "gain": math.inf}
+    most: dict[tuple[str, int], float] = {}  # of changes of velocity, for a rate of actions
+    for case, (delay, disagreement, actions) in enumerate(cases()):
+        world = world_of(case, delay, disagreement, actions)
+        found = {name: figures(world, play(world)) for name, play in PLAYERS.items()}
+        if print_table:
+            print(f"{1e3 * delay:.0f} ms, {1e3 * disagreement:.0f} mrad, {actions} actions/s")
+            for name, values in found.items():
+                print(f"  {name:9}", *(f"{key} {value:.3g};" for key, value in values.items()))
+        ours = found["chunks"]
+        worst["wrong"] = max(worst["wrong"], ours["wrong rows [%]"])
+        # with short delays nearly every iteration belongs to a take-over: the rest is that of all
+        for part in ("take-over [rad/s]", "rest [rad/s]"):
+            most[part, actions] = max(most.get((part, actions), 0.0), ours[part])
+        if delay == 0.3:
+            gain = found["queue"]["take-over [rad/s]"] / ours["take-over [rad/s]"]
+            worst["gain"] = min(worst["gain"], gain)
+    if not print_table:
+        sample("chunks_wrong", "%", worst["wrong"])
+        ratios = (most["take-over [rad/s]", n] / most["rest [rad/s]", n] for n in (20, 50))
+        sample("chunks_take_over", "x", max(ratios))
+        sample("chunks_gain", "x", worst["gain"])
+
+
+if __name__ == "__main__":
+    main()
