@@ -5,8 +5,8 @@ that knows it but for a disagreement of each answer. Delays are drawn once and a
 players, with outliers and losses; the policy is asked again when it has answered. The players:
 
 chunks: Frontend.chunks, all rows in their iterations (`fixed`).
-queue: the ActionQueue of LeRobot 0.4.4 with real-time chunking (its class where lerobot is
-    installed, else its rule): drops as many actions as the latency has steps, rounded up.
+queue: the rule of LeRobot's ActionQueue (0.4.4) with real-time chunking: drops as many actions as
+    the latency has steps, rounded up. Its own class gives the same figures.
 consumed: the same with the rule of lerobot#4454: never more than were consumed meanwhile.
 naive: each answer is played from its first action on.
 
@@ -15,8 +15,9 @@ The last three show one action a step, in straight lines between them, as LeRobo
 
 import math
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -122,28 +123,6 @@ def by_chunks(world: World) -> Played:
     return played
 
 
-def queue_of_lerobot() -> Any:
-    """LeRobot's own queue; None where it is not installed."""
-    try:
-        import torch
-        from lerobot.policies.rtc.action_queue import ActionQueue
-        from lerobot.policies.rtc.configuration_rtc import RTCConfig
-    except ImportError:
-        return None
-    queue = ActionQueue(RTCConfig(enabled=True))
-
-    class Queue:
-        def merge(self, actions: Places, delay: int) -> None:
-            tensor = torch.from_numpy(np.stack([np.arange(len(actions)), actions], axis=1))
-            queue.merge(tensor, tensor, delay, None)
-
-        def get(self) -> Any:
-            action = queue.get()
-            return None if action is None else action.tolist()
-
-    return Queue()
-
-
 class Queue:
     """The rule of LeRobot's queue."""
 
@@ -160,7 +139,7 @@ class Queue:
 def by_queue(world: World, rule: str) -> Played:
     """One action a step, interpolated in straight lines. rule: latency, consumed or none."""
     played = Played()
-    queue = queue_of_lerobot() or Queue()
+    queue = Queue()
     arrivals = iter([*world.answers, Answer(0, 10 * LENGTH, np.zeros(0))])
     coming = next(arrivals)
     newest: Answer | None = None
@@ -191,11 +170,11 @@ def by_queue(world: World, rule: str) -> Played:
     return played
 
 
-PLAYERS = {
+PLAYERS: dict[str, Callable[[World], Played]] = {
     "chunks": by_chunks,
-    "queue": lambda world: by_queue(world, "latency"),
-    "consumed": lambda world: by_queue(world, "consumed"),
-    "naive": lambda world: by_queue(world, "none"),
+    "queue": partial(by_queue, rule="latency"),
+    "consumed": partial(by_queue, rule="consumed"),
+    "naive": partial(by_queue, rule="none"),
 }
 
 
