@@ -163,7 +163,8 @@ def played(arm: o80.Frontend, sends: list[tuple[int, int, Any, int]]) -> list[li
             arm.burst(now - arm.published)
             plan.send(rows, seen=seen, first=first)
         arm.burst(700 - arm.published)
-    return arm.history().desired.tolist()
+    rows: list[list[float]] = arm.history().desired.tolist()
+    return rows
 
 
 def test_behind_a_frozen_prefix_the_delay_of_an_answer_changes_no_bit() -> None:
