@@ -55,6 +55,9 @@ CALLS = {
     "Frontend.move_to, bursting": Call(
         "standing.move_to(0, 1.0, tolerance=0.1)", "standing.close()"
     ),
+    "Chunks.wait": Call(
+        "(plan := silent.chunks(step=5), plan.send([[0.0, 0.0]]), plan.wait())", "silent.close()"
+    ),
     "Frontend.request": Call("silent.request('home')", "silent.close()"),
     "Frontend.resume": Call("(silent.halt(), silent.resume(timeout=None))", "silent.close()"),
     "halt": Call("o80.halt(late, timeout=None)", "begin(late)", ""),

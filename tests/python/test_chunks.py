@@ -1,11 +1,12 @@
 """Chunks: what is planned is what happens, and a sender is told what became of its rows."""
 
+import asyncio
 import random
 import re
 import subprocess
 import sys
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -35,10 +36,10 @@ def test_a_chunk_is_played_and_told(arm: o80.Frontend) -> None:
         assert (sent.late, sent.skipped, sent.first, sent.begins, sent.shift) == (0, 0, 0, 101, 0)
         assert plan.planned(110, 16)[:, 0].tolist() == [0.1, 0.3, 0.3, 0.2]
         assert plan.planned(115, 16)[:, 1] == pytest.approx([0.21875, 0.3, 0.25])
-        assert not plan.starved
+        starved = [plan.starved]
         plan.wait()
-        assert plan.starved
-    assert not plan.starved
+        starved.append(plan.starved)
+    assert [*starved, plan.starved] == [False, True, False]
     assert arm.history().desired[[110, 120, 130, 140, 150]].tolist() == ROWS.tolist()
     assert sent.batch.statuses == ["completed"]
     with pytest.raises(o80.InvalidArgument, match="this plan was closed"):
@@ -146,6 +147,20 @@ def test_in_real_time_each_answer_is_waited_for_once(process: o80.robots.Process
         assert plan.wait(grid=True, timeout=WAIT).iteration % 10 == asked[-1] % 10
 
 
+def test_a_task_awaits_what_a_thread_waits_for(process: o80.robots.Process) -> None:
+    async def policies() -> list[int]:
+        seen = []
+        with process.frontend() as arm, arm.chunks(step=5) as plan:
+            for _ in range(3):
+                row = await plan.aio.wait(lead=20, timeout=WAIT)
+                seen.append(row.iteration)
+                plan.send(np.zeros((10, 2)), seen=row)
+        return seen
+
+    seen = asyncio.run(policies())
+    assert seen == sorted(set(seen))
+
+
 def test_a_hanging_policy_is_seen(process: o80.robots.Process) -> None:
     with process.frontend() as arm, arm.chunks(step=5) as plan:
         plan.send(np.zeros((4, 2)))
@@ -163,8 +178,7 @@ def played(arm: o80.Frontend, sends: list[tuple[int, int, Any, int]]) -> list[li
             arm.burst(now - arm.published)
             plan.send(rows, seen=seen, first=first)
         arm.burst(700 - arm.published)
-    rows: list[list[float]] = arm.history().desired.tolist()
-    return rows
+    return cast(list[list[float]], arm.history().desired.tolist())
 
 
 def test_behind_a_frozen_prefix_the_delay_of_an_answer_changes_no_bit() -> None:

@@ -34,6 +34,7 @@ CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
         "preview": lambda it: it.preview(0, 0.1),
         "move_to": lambda it: it.move_to(0, 0.1, tolerance=0.1, timeout=WAIT),
         "mark": lambda it: it.mark("here"),
+        "chunks": lambda it: it.chunks(step=5),
         "reattach": lambda it: it.reattach(WAIT),
         "burst": lambda it: it.burst(timeout=WAIT),
     },

@@ -14,6 +14,7 @@ import numpy as np
 
 import o80._core as _core
 from o80.base.argument_checks import whole
+from o80.base.awaiting import in_thread
 from o80.base.errors import InvalidArgument
 from o80.base.words import RowsWord, Status
 from o80.rows.targets import common_type, states_of
@@ -132,6 +133,19 @@ class _Part:
         return self.places[iteration - self.begins], self.slopes[iteration - self.begins]
 
 
+class ChunkWaits:
+    """The wait of a plan as a coroutine, as those of `Frontend.aio`."""
+
+    def __init__(self, plan: Chunks) -> None:
+        self._plan = plan
+
+    async def wait(
+        self, lead: int = 0, timeout: float | None = None, *, grid: bool = False
+    ) -> _core.Observation:
+        """Waits as `Chunks.wait`."""
+        return await in_thread(lambda: self._plan.wait(lead, timeout, grid=grid))
+
+
 class Chunks:
     """The plan of a policy that answers with rows of targets, late, while the robot moves.
 
@@ -148,6 +162,7 @@ class Chunks:
         profile: RowsWord = "cubic",
         ensemble: float | None = None,
     ) -> None:
+        arm.latest()  # raises what a frontend that cannot be used raises
         self._arm = arm
         self._actuators, self._single = arm._chosen(actuators)
         self._kind = common_type(self._actuators, arm._layout)
@@ -334,6 +349,11 @@ class Chunks:
         steps = int((arm.published - anchor) / self.step)
         behind = int(self._due(steps)[-1]) if steps > 0 else 0
         return arm.wait_for(anchor + behind)
+
+    @property
+    def aio(self) -> ChunkWaits:
+        """The same wait for asyncio: `seen = await plan.aio.wait(lead=120)`."""
+        return ChunkWaits(self)
 
     @property
     def _undecided(self) -> SentChunk | None:
