@@ -264,6 +264,7 @@ def test_actions_come_with_the_latency_of_their_decisions(segment: str, tmp_path
 
     iterations = [2, 4, 6, 8, 10, 12]  # at the ends of the steps; batches began at 6 and 11
     assert episode.rows.iteration[1:].tolist() == iterations
+    assert episode.seen.tolist() == [-1, -1, 4, 4, 4, 7]
     delays = [np.nan, np.nan, 0.002, 0.002, 0.002, 0.004]
     assert episode.delays == pytest.approx(delays, nan_ok=True)
     lerobot.write(tmp_path / "set", found)

@@ -221,6 +221,9 @@ def test_a_device_s_row_counts_from_its_capture(segment: str) -> None:
         known, nothing = decided(captured), decided(0)
         robot.step()
         robot.publish()
+        joined = o80.align({"arm": arm, "camera": eye}, by="seen")["camera"]
+        assert joined.iteration[-1] == 2  # the newest batch; that row captured nothing
+        assert np.isnan(joined.age).all()
         assert known.decision_latency is not None
         assert known.decision_latency.iterations == 5
         delay = (arm.latest().time - captured) * 1e-9

@@ -32,8 +32,10 @@ class Episode:
 
     rows: History  #: T + 1 rows: what was there before each step, and after the last one
     rewards: NDArray[np.float64]  #: (T,)
-    #: (T,) the decision latency of each action [s]: from the capture of the row by which it was
-    #: decided, as `pulse(seen=row)` said, to its first iteration. NaN: not known.
+    #: (T,) the iteration of the row by which each action was decided, as `pulse(seen=row)` said (of
+    #: a row of another robot: the newest one of this robot then); -1: not known.
+    seen: NDArray[np.int64]
+    #: (T,) the decision latency of each action, from that row to its first one [s]; NaN: not known.
     delays: NDArray[np.float64]
     terminated: bool  #: it ended by itself; else it was cut off
     task: str
@@ -176,23 +178,27 @@ def _episode(
     if steps < 1:
         raise InvalidArgument(f"{where}: it has no step")
     rows = rows[: steps * every + 1 : every]
+    seen, delays = _decided(taken[epoch], rows.iteration[1:], epoch.schema["period"])
     ending = None if span.until is None or span.until.name == mark.name else span.until
     return Episode(
         rows=rows,
         rewards=_rewards(span, ending, segment, every, steps),
-        delays=_delays(taken[epoch], rows.iteration[1:], epoch.schema["period"]),
+        seen=seen,
+        delays=delays,
         terminated=ending is not None and not ending.values.get("truncated", False),
         task=str(mark.values.get("task", "")) or epoch.schema["robot"],
         values=mark.values,
     )
 
 
-def _delays(taken: Decisions, iterations: NDArray[np.int64], period: int) -> NDArray[np.float64]:
-    """Decision latency of the newest batch that was taken at each of these iterations [s]."""
+def _decided(
+    taken: Decisions, iterations: NDArray[np.int64], period: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """`seen` and `delays` of the newest batch that was taken at each of these iterations."""
     newest = np.searchsorted(taken.taken, iterations, side="right") - 1
-    known = (newest >= 0) & (np.append(taken.since, -1)[newest] >= 0)
-    latency = np.append(taken.taken - taken.since, 0)[newest]
-    return np.where(known, latency * period * 1e-9, np.nan)
+    seen: NDArray[np.int64] = np.append(taken.since, -1)[newest]  # the last one: none yet
+    latency = np.append(taken.taken, 0)[newest] - seen
+    return seen, np.where(seen >= 0, latency * period * 1e-9, np.nan)
 
 
 def _epoch_at(mark: "Mark", epochs: Sequence["RecordedEpoch"]) -> "RecordedEpoch":

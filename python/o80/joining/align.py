@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 import o80._core as _core
 from o80.base.errors import InvalidArgument
 from o80.joining.row_selection import NANOSECOND, NOWHERE, before, blanked, linear, nearest
-from o80.joining.sources import Timed, named, opened, run_of, timed
+from o80.joining.sources import Timed, capture_times, named, opened, run_of, timed
 from o80.rows.history import History
 from o80.rows.journal import decisions
 
@@ -148,9 +148,10 @@ def _by_seen(sources: Mapping[str, Source], seconds: float | None) -> Aligned:
         seen = np.append(taken.iteration[of_other], -1)[newest]  # the last one: none yet
         picked = _aligned(other, _counted(history), seen, "before", 0.0)
         same_clock = history.schema["clock"] == rows.schema["clock"]
-        picked.age[picked.found] = np.nan
-        if same_clock:
-            picked.age[picked.found] = (rows.time - picked.time)[picked.found] * NANOSECOND
+        captured = capture_times(picked)
+        known = picked.found & same_clock & (captured is None or captured > 0)
+        age = (rows.time - (picked.time if captured is None else captured)) * NANOSECOND
+        picked.age[...] = np.where(known, age, np.nan)
         found[other] = picked
     if not any(found[other].found.any() for other in others):
         raise InvalidArgument(

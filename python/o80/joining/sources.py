@@ -132,16 +132,22 @@ def shifts_of(found: Mapping[str, tuple[History, int | None]]) -> dict[str, int]
     return {name: offset or 0 for name, (_, offset) in found.items()}
 
 
+def capture_times(history: History) -> NDArray[np.int64] | None:
+    """When a device captured the rows [ns], at most 0: never; None: when they were published."""
+    if CAPTURE_TIME not in (history.extended.keys() if len(history) else ()):
+        return None
+    return np.asarray(getattr(history.extended, CAPTURE_TIME)).astype(np.int64)
+
+
 def _on_clock(history: History, shift: int) -> Timed:
     """The rows that were captured, in the order of their capture; of equal ones the newest."""
-    times = history.time
-    if CAPTURE_TIME in (history.extended.keys() if len(history) else ()):
-        times = np.asarray(getattr(history.extended, CAPTURE_TIME)).astype(np.int64)
+    times = capture_times(history)
+    if times is not None:
         captured = np.flatnonzero(times > 0)
         order = captured[np.argsort(times[captured], kind="stable")]
         ordered = times[order]
         newest = np.append(ordered[1:] != ordered[:-1], True)[: len(ordered)]
         rows = order[newest]
     else:
-        rows = np.arange(len(history))
+        rows, times = np.arange(len(history)), history.time
     return Timed(history, rows, times[rows] + shift)
