@@ -81,6 +81,15 @@ std::string text_of_seen(const o80::Seen& seen) {
          std::to_string(seen.epoch) + ">";
 }
 
+o80::Seen seen_from(std::uint64_t epoch, o80::Iteration iteration, std::int64_t time,
+                    const std::string& clock, o80::Iteration since) {
+  if (clock != "monotonic" && clock != "simulated") {
+    throw o80::InvalidArgument("clock must be 'monotonic' or 'simulated', got '" + clock + "'");
+  }
+  return {epoch, iteration, time,
+          clock == "simulated" ? o80::Clock::simulated : o80::Clock::monotonic, since};
+}
+
 void bind_seen(nb::module_& m) {
   using o80::DecisionLatency;
   using o80::Seen;
@@ -88,13 +97,7 @@ void bind_seen(nb::module_& m) {
     return self.clock == o80::Clock::simulated ? "simulated" : "monotonic";
   };
   nb::class_<Seen>(m, "Seen", "The row by which a batch was decided, of any segment.")
-      .def(nb::new_([](std::uint64_t epoch, o80::Iteration iteration, std::int64_t time,
-                       const std::string& clock, o80::Iteration since) {
-             return Seen{epoch, iteration, time,
-                         clock == "simulated" ? o80::Clock::simulated : o80::Clock::monotonic,
-                         since};
-           }),
-           "epoch"_a, "iteration"_a, "time"_a, "clock"_a, "since"_a = -1)
+      .def(nb::new_(&seen_from), "epoch"_a, "iteration"_a, "time"_a, "clock"_a, "since"_a = -1)
       .def(
           "__reduce__",
           [clock_of](nb::handle self) {
