@@ -8,6 +8,7 @@
 #include "control/batch/record.hpp"
 #include "enums.hpp"
 #include "o80/base/error.hpp"
+#include "observation.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -140,7 +141,23 @@ o80::PulseOptions::Late late_of(nb::handle word) {
 
 }  // namespace
 
-o80::PulseOptions pulse_options(nb::handle at, nb::handle late) {
+std::optional<o80::Seen> seen_of(nb::handle seen) {
+  if (seen.is_none()) return {};
+  o80::Seen found;
+  if (nb::isinstance<Observation>(seen)) {
+    found = nb::inst_ptr<Observation>(seen)->row;
+  } else if (nb::isinstance<o80::Seen>(seen)) {
+    found = *nb::inst_ptr<o80::Seen>(seen);
+  } else {
+    throw InvalidArgument(
+        "seen must be the observation by which you decided, as latest(), wait_for_next() or "
+        "history()[i] returns it, got " +
+        nb::cast<std::string>(nb::repr(seen.type())));
+  }
+  return found;
+}
+
+o80::PulseOptions pulse_options(nb::handle at, nb::handle late, nb::handle seen) {
   o80::PulseOptions options;
   if (!at.is_none()) {
     options.at = count_of(at, "at");
@@ -150,5 +167,6 @@ o80::PulseOptions pulse_options(nb::handle at, nb::handle late) {
     }
   }
   options.late = late_of(late);
+  options.seen = seen_of(seen);
   return options;
 }

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <optional>
 #include <string>
 
 #include "o80/control/command.hpp"
@@ -30,5 +31,7 @@ o80::CommandOptions command_options(const o80::PaceSpec& pace, nanobind::handle 
 /// True for a list of actuators, or None (all); false for one index or name.
 bool names_several(nanobind::handle actuators);
 
-/// `at`: an iteration or None; `late`: "reject" or "now".
-o80::PulseOptions pulse_options(nanobind::handle at, nanobind::handle late);
+/// The row by which a batch was decided: an o80.Observation, an o80.Seen, or None.
+std::optional<o80::Seen> seen_of(nanobind::handle seen);
+/// `at`: an iteration or None; `late`: "reject" or "now"; `seen`: as above.
+o80::PulseOptions pulse_options(nanobind::handle at, nanobind::handle late, nanobind::handle seen);

@@ -77,9 +77,65 @@ nb::list statuses_of(const Batch& batch) {
   return statuses;
 }
 
+std::string text_of_seen(const o80::Seen& seen) {
+  return "<o80.Seen row " + std::to_string(seen.iteration) + " of run " +
+         std::to_string(seen.epoch) + ">";
+}
+
+o80::Seen seen_from(std::uint64_t epoch, o80::Iteration iteration, std::int64_t time,
+                    const std::string& clock, o80::Iteration since) {
+  if (clock != "monotonic" && clock != "simulated") {
+    throw o80::InvalidArgument("clock must be 'monotonic' or 'simulated', got '" + clock + "'");
+  }
+  return {epoch, iteration, time,
+          clock == "simulated" ? o80::Clock::simulated : o80::Clock::monotonic, since};
+}
+
+void bind_seen(nb::module_& m) {
+  using o80::DecisionLatency;
+  using o80::Seen;
+  const auto clock_of = [](const Seen& self) {
+    return self.clock == o80::Clock::simulated ? "simulated" : "monotonic";
+  };
+  nb::class_<Seen>(m, "Seen", "The row by which a batch was decided, of any segment.")
+      .def(nb::new_(&seen_from), "epoch"_a, "iteration"_a, "time"_a, "clock"_a, "since"_a = -1)
+      .def(
+          "__reduce__",
+          [clock_of](nb::handle self) {
+            const auto& seen = *nb::inst_ptr<Seen>(self);
+            return nb::make_tuple(self.type(), nb::make_tuple(seen.epoch, seen.iteration, seen.time,
+                                                              clock_of(seen), seen.since));
+          },
+          nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
+      .def_ro("epoch", &Seen::epoch, "The number of the run that published it.")
+      .def_ro("iteration", &Seen::iteration, "Its iteration.")
+      .def_ro("time", &Seen::time,
+              "When it was captured [ns]; for devices their `capture_time`. -1: not known.")
+      .def_prop_ro("clock", clock_of, "The clock of that time: monotonic or simulated.")
+      .def_prop_ro(
+          "since", [](const Seen& self) { return known(self.since); },
+          "The newest iteration of the commanded robot at or before that capture, from which the "
+          "latency of the decision counts. None: not known.")
+      .def("__repr__", &text_of_seen);
+  nb::class_<DecisionLatency>(
+      m, "DecisionLatency",
+      "Delay from the capture of a row to the first iteration of the batch that it decided.")
+      .def_prop_ro(
+          "iterations", [](const DecisionLatency& self) { return known(self.iterations); },
+          "Iterations of the robot that took the batch; None: not known.")
+      .def_prop_ro(
+          "seconds",
+          [](const DecisionLatency& self) -> std::optional<double> {
+            if (self.time < 0) return {};
+            return static_cast<double>(self.time) / 1e9;
+          },
+          "Time between the rows [s]; None: not known, as if their clocks differ.");
+}
+
 }  // namespace
 
 void bind_batch(nb::module_& m) {
+  bind_seen(m);
   nb::class_<Handle>(m, "Handle", "Status of one command or request, when it was read.")
       .def(nb::new_(&handle_of), "id"_a, "status"_a, "reason"_a, "iteration"_a, "late"_a, "text"_a,
            "progress"_a)
@@ -147,6 +203,16 @@ void bind_batch(nb::module_& m) {
           [](const Batch& self) { return reached(self.last_iteration(), "has not ended yet"); },
           "The iteration in which the last of its commands ended. Raises Error if some have not "
           "ended; see `ended` and `wait`.")
+      .def_prop_ro(
+          "seen", [](const Batch& self) { return self.seen(); },
+          nb::sig("def seen(self) -> Seen | None"),
+          "The row by which it was decided: `seen` of its pulse, or None.")
+      .def_prop_ro("decision_latency", &Batch::decision_latency,
+                   nb::sig("def decision_latency(self) -> DecisionLatency | None"),
+                   R"(The delay from the capture of `seen` to the first row in which the batch acts.
+
+None if it was pulsed without `seen`, was rejected, or if that row is not published yet. It is read
+from the history, so ask while that holds the row.)")
       .def(
           "wait",
           [](const Batch& self, nb::handle timeout, nb::handle check) {

@@ -154,9 +154,10 @@ void Frontend::close() {
   if (robot) robot->stop();
 }
 
-void Frontend::reattach(const Attachment& attachment) {
+void Frontend::reattach(const Attachment& attachment, std::shared_ptr<Decoder> decoder) {
   untyped_->link()->check_usable();
   untyped_ = attachment.frontend;
+  decoder_ = std::move(decoder);
   next = -1;  // a new run has other iterations
 }
 
@@ -232,5 +233,5 @@ void bind_frontend(nb::module_& m) {
           "_has_lane",
           [](const Frontend& self) { return self.untyped().link()->lane_if_taken() != nullptr; })
       .def("_attach_again", &attach_again, "timeout"_a.none(), "read_only"_a)
-      .def("_reattach", &Frontend::reattach, "attachment"_a);
+      .def("_reattach", &Frontend::reattach, "attachment"_a, "decoder"_a);
 }

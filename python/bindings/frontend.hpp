@@ -56,7 +56,7 @@ class Frontend {
   /// Releases the lane and stops an inline robot.
   void close();
   /// Throws Closed after close().
-  void reattach(const Attachment& attachment);
+  void reattach(const Attachment& attachment, std::shared_ptr<Decoder> decoder);
 
   o80::Iteration next = -1;  // next row of wait_for_next; -1: not called yet
 

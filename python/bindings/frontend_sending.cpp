@@ -140,16 +140,16 @@ std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint
   return frontend->add_trajectories(actuators, rows, all.span(), options, ends, mask);
 }
 
-Batch pulse(const Frontend& self, nb::handle at, nb::handle late) {
-  const o80::PulseOptions options = pulse_options(at, late);
+Batch pulse(const Frontend& self, nb::handle at, nb::handle late, nb::handle seen) {
+  const o80::PulseOptions options = pulse_options(at, late, seen);
   if (!self.is_inline()) return self.untyped().pulse(options);
   const auto frontend = self.shared();
   const Waiting waiting;
   return frontend->pulse(options);
 }
 
-Batch pulse_to_end(const Frontend& self, nb::handle at, nb::handle late) {
-  const o80::PulseOptions options = pulse_options(at, late);
+Batch pulse_to_end(const Frontend& self, nb::handle at, nb::handle late, nb::handle seen) {
+  const o80::PulseOptions options = pulse_options(at, late, seen);
   const auto frontend = self.shared();
   const Waiting waiting;
   return frontend->pulse_to_end(options);
@@ -171,11 +171,11 @@ Observation wait_for_end(const Frontend& self, const Batch& batch, nb::handle ti
 }
 
 Observation pulse_and_wait(const Frontend& self, nb::handle timeout, nb::handle at, nb::handle late,
-                           nb::handle check) {
+                           nb::handle seen, nb::handle check) {
   // refused before anything is sent
   timeout_of(timeout);
   truth_of(check, "check");
-  return wait_for_end(self, pulse_to_end(self, at, late), timeout, check);
+  return wait_for_end(self, pulse_to_end(self, at, late, seen), timeout, check);
 }
 
 /// The number of iterations of a burst: any whole number.
@@ -184,9 +184,9 @@ std::int64_t burst_length(nb::handle iterations) {
 }
 
 PendingBurst start_burst(const Frontend& self, nb::handle iterations, nb::handle at,
-                         nb::handle late) {
+                         nb::handle late, nb::handle seen) {
   const std::int64_t count = burst_length(iterations);
-  const o80::PulseOptions options = pulse_options(at, late);
+  const o80::PulseOptions options = pulse_options(at, late, seen);
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
   const Waiting waiting;
@@ -194,10 +194,10 @@ PendingBurst start_burst(const Frontend& self, nb::handle iterations, nb::handle
 }
 
 Observation burst(const Frontend& self, nb::handle iterations, nb::handle timeout, nb::handle at,
-                  nb::handle late) {
+                  nb::handle late, nb::handle seen) {
   const std::int64_t count = burst_length(iterations);
   const o80::Timeout patience = timeout_of(timeout);
-  const o80::PulseOptions options = pulse_options(at, late);
+  const o80::PulseOptions options = pulse_options(at, late, seen);
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
   o80::UntypedObservation row = [&] {
@@ -208,17 +208,18 @@ Observation burst(const Frontend& self, nb::handle iterations, nb::handle timeou
 }
 
 /// Starts the bursts of a group, each with the decoder of its row.
-std::vector<PendingBurst> start_bursts(
-    const std::vector<std::pair<Frontend*, nb::object>>& members) {
+std::vector<PendingBurst> start_bursts(const std::vector<std::pair<Frontend*, nb::object>>& members,
+                                       nb::handle seen) {
   std::vector<std::shared_ptr<UntypedFrontend>> alive;
   std::vector<o80::BurstMember> group;
   for (const auto& [member, iterations] : members) {
     alive.push_back(member->shared());
     group.emplace_back(alive.back().get(), burst_length(iterations));
   }
+  const std::optional<o80::Seen> decided = seen_of(seen);
   const std::vector<o80::Burst> bursts = [&] {
     const Waiting waiting;
-    return o80::start_bursts(group);
+    return o80::start_bursts(group, decided);
   }();
   std::vector<PendingBurst> pending;
   for (std::size_t i = 0; i < bursts.size(); ++i) {
@@ -245,19 +246,19 @@ std::vector<Observation> wait_for_bursts(const std::vector<PendingBurst>& pendin
 
 /// Sends a batch of one record at once.
 template <class Fill>
-Batch send_alone(const Frontend& self, Fill&& fill) {
+Batch send_alone(const Frontend& self, Fill&& fill, const std::optional<o80::Seen>& seen = {}) {
   o80::BatchBuilder batch;
   fill(batch);
   const auto frontend = self.shared();
   const Waiting waiting;
-  return frontend->pulse(batch);
+  return frontend->pulse(batch, seen);
 }
 
 /// Sends a chunk. `due`: for each row an uint32, iterations after the anchor.
 Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators, nb::handle due,
                  nb::handle states, const std::vector<std::uint64_t>& mask, o80::Iteration anchor,
                  std::uint64_t plan, std::uint32_t ease, std::uint32_t first, bool fixed,
-                 bool reject_late, nb::handle profile) {
+                 bool reject_late, nb::handle profile, nb::handle seen) {
   const Bytes iterations(due);
   std::vector<std::uint32_t> ends(iterations.span().size() / sizeof(std::uint32_t));
   if (!ends.empty()) std::memcpy(ends.data(), iterations.span().data(), iterations.span().size());
@@ -269,9 +270,10 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
                                   .reject_late = reject_late,
                                   .profile = profile_of_rows(profile)};
   const Bytes all(states);
-  return send_alone(self, [&](o80::BatchBuilder& batch) {
+  const auto fill = [&](o80::BatchBuilder& batch) {
     self.untyped().add_chunk(batch, actuators, ends, all.span(), options, mask);
-  });
+  };
+  return send_alone(self, fill, seen_of(seen));
 }
 
 /// Places and slopes of the plan of a chunk, in each iteration from its begin: of one number, from
@@ -306,7 +308,8 @@ std::uint16_t purged(const Frontend& self, nb::handle actuator) {
 }
 
 /// Sends a request at once; a bursting backend runs until it has ended.
-Batch send_request(const Frontend& self, nb::handle name, nb::handle fields) {
+Batch send_request(const Frontend& self, nb::handle name, nb::handle fields, nb::handle seen) {
+  const std::optional<o80::Seen> decided = seen_of(seen);
   const auto frontend = self.shared();
   const std::uint32_t index = frontend->request_index(string_of(name, "the name of a request"));
   const std::vector<std::byte> payload = self.request_bytes(index, fields);
@@ -314,7 +317,7 @@ Batch send_request(const Frontend& self, nb::handle name, nb::handle fields) {
   o80::BatchBuilder batch;
   batch.request(static_cast<std::uint16_t>(index), payload);
   const Waiting waiting;
-  return frontend->pulse_to_end(batch);
+  return frontend->pulse_to_end(batch, decided);
 }
 
 void wait_until_ended(const Frontend& self, const Batch& batch, nb::handle timeout) {
@@ -372,17 +375,17 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
   def_verb(frontend, "forget_added", verbs::forget_added,
            [](const Frontend& self) { self.untyped().forget_added(); });
   def_verb(frontend, "pulse", verbs::pulse, &pulse, nb::kw_only(), "at"_a = nb::none(),
-           "late"_a.none() = "reject");
+           "late"_a.none() = "reject", "seen"_a = nb::none());
   def_verb(frontend, "pulse_and_wait", verbs::pulse_and_wait, &pulse_and_wait,
            "timeout"_a = nb::none(), nb::kw_only(), "at"_a = nb::none(), "late"_a.none() = "reject",
-           "check"_a.none() = true);
+           "seen"_a = nb::none(), "check"_a.none() = true);
 
   frontend
       .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a, "mask"_a,
            "times"_a.none(), "speed"_a.none(), "iterations"_a.none(), "mode"_a.none(),
            "profile"_a.none(), "start"_a.none())
       .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "mask"_a, "anchor"_a,
-           "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "profile"_a)
+           "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "profile"_a, "seen"_a.none())
       .def("_purge_own",
            [](const Frontend& self) {
              return send_alone(
@@ -405,23 +408,26 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
                    "profile: str | None, start: str, every: float | int | None) "
                    "-> tuple[int, str, bytes]"))
       .def("_index", &Frontend::actuator, "named"_a.none())
-      .def("_send_request", &send_request, "name"_a.none(), "fields"_a)
+      .def("_send_request", &send_request, "name"_a.none(), "fields"_a, "seen"_a.none())
       .def("_wait_until_ended", &wait_until_ended, "batch"_a, "timeout"_a.none())
-      .def("_pulse_to_end", &pulse_to_end, "at"_a.none(), "late"_a.none(),
-           nb::sig("def _pulse_to_end(self, at: int | None, late: str) -> Batch"))
+      .def("_pulse_to_end", &pulse_to_end, "at"_a.none(), "late"_a.none(), "seen"_a.none(),
+           nb::sig("def _pulse_to_end(self, at: int | None, late: str, "
+                   "seen: Observation | Seen | None) -> Batch"))
       .def("_wait_for_end", &wait_for_end, "batch"_a, "timeout"_a.none(), "check"_a.none(),
            nb::sig("def _wait_for_end(self, batch: Batch, timeout: float | None, check: bool) -> "
                    "Observation"))
       .def("_burst", &burst, "iterations"_a.none(), "timeout"_a.none(), "at"_a.none(),
-           "late"_a.none(),
+           "late"_a.none(), "seen"_a.none(),
            nb::sig("def _burst(self, iterations: int, timeout: float | None, at: int | None, "
-                   "late: str) -> Observation"))
+                   "late: str, seen: Observation | Seen | None) -> Observation"))
       .def("_start_burst", &start_burst, "iterations"_a.none(), "at"_a.none(), "late"_a.none(),
-           nb::sig("def _start_burst(self, iterations: int, at: int | None, late: str) -> Burst"));
+           "seen"_a.none(),
+           nb::sig("def _start_burst(self, iterations: int, at: int | None, late: str, "
+                   "seen: Observation | Seen | None) -> Burst"));
 
-  m.def("start_bursts", &start_bursts, "members"_a,
-        nb::sig("def start_bursts(members: collections.abc.Sequence[tuple[Frontend, int]]) "
-                "-> list[Burst]"));
+  m.def("start_bursts", &start_bursts, "members"_a, "seen"_a.none(),
+        nb::sig("def start_bursts(members: collections.abc.Sequence[tuple[Frontend, int]], "
+                "seen: Observation | Seen | None) -> list[Burst]"));
   m.def("wait_for_bursts", &wait_for_bursts, "bursts"_a, "timeout"_a.none(),
         nb::sig("def wait_for_bursts(bursts: collections.abc.Sequence[Burst], "
                 "timeout: float | None) -> list[Observation]"));

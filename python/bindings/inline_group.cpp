@@ -70,9 +70,9 @@ class PreparedBurst {
 
   const o80::InlineGroup::BurstPlan& plan() const { return plan_; }
   /// As the burst of one robot. Returns its last iteration.
-  o80::Iteration run(const Frontend& self, nb::handle timeout, nb::handle at,
-                     nb::handle late) const {
-    const o80::PulseOptions options = pulse_options(at, late);
+  o80::Iteration run(const Frontend& self, nb::handle timeout, nb::handle at, nb::handle late,
+                     nb::handle seen) const {
+    const o80::PulseOptions options = pulse_options(at, late, seen);
     const o80::Timeout patience = timeout_of(timeout);
     const auto frontend = self.shared();
     plan_.add_targets(*frontend, plan_.targets);
@@ -238,8 +238,9 @@ void bind_inline_group(nb::module_& m) {
            "first"_a, "group"_a, "following"_a, "feeds"_a, nb::keep_alive<1, 2>(),
            nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
       .def("run", &PreparedBurst::run, "frontend"_a, "timeout"_a.none(), "at"_a.none(), "late"_a,
+           "seen"_a.none(),
            nb::sig("def run(self, frontend: Frontend, timeout: float | None, at: int | None, "
-                   "late: str) -> int"));
+                   "late: str, seen: Observation | Seen | None) -> int"));
 
   nb::class_<Group> group(m, "InlineGroup", "The compiled half of o80.InlineGroup.");
   refuse_to_pickle(group, "an inline group", "its rows");

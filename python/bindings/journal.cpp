@@ -1,6 +1,7 @@
 #include "o80/runtime/journal.hpp"
 
 #include <nanobind/nanobind.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
@@ -173,6 +174,7 @@ void bind_journal(nb::module_& m) {
       .def_ro("ticket", &JournalEntry::ticket)
       .def_ro("at", &JournalEntry::at)
       .def_ro("burst", &JournalEntry::burst)
+      .def_ro("seen", &JournalEntry::seen, nb::sig("def seen(self) -> Seen | None"))
       .def_ro("records", &JournalEntry::records)
       .def_ro("records_lost", &JournalEntry::records_lost)
       .def_prop_ro("blocks", [](const JournalEntry& self) { return bytes_of(self.blocks); })

@@ -73,11 +73,12 @@ nb::tuple reduce(nb::handle self) {
                                   row, observation->missed));
 }
 
-std::shared_ptr<o80::Description> description_from(nb::bytes schema) {
+std::shared_ptr<o80::Description> description_from(nb::bytes schema, std::uint64_t epoch) {
   auto description = std::make_shared<o80::Description>();
   description->schema =
       o80::schema_from_bytes(std::as_bytes(std::span(schema.c_str(), schema.size())));
   description->layout = o80::row_layout(description->schema);
+  description->epoch = epoch;
   return description;
 }
 
@@ -85,7 +86,7 @@ std::shared_ptr<o80::Description> description_from(nb::bytes schema) {
 
 void bind_observation(nb::module_& m) {
   nb::class_<o80::Description>(m, "Description", "A robot as its segment describes it.")
-      .def(nb::new_(&description_from), "schema"_a)
+      .def(nb::new_(&description_from), "schema"_a, "epoch"_a = 0)
       .def(
           "schema", [](const o80::Description& self) { return o80::tables_of(self.schema); },
           nb::sig("def schema(self) -> dict[str, typing.Any]"))
@@ -101,11 +102,13 @@ void bind_observation(nb::module_& m) {
       .def_prop_ro(
           "layout", [](const Decoder& self) { return self.layout; },
           nb::sig("def layout(self) -> typing.Any"))
+      .def_prop_ro("epoch", [](const Decoder& self) { return self.description->epoch; })
       .def(
           "__reduce__",
           [](const Decoder& self) {
-            return nb::make_tuple(nb::module_::import_("o80.rows.layout").attr("decoder_of"),
-                                  nb::make_tuple(table_of(*self.description)));
+            return nb::make_tuple(
+                nb::module_::import_("o80.rows.layout").attr("decoder_of"),
+                nb::make_tuple(table_of(*self.description), self.description->epoch));
           },
           nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"));
 
@@ -119,6 +122,9 @@ The arrays are views of this observation's own copy of the row, which does not c
       .def_prop_ro(
           "iteration", [](const Observation& self) { return self.row.iteration(); },
           "The iteration of this row.")
+      .def_prop_ro(
+          "epoch", [](const Observation& self) { return self.row.epoch(); },
+          "The number of the run that published it; 0: not known.")
       .def_prop_ro(
           "time", [](const Observation& self) { return self.row.time(); },
           "When it was published [ns]: of the monotonic clock, or simulated in bursting.")

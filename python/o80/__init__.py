@@ -6,8 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 from o80._core import Batch as Batch
 from o80._core import Burst as Burst
+from o80._core import DecisionLatency as DecisionLatency
 from o80._core import Handle as Handle
 from o80._core import Observation as Observation
+from o80._core import Seen as Seen
 from o80._core import Stream as Stream
 from o80._core import version as version
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import o80
@@ -229,3 +229,71 @@ def test_runs_of_different_starts_of_a_computer_are_joined_on_the_wall_clock() -
     assert shifts_of(runs) == {"a": 10**18, "b": 10**18 + 10**9}  # type: ignore[arg-type]
     runs["b"] = (clock["monotonic"], 10**18 + 1000)  # one start: the wall clock was adjusted
     assert shifts_of(runs) == {"a": 0, "b": 0}  # type: ignore[arg-type]
+
+
+class Mirrored:
+    """A twin that mirrors rows of an arm, whose clocks have nothing in common."""
+
+    def __init__(self, arm: o80.Frontend, twin: o80.Frontend) -> None:
+        self.arm, self.twin = arm, twin
+        self.partners: dict[int, int] = {}  # of each row of the twin
+
+    def follow(self, iterations: int) -> None:
+        seen = self.arm.latest()
+        self.twin.add_command("elbow", 0.01 * seen.iteration)
+        before = self.twin.published
+        self.twin.burst(iterations, seen=seen)
+        for row in range(before + 1, before + 1 + iterations):
+            self.partners[row] = seen.iteration
+
+
+@settings(max_examples=15, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 7), st.integers(1, 4)), min_size=1, max_size=12))
+def test_rows_of_a_twin_meet_the_rows_by_which_it_was_commanded(
+    tmp_path_factory: pytest.TempPathFactory, steps: list[tuple[int, int]]
+) -> None:
+    path = tmp_path_factory.mktemp("seen") / "run.mcap"
+    with (
+        o80.Backend("test-seen-arm", ["joint"]) as robot,
+        o80.robots.load("two_joints").inline("test-seen-twin") as twin,
+    ):
+        robot.publish()
+        with o80.Frontend("test-seen-arm") as arm, o80.Recording(path, [arm, twin]):
+            mirrored = Mirrored(arm, twin)
+            twin.burst(3)
+            for skipped, iterations in steps:
+                for _ in range(skipped):
+                    robot.step()
+                    robot.publish()
+                mirrored.follow(iterations)
+            live = o80.align({"twin": twin, "arm": arm}, by="seen")
+    recorded = o80.open(path)
+    stored = o80.align({name: recorded[f"test-seen-{name}"] for name in ("twin", "arm")}, by="seen")
+    for joined in (live, stored):
+        rows = joined["twin"].iteration
+        assert rows.tolist() == list(range(len(rows)))
+        assert joined["arm"].found.tolist() == [row in mirrored.partners for row in rows]
+        found = joined["arm"].found
+        assert joined["arm"].iteration[found].tolist() == list(mirrored.partners.values())
+        assert np.isnan(joined["arm"].age).all()
+        assert joined["twin"].found.all()
+        assert len(joined.time) == len(rows)
+
+
+def test_rows_by_which_nothing_was_commanded_are_no_partners(arm: o80.Frontend) -> None:
+    history = arm.history()
+    sources: dict[str, Any] = {"arm": arm, "other": history}
+    for wrong in ({"arm": arm}, dict(reversed(sources.items()))):
+        with pytest.raises(o80.InvalidArgument, match="needs two sources"):
+            o80.align(wrong, by="seen")
+    with pytest.raises(o80.InvalidArgument, match=r"give the row when you send.*seen=row"):
+        o80.align(sources, by="seen")
+    with pytest.raises(o80.InvalidArgument, match="takes no period"):
+        o80.align(sources, by="seen", how="nearest")
+    arm.add_command("elbow", 0.1)
+    arm.burst(2, seen=arm.latest())
+    joined = o80.align(sources, by="seen")
+    assert joined["other"].found.tolist() == [False, True, True]
+    assert joined["other"].age[1:].tolist() == pytest.approx([0.001, 0.002])
+    with pytest.raises(o80.InvalidArgument, match="give the row when you send"):
+        o80.align(sources | {"other": arm.history(since=1)}, by="seen")

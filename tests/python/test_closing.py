@@ -63,7 +63,7 @@ DATA = {
     "Backend": {"segment", "schema", "close"},
     "Process": {"segment", "frontend"},
     "Burst": {"batch"},
-    "Batch": set(),
+    "Batch": {"seen"},
     "Stream": {"__iter__"},
 }
 # of a closed one; a frontend's life is that of its backend

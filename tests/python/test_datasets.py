@@ -244,3 +244,29 @@ def test_the_command_writes_a_data_set(form: str, recorded: Path, tmp_path: Path
     options = ("-o", tmp_path / "set", "--format", form, "--every", 10)
     said = run_o80("export", recorded, *options).stdout
     assert "3 episodes, 7 steps at 100 a second" in said
+
+
+def test_actions_come_with_the_latency_of_their_decisions(segment: str, tmp_path: Path) -> None:
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(tmp_path / "run.mcap", arm) as recording,
+    ):
+        recording.mark("episode")
+        arm.burst(4)
+        for delay in (1, 3):
+            seen = arm.latest()
+            arm.burst(delay)
+            arm.add_command("elbow", 0.1 * delay)
+            arm.burst(2, seen=seen)
+        recording.mark("episode_end")
+    found = episodes(tmp_path / "run.mcap", every=2)
+    (episode,) = found.all
+
+    iterations = [2, 4, 6, 8, 10, 12]  # at the ends of the steps; batches began at 6 and 11
+    assert episode.rows.iteration[1:].tolist() == iterations
+    assert episode.seen.tolist() == [-1, -1, 4, 4, 4, 7]
+    delays = [np.nan, np.nan, 0.002, 0.002, 0.002, 0.004]
+    assert episode.delays == pytest.approx(delays, nan_ok=True)
+    lerobot.write(tmp_path / "set", found)
+    table = pyarrow.parquet.read_table(tmp_path / "set/data/chunk-000/file-000.parquet")
+    assert table["action.delay"].to_pylist() == pytest.approx([-1, -1, 0.002, 0.002, 0.002, 0.004])

@@ -160,10 +160,15 @@ def test_the_command_tells_the_delay_in_a_recording(segment: str, tmp_path: Path
 
 def test_the_programs_of_the_page_run(capsys: pytest.CaptureFixture[str]) -> None:
     programs = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
-    assert len(programs) == 2
+    assert len(programs) == 3
     for program in programs:
         exec(compile(program, str(PAGE), "exec"), {})
-    shape, other, age, capture = capsys.readouterr().out.splitlines()
+    shape, other, age, *joined, capture = capsys.readouterr().out.splitlines()
+    assert joined == [
+        "[0 1 2 3 4 5 6]",
+        "[3 3 4 4 8 8]",
+        "[False  True  True  True  True  True  True]",
+    ]
     assert (shape, other) == ("(501,)", "(501, 2)")
     assert 0 < float(age) < 1 / 180
     time, error, epoch = capture.split()

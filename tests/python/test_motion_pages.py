@@ -19,13 +19,14 @@ def test_the_first_program_about_commands_runs(capsys: pytest.CaptureFixture[str
     assert capsys.readouterr().out == "COMPLETED 0 [0.  0.5]\n"
 
 
-def test_the_program_about_previews_prints_what_it_says(
+def test_programs_about_commands_print_what_they_say(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
-    (program,) = (text for text in programs("commands.md") if "arm.preview(" in text)
-    exec(compile(program, "commands.md", "exec"), {"__name__": "preview"})
+    for verb in ("arm.preview(", "seen=seen"):
+        (program,) = (text for text in programs("commands.md") if verb in text)
+        exec(compile(program, "commands.md", "exec"), {"__name__": "preview"})
 
-    assert capsys.readouterr().out.splitlines() == re.findall(r"print\(.*\)  # (.*)", program)
+        assert capsys.readouterr().out.splitlines() == re.findall(r"print\(.*\)  # (.*)", program)
 
 
 def test_the_program_about_chunks_runs(capsys: pytest.CaptureFixture[str]) -> None:

@@ -30,6 +30,7 @@ class Commander:
 
     def __init__(self, arm: o80.Frontend, seed: int) -> None:
         self.arm, self.random = arm, random.Random(seed)
+        self.eyes = random.Random(seed + 1)
 
     def act(self) -> None:
         for _ in range(self.random.randrange(3)):
@@ -39,7 +40,10 @@ class Commander:
         if self.random.random() < 0.05:
             self.arm.add_purge(self.random.choice(["elbow", "shoulder"]))
         later = self.random.random() < 0.1
-        self.arm.pulse(at=self.arm.published + self.random.randrange(8) if later else None)
+        self.arm.pulse(
+            at=self.arm.published + self.random.randrange(8) if later else None,
+            seen=self.arm.latest() if self.eyes.random() < 0.3 else None,
+        )
         if self.random.random() < 0.05:
             self.arm.add_request(self.random.choice(["reset", "restore"]))
             self.arm.pulse()
@@ -127,7 +131,12 @@ def test_a_history_without_row_0_begins_at_a_reset_or_a_snapshot(segment: str, s
         arm.request("snapshot", slot=2)
         arm.burst(700)
         run_bursts(arm, seed, 20)
-        for request, fields in (("reset", {}), ("restore", {"slot": 2}), ("snapshot", {"slot": 1})):
+        requests: dict[str, dict[str, Any]] = {
+            "reset": {},
+            "restore": {"slot": 2},
+            "snapshot": {"slot": 1},
+        }
+        for request, fields in requests.items():
             arm.request(request, **fields)
             run_bursts(arm, seed + 10, 10)
         arm.request("restore", slot=1)

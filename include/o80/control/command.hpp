@@ -6,6 +6,7 @@
 #include <string_view>
 
 #include "o80/base/time.hpp"
+#include "o80/describe/rows.hpp"
 
 namespace o80 {
 
@@ -67,11 +68,27 @@ struct CommandOptions {
   Start start = Start::desired;
 };
 
-/// The iteration at which a batch acts, and what happens if that iteration has begun.
+/// The row by which a batch was decided: of this or of another segment. An observation converts to
+/// it.
+struct Seen {
+  std::uint64_t epoch = 0;  // of the run that published the row
+  Iteration iteration = 0;
+  std::int64_t time = -1;          // of its capture [ns]; -1: not known
+  Clock clock = Clock::monotonic;  // of that time
+  /// The newest iteration of the commanded robot at or before that capture, from which the latency
+  /// of the decision counts; -1: not known. Set when the batch is sent.
+  Iteration since = -1;
+
+  bool operator==(const Seen&) const = default;
+};
+
+/// The iteration at which a batch acts, what happens if that iteration has begun, and by which row
+/// the batch was decided.
 struct PulseOptions {
   enum class Late : std::uint8_t { reject, now };
   Iteration at = kNow;
   Late late = Late::reject;
+  std::optional<Seen> seen = {};  // changes no motion
 };
 
 /// How rows of targets are played, each in a fixed iteration (docs/chunks.md).

@@ -31,6 +31,8 @@ struct RowLayout {
   std::uint32_t mask_words = 0;
   std::uint32_t block = 0;
   std::uint32_t extended_size = 0;
+  /// When the row was captured [ns], int64: RowHead::time, or what a device says (`capture_time`).
+  std::uint32_t captured = offsetof(RowHead, time);
 };
 
 inline RowLayout row_layout(const Schema& schema) {
@@ -46,6 +48,13 @@ inline RowLayout row_layout(const Schema& schema) {
   layout.clamped = layout.active + layout.mask_words * 8;
   layout.braking = layout.clamped + layout.mask_words * 8;
   layout.size = layout.braking + layout.mask_words * 8;
+  if (schema.head.extended == kNoType) return layout;
+  const TypeRow& extended = schema.types.at(schema.head.extended);
+  for (std::uint32_t i = extended.first_field; i < extended.first_field + extended.fields; ++i) {
+    const FieldRow& field = schema.fields.at(i);
+    const bool is_time = field.name.view() == "capture_time" && field.kind == Kind::int64;
+    if (is_time && field.rows == 0) layout.captured = layout.extended + field.offset;
+  }
   return layout;
 }
 

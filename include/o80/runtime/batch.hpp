@@ -9,6 +9,7 @@
 
 #include "o80/base/keep_waiting.hpp"
 #include "o80/base/time.hpp"
+#include "o80/control/command.hpp"
 #include "o80/control/status.hpp"
 #include "o80/runtime/observation.hpp"
 
@@ -28,6 +29,15 @@ struct Handle {
   std::int64_t late = 0;
   std::string text;      // the reason in words
   std::string progress;  // of a running request: the driver's text
+};
+
+/// How long after its row was captured a batch was taken. -1: not known, because that row is of
+/// another clock, or not before the batch, or no longer in the history.
+struct DecisionLatency {
+  Iteration iterations = -1;  // of this robot
+  std::int64_t time = -1;     // [ns]
+
+  bool operator==(const DecisionLatency&) const = default;
 };
 
 struct WaitOptions {
@@ -53,6 +63,11 @@ class Batch {
   bool ended() const;
   /// The iteration in which the batch was taken; -1 if it was not taken yet.
   Iteration first_iteration() const;
+  /// By which row it was decided, as it was sent with it.
+  const std::optional<Seen>& seen() const { return seen_; }
+  /// From the capture of that row to the row of the first iteration in which the batch acts. Empty
+  /// if it was sent without such a row, was rejected, or if that iteration is not published yet.
+  std::optional<DecisionLatency> decision_latency() const;
   /// By how many iterations the rows of its chunk, if it has one, are later than they were sent
   /// for, because the actuators stood still; nothing before it was taken. `stood`: whether they
   /// did.
@@ -85,6 +100,7 @@ class Batch {
   std::shared_ptr<LaneSender> lane_;
   CommandId id_ = 0;
   std::uint32_t records_ = 0;
+  std::optional<Seen> seen_;
   std::shared_ptr<Kept> kept_;
 };
 

@@ -162,11 +162,11 @@ class UntypedFrontend {
   /// NoLane, ReadOnly, BackendGone.
   Batch pulse(const PulseOptions& options = {}) { return pulse(options, 0); }
   /// Sends the records of `batch`; added records stay added.
-  Batch pulse(BatchBuilder& batch);
+  Batch pulse(BatchBuilder& batch, const std::optional<Seen>& seen = {});
   /// As `pulse`; a bursting backend also runs until all records have ended.
   Batch pulse_to_end(const PulseOptions& options = {});
   /// The same for the records of `batch`; added records stay added.
-  Batch pulse_to_end(BatchBuilder& batch);
+  Batch pulse_to_end(BatchBuilder& batch, const std::optional<Seen>& seen = {});
   /// Waits for the end of a batch of pulse_to_end and returns the row of its last iteration (of an
   /// empty batch: the newest row). Throws as Batch::wait; BackendGone also for an empty batch.
   UntypedObservation wait_for_end(const Batch& batch, Timeout timeout,
@@ -283,7 +283,8 @@ class UntypedFrontend {
                      const KeepWaiting& keep_waiting);
   /// Whether somebody will ask for the statuses of a batch.
   enum class Requested : std::uint8_t { yes, no };
-  Sent send(BatchBuilder& builder, const BatchRecord& record, Requested requested = Requested::yes);
+  Sent send(BatchBuilder& builder, const BatchRecord& record, const std::optional<Seen>& seen = {},
+            Requested requested = Requested::yes);
   static BatchRecord batch_of(const PulseOptions& options);
   Sent send_burst(BatchBuilder& builder, std::int64_t iterations, const PulseOptions& options,
                   Requested requested);
@@ -298,9 +299,10 @@ class UntypedFrontend {
   UntypedObservation first_row_of(const Move& move, const Deadline& deadline,
                                   const KeepWaiting& keep_waiting) const;
   UntypedObservation burst_to(const Move& move, Timeout timeout, const KeepWaiting& keep_waiting);
-  friend std::vector<Burst> start_bursts(std::span<const BurstMember> group);
+  friend std::vector<Burst> start_bursts(std::span<const BurstMember> group,
+                                         const std::optional<Seen>& seen);
   void refuse_burst(std::int64_t iterations) const;
-  void refuse_unless_ready(std::int64_t iterations);
+  void refuse_unless_ready(std::int64_t iterations, const std::optional<Seen>& seen);
   CommandId draw_ids(LaneSender& lane, std::uint64_t n, bool stays);
   void refuse_if_too_much(const BatchBuilder& builder) const;
   void refuse_if_too_many_wait(Iteration at, const LaneSender& lane);
@@ -308,7 +310,6 @@ class UntypedFrontend {
                       const LaneSender& lane) const;
   [[noreturn]] void missing(Iteration k) const;
   void wait_for_latest(std::byte* row) const;
-  SegmentError damaged() const;
 
   std::shared_ptr<Link> link_;
 };
@@ -331,7 +332,9 @@ std::uint64_t halt(const std::string& segment, std::string_view reason,
 
 /// Starts bursts of several backends that run at the same time; does not wait. No burst starts
 /// unless all backends are alive, bursting, and have a lane with room for the added records.
-std::vector<Burst> start_bursts(std::span<const BurstMember> group);
+/// `seen`: by which row all of them were decided.
+std::vector<Burst> start_bursts(std::span<const BurstMember> group,
+                                const std::optional<Seen>& seen = {});
 
 /// start_bursts and wait_for.
 std::vector<UntypedObservation> burst(std::span<const BurstMember> group, Timeout timeout,

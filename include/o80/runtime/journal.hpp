@@ -3,6 +3,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -83,6 +84,7 @@ struct JournalEntry {
   std::vector<JournalRecord> records;  // empty with `records_lost`
   bool records_lost = false;           // they were overwritten before they were read
   std::vector<std::byte> blocks;       // the batch as it came; empty with `records_lost`
+  std::optional<Seen> seen{};          // by which row it was decided, as its sender says
   // status, rejected
   Status status = Status::none;
   Reason reason = Reason::none;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "o80/base/time.hpp"
+#include "o80/control/command.hpp"
 #include "o80/describe/describe.hpp"
 #include "o80/describe/layout.hpp"
 #include "o80/describe/schema.hpp"
@@ -17,6 +18,7 @@ namespace o80 {
 struct Description {
   Schema schema;
   RowLayout layout;
+  std::uint64_t epoch = 0;  // of the run whose rows it describes; 0: of none
 };
 
 /// One row of a history, in bytes: desired, observed and extended values of one iteration.
@@ -35,6 +37,14 @@ class UntypedObservation {
   Iteration iteration() const { return head().iteration; }
   /// On the schema's clock [ns].
   std::int64_t time() const { return head().time; }
+  /// The run that published the row.
+  std::uint64_t epoch() const { return description_->epoch; }
+  /// For `pulse({.seen = row})`.
+  operator Seen() const {  // NOLINT(google-explicit-constructor)
+    const auto time = unpack<std::int64_t>(bytes() + layout().captured);
+    const bool is_known = layout().captured == offsetof(RowHead, time) || time > 0;
+    return {epoch(), iteration(), is_known ? time : -1, schema().head.clock};
+  }
   const std::byte* desired() const { return bytes() + layout().desired; }
   const std::byte* observed() const { return bytes() + layout().observed; }
   const std::byte* extended() const { return bytes() + layout().extended; }

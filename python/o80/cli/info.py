@@ -12,8 +12,15 @@ import typer
 import o80._core as _core
 from o80.base.screen import Column, print_json, print_table, style
 from o80.cli.attach import attach
-from o80.frontend.backend_texts import halt_text, pace_text, running_texts, watchdog_text
+from o80.frontend.backend_texts import (
+    halt_text,
+    latency_text,
+    pace_text,
+    running_texts,
+    watchdog_text,
+)
 from o80.rows.actuators import ACTUATOR_HEADS, actuator_rows, field_text
+from o80.rows.journal import latency_summary
 from o80.rows.provenance import started_with
 
 
@@ -51,6 +58,8 @@ def info(
         for said in (halt, trouble, watchdog_text(schema), *running):
             if said:
                 print(said)
+        if line := latency_text(latency_summary(frontend.journal()), schema["period"]):
+            print(line)
         if schema["actuators"]:
             print()
             heads = [Column("", right=True), *(Column(name) for name in ACTUATOR_HEADS[1:])]

@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+import o80._core as _core
 from o80.base.errors import Error, TimeoutError
 from o80.base.screen import style
 from o80.frontend.frontend import Frontend
@@ -92,4 +93,8 @@ class _Lines:
 
 
 def _plain(value: Any) -> Any:
+    if isinstance(value, _core.Seen):
+        return {
+            name: getattr(value, name) for name in ("epoch", "iteration", "time", "clock", "since")
+        }
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else str(value)

@@ -25,14 +25,14 @@ def plot(
     segment: Annotated[str | None, typer.Option(help="Only this segment of a recording.")] = None,
 ) -> None:
     """Plot rows: desired and observed together, sensor values, halts, late iterations, ends of
-    commands, marks of a recording.
+    commands, marks of a recording, the delay of decisions (if no --fields are chosen).
 
     Each run of a robot that was restarted has panels of its own. Runs of different times begin at 0
     each.
     """
     from o80.joining import plot as plots
     from o80.joining.plot import Placed, origins
-    from o80.rows.journal import command_ends
+    from o80.rows.journal import command_ends, decisions
 
     found: dict[str, Named] = {}
     for source in dict.fromkeys(sources):
@@ -45,11 +45,14 @@ def plot(
     zeros, axes = origins(
         {name: Placed(each.history, each.wall_offset) for name, each in found.items()}
     )
+    journals = {name: each.journal() for name, each in found.items()}
+    wanted = [field for field in fields.split(",") if field]
     figure = plots.plot(
         {name: each.history for name, each in found.items()},
-        [field for field in fields.split(",") if field],
-        ends={name: command_ends(each.journal()) for name, each in found.items()},
+        wanted,
+        ends={name: command_ends(entries) for name, entries in journals.items()},
         marks={name: each.marks for name, each in found.items()},
+        decided={} if wanted else {name: decisions(each) for name, each in journals.items()},
         origins=zeros,
         label="time [s]" if axes == 1 else f"time since each of {axes} beginnings [s]",
         window=output is None,

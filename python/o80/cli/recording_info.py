@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import o80._core as _core
 from o80.base.screen import Column, bytes_text, plain, print_json, print_table, style
-from o80.frontend.backend_texts import age_text
+from o80.frontend.backend_texts import age_text, latency_text
 from o80.rows.provenance import started_with
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 MARKS_AT_ENDS = 10  # listed at the beginning and at the end
 LONGEST_VALUE = 60  # of a mark, in characters
 GAPS = 10  # listed for each run
+MAX_ENTRIES = 200_000  # of a journal that are read for the latency of decisions, the newest
 COLUMNS = (
     Column("segment"),
     Column("run", right=True),
@@ -53,6 +54,9 @@ def recording_info(path: Path, *, as_json: bool = False) -> None:
         print_table(COLUMNS, [_row(name, number, epoch) for name, number, epoch in runs])
     for line in [line for run in runs for line in _missing(*run)]:
         print(plain(line))
+    for name, number, epoch in runs:
+        if line := latency_text(latency_of(epoch), epoch.schema["period"]):
+            print(plain(f"{_of_run(name, number)}: {line}"))
     _print_marks(recording.marks)
     _print_starts(runs)
 
@@ -146,9 +150,22 @@ def _summary(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
     }
 
 
+def _of_run(name: str, number: int) -> str:
+    return name if number == 0 else f"{name}/{number}"
+
+
+def latency_of(epoch: RecordedEpoch) -> dict[str, int]:
+    """The decision latency of the batches in the last entries of its journal."""
+    from o80.rows.journal import latency_summary
+
+    if epoch.journal_codec is None or epoch.journal_codec > _core.JOURNAL_CODEC:
+        return {}
+    return latency_summary(epoch.last_entries(MAX_ENTRIES))
+
+
 def _missing(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
     """Gaps and their reasons, a line each; of many the first ones."""
-    of_run = name if number == 0 else f"{name}/{number}"
+    of_run = _of_run(name, number)
     lines = [f"{of_run}: {epoch.interruption}"] if epoch.interruption else []
     lines += [f"{of_run}: {gap}" for gap in epoch.gaps[:GAPS]]
     more = len(epoch.gaps) - GAPS
@@ -161,6 +178,7 @@ def _fields(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
         **_summary(name, number, epoch),
         "gaps": [gap._asdict() for gap in epoch.gaps],
         "interruption": str(epoch.interruption or ""),
+        "decision_latency": latency_of(epoch),
         "schema": epoch.schema,
         "provenance": asdict(epoch.provenance),
     }

@@ -15,6 +15,7 @@ from o80.base.cached import cached
 from o80.base.errors import InvalidArgument
 from o80.rows.columns import columns_of
 from o80.rows.history import History, values_of
+from o80.rows.journal import Decisions, decisions
 
 if TYPE_CHECKING:
     from o80.recording.marks import Mark
@@ -31,6 +32,11 @@ class Episode:
 
     rows: History  #: T + 1 rows: what was there before each step, and after the last one
     rewards: NDArray[np.float64]  #: (T,)
+    #: (T,) the iteration of the row by which each action was decided, as `pulse(seen=row)` said (of
+    #: a row of another robot: the newest one of this robot then); -1: not known.
+    seen: NDArray[np.int64]
+    #: (T,) the decision latency of each action, from that row to its first one [s]; NaN: not known.
+    delays: NDArray[np.float64]
     terminated: bool  #: it ended by itself; else it was cut off
     task: str
     values: Mapping[str, Any]  #: of the mark before it
@@ -91,11 +97,12 @@ def episodes_of(
     every = whole(every, "every", 1)
     chosen = recording[_segment(recording, segment)]
     epochs = [epoch for epoch in chosen.epochs if epoch.rows]
+    taken = {epoch: decisions(epoch.native_journal()) for epoch in epochs}
     left_out: list[str] = []
     found = []
     for span in _spans(recording.marks, chosen.name, begin, end):
         try:
-            found.append(_episode(span, epochs, chosen.name, every))
+            found.append(_episode(span, epochs, chosen.name, every, taken))
         except InvalidArgument as error:
             left_out.append(str(error))
     if not found:
@@ -144,7 +151,13 @@ def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Itera
         yield _Span(number, open_at, None)
 
 
-def _episode(span: _Span, epochs: Sequence["RecordedEpoch"], segment: str, every: int) -> Episode:
+def _episode(
+    span: _Span,
+    epochs: Sequence["RecordedEpoch"],
+    segment: str,
+    every: int,
+    taken: Mapping["RecordedEpoch", Decisions],
+) -> Episode:
     """Raises InvalidArgument if its rows are not all there."""
     mark = span.marks[0]
     where = f"episode {span.number} (mark at row {mark.rows[segment]})"
@@ -165,14 +178,27 @@ def _episode(span: _Span, epochs: Sequence["RecordedEpoch"], segment: str, every
     if steps < 1:
         raise InvalidArgument(f"{where}: it has no step")
     rows = rows[: steps * every + 1 : every]
+    seen, delays = _decided(taken[epoch], rows.iteration[1:], epoch.schema["period"])
     ending = None if span.until is None or span.until.name == mark.name else span.until
     return Episode(
         rows=rows,
         rewards=_rewards(span, ending, segment, every, steps),
+        seen=seen,
+        delays=delays,
         terminated=ending is not None and not ending.values.get("truncated", False),
         task=str(mark.values.get("task", "")) or epoch.schema["robot"],
         values=mark.values,
     )
+
+
+def _decided(
+    taken: Decisions, iterations: NDArray[np.int64], period: int
+) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    """`seen` and `delays` of the newest batch that was taken at each of these iterations."""
+    newest = np.searchsorted(taken.taken, iterations, side="right") - 1
+    seen: NDArray[np.int64] = np.append(taken.since, -1)[newest]  # the last one: none yet
+    latency = np.append(taken.taken, 0)[newest] - seen
+    return seen, np.where(seen >= 0, latency * period * 1e-9, np.nan)
 
 
 def _epoch_at(mark: "Mark", epochs: Sequence["RecordedEpoch"]) -> "RecordedEpoch":

@@ -28,6 +28,8 @@ def write(path: Path, episodes: Episodes) -> None:
 
     observation.state is observed, observation.environment_state the sensor values, action the
     desired states that were reached with the step; next.reward and next.done are those of the step.
+    action.delay is the decision latency of each action [s], -1 where it is not known; only if
+    actions were sent with `pulse(seen=row)`.
     """
     needed("pyarrow", "export", "a LeRobot data set")
     if path.exists():
@@ -62,7 +64,9 @@ def _features(episodes: Episodes) -> dict[str, dict[str, Any]]:
         for name, numbers in vectors.items()
         if numbers
     }
+    says = any(np.isfinite(episode.delays).any() for episode in episodes.all)
     for name, dtype in (
+        *([("action.delay", "float32")] if says else []),
         ("next.reward", "float32"),
         ("next.done", "bool"),
         ("timestamp", "float32"),
@@ -85,6 +89,7 @@ def _frames(
         "action": episode.actions,
         "observation.state": episode.observed[:-1],
         "observation.environment_state": episode.extended[:-1],
+        "action.delay": np.nan_to_num(episode.delays, nan=-1.0),
         "next.reward": episode.rewards,
         "next.done": steps == len(episode) - 1,
         "timestamp": times,

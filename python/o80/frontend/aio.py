@@ -48,6 +48,7 @@ class Waits:
         *,
         at: int | None = None,
         late: LateWord = "reject",
+        seen: _core.Observation | _core.Seen | None = None,
         check: bool = True,
     ) -> _core.Observation:
         """Sends what was added and waits until it has ended; see `Frontend.pulse_and_wait`."""
@@ -55,9 +56,11 @@ class Waits:
         try:
             if frontend._is_inline:  # iterations of an inline robot run in the calling thread
                 return await in_thread(
-                    lambda: frontend.pulse_and_wait(timeout, at=at, late=late, check=check)
+                    lambda: frontend.pulse_and_wait(
+                        timeout, at=at, late=late, seen=seen, check=check
+                    )
                 )
-            batch = frontend._pulse_to_end(at, late)
+            batch = frontend._pulse_to_end(at, late, seen)
             return await in_thread(lambda: frontend._wait_for_end(batch, timeout, check))
         except asyncio.CancelledError:
             if not frontend.closed:
@@ -107,27 +110,36 @@ class Waits:
         timeout: float | None = None,
         at: int | None = None,
         late: LateWord = "reject",
+        seen: _core.Observation | _core.Seen | None = None,
     ) -> _core.Observation:
         """Sends what was added and bursts; see `Frontend.burst`."""
         frontend = self._frontend
         if frontend._is_inline:
             return await in_thread(
-                lambda: frontend.burst(iterations, timeout=timeout, at=at, late=late)
+                lambda: frontend.burst(iterations, timeout=timeout, at=at, late=late, seen=seen)
             )
-        burst = frontend.burst(iterations, wait=False, at=at, late=late)
+        burst = frontend.burst(iterations, wait=False, at=at, late=late, seen=seen)
         try:
             return await in_thread(lambda: burst.wait(timeout))
         except BaseException:
             burst.cancel()
             raise
 
-    async def request(self, name: str, /, *, timeout: float | None = None, **fields: Any) -> None:
+    async def request(
+        self,
+        name: str,
+        /,
+        *,
+        timeout: float | None = None,
+        seen: _core.Observation | _core.Seen | None = None,
+        **fields: Any,
+    ) -> None:
         """Sends a request at once and waits for its answer; see `Frontend.request`."""
         frontend = self._frontend
         if frontend._is_inline:
-            await in_thread(lambda: frontend.request(name, timeout=timeout, **fields))
+            await in_thread(lambda: frontend.request(name, timeout=timeout, seen=seen, **fields))
             return
-        batch = frontend._send_request(name, fields)
+        batch = frontend._send_request(name, fields, seen)
         await in_thread(lambda: frontend._wait_for_answer(name, batch, timeout))
 
     async def resume(

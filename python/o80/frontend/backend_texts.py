@@ -57,6 +57,27 @@ def pace_text(loop: _core.LoopState) -> str:
     return f"{rate} reached, {loop.overruns} overruns, {loop.skipped} missed ticks, {age}"
 
 
+def latency_text(summary: dict[str, int], period: int) -> str:
+    """The decision latency of batches, in one line; empty if none says what it was decided by.
+
+    summary: of `o80.rows.journal.latency_summary`. period: [ns].
+    """
+    if not summary:
+        return ""
+    known, unknown = summary["batches"] - summary["unknown"], summary["unknown"]
+    lacks = f"not known of {unknown} batch{'' if unknown == 1 else 'es'}"
+    if not known:
+        return f"decision latency {lacks}"
+    median, p95, most = (
+        f"{summary[name]} ({summary[name] * period * 1e-6:.4g} ms)"
+        for name in ("median", "p95", "max")
+    )
+    return (
+        f"decision latency of {known} batch{'' if known == 1 else 'es'} in iterations: "
+        f"median {median}, 95 % {p95}, largest {most}" + (f"; {lacks}" if unknown else "")
+    )
+
+
 def age_text(seconds: float) -> str:
     """A duration with one unit."""
     for unit, length in (("h", 3600), ("min", 60)):

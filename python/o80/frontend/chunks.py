@@ -237,6 +237,7 @@ class Chunks:
             bool(fixed),
             late == "reject",
             self.profile,
+            seen if isinstance(seen, _core.Observation) else None,
         )
         numbers = self._numbers(rows) if self._is_plain else np.empty((count, 0))
         self._sent.append(SentChunk(batch, _Sent(anchor, after, ease, first, numbers)))

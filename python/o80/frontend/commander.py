@@ -112,11 +112,20 @@ class Commander(Reader):
         def forget_added(self) -> None:
             """Drops all that was added and not pulsed."""
 
-        def pulse(self, *, at: int | None = None, late: LateWord = "reject") -> _core.Batch:
+        def pulse(
+            self,
+            *,
+            at: int | None = None,
+            late: LateWord = "reject",
+            seen: _core.Observation | _core.Seen | None = None,
+        ) -> _core.Batch:
             """Sends all that was added as one batch; does not wait.
 
             at: the iteration in which the backend takes the batch (None: at once).
             late: if that iteration has begun already: "reject" the batch, or take it "now".
+            seen: the observation by which the batch was decided, of this or another segment, or
+                the `seen` of another batch. It changes no motion; the journal keeps it, and
+                `Batch.decision_latency` gives the delay of the decision.
 
             Raises LaneFull if the lane has no room for it (nothing is sent, all stays added),
             NoLane, ReadOnly, BackendGone.
@@ -128,6 +137,7 @@ class Commander(Reader):
             *,
             at: int | None = None,
             late: LateWord = "reject",
+            seen: _core.Observation | _core.Seen | None = None,
             check: bool = True,
         ) -> _core.Observation:
             """Sends all that was added and waits until every command of it has ended.
@@ -136,7 +146,7 @@ class Commander(Reader):
             nothing was added: the newest one).
 
             timeout: how long to wait [s].
-            at, late: as in pulse.
+            at, late, seen: as in pulse.
             check: False only waits, whatever ends the commands have.
 
             Raises NotCompleted if a command or request ended otherwise than completed, or the whole
@@ -217,11 +227,20 @@ class Commander(Reader):
             return [self._index(actuators)], True
         return [self._index(actuator) for actuator in actuators], False
 
-    def request(self, name: str, /, *, timeout: float | None = None, **fields: Any) -> None:
+    def request(
+        self,
+        name: str,
+        /,
+        *,
+        timeout: float | None = None,
+        seen: _core.Observation | _core.Seen | None = None,
+        **fields: Any,
+    ) -> None:
         """Sends a request to the driver at once and waits for its answer.
 
         name: name of the request; `requests` lists them.
         timeout: how long to wait for the end of the request [s].
+        seen: as in pulse.
         fields: fields of the request; those with a default may be left out.
 
         It needs no pulse; what was added and not pulsed stays added. A bursting backend runs until
@@ -229,7 +248,7 @@ class Commander(Reader):
         halt ended it, BackendGone, and TimeoutError, whose `batch` can be waited for again: the
         request continues. `add_request` makes it a part of a pulse and does not wait.
         """
-        batch = self._send_request(name, fields)
+        batch = self._send_request(name, fields, seen)
         self._wait_for_answer(name, batch, timeout)
 
     def _wait_for_answer(self, name: str, batch: _core.Batch, timeout: float | None) -> None:
@@ -364,6 +383,7 @@ class Commander(Reader):
         wait: Literal[True] = True,
         at: int | None = None,
         late: LateWord = "reject",
+        seen: _core.Observation | _core.Seen | None = None,
     ) -> _core.Observation: ...
     @overload
     def burst(
@@ -374,6 +394,7 @@ class Commander(Reader):
         wait: Literal[False],
         at: int | None = None,
         late: LateWord = "reject",
+        seen: _core.Observation | _core.Seen | None = None,
     ) -> _core.Burst: ...
     def burst(
         self,
@@ -383,6 +404,7 @@ class Commander(Reader):
         wait: bool = True,
         at: int | None = None,
         late: LateWord = "reject",
+        seen: _core.Observation | _core.Seen | None = None,
     ) -> _core.Observation | _core.Burst:
         """Sends all that was added and runs exactly this number of iterations.
 
@@ -390,6 +412,7 @@ class Commander(Reader):
             the first iteration of this burst).
         late: if that iteration has begun already: "reject" the batch, which then does not burst, or
             take it "now".
+        seen: as in pulse.
 
         Returns the observation of the last iteration; with `wait=False` a Burst, to wait for or to
         cancel. A call that ends without its last row (timeout, Ctrl-C) cancels the rest of its
@@ -400,8 +423,8 @@ class Commander(Reader):
         InvalidArgument.
         """
         if wait:
-            return self._burst(iterations, timeout, at, late)
-        return self._start_burst(iterations, at, late)
+            return self._burst(iterations, timeout, at, late, seen)
+        return self._start_burst(iterations, at, late, seen)
 
     def prepared_burst(
         self,

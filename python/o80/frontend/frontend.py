@@ -177,7 +177,9 @@ class Frontend(Commander):
             raise SchemaMismatch(
                 f"'{segment}' is described differently now; open a new frontend:\n{difference}"
             )
-        self._reattach(attachment)
+        decoder = _core.Decoder(attachment.description, self._layout)
+        self._reattach(attachment, decoder)
+        self._description, self._decoder = attachment.description, decoder
 
     def __enter__(self) -> Self:
         return self

@@ -91,17 +91,22 @@ class PreparedBurst(BurstArrays):
         self._frontend, self._run = frontend, self._compiled.run
 
     def run(
-        self, timeout: float | None = None, *, at: int | None = None, late: LateWord = "reject"
+        self,
+        timeout: float | None = None,
+        *,
+        at: int | None = None,
+        late: LateWord = "reject",
+        seen: _core.Observation | _core.Seen | None = None,
     ) -> int:
         """Sends the targets, with all else that was added, and bursts; fills `rows`.
 
         timeout: for the whole burst [s].
-        at, late: as in `Frontend.burst`.
+        at, late, seen: as in `Frontend.burst`.
 
         Returns the iteration of the last row. Raises InvalidArgument for targets that the robot
         cannot follow, and the exceptions of `Frontend.burst`.
         """
-        return self._run(self._frontend, timeout, at, late)
+        return self._run(self._frontend, timeout, at, late, seen)
 
 
 def _checked(count: int, name: str) -> int:

@@ -49,21 +49,37 @@ class BurstGroup:
 
 @overload
 def burst(
-    members: Mapping[Frontend, int], timeout: float | None = None, *, wait: Literal[True] = True
+    members: Mapping[Frontend, int],
+    timeout: float | None = None,
+    *,
+    wait: Literal[True] = True,
+    seen: _core.Observation | _core.Seen | None = None,
 ) -> dict[Frontend, _core.Observation]: ...
 @overload
-def burst(members: Mapping[Frontend, int], *, wait: Literal[False]) -> BurstGroup: ...
 def burst(
-    members: Mapping[Frontend, int], timeout: float | None = None, *, wait: bool = True
+    members: Mapping[Frontend, int],
+    *,
+    wait: Literal[False],
+    seen: _core.Observation | _core.Seen | None = None,
+) -> BurstGroup: ...
+def burst(
+    members: Mapping[Frontend, int],
+    timeout: float | None = None,
+    *,
+    wait: bool = True,
+    seen: _core.Observation | _core.Seen | None = None,
 ) -> dict[Frontend, _core.Observation] | BurstGroup:
     """Lets several bursting backends run at the same time, each its number of iterations.
 
     All members are checked first: nothing runs unless each is alive, bursting, and has a lane with
     room for the added commands. Then all bursts start.
 
+    seen: the observation by which all of them were decided, as in `Frontend.pulse`.
+
     Returns the last observation of each; with `wait=False` a BurstGroup, to wait for or to cancel.
     Raises NotBursting, InvalidArgument, NoLane, LaneFull and BackendGone before anything runs, and
     the exceptions of `BurstGroup.wait`.
     """
-    group = BurstGroup(dict(zip(members, _core.start_bursts(list(members.items())), strict=True)))
+    bursts = _core.start_bursts(list(members.items()), seen)
+    group = BurstGroup(dict(zip(members, bursts, strict=True)))
     return group.wait(timeout) if wait else group

@@ -11,13 +11,15 @@ from numpy.typing import ArrayLike, NDArray
 import o80._core as _core
 from o80.base.errors import InvalidArgument
 from o80.joining.row_selection import NANOSECOND, NOWHERE, before, blanked, linear, nearest
-from o80.joining.sources import Timed, timed
+from o80.joining.sources import Timed, capture_times, named, opened, run_of, timed
 from o80.rows.history import History
+from o80.rows.journal import decisions
 
 if TYPE_CHECKING:
-    from o80.joining.sources import Sources
+    from o80.joining.sources import Source, Sources
 
 HOW = {"before": before, "nearest": nearest, "linear": linear}
+SEEN = "seen"
 HowWord = Literal["before", "nearest", "linear"]
 
 
@@ -86,7 +88,9 @@ def align(
 
     sources: frontends, segments of a recording, or a whole one; or a mapping from names to these,
         to runs of a recording, or to histories.
-    by: name of a source; its rows give the times.
+    by: name of a source; its rows give the times. "seen": the rows of the first source, each with
+        the rows of the others by which it was commanded: of the newest batch that it had taken and
+        that was pulsed with `seen`. Also for clocks that have nothing in common; `age` is NaN then.
     period: times every so many seconds, while all sources have rows [s].
     at: times (T,) [ns], on the clock of the rows. Give one of by, period and at.
     how: "before": the newest row at or before the time, which a program that ran then had;
@@ -102,6 +106,12 @@ def align(
 
     Raises InvalidArgument.
     """
+    if by == SEEN and SEEN not in (given := named(sources)):
+        if (period, at, how, max_age, offsets) != (None, None, "before", None, None):
+            raise InvalidArgument(
+                "by='seen' takes no period, at, how, max_age and offsets: it joins the very rows"
+            )
+        return _by_seen(given, seconds)
     if sum(given is not None for given in (by, period, at)) != 1:
         raise InvalidArgument("give one of by (a source), period [s] and at (times [ns])")
     found = timed(sources, seconds=seconds, offsets=offsets)
@@ -117,6 +127,43 @@ def align(
             for name, source in found.items()
         },
     )
+
+
+def _by_seen(sources: Mapping[str, Source], seconds: float | None) -> Aligned:
+    """The rows of the first source, with those of the others by which it was commanded."""
+    name, *others = sources
+    run = run_of(name, sources[name])
+    if not hasattr(run, "journal") or not others:
+        raise InvalidArgument(
+            f"by='seen' needs two sources or more, and the first must be a frontend or a run of "
+            f"a recording, whose journal says by which rows it was commanded; got {run!r}"
+        )
+    taken = decisions(run.journal())
+    rows, _ = opened(name, run, seconds)
+    found = {name: _aligned(name, _counted(rows), rows.iteration, "before", None)}
+    for other in others:
+        history, _ = opened(other, sources[other], None)
+        of_other = taken.epoch == history.epoch
+        newest = np.searchsorted(taken.taken[of_other], rows.iteration, side="right") - 1
+        seen = np.append(taken.iteration[of_other], -1)[newest]  # the last one: none yet
+        picked = _aligned(other, _counted(history), seen, "before", 0.0)
+        same_clock = history.schema["clock"] == rows.schema["clock"]
+        captured = capture_times(picked)
+        known = picked.found & same_clock & (captured is None or captured > 0)
+        age = (rows.time - (picked.time if captured is None else captured)) * NANOSECOND
+        picked.age[...] = np.where(known, age, np.nan)
+        found[other] = picked
+    if not any(found[other].found.any() for other in others):
+        raise InvalidArgument(
+            f"no batch that '{name}' has taken was decided by a row of {' or '.join(others)} that "
+            "is there: give the row when you send, as in pulse(seen=row)"
+        )
+    return Aligned(rows.time, found)
+
+
+def _counted(history: History) -> Timed:
+    """Its rows by their iterations instead of times."""
+    return Timed(history, np.arange(len(history)), history.iteration)
 
 
 def _each(found: Mapping[str, Timed], given: Any, name: str) -> dict[str, Any]:

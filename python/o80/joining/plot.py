@@ -11,6 +11,7 @@ from o80.base.extras import needed
 from o80.base.words import CommandEnd, Status
 from o80.rows.columns import Column, chosen, columns_of
 from o80.rows.history import History, values_of
+from o80.rows.journal import Decisions
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -39,6 +40,7 @@ def plot(
     *,
     ends: Mapping[str, Sequence[CommandEnd]] | None = None,
     marks: Mapping[str, Sequence[tuple[str, int]]] | None = None,
+    decided: Mapping[str, Decisions] | None = None,
     origins: Mapping[str, int] | None = None,
     label: str = "time [s]",
     window: bool = False,
@@ -50,6 +52,8 @@ def plot(
         empty: all states.
     ends: ends of commands to mark, by name of robot: o80.command_ends.command_ends(arm.journal()).
     marks: text and iteration of the marks of a recording, by name of robot.
+    decided: for a panel of decision latencies, by name of robot: `o80.rows.journal.decisions` of
+        its journal. Robots of which none is known have no panel.
     origins: the time of a row [ns] that is 0 on the axis, by name of robot (None: the earliest row
         of all). Give those of `o80.timelines.origins` if the clocks of the robots differ.
     label: of the time axis.
@@ -70,10 +74,12 @@ def plot(
         raise InvalidArgument(
             f"{len(panels)} panels are too many for a picture (at most {MAX_PANELS}): name fields"
         )
-    figure = _figure(len(panels), window)
-    axes = figure.subplots(len(panels), sharex=True, squeeze=False)[:, 0]
+    late = {name: each for name, each in (decided or {}).items() if len(each.latency)}
+    count = len(panels) + len(late)
+    figure = _figure(count, window)
+    axes = figure.subplots(count, sharex=True, squeeze=False)[:, 0]
     start = min(int(history.time[0]) for history in histories.values() if len(history))
-    for ax, panel in zip(axes, panels, strict=True):
+    for ax, panel in zip(axes[: len(panels)], panels, strict=True):
         drawn = [curve for curve in curves if (curve.robot, curve.panel) == panel]
         history = histories[panel[0]]
         zero = start if origins is None else origins[panel[0]]
@@ -82,6 +88,12 @@ def plot(
         _mark_ends(ax, panel[1], history, times, (ends or {}).get(panel[0], ()))
         _draw_marks(ax, history, times, (marks or {}).get(panel[0], ()))
         ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    for ax, (name, taken) in zip(axes[len(panels) :], late.items(), strict=True):
+        zero = start if origins is None else origins[name]
+        _draw_latency(ax, histories[name], taken, zero)
+        ax.set_ylabel(
+            f"{name}: decision\nlatency [ms]" if len(histories) > 1 else "decision\nlatency [ms]"
+        )
     axes[-1].set_xlabel(label)
     return figure
 
@@ -195,6 +207,19 @@ def _draw_marks(
             # a mark holds any text: none of it is a formula
             short = text if len(text) <= MAX_OF_MARK else text[: MAX_OF_MARK - 1] + "\u2026"
             ax.text(at, 0.98, short, transform=_shares(ax), parse_math=False, **place)
+
+
+def _draw_latency(ax: "Axes", history: History, taken: Decisions, zero: int) -> None:
+    """A dot for each batch whose row and whose first row are there."""
+    known = taken.since >= 0
+    rows, first, since = history.iteration, taken.taken[known], taken.since[known]
+    if len(rows):
+        there = np.isin(first, rows) & np.isin(since, rows)
+        begun = history.time[np.searchsorted(rows, first[there])]
+        delay = begun - history.time[np.searchsorted(rows, since[there])]
+        ax.plot((begun - zero) * 1e-9, delay * 1e-6, ".", color="tab:brown", markersize=3)
+    ax.set_ylim(bottom=0.0)
+    ax.grid(alpha=0.3)
 
 
 def _is_of(panel: str, actuator: str) -> bool:

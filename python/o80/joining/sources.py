@@ -51,7 +51,7 @@ def timed(
 
     seconds: only the last seconds of each. offsets: see `align`. Raises InvalidArgument.
     """
-    found = {name: _opened(name, source, seconds) for name, source in _named(sources).items()}
+    found = {name: opened(name, source, seconds) for name, source in named(sources).items()}
     if unknown := sorted(set(offsets or {}) - set(found)):
         raise InvalidArgument(f"offsets: there is no {unknown[0]!r}; there are: {', '.join(found)}")
     shifts = shifts_of(found)
@@ -68,29 +68,30 @@ def timed(
     return {name: _on_clock(history, shifts[name]) for name, (history, _) in found.items()}
 
 
-def _named(sources: Sources) -> Mapping[str, Source]:
+def named(sources: Sources) -> Mapping[str, Source]:
     if isinstance(sources, Mapping):
         return sources
     if hasattr(sources, "segments"):
         file = cast("RecordingFile", sources)
         return {name: file[name] for name in file}
-    named: dict[str, Source] = {}
+    found: dict[str, Source] = {}
     for source in cast("Iterable[Source]", sources):
         name = getattr(source, "segment", None) or getattr(source, "name", None)
         if name is None:
             raise InvalidArgument(
                 f"{source!r} has no name: give a mapping from names to sources instead of a list"
             )
-        if name in named:
+        if name in found:
             raise InvalidArgument(f"two sources are named '{name}': give a mapping from names")
-        named[name] = source
-    return named
+        found[name] = source
+    return found
 
 
-def _opened(name: str, source: Any, seconds: float | None) -> tuple[History, int | None]:
-    """The history of a source, and wall-clock time less row time [ns]; None: not known."""
-    if isinstance(source, History):
-        return source.select(seconds=seconds) if seconds is not None else source, None
+def run_of(name: str, source: Any) -> Any:
+    """A frontend, history or recorded run as it is; of a recorded segment its only run.
+
+    Raises InvalidArgument.
+    """
     epochs = getattr(source, "epochs", None)
     if epochs is not None:
         if len(epochs) != 1:
@@ -99,6 +100,14 @@ def _opened(name: str, source: Any, seconds: float | None) -> tuple[History, int
                 f"{{'{name}': recording['{name}'].epochs[0]}}"
             )
         (source,) = epochs
+    return source
+
+
+def opened(name: str, source: Any, seconds: float | None) -> tuple[History, int | None]:
+    """The history of a source, and wall-clock time less row time [ns]; None: not known."""
+    source = run_of(name, source)
+    if isinstance(source, History):
+        return source.select(seconds=seconds) if seconds is not None else source, None
     if not hasattr(source, "history"):
         raise InvalidArgument(
             f"{name} must be a Frontend, a History, or a run of a recording, got {source!r}"
@@ -123,16 +132,22 @@ def shifts_of(found: Mapping[str, tuple[History, int | None]]) -> dict[str, int]
     return {name: offset or 0 for name, (_, offset) in found.items()}
 
 
+def capture_times(history: History) -> NDArray[np.int64] | None:
+    """When a device captured the rows [ns], at most 0: never; None: when they were published."""
+    if CAPTURE_TIME not in (history.extended.keys() if len(history) else ()):
+        return None
+    return np.asarray(getattr(history.extended, CAPTURE_TIME)).astype(np.int64)
+
+
 def _on_clock(history: History, shift: int) -> Timed:
     """The rows that were captured, in the order of their capture; of equal ones the newest."""
-    times = history.time
-    if CAPTURE_TIME in (history.extended.keys() if len(history) else ()):
-        times = np.asarray(getattr(history.extended, CAPTURE_TIME)).astype(np.int64)
+    times = capture_times(history)
+    if times is not None:
         captured = np.flatnonzero(times > 0)
         order = captured[np.argsort(times[captured], kind="stable")]
         ordered = times[order]
         newest = np.append(ordered[1:] != ordered[:-1], True)[: len(ordered)]
         rows = order[newest]
     else:
-        rows = np.arange(len(history))
+        rows, times = np.arange(len(history)), history.time
     return Timed(history, rows, times[rows] + shift)

@@ -208,7 +208,7 @@ class RecordedEpoch:
     def _decoder(self) -> Any:
         table = self._parts[0].table()
         try:
-            return decoder_of(table)
+            return decoder_of(table, self._note.epoch)
         except SegmentError as error:
             raise RecordingError(
                 f"{self._parts[0].path}: the description of '{self._note.segment}' is damaged"
@@ -370,6 +370,18 @@ class RecordedEpoch:
         native = _core.RecordedJournal(self.description, whole(since, "since", 0), rests)
         for part in self.journal_parts():
             yield from self._decoded(native, part)
+
+    def last_entries(self, most: int) -> Iterator[_core.JournalEntry]:
+        """The newest entries, at least this number if there are so many; the newest chunk first.
+
+        Batches whose records are in two chunks lack them. Raises RecordingError.
+        """
+        for part in self.journal_parts(newest_first=True):
+            found = self._decoded(_core.RecordedJournal(self.description, 0), part)
+            yield from found
+            most -= len(found)
+            if most <= 0:
+                break
 
     @property
     def has_journal(self) -> bool:

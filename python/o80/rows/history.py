@@ -307,6 +307,11 @@ class History:
         """The rows, for NumPy and h5py."""
         return np.array(self.rows, dtype=dtype, copy=copy)
 
+    @property
+    def epoch(self) -> int:
+        """The number of the run that published them; 0: not known."""
+        return self._decoder.epoch
+
     def __reduce__(self) -> tuple[Any, ...]:
         return History, (self._decoder, self._contiguous)
 

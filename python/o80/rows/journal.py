@@ -2,9 +2,10 @@
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.words import CommandEnd, Reason, Status
@@ -73,6 +74,7 @@ class JournalEntry:
     ticket: int | None = None  #: place of a batch in the order of all pulses
     at: int | None = None  #: the iteration that a batch was sent for, if it is another one
     burst: int | None = None  #: iterations that a burst may run; -1 until its batch has ended
+    seen: _core.Seen | None = None  #: by which row a batch was decided, as its sender says
     cut: bool = False  #: of burst_ended: it ended early
     commands: tuple[JournalCommand, ...] = ()
     commands_lost: bool = False  #: they were overwritten before they were read
@@ -97,6 +99,51 @@ def marks_in(entries: Iterable[JournalEntry]) -> list[tuple[str, int]]:
         for command in entry.commands
         if command.kind == "mark"
     ]
+
+
+class Decisions(NamedTuple):
+    """The N batches that were taken and said by which row they were decided, in their order."""
+
+    taken: NDArray[np.int64]  #: (N,) the iteration that took it
+    epoch: NDArray[np.uint64]  #: (N,) the run that published the row
+    iteration: NDArray[np.int64]  #: (N,) of the row
+    since: NDArray[np.int64]  #: (N,) iteration of the commanded robot then; -1: not known
+
+    @property
+    def latency(self) -> NDArray[np.int64]:
+        """(M,) the decision latency of those of which it is known [iterations]."""
+        latency: NDArray[np.int64] = (self.taken - self.since)[self.since >= 0]
+        return latency
+
+
+def decisions(entries: Iterable[JournalEntry | _core.JournalEntry]) -> Decisions:
+    """Which of the batches were decided by which rows."""
+    found = [
+        (each.iteration, seen.epoch, seen.iteration, -1 if seen.since is None else seen.since)
+        for each in entries
+        if (seen := each.seen) is not None and each.kind == "taken"
+    ]
+    taken, epoch, iteration, since = zip(*found, strict=True) if found else ((), (), (), ())
+    return Decisions(
+        np.array(taken, np.int64),
+        np.array(epoch, np.uint64),
+        np.array(iteration, np.int64),
+        np.array(since, np.int64),
+    )
+
+
+def latency_summary(entries: Iterable[JournalEntry | _core.JournalEntry]) -> dict[str, int]:
+    """The decision latency of these batches [iterations]: median, p95, max; batches, and those of
+    which it is not known. Empty if no batch says by which row it was decided.
+    """
+    taken = decisions(entries)
+    if not len(taken.taken):
+        return {}
+    counts = {"batches": len(taken.taken), "unknown": len(taken.taken) - len(taken.latency)}
+    if not len(taken.latency):
+        return counts
+    found = np.percentile(taken.latency, (50, 95, 100), method="higher").astype(int).tolist()
+    return counts | dict(zip(("median", "p95", "max"), found, strict=True))
 
 
 def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:
@@ -148,6 +195,7 @@ class EntryDecoder:
             ticket=native.ticket if of_batch else None,
             at=native.at if of_batch and native.at not in (-1, native.iteration) else None,
             burst=native.burst if native.burst != 0 else None,
+            seen=native.seen,
             cut=native.cut,
             commands=tuple(self._command(record) for record in native.records),
             commands_lost=native.records_lost,

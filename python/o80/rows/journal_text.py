@@ -75,6 +75,7 @@ class JournalText:
             if entry.kind != "rejected":
                 self._open[entry.lane, command.id] = texts[-1]
         what = "; ".join(texts) or ("commands were overwritten" if entry.commands_lost else "burst")
+        what += _seen(entry)
         if entry.kind == "rejected":
             return f"{_sender(entry)}: {what}: {self._style(f'rejected ({entry.reason})', 'red')}"
         later = f" (for iteration {entry.at})" if entry.kind == "scheduled" else ""
@@ -88,6 +89,15 @@ class JournalText:
         status = "begins" if entry.status == "active" else str(entry.status)
         reason = f" ({entry.reason})" if entry.reason not in (None, "none") else ""
         return f"  {what}: {status}{reason}"
+
+
+def _seen(entry: JournalEntry) -> str:
+    """By which row a batch was decided: ", decided 12 iterations before"."""
+    if entry.seen is None:
+        return ""
+    if entry.kind == "taken" and entry.seen.since is not None:
+        return f", decided {entry.iteration - entry.seen.since} iterations before"
+    return f", decided by row {entry.seen.iteration} of run {entry.seen.epoch}"
 
 
 def _sender(entry: JournalEntry) -> str:

@@ -383,7 +383,10 @@ class Layout:
 
 
 @lru_cache(maxsize=64)
-def decoder_of(table: bytes) -> _core.Decoder:
-    """The decoder of pickled rows; `table` is the description in the format of a segment."""
-    description = _core.Description(table)
+def decoder_of(table: bytes, epoch: int = 0) -> _core.Decoder:
+    """The decoder of pickled or recorded rows.
+
+    table: the description in the format of a segment. epoch: of the run that published them.
+    """
+    description = _core.Description(table, epoch)
     return _core.Decoder(description, Layout(description))

@@ -139,9 +139,9 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   BatchRecord written = batch;
   written.kind = RecordKind::batch;
   written.records = records_;
-  written.blocks = static_cast<std::uint32_t>(blocks_.size());
+  written.blocks = static_cast<std::uint32_t>(blocks());
   const bool is_express = !has_commands() && requests() == 0 && of(RecordKind::mark) == 0 &&
-                          records_ > 0 && records_ <= kMaxExpressRecords && batch.at == kNow &&
+                          records_ > 0 && blocks() <= 1 + kMaxExpressRecords && batch.at == kNow &&
                           batch.burst == 0 && (batch.flags & kBurstUntilEnded) == 0;
   if (is_express) written.flags |= kExpress;
   std::memcpy(blocks_.front().bytes.data(), &written, sizeof written);
@@ -155,6 +155,14 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
     if (head.kind != RecordKind::member) ++place;
     head.id = record_id(batch.id, place - 1);
     std::memcpy(bytes, &head, sizeof head);
+  }
+  if (seen_) {
+    SeenBlock seen{head_of(RecordKind::seen, static_cast<std::uint16_t>(seen_->clock)),
+                   seen_->epoch, seen_->time};
+    seen.head.amount = seen_->iteration;
+    seen.head.id = static_cast<CommandId>(seen_->since);
+    seen.head.payload_bytes = sizeof seen - sizeof seen.head;
+    std::memcpy(blocks_.emplace_back().bytes.data(), &seen, sizeof seen);
   }
   return blocks_;
 }

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string_view>
 #include <vector>
@@ -67,6 +68,9 @@ class BatchBuilder {
   /// A note for the journal: 1 to kMaxMarkBytes bytes in UTF-8. Throws InvalidArgument.
   std::uint32_t mark(std::string_view text);
 
+  /// By which row the batch is decided, if its sender says so: a block behind its records.
+  void set_seen(const std::optional<Seen>& seen) noexcept { seen_ = seen; }
+
   /// Completes the batch. `batch` has id, ticket, at, late_now, burst and flags. A batch of few
   /// purges and control orders, without `at` and without a burst, is marked as express.
   std::span<const Block> seal(const BatchRecord& batch);
@@ -75,6 +79,7 @@ class BatchBuilder {
     blocks_.resize(1);
     records_ = 0;
     counts_ = {};
+    seen_.reset();
   }
   bool empty() const noexcept { return records_ == 0; }
   std::uint32_t records() const noexcept { return records_; }
@@ -86,7 +91,7 @@ class BatchBuilder {
     return of(RecordKind::take_control) + of(RecordKind::release_control);
   }
   /// Number of blocks of the batch.
-  std::uint64_t blocks() const noexcept { return blocks_.size(); }
+  std::uint64_t blocks() const noexcept { return blocks_.size() + (seen_ ? 1 : 0); }
 
  private:
   /// `option`: only_own of a purge, accepts of a resume.
@@ -115,6 +120,7 @@ class BatchBuilder {
   std::vector<Block> blocks_;  // the first is the BatchRecord
   std::uint32_t records_ = 0;  // without members
   std::array<std::uint32_t, static_cast<std::size_t>(RecordKind::mark) + 1> counts_{};  // of a kind
+  std::optional<Seen> seen_;
 };
 
 }  // namespace o80

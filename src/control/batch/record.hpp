@@ -27,6 +27,7 @@ enum class RecordKind : std::uint8_t {
   group,   // one command for several actuators, with one status; `rows` members follow
   member,
   mark,  // a note for the journal; the payload is its text
+  seen,  // the row by which the batch was decided; only the journal's readers look at it
   // set by BatchPlanner only; invalid when sent by a frontend
   overwritten_list = 0x80,  // first of a list of records with this end status, in no queue
   purged_list,
@@ -38,7 +39,7 @@ enum class RecordKind : std::uint8_t {
 
 /// True for the kinds that a lane may hold, and for those of the backend.
 constexpr bool is_known(RecordKind kind) noexcept {
-  return (kind >= RecordKind::batch && kind <= RecordKind::mark) ||
+  return (kind >= RecordKind::batch && kind <= RecordKind::seen) ||
          (kind >= RecordKind::overwritten_list && kind <= RecordKind::overwriter_purged);
 }
 
@@ -118,6 +119,17 @@ struct BatchRecord {
 };
 static_assert(sizeof(BatchRecord) == kBlockBytes && std::is_trivially_copyable_v<BatchRecord> &&
               std::is_standard_layout_v<BatchRecord>);
+
+/// The block behind the records of a batch that says what it answers: a record of kind `seen`. It
+/// is none of the records that the batch counts, so the backend passes it over: it has no id and no
+/// status, and changes nothing that the batch does. Of its head, `amount` is Seen::iteration, `id`
+/// is Seen::since (all bits set: not known), and `actuator` the clock.
+struct SeenBlock {
+  RecordHead head;
+  std::uint64_t epoch = 0;
+  std::int64_t time = -1;
+};
+static_assert(sizeof(SeenBlock) == kBlockBytes && std::is_trivially_copyable_v<SeenBlock>);
 
 /// Number of blocks of a record with this payload.
 constexpr std::uint64_t blocks_of(std::uint64_t payload_bytes) noexcept {

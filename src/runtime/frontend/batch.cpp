@@ -34,6 +34,7 @@ Batch::Batch(std::shared_ptr<Link> link, Sent sent)
       lane_(std::move(sent.lane)),
       id_(sent.id),
       records_(sent.records),
+      seen_(sent.seen),
       kept_(std::make_shared<Kept>()) {
   kept_->commands = std::move(sent.commands);
 }
@@ -186,6 +187,19 @@ Iteration Batch::last_iteration() const {
   if (id_ == 0) return -1;
   const Handle handle = ask(id_ + 1);
   return is_end(handle.status) ? handle.iteration : -1;
+}
+
+std::optional<DecisionLatency> Batch::decision_latency() const {
+  const Iteration first = first_iteration();
+  if (!seen_ || first < 0 || first > link_->history.published() || rejected_by() != Reason::none)
+    return {};
+  UntypedObservation row(link_->description);
+  DecisionLatency found;
+  if (seen_->since >= 0) found.iterations = first - seen_->since;
+  const bool has_time = seen_->time >= 0 && seen_->clock == row.schema().head.clock;
+  if (has_time && link_->history.read(first, row.bytes()) && row.time() > seen_->time)
+    found.time = row.time() - seen_->time;
+  return found;
 }
 
 Reason Batch::rejected_by() const {

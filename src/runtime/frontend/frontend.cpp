@@ -97,7 +97,7 @@ void UntypedFrontend::latest(std::byte* row) const {
 void UntypedFrontend::wait_for_latest(std::byte* row) const {
   const Deadline deadline(std::chrono::seconds(5));
   do {
-    if (link_->history.is_damaged()) throw damaged();
+    if (link_->history.is_damaged()) throw link_->damaged();
     if (link_->history.published() < 0) {
       throw Error("'" + segment() +
                   "' has published no row yet, its robot is still starting: use wait_for(0)");
@@ -116,8 +116,8 @@ UntypedObservation UntypedFrontend::latest() const {
   return observation;
 }
 
-SegmentError UntypedFrontend::damaged() const {
-  return SegmentError("the history of '" + segment() +
+SegmentError Link::damaged() const {
+  return SegmentError("the history of '" + segment.name() +
                       "' is damaged: its counters contradict each other. Start its backend again.");
 }
 
@@ -189,7 +189,7 @@ std::int64_t UntypedFrontend::wait_for_next(Iteration& position, std::byte* row,
                          "' was not published in time");
     }
     if (link_->history.read(next, row)) break;
-    if (link_->history.is_damaged()) throw damaged();
+    if (link_->history.is_damaged()) throw link_->damaged();
     next = std::max(next, link_->history.oldest());
   }
   position = next + 1;

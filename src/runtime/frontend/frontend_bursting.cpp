@@ -80,7 +80,7 @@ Sent UntypedFrontend::send_burst(BatchBuilder& builder, std::int64_t iterations,
   refuse_burst(iterations);
   BatchRecord record = batch_of(options);
   record.burst = iterations;
-  return send(builder, record, requested);
+  return send(builder, record, options.seen, requested);
 }
 
 Burst UntypedFrontend::start_burst(std::int64_t iterations, const PulseOptions& options) {
@@ -137,22 +137,25 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
 // ------------------------------------------------------------------------------ groups
 
 /// Throws what start_burst would throw, or if the backend has gone, as far as it can be known now.
-void UntypedFrontend::refuse_unless_ready(std::int64_t iterations) {
+void UntypedFrontend::refuse_unless_ready(std::int64_t iterations,
+                                          const std::optional<Seen>& seen) {
   refuse_burst(iterations);
   const auto lock = link_->lock_to_send();
   if (link_->runner) link_->runner->refuse_nested();
   link_->segment.throw_if_gone();
   BatchRecord wanted;
   wanted.burst = iterations;
+  link_->builder.set_seen(seen);
   refuse_if_too_much(link_->builder);
   refuse_if_full(link_->builder, wanted, *link_->lane());
 }
 
-std::vector<Burst> start_bursts(std::span<const BurstMember> group) {
-  std::set<const Link*> seen;
+std::vector<Burst> start_bursts(std::span<const BurstMember> group,
+                                const std::optional<Seen>& seen) {
+  std::set<const Link*> members;
   for (const auto& [frontend, iterations] : group) {
-    frontend->refuse_unless_ready(iterations);
-    if (!seen.insert(frontend->link_.get()).second) {
+    frontend->refuse_unless_ready(iterations, seen);
+    if (!members.insert(frontend->link_.get()).second) {
       throw InvalidArgument("the frontend of '" + frontend->segment() +
                             "' is in the group twice: give each frontend once");
     }
@@ -161,7 +164,7 @@ std::vector<Burst> start_bursts(std::span<const BurstMember> group) {
   bursts.reserve(group.size());
   try {
     for (const auto& [frontend, iterations] : group) {
-      bursts.push_back(frontend->start_burst(iterations));
+      bursts.push_back(frontend->start_burst(iterations, {.seen = seen}));
     }
   } catch (...) {
     // another thread has used the free blocks, or a backend has just gone

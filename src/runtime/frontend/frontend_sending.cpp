@@ -489,9 +489,32 @@ CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stay
   return *first;
 }
 
+/// What a batch says about the row by which it was decided: also, which iteration was the newest
+/// then.
+std::optional<Seen> Link::told(const std::optional<Seen>& seen) const {
+  if (!seen) return {};
+  if (seen->epoch == 0 || seen->iteration < 0 || seen->iteration > kMaxIterations) {
+    throw InvalidArgument("seen: row " + std::to_string(seen->iteration) + " of run " +
+                          std::to_string(seen->epoch) +
+                          " is no row: give an observation that a frontend or a recording has "
+                          "returned");
+  }
+  Seen told = *seen;
+  told.since = -1;
+  if (seen->epoch == description->epoch) {
+    if (seen->iteration <= history.published()) told.since = seen->iteration;
+  } else if (seen->time >= 0 && seen->clock == description->schema.head.clock) {
+    const Iteration newest = iteration_at(seen->time);
+    if (newest >= history.oldest()) told.since = newest;
+  }
+  return told;
+}
+
 /// Seals a batch, sends it, and lets an inline robot take it.
-Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted, Requested requested) {
+Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted,
+                           const std::optional<Seen>& seen, Requested requested) {
   Sent sent;
+  sent.seen = link_->told(seen);
   std::shared_ptr<InlineRunner> runner;
   {
     const auto lock = link_->lock_to_send();
@@ -501,6 +524,7 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted, Req
     sent.lane = link_->lane();
     LaneSender* const lane = sent.lane.get();
     link_->segment.throw_if_known_gone();
+    builder.set_seen(sent.seen);
     refuse_if_too_much(builder);
     refuse_if_too_many_wait(wanted.at, *lane);
     refuse_if_full(builder, wanted, *lane);
@@ -528,23 +552,23 @@ Batch UntypedFrontend::pulse(const PulseOptions& options, std::uint16_t flags) {
     const auto lock = link_->lock_to_send();
     if (link_->builder.empty()) return {};
   }
-  return {link_, send(link_->builder, record)};
+  return {link_, send(link_->builder, record, options.seen)};
 }
 
-Batch UntypedFrontend::pulse(BatchBuilder& batch) {
+Batch UntypedFrontend::pulse(BatchBuilder& batch, const std::optional<Seen>& seen) {
   link_->check_usable();
-  return batch.empty() ? Batch() : Batch(link_, send(batch, {}));
+  return batch.empty() ? Batch() : Batch(link_, send(batch, {}, seen));
 }
 
 Batch UntypedFrontend::pulse_to_end(const PulseOptions& options) {
   return pulse(options, bursting() ? kBurstUntilEnded : std::uint16_t{0});
 }
 
-Batch UntypedFrontend::pulse_to_end(BatchBuilder& batch) {
+Batch UntypedFrontend::pulse_to_end(BatchBuilder& batch, const std::optional<Seen>& seen) {
   link_->check_usable();
   BatchRecord record;
   if (bursting()) record.flags = kBurstUntilEnded;
-  return batch.empty() ? Batch() : Batch(link_, send(batch, record));
+  return batch.empty() ? Batch() : Batch(link_, send(batch, record, seen));
 }
 
 }  // namespace o80

@@ -9,8 +9,11 @@ namespace o80 {
 
 Iteration UntypedFrontend::iteration_at(std::int64_t time) const {
   link_->check_usable();
-  const HistoryReader& history = link_->history;
-  UntypedObservation row(link_->description);
+  return link_->iteration_at(time);
+}
+
+Iteration Link::iteration_at(std::int64_t time) const {
+  UntypedObservation row(description);
   // times do not decrease: search by halves from the oldest row to the newest
   Iteration below = history.oldest() - 1;
   Iteration above = history.published() + 1;

@@ -16,6 +16,7 @@ std::shared_ptr<const Description> describe(const AttachedSegment& segment) {
   auto description = std::make_shared<Description>();
   description->schema = schema_from_bytes(segment.schema());
   description->layout = row_layout(description->schema);
+  description->epoch = segment.header().epoch;
   if (description->layout.size != segment.header().shape.row_bytes) {
     throw SegmentError("segment '" + segment.name() + "' has rows of " +
                        std::to_string(segment.header().shape.row_bytes) +

@@ -72,6 +72,11 @@ struct Link {
   /// `keep_waiting`, extended to throw Closed when the frontend is closed during a wait.
   KeepWaiting guarded(const KeepWaiting& keep_waiting) const;
 
+  /// As UntypedFrontend::iteration_at.
+  Iteration iteration_at(std::int64_t time) const;
+  SegmentError damaged() const;
+  std::optional<Seen> told(const std::optional<Seen>& seen) const;
+
   AttachedSegment segment;
   std::shared_ptr<const Description> description;
   CommandCheck command_check;

@@ -18,7 +18,8 @@ struct Sent {
   CommandId id = 0;
   std::uint32_t records = 0;
   std::uint32_t events_before_send = 0;  // event count of the lane before the batch was sent
-  std::vector<SentCommand> commands;     // empty for a burst whose batch nobody gets
+  std::optional<Seen> seen;
+  std::vector<SentCommand> commands;  // empty for a burst whose batch nobody gets
 };
 
 /// Waits until burst `id` is done; returns its last row, or -1 if its batch was rejected.

@@ -17,6 +17,7 @@ namespace {
 // blocks itself (`what` of an entry, `blocks` of a batch).
 static_assert(sizeof(RecordHead) == 48 && sizeof(BatchRecord) == kBlockBytes);
 static_assert(static_cast<std::uint16_t>(RecordKind::mark) == journal_format::kMark);
+static_assert(static_cast<std::uint16_t>(RecordKind::seen) == journal_format::kSeen);
 
 template <class Struct>
 void append(std::vector<std::byte>& to, const Struct& value) {

@@ -246,6 +246,9 @@ void JournalDecoder::fill_batch(JournalEntry& entry) {
   Kept& kept = found->second;
   entry.burst = burst_of(kept.blocks);
   entry.records = records_of(description_->schema, kept.blocks);
+  entry.seen = seen_in(kept.blocks);
+  // a row that was not there yet, or a claim of it
+  if (entry.seen && entry.seen->since >= entry.iteration) entry.seen->since = -1;
   for (const JournalRecord& record : entry.records)
     if (entry.unknown.empty()) entry.unknown = record.unknown;
   entry.blocks = kept.blocks;

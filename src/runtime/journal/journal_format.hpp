@@ -47,6 +47,8 @@ inline constexpr std::uint16_t kLost = 257;
 
 /// A note: its payload is a text. JournalEncoder collects them.
 inline constexpr std::uint16_t kMark = 10;
+/// By which row the batch before it was decided. The batch does not count it among its records.
+inline constexpr std::uint16_t kSeen = 11;
 
 inline constexpr std::size_t kRecordFields = 27;
 inline constexpr std::size_t kBatchFields = 43;

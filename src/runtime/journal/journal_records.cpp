@@ -231,4 +231,29 @@ std::vector<JournalRecord> records_of(const Schema& schema, std::span<const std:
   return records;
 }
 
+std::optional<Seen> seen_in(std::span<const std::byte> blocks) {
+  BatchRecord batch;
+  if (blocks.size() < kBlockBytes) return std::nullopt;
+  std::memcpy(&batch, blocks.data(), sizeof batch);
+  blocks = blocks.subspan(kBlockBytes);
+  // it lies behind the records, members of the last one included
+  for (std::uint32_t records = 0; !blocks.empty();) {
+    SeenBlock last;
+    const std::span<const std::byte> from = blocks;
+    const std::optional<Piece> piece = take_piece(blocks);
+    if (!piece) return std::nullopt;
+    if (piece->head.kind == RecordKind::member || records++ < batch.records) continue;
+    std::memcpy(&last, from.data(), sizeof last);
+    const bool is_row = last.head.kind == RecordKind::seen && blocks.empty() &&
+                        last.head.payload_bytes == sizeof last - sizeof last.head &&
+                        last.head.amount >= 0 && last.head.amount <= kMaxIterations &&
+                        last.head.actuator <= static_cast<std::uint16_t>(Clock::simulated);
+    if (!is_row) return std::nullopt;
+    const auto since = static_cast<Iteration>(last.head.id);
+    return Seen{last.epoch, last.head.amount, last.time, static_cast<Clock>(last.head.actuator),
+                since >= 0 && since <= kMaxIterations ? since : -1};
+  }
+  return std::nullopt;
+}
+
 }  // namespace o80

@@ -104,6 +104,7 @@ class Liar {
     head.amount = static_cast<std::int64_t>(random() >> random() % 64);
     // the requests of the station that break it are a frontend's right too
     if (head.kind == RecordKind::request) head.kind = RecordKind::command;
+    if (random() % 8 == 0) head.kind = RecordKind::seen;
     constexpr double kTargets[] = {0.5,
                                    -0.5,
                                    1e300,

@@ -138,6 +138,7 @@ struct SentBatch {
   std::int64_t taken;      // iteration, -1: not told
   std::int64_t burst_row;  // last row of the burst, -1: not told
   std::int64_t sent_at;    // [ns], when it was out; 0: not told
+  std::int64_t seen;       // one more than the row by which it was decided; 0: not told
 };
 
 enum class SentKind : std::uint32_t {

@@ -56,6 +56,11 @@ class Commander {
 
   o80::PulseOptions when(Sender& sender) {
     o80::PulseOptions options;
+    const o80::Iteration newest = sender.frontend().published();
+    if (actor_.chance.percent(30) && newest >= 0) {
+      options.seen = {sender.frontend().epoch(), newest - actor_.chance.between(-5, 5)};
+      options.seen->iteration = std::max<o80::Iteration>(0, options.seen->iteration);
+    }
     if (actor_.chance.percent(85)) return options;
     options.at =
         std::max<o80::Iteration>(0, sender.frontend().published() + actor_.chance.between(-2, 40));

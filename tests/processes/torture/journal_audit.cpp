@@ -57,6 +57,7 @@ class JournalAudit {
       if (!decided_.emplace(key, taken ? entry.iteration : -1).second)
         fail(Fault::doubled, key, "the batch was decided on twice");
       if (!missed_ && entry.records_lost) fail(Fault::lost, key, "its records are not there");
+      if (!entry.records_lost) seen_[key] = entry.seen ? entry.seen->iteration + 1 : 0;
     }
     if (entry.kind == JournalKind::status && o80::is_end(entry.status)) {
       if (!ends_.emplace(key, End{entry.status, entry.iteration}).second)
@@ -65,8 +66,11 @@ class JournalAudit {
   }
 
   void compare(const SentBatch& batch) {
-    if (batch.taken < 0) return;
     const Key key{batch.lane, batch.id};
+    const auto seen = seen_.find(key);
+    if (seen != seen_.end() && seen->second != batch.seen)
+      fail(Fault::falsely_told, key, "it was decided by another row");
+    if (batch.taken < 0) return;
     const auto found = decided_.find(key);
     if (found == decided_.end()) {
       if (!missed_) fail(Fault::lost, key, "it was taken, and the journal does not say so");
@@ -97,6 +101,7 @@ class JournalAudit {
   bool missed_ = false;
   std::map<Key, std::int64_t> decided_;  // the iteration; -1: rejected
   std::map<Key, End> ends_;
+  std::map<Key, std::int64_t> seen_;  // one more than the row; 0: none
 };
 
 }  // namespace

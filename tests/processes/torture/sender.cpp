@@ -198,6 +198,7 @@ bool Sender::send(std::int64_t at, bool late_now, std::int64_t burst, bool until
   entry.taken = -1;
   entry.burst_row = -1;
   entry.sent_at = 0;
+  entry.seen = 0;
   entry.sent = static_cast<std::uint32_t>(Sent::under_way);
   actor_.slot.batches = place + 1;
   first_ = actor_.slot.commands;
@@ -210,6 +211,7 @@ bool Sender::send(std::int64_t at, bool late_now, std::int64_t burst, bool until
     const o80::Batch batch = send();
     entry.id = batch.id();
     entry.lane = frontend_.link()->lane()->lane();
+    entry.seen = batch.seen() ? batch.seen()->iteration + 1 : 0;
     entry.sent = static_cast<std::uint32_t>(Sent::sent);
     entry.sent_at = o80::monotonic_now();
     open_.push_back({batch, &entry});

@@ -81,6 +81,7 @@ void read_all(JournalReader& reader, const Schema& schema, std::vector<std::byte
     if (item.payload.size() + sizeof(JournalHead) != item.head.words * 8UL) std::abort();
     if (to_text(item.head.kind).empty()) std::abort();
     records_of(schema, item.payload);
+    seen_in(item.payload);
     encoder.encode(item.head, item.payload, copy);
   }
 }
@@ -136,6 +137,7 @@ void run(Bytes bytes) {
   // and as the blocks of a batch
   const auto rest = bytes.rest();
   records_of(schema, rest);
+  seen_in(rest);
   decode(description, rest);
 }
 

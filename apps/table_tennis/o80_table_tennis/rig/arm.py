@@ -79,8 +79,10 @@ class Arm(ArmRows):
         super().__init__(self._rows[-1:], PressureRange.of(frontend))
         motion = field_view(self._rows, *MOTION)
         self.motion = motion.reshape(ITERATIONS, 2, JOINTS).transpose(2, 0, 1)
-        self.start_pressures = np.array(frontend.latest().desired)
-        self.start_angles = np.array(frontend.latest().extended.joint_positions)
+        newest = frontend.latest()
+        self._epoch, self._clock = newest.epoch, frontend.schema["clock"]
+        self.start_pressures = np.array(newest.desired)
+        self.start_angles = np.array(newest.extended.joint_positions)
         assert self.start_pressures.shape == (MUSCLES,)
         assert self.start_angles.shape == (JOINTS,)
 
@@ -88,6 +90,11 @@ class Arm(ArmRows):
     def newest(self) -> int:
         """Iteration of the newest row."""
         return self.frontend.published
+
+    @property
+    def seen(self) -> o80.Seen:
+        """The last row that was read, for what is sent to others by it."""
+        return o80.Seen(self._epoch, int(self._rows["iteration"][-1]), self.last_time, self._clock)
 
     @property
     def last_time(self) -> int:
@@ -103,7 +110,7 @@ class Arm(ArmRows):
         self._at = at
         if self._burst is None:
             self.frontend.add_trajectory(self._pressures, mode="overwrite")
-            self._sent = self.frontend.pulse(at=at, late="now")
+            self._sent = self.frontend.pulse(at=at, late="now", seen=self.seen)
 
     def step(self, first: int) -> bool:
         """Makes the five rows from `first` on, or waits for them, and reads them.

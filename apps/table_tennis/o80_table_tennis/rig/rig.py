@@ -158,7 +158,7 @@ class Rig(Closeable):
         Returns whether the first one made exactly five rows.
         """
         if len(self.twins) == 1:
-            self.twin.step(self.arm.motion)
+            self.twin.step(self.arm.motion, self._seen)
         else:
             for twin in self.twins:
                 twin.mirror(self.arm.motion)
@@ -169,6 +169,11 @@ class Rig(Closeable):
             self.after_step()
         return exact
 
+    @property
+    def _seen(self) -> o80.Seen | None:
+        """The row of the arm that the twins mirror. Without a clock rows of both are as many."""
+        return self.arm.seen if self._real_time else None
+
     def positions(self, _copy: int = 0) -> FloatArray:
         """(balls, 3) of the played ball and the extra ones [m]."""
         extra = [twin.all_balls[0, twin.extra] for twin in self.twins]
@@ -176,7 +181,8 @@ class Rig(Closeable):
 
     def _burst_twins(self, iterations: int) -> None:
         """All twins run at the same time."""
-        rows = o80.burst({twin.frontend: iterations for twin in self.twins}, timeout=TIMEOUT)
+        bursts = {twin.frontend: iterations for twin in self.twins}
+        rows = o80.burst(bursts, timeout=TIMEOUT, seen=self._seen)
         for twin in self.twins:
             twin.see(rows[twin.frontend])
 

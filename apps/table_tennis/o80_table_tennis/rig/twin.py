@@ -88,10 +88,13 @@ class Twin(TwinRows):
         for ball, flight in zip(self.ball_names, flights, strict=bool(flights)):
             self.frontend.add_trajectory(flight.states.view(BALL_STATE)[:, 0], ball)
 
-    def step(self, motion: FloatArray) -> None:
-        """Mirrors angle and velocity of each joint in the arm's last rows (4, 5, 2)."""
+    def step(self, motion: FloatArray, seen: o80.Seen | None) -> None:
+        """Mirrors angle and velocity of each joint in the arm's last rows (4, 5, 2).
+
+        seen: the last of these rows, for those who join the rows of arm and twin.
+        """
         self._motion[...] = motion
-        self.iteration = self._burst.run(TIMEOUT)
+        self.iteration = self._burst.run(TIMEOUT, seen=seen)
 
     def mirror(self, motion: FloatArray) -> None:
         """Adds the same, to be burst together with other twins."""

@@ -52,6 +52,25 @@ TEST(BatchBuilder, IsEmptyAgainWhenCleared) {
   EXPECT_EQ(builder.seal({}).size(), 1U);
 }
 
+TEST(BatchBuilder, WhatWasSeenIsABlockBehindItsRecordsThatTheyDoNotCount) {
+  BatchBuilder builder;
+  builder.purge(kEveryActuator);
+  builder.set_seen(Seen{.epoch = 5, .iteration = 7, .time = 9, .clock = Clock::simulated});
+  EXPECT_EQ(builder.blocks(), 3U);
+  EXPECT_EQ(builder.records(), 1U);
+  const auto blocks = builder.seal({});
+
+  ASSERT_EQ(blocks.size(), 3U);
+  BatchRecord written;
+  std::memcpy(&written, blocks[0].bytes.data(), sizeof written);
+  EXPECT_EQ(written.records, 1U);
+  EXPECT_EQ(written.blocks, 3U);
+  EXPECT_TRUE((written.flags & kExpress) != 0) << "a purge is as fast with it";
+  EXPECT_EQ(head_in(blocks[2]).kind, RecordKind::seen);
+  builder.clear();
+  EXPECT_EQ(builder.seal({}).size(), 1U);
+}
+
 template <class Enum>
 void every_value_has_its_own_text(Enum last) {
   std::set<std::string_view> texts;

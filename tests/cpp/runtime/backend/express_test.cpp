@@ -53,7 +53,7 @@ TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOther
   const Batch queued = send(one, 0, 5.0, {.pace = iterations(10)});
   const Batch mixed = send(one, 1, 5.0, {.pace = iterations(10)});
   one.add_purge(0);
-  const Batch purge = one.pulse();
+  const Batch purge = one.pulse({.seen = one.latest()});
   const Iteration now = station.last() + 1;
   station.run(1);
   EXPECT_EQ(purge.first_iteration(), now);

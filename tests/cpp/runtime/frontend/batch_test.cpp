@@ -46,6 +46,53 @@ TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
   EXPECT_THROW(static_cast<void>(batch.handle(4)), InvalidArgument);
 }
 
+TEST_F(BatchTest, TellsHowLateItsDecisionWas) {
+  StartedStation station({.segment = "pair", .history = 8, .lane_blocks = 16});
+  UntypedFrontend frontend("pair");
+  station.run(2);
+  const UntypedObservation seen = frontend.latest();
+  station.run(3);
+  EXPECT_EQ(frontend.pulse({.seen = seen}).id(), 0U) << "nothing was decided";
+  EXPECT_EQ(send(frontend, 0, 1.0).decision_latency(), std::nullopt);
+  add(frontend, 0, 1.0);
+  const Batch batch = frontend.pulse({.seen = seen});
+  const Seen row{frontend.epoch(), 2, seen.time(), seen.schema().head.clock, 2};
+  EXPECT_EQ(batch.seen(), row);
+  EXPECT_EQ(batch.size(), 1U);
+  EXPECT_EQ(batch.decision_latency(), std::nullopt) << "it was not taken yet";
+  station.run(1);
+  EXPECT_EQ(batch.decision_latency(), (DecisionLatency{4, frontend.latest().time() - seen.time()}));
+
+  // a row of the future, of an unknown run, of one whose clock is another
+  const auto latency_of = [&](Seen claimed) {
+    add(frontend, 0, 1.0);
+    const Batch sent = frontend.pulse({.seen = claimed});
+    station.run(1);
+    return sent.decision_latency();
+  };
+  const Clock other = row.clock == Clock::simulated ? Clock::monotonic : Clock::simulated;
+  EXPECT_EQ(latency_of({frontend.epoch(), 1'000'000, -1, row.clock}), DecisionLatency{});
+  EXPECT_EQ(latency_of({77, 3, -1, row.clock}), DecisionLatency{});
+  EXPECT_EQ(latency_of({77, 3, row.time, other}), DecisionLatency{});
+  EXPECT_EQ(latency_of({77, 3, -5'000'000'000'000'000, row.clock}), DecisionLatency{});
+  // of another run on its clock: from the newest row of this robot then
+  const UntypedObservation newest = frontend.latest();
+  const std::optional<DecisionLatency> known =
+      latency_of({77, 3, newest.time() + 1, newest.schema().head.clock});
+  ASSERT_TRUE(known.has_value());
+  EXPECT_EQ(known->iterations, 1);
+
+  station.run(60);
+  EXPECT_EQ(batch.decision_latency()->iterations, 4);
+  EXPECT_EQ(batch.decision_latency()->time, -1) << "its row was overwritten";
+
+  // it takes one block, and does not stay behind when that does not fit
+  for (int i = 0; i < 13; ++i) add(frontend, 0, 1.0);
+  EXPECT_THROW(frontend.pulse({.seen = newest}), LaneFull);
+  EXPECT_EQ(frontend.added(), 13U);
+  EXPECT_EQ(frontend.pulse().seen(), std::nullopt);
+}
+
 TEST_F(BatchTest, KeepsTheEndStatusesItSawAndForgetsTheRest) {
   StartedStation station({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");

@@ -69,7 +69,9 @@ TEST_F(TypedTest, CommandsSeveralActuatorsOfOneTypeAtOnce) {
   EXPECT_THAT(message_of<InvalidArgument>(
                   [&] { frontend.add_commands({"joints_3", "joints_0"}, {Joint{}}); }),
               HasSubstr("2 actuators"));
-  EXPECT_EQ(frontend.pulse().size(), 1U);
+  const Batch batch = frontend.pulse({.seen = frontend.latest()});
+  EXPECT_EQ(batch.size(), 1U);
+  EXPECT_EQ(batch.seen()->epoch, frontend.epoch());
   const auto desired = backend.step();
   ASSERT_TRUE(desired);
   EXPECT_EQ(desired->joints[3].position, 0.5);

@@ -12,6 +12,7 @@ namespace {
 
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::UnorderedElementsAre;
 
 std::vector<JournalEntry> all_of(Journal& journal) {
   std::vector<JournalEntry> entries;
@@ -112,6 +113,30 @@ TEST_F(JournalAuthorTest, ShowsWhoSentWhatAndWhenItWasTakenStartedAndEnded) {
   EXPECT_EQ(entries[2].status, Status::completed);
   EXPECT_EQ(entries[2].iteration, 5);
   EXPECT_EQ(batch.handle(0).iteration, 5);
+}
+
+TEST_F(JournalAuthorTest, WhatABatchAnswersStandsInEachDecisionOnIt) {
+  station.run(2);
+  const UntypedObservation row = commander->latest();
+  const auto pulse = [&](PulseOptions options) {
+    options.seen = row;
+    add(*commander, 0, 0.5);
+    return commander->pulse(options);
+  };
+  pulse({});
+  pulse({.at = 5});
+  pulse({.at = 1});  // late
+  station.run(4);
+  std::vector<std::pair<JournalKind, Iteration>> decided;
+  for (const JournalEntry& entry : news()) {
+    if (entry.kind == JournalKind::status) continue;
+    EXPECT_EQ(entry.records.size(), 1U);
+    EXPECT_EQ(entry.seen, (Seen{commander->epoch(), 2, row.time(), row.schema().head.clock, 2}));
+    decided.emplace_back(entry.kind, entry.iteration);
+  }
+  using enum JournalKind;
+  EXPECT_THAT(decided, UnorderedElementsAre(std::pair(taken, 3), std::pair(scheduled, 3),
+                                            std::pair(rejected, 3), std::pair(taken, 5)));
 }
 
 TEST_F(JournalAuthorTest, BatchesOfSeveralLanesStandInTheOrderOfTheirTickets) {

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
 #include <map>
 #include <random>
 #include <string>
@@ -359,6 +360,32 @@ class LaterFileTest : public StationTest {
     journal_format::record_fields(put, head);
     put.u64(0U);
   }
+  void add_seen(std::int64_t iteration, std::int64_t since, std::uint16_t clock = 0,
+                std::size_t payload = 16) {
+    RecordHead head;
+    head.amount = iteration;
+    head.id = static_cast<CommandId>(since);
+    head.actuator = clock;
+    LittleEndianWriter put(records_);
+    put.u16(journal_format::kSeen, journal_format::kRecordFields);
+    put.u32(payload, payload);
+    journal_format::record_fields(put, head);
+    put.bytes(std::vector<std::byte>(payload, std::byte{1}));
+  }
+  /// What the reader makes of one behind a command, in the decision of iteration 0.
+  std::optional<Seen> seen_behind_a_command(const std::function<void()>& add) {
+    records_.clear();
+    file_.clear();
+    numbers_ = 0;
+    begin_batch(1, 3);
+    add_command();
+    add();
+    const std::vector<JournalEntry> found = entries();
+    EXPECT_EQ(found.size(), 1U);
+    EXPECT_EQ(found[0].records.size(), 1U);
+    EXPECT_EQ(found[0].unknown, "");
+    return found[0].seen;
+  }
   void add_unknown(std::uint16_t kind, std::size_t fields, std::size_t payload) {
     LittleEndianWriter put(records_);
     put.u16(kind, fields);
@@ -407,18 +434,41 @@ TEST_F(LaterFileTest, ARecordOfAnUnknownKindIsSkippedAndNamed) {
       numbers_ = 0;
       begin_batch(3, 4);
       add_command();
-      add_unknown(11, fields, payload);
+      add_unknown(12, fields, payload);
       add_command();
       const std::vector<JournalEntry> found = entries();
       ASSERT_EQ(found.size(), 1U);
       std::vector<Kind> kinds;
       for (const JournalRecord& record : found[0].records) kinds.push_back(record.kind);
       EXPECT_THAT(kinds, ElementsAre(Kind::command, Kind::unknown, Kind::command));
-      EXPECT_EQ(found[0].records[1].unknown, "record kind 11");
-      EXPECT_EQ(found[0].unknown, "record kind 11");
+      EXPECT_EQ(found[0].records[1].unknown, "record kind 12");
+      EXPECT_EQ(found[0].unknown, "record kind 12");
       EXPECT_FALSE(found[0].records_lost);
     }
   }
+}
+
+TEST_F(LaterFileTest, WhatWasSeenIsReadAndWhatIsNoRowIsNot) {
+  constexpr std::uint64_t kOnes = 0x0101010101010101;
+  const Seen row{kOnes, 7, static_cast<std::int64_t>(kOnes), Clock::simulated, -1};
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(7, -1, 1); }), row);
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(7, 3, 1); }), row) << "a row of the future";
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(7, -9, 1); }), row);
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(7, kMaxIterations + 1, 1); }), row);
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(-1, -1); }), std::nullopt);
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(kMaxIterations + 1, -1); }), std::nullopt);
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(7, -1, 2); }), std::nullopt) << "no clock";
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(7, -1, 0, 15); }), std::nullopt);
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(7, -1, 0, 17); }), std::nullopt);
+  EXPECT_EQ(seen_behind_a_command([&] { add_seen(7, -1, 0, 0); }), std::nullopt);
+  EXPECT_EQ(seen_behind_a_command([&] { add_unknown(12, 27, 16); }), std::nullopt);
+  EXPECT_EQ(seen_behind_a_command([&] {
+              add_seen(7, -1);
+              add_seen(8, -1);
+            }),
+            std::nullopt)
+      << "two answers are none";
+  EXPECT_EQ(seen_behind_a_command([] {}), std::nullopt);
 }
 
 TEST_F(LaterFileTest, ACommandWithAnUnknownWordIsNotReadAsAnother) {
