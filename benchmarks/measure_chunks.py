@@ -52,7 +52,7 @@ class Arm:
 
 @dataclass(frozen=True)
 class Answer:
-    """What the policy said of the row `seen`, in iteration `at`; no actions: it was lost."""
+    """An answer about the row `seen`, that came in iteration `at`; without actions: it was lost."""
 
     seen: int
     at: int

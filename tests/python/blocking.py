@@ -58,6 +58,7 @@ CALLS = {
     "Chunks.wait": Call(
         "(plan := silent.chunks(step=5), plan.send([[0.0, 0.0]]), plan.wait())", "silent.close()"
     ),
+    "SentChunk.wait": Call("silent.chunks(step=5).send([[0.0, 0.0]]).wait()", "silent.close()"),
     "Frontend.request": Call("silent.request('home')", "silent.close()"),
     "Frontend.resume": Call("(silent.halt(), silent.resume(timeout=None))", "silent.close()"),
     "halt": Call("o80.halt(late, timeout=None)", "begin(late)", ""),
