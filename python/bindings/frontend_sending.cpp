@@ -20,6 +20,7 @@
 #include "control/motion/state_layout.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
+#include "runtime/frontend/link.hpp"
 #include "verb.hpp"
 #include "waiting.hpp"
 
@@ -386,6 +387,12 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            "profile"_a.none(), "start"_a.none())
       .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "mask"_a, "anchor"_a,
            "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "profile"_a, "seen"_a.none())
+      .def(
+          "_since",
+          [](const Frontend& self, nb::handle seen) {
+            return self.shared()->link()->told(seen_of(seen))->since;
+          },
+          "seen"_a)
       .def("_purge_own",
            [](const Frontend& self) {
              return send_alone(
