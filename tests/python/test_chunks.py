@@ -308,6 +308,19 @@ def test_what_was_dropped_is_no_longer_planned(arm: o80.Frontend, end: str) -> N
         assert arm.history(len(planned)).desired.tolist() == planned.tolist()
 
 
+def test_a_plan_that_limits_hold_back_goes_on_until_its_last_row_is_desired(segment: str) -> None:
+    limits = {"left": o80.Limits(minimum=-10.0, maximum=10.0, speed=20.0, acceleration=200.0)}
+    with stepped(segment, limits=limits) as robot:
+        plan = robot.frontend.chunks("left", step=2, ease=1)
+        sent = plan.send([0.5, 1.0], seen=0)
+        robot.run(20)
+        assert not sent.batch.ended
+        plan.send([1.0] * 9)
+        robot.run(1)
+        planned = plan.planned(20, step=1).tolist()
+        assert planned == [1.0] * 18, "from the plan, not from what limits made of it"
+
+
 def test_a_row_that_is_gone_is_named_and_the_plan_goes_on(segment: str) -> None:
     with stepped(segment, history=64) as robot:
         plan = robot.frontend.chunks("left", step=5)
