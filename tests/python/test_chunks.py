@@ -5,7 +5,11 @@ import random
 import re
 import subprocess
 import sys
-from collections.abc import Callable
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from fractions import Fraction
 from typing import Any, cast
 
 import numpy as np
@@ -89,6 +93,36 @@ def test_a_late_first_answer_begins_where_the_arm_stands(arm: o80.Frontend) -> N
         plan.wait()
     assert (sent.shift, sent.begins, sent.first) == (350, 452, 0)
     assert arm.history().desired[[461, 471, 481, 491, 501]].tolist() == ROWS.tolist()
+
+
+def test_the_row_of_a_camera_is_an_anchor(process: o80.robots.Process) -> None:
+    with process.frontend() as arm, o80.Backend(f"{process.segment}-camera", ["lens"]) as camera:
+        arm.wait_for(20, WAIT)
+        camera.publish([0.0])
+        with o80.Frontend(f"{process.segment}-camera") as reader:
+            seen = reader.latest()
+        arm.wait_for(arm.published + 20, WAIT)
+        with arm.chunks(step=2000) as plan:
+            sent = plan.send(ROWS, seen=seen)
+            plan.wait(lead=10**6, timeout=WAIT)
+            assert sent.batch.seen.iteration == 0
+            assert sent.batch.seen.epoch == seen.epoch != arm.epoch
+            before = arm.at_time(seen.time)
+            command = next(
+                each for entry in arm.journal() for each in entry.commands if each.pace == "chunk"
+            )
+            assert command.anchor == before.iteration
+            arm.purge()
+
+
+def test_a_row_of_another_clock_is_no_anchor(process: o80.robots.Process) -> None:
+    with process.frontend() as real, o80.robots.load("two_joints").inline() as arm:
+        arm.burst(3)
+        with (
+            arm.chunks(step=10) as plan,
+            pytest.raises(o80.InvalidArgument, match="is of another run"),
+        ):
+            plan.send(ROWS, seen=real.latest())
 
 
 def test_an_older_answer_and_one_from_before_a_fresh_start_are_rejected(arm: o80.Frontend) -> None:
@@ -322,3 +356,228 @@ def test_the_journal_names_a_chunk(segment: str, arm: o80.Frontend) -> None:
     assert command.due == (110, 120, 130, 140, 150)
     assert (command.anchor, command.ease, command.first) == (100, 10, 1)
     assert command.targets[1].tolist() == ROWS[:, 1].tolist()
+
+
+class Grip(IntEnum):
+    OPEN = 0
+    SHUT = 3
+
+
+class Stepped:
+    """A bursting robot in this process, which is at once where it is asked to be."""
+
+    def __init__(self, backend: o80.Backend, frontend: o80.Frontend) -> None:
+        self.backend, self.frontend = backend, frontend
+
+    def run(self, iterations: int) -> None:
+        self.frontend.burst(iterations, wait=False)
+        for _ in range(iterations):
+            self.backend.publish(self.backend.step())
+
+
+@contextmanager
+def stepped(segment: str, state: Any = float, **options: Any) -> Iterator[Stepped]:
+    with o80.Backend(segment, ["left", "right"], state, bursting=True, **options) as backend:
+        backend.publish(np.zeros_like(backend._observed))
+        with o80.Frontend(segment) as frontend:
+            yield Stepped(backend, frontend)
+
+
+@pytest.mark.parametrize("kind", [np.float32, np.int8, np.int64, np.bool_, Grip])
+@pytest.mark.parametrize("profile", ["cubic", "linear", "hold"])
+def test_the_plan_is_that_of_the_numbers_which_are_sent(
+    segment: str, kind: Any, profile: Any
+) -> None:
+    choose = random.Random(3)
+    drawn: dict[Any, Callable[[], Any]] = {
+        np.float32: lambda: choose.uniform(-1, 1),
+        np.bool_: lambda: choose.random() < 0.5,
+    }
+    draw = drawn.get(kind, lambda: choose.choice([0, 3]))
+    with stepped(segment, kind) as robot:
+        arm = robot.frontend
+        plan = arm.chunks(step=5, ease=7, profile=profile)
+        for _ in range(20):
+            plan.send([[draw(), draw()] for _ in range(8)])
+            robot.run(1)
+            now = arm.published
+            planned = plan.planned(now, step=1)
+            count = choose.randrange(1, 30)
+            robot.run(count)
+            desired = arm.history(count).desired
+            rounded = planned if kind is np.float32 else np.floor(planned + 0.5)
+            difference = np.abs(rounded[:count].astype(desired.dtype).astype(float) - desired)
+            # on a line, integers of 64 bits begin at the rounded value
+            assert difference.max() <= (kind is np.int64 and profile == "linear")
+
+
+def test_fields_are_given_by_name(segment: str) -> None:
+    with stepped(segment, [("position", float), ("velocity", float)]) as robot:
+        plan = robot.frontend.chunks("left", step=5, ease=1)
+        sent = plan.send({"position": [0.1, 0.2, 0.3]})
+        robot.run(20)
+        assert sent.batch.statuses == ["completed"]
+        assert robot.frontend.latest().desired["position"].tolist() == [0.3, 0.0]
+
+
+def test_a_chunk_that_waits_is_planned(arm: o80.Frontend) -> None:
+    arm.burst(10)
+    with arm.chunks(step=10, ease=10) as plan:
+        plan.send(ROWS, seen=100)
+        assert plan.left == 140
+        assert not plan.starved
+        planned = plan.planned(100, step=1)
+        seen = plan.wait(lead=20)
+        assert seen.iteration == 130
+        plan.wait()
+        assert arm.history().desired[101:].tolist() == planned.tolist()
+
+
+@pytest.mark.parametrize("end", ["purge", "halt", "overwrite"])
+def test_what_was_dropped_is_no_longer_planned(arm: o80.Frontend, end: str) -> None:
+    arm.burst(10)
+    with arm.chunks(step=10, ease=10) as plan:
+        plan.send(ROWS + 0.5, seen=10)
+        arm.burst(15)
+        if end == "purge":
+            arm.purge()
+        elif end == "halt":
+            arm.resume(arm.halt("a look"), timeout=WAIT)
+        else:
+            arm.add_command(None, [0.0, 0.0], iterations=3, mode="overwrite")
+            arm.pulse()
+        arm.burst(2)
+        assert plan.left == 0
+        assert not plan.starved
+        assert len(plan.planned(arm.published, step=1)) == 0
+        arm.burst(8)
+        plan.send(ROWS)
+        arm.burst(1)
+        now = arm.published
+        planned = plan.planned(now, step=1)
+        plan.wait()
+        assert arm.history(len(planned)).desired.tolist() == planned.tolist()
+
+
+def test_a_plan_that_limits_hold_back_goes_on_until_its_last_row_is_desired(segment: str) -> None:
+    limits = {"left": o80.Limits(minimum=-10.0, maximum=10.0, speed=20.0, acceleration=200.0)}
+    with stepped(segment, limits=limits) as robot:
+        plan = robot.frontend.chunks("left", step=2, ease=1)
+        sent = plan.send([0.5, 1.0], seen=0)
+        robot.run(20)
+        assert not sent.batch.ended
+        plan.send([1.0] * 9)
+        robot.run(1)
+        planned = plan.planned(20, step=1).tolist()
+        assert planned == [1.0] * 18, "from the plan, not from what limits made of it"
+
+
+def test_a_row_that_is_gone_is_named_and_the_plan_goes_on(segment: str) -> None:
+    with stepped(segment, history=64) as robot:
+        plan = robot.frontend.chunks("left", step=5)
+        plan.send([0.1] * 100)
+        robot.run(200)
+        assert plan.left == 300
+        assert plan.wait(lead=300).iteration == 200
+        with pytest.raises(o80.RowOverwritten, match="the history keeps 64 rows"):
+            plan.planned(200)
+        robot.run(301)
+        plan.send([0.2] * 3)
+        robot.run(1)
+        assert len(plan.planned(501)) > 0
+
+
+def test_a_plan_keeps_only_what_it_needs(segment: str) -> None:
+    with stepped(segment, history=64) as robot:
+        plan = robot.frontend.chunks("left", step=5)
+        for _ in range(200):
+            plan.send([0.1] * 50)
+            robot.run(3)
+            plan.planned(robot.frontend.published, 2)
+        computed = [part._computed for part in plan._parts]
+        kept = sum(len(places) for places, _ in filter(None, computed))
+        assert len(plan._open) <= 1
+        assert len(plan._parts) < 64
+        assert kept <= 64 + 250 + 10
+
+
+def test_a_plan_of_a_later_process_on_the_same_lane_is_another_one(
+    bursting: o80.robots.Process, segment: str
+) -> None:
+    send = f"""
+import o80
+with o80.Frontend({segment!r}) as arm, arm.chunks(step=1, ease=1) as plan:
+    sent = plan.send([[0.5, 0.5]] * %d, seen=%d)
+    arm.burst(130)
+    print(sent.batch[0].status)
+"""
+    for rows, seen in ((3, 100), (9, 99)):
+        said = subprocess.run(
+            [sys.executable, "-c", send % (rows, seen)],
+            capture_output=True,
+            text=True,
+            timeout=WAIT,
+        )
+        assert (said.stdout, said.stderr) == ("completed\n", "")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"step": "a"}, "step must be a number, got 'a'"),
+        ({"step": float("nan")}, "step must be a number, got nan"),
+        ({"step": 1e300}, "at most 2"),
+        ({"step": Fraction(1, 2)}, "at least 1 iteration"),
+        ({"ease": 0}, "ease must be from 1 to 2147483648, got 0"),
+        ({"profile": "minimum_jerk"}, "must be one of 'cubic', 'linear', 'hold'"),
+        ({"profile": None}, "profile must be a string, got None"),
+        ({"ensemble": float("inf")}, "ensemble must be a finite number, got inf"),
+    ],
+)
+def test_a_plan_that_cannot_be_is_refused_when_it_is_opened(
+    arm: o80.Frontend, options: dict[str, Any], said: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=said):
+        arm.chunks(**{"step": 5, **options})
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"first": -1}, "first must be from 0 to 1, got -1"),
+        ({"seen": 2**63}, "seen must be from -2147483648"),
+        ({"due": [9, 10.7]}, "due must be a list of whole numbers"),
+        ({"weights": "ab"}, "weights must be finite numbers, got 'ab'"),
+        ({"weights": [1.0, float("nan")]}, "weights must be finite numbers"),
+    ],
+)
+def test_options_of_a_chunk_that_cannot_be_are_refused(
+    arm: o80.Frontend, options: dict[str, Any], said: str
+) -> None:
+    with arm.chunks(step=5) as plan, pytest.raises(o80.InvalidArgument, match=said):
+        plan.send(np.zeros((2, 2)), **options)
+
+
+def test_several_threads_send_on_one_plan(arm: o80.Frontend) -> None:
+    raised: list[BaseException] = []
+    with arm.chunks(step=5, ease=1) as plan:
+
+        def send(place: float) -> None:
+            try:
+                for _ in range(40):
+                    plan.send(np.full((20, 2), place))
+                    plan.planned(arm.published, 3)
+            except BaseException as error:
+                raised.append(error)
+
+        threads = [threading.Thread(target=send, args=(0.1 * i,)) for i in range(4)]
+        for thread in threads:
+            thread.start()
+        while any(thread.is_alive() for thread in threads):
+            arm.burst(1)
+        assert raised == []
+        arm.burst(1)
+        now = arm.published
+        planned = plan.planned(now, step=1)
+        plan.wait()
+        assert arm.history(len(planned)).desired.tolist() == planned.tolist()

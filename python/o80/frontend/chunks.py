@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 import itertools
 import math
+import os
+import threading
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal, Self
@@ -13,11 +16,11 @@ from typing import TYPE_CHECKING, Any, Literal, Self
 import numpy as np
 
 import o80._core as _core
-from o80.base.argument_checks import whole
+from o80.base.argument_checks import number, text, whole, whole_or_none
 from o80.base.awaiting import in_thread
-from o80.base.errors import InvalidArgument
+from o80.base.errors import InvalidArgument, RowOverwritten
 from o80.base.words import RowsWord, Status
-from o80.rows.targets import common_type, states_of
+from o80.rows.targets import common_labels, common_type, states_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -27,7 +30,45 @@ if TYPE_CHECKING:
 #: Time of a take-over, if a step is not longer [s].
 EASE = 0.1
 
-_plans = itertools.count(1)
+_LATEST = 2**31  # a row is due at most so many iterations after its anchor
+_MOST_ITERATIONS = 2**47
+_ONE_NUMBER = "planned, weights and ensemble are for actuators whose state is one number"
+
+
+def _from_to(value: Any, name: str, low: int, high: int) -> int:
+    if low <= whole(value, name) <= high:
+        return int(value)
+    raise InvalidArgument(f"{name} must be from {low} to {high}, got {value}")
+
+
+def _fraction(step: Any) -> Fraction:
+    try:
+        exact = step if isinstance(step, Fraction) else Fraction(number(step, "step"))
+    except (ValueError, OverflowError):
+        raise InvalidArgument(f"step must be a number, got {step!r}") from None
+    fraction = exact.limit_denominator(10**6)
+    if fraction < 1:
+        raise InvalidArgument(f"step must be at least 1 iteration, got {step}")
+    if fraction > _LATEST:
+        raise InvalidArgument(f"step must be at most 2^31 iterations, got {step}")
+    return fraction
+
+
+def _iterations(values: ArrayLike, name: str) -> NDArray[np.int64]:
+    array = np.asarray(values)
+    if array.ndim != 1 or array.dtype.kind not in "iu":
+        raise InvalidArgument(f"{name} must be a list of whole numbers, got {values!r}")
+    return array.astype(np.int64)
+
+
+def _finite(values: ArrayLike, name: str) -> NDArray[np.float64]:
+    try:
+        array = np.asarray(values, np.float64)
+    except (TypeError, ValueError):
+        array = np.array(np.nan)
+    if np.all(np.isfinite(array)):
+        return array
+    raise InvalidArgument(f"{name} must be finite numbers, got {values!r}")
 
 
 class SentChunk:
@@ -43,7 +84,7 @@ class SentChunk:
     @property
     def decided(self) -> bool:
         """Whether the backend has taken or rejected it."""
-        return self.batch.taken
+        return self.batch._shift is not None or self.batch.ended
 
     @property
     def rejected(self) -> bool:
@@ -78,9 +119,9 @@ class SentChunk:
 
     @property
     def _decided(self) -> _Decision | None:
-        if self._decision is None and self.decided:
+        if self._decision is None:
             shift = self.batch._shift
-            if shift is not None and not self.rejected:
+            if shift is not None:
                 self._decision = _decide(self._sent, self.batch.first_iteration, *shift)
         return self._decision
 
@@ -113,24 +154,80 @@ def _decide(sent: _Sent, taken: int, shift: int, stood: bool) -> _Decision:
     return _Decision(shift, begins, late, min(row, len(sent.due) - 1), stood)
 
 
-@dataclass(frozen=True)
 class _Part:
-    """The plan of one chunk, from its begin on."""
+    """The plan of one chunk, from its begin on.
 
-    begins: int
-    places: NDArray[np.float64]  # (iterations, actuators)
-    slopes: NDArray[np.float64]
-    sent: SentChunk
+    `known`: place and slope of the iteration before it, from which its places are computed when
+    somebody asks for them. Until that row is there, `start` may be what is expected.
+    """
 
-    @property
-    def last(self) -> int:
-        return self.begins + len(self.places) - 1
+    def __init__(
+        self, sent: SentChunk, decision: _Decision, profile: RowsWord, switches: bool
+    ) -> None:
+        chunk = sent._sent
+        self.sent = sent
+        self.begins = decision.begins
+        self.known = False
+        self.start: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        self._computed: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
+        ends = chunk.due + (chunk.anchor + decision.shift - self.begins + 1)
+        last = max(int(ends[-1]), chunk.ease if decision.row == len(ends) - 1 else 1)
+        row = int(np.searchsorted(ends, 1)) if switches else decision.row
+        self._profile: RowsWord = "hold" if switches else profile
+        self._rows = chunk.rows[min(row, len(ends) - 1) :]
+        # the last iteration of the way to each row, counted from the begin
+        self._ends = ends[-len(self._rows) :]
+        self._ends[0] = max(int(self._ends[0]), 1)
+        self._ends[-1] = last
+        self.last = self.begins + last - 1
+
+    def begin(
+        self, start: tuple[NDArray[np.float64], NDArray[np.float64]], known: bool = True
+    ) -> None:
+        """From place and slope in the iteration before it."""
+        self.start, self.known, self._computed = start, known, None
 
     def at(self, iteration: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Places and slopes; after its end it rests."""
-        if iteration > self.last:
-            return self.places[-1], np.zeros_like(self.places[-1])
-        return self.places[iteration - self.begins], self.slopes[iteration - self.begins]
+        """Places and slopes (actuators,) from its begin on; after its end it rests."""
+        if self._computed is None:
+            self._computed = self._compute()
+        places, slopes = self._computed  # (iterations, actuators)
+        if iteration >= self.begins + len(places):
+            return self._rows[-1], np.zeros_like(self._rows[-1])
+        return places[iteration - self.begins], slopes[iteration - self.begins]
+
+    def _compute(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        assert self.start is not None
+        ends = self._ends.tolist()
+        plans = [
+            _core.plan_of_rows(float(place), float(slope), rows.tolist(), ends, self._profile)
+            for place, slope, rows in zip(*self.start, self._rows.T, strict=True)
+        ]
+        shape = len(plans), ends[-1]
+        places, slopes = (np.array([each[i] for each in plans]).reshape(shape).T for i in (0, 1))
+        return places, slopes
+
+    def acts(self, iteration: int) -> bool:
+        """Whether what comes in the iteration after this one goes on from this plan."""
+        batch = self.sent.batch
+        # dropped commands act no more in the iteration in which they end, and braking is no plan
+        behind = {Status.COMPLETED: 0, Status.OVERWRITTEN: 1}.get(batch[0].status, 2)
+        return not batch.ended or batch.last_iteration >= iteration + behind
+
+    def note_end(self) -> None:
+        """If it was dropped: nothing of it is planned from there on."""
+        batch = self.sent.batch
+        kept = (Status.COMPLETED, Status.FORGOTTEN)
+        if batch.ended and batch[0].status not in kept and batch.last_iteration <= self.last:
+            self.end_in(batch.last_iteration)
+
+    def end_in(self, iteration: int) -> None:
+        """Nothing of it is planned in this iteration and later."""
+        self.last = min(self.last, iteration - 1)
+        kept = max(0, iteration - self.begins)
+        if self._computed is not None and len(self._computed[0]) > kept:
+            places, slopes = self._computed
+            self._computed = places[:kept].copy(), slopes[:kept].copy()
 
 
 class ChunkWaits:
@@ -166,25 +263,32 @@ class Chunks:
         self._arm = arm
         self._actuators, self._single = arm._chosen(actuators)
         self._kind = common_type(self._actuators, arm._layout)
-        self.step = Fraction(step).limit_denominator(10**6)  #: iterations from row to row
-        if self.step < 1:
-            raise InvalidArgument(f"step must be at least 1 iteration, got {step}")
+        self._switches = self._kind.kind == "b" or bool(common_labels(self._actuators, arm._layout))
+        self.step = _fraction(step)  #: iterations from row to row
         usual = max(math.ceil(self.step), round(EASE / arm.period))
-        self.ease = usual if ease is None else whole(ease, "ease")  #: iterations of a take-over
+        self.ease = usual  #: iterations of a take-over
+        if ease is not None:
+            self.ease = _from_to(ease, "ease", 1, _LATEST)
+        # it says what a profile may be
+        _core.plan_of_rows(0.0, 0.0, [0.0], [1], text(profile, "profile"))
         self.profile = profile
-        self.ensemble = ensemble
-        self._number = next(_plans)
+        self.ensemble = ensemble if ensemble is None else number(ensemble, "ensemble")
+        if self.ensemble is not None and not math.isfinite(self.ensemble):
+            raise InvalidArgument(f"ensemble must be a finite number, got {ensemble}")
+        # no other plan has it, also not that of a process which had the same lane before
+        self._number = int.from_bytes(os.urandom(8))
         self._closed = False
-        self._sent: list[SentChunk] = []
+        self._lock = threading.RLock()
+        self._newest: SentChunk | None = None  # the one sent last
+        self._open: list[SentChunk] = []  # those that _parts does not know yet
         self._parts: list[_Part] = []
-        self._settled = 0  # of the chunks sent, those that _parts knows
         self._answers: dict[int, int] = {}  # for a due iteration, how many chunks had a row for it
 
     # ------------------------------------------------------------------ sending
 
     def send(
         self,
-        rows: ArrayLike,
+        rows: ArrayLike | Mapping[str, ArrayLike],
         *,
         seen: _core.Observation | int | None = None,
         first: int = 0,
@@ -195,8 +299,10 @@ class Chunks:
     ) -> SentChunk:
         """Sends rows of targets; row j is due in iteration seen + (j + 1) x step, rounded.
 
-        rows: (n, actuators), or (n,) for a single actuator, as in add_trajectory.
-        seen: the observation that the policy saw, or its iteration (None: the newest).
+        rows: (n, actuators), or (n,) for a single actuator, or a mapping from some fields of the
+            state to such arrays, as in add_trajectory.
+        seen: the observation that the policy saw, or its iteration (None: the newest). Of another
+            segment on the same clock: the newest row from before its capture counts.
         first: number of rows at the begin that are what was planned before; they are not played,
             and an answer that comes before the last of them is over gives the same motion however
             late it is.
@@ -216,53 +322,58 @@ class Chunks:
         if late not in ("skip", "reject"):
             raise InvalidArgument(f"late must be 'skip' or 'reject', got {late!r}")
         anchor = self._anchor(seen)
-        mixed = weights is not None or self.ensemble is not None
-        if mixed:
-            rows = self._numbers(rows)
-            after = self._after(len(rows), anchor, due)
-            rows = self._mixed(rows, anchor + after, weights)
-        states, count, mask = states_of(rows, self._actuators, self._single, self._arm._layout)
-        if not mixed:
-            after = self._after(count, anchor, due)
-        ease = 1 if self.profile == "hold" else self.ease
-        batch = self._arm._send_chunk(
-            self._actuators,
-            after.astype(np.uint32).view(np.uint8),
-            states,
-            mask,
-            anchor,
-            self._number,
-            ease,
-            whole(first, "first"),
-            bool(fixed),
-            late == "reject",
-            self.profile,
-            seen if isinstance(seen, _core.Observation) else None,
-        )
-        numbers = self._numbers(rows) if self._is_plain else np.empty((count, 0))
-        self._sent.append(SentChunk(batch, _Sent(anchor, after, ease, first, numbers)))
-        return self._sent[-1]
-
-    def _anchor(self, seen: _core.Observation | int | None) -> int:
-        if seen is None:
-            return self._arm.published
-        return whole(seen.iteration if isinstance(seen, _core.Observation) else seen, "seen")
-
-    def _after(self, count: int, anchor: int, due: Sequence[int] | None) -> NDArray[np.int64]:
-        """When rows are due, in iterations after the anchor. Raises InvalidArgument."""
-        if count == 0:
+        if isinstance(rows, Sized) and len(rows) == 0:
             raise InvalidArgument("a chunk needs a row")
-        if due is None:
-            return self._due(count)
-        after = np.asarray(due, np.int64) - anchor
+        states, count, mask = states_of(rows, self._actuators, self._single, self._arm._layout)
+        first = _from_to(first, "first", 0, count - 1)
+        after = self._due(count) if due is None else _iterations(due, "due") - anchor
         if len(after) != count:
             raise InvalidArgument(f"{count} rows need as many due iterations, got {len(after)}")
-        if not (after[0] >= 1 and np.all(np.diff(after) > 0) and after[-1] <= 2**31):
+        if not (after[0] >= 1 and np.all(np.diff(after) > 0) and after[-1] <= _LATEST):
             raise InvalidArgument(
                 f"rows are due one after the other, after iteration {anchor}, which they answer, "
                 f"and at most 2^31 iterations later: got {(after + anchor).tolist()}"
             )
-        return after
+        with self._lock:  # those of several threads are known in the order in which they are sent
+            if weights is not None or self.ensemble is not None:
+                mixed = self._mixed(self._numbers(states), anchor + after, weights)
+                states, count, mask = states_of(mixed, self._actuators, False, self._arm._layout)
+            ease = 1 if self.profile == "hold" else self.ease
+            batch = self._arm._send_chunk(
+                self._actuators,
+                after.astype(np.uint32).view(np.uint8),
+                states,
+                mask,
+                anchor,
+                self._number,
+                ease,
+                first,
+                bool(fixed),
+                late == "reject",
+                self.profile,
+                seen if isinstance(seen, _core.Observation) else None,
+            )
+            if self.ensemble is not None:
+                self._count_answers(anchor + after)
+            numbers = self._numbers(states) if self._is_plain else np.empty((count, 0))
+            sent = SentChunk(batch, _Sent(anchor, after, ease, first, numbers))
+            self._open.append(sent)
+            self._newest = sent
+            self._settle()
+        return sent
+
+    def _anchor(self, seen: _core.Observation | int | None) -> int:
+        if seen is None:
+            return self._arm.published
+        if not isinstance(seen, _core.Observation):
+            return _from_to(seen, "seen", -_LATEST, _MOST_ITERATIONS)
+        since: int = self._arm._since(seen)
+        if since < 0:
+            raise InvalidArgument(
+                f"row {seen.iteration} is of another run, and '{self._arm.segment}' has no row "
+                "from before its capture: give one of this robot, or of one on the same clock"
+            )
+        return since
 
     def _due(self, count: int) -> NDArray[np.int64]:
         """Iterations after the anchor: (j + 1) x step, halves up."""
@@ -272,23 +383,28 @@ class Chunks:
     def _mixed(
         self, new: NDArray[np.float64], due: NDArray[np.int64], weights: ArrayLike | None
     ) -> NDArray[np.float64]:
-        shares = np.ones(len(new)) if weights is None else np.asarray(weights, float)
+        shares = np.ones(len(new)) if weights is None else _finite(weights, "weights")
         if shares.shape != (len(new),):
             raise InvalidArgument(f"weights are ({len(new)},), not {shares.shape}")
+        self._settle()
         for row, iteration in enumerate(due.tolist()):
             plan = self._plan_at(iteration)
-            answers = self._answers.get(iteration, 0) if plan is not None else 0
-            self._answers[iteration] = answers + 1
             if plan is None:
                 continue
             share = shares[row]
             if self.ensemble is not None:
+                answers = self._answers.get(iteration, 0)
                 all_of_them = np.exp(-self.ensemble * np.arange(answers + 1))
                 share = all_of_them[-1] / all_of_them.sum()
             new[row] = plan + (new[row] - plan) * share
+        return new
+
+    def _count_answers(self, due: NDArray[np.int64]) -> None:
+        for iteration in due.tolist():
+            planned = self._plan_at(iteration) is not None
+            self._answers[iteration] = (self._answers.get(iteration, 0) if planned else 0) + 1
         past = self._arm.published
         self._answers = {key: value for key, value in self._answers.items() if key > past}
-        return new[:, 0] if self._single else new
 
     # ------------------------------------------------------------------ the plan
 
@@ -296,12 +412,21 @@ class Chunks:
     def left(self) -> int:
         """Iterations from the newest row to the last row of the plan; 0 if there is none."""
         self._settle()
-        return max(0, self._last - self._arm.published) if self._parts else 0
+        parts = self._parts
+        return max(0, parts[-1].last - self._arm.published) if parts else 0
 
     @property
     def starved(self) -> bool:
         """Whether the plan is open, was begun, and has no row ahead."""
-        return not self._closed and bool(self._sent) and self._undecided is None and self.left == 0
+        newest = self._newest
+        if self._closed or newest is None or not newest.decided or self.left > 0:
+            return False
+        return newest.batch[0].status not in (
+            Status.OVERWRITTEN,
+            Status.PURGED,
+            Status.INTERRUPTED,
+            Status.HALTED,
+        )
 
     def planned(
         self,
@@ -319,7 +444,11 @@ class Chunks:
         targets that are played whatever it answers. It counts the chunks that were decided, and
         holds if nobody else commands.
         """
+        if not self._is_plain:
+            raise InvalidArgument(_ONE_NUMBER)
         anchor = self._anchor(since)
+        n = whole_or_none(n, "n", 0)
+        self._settle()
         own = self if step is None else Chunks(self._arm, self._actuators, step=step)
         places: list[NDArray[np.float64]] = []
         for count in itertools.count(1):
@@ -329,6 +458,11 @@ class Chunks:
             places.append(place)
         planned = np.array(places).reshape(len(places), len(self._actuators))
         return planned[:, 0] if self._single else planned
+
+    @property
+    def aio(self) -> ChunkWaits:
+        """The same wait for asyncio: `seen = await plan.aio.wait(lead=120)`."""
+        return ChunkWaits(self)
 
     def wait(
         self, lead: int = 0, timeout: float | None = None, *, grid: bool = False
@@ -341,9 +475,11 @@ class Chunks:
         timeout: how long to wait [s]. Raises TimeoutError, BackendGone, BackendHalted.
         """
         arm = self._arm
+        lead = whole(lead, "lead", 0)
         end = None if timeout is None else time.monotonic() + timeout
         while True:
-            waits = self._undecided is not None
+            newest = self._newest
+            waits = newest is not None and not newest.decided
             ahead = max(1, 0 if waits else self.left - lead)
             if not waits and self.left <= lead:
                 break
@@ -353,101 +489,101 @@ class Chunks:
             else:
                 arm.keep_alive()
                 arm.wait_for(arm.published + min(ahead, 10), patience)
-        if not grid or not self._sent:
+        if not grid or newest is None:
             return arm.latest()
-        anchor = self._sent[-1]._sent.anchor
+        anchor = newest._sent.anchor
         steps = int((arm.published - anchor) / self.step)
         behind = int(self._due(steps)[-1]) if steps > 0 else 0
         return arm.wait_for(anchor + behind)
 
     @property
-    def aio(self) -> ChunkWaits:
-        """The same wait for asyncio: `seen = await plan.aio.wait(lead=120)`."""
-        return ChunkWaits(self)
-
-    @property
-    def _undecided(self) -> SentChunk | None:
-        return next((sent for sent in self._sent[self._settled :] if not sent.decided), None)
-
-    @property
-    def _last(self) -> int:
-        return self._parts[-1].last
-
-    @property
     def _is_plain(self) -> bool:
         return self._kind.names is None and self._kind.shape == ()
 
-    def _numbers(self, rows: ArrayLike) -> NDArray[np.float64]:
+    def _numbers(self, states: NDArray[np.uint8]) -> NDArray[np.float64]:
+        """The values (rows, actuators) that are sent: as the loop reads them."""
         if not self._is_plain:
-            raise InvalidArgument(
-                "planned, weights and ensemble are for actuators whose state is one number"
-            )
-        numbers = np.array(rows, np.float64)
-        return numbers[:, np.newaxis] if numbers.ndim == 1 else numbers
+            raise InvalidArgument(_ONE_NUMBER)
+        values = states.view(self._kind).reshape(len(self._actuators), -1)
+        return values.T.astype(np.float64)
 
     def _plan_at(self, iteration: int) -> NDArray[np.float64] | None:
-        """Places in an iteration; None if nothing is planned for it."""
-        if not self._is_plain:
-            self._numbers(())
-        self._settle()
-        for part in reversed(self._parts):
-            if part.begins <= iteration:
-                return part.places[iteration - part.begins] if iteration <= part.last else None
-        return None
+        """Places in an iteration; None if nothing is planned for it, or not known yet."""
+        with self._lock:
+            i = len(self._parts) - 1
+            while i >= 0 and self._parts[i].begins > iteration:
+                i -= 1
+            if i < 0 or iteration > self._parts[i].last:
+                return None
+            part = self._parts[i]
+            if part.start is not None:
+                return part.at(iteration)[0]
+            # what it goes on from is not there any more, or not yet
+            while i > 0 and self._parts[i - 1].acts(self._parts[i].begins - 1):
+                i -= 1
+            before = self._parts[i].begins - 1
+            if before <= self._arm.published:
+                self._motion(before)
+            return None
 
     def _settle(self) -> None:
         """Adds the plans of chunks that were decided meanwhile, in their order."""
-        while self._settled < len(self._sent):
-            sent = self._sent[self._settled]
-            if not sent.decided:
-                return
-            decision = sent._decided
-            if decision is not None and not self._add(sent, decision):
-                return
-            self._settled += 1
-        # of what is over, the history has the rows
-        while len(self._parts) > 1 and self._parts[1].begins <= self._arm.oldest:
-            del self._parts[0]
+        with self._lock:
+            parts = self._parts
+            while self._open and self._open[0].decided:
+                sent = self._open.pop(0)
+                decision = sent._decided
+                if decision is None:
+                    continue
+                # those that wait for the same or a later iteration are overwritten
+                parts = [part for part in parts if part.begins < decision.begins]
+                parts.append(_Part(sent, decision, self.profile, self._switches))
+            for part in parts:
+                part.note_end()
+            parts = [part for part in parts if part.last >= part.begins]
+            self._begin(parts)
+            for part, successor in itertools.pairwise(parts):
+                if successor.known and successor.begins <= self._arm.published:
+                    part.end_in(successor.begins)
+            # of what is over, the history has the rows
+            oldest = self._arm.oldest
+            while len(parts) > 1 and parts[1].begins <= oldest:
+                parts = parts[1:]
+            self._parts = parts
 
-    def _add(self, sent: SentChunk, decision: _Decision) -> bool:
-        """False if the row before it is needed, and is not there yet."""
-        before = decision.begins - 1
-        # those that wait for the same or a later iteration are overwritten
-        parts = [part for part in self._parts if part.begins < decision.begins]
-        chunk = sent._sent
-        if parts and before <= parts[-1].last:
-            place, slope = parts[-1].at(before)
-        elif before > self._arm.published:
-            return False
-        else:
-            place, slope = self._motion(before, decision.stood)
-        ends = chunk.due + chunk.anchor + decision.shift - before
-        ends = ends[decision.row :]
-        ends[0] = max(int(ends[0]), 1 if self.profile == "hold" else chunk.ease)
-        rows = chunk.rows[decision.row :]
-        plans = [
-            _core.plan_of_rows(
-                float(place[i]), float(slope[i]), rows[:, i].tolist(), ends.tolist(), self.profile
-            )
-            for i in range(rows.shape[1])
-        ]
-        count = int(ends[-1])
-        places = np.array([each[0] for each in plans]).reshape(len(plans), count).T
-        slopes = np.array([each[1] for each in plans]).reshape(len(plans), count).T
-        self._parts = [*parts, _Part(decision.begins, places, slopes, sent)]
-        return True
+    def _begin(self, parts: list[_Part]) -> None:
+        """Notes from where each part begins, as far as that is there."""
+        former: _Part | None = None
+        for part in parts:
+            before = part.begins - 1
+            if part.known or not self._is_plain:
+                pass
+            elif former is not None and former.acts(before):
+                if former.known:
+                    part.begin(former.at(before))
+            elif before <= self._arm.published:
+                with contextlib.suppress(RowOverwritten):
+                    part.begin(self._motion(before))
+            else:
+                # it waits: if nobody else commands, what rests goes on to rest
+                latest = self._arm.latest()
+                if part.start is None and not latest.active[self._actuators].any():
+                    place = self._desired(latest)
+                    part.begin((place, np.zeros_like(place)), known=False)
+            former = part
 
-    def _motion(self, row: int, stood: bool) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Desired places and differences of a row, from the history."""
-        if not self._is_plain:
-            return np.empty(0), np.empty(0)
+    def _desired(self, row: _core.Observation) -> NDArray[np.float64]:
+        desired = row.desired
+        return np.array([desired[actuator] for actuator in self._actuators], np.float64)
 
-        def desired(iteration: int) -> NDArray[np.float64]:
-            all_of_them = self._arm.wait_for(iteration).desired
-            return np.array([all_of_them[actuator] for actuator in self._actuators], np.float64)
-
-        here = desired(row)
-        return here, np.zeros_like(here) if stood or row == 0 else here - desired(row - 1)
+    def _motion(self, iteration: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Desired places and differences of a row, from the history; 0 for what does not act."""
+        row = self._arm.wait_for(iteration)
+        here = self._desired(row)
+        active = row.active[self._actuators]
+        if not active.any():
+            return here, np.zeros_like(here)
+        return here, np.where(active, here - self._desired(self._arm.wait_for(iteration - 1)), 0.0)
 
     # ------------------------------------------------------------------ its end
 

@@ -111,6 +111,7 @@ Reason judge(ChunkHead& chunk, const ChunkRows& rows, const ChunkSurroundings& a
   chunk.shift = 0;
   chunk.stood = stood ? 1 : 0;
   if (stood && chunk.anchor < last) chunk.shift = last - std::max(at.acted_last, chunk.anchor);
+  if (chunk.shift > TakenChunk::kMostShift) return Reason::late;
   const std::uint32_t first = stood ? 0 : chunk.first;
   const Iteration anchor = chunk.anchor + chunk.shift;
   const Iteration before = anchor + (first == 0 ? 0 : rows.due(first - 1));

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <optional>
 
 #include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
@@ -178,21 +179,28 @@ struct ChunkSurroundings {
   bool stand = false;         // none of them has a command, and no chunk waits
   bool eases = true;          // false: rows are held
 };
-/// What a status tells of a chunk that was taken: the shift in its delay and in 7 bits of its
-/// detail.
+/// What the active status of its batch tells of a chunk that was taken: the shift in its delay and
+/// in 6 bits of its detail. A bit tells this status from the one before, of the batch alone.
 struct TakenChunk {
-  std::int64_t shift = 0;  // at most 2^23 - 1
+  static constexpr std::int64_t kMostShift = (std::int64_t{1} << 22) - 1;
+
+  std::int64_t shift = 0;
   bool stood = false;
 
   std::uint8_t detail() const noexcept {
-    const auto high = static_cast<std::uint8_t>(std::min<std::int64_t>(shift >> 16, 0x7F));
-    return static_cast<std::uint8_t>(high | (stood ? 0x80 : 0));
+    return static_cast<std::uint8_t>(shift >> 16 | (stood ? 0x80 : 0) | kIsTaken);
   }
-  static TakenChunk of(std::uint8_t detail, std::int64_t late) noexcept {
-    return {static_cast<std::int64_t>(detail & 0x7F) << 16 | late, (detail & 0x80) != 0};
+  /// Nothing if it was not taken yet.
+  static std::optional<TakenChunk> of(std::uint8_t detail, std::int64_t late) noexcept {
+    if ((detail & kIsTaken) == 0) return std::nullopt;
+    return TakenChunk{static_cast<std::int64_t>(detail & 0x3F) << 16 | late, (detail & 0x80) != 0};
   }
+
+ private:
+  static constexpr std::uint8_t kIsTaken = 0x40;
 };
-/// Decides when a chunk begins and with which row; Reason::late if all its rows are.
+/// Decides when a chunk begins and with which row; Reason::late if all its rows are, or if its
+/// actuators stood still for too long after its anchor to tell the shift.
 Reason judge(ChunkHead& chunk, const ChunkRows& rows, const ChunkSurroundings& at) noexcept;
 
 }  // namespace o80

@@ -88,6 +88,7 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   if (first_row || !is_row_) layout_.copy(from(), desired);
   const std::byte* observed = first_row ? std::exchange(observed_, nullptr) : nullptr;
   if (observed != nullptr) layout_.copy_finite(from(), observed);
+  if (course.of_chunk && profile_ == Profile::hold) layout_.copy(from(), target());
 
   std::int64_t longest = std::max<std::int64_t>(1, course.iterations);
   slowest_ = {};
@@ -143,7 +144,7 @@ void Motion::to_row(Number& number, const Course& course) noexcept {
 
 /// Types that blend by themselves: by the share of the time, from rest to rest.
 void Motion::blend(Iteration now, std::byte* state) noexcept {
-  if (now >= last_) return layout_.copy(state, target());
+  if (now >= last_ || profile_ == Profile::hold) return layout_.copy(state, target());
   const auto i = static_cast<double>(now - first_ + 1);
   const std::int64_t iterations = last_ - first_ + 1;
   const double share = profile_ == Profile::minimum_jerk

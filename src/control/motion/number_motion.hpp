@@ -89,7 +89,7 @@ class NumberMotion {
   void take_over() noexcept {
     const bool goes_on = planned_ && of_chunk_;
     const double place = goes_on ? plan_.place() : guard_.position();
-    const double slope = goes_on ? plan_.slope() : guard_.moment().speed;
+    const double slope = goes_on ? plan_.slope() : rests_ ? 0.0 : guard_.moment().speed;
     begin();
     plan_.stand(place, slope);
     Span span = guard_.stop();
@@ -134,6 +134,7 @@ class NumberMotion {
       former_ = plan_;
       leaves_ = true;
     }
+    rests_ = arrived && of_chunk_;
     planned_ = follows_ = of_chunk_ = false;
     guard_.follow_within_bounds();
     // a jump is no speed
@@ -174,6 +175,7 @@ class NumberMotion {
   bool planned_ = false;   // a command moves it by `plan_`
   bool follows_ = false;   // `plan_` may break limits
   bool of_chunk_ = false;  // `plan_` is that of rows of a chunk
+  bool rests_ = false;     // such a plan has just ended: at its last row it rests
   bool held_ = false;
   bool jumps_at_once_ = false;  // propose() needed no plan
   Requested requested_;         // then

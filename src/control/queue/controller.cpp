@@ -28,8 +28,8 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
       desired_((schema.head.block + kBlockBytes - 1) / kBlockBytes) {
   const auto count = static_cast<std::uint32_t>(schema.actuators.size());
   const std::uint32_t words = mask_words(count);
-  for (Mask* mask :
-       {&active_mask_, &clamped_mask_, &braking_mask_, &busy_, &stepped_, &follow_, &dropped_}) {
+  for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_, &busy_, &stepped_, &follow_,
+                     &dropped_, &of_chunk_}) {
     mask->resize(words);
   }
   actuators_.reserve(count);
@@ -222,51 +222,60 @@ void Controller::take_commands(const Taking& from, BlockIndex first, Iteration i
 /// Decides on a chunk: it waits, begins, or is rejected.
 void Controller::take_chunk(const Taking& from, BlockIndex group, BatchHandler& handler) noexcept {
   const Iteration now = handler.iteration();
+  const auto is_purged = [&](std::uint32_t actuator) {
+    return purge_tickets_.cover(from.lane, actuator, from.ticket);
+  };
+  if (!drop_members(group, is_purged, {Status::purged}, now)) return;
+  std::ranges::fill(of_chunk_, 0);
+  each_member(group, [&](BlockIndex member) { set(of_chunk_, pool_.head(member).actuator); });
   const std::uint64_t epoch = handler.epoch();
   const bool is_foreign = epoch != 0 && chunk_of(pool_, group).epoch != epoch;
-  const Outcome outcome =
-      is_foreign ? Outcome{Status::rejected, Reason::invalid} : decide(from, group, now);
-  if (outcome.status != Status::active) {
-    return each_member(group, [&](BlockIndex member) { ledger_.end(member, outcome, now); });
+  const Reason reason = is_foreign ? Reason::invalid : decide(from, group, now);
+  if (reason != Reason::none) {
+    const Outcome rejected{Status::rejected, reason};
+    return each_member(group, [&](BlockIndex member) { ledger_.end(member, rejected, now); });
   }
   const ChunkHead& chunk = chunk_of(pool_, group);
   ledger_.note_decided(group, {chunk.shift, chunk.stood != 0}, now);
   each_member(group, [&](BlockIndex member) {
     const std::uint32_t actuator = pool_.head(member).actuator;
     actuators_[actuator].last_chunk = {from.lane, chunk.plan, chunk.anchor};
-    drop_waiting(kEveryLane, actuator, {Status::overwritten}, now, chunk.begins);
   });
+  drop_waiting(
+      kEveryLane, [&](std::uint32_t i) { return masked(of_chunk_.data(), i); },
+      {Status::overwritten}, now, chunk.begins);
   const Waiting waiting{group, from.lane, chunk.begins};
   if (waiting.begins == now) return begin_chunk(group, from.lane, now);
   waiting_.insert(std::ranges::upper_bound(waiting_, waiting.begins, {}, &Waiting::begins),
                   waiting);
 }
 
-Outcome Controller::decide(const Taking& from, BlockIndex group, Iteration now) noexcept {
+/// Reason::none if the chunk of the actuators in of_chunk_ is taken.
+Reason Controller::decide(const Taking& from, BlockIndex group, Iteration now) noexcept {
   ChunkHead& chunk = chunk_of(pool_, group);
-  const auto reject = [](Reason reason) { return Outcome{Status::rejected, reason}; };
   ChunkSurroundings at{.now = now, .stand = true};
   bool is_older = false;
-  bool is_purged = false;
   each_member(group, [&](BlockIndex member) {
-    const std::uint32_t actuator = pool_.head(member).actuator;
-    const ActuatorQueue& queue = actuators_[actuator];
+    const ActuatorQueue& queue = actuators_[pool_.head(member).actuator];
     const ActuatorQueue::LastChunk& last = queue.last_chunk;
     is_older = is_older ||
                (last.lane == from.lane && last.plan == chunk.plan && chunk.anchor < last.anchor);
-    is_purged = is_purged || purge_tickets_.cover(from.lane, actuator, from.ticket);
-    at.stand = at.stand && queue.empty() && !waits(actuator);
+    at.stand = at.stand && queue.empty();
     at.acted_last = std::max(at.acted_last, queue.acted_last());
     at.eases = pool_.head(member).profile != Profile::hold;
   });
-  if (is_purged) return {Status::purged};
-  if (is_older) return reject(Reason::older);
-  if (chunk.anchor < fresh_row_) return reject(Reason::fresh_start);
-  if (waiting_.size() == kMaxWaiting) return reject(Reason::full);
+  for (const Waiting& each : waiting_) {
+    each_member(each.group, [&](BlockIndex member) {
+      at.stand = at.stand && !masked(of_chunk_.data(), pool_.head(member).actuator);
+    });
+  }
+  if (is_older) return Reason::older;
+  if (chunk.anchor < fresh_row_) return Reason::fresh_start;
   const BlockIndex first = pool_.head(group).own[Own::kNext];
   const ActuatorQueue& queue = actuators_[pool_.head(first).actuator];
   const Reason reason = judge(chunk, ChunkRows(pool_, first, queue.layout()), at);
-  return reason == Reason::none ? Outcome{Status::active} : reject(reason);
+  const bool is_full = waiting_.size() == kMaxWaiting && chunk.begins > now;
+  return reason == Reason::none && is_full ? Reason::full : reason;
 }
 
 void Controller::begin_chunk(BlockIndex group, std::uint32_t lane, Iteration iteration) noexcept {
@@ -280,32 +289,36 @@ void Controller::begin_chunk(BlockIndex group, std::uint32_t lane, Iteration ite
   });
 }
 
-bool Controller::waits(std::uint32_t actuator) noexcept {
-  bool found = false;
-  for (const Waiting& each : waiting_) {
-    each_member(each.group, [&](BlockIndex member) {
-      found = found || pool_.head(member).actuator == actuator;
-    });
-  }
-  return found;
+template <class Ends>
+bool Controller::drop_members(BlockIndex group, Ends&& ends, const Outcome& outcome,
+                              Iteration iteration) noexcept {
+  // the group is freed with its last member
+  BlockIndex kept = kNoBlock;
+  BlockIndex dropped = kNoBlock;
+  each_member(group, [&](BlockIndex member) {
+    RecordHead& head = pool_.head(member);
+    head.own[Own::kNext] = std::exchange(ends(head.actuator) ? dropped : kept, member);
+  });
+  pool_.head(group).own[Own::kNext] = kept;
+  ledger_.drop(dropped, outcome, iteration);
+  return kept != kNoBlock;
 }
 
-void Controller::drop_waiting(std::uint32_t lane, std::uint32_t actuator, const Outcome& outcome,
+template <class Ends>
+void Controller::drop_waiting(std::uint32_t lane, Ends&& ends, const Outcome& outcome,
                               Iteration iteration, Iteration from) noexcept {
   std::erase_if(waiting_, [&](const Waiting& each) {
     if ((lane != kEveryLane && each.lane != lane) || each.begins < from) return false;
-    // the group is freed with its last member
-    BlockIndex kept = kNoBlock;
-    BlockIndex dropped = kNoBlock;
-    each_member(each.group, [&](BlockIndex member) {
-      RecordHead& head = pool_.head(member);
-      const bool ends = actuator == kEveryActuator || head.actuator == actuator;
-      head.own[Own::kNext] = std::exchange(ends ? dropped : kept, member);
-    });
-    pool_.head(each.group).own[Own::kNext] = kept;
-    ledger_.drop(dropped, outcome, iteration);
-    return kept == kNoBlock;
+    return !drop_members(each.group, ends, outcome, iteration);
   });
+}
+
+void Controller::drop_waiting(std::uint32_t lane, std::uint32_t actuator, const Outcome& outcome,
+                              Iteration iteration) noexcept {
+  const auto is_meant = [&](std::uint32_t i) {
+    return actuator == kEveryActuator || i == actuator;
+  };
+  drop_waiting(lane, is_meant, outcome, iteration, 0);
 }
 
 }  // namespace o80

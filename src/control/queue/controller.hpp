@@ -240,13 +240,18 @@ class Controller {
   static constexpr std::size_t kMaxWaiting = 64;
   static constexpr std::uint32_t kEveryLane = 0xFFFFFFFF;
   void take_chunk(const Taking& from, BlockIndex group, BatchHandler& handler) noexcept;
-  bool waits(std::uint32_t actuator) noexcept;
-  Outcome decide(const Taking& from, BlockIndex group, Iteration now) noexcept;
+  Reason decide(const Taking& from, BlockIndex group, Iteration now) noexcept;
   void begin_chunk(BlockIndex group, std::uint32_t lane, Iteration iteration) noexcept;
-  /// Ends members of chunks that wait, of one lane or kEveryLane; those that begin in `from` or
-  /// later.
+  /// Ends members of a chunk that has not begun, those with ends(actuator); false if none is left.
+  template <class Ends>
+  bool drop_members(BlockIndex group, Ends&& ends, const Outcome& outcome,
+                    Iteration iteration) noexcept;
+  /// The same for all chunks that wait, of one lane or kEveryLane, and begin in `from` or later.
+  template <class Ends>
+  void drop_waiting(std::uint32_t lane, Ends&& ends, const Outcome& outcome, Iteration iteration,
+                    Iteration from) noexcept;
   void drop_waiting(std::uint32_t lane, std::uint32_t actuator, const Outcome& outcome,
-                    Iteration iteration, Iteration from = 0) noexcept;
+                    Iteration iteration) noexcept;
   /// Calls visit(member) for each member of a chunk that has not begun; it may end the member.
   template <class Visit>
   void each_member(BlockIndex group, Visit&& visit) noexcept {
@@ -306,6 +311,7 @@ class Controller {
   Mask stepped_;                  // has its desired state from given_ already
   Mask follow_;                   // follows the observed state when idle
   std::vector<Waiting> waiting_;  // in the order in which they begin
+  Mask of_chunk_;                 // actuators of the chunk that is being taken
   Iteration fresh_row_ = 0;       // of the last fresh start
   DirectTargets given_;
   Mask dropped_;                // no longer gets its targets

@@ -179,8 +179,8 @@ std::optional<Batch::Shift> Batch::shift() const {
       static_cast<Status>(answer.word.status) != Status::active) {
     return std::nullopt;
   }
-  const TakenChunk taken = TakenChunk::of(answer.word.detail, answer.late);
-  return Shift{taken.shift, taken.stood};
+  const auto taken = TakenChunk::of(answer.word.detail, answer.late);
+  return taken ? std::optional<Shift>({taken->shift, taken->stood}) : std::nullopt;
 }
 
 Iteration Batch::last_iteration() const {

@@ -179,5 +179,46 @@ TEST_F(BoundedTest, CheckingGarbage) {
   EXPECT_TRUE(rig.all_blocks_back());
 }
 
+/// Looks at blocks while a chunk is taken and begins, so many of its rows being late.
+std::uint32_t visits_of_a_chunk(std::uint32_t rows, std::uint32_t late) {
+  Rig rig(plain_robot(1), kLane);
+  const StateLayout layout(rig.schema, rig.schema.actuators[0].type);
+  while (rig.next < 2000) rig.step();
+  std::vector<std::uint32_t> due(rows);
+  for (std::uint32_t i = 0; i < rows; ++i) due[i] = i + 1;
+  const auto targets = bytes_of(std::vector<double>(rows, 1.0));
+  const std::vector<BatchBuilder::Member> members{{{}, {}, targets}};
+  const std::vector<const StateLayout*> layouts{&layout};
+  const ChunkHead chunk{.anchor = rig.next - 1 - Iteration{late}, .ease = 1, .fixed = 1};
+  rig.batch.chunk(members, chunk, due, layouts);
+  const BlockIndex batch = rig.send();
+  while (!rig.check(0, batch, kBudget)) {
+  }
+  work_since_last_asked();
+  rig.controller.take(0, batch, rig);
+  rig.step();
+  const std::uint32_t visits = work_since_last_asked().visits;
+  EXPECT_EQ(rig.desired(), 1.0) << rows << " rows, " << late << " late";
+  return visits;
+}
+
+TEST(BoundedChunk, TakingItLooksAtNearlyAsManyBlocksHoweverManyRowsItHasOrAreLate) {
+  constexpr std::uint32_t kOfASearch = 3;  // the note of a row: its list, the place in it, the note
+  const auto searched = [](std::uint32_t rows) {
+    std::uint32_t steps = 0;
+    for (std::uint32_t notes = (rows + RowNote::kRows - 1) / RowNote::kRows; notes > 1; ++steps) {
+      notes -= notes / 2;
+    }
+    return steps * kOfASearch;
+  };
+  const std::uint32_t few = visits_of_a_chunk(1, 0);
+  EXPECT_GT(few, 10U) << "the count counts";
+  // two searches: for late rows, and for the first that is reached; and the row after that
+  EXPECT_LE(visits_of_a_chunk(2000, 0), few + 2 * searched(2000) + 4);
+  const std::uint32_t in_time = visits_of_a_chunk(1000, 0);
+  const std::uint32_t late = visits_of_a_chunk(1000, 999);
+  EXPECT_LE(std::max(late, in_time), std::min(late, in_time) + 2 * kOfASearch);
+}
+
 }  // namespace
 }  // namespace o80::test

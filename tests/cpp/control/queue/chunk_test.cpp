@@ -57,6 +57,13 @@ class ChunkRig : public Rig {
   CommandId chunk(const std::vector<double>& values, const std::vector<std::uint32_t>& due,
                   const ChunkHead& head, Profile profile = Profile::cubic,
                   const std::vector<std::uint32_t>& actuators = {0}, std::uint32_t lane = 0) {
+    const std::uint32_t place = add_chunk(values, due, head, profile, actuators);
+    return record_id(pulse(lane), place);
+  }
+  /// Adds it to the batch; returns its place there.
+  std::uint32_t add_chunk(const std::vector<double>& values, const std::vector<std::uint32_t>& due,
+                          const ChunkHead& head, Profile profile,
+                          const std::vector<std::uint32_t>& actuators) {
     const auto bytes = bytes_of(values);
     std::vector<BatchBuilder::Member> members;
     std::vector<const StateLayout*> layouts;
@@ -67,8 +74,7 @@ class ChunkRig : public Rig {
       members.push_back({of, {}, bytes});
       layouts.push_back(&layout);
     }
-    const std::uint32_t place = batch.chunk(members, head, due, layouts);
-    return record_id(pulse(lane), place);
+    return batch.chunk(members, head, due, layouts);
   }
   /// One of the worked examples.
   CommandId example(ChunkHead head, Profile profile = Profile::cubic) {
@@ -379,6 +385,100 @@ TEST(Chunk, NumbersThatCannotBeInterpolatedAreHeldFromTheFirstIteration) {
   EXPECT_DOUBLE_EQ(rig.desired(), 1.9);
 }
 
+TEST(Chunk, APurgeThatOvertakesItEndsTheActuatorsThatItIsFor) {
+  ChunkRig rig(plain_robot(3));
+  rig.run_to(101);
+  rig.add_chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::cubic, {0, 1, 2});
+  const BlockIndex chunk = rig.send();
+  const CommandId id = record_id(rig.sent, 0);
+  rig.pool.batch(chunk).ticket = 10;
+  rig.batch.purge(1);
+  const BlockIndex purge = rig.send(1);
+  rig.pool.batch(purge).ticket = 11;
+  rig.controller.take(1, purge, rig);
+  rig.controller.take(0, chunk, rig);
+  rig.run_to(155);
+  EXPECT_EQ(rig.desired(0), 0.2);
+  EXPECT_EQ(rig.desired(1), 0.0);
+  EXPECT_EQ(rig.desired(2), 0.2);
+  EXPECT_EQ(rig.witness.last(id).status, Status::purged);
+  EXPECT_EQ(rig.witness.last(id).iteration, 150);
+  EXPECT_TRUE(rig.all_blocks_back());
+}
+
+TEST(Chunk, ThatBeginsAtOnceNeedsNoPlaceAmongThoseThatWait) {
+  ChunkRig rig(plain_robot(2));
+  rig.run_to(10);
+  std::vector<CommandId> waiting;
+  for (Iteration i = 0; i < 65; ++i) {
+    waiting.push_back(rig.chunk({1.0}, {5}, {.anchor = 1000 + i}, Profile::cubic, {0}));
+  }
+  const CommandId at_once = rig.chunk({1.0}, {5}, {.anchor = 9}, Profile::cubic, {1});
+  rig.run_to(20);
+  EXPECT_EQ(rig.witness.last(waiting.back()).reason, Reason::full);
+  EXPECT_EQ(rig.witness.status(at_once), Status::completed);
+  rig.run_to(1100);
+  EXPECT_EQ(rig.witness.status(waiting[63]), Status::completed);
+  EXPECT_TRUE(rig.all_blocks_back());
+}
+
+/// Where limits do not act, they change nothing: the plan that has just ended is at rest.
+TEST(Chunk, AfterTheLastRowThePlanRestsWithLimitsOrWithout) {
+  std::vector<std::vector<double>> shown;
+  for (const bool limited : {false, true}) {
+    Schema schema = plain_robot(1);
+    if (limited) schema.actuator(0).limits({.speed = 1e6, .acceleration = 1e12});
+    ChunkRig rig(std::move(schema));
+    rig.run_to(101);
+    rig.chunk({0.1, 0.5}, every(3, 2), {.anchor = 100, .ease = 1});
+    rig.run_to(107);
+    EXPECT_EQ(rig.at(106), 0.5);
+    rig.chunk({0.0, 0.5}, every(10, 2), {.anchor = 106, .ease = 1});
+    rig.run_to(130);
+    EXPECT_LE(*std::ranges::max_element(rig.rows.begin() + 107, rig.rows.end()), 0.5);
+    shown.emplace_back(rig.rows.begin() + 101, rig.rows.end());
+  }
+  EXPECT_EQ(shown[0], shown[1]);
+}
+
+TEST(Chunk, HeldRowsOf64BitsAreHeld) {
+  Schema schema;
+  schema.head.robot = NameText("robot");
+  schema.head.period = kMillisecond;
+  schema.add_actuators("wheel", schema.add_type("int64", {scalar_field("", Kind::int64)}), 1);
+  ChunkRig rig(std::move(schema));
+  rig.run_to(101);
+  const std::vector<std::int64_t> rows{(std::int64_t{1} << 60) + 1, -20, 7};
+  std::vector<double> bits(rows.size());
+  std::memcpy(bits.data(), rows.data(), bytes_of(rows).size());
+  rig.chunk(bits, every(5, 3), {.anchor = 100}, Profile::hold);
+  for (Iteration now = 101; now <= 115; ++now) {
+    rig.run_to(now + 1);
+    EXPECT_EQ(rig.desired_as<std::int64_t>(0), rows[static_cast<std::size_t>((now - 101) / 5)])
+        << now;
+  }
+}
+
+TEST(Chunk, HeldRowsOfATypeThatBlendsAreHeld) {
+  for (const Profile profile : {Profile::hold, Profile::cubic}) {
+    Schema schema = plain_robot(1);
+    schema.hooks[0].blend = [](void* out, const void* from, const void* to, double share) {
+      const double begin = *static_cast<const double*>(from);
+      *static_cast<double*>(out) = begin + share * (*static_cast<const double*>(to) - begin);
+    };
+    ChunkRig rig(std::move(schema));
+    rig.run_to(101);
+    rig.chunk({1.0, 3.0}, every(4, 2), {.anchor = 100, .ease = 1}, profile);
+    rig.run_to(110);
+    for (Iteration now = 101; now <= 108; ++now) {
+      const double row = now <= 104 ? 1.0 : 3.0;
+      const auto n = static_cast<double>(now - 100);
+      const double between = now <= 104 ? n / 4.0 : 1.0 + (n - 4.0) / 2.0;
+      EXPECT_EQ(rig.at(now), profile == Profile::hold ? row : between) << now;
+    }
+  }
+}
+
 /// Random scripts of chunks: what was due is shown, nothing that was skipped matters.
 class ChunkScript {
  public:
@@ -451,7 +551,7 @@ TEST(Chunk, EveryRowThatIsDueIsShown) {
       if (told.front().status != Status::active) continue;
       const std::int64_t shift = [&] {
         for (const StatusChange& each : rig.witness.of(sent.id - 2)) {
-          if (each.late > 0) return std::int64_t{each.detail} << 16 | each.late;
+          if (each.late > 0) return TakenChunk::of(each.detail, each.late)->shift;
         }
         return std::int64_t{0};
       }();
@@ -722,6 +822,120 @@ TEST(ChunkHostile, RandomBytesAreSafe) {
     ASSERT_EQ(rig.witness.ends_of(3), 1U) << round;
     ASSERT_TRUE(rig.all_blocks_back()) << round;
     ASSERT_TRUE(std::isfinite(rig.desired(0)) && std::isfinite(rig.desired(1))) << round;
+  }
+}
+
+/// Chunks of three lanes for overlapping actuators of different types, among all else that there
+/// is.
+TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
+  for (unsigned seed = 0; seed < 150; ++seed) {
+    std::mt19937 dice(seed);
+    const auto pick = [&](int low, int high) {
+      return std::uniform_int_distribution<int>(low, high)(dice);
+    };
+    Schema schema = plain_robot(1);
+    const auto hand = schema.add_type(
+        "Hand", {scalar_field("place", Kind::float32), scalar_field("open", Kind::boolean),
+                 scalar_field("count", Kind::int64)});
+    schema.add_actuators("joint", schema.actuators[0].type, 3);
+    schema.add_actuators("hand", hand, 2);
+    schema.actuator(1).limits(
+        {.minimum = -2.0, .maximum = 2.0, .speed = 5.0, .acceleration = 50.0});
+    Rig rig(std::move(schema), 3000);
+    std::vector<StateLayout> layouts;
+    for (std::uint32_t i = 0; i < 6; ++i) {
+      layouts.emplace_back(rig.schema, rig.schema.actuators[i].type);
+    }
+    const auto state_of = [&](std::uint32_t actuator) {
+      std::vector<std::byte> state(layouts[actuator].size());
+      for (std::uint32_t i = 0; i < layouts[actuator].numbers().size(); ++i) {
+        const NumberPlace& place = layouts[actuator].numbers()[i];
+        visit_number(place.kind, [&]<class T>(T) {
+          const T value = static_cast<T>(pick(0, 1));
+          std::memcpy(state.data() + place.offset, &value, sizeof value);
+        });
+      }
+      return state;
+    };
+    std::vector<std::pair<CommandId, std::uint32_t>> sent;
+    for (int turn = 0; turn < 250; ++turn) {
+      const auto lane = static_cast<std::uint32_t>(pick(0, 2));
+      const CommandId batch = rig.used_ids[lane] + 1;
+      for (int records = pick(0, 4); records > 0; --records) {
+        const int what = pick(0, 9);
+        if (what == 0) {
+          rig.batch.purge(static_cast<std::uint16_t>(pick(0, 5)));
+        } else if (what == 1) {
+          rig.batch.purge_own(kEveryActuator);
+        } else if (what < 5) {
+          const auto actuator = static_cast<std::uint32_t>(pick(0, 5));
+          RecordHead head = pick(0, 1) == 0 ? direct() : over(pick(1, 9));
+          if (pick(0, 2) == 0) head = overwriting(head);
+          head.actuator = static_cast<std::uint16_t>(actuator);
+          rig.batch.command(head, state_of(actuator));
+        } else {
+          std::vector<std::vector<std::byte>> rows;
+          std::vector<BatchBuilder::Member> members;
+          std::vector<const StateLayout*> of;
+          const auto count = static_cast<std::size_t>(pick(1, 20));
+          const auto profile =
+              std::array{Profile::cubic, Profile::linear, Profile::hold}[dice() % 3];
+          rows.reserve(6);
+          for (std::uint32_t i = 0; i < 6; ++i) {
+            if (pick(0, 2) == 0) continue;
+            rows.emplace_back();
+            for (std::size_t k = 0; k < count; ++k) {
+              const auto state = state_of(i);
+              rows.back().insert(rows.back().end(), state.begin(), state.end());
+            }
+            RecordHead head;
+            head.actuator = static_cast<std::uint16_t>(i);
+            head.profile = profile;
+            members.push_back({head, {}, rows.back()});
+            of.push_back(&layouts[i]);
+          }
+          if (members.empty()) continue;
+          const ChunkHead head{
+              .anchor = rig.next - pick(-40, 20),
+              .plan = static_cast<std::uint64_t>(pick(0, 1)),
+              .ease = static_cast<std::uint32_t>(pick(1, 12)),
+              .first = static_cast<std::uint32_t>(pick(0, static_cast<int>(count) - 1)),
+              .fixed = static_cast<std::uint8_t>(pick(0, 1)),
+              .reject_late = static_cast<std::uint8_t>(pick(0, 1))};
+          rig.batch.chunk(members, head, every(static_cast<std::uint32_t>(pick(1, 9)), count), of);
+        }
+      }
+      for (std::uint32_t i = 0; i < rig.batch.records(); ++i) {
+        sent.emplace_back(record_id(batch, i), lane);
+      }
+      const BlockIndex first = rig.send(lane);
+      rig.pool.batch(first).ticket = static_cast<std::uint64_t>(turn + pick(0, 3));
+      while (pick(0, 3) != 0 && !rig.check(lane, first, static_cast<std::uint32_t>(pick(1, 30)))) {
+        rig.step();
+      }
+      rig.controller.take(lane, first, rig);
+      const int event = pick(0, 40);
+      if (event == 0) rig.controller.halt(rig.next);
+      if (event == 1) rig.controller.restart(rig.observed.data(), nullptr, rig.next++);
+      if (event == 2) rig.controller.interrupt(static_cast<std::uint32_t>(pick(0, 5)), rig.next);
+      if (event == 3) {
+        rig.controller.purge_lane(static_cast<std::uint32_t>(pick(0, 2)), kEveryActuator, rig.next,
+                                  Reason::dead_frontend);
+      }
+      for (int i = pick(0, 12); i > 0; --i) {
+        rig.step();
+        for (std::uint32_t k = 0; k < 6; ++k) {
+          ASSERT_EQ(layouts[k].first_not_finite(rig.controller.desired() +
+                                                rig.schema.actuators[k].offset),
+                    StateLayout::kNoNumber);
+        }
+      }
+    }
+    for (int i = 0; i < 2000 && rig.controller.active(); ++i) rig.step();
+    for (int i = 0; i < 3; ++i) rig.step();
+    EXPECT_FALSE(rig.controller.active()) << seed;
+    for (const auto& [id, lane] : sent) ASSERT_EQ(rig.witness.ends_of(id, lane), 1U) << seed;
+    EXPECT_TRUE(rig.all_blocks_back()) << seed;
   }
 }
 
