@@ -39,15 +39,6 @@ Cursor ChunkRows::cursor(std::uint32_t row) const noexcept {
           std::uint64_t{rows_ - row} * places_.size};
 }
 
-Span& ChunkRows::range(std::uint32_t of_note, std::uint32_t number) const noexcept {
-  if (number == 0) return note(of_note).range;
-  BlockIndex block = block_of(of_note);
-  for (std::uint32_t i = 0; i <= (number - 1) / ChunkPlaces::kRanges; ++i) {
-    block = pool_.next(block);
-  }
-  return reinterpret_cast<Span*>(pool_.bytes(block))[(number - 1) % ChunkPlaces::kRanges];
-}
-
 bool ChunkRows::walk(Notes& notes) noexcept {
   notes.at = notes.walked == 0 ? member_ : pool_.next(notes.at);
   const std::uint32_t place = notes.walked++;
@@ -77,9 +68,10 @@ void ChunkRows::add(Notes& notes, const Cursor& at, const std::byte* row) noexce
     // a cursor at the end of a block has not gone on to the next one
     note(i).block = at.offset() < kBlockBytes ? at.block() : pool_.next(at.block());
   }
+  Ranges noted = ranges(i);
   for (std::uint32_t number = 0; number < layout_.numbers().size(); ++number) {
     const double value = layout_.number(number, row);
-    Span& known = range(i, number);
+    Span& known = noted.next();
     if (is_first) {
       known = {value, value};
     } else {
@@ -91,10 +83,13 @@ void ChunkRows::add(Notes& notes, const Cursor& at, const std::byte* row) noexce
 
 void ChunkRows::join(Notes& notes) noexcept {
   const std::uint32_t i = --notes.not_joined;
+  Ranges noted = ranges(i);
+  Ranges behind = ranges(i + 1);
   for (std::uint32_t number = 0; number < layout_.numbers().size(); ++number) {
-    const Span behind = range(i + 1, number);
-    range(i, number).include(behind.low);
-    range(i, number).include(behind.high);
+    const Span& rest = behind.next();
+    Span& known = noted.next();
+    known.include(rest.low);
+    known.include(rest.high);
   }
 }
 

@@ -116,7 +116,8 @@ class ChunkRows {
   void ranges_from(std::uint32_t row, std::byte* scratch, Visit&& visit) const noexcept {
     const std::uint32_t next = row / RowNote::kRows + 1;
     if (next < places_.notes) {
-      for (std::uint32_t i = 0; i < layout_.numbers().size(); ++i) visit(i, range(next, i));
+      Ranges behind = ranges(next);
+      for (std::uint32_t i = 0; i < layout_.numbers().size(); ++i) visit(i, behind.next());
     }
     Cursor rows = cursor(row);
     for (; row < rows_ && row < next * RowNote::kRows; ++row) {
@@ -141,6 +142,8 @@ class ChunkRows {
   bool is_walked(const Notes& notes) const noexcept {
     return notes.walked == places_.blocks_before_rows();
   }
+  /// The work of add(), and half of that of join() [blocks].
+  std::uint32_t blocks_of_ranges() const noexcept { return places_.blocks_of_note; }
   /// Notes the values of the next row, whose first byte is at `at`.
   void add(Notes& notes, const Cursor& at, const std::byte* row) noexcept;
   /// Then, once for each note: extends the ranges of the last one that is left by the next one's.
@@ -159,7 +162,24 @@ class ChunkRows {
   RowNote& note(std::uint32_t i) const noexcept {
     return *reinterpret_cast<RowNote*>(pool_.bytes(block_of(i)));
   }
-  Span& range(std::uint32_t of_note, std::uint32_t number) const noexcept;
+  /// The ranges of a note, one number after the other.
+  class Ranges {
+   public:
+    Ranges(BlockPool& pool, BlockIndex note) noexcept : pool_(pool), block_(note) {}
+    Span& next() noexcept {
+      const std::uint32_t number = number_++;
+      if (number == 0) return reinterpret_cast<RowNote*>(pool_.bytes(block_))->range;
+      const std::uint32_t place = (number - 1) % ChunkPlaces::kRanges;
+      if (place == 0) block_ = pool_.next(block_);
+      return reinterpret_cast<Span*>(pool_.bytes(block_))[place];
+    }
+
+   private:
+    BlockPool& pool_;
+    BlockIndex block_;
+    std::uint32_t number_ = 0;
+  };
+  Ranges ranges(std::uint32_t of_note) const noexcept { return {pool_, block_of(of_note)}; }
 
   BlockPool& pool_;
   BlockIndex member_;

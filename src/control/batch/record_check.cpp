@@ -165,7 +165,8 @@ RecordCheck::Verdict RecordCheck::go_on_with_chunk(BlockPool& pool, BlockIndex b
     progress.payload =
         Cursor(pool, pool.next(notes.at), 0, std::uint64_t{head.rows} * layout.size());
   }
-  const std::uint32_t cost = 1 + layout.size() / static_cast<std::uint32_t>(kBlockBytes);
+  const std::uint32_t ranges = rows.blocks_of_ranges();
+  const std::uint32_t cost = layout.size() / static_cast<std::uint32_t>(kBlockBytes) + ranges;
   for (; rows.is_walked(notes) && progress.rows_left > 0 && budget > 0; --progress.rows_left) {
     const Cursor at = progress.payload;
     progress.payload.read(state, layout.size());
@@ -173,7 +174,10 @@ RecordCheck::Verdict RecordCheck::go_on_with_chunk(BlockPool& pool, BlockIndex b
     rows.add(notes, at, state);
     budget -= std::min(budget, cost);
   }
-  for (; progress.rows_left == 0 && notes.not_joined > 0 && budget > 0; --budget) rows.join(notes);
+  for (; progress.rows_left == 0 && notes.not_joined > 0 && budget > 0;) {
+    rows.join(notes);
+    budget -= std::min(budget, 2 * ranges);
+  }
   return progress.rows_left > 0 || notes.not_joined > 0 ? Verdict::unfinished : Verdict::valid;
 }
 

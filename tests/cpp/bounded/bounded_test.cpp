@@ -220,5 +220,32 @@ TEST(BoundedChunk, TakingItLooksAtNearlyAsManyBlocksHoweverManyRowsItHasOrAreLat
   EXPECT_LE(std::max(late, in_time), std::min(late, in_time) + 2 * kOfASearch);
 }
 
+/// However many numbers a state has, a share of the budget is what it says, and so is a begin.
+TEST(BoundedChunk, CheckingAndBeginningLargeStatesLooksAtEachBlockAFewTimes) {
+  constexpr std::uint32_t kNumbers = 800;
+  constexpr std::uint32_t kRows = 24;
+  Rig rig(plain_robot(1, kNumbers), kLane);
+  const StateLayout layout(rig.schema, rig.schema.actuators[0].type);
+  std::vector<std::uint32_t> due(kRows);
+  for (std::uint32_t i = 0; i < kRows; ++i) due[i] = 2 * i + 2;
+  const auto targets = bytes_of(std::vector<double>(kRows * kNumbers, 1.0));
+  const std::vector<BatchBuilder::Member> members{{{}, {}, targets}};
+  const std::vector<const StateLayout*> layouts{&layout};
+  rig.batch.chunk(members, {.anchor = 0, .ease = 1}, due, layouts);
+  const BlockIndex batch = rig.send();
+  work_since_last_asked();
+  constexpr std::uint32_t kShare = 256;
+  for (bool done = false; !done;) {
+    done = rig.check(0, batch, kShare);
+    // of the row, or the notes, with which the budget ends
+    EXPECT_LE(work_since_last_asked().visits, 3 * kShare + 2 * kNumbers);
+  }
+  rig.controller.take(0, batch, rig);
+  rig.step();
+  EXPECT_LE(work_since_last_asked().visits, 6 * kNumbers);
+  rig.step();
+  EXPECT_EQ(rig.desired(kNumbers - 1), 1.0);
+}
+
 }  // namespace
 }  // namespace o80::test
