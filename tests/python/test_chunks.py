@@ -105,8 +105,9 @@ def test_the_row_of_a_camera_is_an_anchor(process: o80.robots.Process) -> None:
         with arm.chunks(step=2000) as plan:
             sent = plan.send(ROWS, seen=seen)
             plan.wait(lead=10**6, timeout=WAIT)
-            assert sent.batch.seen.iteration == 0
-            assert sent.batch.seen.epoch == seen.epoch != arm.epoch
+            told = sent.batch.seen
+            assert told is not None
+            assert (told.iteration, told.epoch) == (0, seen.epoch)
             before = arm.at_time(seen.time)
             command = next(
                 each for entry in arm.journal() for each in entry.commands if each.pace == "chunk"

@@ -92,8 +92,8 @@ TEST(Chunk, FromRestItReachesEachRowInItsIteration) {
   const CommandId id = rig.example({.ease = 10});
   rig.run_to(160);
   const std::vector<std::pair<Iteration, double>> wanted{
-      {110, 0.0}, {115, 0.03125}, {120, 0.1}, {125, 0.21875}, {130, 0.3},
-      {135, 0.3}, {140, 0.3},     {145, 0.25}, {150, 0.2},    {155, 0.2}};
+      {110, 0.0}, {115, 0.03125}, {120, 0.1},  {125, 0.21875}, {130, 0.3},
+      {135, 0.3}, {140, 0.3},     {145, 0.25}, {150, 0.2},     {155, 0.2}};
   for (const auto& [iteration, value] : wanted) EXPECT_NEAR(rig.at(iteration), value, 1e-12);
   for (std::size_t i = 0; i < kRows.size(); ++i) {
     EXPECT_EQ(rig.at(110 + 10 * static_cast<Iteration>(i)), kRows[i]) << "bit for bit";
@@ -276,7 +276,8 @@ TEST(Chunk, OneOverwritesAnotherFromItsPlan) {
   const double m = 14.0;
   const double w = 1.0 / m;
   const double next = place * (1 + 2 * w) * (1 - w) * (1 - w) + 0.1 * w * w * (3 - 2 * w) +
-                      m * slope * w * (1 - w) * (1 - w) - m * 2 * (0.1 - place) / m * w * w * (1 - w);
+                      m * slope * w * (1 - w) * (1 - w) -
+                      m * 2 * (0.1 - place) / m * w * w * (1 - w);
   EXPECT_LT(std::abs(rig.at(117) - next), 0.003);
   EXPECT_LT(std::abs(rig.at(117) - 2 * rig.at(116) + rig.at(115)), 0.002) << "no jump of velocity";
 }
@@ -338,8 +339,8 @@ TEST(Chunk, APurgeAHaltAnOverwriteAndAFreshStartEndOneThatWaits) {
 TEST(Chunk, OfSeveralActuatorsOneThatIsOverwrittenLeavesTheOthers) {
   ChunkRig rig(plain_robot(3));
   rig.run_to(101);
-  const CommandId id = rig.chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::cubic,
-                                 {0, 1, 2});
+  const CommandId id =
+      rig.chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::cubic, {0, 1, 2});
   rig.run_to(125);
   rig.add(1, overwriting(over(2)), {7.0});
   rig.pulse();
@@ -577,7 +578,8 @@ TEST(Chunk, EveryRowThatIsDueIsShown) {
       for (std::size_t k = 0; k < sent.rows.size(); ++k) {
         const Iteration due = sent.anchor + shift + sent.due[k];
         const bool counts = due >= begins + static_cast<Iteration>(sent.head.ease) - 1;
-        if (!counts || due > ends || (due == ends && told.back().status != Status::completed)) continue;
+        if (!counts || due > ends || (due == ends && told.back().status != Status::completed))
+          continue;
         ASSERT_EQ(rig.at(due), sent.rows[k]) << "seed " << seed << ", row " << k;
         ++exact;
       }
@@ -607,7 +609,11 @@ Schema limited_robot(const Limits& limits) {
 
 /// [per iteration] at a millisecond.
 Limits limits_of(double speed, double acceleration, double jerk = kNoLimit) {
-  return {.minimum = -10.0, .maximum = 10.0, .speed = speed, .acceleration = acceleration, .jerk = jerk};
+  return {.minimum = -10.0,
+          .maximum = 10.0,
+          .speed = speed,
+          .acceleration = acceleration,
+          .jerk = jerk};
 }
 
 TEST(ChunkLimits, AFirstAnswerThatComesLateDoesNotThrowTheArm) {
@@ -637,7 +643,8 @@ TEST(ChunkLimits, ALowJerkLimitDoesNotLeadAstray) {
     rig.run_to(now);
     const Iteration anchor = std::max<Iteration>(0, now - 1);
     std::vector<double> rows;
-    for (const std::uint32_t each : due) rows.push_back(sine(1e-3 * static_cast<double>(anchor + each)));
+    for (const std::uint32_t each : due)
+      rows.push_back(sine(1e-3 * static_cast<double>(anchor + each)));
     rig.chunk(rows, due, {.anchor = anchor, .ease = 100});
     if (now < 3000) continue;
     for (Iteration i = now - 100; i < now; ++i) {
@@ -835,7 +842,8 @@ TEST(ChunkHostile, RandomBytesAreSafe) {
   }
 }
 
-/// Chunks of three lanes for overlapping actuators of different types, among all else that there is.
+/// Chunks of three lanes for overlapping actuators of different types, among all else that there
+/// is.
 TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
   for (unsigned seed = 0; seed < 60; ++seed) {
     std::mt19937 dice(seed);
@@ -848,7 +856,8 @@ TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
                  scalar_field("count", Kind::int64)});
     schema.add_actuators("joint", schema.actuators[0].type, 3);
     schema.add_actuators("hand", hand, 2);
-    schema.actuator(1).limits({.minimum = -2.0, .maximum = 2.0, .speed = 5.0, .acceleration = 50.0});
+    schema.actuator(1).limits(
+        {.minimum = -2.0, .maximum = 2.0, .speed = 5.0, .acceleration = 50.0});
     schema.actuators[2].when_idle = WhenIdle::follow;
     Rig rig(std::move(schema), 3000);
     std::vector<StateLayout> layouts;
@@ -907,12 +916,13 @@ TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
             of.push_back(&layouts[i]);
           }
           if (members.empty()) continue;
-          const ChunkHead head{.anchor = rig.next - pick(-40, 20),
-                               .plan = static_cast<std::uint64_t>(pick(0, 1)),
-                               .ease = static_cast<std::uint32_t>(pick(1, 12)),
-                               .first = static_cast<std::uint32_t>(pick(0, static_cast<int>(count) - 1)),
-                               .fixed = static_cast<std::uint8_t>(pick(0, 1)),
-                               .reject_late = static_cast<std::uint8_t>(pick(0, 1))};
+          const ChunkHead head{
+              .anchor = rig.next - pick(-40, 20),
+              .plan = static_cast<std::uint64_t>(pick(0, 1)),
+              .ease = static_cast<std::uint32_t>(pick(1, 12)),
+              .first = static_cast<std::uint32_t>(pick(0, static_cast<int>(count) - 1)),
+              .fixed = static_cast<std::uint8_t>(pick(0, 1)),
+              .reject_late = static_cast<std::uint8_t>(pick(0, 1))};
           rig.batch.chunk(members, head, every(static_cast<std::uint32_t>(pick(1, 9)), count), of);
         }
       }
@@ -957,7 +967,8 @@ TEST(Chunk, LongOnesWithStatesOfManyNumbersFindTheirRows) {
       const StateLayout layout(rig.schema, rig.schema.actuators[0].type);
       std::vector<double> rows;
       for (std::size_t i = 0; i < count; ++i) {
-        for (std::uint32_t k = 0; k < numbers; ++k) rows.push_back(static_cast<double>(i * (k + 1)));
+        for (std::uint32_t k = 0; k < numbers; ++k)
+          rows.push_back(static_cast<double>(i * (k + 1)));
       }
       const auto bytes = bytes_of(rows);
       const std::vector<BatchBuilder::Member> members{{{}, {}, bytes}};
@@ -969,7 +980,8 @@ TEST(Chunk, LongOnesWithStatesOfManyNumbersFindTheirRows) {
       for (Iteration row = late; row < static_cast<Iteration>(count); ++row) {
         while (rig.next <= 1 + 2 * (row + 1)) rig.step();
         for (std::uint32_t k = 0; k < numbers; ++k) {
-          ASSERT_EQ(rig.desired(k), static_cast<double>(row) * (k + 1)) << numbers << ' ' << count << ' ' << row;
+          ASSERT_EQ(rig.desired(k), static_cast<double>(row) * (k + 1))
+              << numbers << ' ' << count << ' ' << row;
         }
       }
       EXPECT_EQ(rig.witness.status(id), Status::completed);
