@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import socket
 import time
 from collections.abc import Callable
 from dataclasses import astuple, dataclass
@@ -101,7 +102,9 @@ class FakeLauncher:
     def die(self) -> None:
         """Loses its connections, what it was doing, and its state."""
         if self._socket is not None:
+            bound = self._socket.getsockopt(self._zmq.LAST_ENDPOINT).decode().rstrip("\0")
             self._socket.close(linger=0)
+            _wait_until_closed(bound)
         self._socket, self._busy, self.state = None, None, State()
 
     def close(self) -> None:
@@ -187,6 +190,17 @@ class FakeLauncher:
             self.state = State(self.state.phi, self.state.theta, *motors)
         else:
             self.state = request.state
+
+
+def _wait_until_closed(address: str) -> None:
+    """Waits until nobody listens there: ZeroMQ closes a socket in the background."""
+    host, _, port = address.removeprefix("tcp://").rpartition(":")
+    end = time.monotonic() + FREED_WITHIN
+    while time.monotonic() < end:
+        with socket.socket() as probe:
+            if probe.connect_ex((host, int(port))) != 0:
+                return
+        time.sleep(0.001)
 
 
 def _told(state: State | None) -> str:
