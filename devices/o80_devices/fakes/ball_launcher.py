@@ -104,7 +104,8 @@ class FakeLauncher:
         if self._socket is not None:
             bound = self._socket.getsockopt(self._zmq.LAST_ENDPOINT).decode().rstrip("\0")
             self._socket.close(linger=0)
-            _wait_until_closed(bound)
+            if bound:
+                _wait_until_closed(bound)
         self._socket, self._busy, self.state = None, None, State()
 
     def close(self) -> None:
