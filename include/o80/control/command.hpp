@@ -93,9 +93,9 @@ struct PulseOptions {
 
 /// How rows of targets are played, each in a fixed iteration (docs/chunks.md).
 struct ChunkOptions {
-  Iteration anchor = 0;      ///< Of the observation that the rows answer.
-  std::uint64_t epoch = 0;   ///< Of its backend.
-  std::uint64_t plan = 0;    ///< Of one plan of a frontend, an older anchor is rejected.
+  Iteration anchor = 0;      ///< Iteration of the observation that the rows answer.
+  std::uint64_t epoch = 0;   ///< Of the run that takes it; set when it is sent.
+  std::uint64_t plan = 0;    ///< Number of a plan: within one, an older anchor is rejected.
   std::uint32_t ease = 1;    ///< Iterations of the take-over.
   std::uint32_t first = 0;   ///< Rows before this one are what was planned before, not played.
   bool fixed = false;        ///< Rows keep their iterations also where the actuators stand still.

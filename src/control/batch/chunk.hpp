@@ -47,11 +47,11 @@ inline ChunkHead& chunk_of(BlockPool& pool, BlockIndex group) noexcept {
   return *reinterpret_cast<ChunkHead*>(pool.bytes(pool.next(group)));
 }
 
-/// What is noted of kRows rows of a member: where they are, when they are due, and between which
-/// values each number stays from there to the end.
+/// A note about kRows rows of a member: where they are, when they are due, and between which values
+/// each number stays from there to the last row.
 ///
-/// The sender leaves room for the notes before the rows, so that one row is found by a few blocks,
-/// however many there are.
+/// The sender leaves room for the notes before the rows. So a look at a few blocks finds a row,
+/// however many rows there are.
 struct RowNote {
   static constexpr std::uint32_t kRows = 8;
   BlockIndex block = kNoBlock;  // of the first of these rows
@@ -62,8 +62,8 @@ struct RowNote {
 };
 static_assert(sizeof(RowNote) == kBlockBytes);
 
-/// Where the parts of a member are: its head and mask, 1 block that lists the blocks of a list of
-/// notes, that list, the notes, the rows.
+/// The parts of a member, each from a new block on: head and mask; one block that says where the
+/// lists are; the lists, which say where the notes are; the notes; the rows.
 struct ChunkPlaces {
   static constexpr std::uint32_t kListed = kBlockBytes / sizeof(BlockIndex);
   static constexpr std::uint32_t kRanges = kBlockBytes / sizeof(Span);

@@ -55,9 +55,8 @@ inline constexpr std::int64_t kLongestDuration = std::int64_t{1} << 61;
 /// - if a trajectory has its own times (pace `duration`, rows > 1): the end time of each row since
 ///   the start of the command (int64 [ns]);
 /// - the rows, one state each. `iterations` and `speed` apply to each row; `until` allows one row.
-/// Payload of a member of a chunk: the mask, zeros to the end of a block, notes and rows
-/// (chunk.hpp). Payload of a request: its struct; of a mark: its text in UTF-8. A group has none,
-/// but that of a chunk kChunkGroupBytes.
+/// Payload of a member of a chunk: see ChunkPlaces. Payload of a request: its struct; of a mark:
+/// its text in UTF-8. A group has none; that of a chunk has a ChunkHead in its second block.
 ///
 /// Members follow their group record. They do not count as records of the batch, have the id of the
 /// group, and the layout of a command with the pace, mode, profile, start and rows of the group.
