@@ -30,6 +30,7 @@ def shell() -> Iterator[InteractiveShell]:
         assert made.history_manager is not None
         made.history_manager.end_session()
         InteractiveShell.clear_instance()
+        made.user_ns.clear()  # IPython keeps each shell, and its arms would keep their memory
 
 
 def completed(shell: InteractiveShell, text: str) -> set[str]:
