@@ -26,6 +26,8 @@ from steps import JOBS, PYTHON, Step, build, run, use_tools
 FOLDER = ROOT / "build" / "soak"
 GROUPS = Path("/sys/fs/cgroup")
 NOBODY = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
+# a program that a user's own program starts: `setpriv` itself may start one that no user may read
+STARTS = "import subprocess, sys; subprocess.run([sys.executable, '-c', ''], check=True)"
 BURN = [sys.executable, "-c", "while True: pass"]
 WRITE = """
 import os, sys
@@ -220,7 +222,7 @@ def available() -> list[str]:
         "quota": not has_quota,
         "memory": not root,
         "user": not root
-        or subprocess.run([*NOBODY, sys.executable, "-c", ""], capture_output=True).returncode != 0,
+        or subprocess.run([*NOBODY, sys.executable, "-c", STARTS], capture_output=True).returncode != 0,
     }
     for name in [name for name, lacks in lacking.items() if lacks]:
         print(f"condition {name}: not possible here")
