@@ -222,7 +222,8 @@ def available() -> list[str]:
         "quota": not has_quota,
         "memory": not root,
         "user": not root
-        or subprocess.run([*NOBODY, sys.executable, "-c", STARTS], capture_output=True).returncode != 0,
+        or subprocess.run([*NOBODY, sys.executable, "-c", STARTS], capture_output=True).returncode
+        != 0,
     }
     for name in [name for name, lacks in lacking.items() if lacks]:
         print(f"condition {name}: not possible here")

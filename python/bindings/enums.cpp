@@ -70,6 +70,11 @@ o80::Profile profile_of_rows(nb::handle word) {
   return parse(word, std::array{cubic, linear, hold}, "the profile of a chunk");
 }
 
+o80::Profile profile_of_trajectory(nb::handle word) {
+  using enum o80::Profile;
+  return parse(word, std::array{cubic, linear, hold, minimum_jerk}, "the profile of a trajectory");
+}
+
 o80::Start start_of(nb::handle word) {
   using enum o80::Start;
   return parse(word, std::array{desired, observed}, "start");

@@ -10,6 +10,7 @@
 o80::Mode mode_of(nanobind::handle word);
 o80::Profile profile_of(nanobind::handle word);
 o80::Profile profile_of_rows(nanobind::handle word);
+o80::Profile profile_of_trajectory(nanobind::handle word);
 o80::Start start_of(nanobind::handle word);
 
 /// Members of o80.Status and o80.Reason.

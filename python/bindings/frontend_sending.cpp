@@ -129,8 +129,8 @@ std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint
   const auto frontend = self.shared();
   o80::CommandOptions options{.pace = pace_of(nb::none(), speed, nb::none(), iterations),
                               .mode = mode_of(mode),
-                              .profile = profile_of(profile),
                               .start = start_of(start)};
+  if (!profile.is_none()) options.profile = profile_of_trajectory(profile);
   std::vector<std::int64_t> ends;
   if (!times.is_none()) {
     const Bytes bytes(times);

@@ -586,3 +586,25 @@ def test_several_threads_send_on_one_plan(arm: o80.Frontend) -> None:
         planned = plan.planned(now, step=1)
         plan.wait()
         assert arm.history(len(planned)).desired.tolist() == planned.tolist()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_trajectory_is_a_chunk_that_begins_when_its_queue_reaches_it(seed: int) -> None:
+    choose = random.Random(seed)
+    rows = rows_of(choose, 0.0, choose.randrange(2, 20))
+    step = choose.randrange(1, 20)
+    profile: Any = choose.choice(["cubic", "linear", "hold"])
+    load = o80.robots.load("two_joints")
+    with load.inline() as one, load.inline() as other:
+        for arm in (one, other):
+            arm.add_command(None, [0.3, -0.2], iterations=50)
+            arm.pulse()
+            arm.burst(30)
+        one.add_trajectory(rows, iterations=step, mode="overwrite", profile=profile)
+        one.pulse()
+        with other.chunks(step=step, ease=1, profile=profile) as plan:
+            plan.send(rows, seen=30)
+            for arm in (one, other):
+                arm.burst(len(rows) * step + 20)
+        assert one.history().desired.tolist() == other.history().desired.tolist()
+        assert one.history().desired[30 + step :: step][: len(rows)].tolist() == rows

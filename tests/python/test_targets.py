@@ -2,12 +2,13 @@
 
 from collections.abc import Iterator
 from enum import IntEnum
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 import o80
+from o80.base.words import ProfileWord, RowsWord
 
 WAIT = 30.0  # [s] longer than any wait should take
 
@@ -237,11 +238,41 @@ def test_states_of_several_types_may_be_given_in_part(robot: Robot) -> None:
     assert row.valve
 
 
-def test_a_trajectory_takes_its_iterations_for_each_row(arm: o80.Frontend) -> None:
-    arm.add_trajectory([[1.0, -1.0], [0.0, 0.0]], iterations=4)
+@pytest.mark.parametrize(
+    ("profile", "first"),
+    [
+        (None, [0.15625, 0.5, 0.84375, 1.0]),  # at rest at a row where it turns round
+        ("cubic", [0.15625, 0.5, 0.84375, 1.0]),
+        ("linear", [0.25, 0.5, 0.75, 1.0]),
+        ("hold", [1.0, 1.0, 1.0, 1.0]),
+    ],
+)
+def test_a_trajectory_takes_its_iterations_for_each_row(
+    arm: o80.Frontend, profile: RowsWord | None, first: list[float]
+) -> None:
+    arm.add_trajectory([[1.0, -1.0], [0.0, 0.0]], iterations=4, profile=profile)
 
     assert arm.pulse_and_wait(timeout=WAIT).iteration == 8
-    assert arm.history().desired[1:, 0].tolist() == [0.25, 0.5, 0.75, 1.0, 0.75, 0.5, 0.25, 0.0]
+    desired = arm.history().desired[1:, 0]
+    assert desired[:4].tolist() == first
+    assert desired[4:].tolist() == [1.0 - each for each in first]
+
+
+def test_at_a_speed_a_trajectory_goes_in_straight_lines(arm: o80.Frontend) -> None:
+    arm.add_trajectory([1.0, 2.0], "elbow", speed=250.0)
+
+    assert arm.pulse_and_wait(timeout=WAIT).iteration == 8
+    assert arm.history().desired[1:, 1].tolist() == [0.25 * i for i in range(1, 9)]
+
+
+def test_profiles_of_rows_are_refused_where_they_cannot_be(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match="cubic needs rows that are due in fixed iter"):
+        arm.add_trajectory([1.0, 2.0], "elbow", speed=250.0, profile="cubic")
+    with pytest.raises(o80.InvalidArgument, match="'minimum_jerk', got 'as_sent'"):
+        arm.add_trajectory([1.0, 2.0], "elbow", profile="as_sent")
+    with pytest.raises(o80.InvalidArgument, match="profile"):
+        arm.add_command("elbow", 1.0, profile=cast(ProfileWord, "cubic"))
+    assert arm.added == 0
 
 
 def test_a_trajectory_may_have_its_own_times(arm: o80.Frontend) -> None:
@@ -249,7 +280,8 @@ def test_a_trajectory_may_have_its_own_times(arm: o80.Frontend) -> None:
 
     assert arm.pulse_and_wait(timeout=WAIT).iteration == 10
     assert arm.history(since=2, until=2).desired[0, 1] == 1.0
-    assert arm.history(since=6, until=6).desired[0, 1] == 1.5
+    # from its slope at the first row, a quarter, to rest
+    assert arm.history(since=6, until=6).desired[0, 1] == 1.75
 
 
 def test_a_trajectory_of_chosen_actuators(arm: o80.Frontend) -> None:

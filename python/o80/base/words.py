@@ -20,8 +20,8 @@ class Profile(StrEnum):
     LINEAR = "linear"
     MINIMUM_JERK = "minimum_jerk"
     AS_SENT = "as_sent"  #: no interpolation: each target in its iteration, where limits allow
-    CUBIC = "cubic"  #: of a chunk: through its rows, without overshoot
-    HOLD = "hold"  #: of a chunk: each row from the iteration after the one before it
+    CUBIC = "cubic"  #: of rows: a curve through them, without overshoot
+    HOLD = "hold"  #: of rows: each from the iteration after the one before it
 
 
 class Start(StrEnum):

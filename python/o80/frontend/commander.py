@@ -24,6 +24,7 @@ from o80.base.words import (
     ModeWord,
     OnErrorWord,
     ProfileWord,
+    RowsWord,
     StartWord,
     Status,
 )
@@ -181,7 +182,7 @@ class Commander(Reader):
         times: ArrayLike | None = None,
         speed: float | None = None,
         mode: ModeWord = "queue",
-        profile: ProfileWord = "linear",
+        profile: ProfileWord | RowsWord | None = None,
         start: StartWord = "desired",
     ) -> int:
         """Adds one command through many states, for one or several actuators.
@@ -193,7 +194,10 @@ class Commander(Reader):
         iterations: number of iterations for each row (default: 1).
         times: when each row is reached, since the start [s]: (T,), not decreasing.
         speed: peak speed to each row, as in add_command.
-        mode, profile, start: as in add_command.
+        profile: "cubic" (default, not with speed): a curve through the rows that stays between
+            them, at rest at the last one; "linear" (default with speed): straight lines; "hold":
+            each row from the iteration after the one before it; "minimum_jerk": at rest at each row.
+        mode, start: as in add_command.
 
         Several actuators reach each row together, as in add_command. If InvalidArgument is raised,
         nothing is added. Returns its place, as add_command.

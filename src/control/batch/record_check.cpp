@@ -22,12 +22,16 @@ bool sane_pace(const RecordHead& head) noexcept {
   }
 }
 
-/// True for the options of a member of a chunk.
-bool suits_chunk(const RecordHead& head) noexcept {
-  const bool plays_rows = head.profile == Profile::cubic || head.profile == Profile::linear ||
-                          head.profile == Profile::hold;
-  return head.kind == RecordKind::member && plays_rows && head.mode == Mode::overwrite &&
-         head.start == Start::desired && head.rows <= kMaxChunkRows;
+/// True if the profile suits the pace, and the other options too if that is `chunk`.
+bool sane_profile(const RecordHead& head) noexcept {
+  const bool is_of_rows = head.profile == Profile::cubic || head.profile == Profile::hold;
+  if (is_chunk(head)) {
+    return head.kind == RecordKind::member && (is_of_rows || head.profile == Profile::linear) &&
+           head.mode == Mode::overwrite && head.start == Start::desired &&
+           head.rows <= kMaxChunkRows;
+  }
+  if (is_of_rows) return head.pace == Pace::iterations || head.pace == Pace::duration;
+  return head.profile != Profile::as_sent || (head.pace == Pace::direct && head.rows == 1);
 }
 
 }  // namespace
@@ -80,13 +84,12 @@ RecordCheck::Verdict RecordCheck::begin(BlockPool& pool, BlockIndex block,
 
 RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
-  const bool as_sent = head.profile == Profile::as_sent;
   const bool of_chunk = is_chunk(head);
   const bool is_known = head.mode <= Mode::overwrite && head.pace <= Pace::chunk &&
-                        head.start <= Start::observed && head.masked <= 1 &&
-                        (of_chunk ? suits_chunk(head) : head.profile <= Profile::as_sent);
+                        head.profile <= Profile::hold && head.start <= Start::observed &&
+                        head.masked <= 1;
   if (head.actuator >= targets_.actuators() || head.rows == 0 || !is_known || !sane_pace(head) ||
-      (as_sent && (head.pace != Pace::direct || head.rows > 1))) {
+      !sane_profile(head)) {
     return Verdict::invalid;
   }
   const StateLayout& layout = targets_.layout(head.actuator);

@@ -16,7 +16,14 @@ namespace o80 {
 inline bool is_timed(const RecordHead& head) noexcept {
   return head.kind == RecordKind::command && head.pace == Pace::duration && head.rows > 1;
 }
-/// For such a command: stores the position of its first row in `amount`, which it does not use.
+/// True for a command that follows rows, each in its own iteration, as a chunk does. The others are
+/// planned to rest at their target, or at each of their rows.
+inline bool plays_rows(const RecordHead& head) noexcept {
+  const bool in_lines = head.profile == Profile::linear && head.rows > 1 &&
+                        head.pace != Pace::direct && head.pace != Pace::fastest;
+  return in_lines || head.profile == Profile::cubic || head.profile == Profile::hold;
+}
+/// For a timed one: stores the position of its first row in `amount`, which it does not use.
 inline void note_rows(RecordHead& head, const Cursor& rows) noexcept {
   head.amount = static_cast<std::int64_t>(std::uint64_t{rows.offset()} << 32 | rows.block());
 }

@@ -83,12 +83,14 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
 std::int64_t Motion::propose(const Course& course, const std::byte* desired) noexcept {
   profile_ = course.profile;
   is_row_ = course.is_row;
+  next_row_ = course.next;
+  next_iterations_ = course.next_iterations;
   const bool first_row = std::exchange(begun_, false);
   // a row begins at the row before it
   if (first_row || !is_row_) layout_.copy(from(), desired);
   const std::byte* observed = first_row ? std::exchange(observed_, nullptr) : nullptr;
   if (observed != nullptr) layout_.copy_finite(from(), observed);
-  if (course.of_chunk && profile_ == Profile::hold) layout_.copy(from(), target());
+  if (is_row_ && profile_ == Profile::hold) layout_.copy(from(), target());
 
   std::int64_t longest = std::max<std::int64_t>(1, course.iterations);
   slowest_ = {};
@@ -105,20 +107,16 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   requested_by_speed_ = longest;
   for (Number& each : numbers_) {
     if (!each.is_commanded) continue;
-    if (course.of_chunk) {
-      to_row(each, course);
+    const bool at_published = observed != nullptr || !each.is_limited;
+    const double start =
+        at_published ? layout_.number(each.number, from()) : each.motion.position();
+    if (is_row_) {
+      if (observed != nullptr || !each.motion.is_planned()) each.motion.stand(start, 0.0, false);
       continue;
     }
     Requested requested = course;
     requested.target = layout_.number(each.number, target());
-    const bool at_published = observed != nullptr || !each.is_limited || !(first_row || !is_row_);
-    requested.line_start =
-        at_published ? layout_.number(each.number, from()) : each.motion.position();
-    if (is_row_) {
-      follows_rows_ = follows_rows_ || each.motion.has_rates();
-      each.motion.line(requested.line_start, requested.target);
-      continue;
-    }
+    requested.line_start = start;
     if (!first_row) each.motion.begin();
     if (observed != nullptr) requested.start = requested.line_start;
     if (each.number != course.first) requested.cruise = kUnlimited;
@@ -131,15 +129,14 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   return longest;
 }
 
-/// The way of one number to the next row of a chunk.
-void Motion::to_row(Number& number, const Course& course) noexcept {
+/// Plans the way of one number to the next row.
+void Motion::to_row(Number& number, std::int64_t iterations) noexcept {
   const double row = layout_.number(number.number, target());
-  if (course.profile == Profile::hold) return number.motion.jump_on(row);
-  if (course.profile == Profile::linear) return number.motion.line_on(row, course.iterations);
-  const bool is_last = course.next_iterations == 0;
-  number.motion.curve_on(row, course.iterations,
-                         is_last ? row : layout_.number(number.number, course.next),
-                         course.next_iterations);
+  if (profile_ == Profile::hold) return number.motion.jump_on(row);
+  if (profile_ == Profile::linear) return number.motion.line_on(row, iterations);
+  const bool is_last = next_iterations_ == 0;
+  number.motion.curve_on(row, iterations, is_last ? row : layout_.number(number.number, next_row_),
+                         next_iterations_);
 }
 
 /// Types that blend by themselves: by the share of the time, from rest to rest.

@@ -32,11 +32,10 @@ class Motion {
  public:
   Motion(const Schema& schema, const ActuatorRow& actuator, const StateLayout& layout);
 
-  /// How a command gets to its target, or to the next row of a trajectory.
+  /// How a command gets to its target, or to the next row.
   struct Course : Requested {
     std::uint32_t first = 0;  // the number that the cruising speed is for
-    bool is_row = false;      // of a trajectory in straight lines: it has `iterations`
-    bool of_chunk = false;    // a row of a chunk; the row after it, so many iterations later
+    bool is_row = false;      // it is followed; the row after it, so many iterations later
     const std::byte* next = nullptr;
     std::int64_t next_iterations = 0;  // 0: it is the last row
   };
@@ -47,7 +46,7 @@ class Motion {
   void begin(const std::uint64_t* mask) noexcept {
     begin(mask, [](Number& each) { each.motion.begin(); });
   }
-  /// A chunk begins: its rows are followed from the plan of the chunk before it.
+  /// Rows begin: they are followed from the plan of the rows before them.
   void take_over(const std::uint64_t* mask) noexcept {
     begin(mask,
           [](Number& each) { each.is_commanded ? each.motion.take_over() : each.motion.begin(); });
@@ -83,7 +82,7 @@ class Motion {
     for (Number& each : numbers_) {
       if (!each.is_commanded) continue;
       if (is_row_) {
-        each.motion.line_for(iterations);
+        to_row(each, iterations);
       } else {
         each.motion.settle(iterations);
       }
@@ -105,8 +104,12 @@ class Motion {
       if (each.is_commanded) each.motion.widen(layout_.number(each.number, row));
     }
   }
-  /// True if a limit can keep the actuator from a row.
-  bool follows_rows() const noexcept { return follows_rows_; }
+  /// True if what settle() planned last is the way to a row, and a limit can keep it from there.
+  bool follows_rows() const noexcept {
+    return is_row_ && std::ranges::any_of(numbers_, [](auto& each) {
+             return each.is_commanded && each.motion.has_rates();
+           });
+  }
   /// True if a commanded number has a limit of acceleration.
   bool accelerates() const noexcept {
     return std::ranges::any_of(
@@ -216,7 +219,6 @@ class Motion {
   void begin(const std::uint64_t* mask, Begin&& begin) noexcept {
     begun_ = true;
     observed_ = nullptr;
-    follows_rows_ = false;
     for (Number& each : numbers_) {
       each.is_commanded = masked(mask, each.number);
       begin(each);
@@ -231,7 +233,7 @@ class Motion {
     return std::ranges::any_of(numbers_, predicate, &Number::motion);
   }
   std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
-  void to_row(Number& number, const Course& course) noexcept;
+  void to_row(Number& number, std::int64_t iterations) noexcept;
   void blend(Iteration now, std::byte* state) noexcept;
   void publish(const Number& number, std::byte* state) noexcept;
 
@@ -246,8 +248,9 @@ class Motion {
   const std::byte* observed_ = nullptr;
   bool has_integrals_ = false;
   bool is_row_ = false;
+  const std::byte* next_row_ = nullptr;  // as in Course
+  std::int64_t next_iterations_ = 0;
   bool begun_ = false;  // the next row begins a command
-  bool follows_rows_ = false;
   std::int64_t requested_by_speed_ = 1;
   Limited slowest_;
 };

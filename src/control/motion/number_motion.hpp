@@ -49,7 +49,7 @@ class NumberMotion {
   /// Sets the position, at rest.
   void restart(double position) noexcept {
     guard_.restart(position);
-    planned_ = follows_ = of_chunk_ = held_ = leaves_ = held_back_ = stands_ = false;
+    planned_ = follows_ = of_rows_ = held_ = leaves_ = held_back_ = stands_ = false;
     difference_ = former_difference_ = 0.0;
   }
   /// One iteration of a motion that was made elsewhere.
@@ -72,34 +72,28 @@ class NumberMotion {
   }
   /// Then plans it for `iterations`, at least those.
   void settle(std::int64_t iterations) noexcept;
-  /// A straight line to the next row of a trajectory, to be followed; line_for() sets its length.
-  void line(double start, double target) noexcept {
-    if (!planned_) {
-      Span stop = guard_.stop();
-      stop.include(start);
-      guard_.begin(stop);
-      planned_ = follows_ = true;
-    }
-    guard_.widen(target);
-    plan_.line(start, target);
-  }
-  void line_for(std::int64_t iterations) noexcept { plan_.line_for(iterations); }
-  /// The rows of a chunk begin: from the plan of the chunk before it, whatever limits made of that;
-  /// else from the motion of this number.
+  /// Rows begin: from the plan of the rows before them, whatever limits made of that; else from the
+  /// motion of this number.
   void take_over() noexcept {
-    const bool goes_on = planned_ && of_chunk_;
+    const bool goes_on = planned_ && of_rows_;
     const double place = goes_on ? plan_.place() : guard_.position();
     const double slope = goes_on ? plan_.slope() : rests_ ? 0.0 : guard_.moment().speed;
     begin();
+    stand(place, slope, goes_on);
+  }
+  /// Or they begin at this place.
+  void stand(double place, double slope, bool goes_on) noexcept {
     plan_.stand(place, slope);
     Span span = guard_.stop();
     span.include(place);
     goes_on ? guard_.reach(span) : guard_.begin(span);
-    planned_ = follows_ = of_chunk_ = true;
+    planned_ = follows_ = of_rows_ = true;
   }
+  bool is_planned() const noexcept { return planned_; }
   /// Then the plan to the next row, as NumberPlan has it.
   void line_on(double target, std::int64_t iterations) noexcept {
     plan_.line_on(target, iterations);
+    guard_.widen(target);
   }
   void curve_on(double target, std::int64_t iterations, double next,
                 std::int64_t next_iterations) noexcept {
@@ -108,7 +102,10 @@ class NumberMotion {
     widen(plan_.hull().high);
   }
   /// To the row in the first of its iterations.
-  void jump_on(double target) noexcept { plan_.line(target, target); }
+  void jump_on(double target) noexcept {
+    plan_.line(target, target);
+    guard_.widen(target);
+  }
   /// Goes to the target within the limits, whatever they keep it from (Profile::as_sent).
   void follow_as_sent(double target) noexcept {
     if (!planned_) guard_.begin();
@@ -134,8 +131,8 @@ class NumberMotion {
       former_ = plan_;
       leaves_ = true;
     }
-    rests_ = arrived && of_chunk_;
-    planned_ = follows_ = of_chunk_ = false;
+    rests_ = arrived && of_rows_;
+    planned_ = follows_ = of_rows_ = false;
     guard_.follow_within_bounds();
     // a jump is no speed
     if (arrived && !accelerates()) guard_.rest();
@@ -172,10 +169,10 @@ class NumberMotion {
   NumberLimiter guard_;
   std::optional<double> rest_;
   NumberPlan plan_;
-  bool planned_ = false;   // a command moves it by `plan_`
-  bool follows_ = false;   // `plan_` may break limits
-  bool of_chunk_ = false;  // `plan_` is that of rows of a chunk
-  bool rests_ = false;     // such a plan has just ended: at its last row it rests
+  bool planned_ = false;  // a command moves it by `plan_`
+  bool follows_ = false;  // `plan_` may break limits
+  bool of_rows_ = false;  // `plan_` is that of rows
+  bool rests_ = false;    // such a plan has just ended: at its last row it rests
   bool held_ = false;
   bool jumps_at_once_ = false;  // propose() needed no plan
   Requested requested_;         // then

@@ -82,7 +82,8 @@ ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
       end(record, {Status::interrupted, Reason::limits, limited.packed()}, iteration);
     } else if (motion_.arrived()) {
       end_running(iteration);
-    } else if (runs_ == Runs::queued && (pool_->head(record_).rows > 1 || pace_ == Pace::chunk)) {
+    } else if (runs_ == Runs::queued &&
+               (pool_->head(record_).rows > 1 || plays_rows(pool_->head(record_)))) {
       take_out();
     }
   }
@@ -156,10 +157,9 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   // targets of a generator are one motion
   const bool streams = same_mask && in_force_ && set_point_.profile == Profile::as_sent &&
                        head.profile == Profile::as_sent;
-  time_ = 0;
   if (is_timed(head)) {
     // the check has stored the position of the rows
-    times_ = rows_;
+    times_ = {rows_};
     rows_ = rows_of_timed(*pool_, head, layout_->size());
   }
   pace_ = head.pace;
@@ -174,7 +174,9 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   set_point_ = next;
   motion_.hold(false);
   if (keeps_plan_ || streams) return;
-  motion_.begin(mask());
+  // straight lines begin at the actuator, curves at the plan of the rows before them
+  const bool is_curve = plays_rows(head) && head.profile != Profile::linear;
+  is_curve ? motion_.take_over(mask()) : motion_.begin(mask());
   if (head.start == Start::observed) motion_.start_at(observed);
 }
 
@@ -257,7 +259,8 @@ bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
     Outcome outcome{Status::active};
     if (late_ > 0) outcome = {Status::active, Reason::limits, reason_.packed(), late_};
     ledger_->activate(record_, iteration, outcome);
-    if (head.rows > 1 && motion_.follows_rows()) ahead_left_ = head.rows;
+    // of a chunk the span is known
+    if (head.rows > 1 && pace_ != Pace::chunk && motion_.follows_rows()) ahead_left_ = head.rows;
   }
   if (pace_ == Pace::direct && rows_left_ == 0) take_out();
   return true;
@@ -293,8 +296,7 @@ Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration
   Motion::Course next;
   next.profile = head.profile;
   next.first = layout_->first_commanded(mask());
-  next.is_row = head.rows > 1 && head.profile == Profile::linear && head.pace != Pace::fastest &&
-                head.pace != Pace::direct;
+  next.is_row = plays_rows(head);
   switch (head.pace) {
     case Pace::direct:
       if (head.amount > 0 && motion_.accelerates()) {
@@ -319,9 +321,12 @@ Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration
       to_next_row(next, iteration);
       break;
     case Pace::duration:
-      next.iterations = is_timed(head) ? row_of_own_time() : carry_.iterations(head.amount);
+      next.iterations = is_timed(head) ? times_.next(carry_, rows_left_, [this] { read_row(); })
+                                       : carry_.iterations(head.amount);
       break;
   }
+  const bool is_curve = next.is_row && head.profile == Profile::cubic;
+  if (is_curve && rows_left_ > 0) look_ahead(next, head);
   return next;
 }
 
@@ -335,29 +340,43 @@ void ActuatorQueue::to_next_row(Motion::Course& course, Iteration iteration) noe
   if (row == of.row && course.profile != Profile::hold) {
     due = std::max<Iteration>(due, iteration + of.ease - 1);
   }
-  course.is_row = course.of_chunk = true;
   course.iterations = std::max<std::int64_t>(1, due - iteration + 1);
-  if (rows_left_ == 0) return;
-  Cursor after = rows_;
-  std::byte* const next = scratch() + scratch_.size() / 2 * sizeof scratch_.front();
-  after.read(next, layout_->size());
-  course.next = next;
-  course.next_iterations = rows.due(row + 1) - rows.due(row);
+  if (rows_left_ > 0) course.next_iterations = rows.due(row + 1) - rows.due(row);
 }
 
-/// Skips waypoints that end before the next iteration; the iterations of the first that does not.
-std::int64_t ActuatorQueue::row_of_own_time() noexcept {
-  const auto next = [&] {
-    std::int64_t end = time_;
-    times_.read(&end, sizeof end);
-    return end - std::exchange(time_, end);
+/// Reads the row after the next one, for the slope of a curve between them.
+void ActuatorQueue::look_ahead(Motion::Course& course, const RecordHead& head) noexcept {
+  std::byte* const next = scratch() + scratch_.size() / 2 * sizeof scratch_.front();
+  Cursor rows = rows_;
+  std::uint32_t left = rows_left_;
+  const auto read = [&] {
+    rows.read(next, layout_->size());
+    --left;
   };
-  std::int64_t duration = next();
-  for (int i = 0; i < kMaxPassed && rows_left_ > 0 && carry_.pass(duration); ++i) {
-    read_row();
-    duration = next();
+  read();
+  course.next = next;
+  if (head.pace == Pace::iterations) course.next_iterations = course.iterations;
+  if (!is_timed(head)) return;
+  RowTimes times = times_;
+  DurationCarry carry = carry_;
+  course.next_iterations = times.next(carry, left, read);
+}
+
+/// Skips rows that end before the next iteration; the iterations of the first that does not.
+template <class Read>
+std::int64_t ActuatorQueue::RowTimes::next(DurationCarry& carry, const std::uint32_t& left,
+                                           Read&& read) noexcept {
+  const auto duration = [&] {
+    std::int64_t end = time;
+    ends.read(&end, sizeof end);
+    return end - std::exchange(time, end);
+  };
+  std::int64_t next = duration();
+  for (int i = 0; i < kMaxPassed && left > 0 && carry.pass(next); ++i) {
+    read();
+    next = duration();
   }
-  return carry_.iterations(duration);
+  return carry.iterations(next);
 }
 
 }  // namespace o80

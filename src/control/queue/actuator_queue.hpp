@@ -164,6 +164,16 @@ class ActuatorQueue {
     bool operator==(const SetPoint&) const = default;
   };
 
+  /// The rest of the own times of rows.
+  struct RowTimes {
+    Cursor ends;
+    std::int64_t time = 0;  // end time of the last row [ns]
+
+    /// `left`: rows that are left; read() reads one of them.
+    template <class Read>
+    std::int64_t next(DurationCarry& carry, const std::uint32_t& left, Read&& read) noexcept;
+  };
+
   bool has_record() const noexcept { return runs_ == Runs::queued || runs_ == Runs::alone; }
   bool is_of(std::uint32_t lane) const noexcept {
     return has_record() && ledger_->lane_of(record_) == lane;
@@ -212,7 +222,7 @@ class ActuatorQueue {
     --rows_left_;
   }
   Motion::Course course(const RecordHead& head, Iteration iteration) noexcept;
-  std::int64_t row_of_own_time() noexcept;
+  void look_ahead(Motion::Course& course, const RecordHead& head) noexcept;
   void to_next_row(Motion::Course& course, Iteration iteration) noexcept;
   /// The chunk that runs.
   const ChunkHead& chunk() const noexcept {
@@ -283,8 +293,7 @@ class ActuatorQueue {
   std::int64_t requested_ = 0;       // of these, those that were asked for; 0: none
   std::int64_t late_ = 0;            // iterations more than requested
   Limited reason_;                   // for these
-  std::int64_t time_ = 0;            // end time of the last waypoint [ns]
-  Cursor times_;
+  RowTimes times_;
   Cursor rows_;
   // of a chunk: the next row, and while it takes over the row that numbers that switch are at
   std::uint32_t row_ = 0;

@@ -119,6 +119,10 @@ RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
   const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
   link_->command_check.targets(index, state, mask);
   check_options(options);
+  if (options.profile == Profile::cubic || options.profile == Profile::hold) {
+    throw InvalidArgument("the profile " + std::string(to_text(*options.profile)) +
+                          " is for rows of targets, of a trajectory or a chunk");
+  }
   const PaceSpec& pace = options.pace;
   check_pace(pace, 1);
   if (pace.pace == Pace::speed) link_->command_check.speed(index, pace.per_second, mask);
@@ -216,6 +220,12 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
     paced.pace = duration(std::chrono::nanoseconds(times.back()));
   } else if (paced.pace.pace == Pace::duration && rows > 1) {
     throw InvalidArgument("a trajectory at a duration needs the times of its rows");
+  }
+  const bool is_timed = paced.pace.pace == Pace::iterations || paced.pace.pace == Pace::duration;
+  if (!paced.profile) paced.profile = is_timed ? Profile::cubic : Profile::linear;
+  if (!is_timed && (paced.profile == Profile::cubic || paced.profile == Profile::hold)) {
+    throw InvalidArgument("the profile " + std::string(to_text(*paced.profile)) +
+                          " needs rows that are due in fixed iterations: give iterations or times");
   }
   check_pace(paced.pace, rows);
   if (paced.pace.pace == Pace::speed)

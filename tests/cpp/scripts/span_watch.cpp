@@ -83,6 +83,18 @@ long double SpanWatch::seam_speed(const ScriptWorld& world, std::size_t actuator
   return seam;
 }
 
+/// The most iterations to the first row of a curve; those that end within one are passed over.
+long double SpanWatch::first_row(const ScriptStep& step) {
+  if (step.head.pace == Pace::iterations) return std::max<std::int64_t>(1, step.head.amount);
+  constexpr auto kPassed = static_cast<std::int64_t>(1.5e9 * kPeriod);
+  std::int64_t end = 0;
+  for (const std::int64_t time : step.times) {
+    end = time;
+    if (end > kPassed) break;
+  }
+  return static_cast<long double>(end) * 1e-9L / kPeriod + 2.0L;
+}
+
 void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken_over) {
   const SentCommand& command = *world.actuators[actuator].driver;
   const ScriptStep& step = world.step_of(command);
@@ -108,6 +120,12 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
       span.include(
           stops(number, place, rounding_of(world.script.actuators[actuator].numbers[n], place)));
       span.include(number.targets);
+      if (step.head.profile == Profile::cubic && world.names(command, n)) {
+        const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
+        const long double bend = seam_speed(world, actuator, number, spec) * first_row(step) / 3.0L;
+        span.include(place - bend);
+        span.include(place + bend);
+      }
     }
     Span targets{place, place};
     if (world.names(command, n)) {
