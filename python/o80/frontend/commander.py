@@ -195,8 +195,9 @@ class Commander(Reader):
         times: when each row is reached, since the start [s]: (T,), not decreasing.
         speed: peak speed to each row, as in add_command.
         profile: "cubic" (default, not with speed): a curve through the rows that stays between
-            them, at rest at the last one; "linear" (default with speed): straight lines; "hold":
-            each row from the iteration after the one before it; "minimum_jerk": at rest at each row.
+            them, at rest at the last one; "linear" (default with speed): straight lines;
+            "hold": each row from the iteration after the one before it; "minimum_jerk": at rest
+            at each row.
         mode, start: as in add_command.
 
         Several actuators reach each row together, as in add_command. If InvalidArgument is raised,
