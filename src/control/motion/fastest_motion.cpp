@@ -77,7 +77,12 @@ FastestMotion::FastestMotion(const Moment& start, double target, const Rates& ra
   const double reached = root([&](double v) { return time_to(v) - time; }, lowest, cruise_, 0.0);
   const bool is_enough = distance(reached, time) >= distance_;
   if (!is_enough) ++before_;
-  cruise_ = cruise_for(static_cast<double>(before_), lowest, is_enough ? reached : cruise_, kExact);
+  if (distance(lowest, static_cast<double>(before_)) > distance_) {
+    mix(lowest);
+  } else {
+    cruise_ =
+        cruise_for(static_cast<double>(before_), lowest, is_enough ? reached : cruise_, kExact);
+  }
   settle();
 }
 
