@@ -78,6 +78,8 @@ bool NumberMotion::brake() noexcept {
     if (moves) {
       guard_.widen(*rest_);
       guard_.follow(*rest_);
+      // a jump is no speed
+      if (!accelerates() && guard_.position() == *rest_) guard_.rest();
     } else if (!leave()) {
       guard_.brake();
     }
