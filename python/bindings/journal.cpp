@@ -143,6 +143,7 @@ void bind_record(nb::module_& m) {
       .def_prop_ro("anchor", [](const JournalRecord& self) { return self.chunk.anchor; })
       .def_prop_ro("first", [](const JournalRecord& self) { return self.chunk.first; })
       .def_prop_ro("ease", [](const JournalRecord& self) { return self.chunk.ease; })
+      .def_prop_ro("fixed", [](const JournalRecord& self) { return self.chunk.fixed; })
       .def_ro("targets", &JournalRecord::targets)
       .def_ro("actuator", &JournalRecord::actuator)
       .def_ro("only_own", &JournalRecord::only_own)

@@ -18,6 +18,8 @@ from processes import run_o80
 
 import o80
 from o80 import _core
+from o80.plot import plot
+from o80.rows.plans import planned_by_chunks
 
 WAIT = 60.0  # [s] longer than any wait should take
 ROWS = np.array([[0.0, 0.1, 0.3, 0.3, 0.2]] * 2).T
@@ -608,3 +610,35 @@ def test_a_trajectory_is_a_chunk_that_begins_when_its_queue_reaches_it(seed: int
                 arm.burst(len(rows) * step + 20)
         assert one.history().desired.tolist() == other.history().desired.tolist()
         assert one.history().desired[30 + step :: step][: len(rows)].tolist() == rows
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_the_journal_and_the_rows_give_the_plans(arm: o80.Frontend, seed: int) -> None:
+    choose = random.Random(seed)
+    profile: Any = choose.choice(["cubic", "linear", "hold"])
+    sent = []
+    with arm.chunks(step=choose.choice([4, 10, 50 / 3]), profile=profile, ease=9) as plan:
+        for _ in range(12):
+            arm.burst(choose.randrange(1, 300))
+            rows = rows_of(choose, float(arm.latest().desired[0]), choose.randrange(1, 20))
+            first = choose.randrange(min(len(rows), 3))
+            seen = max(0, arm.published - choose.randrange(40))
+            fixed = choose.random() < 0.3
+            sent.append(plan.send(rows, seen=seen, first=first, fixed=fixed))
+        arm.burst(200)
+    history = arm.history()
+    found = planned_by_chunks(arm.journal(), history)
+    begun = [each for each in sent if each.begins is not None and each.batch[0].status != "purged"]
+    begun = [each for each in begun if each.batch.first_iteration is not None]
+    assert len(found["elbow"]) == len(found["shoulder"]) > 3
+    assert {each.begins for each in found["elbow"]} <= {each.begins for each in begun}
+    for i, name in enumerate(("shoulder", "elbow")):
+        plans = found[name]
+        for planned, after in zip(plans, [*plans[1:], None], strict=True):
+            end = planned.begins + len(planned.places)
+            end = end if after is None else min(end, after.begins)
+            wanted = history.desired[planned.begins : end, i]
+            assert planned.places[: len(wanted)] == pytest.approx(wanted, abs=1e-12)
+    legend = plot({"arm": history}, ["elbow"], planned={"arm": found}).axes[0].get_legend()
+    assert legend is not None
+    assert "planned by chunks" in [text.get_text() for text in legend.get_texts()]

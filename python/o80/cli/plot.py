@@ -25,7 +25,8 @@ def plot(
     segment: Annotated[str | None, typer.Option(help="Only this segment of a recording.")] = None,
 ) -> None:
     """Plot rows: desired and observed together, sensor values, halts, late iterations, ends of
-    commands, marks of a recording, the delay of decisions (if no --fields are chosen).
+    commands, what chunks planned, marks of a recording, the delay of decisions (if no --fields are
+    chosen).
 
     Each run of a robot that was restarted has panels of its own. Runs of different times begin at 0
     each.
@@ -33,6 +34,7 @@ def plot(
     from o80.joining import plot as plots
     from o80.joining.plot import Placed, origins
     from o80.rows.journal import command_ends, decisions
+    from o80.rows.plans import planned_by_chunks
 
     found: dict[str, Named] = {}
     for source in dict.fromkeys(sources):
@@ -53,6 +55,10 @@ def plot(
         ends={name: command_ends(entries) for name, entries in journals.items()},
         marks={name: each.marks for name, each in found.items()},
         decided={} if wanted else {name: decisions(each) for name, each in journals.items()},
+        planned={
+            name: planned_by_chunks(entries, found[name].history)
+            for name, entries in journals.items()
+        },
         origins=zeros,
         label="time [s]" if axes == 1 else f"time since each of {axes} beginnings [s]",
         window=output is None,

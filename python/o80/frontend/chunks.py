@@ -9,7 +9,6 @@ import os
 import threading
 import time
 from collections.abc import Mapping, Sequence, Sized
-from dataclasses import dataclass
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal, Self
 
@@ -20,6 +19,7 @@ from o80.base.argument_checks import number, text, whole, whole_or_none
 from o80.base.awaiting import in_thread
 from o80.base.errors import InvalidArgument, RowOverwritten
 from o80.base.words import RowsWord, Status
+from o80.rows.plans import ChunkRows, ChunkWay, Decision, Moment, decide
 from o80.rows.targets import common_labels, common_type, states_of
 
 if TYPE_CHECKING:
@@ -76,10 +76,10 @@ class SentChunk:
     was decided in the loop, and if it was rejected.
     """
 
-    def __init__(self, batch: _core.Batch, sent: _Sent) -> None:
+    def __init__(self, batch: _core.Batch, sent: ChunkRows) -> None:
         self.batch = batch  #: with this chunk as its only command
         self._sent = sent
-        self._decision: _Decision | None = None
+        self._decision: Decision | None = None
 
     @property
     def decided(self) -> bool:
@@ -118,40 +118,12 @@ class SentChunk:
         self.batch.wait(timeout, check=False)
 
     @property
-    def _decided(self) -> _Decision | None:
+    def _decided(self) -> Decision | None:
         if self._decision is None:
             shift = self.batch._shift
             if shift is not None:
-                self._decision = _decide(self._sent, self.batch.first_iteration, *shift)
+                self._decision = decide(self._sent, self.batch.first_iteration, *shift)
         return self._decision
-
-
-@dataclass(frozen=True)
-class _Sent:
-    anchor: int
-    due: NDArray[np.int64]  # iterations after the anchor
-    ease: int
-    first: int
-    rows: NDArray[np.float64]  # (rows, actuators)
-
-
-@dataclass(frozen=True)
-class _Decision:
-    shift: int
-    begins: int
-    late: int
-    row: int  # the first that is reached
-    stood: bool
-
-
-def _decide(sent: _Sent, taken: int, shift: int, stood: bool) -> _Decision:
-    """As the loop decides (src/control/batch/chunk.cpp), from what its status tells."""
-    anchor = sent.anchor + shift
-    first = 0 if stood else sent.first
-    begins = max(taken, anchor + (int(sent.due[first - 1]) if first else 0) + 1)
-    late = int(np.searchsorted(sent.due, taken - anchor))
-    row = int(np.searchsorted(sent.due, begins + sent.ease - 1 - anchor))
-    return _Decision(shift, begins, late, min(row, len(sent.due) - 1), stood)
 
 
 class _Part:
@@ -161,51 +133,28 @@ class _Part:
     somebody asks for them. Until that row is there, `start` may be what is expected.
     """
 
-    def __init__(
-        self, sent: SentChunk, decision: _Decision, profile: RowsWord, switches: bool
-    ) -> None:
-        chunk = sent._sent
+    def __init__(self, sent: SentChunk, way: ChunkWay) -> None:
         self.sent = sent
-        self.begins = decision.begins
+        self.begins = way.begins
+        self.last = way.last
         self.known = False
-        self.start: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-        self._computed: tuple[NDArray[np.float64], NDArray[np.float64]] | None = None
-        ends = chunk.due + (chunk.anchor + decision.shift - self.begins + 1)
-        last = max(int(ends[-1]), chunk.ease if decision.row == len(ends) - 1 else 1)
-        row = int(np.searchsorted(ends, 1)) if switches else decision.row
-        self._profile: RowsWord = "hold" if switches else profile
-        self._rows = chunk.rows[min(row, len(ends) - 1) :]
-        # the last iteration of the way to each row, counted from the begin
-        self._ends = ends[-len(self._rows) :]
-        self._ends[0] = max(int(self._ends[0]), 1)
-        self._ends[-1] = last
-        self.last = self.begins + last - 1
+        self.start: Moment | None = None
+        self._way = way
+        self._computed: Moment | None = None
 
-    def begin(
-        self, start: tuple[NDArray[np.float64], NDArray[np.float64]], known: bool = True
-    ) -> None:
+    def begin(self, start: Moment, known: bool = True) -> None:
         """From place and slope in the iteration before it."""
         self.start, self.known, self._computed = start, known, None
 
-    def at(self, iteration: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def at(self, iteration: int) -> Moment:
         """Places and slopes (actuators,) from its begin on; after its end it rests."""
         if self._computed is None:
-            self._computed = self._compute()
+            assert self.start is not None
+            self._computed = self._way.places(self.start)
         places, slopes = self._computed  # (iterations, actuators)
         if iteration >= self.begins + len(places):
-            return self._rows[-1], np.zeros_like(self._rows[-1])
+            return self._way.rows[-1], np.zeros_like(self._way.rows[-1])
         return places[iteration - self.begins], slopes[iteration - self.begins]
-
-    def _compute(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        assert self.start is not None
-        ends = self._ends.tolist()
-        plans = [
-            _core.plan_of_rows(float(place), float(slope), rows.tolist(), ends, self._profile)
-            for place, slope, rows in zip(*self.start, self._rows.T, strict=True)
-        ]
-        shape = len(plans), ends[-1]
-        places, slopes = (np.array([each[i] for each in plans]).reshape(shape).T for i in (0, 1))
-        return places, slopes
 
     def acts(self, iteration: int) -> bool:
         """Whether what comes in the iteration after this one goes on from this plan."""
@@ -356,7 +305,7 @@ class Chunks:
             if self.ensemble is not None:
                 self._count_answers(anchor + after)
             numbers = self._numbers(states) if self._is_plain else np.empty((count, 0))
-            sent = SentChunk(batch, _Sent(anchor, after, ease, first, numbers))
+            sent = SentChunk(batch, ChunkRows(anchor, after, ease, first, numbers))
             self._open.append(sent)
             self._newest = sent
             self._settle()
@@ -537,7 +486,9 @@ class Chunks:
                     continue
                 # those that wait for the same or a later iteration are overwritten
                 parts = [part for part in parts if part.begins < decision.begins]
-                parts.append(_Part(sent, decision, self.profile, self._switches))
+                parts.append(
+                    _Part(sent, ChunkWay(sent._sent, decision, self.profile, self._switches))
+                )
             for part in parts:
                 part.note_end()
             parts = [part for part in parts if part.last >= part.begins]

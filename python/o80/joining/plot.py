@@ -12,6 +12,7 @@ from o80.base.words import CommandEnd, Status
 from o80.rows.columns import Column, chosen, columns_of
 from o80.rows.history import History, values_of
 from o80.rows.journal import Decisions
+from o80.rows.plans import Planned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -41,6 +42,7 @@ def plot(
     ends: Mapping[str, Sequence[CommandEnd]] | None = None,
     marks: Mapping[str, Sequence[tuple[str, int]]] | None = None,
     decided: Mapping[str, Decisions] | None = None,
+    planned: Mapping[str, Mapping[str, Sequence[Planned]]] | None = None,
     origins: Mapping[str, int] | None = None,
     label: str = "time [s]",
     window: bool = False,
@@ -54,6 +56,8 @@ def plot(
     marks: text and iteration of the marks of a recording, by name of robot.
     decided: for a panel of decision latencies, by name of robot: `o80.rows.journal.decisions` of
         its journal. Robots of which none is known have no panel.
+    planned: the plans of chunks to draw, by name of robot: `o80.rows.plans.planned_by_chunks` of
+        its journal.
     origins: the time of a row [ns] that is 0 on the axis, by name of robot (None: the earliest row
         of all). Give those of `o80.timelines.origins` if the clocks of the robots differ.
     label: of the time axis.
@@ -85,6 +89,7 @@ def plot(
         zero = start if origins is None else origins[panel[0]]
         times = np.asarray((history.time - zero) * 1e-9, np.float64)
         _draw(ax, drawn, history, times, several=len(histories) > 1)
+        _draw_plans(ax, history, times, (planned or {}).get(panel[0], {}).get(panel[1], ()))
         _mark_ends(ax, panel[1], history, times, (ends or {}).get(panel[0], ()))
         _draw_marks(ax, history, times, (marks or {}).get(panel[0], ()))
         ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
@@ -189,6 +194,23 @@ def _mark_ends(
             where = times[sorted(places)]
             line = ax.plot(where, at, marker, color=color, transform=_shares(ax), label=label)
             line[0].set(markersize=9 if marker == "|" else 6, markeredgewidth=2)
+
+
+def _draw_plans(
+    ax: "Axes", history: History, times: NDArray[np.float64], plans: Sequence[Planned]
+) -> None:
+    """What each chunk planned, also where another one took over before."""
+    iterations = history.iteration
+    for i, (begins, places, _) in enumerate(plans):
+        rows = np.arange(begins, begins + len(places))
+        # behind the last row a plan is drawn by the period
+        rows = rows[rows <= iterations[-1] + len(places)]
+        at = np.interp(rows, iterations, times)
+        if len(iterations) > 1:
+            period = (times[-1] - times[0]) / (iterations[-1] - iterations[0])
+            at += np.maximum(0, rows - iterations[-1]) * period
+        label = "planned by chunks" if i == 0 else None
+        ax.plot(at, places[: len(rows)], ":", color="tab:red", linewidth=1.0, label=label)
 
 
 def _draw_marks(

@@ -49,6 +49,7 @@ class JournalCommand:
     due: tuple[int, ...] = ()
     ease: int | None = None
     first: int | None = None
+    fixed: bool = False  #: its rows keep their iterations also where the actuators stand still
     only_own: bool = False  #: of a purge: only commands of its frontend
     request: str = ""  #: the name of the request
     fields: dict[str, Any] | None = None  #: its values
@@ -232,6 +233,7 @@ class EntryDecoder:
                 due=tuple(native.anchor + due for due in native.due),
                 ease=native.ease if is_chunk else None,
                 first=native.first if is_chunk else None,
+                fixed=native.fixed,
             )
         if kind == "purge":
             every = native.actuator >= len(self._names)
