@@ -129,6 +129,28 @@ void Sender::add_trajectory() {
   frontend_.add_trajectory(actuator, count, states, {}, times);
 }
 
+/// A chunk that begins when it is taken: it overwrites as a command does.
+void Sender::add_chunk() {
+  Chance& chance = actor_.chance;
+  const auto actuator = static_cast<std::uint32_t>(chance.below(kActuators));
+  std::vector<double> rows(static_cast<std::size_t>(chance.between(1, 30)));
+  std::vector<std::uint32_t> due;
+  for (double& row : rows) {
+    row = unique_target(chance.bits());
+    due.push_back((due.empty() ? 0 : due.back()) +
+                  static_cast<std::uint32_t>(chance.between(1, 10)));
+  }
+  const o80::Iteration published = std::max<o80::Iteration>(0, frontend_.published());
+  const o80::ChunkOptions options{
+      .anchor = std::max<o80::Iteration>(0, published - chance.between(0, 20)),
+      .plan = static_cast<std::uint64_t>(attachment_),
+      .ease = static_cast<std::uint32_t>(chance.between(1, 20)),
+      .fixed = chance.percent(30)};
+  note(SentKind::command, bits_of(rows.back()), actuator).arrives_early =
+      life_.limited != 0 && actuator == kLimited ? 1 : 0;
+  frontend_.add_chunk({&actuator, 1}, due, std::as_bytes(std::span(rows)), options);
+}
+
 void Sender::add_outside() {
   const double target = actor_.chance.percent(50) ? kHighest + 1e-9 : kLowest - 1e-9;
   try {
@@ -147,8 +169,10 @@ void Sender::add_some() {
       add_command();
     } else if (kind < 70) {
       add_group();
-    } else if (kind < 80) {
+    } else if (kind < 75) {
       add_trajectory();
+    } else if (kind < 80) {
+      add_chunk();
     } else if (kind < 82) {
       add_outside();
     } else if (kind < 84) {

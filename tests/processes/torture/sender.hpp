@@ -56,6 +56,7 @@ class Sender {
   void add_command();
   void add_group();
   void add_trajectory();
+  void add_chunk();
   void add_outside();
   bool send(std::int64_t at, bool late_now, std::int64_t burst, bool until_ended,
             const std::function<o80::Batch()>& send);
