@@ -277,16 +277,17 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
   return send_alone(self, fill, seen_of(seen));
 }
 
-/// Places and slopes of the plan of a chunk, in each iteration from its begin: of one number, from
-/// this place and slope. `ends`: the last iteration of the way to each row, counted from its begin.
-std::pair<std::vector<double>, std::vector<double>> plan_of_rows(
-    double place, double slope, const std::vector<double>& rows,
-    const std::vector<std::int64_t>& ends, nb::handle profile) {
+/// Places and slopes (doubles) of the plan of a chunk, in the first `most` iterations from its
+/// begin: of one number, from this place and slope. `ends`: the last iteration of the way to each
+/// row, counted from its begin.
+nb::tuple plan_of_rows(double place, double slope, const std::vector<double>& rows,
+                       const std::vector<std::int64_t>& ends, nb::handle profile,
+                       std::size_t most) {
   const o80::Profile shape = profile_of_rows(profile);
   std::pair<std::vector<double>, std::vector<double>> plan;
   o80::NumberPlan way;
   way.stand(place, slope);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
+  for (std::size_t i = 0; i < rows.size() && plan.first.size() < most; ++i) {
     const std::int64_t count = ends[i] - (i == 0 ? 0 : ends[i - 1]);
     const bool is_last = i + 1 == rows.size();
     if (shape == o80::Profile::hold) way.line(rows[i], rows[i]);
@@ -295,12 +296,15 @@ std::pair<std::vector<double>, std::vector<double>> plan_of_rows(
       way.curve_on(rows[i], count, is_last ? rows[i] : rows[i + 1],
                    is_last ? 0 : ends[i + 1] - ends[i]);
     }
-    for (std::int64_t k = 0; k < count; ++k) {
+    for (std::int64_t k = 0; k < count && plan.first.size() < most; ++k) {
       plan.first.push_back(way.next());
       plan.second.push_back(way.slope());
     }
   }
-  return plan;
+  const auto bytes = [](const std::vector<double>& values) {
+    return nb::bytes(values.data(), values.size() * sizeof(double));
+  };
+  return nb::make_tuple(bytes(plan.first), bytes(plan.second));
 }
 
 std::uint16_t purged(const Frontend& self, nb::handle actuator) {
@@ -339,7 +343,8 @@ std::uint32_t add_request(const Frontend& self, nb::handle name, const nb::kwarg
 }  // namespace
 
 void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
-  m.def("plan_of_rows", &plan_of_rows, "place"_a, "slope"_a, "rows"_a, "ends"_a, "profile"_a);
+  m.def("plan_of_rows", &plan_of_rows, "place"_a, "slope"_a, "rows"_a, "ends"_a, "profile"_a,
+        "most"_a);
   const auto all = "actuator"_a = nb::none();
   def_verb(frontend, "add_command", verbs::add_command, &add_command, "actuator"_a.none(),
            "target"_a.none(), nb::kw_only(), "duration"_a = nb::none(), "speed"_a = nb::none(),

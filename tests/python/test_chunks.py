@@ -18,6 +18,7 @@ from processes import run_o80
 
 import o80
 from o80 import _core
+from o80.frontend import chunks as o80_chunks
 from o80.plot import plot
 from o80.rows.plans import planned_by_chunks
 
@@ -257,7 +258,8 @@ def test_due_iterations_do_not_drift(arm: o80.Frontend) -> None:
 
 def test_the_curve_has_the_slopes_of_a_parabola() -> None:
     ends = [5, 12, 20, 33]
-    places, slopes = _core.plan_of_rows(0.0, 0.0, [float(e * e) for e in ends], ends, "cubic")
+    plan = _core.plan_of_rows(0.0, 0.0, [float(e * e) for e in ends], ends, "cubic", ends[-1])
+    places, slopes = (np.frombuffer(each) for each in plan)
     for row, end in enumerate(ends[:-1]):
         assert places[end - 1] == float(end * end)
         a = (end * end - (ends[row - 1] ** 2 if row else 0)) / (end - (ends[row - 1] if row else 0))
@@ -642,3 +644,23 @@ def test_the_journal_and_the_rows_give_the_plans(arm: o80.Frontend, seed: int) -
     legend = plot({"arm": history}, ["elbow"], planned={"arm": found}).axes[0].get_legend()
     assert legend is not None
     assert "planned by chunks" in [text.get_text() for text in legend.get_texts()]
+
+
+def test_a_send_looks_at_few_of_the_chunks_before_it(
+    arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    looked: list[int] = []
+    note_end = o80_chunks._Part.note_end
+
+    def noted(part: o80_chunks._Part) -> None:
+        looked.append(part.begins)
+        note_end(part)
+
+    monkeypatch.setattr(o80_chunks._Part, "note_end", noted)
+    with arm.chunks(step=10) as plan:
+        for _ in range(60):
+            looked.clear()
+            plan.send(ROWS, seen=arm.latest())
+            assert len(looked) <= 3
+            arm.burst(2)
+        assert len(plan.planned(0, 1)) == 1

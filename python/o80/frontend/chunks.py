@@ -146,15 +146,20 @@ class _Part:
         """From place and slope in the iteration before it."""
         self.start, self.known, self._computed = start, known, None
 
-    def at(self, iteration: int) -> Moment:
-        """Places and slopes (actuators,) from its begin on; after its end it rests."""
-        if self._computed is None:
-            assert self.start is not None
-            self._computed = self._way.places(self.start)
-        places, slopes = self._computed  # (iterations, actuators)
-        if iteration >= self.begins + len(places):
+    def at(self, iteration: int, *, alone: bool = False) -> Moment:
+        """Places and slopes (actuators,) from its begin on; after its end it rests.
+
+        alone: nobody will ask for later ones.
+        """
+        place = iteration - self.begins
+        most = self.last - self.begins + 1
+        if place >= most:
             return self._way.rows[-1], np.zeros_like(self._way.rows[-1])
-        return places[iteration - self.begins], slopes[iteration - self.begins]
+        if self._computed is None or len(self._computed[0]) <= place:
+            assert self.start is not None
+            self._computed = self._way.places(self.start, place + 1 if alone else most)
+        places, slopes = self._computed  # (iterations, actuators)
+        return places[place], slopes[place]
 
     def acts(self, iteration: int) -> bool:
         """Whether what comes in the iteration after this one goes on from this plan."""
@@ -169,6 +174,10 @@ class _Part:
         kept = (Status.COMPLETED, Status.FORGOTTEN)
         if batch.ended and batch[0].status not in kept and batch.last_iteration <= self.last:
             self.end_in(batch.last_iteration)
+
+    def is_over(self, iteration: int) -> bool:
+        """Whether it has ended before this iteration, and nothing changes any more."""
+        return self.known and self.last < iteration and self.sent.batch.ended
 
     def end_in(self, iteration: int) -> None:
         """Nothing of it is planned in this iteration and later."""
@@ -219,7 +228,7 @@ class Chunks:
         if ease is not None:
             self.ease = _from_to(ease, "ease", 1, _LATEST)
         # it says what a profile may be
-        _core.plan_of_rows(0.0, 0.0, [0.0], [1], text(profile, "profile"))
+        _core.plan_of_rows(0.0, 0.0, [0.0], [1], text(profile, "profile"), 1)
         self.profile = profile
         self.ensemble = ensemble if ensemble is None else number(ensemble, "ensemble")
         if self.ensemble is not None and not math.isfinite(self.ensemble):
@@ -231,6 +240,7 @@ class Chunks:
         self._newest: SentChunk | None = None  # the one sent last
         self._open: list[SentChunk] = []  # those that _parts does not know yet
         self._parts: list[_Part] = []
+        self._over = 0  # of these, so many from the first one on are over
         self._answers: dict[int, int] = {}  # for a due iteration, how many chunks had a row for it
 
     # ------------------------------------------------------------------ sending
@@ -485,33 +495,39 @@ class Chunks:
                 if decision is None:
                     continue
                 # those that wait for the same or a later iteration are overwritten
-                parts = [part for part in parts if part.begins < decision.begins]
-                parts.append(
-                    _Part(sent, ChunkWay(sent._sent, decision, self.profile, self._switches))
-                )
-            for part in parts:
+                while parts and parts[-1].begins >= decision.begins:
+                    parts.pop()
+                way = ChunkWay(sent._sent, decision, self.profile, self._switches)
+                parts.append(_Part(sent, way))
+            # nothing becomes of the others any more
+            self._over = min(self._over, len(parts))
+            changing = parts[self._over :]
+            for part in changing:
                 part.note_end()
-            parts = [part for part in parts if part.last >= part.begins]
-            self._begin(parts)
-            for part, successor in itertools.pairwise(parts):
-                if successor.known and successor.begins <= self._arm.published:
+            changing = [part for part in changing if part.last >= part.begins]
+            parts[self._over :] = changing
+            self._begin(changing, parts[self._over - 1] if self._over else None)
+            published = self._arm.published
+            for part, successor in itertools.pairwise(parts[max(0, self._over - 1) :]):
+                if successor.known and successor.begins <= published:
                     part.end_in(successor.begins)
+            while self._over < len(parts) - 1 and parts[self._over].is_over(published):
+                self._over += 1
             # of what is over, the history has the rows
             oldest = self._arm.oldest
             while len(parts) > 1 and parts[1].begins <= oldest:
-                parts = parts[1:]
-            self._parts = parts
+                del parts[0]
+                self._over = max(0, self._over - 1)
 
-    def _begin(self, parts: list[_Part]) -> None:
+    def _begin(self, parts: list[_Part], former: _Part | None) -> None:
         """Notes from where each part begins, as far as that is there."""
-        former: _Part | None = None
         for part in parts:
             before = part.begins - 1
             if part.known or not self._is_plain:
                 pass
             elif former is not None and former.acts(before):
                 if former.known:
-                    part.begin(former.at(before))
+                    part.begin(former.at(before, alone=True))
             elif before <= self._arm.published:
                 with contextlib.suppress(RowOverwritten):
                     part.begin(self._motion(before))

@@ -70,15 +70,21 @@ class ChunkWay:
         self._ends[-1] = last
         self.last = self.begins + last - 1
 
-    def places(self, start: Moment) -> Moment:
-        """Places and slopes (iterations, actuators) from its begin to its last row."""
+    def places(self, start: Moment, most: int | None = None) -> Moment:
+        """Places and slopes (iterations, actuators) from its begin to its last row, at most so
+        many.
+        """
         ends = self._ends.tolist()
+        shape = len(self.rows.T), ends[-1] if most is None else min(most, ends[-1])
         plans = [
-            _core.plan_of_rows(float(place), float(slope), rows.tolist(), ends, self._profile)
-            for place, slope, rows in zip(*start, self.rows.T, strict=True)
+            _core.plan_of_rows(place, slope, rows, ends, self._profile, shape[1])
+            for place, slope, rows in zip(
+                *(each.tolist() for each in start), self.rows.T.tolist(), strict=True
+            )
         ]
-        shape = len(plans), ends[-1]
-        places, slopes = (np.array([each[i] for each in plans]).reshape(shape).T for i in (0, 1))
+        places, slopes = (
+            np.frombuffer(b"".join(each[i] for each in plans)).reshape(shape).T for i in (0, 1)
+        )
         return places, slopes
 
 
