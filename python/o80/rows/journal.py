@@ -30,7 +30,7 @@ ENDS = frozenset(
 class JournalCommand:
     """A command, a request or an order of a batch, as its frontend sent it."""
 
-    #: command, purge, request, take_control, release_control, resume, mark or unknown
+    #: command, purge, request, take_control, release_control, resume, mark, close_plan or unknown
     kind: str
     id: int  #: the id that its `status` entries have
     actuators: tuple[str, ...] = ()  #: of a command or a purge; of a purge of all: none
@@ -49,6 +49,7 @@ class JournalCommand:
     due: tuple[int, ...] = ()
     ease: int | None = None
     first: int | None = None
+    final: bool = False  #: no chunk of its plan follows
     only_own: bool = False  #: of a purge: only commands of its frontend
     request: str = ""  #: the name of the request
     fields: dict[str, Any] | None = None  #: its values
@@ -232,6 +233,7 @@ class EntryDecoder:
                 due=tuple(native.anchor + due for due in native.due),
                 ease=native.ease if is_chunk else None,
                 first=native.first if is_chunk else None,
+                final=native.final,
             )
         if kind == "purge":
             every = native.actuator >= len(self._names)
