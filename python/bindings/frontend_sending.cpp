@@ -259,7 +259,7 @@ Batch send_alone(const Frontend& self, Fill&& fill, const std::optional<o80::See
 Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators, nb::handle due,
                  nb::handle states, const std::vector<std::uint64_t>& mask, o80::Iteration anchor,
                  std::uint64_t plan, std::uint32_t ease, std::uint32_t first, bool fixed,
-                 bool reject_late, nb::handle profile, nb::handle seen) {
+                 bool reject_late, bool final, nb::handle profile, nb::handle seen) {
   const Bytes iterations(due);
   std::vector<std::uint32_t> ends(iterations.span().size() / sizeof(std::uint32_t));
   if (!ends.empty()) std::memcpy(ends.data(), iterations.span().data(), iterations.span().size());
@@ -269,6 +269,7 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
                                   .first = first,
                                   .fixed = fixed,
                                   .reject_late = reject_late,
+                                  .final = final,
                                   .profile = profile_of_rows(profile)};
   const Bytes all(states);
   const auto fill = [&](o80::BatchBuilder& batch) {
@@ -391,7 +392,14 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            "times"_a.none(), "speed"_a.none(), "iterations"_a.none(), "mode"_a.none(),
            "profile"_a.none(), "start"_a.none())
       .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "mask"_a, "anchor"_a,
-           "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "profile"_a, "seen"_a.none())
+           "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "final"_a, "profile"_a,
+           "seen"_a.none())
+      .def(
+          "_close_plan",
+          [](const Frontend& self, std::uint64_t plan) {
+            send_alone(self, [&](o80::BatchBuilder& batch) { batch.close_plan(plan); });
+          },
+          "plan"_a)
       .def(
           "_since",
           [](const Frontend& self, nb::handle seen) {

@@ -41,6 +41,8 @@ std::string word_of(o80::JournalRecord::Kind kind) {
       return "resume";
     case mark:
       return "mark";
+    case close_plan:
+      return "close_plan";
     case unknown:
       return "unknown";
   }
@@ -142,6 +144,7 @@ void bind_record(nb::module_& m) {
       .def_ro("due", &JournalRecord::due)
       .def_prop_ro("anchor", [](const JournalRecord& self) { return self.chunk.anchor; })
       .def_prop_ro("first", [](const JournalRecord& self) { return self.chunk.first; })
+      .def_prop_ro("final", [](const JournalRecord& self) { return self.chunk.final; })
       .def_prop_ro("ease", [](const JournalRecord& self) { return self.chunk.ease; })
       .def_prop_ro("fixed", [](const JournalRecord& self) { return self.chunk.fixed; })
       .def_ro("targets", &JournalRecord::targets)

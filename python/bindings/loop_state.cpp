@@ -71,6 +71,7 @@ void bind_loop_state(nb::module_& m) {
       .def_ro("last", &LoopState::last)
       .def_ro("overruns", &LoopState::overruns)
       .def_ro("skipped", &LoopState::skipped)
+      .def_ro("starvations", &LoopState::starvations)
       .def_ro("rate", &LoopState::rate)
       .def_ro("recent_rows", &LoopState::recent_rows)
       .def_ro("recent_overruns", &LoopState::recent_overruns)

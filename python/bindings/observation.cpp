@@ -24,6 +24,7 @@ Decoder::Decoder(std::shared_ptr<const o80::Description> what, nb::object how)
       active(layout.attr("active")),
       clamped(layout.attr("clamped")),
       braking(layout.attr("braking")),
+      starved(layout.attr("starved")),
       flat(layout.attr("flat")),
       text(layout.attr("text")) {}
 
@@ -143,6 +144,9 @@ The arrays are views of this observation's own copy of the row, which does not c
       .def_prop_ro(
           "halted", [](const Observation& self) { return self.row.head().halted != 0; },
           "True if a halt was in force in this row.")
+      .def_prop_ro(
+          "starvations", [](const Observation& self) { return self.row.head().starvations; },
+          "Number of iterations so far in which a plan of chunks began to be starved.")
       .def_ro("missed", &Observation::missed,
               "Number of rows between the row read before and this one that were overwritten; set "
               "by wait_for_next and stream.")
@@ -170,6 +174,10 @@ The arrays are views of this observation's own copy of the row, which does not c
           "braking", [](nb::handle self) { return decoded(self, &Decoder::braking); },
           nb::sig("def braking(self) -> numpy.typing.NDArray[numpy.bool_]"),
           "True where the actuator comes to rest without a command: bool (actuators,).")
+      .def_prop_ro(
+          "starved", [](nb::handle self) { return decoded(self, &Decoder::starved); },
+          nb::sig("def starved(self) -> numpy.typing.NDArray[numpy.bool_]"),
+          "True where a plan of chunks has no row left and is not closed: bool (actuators,).")
       .def(
           "flat",
           [](nb::handle self, nb::handle dtype) {

@@ -196,12 +196,14 @@ nb::dict of_row(const RowLayout& layout) {
                                                          {"skipped", 28},
                                                          {"fresh", 32},
                                                          {"halted", 36},
+                                                         {"starvations", 40},
                                                          {"desired", layout.desired},
                                                          {"observed", layout.observed},
                                                          {"extended", layout.extended},
                                                          {"active", layout.active},
                                                          {"clamped", layout.clamped},
                                                          {"braking", layout.braking},
+                                                         {"starved", layout.starved},
                                                          {"mask_words", layout.mask_words},
                                                          {"extended_size", layout.extended_size}};
   for (const auto& [name, value] : parts) found[name] = value;

@@ -1,6 +1,7 @@
 """Chunks: what is planned is what happens, and a sender is told what became of its rows."""
 
 import asyncio
+import os
 import random
 import re
 import subprocess
@@ -20,6 +21,7 @@ import o80
 from o80 import _core
 from o80.frontend import chunks as o80_chunks
 from o80.plot import plot
+from o80.rows.journal_text import command_text
 from o80.rows.plans import planned_by_chunks
 
 WAIT = 60.0  # [s] longer than any wait should take
@@ -43,10 +45,7 @@ def test_a_chunk_is_played_and_told(arm: o80.Frontend) -> None:
         assert (sent.late, sent.skipped, sent.first, sent.begins, sent.shift) == (0, 0, 0, 101, 0)
         assert plan.planned(110, 16)[:, 0].tolist() == [0.1, 0.3, 0.3, 0.2]
         assert plan.planned(115, 16)[:, 1] == pytest.approx([0.21875, 0.3, 0.25])
-        starved = [plan.starved]
         plan.wait()
-        starved.append(plan.starved)
-    assert [*starved, plan.starved] == [False, True, False]
     assert arm.history().desired[[110, 120, 130, 140, 150]].tolist() == ROWS.tolist()
     assert sent.batch.statuses == ["completed"]
     with pytest.raises(o80.InvalidArgument, match="this plan was closed"):
@@ -297,12 +296,13 @@ def test_where_a_limit_acts_the_plan_stays_what_it_is() -> None:
 
 @pytest.mark.parametrize("stale", ["hold", "purge"])
 def test_what_a_killed_sender_left_ends_as_it_was_told(segment: str, stale: Any) -> None:
+    step = 20 if stale == "hold" else 1000  # until the last row 4 s, 100 s
     program = (
         "import sys, os, signal, numpy as np, o80\n"
         f"with o80.Frontend({segment!r}) as arm:\n"
-        "    plan = arm.chunks(step=1000)\n"  # 100 s
+        f"    plan = arm.chunks(step={step})\n"
         "    plan.send(np.linspace([0, 0], [1, 1], 100))\n"
-        "    plan.wait(lead=99_000)\n"
+        f"    plan.wait(lead={99 * step})\n"
         "    os.kill(os.getpid(), signal.SIGKILL)\n"
     )
     with (
@@ -310,13 +310,118 @@ def test_what_a_killed_sender_left_ends_as_it_was_told(segment: str, stale: Any)
         process.frontend() as arm,
     ):
         subprocess.run([sys.executable, "-c", program], check=False, timeout=WAIT)
+        while arm.latest().active.any() or arm.latest().starved.any():  # its death ends its plan
+            arm.wait_for(arm.published + 1, WAIT)
         if stale == "hold":
-            before = arm.latest().desired[0]
-            assert arm.wait_for(arm.published + 2000, WAIT).desired[0] > before
+            assert arm.latest().desired.tolist() == [1.0, 1.0]
         else:
-            while arm.latest().active.any():
-                arm.wait_for(arm.published + 1, WAIT)
             assert arm.latest().desired[0] < 1.0
+
+
+def marked(history: o80.History) -> list[int]:
+    """The first row of each stretch in which a plan is starved, and the one after its last."""
+    changes = np.flatnonzero(np.diff(history.starved.any(axis=1).astype(int), prepend=0, append=0))
+    return [int(history.iteration[0]) + int(change) for change in changes]
+
+
+def test_a_starved_plan_is_marked_counted_and_replayed(
+    segment: str, arm: o80.Frontend, tmp_path: Any
+) -> None:
+    def burst_and_look(iterations: int, plan: o80.Chunks) -> None:
+        for _ in range(iterations):
+            row = arm.burst(1)
+            assert plan.starved == row.starved.any()
+
+    arm.burst(100)
+    with arm.chunks("elbow", step=10, ease=10) as plan:
+        plan.send(ROWS[:, 0], seen=100)
+        burst_and_look(60, plan)
+        plan.send(ROWS[:, 0])
+        burst_and_look(60, plan)
+        arm.add_command(None, [0.0, 0.0], iterations=10)
+        arm.pulse()
+        burst_and_look(20, plan)
+        plan.send(ROWS[:, 0], final=True)
+        burst_and_look(60, plan)
+        plan.send(ROWS[:, 0])
+        burst_and_look(55, plan)
+        shown = run_o80("echo", segment, "--count", "1").stdout
+        assert re.search(r"starved elbow\b", shown), shown
+        row = arm.latest()
+        assert (row.starved.tolist(), row.starvations) == ([False, True], 3)
+    assert not plan.starved
+    arm.burst(20)
+    history = arm.history()
+    assert marked(history) == [151, 161, 211, 221, 351, 356]
+    assert history.starvations[[150, 151, 210, 211, 370]].tolist() == [0, 1, 1, 2, 3]
+    run_o80("save", segment, "-o", tmp_path / "run.mcap")
+    for name in (segment, tmp_path / "run.mcap"):
+        shown = run_o80("info", name).stdout
+        assert "plans of chunks ran out of rows 3 times" in shown, shown
+    said = [command_text(each) for entry in arm.journal() for each in entry.commands]
+    assert ["the last of its plan" in line for line in said] == [False] * 3 + [True, False, False]
+    assert said[-1] == "close plan"
+    for run in (tmp_path / "run.mcap", arm):
+        assert o80.replay(run).identical
+    (run,) = o80.replay(tmp_path / "run.mcap", driver=False)
+    assert run.identical
+    (run,) = o80.replay(tmp_path / "run.mcap", driver=False, since=305)
+    assert run.identical
+    assert run.rows <= 20, "it begins where the plan is closed"
+
+
+@pytest.mark.parametrize("how", ["open", "final", "closed"])
+def test_the_watchdog_sees_a_stopped_policy_whose_plan_is_open(segment: str, how: str) -> None:
+    program = f"""
+import os, signal, numpy as np, o80
+with o80.Frontend({segment!r}) as arm:
+    plan = arm.chunks(step=5)
+    plan.send(np.zeros((4, 2)), final={how == "final"})
+    if {how == "closed"}:
+        plan.close()
+    plan.wait()
+    arm.wait_for(arm.published + 2)
+    os.kill(os.getpid(), signal.SIGSTOP)
+"""
+    silence = 500
+    with (
+        o80.robots.load("two_joints").start(segment, silence=silence, stale="halt") as process,
+        process.frontend() as arm,
+        subprocess.Popen([sys.executable, "-c", program]) as policy,
+    ):
+        try:
+            os.waitid(os.P_PID, policy.pid, os.WSTOPPED | os.WEXITED | os.WNOWAIT)
+            stopped = arm.published
+            while arm.published < stopped + 2 * silence and not arm.halted:
+                arm.wait_for(arm.published + 1, WAIT)
+            arm.wait_for(arm.published + 2, WAIT)
+            halt, last = arm.halted, arm.latest()
+        finally:
+            policy.kill()
+        assert not last.starved.any()
+        if how != "open":
+            assert halt is None
+            return
+        assert halt is not None
+        assert halt.cause == "silence"
+        (begin, end) = marked(arm.history())
+        assert begin < stopped
+        assert end == halt.iteration
+        assert end <= stopped + silence + 2
+        while "ran out of rows" not in process.output:
+            arm.wait_for(arm.published + 10, WAIT)
+
+
+def test_a_frontend_that_closes_ends_its_plans(process: o80.robots.Process) -> None:
+    with process.frontend() as other:
+        with process.frontend() as arm:
+            arm.chunks(step=5).send(np.zeros((4, 2)))
+        arm.close()
+        last = other.published + 30
+        other.wait_for(last, WAIT)
+        while other.latest().active.any():
+            other.wait_for(other.published + 1, WAIT)
+        assert other.wait_for(other.published + 2, WAIT).starvations == 0
 
 
 @pytest.mark.parametrize(

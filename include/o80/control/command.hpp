@@ -100,6 +100,7 @@ struct ChunkOptions {
   std::uint32_t first = 0;   ///< Rows before this one are what was planned before, not played.
   bool fixed = false;        ///< Rows keep their iterations also where the actuators stand still.
   bool reject_late = false;  ///< Rejects it if row `first` is late, instead of skipping rows.
+  bool final = false;        ///< No chunk of its plan follows: as UntypedFrontend::add_close_plan.
   Profile profile = Profile::cubic;  ///< Or linear, or hold.
 };
 

@@ -16,8 +16,10 @@ struct RowHead {
   std::uint32_t skipped = 0;   // periods so far that were skipped to catch up
   std::uint32_t fresh = 0;     // 1: fresh start (reset, restore or resume) in this row
   std::uint32_t halted = 0;    // 1: the backend was halted in this iteration
+  /// Iterations so far in which a plan of chunks began to be starved (the mask `starved`).
+  std::int64_t starvations = 0;
 };
-static_assert(sizeof(RowHead) == 40 && std::is_trivially_copyable_v<RowHead>);
+static_assert(sizeof(RowHead) == 48 && std::is_trivially_copyable_v<RowHead>);
 
 /// Offsets of the parts of a row from its start [bytes].
 struct RowLayout {
@@ -27,6 +29,7 @@ struct RowLayout {
   std::uint32_t active = 0;   // mask: one bit for each actuator, in 8-byte words
   std::uint32_t clamped = 0;  // mask
   std::uint32_t braking = 0;  // mask
+  std::uint32_t starved = 0;  // mask
   std::uint32_t size = 0;
   std::uint32_t mask_words = 0;
   std::uint32_t block = 0;
@@ -47,7 +50,8 @@ inline RowLayout row_layout(const Schema& schema) {
   layout.active = layout.extended + layout.extended_size;
   layout.clamped = layout.active + layout.mask_words * 8;
   layout.braking = layout.clamped + layout.mask_words * 8;
-  layout.size = layout.braking + layout.mask_words * 8;
+  layout.starved = layout.braking + layout.mask_words * 8;
+  layout.size = layout.starved + layout.mask_words * 8;
   if (schema.head.extended == kNoType) return layout;
   const TypeRow& extended = schema.types.at(schema.head.extended);
   for (std::uint32_t i = extended.first_field; i < extended.first_field + extended.fields; ++i) {

@@ -28,6 +28,7 @@ struct JournalRecord {
     release_control,
     resume,
     mark,
+    close_plan,
     unknown
   };
   /// Targets of a command for one actuator.

@@ -54,6 +54,8 @@ class UntypedObservation {
   bool clamped(std::uint32_t actuator) const { return bit(layout().clamped, actuator); }
   /// True if the actuator comes to rest without a command.
   bool braking(std::uint32_t actuator) const { return bit(layout().braking, actuator); }
+  /// True if a plan of chunks has no row left for this actuator, and is not closed.
+  bool starved(std::uint32_t actuator) const { return bit(layout().starved, actuator); }
   /// True if any actuator brakes.
   bool any_braking() const {
     for (std::uint32_t word = 0; word < layout().mask_words; ++word) {

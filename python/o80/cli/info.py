@@ -17,6 +17,7 @@ from o80.frontend.backend_texts import (
     latency_text,
     pace_text,
     running_texts,
+    starved_text,
     watchdog_text,
 )
 from o80.rows.actuators import ACTUATOR_HEADS, actuator_rows, field_text
@@ -54,8 +55,9 @@ def info(
             print(pace_text(loop))
         halt = halt_text(segment, frontend._halted, played=frontend.played)
         trouble = loop.trouble if frontend.alive else ""
+        starved = starved_text(loop.starvations)
         running = running_texts(frontend._running_requests) if frontend.alive else []
-        for said in (halt, trouble, watchdog_text(schema), *running):
+        for said in (halt, trouble, starved, watchdog_text(schema), *running):
             if said:
                 print(said)
         if line := latency_text(latency_summary(frontend.journal()), schema["period"]):

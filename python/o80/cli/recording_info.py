@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import o80._core as _core
 from o80.base.screen import Column, bytes_text, plain, print_json, print_table, style
-from o80.frontend.backend_texts import age_text, latency_text
+from o80.frontend.backend_texts import age_text, latency_text, starved_text
 from o80.rows.provenance import started_with
 
 if TYPE_CHECKING:
@@ -55,8 +55,10 @@ def recording_info(path: Path, *, as_json: bool = False) -> None:
     for line in [line for run in runs for line in _missing(*run)]:
         print(plain(line))
     for name, number, epoch in runs:
-        if line := latency_text(latency_of(epoch), epoch.schema["period"]):
-            print(plain(f"{_of_run(name, number)}: {line}"))
+        latency = latency_text(latency_of(epoch), epoch.schema["period"])
+        for line in (latency, starved_text(starvations_of(epoch))):
+            if line:
+                print(plain(f"{_of_run(name, number)}: {line}"))
     _print_marks(recording.marks)
     _print_starts(runs)
 
@@ -163,6 +165,12 @@ def latency_of(epoch: RecordedEpoch) -> dict[str, int]:
     return latency_summary(epoch.last_entries(MAX_ENTRIES))
 
 
+def starvations_of(epoch: RecordedEpoch) -> int:
+    """How often a plan of chunks ran out of rows, up to the last recorded row."""
+    last = epoch.history(1).starvations
+    return int(last[0]) if len(last) else 0
+
+
 def _missing(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
     """Gaps and their reasons, a line each; of many the first ones."""
     of_run = _of_run(name, number)
@@ -179,6 +187,7 @@ def _fields(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
         "gaps": [gap._asdict() for gap in epoch.gaps],
         "interruption": str(epoch.interruption or ""),
         "decision_latency": latency_of(epoch),
+        "starvations": starvations_of(epoch),
         "schema": epoch.schema,
         "provenance": asdict(epoch.provenance),
     }

@@ -28,9 +28,11 @@ class RowValues:
             "active": [bool(value) for value in row.active],
             "clamped": [bool(value) for value in row.clamped],
             "braking": [bool(value) for value in row.braking],
+            "starved": [bool(value) for value in row.starved],
             "halted": row.halted,
             "overruns": row.overruns,
             "missed_ticks": row.skipped,
+            "starvations": row.starvations,
         }
 
     def _states(self, states: Any) -> Any:
@@ -42,12 +44,13 @@ class RowValues:
         return {group["name"]: _described(states[group["name"]], group["type"]) for group in groups}
 
     def acting(self, row: Observation) -> str:
-        """The actuators that commands drive, and those that brake."""
-        active, braking = row.active, row.braking
+        """The actuators that commands drive, those that brake, and those whose plan is starved."""
+        active, braking, starved = row.active, row.braking, row.starved
         driven = [name for i, name in enumerate(self._actuators) if active[i] and not braking[i]]
         slowing = [name for i, name in enumerate(self._actuators) if braking[i]]
+        starving = [name for i, name in enumerate(self._actuators) if starved[i]]
         said = []
-        for word, names in (("driven", driven), ("braking", slowing)):
+        for word, names in (("driven", driven), ("braking", slowing), ("starved", starving)):
             if names:
                 said.append(f"{word} {self._named(names)}")
         return "  ".join(said) or ("idle" if self._actuators else "")

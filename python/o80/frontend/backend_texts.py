@@ -57,6 +57,12 @@ def pace_text(loop: _core.LoopState) -> str:
     return f"{rate} reached, {loop.overruns} overruns, {loop.skipped} missed ticks, {age}"
 
 
+def starved_text(starvations: int) -> str:
+    """How often a plan of chunks ran out of rows; empty if it never did."""
+    times = "once" if starvations == 1 else f"{starvations} times"
+    return f"plans of chunks ran out of rows {times} (docs/chunks.md)" if starvations else ""
+
+
 def latency_text(summary: dict[str, int], period: int) -> str:
     """The decision latency of batches, in one line; empty if none says what it was decided by.
 

@@ -17,7 +17,7 @@ import numpy as np
 import o80._core as _core
 from o80.base.argument_checks import number, text, whole, whole_or_none
 from o80.base.awaiting import in_thread
-from o80.base.errors import InvalidArgument, RowOverwritten
+from o80.base.errors import BackendGone, Closed, InvalidArgument, RowOverwritten
 from o80.base.words import RowsWord, Status
 from o80.rows.plans import ChunkRows, ChunkWay, Decision, Moment, decide
 from o80.rows.targets import common_labels, common_type, states_of
@@ -255,6 +255,7 @@ class Chunks:
         late: Literal["skip", "reject"] = "skip",
         due: Sequence[int] | None = None,
         weights: ArrayLike | None = None,
+        final: bool = False,
     ) -> SentChunk:
         """Sends rows of targets; row j is due in iteration seen + (j + 1) x step, rounded.
 
@@ -271,6 +272,7 @@ class Chunks:
         due: an own iteration for each row, rising, instead of the steps.
         weights: the share of each row (n,); the rest is the plan in its iteration, where there is
             one.
+        final: no chunk follows, so that the plan is not starved when its rows end.
 
         It replaces what its actuators do, from the plan of the chunk before it without a jump. If
         they stood still, rows are later by the time in which they did. Raises InvalidArgument,
@@ -309,6 +311,7 @@ class Chunks:
                 first,
                 bool(fixed),
                 late == "reject",
+                bool(final),
                 self.profile,
                 seen if isinstance(seen, _core.Observation) else None,
             )
@@ -316,6 +319,7 @@ class Chunks:
                 self._count_answers(anchor + after)
             numbers = self._numbers(states) if self._is_plain else np.empty((count, 0))
             sent = SentChunk(batch, ChunkRows(anchor, after, ease, first, numbers))
+            self._arm._open_plans.add(self._number)
             self._open.append(sent)
             self._newest = sent
             self._settle()
@@ -376,16 +380,10 @@ class Chunks:
 
     @property
     def starved(self) -> bool:
-        """Whether the plan is open, was begun, and has no row ahead."""
-        newest = self._newest
-        if self._closed or newest is None or not newest.decided or self.left > 0:
+        """Whether the plan is open, and the newest row says that it has no row ahead."""
+        if self._closed or self._newest is None:
             return False
-        return newest.batch[0].status not in (
-            Status.OVERWRITTEN,
-            Status.PURGED,
-            Status.INTERRUPTED,
-            Status.HALTED,
-        )
+        return bool(self._arm.latest().starved[self._actuators].any())
 
     def planned(
         self,
@@ -555,7 +553,15 @@ class Chunks:
     # ------------------------------------------------------------------ its end
 
     def close(self) -> None:
-        """Ends the plan: what was sent is played to its last row. May be called twice."""
+        """Ends the plan: what was sent is played to its last row. May be called twice.
+
+        Raises LaneFull if the backend cannot be told yet.
+        """
+        arm = self._arm
+        if self._number in arm._open_plans and not arm._forked:
+            with self._lock, contextlib.suppress(BackendGone, Closed):
+                arm._close_plan(self._number)
+            arm._open_plans.discard(self._number)
         self._closed = True
 
     def __enter__(self) -> Self:

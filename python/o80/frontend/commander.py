@@ -45,6 +45,7 @@ class Commander(Reader):
     """The part of o80.Frontend that commands, requests, bursts and halts."""
 
     _on_error: OnErrorWord
+    _open_plans: set[int]  # numbers of plans of chunks that were begun and not closed
 
     # ------------------------------------------------------------------ commands and requests
 

@@ -1,5 +1,6 @@
 """Frontend: opens, closes and attaches again; classes for single robots; a wait for several."""
 
+import contextlib
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from types import TracebackType
@@ -8,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Self, cast
 import o80._core as _core
 from o80.base import lifecycle
 from o80.base.cached import cached
-from o80.base.errors import InvalidArgument, SchemaMismatch, UsedAfterFork
+from o80.base.errors import Error, InvalidArgument, SchemaMismatch, UsedAfterFork
 from o80.base.installation import announced
 from o80.base.words import OnErrorWord, RowsWord
 from o80.frontend.commander import Commander
@@ -93,6 +94,7 @@ class Frontend(Commander):
         self._layout = Layout(self._description)
         self._decoder = _core.Decoder(self._description, self._layout)
         super().__init__(attachment, self._decoder)
+        self._open_plans = set()
         self._first = self._read(self.oldest, 1) if self.published >= 0 else None
         self._is_set_up = True
         lifecycle.close_later(self)
@@ -131,7 +133,8 @@ class Frontend(Commander):
         return Waits(self)
 
     def close(self) -> None:
-        """Closes the frontend. Sent commands continue; an inline robot stops.
+        """Closes the frontend. Sent commands continue; its plans of chunks are closed; an inline
+        robot stops.
 
         May be called twice. Calls that wait in other threads raise Closed. In a forked child it
         does not affect the parent.
@@ -145,6 +148,9 @@ class Frontend(Commander):
                 ResourceWarning,
                 stacklevel=2,
             )
+        if self._open_plans and not self._forked:
+            with contextlib.suppress(Error):
+                self._close_plan(0)
         self._close()
         if self._unnamed and not self._forked:  # the segment of a failed robot would remain
             _core.clean(self.segment)

@@ -14,6 +14,8 @@ from o80.rows.history import History, columns_in
 
 OF_THE_CLOCK = ("time", "lateness", "overruns", "skipped")
 """Columns that differ from run to run if the robot runs in real time."""
+COUNT = "starvations"
+"""A count since the start of a run, which a replay may begin later; the masks show what counts."""
 
 
 class RobotsDifferError(InvalidArgument):
@@ -45,8 +47,9 @@ def first_difference(
 ) -> Difference | None:
     """The earliest iteration in which two histories differ, or None.
 
-    Numbers are compared bit for bit. The fields of the clock are left out: `time`, `lateness`,
-    `overruns` and `skipped` of a robot in real time, and those that its driver marks so.
+    Numbers are compared bit for bit. `starvations` is left out, and so are the fields of the clock:
+    `time`, `lateness`, `overruns` and `skipped` of a robot in real time, and those that its driver
+    marks so.
     ignore: columns to leave out, such as "lateness" or "extended" (all sensor values). Only these
         may be those of one robot alone.
     tolerances: by column, likewise, the largest absolute difference that counts as equal.
@@ -70,7 +73,7 @@ def first_difference(
     first, second, lacking = _rows_of_both(mine["iteration"], others["iteration"])
     found = [] if lacking is None else [lacking]
     real_time = "monotonic" in (one.schema["clock"], other.schema["clock"])
-    left_out = [*ignore, *(OF_THE_CLOCK if real_time else ())]
+    left_out = [*ignore, COUNT, *(OF_THE_CLOCK if real_time else ())]
     left_out += [each.name for each in columns_of(one.schema) if each.origin == "clock"]
     for column in mine:
         if column == "iteration" or any(_belongs(column, named) for named in left_out):
@@ -130,10 +133,9 @@ def _compared(history: History) -> NDArray[Any]:
     fields = history.rows.dtype.fields
     assert fields is not None
     rows = np.frombuffer(history.rows.tobytes(), np.uint8).reshape(len(history), -1).copy()
-    if history.schema["clock"] == "monotonic":
-        for name in OF_THE_CLOCK:
-            dtype, offset = fields[name][:2]
-            rows[:, offset : offset + dtype.itemsize] = 0
+    for name in (COUNT, *(OF_THE_CLOCK if history.schema["clock"] == "monotonic" else ())):
+        dtype, offset = fields[name][:2]
+        rows[:, offset : offset + dtype.itemsize] = 0
     for column in columns_of(history.schema):
         if column.origin != "robot":
             rows[:, column.offset : column.offset + column.dtype.itemsize] = 0

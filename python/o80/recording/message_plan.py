@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80.recording.cdr import ENCAPSULATION
-from o80.recording.message_types import MessageType
+from o80.recording.message_types import MessageType, row_type
+from o80.rows.layout import Layout
 
 Bytes = NDArray[np.uint8]
 
@@ -94,6 +95,22 @@ class MessagePlan:
         begin = -(-self._at // alignment) * alignment
         self._at = begin + length
         return len(ENCAPSULATION) + begin
+
+
+#: parts that rows did not have in earlier recordings
+_LATER = ("starvations", "starved")
+
+
+def plan_of_rows(layout: Layout, size: int) -> MessagePlan:
+    """The plan of a robot's recorded rows, of this version of o80 or an earlier one.
+
+    size: of their messages [bytes]. Raises ValueError if no version has such rows.
+    """
+    for leave_out in ((), _LATER):
+        plan = MessagePlan(row_type(layout, leave_out=leave_out), layout.size)
+        if plan.size == size:
+            return plan
+    raise ValueError(f"rows of '{layout.schema['robot']}' have another size")
 
 
 def _merged(copies: Iterator[Copy]) -> list[Copy]:

@@ -16,8 +16,7 @@ from o80.recording.epoch import GAP, OVERWRITTEN, Gap, Interruption
 from o80.recording.epoch_part import EpochPart
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of, entries_in, last_entries_in
-from o80.recording.message_plan import MessagePlan
-from o80.recording.message_types import row_type
+from o80.recording.message_plan import MessagePlan, plan_of_rows
 from o80.recording.scan import content_of, index_of
 from o80.rows.history import History, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
@@ -279,7 +278,6 @@ class RecordedEpoch:
     ) -> Iterator[History]:
         """The rows of each chunk that may have rows of these times."""
         layout = self._decoder.layout
-        plan = MessagePlan(row_type(layout), layout.size)
         offset = self.wall_offset
         start = 0 if from_time is None else from_time + offset
         end = 2**64 if to_time is None else to_time + offset
@@ -287,8 +285,7 @@ class RecordedEpoch:
             chunks = part.found.chunks.having(
                 part.channel, start=start, end=end, newest_first=newest_first
             )
-            for messages in self._messages(part, plan.size, chunks):
-                raw = np.ascontiguousarray(plan.decode(messages))
+            for raw in self._decoded_rows(part, chunks):
                 yield History(self._decoder, raw.view(layout.row).reshape(len(raw)))
 
     def _last_blocks(self, n: int) -> list[History]:
@@ -301,17 +298,16 @@ class RecordedEpoch:
             n -= len(block)
         return blocks[::-1]
 
-    def _messages(
-        self, part: EpochPart, size: int, chunks: "Iterator[ChunkIndex]"
-    ) -> Iterator[Any]:
-        """The messages (n, size) of each of these chunks."""
+    def _decoded_rows(self, part: EpochPart, chunks: "Iterator[ChunkIndex]") -> Iterator[Any]:
+        """The rows (n, bytes) of each of these chunks."""
+        plan: MessagePlan | None = None
         with part.reading() as file:
             for chunk in chunks:
                 index = index_of(file, chunk, part.channel)
                 messages = messages_in(content_of(file, chunk), index)
-                if messages.shape[1] != size:
-                    raise ValueError(f"rows of '{self._note.segment}' have another size")
-                yield messages
+                if plan is None or plan.size != messages.shape[1]:
+                    plan = plan_of_rows(self._decoder.layout, messages.shape[1])
+                yield np.ascontiguousarray(plan.decode(messages))
 
     @property
     def first_row(self) -> int:

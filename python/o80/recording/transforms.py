@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from o80.recording.blocks import Block
 from o80.recording.cdr import CdrWriter
-from o80.recording.message_plan import MessagePlan
-from o80.recording.message_types import SEPARATOR, row_type
+from o80.recording.message_plan import plan_of_rows
+from o80.recording.message_types import SEPARATOR
 
 if TYPE_CHECKING:
     from o80.recording.file_writer import FileWriter
@@ -73,7 +73,7 @@ class TransformWriter:
     ) -> None:
         """Rate: of messages [Hz]."""
         self._poses, self._rate = poses, rate
-        self._plan = MessagePlan(row_type(layout), layout.size)
+        self._layout = layout
         self._last = -1.0  # number of the period of the last message
         self._count = 0
         found = (each.id for each in file.found.channels.values() if each.topic == TOPIC)
@@ -102,11 +102,10 @@ class TransformWriter:
         if not chosen:
             return None
         log_times = np.array([time for time, _ in chosen], np.uint64)
-        raw = self._plan.decode(
-            np.frombuffer(b"".join(message for _, message in chosen), np.uint8).reshape(
-                len(chosen), -1
-            )
+        encoded = np.frombuffer(b"".join(message for _, message in chosen), np.uint8).reshape(
+            len(chosen), -1
         )
+        raw = plan_of_rows(self._layout, encoded.shape[1]).decode(encoded)
         block = Block.reserved(self._channel, log_times, self._count, len(self._template))
         self._count += len(chosen)
         messages: Any = block.messages

@@ -209,7 +209,7 @@ def find_rest(run: RecordedRun, since: int) -> Start | None:
     for block in run.blocks():
         calm = (block.rows["fresh"] == 0) & (block.rows["halted"] == 0)
         calm &= block.iteration >= since
-        for mask in ("active", "clamped", "braking"):
+        for mask in ("active", "clamped", "braking", "starved"):
             calm &= ~getattr(block, mask).any(axis=1)
         rows = block.iteration[calm]
         ranges = [each for each in ranges if len(block) == 0 or each[1] >= block.iteration[0]]

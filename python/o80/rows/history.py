@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from o80.rows.columns import Column
 
 LONGEST = 2.0**62  # duration [ns], 146 years
-_HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted")
+_HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted", "starvations")
 _ENDS = 5  # rows of each end of a history that a notebook shows
 _COLUMNS = 16  # most numbers of its rows
 
@@ -258,6 +258,11 @@ class History:
         halted: NDArray[np.bool_] = self._part("halted") != 0
         return halted
 
+    @property
+    def starvations(self) -> NDArray[np.int64]:
+        """Number of iterations so far in which a plan of chunks began to be starved: (T,)."""
+        return self._part("starvations")
+
     def _part(self, name: str) -> NDArray[Any]:
         part: NDArray[Any] = self.rows[name]
         return part
@@ -296,6 +301,12 @@ class History:
     def braking(self) -> NDArray[np.bool_]:
         """True where the actuator comes to rest without a command: (T, actuators)."""
         mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "braking")
+        return mask
+
+    @property
+    def starved(self) -> NDArray[np.bool_]:
+        """True where a plan of chunks has no row left and is not closed: (T, actuators)."""
+        mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "starved")
         return mask
 
     def flat(self, dtype: Any = None) -> NDArray[Any]:
@@ -345,7 +356,7 @@ def columns_in(history: History) -> dict[str, NDArray[Any]]:
     for column in columns_of(history.schema):
         columns[column.name] = values_of(history, column)
     names = [actuator["name"] for actuator in history.schema["actuators"]]
-    for part in ("active", "clamped", "braking"):
+    for part in ("active", "clamped", "braking", "starved"):
         mask = getattr(history, part)
         columns.update({f"{part}.{name}": mask[:, i].copy() for i, name in enumerate(names)})
     return columns

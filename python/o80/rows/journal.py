@@ -30,7 +30,7 @@ ENDS = frozenset(
 class JournalCommand:
     """A command, a request or an order of a batch, as its frontend sent it."""
 
-    #: command, purge, request, take_control, release_control, resume, mark or unknown
+    #: command, purge, request, take_control, release_control, resume, mark, close_plan or unknown
     kind: str
     id: int  #: the id that its `status` entries have
     actuators: tuple[str, ...] = ()  #: of a command or a purge; of a purge of all: none
@@ -50,6 +50,7 @@ class JournalCommand:
     ease: int | None = None
     first: int | None = None
     fixed: bool = False  #: its rows keep their iterations also where the actuators stand still
+    final: bool = False  #: no chunk of its plan follows
     only_own: bool = False  #: of a purge: only commands of its frontend
     request: str = ""  #: the name of the request
     fields: dict[str, Any] | None = None  #: its values
@@ -234,6 +235,7 @@ class EntryDecoder:
                 ease=native.ease if is_chunk else None,
                 first=native.first if is_chunk else None,
                 fixed=native.fixed,
+                final=native.final,
             )
         if kind == "purge":
             every = native.actuator >= len(self._names)

@@ -132,7 +132,8 @@ def command_text(command: JournalCommand) -> str:
 def _pace(command: JournalCommand) -> str:
     if command.due:
         first, last = command.due[command.first or 0], command.due[-1]
-        return f" in a chunk due {first} to {last}, which answers iteration {command.anchor}"
+        end = ", the last of its plan" if command.final else ""
+        return f" in a chunk due {first} to {last}, which answers iteration {command.anchor}{end}"
     if command.times:
         return f" in {command.times[-1]:g} s"
     amount = command.amount

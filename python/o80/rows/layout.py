@@ -21,6 +21,7 @@ HEAD = (
     ("skipped", "u4"),
     ("fresh", "u4"),
     ("halted", "u4"),
+    ("starvations", "i8"),
 )
 
 
@@ -202,6 +203,7 @@ class Layout:
         self._active_at: int = row["active"]
         self._clamped_at: int = row["clamped"]
         self._braking_at: int = row["braking"]
+        self._starved_at: int = row["starved"]
         self._mask_bytes: int = row["mask_words"] * 8
         self._is_array = self.states.subdtype is not None
         self._element, self._shape = self.states.subdtype or (self.states, ())
@@ -224,6 +226,7 @@ class Layout:
                 ("active", mask, self._active_at),
                 ("clamped", mask, self._clamped_at),
                 ("braking", mask, self._braking_at),
+                ("starved", mask, self._starved_at),
             ]
         if self.extras.itemsize:
             parts.append(("extended", self.extras, self._extended_at))
@@ -314,6 +317,9 @@ class Layout:
 
     def braking(self, row: Any) -> NDArray[np.bool_]:
         return self._mask(row, self._braking_at)
+
+    def starved(self, row: Any) -> NDArray[np.bool_]:
+        return self._mask(row, self._starved_at)
 
     def flat(self, row: Any, dtype: Any = None) -> NDArray[Any]:
         kind = np.dtype(np.float32 if dtype is None else dtype)

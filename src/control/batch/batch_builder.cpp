@@ -141,7 +141,8 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   written.records = records_;
   written.blocks = static_cast<std::uint32_t>(blocks());
   const bool is_express = !has_commands() && requests() == 0 && of(RecordKind::mark) == 0 &&
-                          records_ > 0 && blocks() <= 1 + kMaxExpressRecords && batch.at == kNow &&
+                          of(RecordKind::close_plan) == 0 && records_ > 0 &&
+                          blocks() <= 1 + kMaxExpressRecords && batch.at == kNow &&
                           batch.burst == 0 && (batch.flags & kBurstUntilEnded) == 0;
   if (is_express) written.flags |= kExpress;
   std::memcpy(blocks_.front().bytes.data(), &written, sizeof written);

@@ -65,6 +65,11 @@ class BatchBuilder {
     return add(head_of(RecordKind::resume, 0, accept_reading ? 1 : 0, number));
   }
 
+  /// No chunk of this plan follows; 0: of no plan of this lane.
+  std::uint32_t close_plan(std::uint64_t plan) {
+    return add(head_of(RecordKind::close_plan, 0, 0, plan));
+  }
+
   /// A note for the journal: 1 to kMaxMarkBytes bytes in UTF-8. Throws InvalidArgument.
   std::uint32_t mark(std::string_view text);
 
@@ -87,8 +92,9 @@ class BatchBuilder {
   std::uint32_t requests() const noexcept {
     return of(RecordKind::request) + of(RecordKind::resume);
   }
-  std::uint32_t control_orders() const noexcept {
-    return of(RecordKind::take_control) + of(RecordKind::release_control);
+  std::uint32_t orders() const noexcept {
+    return of(RecordKind::take_control) + of(RecordKind::release_control) +
+           of(RecordKind::close_plan);
   }
   /// Number of blocks of the batch.
   std::uint64_t blocks() const noexcept { return blocks_.size() + (seen_ ? 1 : 0); }
@@ -119,7 +125,8 @@ class BatchBuilder {
 
   std::vector<Block> blocks_;  // the first is the BatchRecord
   std::uint32_t records_ = 0;  // without members
-  std::array<std::uint32_t, static_cast<std::size_t>(RecordKind::mark) + 1> counts_{};  // of a kind
+  // of a kind
+  std::array<std::uint32_t, static_cast<std::size_t>(RecordKind::close_plan) + 1> counts_{};
   std::optional<Seen> seen_;
 };
 

@@ -39,7 +39,7 @@ struct BatchPlanner::Batch {
   std::uint32_t blocks = 1;  // blocks of the batch that are checked
   Plan plan{.effort = {.work = kBatchWork, .express = 1}};
   std::uint32_t control_orders = 0;
-  std::uint32_t free = 0;  // resumes and marks
+  std::uint32_t free = 0;  // resumes, marks and closed plans
   // the group whose members are being checked
   BlockIndex group = kNoBlock;
   BlockIndex first_member = kNoBlock;
@@ -195,9 +195,10 @@ struct BatchPlanner::Lane : Batch {
   bool is_one_too_many(const RecordHead& head) noexcept {
     using enum RecordKind;
     const bool is_request = head.kind == request || head.kind == resume;
-    const bool is_order = head.kind == take_control || head.kind == release_control;
+    const bool is_order =
+        head.kind == take_control || head.kind == release_control || head.kind == close_plan;
     return (is_request && plan.effort.requests >= kMaxRequests) ||
-           (is_order && ++control_orders > kMaxControlOrders);
+           (is_order && ++control_orders > kMaxOrders);
   }
 
   /// True if a member has the options of its group, and an actuator that no other member has.
@@ -282,6 +283,11 @@ struct BatchPlanner::Lane : Batch {
         plan.effort.express = 0;
         ++free;
         return add_to_end(RecordKind::completed_list, record);
+      case RecordKind::close_plan:
+        // never express: it would overtake the chunks that it closes
+        plan.effort.express = 0;
+        ++free;
+        return add_step(record, kStepWork + static_cast<std::uint32_t>(targets.size()));
       case RecordKind::release_control:
         plan.effort.releases = 1;
         [[fallthrough]];

@@ -18,7 +18,7 @@ struct Effort {
   std::uint32_t express : 1 = 0;   // only purges and control orders
   std::uint32_t releases : 1 = 0;  // releases exclusive control
   std::uint32_t moves : 1 = 0;     // has a command, or a request without `while_halted`
-  std::uint32_t free : 1 = 0;      // only resumes and marks, which need no control, and no burst
+  std::uint32_t free : 1 = 0;      // needs no control: resumes, marks, closed plans; no burst
   std::uint32_t groups : 21 = 0;   // number of commands of several actuators
 };
 

@@ -96,7 +96,8 @@ void ChunkRows::join(Notes& notes) noexcept {
 bool is_sane(const ChunkHead& chunk) noexcept {
   return chunk.rows > 0 && chunk.rows <= kMaxChunkRows && chunk.first < chunk.rows &&
          chunk.ease > 0 && chunk.ease <= kLatestDue && chunk.fixed <= 1 && chunk.reject_late <= 1 &&
-         chunk.anchor >= -static_cast<Iteration>(kLatestDue) && chunk.anchor <= kMaxIterations;
+         chunk.final <= 1 && chunk.anchor >= -static_cast<Iteration>(kLatestDue) &&
+         chunk.anchor <= kMaxIterations;
 }
 
 Reason judge(ChunkHead& chunk, const ChunkRows& rows, const ChunkSurroundings& at) noexcept {

@@ -29,7 +29,7 @@ struct ChunkHead {
   std::uint8_t fixed = 0;
   std::uint8_t reject_late = 0;
   std::uint8_t stood = 0;  // by judge(): whether its actuators stood still
-  std::uint8_t unused = 0;
+  std::uint8_t final = 0;  // the last chunk of its plan; by a record close_plan too
   // for the backend, by judge(); values from a frontend are ignored
   std::int64_t shift = 0;  // rows are due so much later, because the actuators stood still
   Iteration begins = 0;

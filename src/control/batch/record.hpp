@@ -26,8 +26,9 @@ enum class RecordKind : std::uint8_t {
   resume,  // clears halts up to the number in `amount`
   group,   // one command for several actuators, with one status; `rows` members follow
   member,
-  mark,  // a note for the journal; the payload is its text
-  seen,  // the row by which the batch was decided; only the journal's readers look at it
+  mark,        // a note for the journal; the payload is its text
+  seen,        // the row by which the batch was decided; only the journal's readers look at it
+  close_plan,  // no chunk of the sender's plan `amount` follows; 0: of none of its plans
   // set by BatchPlanner only; invalid when sent by a frontend
   overwritten_list = 0x80,  // first of a list of records with this end status, in no queue
   purged_list,
@@ -39,7 +40,7 @@ enum class RecordKind : std::uint8_t {
 
 /// True for the kinds that a lane may hold, and for those of the backend.
 constexpr bool is_known(RecordKind kind) noexcept {
-  return (kind >= RecordKind::batch && kind <= RecordKind::seen) ||
+  return (kind >= RecordKind::batch && kind <= RecordKind::close_plan) ||
          (kind >= RecordKind::overwritten_list && kind <= RecordKind::overwriter_purged);
 }
 
@@ -93,7 +94,7 @@ inline constexpr std::uint16_t kExpress = 2;
 
 // limits of one batch: `pulse` refuses more, and the backend rejects the records beyond them
 inline constexpr std::uint32_t kMaxRequests = 8;
-inline constexpr std::uint32_t kMaxControlOrders = 8;
+inline constexpr std::uint32_t kMaxOrders = 8;
 /// Longest text of a mark [bytes].
 inline constexpr std::uint32_t kMaxMarkBytes = 1024 - sizeof(RecordHead);
 /// Most records of an express batch.

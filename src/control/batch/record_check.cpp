@@ -72,6 +72,7 @@ RecordCheck::Verdict RecordCheck::begin(BlockPool& pool, BlockIndex block,
                      (head.actuator == kEveryActuator || head.actuator < targets_.actuators()));
     case RecordKind::take_control:
     case RecordKind::release_control:
+    case RecordKind::close_plan:
       return verdict(head.payload_bytes == 0);
     case RecordKind::resume:
       return verdict(head.payload_bytes == 0 && head.accepts <= 1);

@@ -39,6 +39,7 @@ void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
   // the motion of an overwritten command goes on until its successor begins
   if (!is_overwritten) motion_.end();
   stop();
+  open_plan_.is_open = false;
   in_force_ = in_force;
   motion_.hold(false);
   while (!queue_.empty()) ledger_->drop(queue_.take_any(), outcome, iteration);
@@ -79,6 +80,7 @@ ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
       // bounds of an integral hold it back: it ends where it is
       const BlockIndex record = leave();
       end_motion();
+      open_plan_.is_open = false;
       end(record, {Status::interrupted, Reason::limits, limited.packed()}, iteration);
     } else if (motion_.arrived()) {
       end_running(iteration);
@@ -152,6 +154,7 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
     mask_.swap(next_mask_);
   }
   if (is_chunk(head)) return begin_chunk();
+  open_plan_.is_open = false;
   const SetPoint next{head.profile, head.start, head.amount};
   keeps_plan_ = same_mask && head.pace == Pace::direct && is_in_force(next) && is_next_row_target();
   // targets of a generator are one motion

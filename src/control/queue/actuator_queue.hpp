@@ -45,6 +45,7 @@ class ActuatorQueue {
       end_motion();
     }
     if (holder_ == lane) motion_.hold(false);
+    close_plan(lane, kEveryPlan);
     ledger_->drop(queue_.take(lane), outcome, iteration);
     if (empty()) end_motion();
   }
@@ -93,12 +94,26 @@ class ActuatorQueue {
     static constexpr Iteration kNone = -(Iteration{1} << 62);
   };
   LastChunk last_chunk;
+  /// A chunk of this plan begins in this iteration.
+  void open_plan(std::uint32_t lane, const ChunkHead& chunk) noexcept {
+    open_plan_ = {lane, chunk.final == 0, chunk.plan};
+  }
+  static constexpr std::uint64_t kEveryPlan = 0;
+  /// No chunk of this plan of a lane follows.
+  void close_plan(std::uint32_t lane, std::uint64_t plan) noexcept {
+    const bool is_meant =
+        open_plan_.lane == lane && (plan == kEveryPlan || plan == open_plan_.plan);
+    if (is_meant) open_plan_.is_open = false;
+  }
+  /// True if a plan of chunks is open and has no row left, and nothing else acts.
+  bool starved() const noexcept { return open_plan_.is_open && empty(); }
   /// True if no command or given target is running or queued.
   bool empty() const noexcept { return has_no_command() && runs_ == Runs::nothing; }
   bool has_no_command() const noexcept { return queue_.empty() && !has_record(); }
   /// For targets that are given without a command, to a queue that has none: begins a row of them.
   void begin_given(Mode mode) noexcept {
     if (mode == Mode::overwrite) carry_.reset();
+    open_plan_.is_open = false;
     motion_.hold(false);
   }
   /// Then, in each iteration: goes to the next one, like a direct command. The last stays in force.
@@ -114,9 +129,11 @@ class ActuatorQueue {
   }
   /// True if nothing moves.
   bool rests() const noexcept { return follows() ? at_rest() : motion_.rests(); }
-  /// True if a command of this lane is queued or running, or its direct value is still held.
+  /// True if a command of this lane is queued or running, its direct value is still held, or its
+  /// plan of chunks is open.
   bool acts(std::uint32_t lane) const noexcept {
-    return queue_.has(lane) || is_of(lane) || (holder_ == lane && holds());
+    return queue_.has(lane) || is_of(lane) || (holder_ == lane && holds()) ||
+           (open_plan_.is_open && open_plan_.lane == lane);
   }
 
   /// Sets the desired state, at rest. Numbers that are not finite keep their last desired value.
@@ -277,6 +294,13 @@ class ActuatorQueue {
   Runs runs_ = Runs::nothing;
   BlockIndex record_ = kNoBlock;  // the running command
   std::uint32_t holder_ = 0;      // lane that gave the direct value that stays
+  /// The plan of the chunk that began last.
+  struct OpenPlan {
+    std::uint32_t lane = 0;
+    bool is_open = false;  // that chunk was not its last one, and nothing has ended or replaced it
+    std::uint64_t plan = 0;
+  };
+  OpenPlan open_plan_;
 
   // the set-point in force: of the running command, or of the last one if nothing came after it
   bool in_force_ = false;

@@ -28,8 +28,8 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
       desired_((schema.head.block + kBlockBytes - 1) / kBlockBytes) {
   const auto count = static_cast<std::uint32_t>(schema.actuators.size());
   const std::uint32_t words = mask_words(count);
-  for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_, &busy_, &stepped_, &follow_,
-                     &dropped_, &of_chunk_}) {
+  for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_, &starved_mask_, &busy_,
+                     &stepped_, &follow_, &dropped_, &of_chunk_}) {
     mask->resize(words);
   }
   actuators_.reserve(count);
@@ -79,23 +79,29 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
   if (ledger_.open_groups() > 0) step_groups(iteration, observed, late_budget);
   const bool gives = given_.acts(iteration);
   if (gives) step_given(iteration, observed);
+  bool knows_waiting = false;
+  bool starves = false;
   for (std::size_t word = 0; word < busy_.size(); ++word) {
     const auto base = static_cast<std::uint32_t>(word * 64);
     const std::uint64_t stepped = gives ? stepped_[word] : 0;
     std::uint64_t active = stepped;
     std::uint64_t clamped = gives ? clamped_mask_[word] & stepped : 0;
     std::uint64_t braking = 0;
+    const std::uint64_t busy = busy_[word];
+    std::uint64_t starved = 0;
 
     // idle actuators follow the observed state, busy ones step
-    each_bit(follow_[word] & ~busy_[word], base,
+    each_bit(follow_[word] & ~busy, base,
              [&](std::uint32_t i) { actuators_[i].follow(of(i, observed)); });
-    each_bit(busy_[word] & ~stepped, base, [&](std::uint32_t i) {
+    each_bit(busy & ~stepped, base, [&](std::uint32_t i) {
       using Moved = ActuatorQueue::Moved;
       ActuatorQueue& queue = actuators_[i];
       const std::uint64_t bit = std::uint64_t{1} << (i % 64);
       const Moved moved = queue.step(iteration, of(i, observed), late_budget);
       // the queue is not empty if late commands have used up their budget
       if (moved == Moved::idle && queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
+      const bool has_no_command = moved == Moved::idle || moved == Moved::braking;
+      if (has_no_command && queue.starved() && !awaits_chunk(i, knows_waiting)) starved |= bit;
       if (moved == Moved::idle) return;
       queue.acted(iteration);
       active |= bit;
@@ -105,7 +111,10 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
     active_mask_[word] = active;
     clamped_mask_[word] = clamped;
     braking_mask_[word] = braking;
+    starves = starves || (starved & ~starved_mask_[word]) != 0;
+    starved_mask_[word] = (starved_mask_[word] & ~busy) | starved;
   }
+  if (starves) ++starvations_;
   reported_ += kStatusesPerIteration - late_budget;
 }
 
@@ -178,6 +187,9 @@ void Controller::take_step(const Taking& from, BlockIndex record, BatchHandler& 
       if (outcome.status == Status::active) return ledger_.activate(record, now);
       return end(outcome);
     }
+    case RecordKind::close_plan:
+      close_plan(from.lane, static_cast<std::uint64_t>(head.amount));
+      return end({});
     case RecordKind::take_control:
       return end(handler.take_control(from.lane));
     case RecordKind::release_control:
@@ -246,6 +258,7 @@ void Controller::take_chunk(const Taking& from, BlockIndex group, BatchHandler& 
       {Status::overwritten}, now, chunk.begins);
   const Waiting waiting{group, from.lane, chunk.begins};
   if (waiting.begins == now) return begin_chunk(group, from.lane, now);
+  look_at_starved();
   waiting_.insert(std::ranges::upper_bound(waiting_, waiting.begins, {}, &Waiting::begins),
                   waiting);
 }
@@ -285,8 +298,33 @@ void Controller::begin_chunk(BlockIndex group, std::uint32_t lane, Iteration ite
     O80_COUNT(queue_dropped);
     actuators_[actuator].drop({Status::overwritten}, iteration);
     actuators_[actuator].append(member, member, lane);
+    actuators_[actuator].open_plan(lane, chunk_of(pool_, group));
     set(busy_, actuator);
   });
+}
+
+void Controller::close_plan(std::uint32_t lane, std::uint64_t plan) noexcept {
+  for (const Waiting& each : waiting_) {
+    ChunkHead& chunk = chunk_of(pool_, each.group);
+    const bool is_meant = plan == ActuatorQueue::kEveryPlan || chunk.plan == plan;
+    if (each.lane == lane && is_meant) chunk.final = 1;
+  }
+  for (ActuatorQueue& queue : actuators_) queue.close_plan(lane, plan);
+  look_at_starved();
+}
+
+/// True if a chunk of this actuator waits for its begin. `known`: of_chunk_ has the actuators of
+/// all that wait.
+bool Controller::awaits_chunk(std::uint32_t actuator, bool& known) noexcept {
+  if (waiting_.empty()) return false;
+  if (!std::exchange(known, true)) {
+    std::ranges::fill(of_chunk_, 0);
+    for (const Waiting& each : waiting_) {
+      each_member(each.group,
+                  [&](BlockIndex member) { set(of_chunk_, pool_.head(member).actuator); });
+    }
+  }
+  return masked(of_chunk_.data(), actuator);
 }
 
 template <class Ends>

@@ -88,7 +88,8 @@ class Controller {
     drop(kEveryActuator, {Status::purged, Reason::fresh_start}, row);
     each(kEveryActuator, [&](std::uint32_t i) { actuators_[i].restart(of(i, source)); });
     fresh_row_ = row;
-    for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_}) std::ranges::fill(*mask, 0);
+    for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_, &starved_mask_})
+      std::ranges::fill(*mask, 0);
   }
 
   /// One more iteration, after restart(), of a motion that was made elsewhere: its desired block.
@@ -148,6 +149,9 @@ class Controller {
       actuators_[i].drop_lane(lane, {Status::purged, reason}, iteration);
     });
   }
+  /// No chunk of this plan of a lane follows, or of any plan of it (ActuatorQueue::kEveryPlan).
+  /// Changes no motion; O(actuators).
+  void close_plan(std::uint32_t lane, std::uint64_t plan) noexcept;
   /// Earlier purges no longer end commands that are taken later; for an invalid ticket counter.
   void forget_tickets() noexcept { purge_tickets_.forget(); }
   /// Ends all commands as halted; each actuator then brakes within its limits.
@@ -179,6 +183,11 @@ class Controller {
   const std::uint64_t* clamped_mask() const noexcept { return clamped_mask_.data(); }
   /// One bit for each actuator: it braked in the last step, without a command.
   const std::uint64_t* braking_mask() const noexcept { return braking_mask_.data(); }
+  /// One bit for each actuator: in the last step it had no command and no row of a chunk ahead,
+  /// although its plan of chunks is open.
+  const std::uint64_t* starved_mask() const noexcept { return starved_mask_.data(); }
+  /// Number of steps so far in which an actuator began to be starved.
+  std::int64_t starvations() const noexcept { return starvations_; }
   /// True if an actuator without a command is not at rest; O(actuators).
   bool braking() const noexcept {
     // in the last step; or in the next one, for an actuator that has just lost its command
@@ -203,13 +212,15 @@ class Controller {
   }
   /// True if nothing acts, and a restart() with the desired block would change nothing later.
   bool shows_all() noexcept {
-    return !pending() && waiting_.empty() &&
-           std::ranges::all_of(busy_, [](std::uint64_t word) { return word == 0; }) &&
+    const auto is_zero = [](std::uint64_t word) { return word == 0; };
+    return !pending() && waiting_.empty() && std::ranges::all_of(busy_, is_zero) &&
+           std::ranges::all_of(starved_mask_, is_zero) &&
            std::ranges::all_of(actuators_, &ActuatorQueue::shows_all);
   }
   /// True if a direct value keeps a number away from its rest value; O(actuators).
   bool holds() const noexcept { return any(&ActuatorQueue::holds); }
-  /// True if a command of this lane runs or waits, or its direct value is held; O(actuators).
+  /// True if a command of this lane runs or waits, its direct value is held, or its plan of chunks
+  /// is open; O(actuators).
   bool acts(std::uint32_t lane) const noexcept {
     return std::ranges::any_of(waiting_, [&](const Waiting& each) { return each.lane == lane; }) ||
            any([&](const ActuatorQueue& queue) { return queue.acts(lane); });
@@ -261,6 +272,11 @@ class Controller {
       visit(member);
     }
   }
+  /// The next step finds out whether actuators that are starved still are.
+  void look_at_starved() noexcept {
+    for (std::size_t word = 0; word < busy_.size(); ++word) busy_[word] |= starved_mask_[word];
+  }
+  bool awaits_chunk(std::uint32_t actuator, bool& known) noexcept;
   void take_step(const Taking& from, BlockIndex record, BatchHandler& handler) noexcept;
   void take_commands(const Taking& from, BlockIndex first, Iteration iteration) noexcept;
   void step_groups(Iteration iteration, const std::byte* observed,
@@ -305,13 +321,15 @@ class Controller {
   Mask active_mask_;
   Mask clamped_mask_;
   Mask braking_mask_;
+  Mask starved_mask_;  // of actuators that are not busy: as in the step before
+  std::int64_t starvations_ = 0;
   std::vector<std::uint32_t> offsets_;  // offset of each actuator in a block of states [bytes]
   std::vector<ActuatorQueue> actuators_;
   Mask busy_;                     // has commands, or is not known to be at rest
   Mask stepped_;                  // has its desired state from given_ already
   Mask follow_;                   // follows the observed state when idle
   std::vector<Waiting> waiting_;  // in the order in which they begin
-  Mask of_chunk_;                 // actuators of the chunk that is being taken
+  Mask of_chunk_;                 // actuators of the chunk that is being taken, or of all that wait
   Iteration fresh_row_ = 0;       // of the last fresh start
   DirectTargets given_;
   Mask dropped_;                // no longer gets its targets

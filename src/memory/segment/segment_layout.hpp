@@ -29,7 +29,7 @@ namespace o80 {
 
 inline constexpr std::uint64_t kSegmentMagic = 0x0a67'6573'2030'386fULL;   // "o80 seg\n"
 inline constexpr std::uint64_t kCommandsMagic = 0x0a64'6d63'2030'386fULL;  // "o80 cmd\n"
-inline constexpr std::uint32_t kSegmentVersion = 8;                        // format of both files
+inline constexpr std::uint32_t kSegmentVersion = 9;                        // format of both files
 inline constexpr std::size_t kLineBytes = 64;       // size of a cache line [bytes]
 inline constexpr std::size_t kBlockSize = 64;       // size of a block of a lane [bytes]
 inline constexpr std::size_t kMessages = 64;        // status texts kept for each lane

@@ -96,12 +96,20 @@ void LoopReport::run() noexcept {
     OverrunReport overruns(watcher.period());
     HangReport hangs;
     std::uint64_t halted = 0;
+    bool has_starved = false;
     while (stop_.load(std::memory_order_acquire) == 0) {
       const std::int64_t moment = monotonic_now();
       if (const auto line = lost_priority()) say(*line);
       if (const auto line = hangs.look(loop_state(watcher, moment), moment)) say(*line);
       if (watcher.published() >= 0) {
-        if (const auto line = overruns.look(watcher.latest().head(), moment)) say(*line);
+        const RowHead row = watcher.latest().head();
+        if (const auto line = overruns.look(row, moment)) say(*line);
+        if (row.starvations > 0 && !std::exchange(has_starved, true)) {
+          say("a plan of chunks ran out of rows: its policy answers too late, or has not closed "
+              "it. "
+              "This is said once; `o80 info " +
+              segment_ + "` counts, rows are marked `starved` (docs/chunks.md)");
+        }
       }
       const std::optional<Halt> halt = watcher.halted();
       const std::uint64_t now = halt ? halt->number : 0;

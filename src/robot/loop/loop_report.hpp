@@ -37,7 +37,7 @@ class HangReport {
 };
 
 /// Reads the rows of a loop in this process, in a thread of its own, and reports on the standard
-/// error late iterations, a loop that hangs, and halts and resumes.
+/// error late iterations, a loop that hangs, halts and resumes, and the first starved plan.
 class LoopReport {
  public:
   explicit LoopReport(std::string segment);

@@ -225,16 +225,19 @@ void UntypedBackend::Body::fill_row(bool fresh) noexcept {
   head.skipped = timing.skipped;
   head.fresh = fresh ? 1 : 0;
   head.halted = halts.acts() ? 1 : 0;
+  head.starvations = controller.starvations();
   std::memcpy(row(), &head, sizeof head);
   if (layout.block > 0) std::memcpy(row() + layout.desired, controller.desired(), layout.block);
   if (layout.mask_words == 1) {  // mostly: no calls
     std::memcpy(row() + layout.active, controller.active_mask(), 8);
     std::memcpy(row() + layout.clamped, controller.clamped_mask(), 8);
     std::memcpy(row() + layout.braking, controller.braking_mask(), 8);
+    std::memcpy(row() + layout.starved, controller.starved_mask(), 8);
   } else if (layout.mask_words > 1) {
     std::memcpy(row() + layout.active, controller.active_mask(), layout.mask_words * 8);
     std::memcpy(row() + layout.clamped, controller.clamped_mask(), layout.mask_words * 8);
     std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
+    std::memcpy(row() + layout.starved, controller.starved_mask(), layout.mask_words * 8);
   }
 }
 

@@ -60,6 +60,7 @@ void UntypedBackend::Body::on_owner_death(std::uint32_t lane, std::uint64_t inca
   if (incarnation <= handled_deaths_[lane]) return;
   handled_deaths_[lane] = incarnation;
   journal.died(lane, incarnation, stale_);
+  controller.close_plan(lane, ActuatorQueue::kEveryPlan);
   stale(lane, Reason::dead_frontend);
   if (burst_.runs_for(lane) && burst_.incarnation() <= incarnation) stop_burst();
   // it may have died between its commit and the bell

@@ -59,6 +59,8 @@ void UntypedBackend::Body::obey(const JournalEntry& entry) noexcept {
       put_halt(segment.view(), entry.halt, entry.cause, entry.who, entry.text);
       return watch_halt();
     case JournalKind::died:
+      controller.close_plan(entry.lane, ActuatorQueue::kEveryPlan);
+      [[fallthrough]];
     case JournalKind::silent:
       if (stale_ == Stale::purge) {
         const bool died = entry.kind == JournalKind::died;

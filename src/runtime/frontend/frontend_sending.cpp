@@ -307,7 +307,8 @@ std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
                         .ease = options.ease,
                         .first = options.first,
                         .fixed = static_cast<std::uint8_t>(options.fixed),
-                        .reject_late = static_cast<std::uint8_t>(options.reject_late)};
+                        .reject_late = static_cast<std::uint8_t>(options.reject_late),
+                        .final = static_cast<std::uint8_t>(options.final)};
   std::vector<const StateLayout*> layouts;
   const auto lock = link_->lock_to_add();
   link_->members.clear();
@@ -351,6 +352,11 @@ void UntypedFrontend::add_set_points(std::span<const std::uint32_t> actuators, s
     head.profile = link_->command_check.usual_profile(actuator);
     link_->builder.command(head, {}, {}, rows, targets);
   });
+}
+
+std::uint32_t UntypedFrontend::add_close_plan(std::uint64_t plan) {
+  const auto lock = link_->lock_to_add();
+  return link_->builder.close_plan(plan);
 }
 
 std::uint32_t UntypedFrontend::add_purge(std::uint32_t actuator) {
@@ -435,7 +441,7 @@ void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
                           "(forget_added() drops it)");
   };
   refuse(builder.requests(), kMaxRequests, "requests");
-  refuse(builder.control_orders(), kMaxControlOrders, "orders to take or release control");
+  refuse(builder.orders(), kMaxOrders, "orders to take or release control, or to close plans");
 
   const std::uint64_t journal = link_->segment.view().shape.journal_bytes;
   const std::uint64_t bytes = builder.blocks() * kBlockBytes;

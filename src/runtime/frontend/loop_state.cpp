@@ -143,6 +143,7 @@ LoopState loop_state(const UntypedFrontend& frontend, std::int64_t now) {
   if (state.last < 0 || !heads.read(state.last, last)) return state;
   state.overruns = last.overruns;
   state.skipped = last.skipped;
+  state.starvations = last.starvations;
   if (frontend.schema().head.clock == Clock::simulated) return state;
   state.row_age = now - last.time;
   RowHead first;

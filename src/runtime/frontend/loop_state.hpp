@@ -22,11 +22,12 @@ struct LoopState {
   bool process_stopped = false;  // by SIGSTOP or a debugger
   bool bursting = false;
   bool halted = false;
-  bool played = false;         // its rows come from a recording
-  std::int64_t period = 0;     // [ns]
-  Iteration last = -1;         // the newest row; -1: none yet
-  std::uint32_t overruns = 0;  // so far
-  std::uint32_t skipped = 0;   // periods skipped, or ticks of the robot missed, so far
+  bool played = false;           // its rows come from a recording
+  std::int64_t period = 0;       // [ns]
+  Iteration last = -1;           // the newest row; -1: none yet
+  std::uint32_t overruns = 0;    // so far
+  std::uint32_t skipped = 0;     // periods skipped, or ticks of the robot missed, so far
+  std::int64_t starvations = 0;  // RowHead::starvations
 
   // over the last second of rows, or the last two rows; nothing in simulated time
   std::optional<double> rate;  // reached [1/s]; 0: stalled

@@ -17,7 +17,8 @@ namespace {
 // blocks itself (`what` of an entry, `blocks` of a batch).
 static_assert(sizeof(RecordHead) == 48 && sizeof(BatchRecord) == kBlockBytes);
 static_assert(static_cast<std::uint16_t>(RecordKind::mark) == journal_format::kMark);
-static_assert(static_cast<std::uint16_t>(RecordKind::seen) == journal_format::kSeen);
+static_assert(static_cast<std::uint16_t>(RecordKind::seen) == journal_format::kSeen &&
+              static_cast<std::uint16_t>(RecordKind::close_plan) == 12);
 
 template <class Struct>
 void append(std::vector<std::byte>& to, const Struct& value) {

@@ -81,6 +81,7 @@ ChunkOptions options_of(const ChunkHead& chunk, Profile profile) {
           .first = chunk.first,
           .fixed = chunk.fixed != 0,
           .reject_late = chunk.reject_late != 0,
+          .final = chunk.final != 0,
           .profile = profile};
 }
 
@@ -197,6 +198,9 @@ std::optional<JournalRecord> take_record(const Schema& schema, std::span<const s
       break;
     case RecordKind::release_control:
       record.kind = Kind::release_control;
+      break;
+    case RecordKind::close_plan:
+      record.kind = Kind::close_plan;
       break;
     case RecordKind::resume:
       record.kind = Kind::resume;

@@ -198,6 +198,9 @@ class Rig : public BatchHandler {
   bool braking(std::uint32_t actuator = 0) const {
     return (controller.braking_mask()[actuator / 64] >> (actuator % 64) & 1) != 0;
   }
+  bool starved(std::uint32_t actuator = 0) const {
+    return (controller.starved_mask()[actuator / 64] >> (actuator % 64) & 1) != 0;
+  }
   bool all_blocks_back() const { return pool.available() == pool.size(); }
 
   // what a backend does of a batch's requests

@@ -16,7 +16,8 @@ TEST(RowLayout, PutsThePartsOneBehindTheOther) {
   EXPECT_EQ(layout.extended, layout.observed + layout.block);
   EXPECT_EQ(layout.active, layout.extended + round_up(sizeof(described::Sensors), 8));
   EXPECT_EQ(layout.mask_words, 1U);
-  EXPECT_EQ(layout.size, layout.braking + 8);
+  EXPECT_EQ(layout.starved, layout.braking + 8);
+  EXPECT_EQ(layout.size, layout.starved + 8);
   EXPECT_EQ(layout.size % 8, 0U);
 }
 

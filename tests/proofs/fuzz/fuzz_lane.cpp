@@ -237,7 +237,7 @@ class Liar {
     } else if (kind == 1) {
       builder.purge_own(kEveryActuator);
     } else if (kind == 2) {
-      builder.take_control();
+      head.actuator == 3 ? builder.close_plan(bytes.below(2)) : builder.take_control();
     } else if (kind == 3) {
       const std::array<std::uint64_t, 1> payload{bytes.word()};
       builder.request(0, std::as_bytes(std::span(payload)));
@@ -260,7 +260,9 @@ class Liar {
     chunk.anchor = static_cast<Iteration>(bytes.below(64));
     chunk.ease = 1 + bytes.below(20);
     chunk.first = bytes.below(rows);
-    chunk.fixed = static_cast<std::uint8_t>(bytes.below(2));
+    const std::uint32_t options = bytes.below(4);
+    chunk.fixed = static_cast<std::uint8_t>(options % 2);
+    chunk.final = static_cast<std::uint8_t>(options / 2);
     std::vector<std::vector<std::byte>> states(1 + bytes.below(2));
     std::vector<BatchBuilder::Member> members;
     std::vector<const StateLayout*> layouts;

@@ -81,8 +81,7 @@ TEST(BatchPlan, ABatchIsTakenAsIfItsRecordsWereTakenOneAfterTheOther) {
         record(whole);
         record(single);
         ids.push_back(record_id(single.pulse(lane), 0));
-        if (whole.batch.requests() == kMaxRequests ||
-            whole.batch.control_orders() == kMaxControlOrders) {
+        if (whole.batch.requests() == kMaxRequests || whole.batch.orders() == kMaxOrders) {
           break;
         }
       }
@@ -140,11 +139,11 @@ TEST(BatchPlan, TakingThousandsOfOverwritesAndPurgesCostsNoMoreThanTheirActuator
 TEST(BatchPlan, RejectsTheRequestsAndControlOrdersBeyondTheMost) {
   Rig rig(robot());
   for (std::uint32_t i = 0; i < kMaxRequests + 2; ++i) rig.batch.request(0, {});
-  for (std::uint32_t i = 0; i < kMaxControlOrders + 2; ++i) rig.batch.release_control();
+  for (std::uint32_t i = 0; i < kMaxOrders + 2; ++i) rig.batch.release_control();
   const CommandId batch = rig.pulse();
   rig.step();
   EXPECT_EQ(rig.requests.size(), kMaxRequests);
-  EXPECT_EQ(rig.controls.size(), kMaxControlOrders);
+  EXPECT_EQ(rig.controls.size(), kMaxOrders);
   EXPECT_EQ(rig.witness.status(record_id(batch, kMaxRequests - 1)), Status::completed);
   EXPECT_EQ(rig.witness.last(record_id(batch, kMaxRequests)).reason, Reason::invalid);
   EXPECT_TRUE(rig.all_blocks_back());

@@ -214,7 +214,7 @@ TEST_F(ExpressTest, MoreRequestsOrOrdersThanABatchMayHaveAreRefused) {
               AllOf(HasSubstr("may have 8 requests, this one has 9"), HasSubstr("several pulses")));
   EXPECT_EQ(one.added(), kMaxRequests + 1) << "nothing was sent";
   one.forget_added();
-  for (std::uint32_t i = 0; i < kMaxControlOrders + 1; ++i) one.add_take_control();
+  for (std::uint32_t i = 0; i < kMaxOrders + 1; ++i) one.add_take_control();
   EXPECT_THAT(message_of<InvalidArgument>([&] { one.pulse(); }), HasSubstr("control"));
 }
 

@@ -30,6 +30,33 @@ TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
   EXPECT_EQ(desired(frontend.latest()), 6.0) << "five iterations after the batch";
 }
 
+TEST_F(SilenceTest, AStarvedPlanActsAndAClosedOneDoesNot) {
+  enum class Closed { no, by_its_last_chunk, by_order };
+  for (const Closed closed : {Closed::no, Closed::by_its_last_chunk, Closed::by_order}) {
+    StartedStation station(watched(Stale::halt));
+    UntypedFrontend frontend("pair");
+    const std::array<std::uint32_t, 1> actuator{0};
+    const std::array<std::uint32_t, 2> due{1, 2};
+    const std::array<double, 2> rows{};
+    frontend.add_chunk(
+        actuator, due, std::as_bytes(std::span(rows)),
+        {.anchor = frontend.published(), .plan = 1, .final = closed == Closed::by_its_last_chunk});
+    if (closed == Closed::by_order) frontend.add_close_plan(1);
+    const Batch batch = frontend.pulse();
+    station.run(3);
+    EXPECT_EQ(batch.handle(0).status, Status::completed);
+    EXPECT_EQ(frontend.latest().starved(0), closed == Closed::no);
+    EXPECT_FALSE(frontend.latest().starved(1));
+    EXPECT_FALSE(frontend.halted());
+    station.run(4);
+    ASSERT_EQ(frontend.halted().has_value(), closed == Closed::no);
+    if (closed != Closed::no) continue;
+    EXPECT_EQ(frontend.halted()->iteration, 7);
+    EXPECT_FALSE(frontend.latest().starved(0));
+    EXPECT_EQ(frontend.latest().head().starvations, 1);
+  }
+}
+
 TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
   StartedStation station(watched(Stale::purge, 50));
   UntypedFrontend silent("pair");

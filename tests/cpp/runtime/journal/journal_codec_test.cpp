@@ -434,15 +434,15 @@ TEST_F(LaterFileTest, ARecordOfAnUnknownKindIsSkippedAndNamed) {
       numbers_ = 0;
       begin_batch(3, 4);
       add_command();
-      add_unknown(12, fields, payload);
+      add_unknown(13, fields, payload);
       add_command();
       const std::vector<JournalEntry> found = entries();
       ASSERT_EQ(found.size(), 1U);
       std::vector<Kind> kinds;
       for (const JournalRecord& record : found[0].records) kinds.push_back(record.kind);
       EXPECT_THAT(kinds, ElementsAre(Kind::command, Kind::unknown, Kind::command));
-      EXPECT_EQ(found[0].records[1].unknown, "record kind 12");
-      EXPECT_EQ(found[0].unknown, "record kind 12");
+      EXPECT_EQ(found[0].records[1].unknown, "record kind 13");
+      EXPECT_EQ(found[0].unknown, "record kind 13");
       EXPECT_FALSE(found[0].records_lost);
     }
   }
