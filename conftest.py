@@ -24,12 +24,17 @@ GRACE = 5.0  # [s] for the last to die
 Found = TypeVar("Found", int, Path)
 
 
-def own_directory() -> Path:
-    """A directory for the segments of this process: other test runs and robots use their own."""
+def remove_own_and_dead() -> None:
+    """The directory of this process, and those whose process has ended: it may have been killed."""
     for old in Path("/dev/shm").glob("pytest-o80-*"):
         process = old.name.rpartition("-")[2]
         if process == str(os.getpid()) or not Path("/proc", process).exists():
             shutil.rmtree(old, ignore_errors=True)
+
+
+def own_directory() -> Path:
+    """A directory for the segments of this process: other test runs and robots use their own."""
+    remove_own_and_dead()
     made = Path(f"/dev/shm/pytest-o80-{os.getpid()}")
     made.mkdir()
     return made
@@ -40,7 +45,8 @@ os.environ["O80_DIRECTORY"] = str(DIRECTORY)  # all that is started here inherit
 
 
 def pytest_unconfigure() -> None:
-    shutil.rmtree(DIRECTORY, ignore_errors=True)
+    # a worker that takes long to end on a slow machine is killed by its controller
+    remove_own_and_dead()
 
 
 # names of tests that were left out: for their mark or name, and for want of recordings

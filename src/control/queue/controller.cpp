@@ -111,10 +111,10 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
     active_mask_[word] = active;
     clamped_mask_[word] = clamped;
     braking_mask_[word] = braking;
-    starves = starves || (starved & ~starved_mask_[word]) != 0;
+    if (busy == 0) continue;
+    if ((starved & ~starved_mask_[word]) != 0 && !std::exchange(starves, true)) ++starvations_;
     starved_mask_[word] = (starved_mask_[word] & ~busy) | starved;
   }
-  if (starves) ++starvations_;
   reported_ += kStatusesPerIteration - late_budget;
 }
 

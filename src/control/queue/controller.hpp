@@ -213,8 +213,8 @@ class Controller {
   /// True if nothing acts, and a restart() with the desired block would change nothing later.
   bool shows_all() noexcept {
     const auto is_zero = [](std::uint64_t word) { return word == 0; };
-    return !pending() && waiting_.empty() && std::ranges::all_of(busy_, is_zero) &&
-           std::ranges::all_of(starved_mask_, is_zero) &&
+    return std::ranges::all_of(starved_mask_, is_zero) && !pending() && waiting_.empty() &&
+           std::ranges::all_of(busy_, is_zero) &&
            std::ranges::all_of(actuators_, &ActuatorQueue::shows_all);
   }
   /// True if a direct value keeps a number away from its rest value; O(actuators).
