@@ -30,14 +30,17 @@ from o80_table_tennis.rig.arm_numbers import ArmNumbers
 from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
 from o80_table_tennis.world.arm import MUSCLES
 from o80_table_tennis.world.table import TARGET
-from o80_table_tennis.world.timing import STEP
+from o80_table_tennis.world.timing import PERIOD, STEP
 
 LATE_STEPS = 3
 LATE = LATE_STEPS * STEP
 """How long an answer takes [s]."""
-RIG = RigSettings(preset="identified")
-SINGLE = TaskSettings(factor=DEFAULT_FACTOR, fly_out=True)
-CHUNKS = replace(SINGLE, chunk_size=8, action_steps=4, delay=16)
+CHUNKS = TaskSettings(factor=DEFAULT_FACTOR, fly_out=True, chunk_size=10, action_steps=5, delay=16)
+LONGER = replace(CHUNKS, chunk_size=13, action_steps=8)
+SINGLE = TaskSettings(
+    factor=DEFAULT_FACTOR, fly_out=True, max_late=CHUNKS.max_late + CHUNKS.planned
+)
+"""Given up as stalled as late as both of them."""
 AT_A_TIME = 5
 """Balls that a way plays before the next one's turn."""
 
@@ -74,9 +77,10 @@ class Delayed:
         return self.underway.popleft()
 
 
-def ways(*, real_time: bool) -> Mapping[str, tuple[Callable[[], Policy], TaskSettings]]:
+def ways(rig: RigSettings) -> Mapping[str, tuple[Callable[[], Policy], TaskSettings]]:
     """By name: policy and task."""
-    settings = found_settings().for_arm(ArmNumbers.of_rig(RIG))
+    real_time = rig.pacing.real_time
+    settings = found_settings().for_arm(ArmNumbers.of_rig(rig))
     told = replace(settings, dead_time=tuple(each + LATE for each in settings.dead_time))
     blocking: Callable[[Policy], Policy] = Slow if real_time else lambda policy: policy
     found = {
@@ -84,7 +88,14 @@ def ways(*, real_time: bool) -> Mapping[str, tuple[Callable[[], Policy], TaskSet
         "single actions, thinks for 30 ms": (lambda: Slow(HittingPolicy(settings)), SINGLE),
         "single actions, acting 30 ms late": (lambda: Delayed(HittingPolicy(settings)), SINGLE),
         "the same, policy told of the delay": (lambda: Delayed(HittingPolicy(told)), SINGLE),
-        "chunks, thinks for 30 ms": (lambda: blocking(RolledOutPolicy(settings, CHUNKS)), CHUNKS),
+        "chunks, thinks for 30 ms every 50 ms": (
+            lambda: blocking(RolledOutPolicy(settings, CHUNKS)),
+            CHUNKS,
+        ),
+        "chunks, thinks for 30 ms every 80 ms": (
+            lambda: blocking(RolledOutPolicy(settings, LONGER)),
+            LONGER,
+        ),
     }
     if not real_time:
         del found["single actions, thinks for 30 ms"]
@@ -124,7 +135,7 @@ def row(name: str, played: list[Played], load: float) -> str:
 
     median = f"{np.median(misses):.2f} m" if misses else ""
     touched, returned = (sum(each.touches for each in played), sum(each.returns for each in played))
-    starved = 1000 * total("starved_iterations") * RIG.period
+    starved = 1000 * total("starved_iterations") * PERIOD
     return (
         f"| {name} | {touched} | {returned} | {median} | {total('late_actions')} of "
         f"{total('steps')} | {starved:.0f} ms | {total('stalled_episodes')} | {load:.1f} |"
@@ -139,16 +150,18 @@ def main() -> None:
     parser.add_argument(
         "--simulated-time", action="store_true", help="accelerated: no answer takes any time"
     )
+    parser.add_argument("--preset", default="standard", help="of the arm")
     asked = parser.parse_args()
     pacing = Pacing.INLINE if asked.simulated_time else Pacing.REAL_TIME
-    compared = ways(real_time=pacing.real_time)
+    rig = RigSettings(preset=asked.preset, pacing=pacing)
+    compared = ways(rig)
     played: dict[str, list[Played]] = {name: [] for name in compared}
     loads: dict[str, list[float]] = {name: [] for name in compared}
     with busy(2 * len(os.sched_getaffinity(0)) if asked.busy else 0):
         for first in range(0, asked.balls, AT_A_TIME):
             for name, (make, task) in compared.items():
                 balls = range(first, min(first + AT_A_TIME, asked.balls))
-                with TableTennisEnvironment(rig=RIG.paced(pacing), task=task) as environment:
+                with TableTennisEnvironment(rig=rig, task=task) as environment:
                     played[name].append(play(environment, make(), balls, seed=asked.seed))
                 loads[name].append(os.getloadavg()[0])
     print(f"{asked.balls} balls")

@@ -21,7 +21,7 @@ def _scripted() -> Contestant:
 
 def _scripted_chunks() -> Contestant:
     policy, conditions = _scripted()
-    return policy, replace(conditions, chunk_size=8, action_steps=4, delay=16)
+    return policy, replace(conditions, chunk_size=10, action_steps=5, delay=16)
 
 
 def _learned() -> Contestant:

@@ -115,4 +115,5 @@ class RolledOutPolicy:
         """Pressures (8,) that act on the muscles at `time` [s], after the dead time of each."""
         since = (time - self._dead_time - self._delay * PERIOD) / STEP
         places = np.clip(self._earlier + np.floor(since), 0, len(commanded) - 1).astype(int)
-        return np.array(commanded)[places, np.arange(MUSCLES)]
+        acting: FloatArray = np.array(commanded)[places, np.arange(MUSCLES)]
+        return acting
