@@ -159,9 +159,11 @@ class TaskSettings:
         whole(self.action_steps, "action_steps", 1)
         if self.chunk_size is not None:
             whole(self.chunk_size, "chunk_size", 1)
-        if self.action_steps > (self.chunk_size or 1):
+        rows = self.chunk_size or 1
+        if self.action_steps > rows:
             raise ValueError(
-                f"a chunk of {self.chunk_size} rows has no {self.action_steps} action_steps"
+                f"action_steps must be at most {rows}, the rows of an action (chunk_size), "
+                f"got {self.action_steps}"
             )
         if self.ball_count is not None:
             whole(self.ball_count, "ball_count", 1)
