@@ -77,13 +77,16 @@ class Delayed:
         return self.underway.popleft()
 
 
-def ways(rig: RigSettings) -> Mapping[str, tuple[Callable[[], Policy], TaskSettings]]:
+Way = tuple[Callable[[], Policy], TaskSettings]
+
+
+def ways(rig: RigSettings) -> Mapping[str, Way]:
     """By name: policy and task."""
     real_time = rig.pacing.real_time
     settings = found_settings().for_arm(ArmNumbers.of_rig(rig))
     told = replace(settings, dead_time=tuple(each + LATE for each in settings.dead_time))
     blocking: Callable[[Policy], Policy] = Slow if real_time else lambda policy: policy
-    found = {
+    found: dict[str, Way] = {
         "single actions, no delay": (lambda: HittingPolicy(settings), SINGLE),
         "single actions, thinks for 30 ms": (lambda: Slow(HittingPolicy(settings)), SINGLE),
         "single actions, acting 30 ms late": (lambda: Delayed(HittingPolicy(settings)), SINGLE),
@@ -122,7 +125,7 @@ def _loop() -> None:
 
 
 def row(name: str, played: list[Played], load: float) -> str:
-    """Of the table."""
+    """A row of the table."""
     episodes = [episode for each in played for episode in each.episodes]
     misses = [
         float(np.hypot(each.landing[0] - TARGET[0], each.landing[1] - TARGET[1]))

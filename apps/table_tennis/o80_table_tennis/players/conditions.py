@@ -29,7 +29,7 @@ class Conditions:
     repeat: int = 2
     """Steps of 10 ms that an action lasts."""
     chunk_size: int | None = None
-    """Of action chunks, as the next two: see `settings.TaskSettings`."""
+    """Rows of an action chunk, see `settings.TaskSettings` for this and the next two."""
     action_steps: int = 1
     delay: int = 1
     reward: str = "ordered"

@@ -81,7 +81,7 @@ class RolledOutPolicy:
         return np.stack(actions)
 
     def _flight(self, row: FloatArray) -> PredictedFlight:
-        """Of the ball, in iterations from now on; its spin goes on from the last prediction."""
+        """Flight of the ball, in iterations from now; its spin goes on from the last prediction."""
         spin: FloatArray = np.array(self._settings.interception.spin)
         if self._ball is not None:
             place = self._steps * ITERATIONS

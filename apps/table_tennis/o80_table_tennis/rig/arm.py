@@ -66,8 +66,8 @@ class Arm(ArmRows):
         """chunks: `ask` gets the rows of a chunk."""
         self.frontend = frontend
         self.late = 0
-        """Of what was asked last: 1 if it was taken later than at its iteration, or not yet; of a
-        chunk the rows that were late, and so skipped. Known after `settle`."""
+        """1 if what was asked last was taken later than at its iteration, or not yet; with chunks
+        its late rows, which were skipped. Known after `settle`."""
         self.starved = 0
         """Iterations before the last chunk began for which the one before it had no row."""
         self._sent: o80.Batch | None = None
