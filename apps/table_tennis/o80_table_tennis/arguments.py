@@ -43,13 +43,14 @@ def refuse_wrong_balls(rig: RigSettings, task: TaskSettings, *, plays_ball: bool
         )
 
 
-def refuse_unless_for_copies(rig: RigSettings) -> None:
-    """Raises ValueError for a rig that a vector environment cannot have."""
+def refuse_unless_for_copies(rig: RigSettings, task: TaskSettings) -> None:
+    """Raises ValueError for a rig or a task that a vector environment cannot have."""
     wanted = {"pacing": Pacing.INLINE, "twins": 1, "extra_balls": 0, "attach": False}
-    for name, value in wanted.items():
-        if getattr(rig, name) != value:
+    given = {name: getattr(rig, name) for name in wanted} | {"chunk_size": task.chunk_size}
+    for name, value in (wanted | {"chunk_size": None}).items():
+        if given[name] != value:
             raise ValueError(
-                f"a vector environment needs {name}={value}, got {getattr(rig, name)}: make it of "
+                f"a vector environment needs {name}={value}, got {given[name]}: make it of "
                 "single environments instead, with vectorization_mode='sync' or 'async'"
             )
 

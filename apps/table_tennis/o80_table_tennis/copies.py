@@ -2,7 +2,8 @@
 
 One step, with the arm's iterations as the only clock; k is its newest row used:
 1. actions => eight pressures of each arm, sent for iteration k + 1 + delay (by the clock, too late:
-   taken at once, counted);
+   taken at once, counted); with chunks row j for the five iterations from k + 1 + delay + 5 j on
+   (too late: skipped, counted);
 2. by the clock: wait for row k + 5; else all arms burst by 5;
 3. the arm's rows k + 1 to k + 5 are replayed to its twins, which all burst by 5 at once;
 4. the arm's row k + 5 and the twin's row of the same instant => observation, contact, reward.
@@ -17,6 +18,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from o80.base.arrays import FloatArray
 from o80.learning import Index, Outcome, Task
 
 from .arguments import refuse_unless_for_copies, refuse_wrong_balls, refuse_wrong_options
@@ -65,7 +67,7 @@ class TableTennisCopies(Task):
         """
         settings, rig = task or TaskSettings(), rig or RigSettings()
         if copies is not None:
-            refuse_unless_for_copies(rig)
+            refuse_unless_for_copies(rig, settings)
         self.settings, self.task = settings, settings.made()
         refuse_wrong_balls(rig, settings, plays_ball=self.task.plays_ball)
         rig = settings.start_of(rig)
@@ -74,7 +76,7 @@ class TableTennisCopies(Task):
         super().__init__(
             copies or 1,
             observation_space=self.observer.space,
-            action_space=spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32),
+            action_space=spaces.Box(-1.0, 1.0, settings.action_shape, np.float32),
         )
         self._rig_settings, self._camera = rig, camera
         self._balls = balls_from(
@@ -82,7 +84,9 @@ class TableTennisCopies(Task):
         )
         self._gathered: list[NDArray[np.float32]] = []
         if copies is None:
-            self.rig: Rig | GroupRig = Rig(rig, delay=settings.delay)
+            self.rig: Rig | GroupRig = Rig(
+                rig, delay=settings.delay, chunks=settings.chunk_size is not None
+            )
         else:
             group = GroupRig(copies, rig, delay=settings.delay, threads=threads)
             if self.observer.is_ball_play:
@@ -138,18 +142,22 @@ class TableTennisCopies(Task):
         self._unobserved = self._stalled = False
 
     def step(self, actions: Any, copies: Index) -> None:
-        """`repeat` times five iterations of these arms and of their twins.
+        """`repeat` times five iterations of these arms and of their twins, with chunks for each of
+        the `action_steps`.
 
         Nothing if the arm has moved on too far for the twin to follow: the episode is given up.
         """
         settings, rig = self.settings, self.rig
-        self._stalled = rig.lateness > settings.max_late
+        self._stalled = rig.lateness > settings.max_late + settings.planned
         if self._stalled:
             return
         commanded = self.commanded[copies]
-        for _ in range(settings.repeat):
-            commanded = changed_pressures(commanded, actions, factor=settings.factor)
-            rig.step(commanded, copies)
+        if settings.chunk_size is None:
+            for _ in range(settings.repeat):
+                commanded = changed_pressures(commanded, actions, factor=settings.factor)
+                rig.step(commanded, copies)
+        else:
+            commanded = self._step_chunk(commanded, np.asarray(actions))
         self.commanded[copies] = commanded
         self._ends[copies], self._some_ended = End.RUNNING, False
         self._look()
@@ -159,12 +167,25 @@ class TableTennisCopies(Task):
             self._fly(np.flatnonzero(touched))
         self._unobserved = True
 
+    def _step_chunk(self, commanded: FloatArray, actions: NDArray[Any]) -> FloatArray:
+        """Sends a chunk (1, chunk_size, 8); the pressures (1, 8) of its last row that is over when
+        the policy sees again: the next chunk changes these.
+        """
+        settings = self.settings
+        rows = []
+        for action in np.repeat(actions[0], settings.repeat, axis=0):
+            commanded = changed_pressures(commanded, action[None], factor=settings.factor)
+            rows.append(commanded)
+        assert isinstance(self.rig, Rig)
+        self.rig.step(np.concatenate(rows), steps=settings.steps)
+        return rows[settings.steps - 1]
+
     def _fly(self, touched: Numbers) -> None:
         """The touched balls of these copies fly to their ends, unless they are there."""
         state = self.state.at(touched)
         flying = touched[undecided(self.task.end(state), state.record.touched)]
         if flying.size:
-            every = ITERATIONS * self.settings.repeat
+            every = ITERATIONS * self.settings.steps
             self.rig.twin.fly_out(flying, every, self.settings.end.passed_y)
             self._look()
 

@@ -37,6 +37,12 @@ class TableTennisEnvironment(Environment):
     defines observation and reward. By default observations are a Box of 22 numbers (see
     `task.observations`), clipped into named bounds, and the reward is paid in the last step.
 
+    With `TaskSettings(chunk_size=n, action_steps=m, delay=d)` an action is a chunk, Box(-1, 1,
+    (n, 8)), of a policy that thinks for up to d iterations of 2 ms. Row j changes the pressures of
+    the row before it. It acts in the five iterations (with `repeat` in as many times five) from
+    k + 1 + d + 5 j on, k that of the observation, in no other ones. A step takes m rows; the next
+    chunk goes on from row m - 1, the other rows act only while it is late.
+
     `info` holds the entries of the task (with a ball `touched`, `returned`, `landing`, `distance`,
     see `task.outcome`, and `smallest_distance` of the surfaces of ball and racket so far [m]),
     `stalled` (real time: the caller paused for so long that the episode was given up), `end` (why
@@ -108,7 +114,7 @@ class TableTennisEnvironment(Environment):
         return observation, self._told(info, End.RUNNING)
 
     def step(self, action: Action) -> Outcome:
-        """`repeat` times five iterations of the arm and of every twin."""
+        """Five iterations of the arm and of every twin, times `repeat`, times `action_steps`."""
         if not self._ready:
             state = "the episode is over" if self._number >= 0 else "no episode has begun"
             raise gymnasium.error.ResetNeeded(f"{state}: call reset() before step()")

@@ -36,7 +36,11 @@ class Match:
 
 def main(
     policies: Annotated[
-        list[str], typer.Argument(help="still, random, scripted, learned, or a file policy.npz.")
+        list[str],
+        typer.Argument(
+            help="still, random, scripted, scripted_chunks (30 ms ahead), learned, or a file "
+            "policy.npz."
+        ),
     ],
     balls: Annotated[
         str | None,

@@ -20,6 +20,7 @@ from .task.observer import Observing
 from .task.reach import ReachTask
 from .task.rewards import RewardRule, reward_rule
 from .task.task import Task, missing_members
+from .world.arm import MUSCLES
 from .world.timing import ITERATIONS, PERIOD
 
 
@@ -126,6 +127,11 @@ class TaskSettings:
     """Factor of the actions: 0.05 fine, 1 coarse."""
     repeat: int = 1
     """How often an action is carried out, for 10 ms each time, before the next observation."""
+    chunk_size: int | None = None
+    """Rows of an action chunk: an action is (chunk_size, 8), each row carried out like an action
+    (8,), one after the other, in iterations of its own. None: single actions (8,)."""
+    action_steps: int = 1
+    """Rows of a chunk that are over when the policy sees again; the others act if it is late."""
     delay: int = 1
     """Iterations the policy has to think, real time: an action acts from row k + 1 + delay."""
     observation: str | FullObservation = "published"
@@ -143,20 +149,31 @@ class TaskSettings:
     """After the first touch nobody is asked any more: in the same step the ball flies to its end,
     and the episode ends. A second touch of the racket then does not happen."""
     max_late: int = 20
-    """Rows of lateness above which an episode is given up as stalled, real time."""
+    """Rows of lateness, with chunks beyond their last row, above which an episode is given up as
+    stalled, real time."""
 
     def __post_init__(self) -> None:
         for name in ("delay", "ball_seed", "max_late"):
             whole(getattr(self, name), name, 0)
         whole(self.repeat, "repeat", 1)
+        whole(self.action_steps, "action_steps", 1)
+        if self.chunk_size is not None:
+            whole(self.chunk_size, "chunk_size", 1)
+        rows = self.chunk_size or 1
+        if self.action_steps > rows:
+            raise ValueError(
+                f"action_steps must be at most {rows}, the rows of an action (chunk_size), "
+                f"got {self.action_steps}"
+            )
         if self.ball_count is not None:
             whole(self.ball_count, "ball_count", 1)
         factor: object = self.factor
         if not isinstance(factor, Real) or not 0 < float(factor) < math.inf:
             raise ValueError(f"factor must be a positive number, got {factor!r}")
-        if self.delay >= ITERATIONS:
+        longest = ITERATIONS * (1 if self.chunk_size is None else self.steps) - 1
+        if self.delay > longest:
             raise ValueError(
-                f"delay must lie between 0 and {ITERATIONS - 1} iterations, so that an action acts "
+                f"delay must lie between 0 and {longest} iterations, so that an action acts "
                 f"within its step, got {self.delay}"
             )
         reward_rule(self.reward)
@@ -178,13 +195,30 @@ class TaskSettings:
         if self.observation != "published" and not self.made().plays_ball:
             raise ValueError("this task plays no ball: observation must be published")
 
+    @property
+    def action_shape(self) -> tuple[int, ...]:
+        """Shape of an action."""
+        return (MUSCLES,) if self.chunk_size is None else (self.chunk_size, MUSCLES)
+
+    @property
+    def steps(self) -> int:
+        """Steps of 10 ms from one observation to the next."""
+        return self.repeat * self.action_steps
+
+    @property
+    def planned(self) -> int:
+        """Iterations after an observation for which the chunk before it has rows."""
+        if self.chunk_size is None:
+            return 0
+        return self.delay + ITERATIONS * (self.chunk_size * self.repeat - self.steps)
+
     def observing(self, step: float) -> Observing:
         """How an environment observes whose steps without repetition take `step` [s]."""
         return Observing(
             noise=self.noise,
             full=full_observation(self.observation),
-            interval=self.repeat * step,
-            largest_change=self.repeat * largest_change(self.factor),
+            interval=self.steps * step,
+            largest_change=self.steps * largest_change(self.factor),
         )
 
     def start_of(self, rig: RigSettings) -> RigSettings:

@@ -19,6 +19,11 @@ def _scripted() -> Contestant:
     return default_policy(), conditions
 
 
+def _scripted_chunks() -> Contestant:
+    policy, conditions = _scripted()
+    return policy, replace(conditions, chunk_size=10, action_steps=5, delay=16)
+
+
 def _learned() -> Contestant:
     policy = LearnedPolicy.load(SHIPPED)
     return policy, policy.conditions
@@ -28,6 +33,7 @@ NAMED: Mapping[str, Callable[[], Contestant]] = {
     "still": lambda: (StillPolicy(), Conditions()),
     "random": lambda: (RandomPolicy(), Conditions()),
     "scripted": _scripted,
+    "scripted_chunks": _scripted_chunks,
     "learned": _learned,
 }
 
@@ -49,6 +55,6 @@ def contestant(name: str, *, balls: str | None = None, preset: str | None = None
     conditions = conditions.playing(balls)
     if preset is not None:
         conditions = replace(conditions, preset=preset)
-    if name == "scripted":
-        policy = default_policy(ArmNumbers.of_rig(conditions.rig()))
+    if name.startswith("scripted"):
+        policy = default_policy(ArmNumbers.of_rig(conditions.rig()), conditions.task())
     return policy, conditions

@@ -28,6 +28,10 @@ class Conditions:
     """Factor of the actions."""
     repeat: int = 2
     """Steps of 10 ms that an action lasts."""
+    chunk_size: int | None = None
+    """Rows of an action chunk, see `settings.TaskSettings` for this and the next two."""
+    action_steps: int = 1
+    delay: int = 1
     reward: str = "ordered"
     balls: str = "wide"
     """Simulated shots: wide, narrow or launcher; or a path of recordings."""
@@ -46,6 +50,9 @@ class Conditions:
             ball_seed=ball_seed,
             factor=self.factor,
             repeat=self.repeat,
+            chunk_size=self.chunk_size,
+            action_steps=self.action_steps,
+            delay=self.delay,
             reward=self.reward,
             observation=self.observation,
             noise=NoiseSettings(

@@ -12,11 +12,13 @@ from numpy.typing import NDArray
 from o80.base.arrays import Float32Array
 
 from ..rig.arm_numbers import ArmNumbers
+from ..settings import TaskSettings
 from ..task.actions import COARSE, FINE
 from ..task.observations import BALL_POSITION, BALL_VELOCITY, JOINT_POSITIONS
 from ..world.arm import MUSCLES
 from .found_parameters import found_settings
 from .hitting_policy import HittingPolicy
+from .rolled_out_policy import RolledOutPolicy
 
 DEFAULT_FACTOR = COARSE
 """Factor of the environment's actions for which `default_policy` is made."""
@@ -30,7 +32,7 @@ class Policy(Protocol):
         ...
 
     def act(self, observation: Float32Array) -> NDArray[np.float32]:
-        """The action (8,) in [-1, 1] after `observation` (22,)."""
+        """The action (8,) in [-1, 1], or chunk (n, 8), after `observation` (22,)."""
         ...
 
 
@@ -94,11 +96,14 @@ BASELINES: Mapping[str, tuple[Callable[[], Policy], float]] = {
 run."""
 
 
-def default_policy(arm: ArmNumbers | None = None) -> Policy:
-    """The best policy there is for an arm; None: the standard one.
+def default_policy(arm: ArmNumbers | None = None, task: TaskSettings | None = None) -> Policy:
+    """The best policy there is for an arm; None: the standard one. It answers with action chunks
+    if the task has them.
 
     `ArmNumbers.of(frontend)` reads those of an arm that runs, `ArmNumbers.of_rig(settings)` those
     of an arm to come.
     """
-    settings = found_settings()
-    return HittingPolicy(settings if arm is None else settings.for_arm(arm))
+    settings = found_settings() if arm is None else found_settings().for_arm(arm)
+    if task is None or task.chunk_size is None:
+        return HittingPolicy(settings)
+    return RolledOutPolicy(settings, task)

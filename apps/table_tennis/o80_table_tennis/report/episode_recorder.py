@@ -10,8 +10,9 @@ plays and what its steps were worth: this is what the marks hold.
 | `episode_end` | after its last step | `EpisodeSummary`; all actions, rewards and observations |
 
 They follow the rules of docs/recording.md for episodes, so `o80 export` makes data sets of them.
-Of n steps: actions (n, 8), rewards (n,), observations (1 + n, M), from that of the reset on. The
-observations are packed (see `packed`): as texts in JSON they would take a fifth of a fast step.
+Of n steps: actions (n, 8), with chunks (n, chunk_size, 8), rewards (n,), observations (1 + n, M),
+from that of the reset on. The observations are packed (see `packed`): as texts in JSON they would
+take a fifth of a fast step.
 """
 
 from __future__ import annotations

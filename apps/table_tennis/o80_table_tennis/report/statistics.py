@@ -44,7 +44,10 @@ class Statistics:
     step_seconds: float
     """How long a step takes in real time [s]."""
     late_actions: int
-    """Actions that came after the iteration for which they were meant, and acted at once."""
+    """Actions that came after the iteration for which they were meant, and acted at once; rows of
+    chunks that were skipped instead."""
+    starved_iterations: int
+    """Iterations of the arm, within episodes, for which no chunk had a row."""
     stalled_episodes: int
     mean_lateness: float
     """Lateness of a step's end: newest row of the arm less the one used [rows]; real time only."""
@@ -83,6 +86,7 @@ def statistics_of(counts: EpisodeCounts, rig: Rig) -> Statistics:
         ),
         step_seconds=rig.settings.step,
         late_actions=steps.late_actions,
+        starved_iterations=steps.starved_iterations,
         stalled_episodes=counts.stalled_episodes,
         mean_lateness=steps.summed_lateness / max(1, steps.steps),
         largest_lateness=steps.largest_lateness,

@@ -62,13 +62,21 @@ class ArmRows:
 class Arm(ArmRows):
     """A frontend to one arm, and its last five rows: `motion` (4, 5, 2) of each joint."""
 
-    def __init__(self, frontend: o80.Frontend) -> None:
+    def __init__(self, frontend: o80.Frontend, *, chunks: bool = False) -> None:
+        """chunks: `ask` gets the rows of a chunk."""
         self.frontend = frontend
-        self.late = False
-        """The last step's pressures were taken later than at their iteration, or not yet."""
+        self.late = 0
+        """1 if what was asked last was taken later than at its iteration, or not yet; with chunks
+        its late rows, which were skipped. Known after `settle`."""
+        self.starved = 0
+        """Iterations before the last chunk began for which the one before it had no row."""
         self._sent: o80.Batch | None = None
+        self._plan = frontend.chunks(step=ITERATIONS, profile="hold") if chunks else None
+        self._chunk: o80.SentChunk | None = None
+        self._rows_asked = 0
+        self._planned_until: int | None = None
         self._burst = None
-        if frontend.bursting:
+        if frontend.bursting and not chunks:
             self._burst = frontend.prepared_burst(ITERATIONS, mode="overwrite")
             self._rows = self._burst.rows
             self._pressures: FloatArray = self._burst.targets
@@ -101,11 +109,22 @@ class Arm(ArmRows):
         """Time of the last row [ns]."""
         return int(self._rows["time"][-1])
 
+    def begin(self) -> None:
+        """An episode begins: nothing is planned."""
+        self._planned_until = None
+
     def ask(self, pressures: FloatArray, at: int) -> None:
         """Asks for normalised pressures (1, 8) from iteration `at` on, or at once if it has begun.
 
-        By the clock they are sent now; an arm that bursts gets them with its `step`.
+        By the clock they are sent now; an arm that bursts gets them with its `step`. With chunks
+        (n, 8): row j for the five iterations from `at` + 5 j on, and in no other ones.
         """
+        if self._plan is not None:
+            if self._planned_until is None:
+                self._planned_until = at - 1
+            self._at, self._rows_asked = at, len(pressures)
+            self._chunk = self._plan.send(self.range.raw(pressures), seen=at - 1, fixed=True)
+            return
         self.range.raw(pressures, out=self._pressures)
         self._at = at
         if self._burst is None:
@@ -120,12 +139,29 @@ class Arm(ArmRows):
         last = first + ITERATIONS - 1
         if self._burst is not None:
             return self._burst.run(TIMEOUT, at=self._at, late="now") == last
-        self.frontend.wait_for(last, timeout=TIMEOUT)
+        if not self.frontend.bursting:
+            self.frontend.wait_for(last, timeout=TIMEOUT)
+        elif self.newest < last:
+            self.frontend.burst(last - self.newest, timeout=TIMEOUT)
         rows = self.frontend.history(since=first, until=last).rows
         self._rows[: len(rows)] = rows
-        sent = self._sent
-        self.late = sent is not None and (not sent.taken or sent.first_iteration > self._at)
         return len(rows) == ITERATIONS
+
+    def settle(self) -> None:
+        """Counts what was late, after the steps of what was asked last."""
+        if self._chunk is None:
+            sent = self._sent
+            self.late = int(
+                sent is not None and (not sent.taken or sent.first_iteration > self._at)
+            )
+            return
+        chunk, rows = self._chunk, self._rows_asked
+        while not chunk.decided:
+            self.frontend.wait_for(self.newest + 1, timeout=TIMEOUT)
+        self.late, self.starved = rows if chunk.late is None else chunk.late, 0
+        if chunk.begins is not None and self._planned_until is not None:
+            self.starved = max(0, chunk.begins - 1 - self._planned_until)
+            self._planned_until = self._at - 1 + ITERATIONS * rows
 
     def reset(self, seed: int) -> None:
         """To the start, at once: a simulated arm can."""

@@ -39,7 +39,10 @@ class StepCounts:
     exact_steps: int = 0
     """Steps in which the arm and the first twin made exactly five iterations."""
     late_actions: int = 0
-    """Actions that came after the iteration for which they were meant."""
+    """Actions that came after the iteration for which they were meant; rows of chunks that were
+    skipped for that reason."""
+    starved_iterations: int = 0
+    """Iterations of the arm, within episodes, for which no chunk had a row."""
     summed_lateness: int = 0
     """[rows]"""
     largest_lateness: int = 0
@@ -58,8 +61,13 @@ class Rig(Closeable):
     While it is open, move arm and twins only through it. Closing it ends what it started.
     """
 
-    def __init__(self, settings: RigSettings | None = None, *, delay: int = 1) -> None:
-        """delay: iterations from the beginning of a step until its pressures act."""
+    def __init__(
+        self, settings: RigSettings | None = None, *, delay: int = 1, chunks: bool = False
+    ) -> None:
+        """delay: iterations from the beginning of a step until its pressures act.
+
+        chunks: a step gets the rows of a chunk.
+        """
         self.settings = settings or RigSettings()
         self.row = self.twin_row = 0
         """Iterations of arm and twins that were used last."""
@@ -72,7 +80,7 @@ class Rig(Closeable):
         self._real_time = self.settings.pacing.real_time
         self._stack = ExitStack()
         try:
-            self.arm = Arm(self._open_arm())
+            self.arm = Arm(self._open_arm(), chunks=chunks)
             self.twins = [
                 Twin(self._open_twin(twin), extra=self.settings.extra_balls_of(twin))
                 for twin in range(self.settings.twins)
@@ -119,6 +127,7 @@ class Rig(Closeable):
 
     def begin(self) -> None:
         """An episode begins now, however long ago the reset was: by the clock the arm moved on."""
+        self.arm.begin()
         if self._real_time:
             self.row = self.arm.newest
 
@@ -127,20 +136,26 @@ class Rig(Closeable):
         """Rows that the arm has made since the one used last: above 0 only by the clock."""
         return self.arm.newest - self.row if self._real_time else 0
 
-    def step(self, pressures: FloatArray, _copies: object = EVERY) -> None:
-        """The arm is asked for normalised pressures (1, 8); five rows of arm and twins."""
+    def step(self, pressures: FloatArray, _copies: object = EVERY, steps: int = 1) -> None:
+        """The arm is asked for normalised pressures (1, 8), or with chunks for rows (n, 8), one
+        each step; five rows of arm and twins in each of the `steps`.
+        """
         self.ask(pressures)
-        exact = self.step_arm()
-        exact = self.step_twins() and exact
-        counts, lateness = self.counts, self.lateness
-        counts.steps += 1
-        counts.exact_steps += exact
+        counts = self.counts
+        for _ in range(steps):
+            exact = self.step_arm()
+            exact = self.step_twins() and exact
+            lateness = self.lateness
+            counts.steps += 1
+            counts.exact_steps += exact
+            counts.summed_lateness += lateness
+            counts.largest_lateness = max(counts.largest_lateness, lateness)
+        self.arm.settle()
         counts.late_actions += self.arm.late
-        counts.summed_lateness += lateness
-        counts.largest_lateness = max(counts.largest_lateness, lateness)
+        counts.starved_iterations += self.arm.starved
 
     def ask(self, pressures: FloatArray) -> None:
-        """Normalised pressures (1, 8) for the next step."""
+        """Normalised pressures for the next steps."""
         self.arm.ask(pressures, at=self.row + 1 + self._delay)
 
     def step_arm(self) -> bool:

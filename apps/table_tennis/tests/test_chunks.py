@@ -1,0 +1,178 @@
+"""Action chunks: each row acts in its own iterations, however late the policy answers."""
+
+from contextlib import closing
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+from opened_environment import PATIENT, WAITING, opened
+
+import o80_table_tennis
+from o80_table_tennis.environment import TableTennisEnvironment
+from o80_table_tennis.players.hitting_policy import HittingPolicy, HittingSettings
+from o80_table_tennis.players.policies import DEFAULT_FACTOR, default_policy
+from o80_table_tennis.players.rolled_out_policy import RolledOutPolicy
+from o80_table_tennis.playing import play
+from o80_table_tennis.report.recorded_episodes import recorded_episodes
+from o80_table_tennis.rig.arm_numbers import ArmNumbers
+from o80_table_tennis.rig.rig import Rig
+from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
+from o80_table_tennis.task.actions import COARSE, changed_pressures
+from o80_table_tennis.world.arm import MUSCLES
+
+ANSWERS = 4
+CHUNKED = TaskSettings(factor=COARSE, max_late=1_000_000, chunk_size=8, action_steps=4, delay=16)
+
+
+def chunks(seed: int = 1) -> np.ndarray:
+    random = np.random.default_rng(seed)
+    return random.uniform(-0.3, 0.3, (ANSWERS, 8, MUSCLES)).astype(np.float32)
+
+
+@pytest.mark.parametrize(
+    ("pacing", "repeat", "observation"),
+    [
+        (Pacing.INLINE, 1, "published"),
+        (Pacing.INLINE, 2, "published"),
+        (Pacing.PROCESSES, 1, "full"),
+    ],
+)
+def test_an_answer_in_no_time_moves_the_arm_as_single_actions_do(
+    pacing: Pacing, repeat: int, observation: str
+) -> None:
+    common = {"factor": COARSE, "repeat": repeat, "observation": observation}
+    with closing(opened(pacing, task=TaskSettings(**common))) as environment:
+        environment.reset(seed=1)
+        for action in chunks()[:, :4].reshape(-1, MUSCLES):
+            seen, *_ = environment.step(action)
+        alone = environment.rig.arm.frontend.history(20 * repeat * ANSWERS)
+    task = TaskSettings(chunk_size=8, action_steps=4, **common)
+    with closing(opened(pacing, task=task)) as environment:
+        environment.reset(seed=1)
+        for chunk in chunks():
+            also_seen, *_ = environment.step(chunk)
+        together = environment.rig.arm.frontend.history(20 * repeat * ANSWERS)
+        statistics = environment.statistics()
+    for name in ("iteration", "desired", "observed"):
+        np.testing.assert_array_equal(together.rows[name], alone.rows[name])
+    if observation == "published":
+        np.testing.assert_array_equal(also_seen, seen)
+    assert statistics.late_actions == statistics.starved_iterations == 0
+    assert statistics.steps == statistics.exact_steps == 4 * repeat * ANSWERS
+
+
+@pytest.mark.parametrize("pacing", [Pacing.INLINE, Pacing.PROCESSES])
+@pytest.mark.parametrize(
+    ("thought", "late", "starved"),
+    [
+        ([0, 0, 0, 0], 0, 0),
+        ([15, 15, 15, 15], 0, 0),  # 30 ms
+        ([20, 16, 20, 16], 0, 4),  # row 0 has begun, and acts for its last iteration
+        ([22, 36, 16, 0], 1 + 4, 6),
+        ([15, 60, 40, 16], 8 + 4, 24),  # the second answer is too late for all of its rows
+    ],
+)
+def test_rows_act_in_their_iterations_only_and_late_ones_are_counted(
+    pacing: Pacing, thought: list[int], late: int, starved: int
+) -> None:
+    """`thought`: iterations that the arm makes between each observation and its answer."""
+    with closing(opened(pacing, task=CHUNKED)) as environment:
+        environment.reset(seed=1)
+        arm, begun = environment.rig.arm, environment.rig.row
+        length = 20 * ANSWERS + 60
+        wanted = np.tile(np.array(arm.start_pressures), (length, 1))
+        pressures, now = arm.commanded()[0], 0
+        for number, (chunk, thinks) in enumerate(zip(chunks(), thought, strict=True)):
+            seen = 20 * number
+            now = max(now, seen + thinks)
+            if begun + now > arm.newest:
+                arm.frontend.burst(begun + now - arm.newest)
+            environment.step(chunk)
+            for row, action in enumerate(chunk):
+                pressures = changed_pressures(pressures, action, factor=COARSE)
+                acts = max(seen + 16 + 5 * row, now)  # place of the first iteration
+                if acts < seen + 16 + 5 * row + 5:
+                    wanted[acts:] = arm.range.raw(pressures)
+                if row == 3:
+                    base = pressures
+            pressures = base
+            now = max(now, seen + 20)
+        statistics = environment.statistics()
+        made = arm.newest - begun
+        desired = arm.frontend.history(made).desired
+    np.testing.assert_array_equal(desired, wanted[:made])
+    assert (statistics.late_actions, statistics.starved_iterations) == (late, starved)
+    assert statistics.exact_steps == 4 * ANSWERS
+
+
+def test_by_the_clock_late_rows_are_skipped_and_counted() -> None:
+    with closing(opened(Pacing.REAL_TIME, task=CHUNKED)) as environment:
+        environment.reset(seed=1)
+        environment.step(chunks()[0])
+        before, k = environment.statistics(), environment.rig.row
+        environment.rig.arm.frontend.wait_for(k + 31, timeout=WAITING)
+        environment.step(chunks()[1])
+        after = environment.statistics()
+        assert after.late_actions - before.late_actions >= 3  # due in k + 21, k + 26, k + 31
+        assert after.exact_steps == after.steps == 8
+
+
+def test_an_episode_is_given_up_when_nothing_was_planned_for_too_long(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    task = TaskSettings(chunk_size=8, action_steps=4, delay=16, max_late=20)
+    with closing(opened(task=task)) as environment:
+        environment.reset(seed=1)
+        # 36 iterations after an observation the last row of the chunk before it is over
+        for lateness, stalled in ((36 + 20, False), (36 + 21, True)):
+            monkeypatch.setattr(Rig, "lateness", lateness)
+            assert environment.step(chunks()[0])[-1]["stalled"] is stalled
+
+
+def test_a_recording_holds_chunks_as_actions(tmp_path: Path) -> None:
+    with closing(opened(task=CHUNKED, record=tmp_path / "run.mcap")) as environment:
+        environment.reset(seed=1)
+        over = False
+        while not over:
+            *_, terminated, truncated, _ = environment.step(chunks()[0])
+            over = terminated or truncated
+        steps = environment.summary.steps
+    (episode,) = recorded_episodes(tmp_path / "run.mcap")
+    np.testing.assert_array_equal(episode.actions, np.tile(chunks()[0], (steps, 1, 1)))
+
+
+def test_a_policy_of_single_actions_is_the_rolled_out_one_whose_chunks_have_one_row() -> None:
+    task = TaskSettings(factor=DEFAULT_FACTOR, chunk_size=1)
+    played = []
+    for policy, its_task in (
+        (HittingPolicy(), TaskSettings(factor=DEFAULT_FACTOR)),
+        (RolledOutPolicy(HittingSettings(), task), task),
+    ):
+        with TableTennisEnvironment(task=its_task) as environment:
+            play(environment, policy, range(1))
+            played.append(environment.rig.arm.frontend.history().desired)
+    np.testing.assert_array_equal(*played)
+
+
+def test_a_policy_that_answers_30_ms_late_returns_balls() -> None:
+    rig = RigSettings(preset="identified")
+    task = TaskSettings(factor=DEFAULT_FACTOR, fly_out=True, chunk_size=8, action_steps=4, delay=16)
+    with TableTennisEnvironment(rig=rig, task=task) as environment:
+        policy = default_policy(ArmNumbers.of_rig(rig), task)
+        played = play(environment, policy, range(4), seed=1)
+    assert played.returns >= 3
+
+
+def test_what_cannot_be_is_refused() -> None:
+    with closing(opened(task=CHUNKED)) as environment:
+        assert environment.action_space.shape == (8, MUSCLES)
+        environment.reset(seed=1)
+        with pytest.raises(
+            ValueError, match=r"an action must have the shape \(8, 8\), got \(4, 8\)"
+        ):
+            environment.step(chunks()[0, :4])
+    with pytest.raises(ValueError, match="a vector environment needs chunk_size=None, got 8"):
+        gymnasium.make_vec(o80_table_tennis.ACCELERATED, num_envs=2, task=CHUNKED)
+    with pytest.raises(ValueError, match="give a task with a chunk_size"):
+        RolledOutPolicy(HittingSettings(), PATIENT)
