@@ -20,6 +20,7 @@ pytestmark = pytest.mark.filterwarnings("ignore::Warning:IPython", "ignore:.*pro
 @pytest.fixture
 def shell() -> Iterator[InteractiveShell]:
     """A shell of its own, in which o80 has been imported."""
+    main = sys.modules["__main__"]  # a shell puts a module of its own there
     made = InteractiveShell()  # type: ignore[no-untyped-call]
     made.Completer.use_jedi = False
     notebook.load_ipython_extension(made)
@@ -30,6 +31,7 @@ def shell() -> Iterator[InteractiveShell]:
         assert made.history_manager is not None
         made.history_manager.end_session()
         InteractiveShell.clear_instance()
+        sys.modules["__main__"] = main
         made.user_ns.clear()  # IPython keeps each shell, and its arms would keep their memory
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from opened_environment import PATIENT, WAITING, opened
 
+import o80
 import o80_table_tennis
 from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.players.hitting_policy import HittingPolicy, HittingSettings
@@ -104,6 +105,26 @@ def test_rows_act_in_their_iterations_only_and_late_ones_are_counted(
     np.testing.assert_array_equal(desired, wanted[:made])
     assert (statistics.late_actions, statistics.starved_iterations) == (late, starved)
     assert statistics.exact_steps == 4 * ANSWERS
+
+
+def test_a_decision_that_is_told_after_the_last_row_is_waited_for(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[bool] = []
+
+    def told_later(sent: o80.SentChunk) -> bool:
+        asked.append(decided.fget(sent) and len(asked) % 3 == 2)
+        return asked[-1]
+
+    with closing(opened(Pacing.PROCESSES, task=CHUNKED)) as environment:
+        environment.reset(seed=1)
+        decided = vars(o80.SentChunk)["decided"]
+        monkeypatch.setattr(o80.SentChunk, "decided", property(told_later))
+        for chunk in chunks():
+            environment.step(chunk)
+        assert asked.count(True) == ANSWERS
+        assert len(asked) >= 3 * ANSWERS
+        assert environment.statistics().late_actions == 0
 
 
 def test_by_the_clock_late_rows_are_skipped_and_counted() -> None:

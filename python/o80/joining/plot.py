@@ -199,7 +199,7 @@ def _mark_ends(
 def _draw_plans(
     ax: "Axes", history: History, times: NDArray[np.float64], plans: Sequence[Planned]
 ) -> None:
-    """What each chunk planned, also where another one took over before."""
+    """Draws what each chunk planned, also where another one took over before."""
     iterations = history.iteration
     for i, (begins, places, _) in enumerate(plans):
         rows = np.arange(begins, begins + len(places))

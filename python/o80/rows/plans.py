@@ -19,7 +19,7 @@ Moment = tuple[NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class ChunkRows:
-    """What was sent of a chunk."""
+    """Rows of a chunk, as they were sent."""
 
     anchor: int
     due: NDArray[np.int64]  #: iterations after the anchor
@@ -30,7 +30,7 @@ class ChunkRows:
 
 @dataclass(frozen=True)
 class Decision:
-    """What became of a chunk that was taken."""
+    """The outcome of a chunk that was taken."""
 
     shift: int
     begins: int
@@ -89,7 +89,7 @@ class ChunkWay:
 
 
 class Planned(NamedTuple):
-    """What a chunk planned for one number, whatever came of it."""
+    """The plan of a chunk for one number, whatever came of it."""
 
     begins: int  #: the first iteration
     places: NDArray[np.float64]  #: (iterations,)

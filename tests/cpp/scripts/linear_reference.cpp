@@ -304,6 +304,7 @@ Iteration LinearReference::end_of_row(std::size_t a) {
         const auto distance =
             std::fabs(static_cast<double>(actuator.to[n]) - static_cast<double>(actuator.from[n]));
         const double needed = distance / (step.head.speed * 1e-3) * (1.0 - 1e-9);
+        if (needed > 0x1p31) too_long_ = true;
         if (needed > static_cast<double>(kMaxIterations)) return run_on(kMaxIterations);
         return run_on(std::max<std::int64_t>(1, static_cast<std::int64_t>(std::ceil(needed))));
       }

@@ -27,8 +27,12 @@ class LinearReference {
   /// How the commands that were pulsed stand, by their place in the script.
   const std::map<std::size_t, Outcome>& outcomes() const { return outcomes_; }
   Iteration iteration() const { return next_ - 1; }
+  /// True once a command at a speed would take longer than a plan can: that is rejected, and what
+  /// comes after it is not followed here.
+  bool is_too_long() const { return too_long_; }
 
  private:
+  bool too_long_ = false;
   /// A command of several actuators.
   struct Group {
     std::vector<std::size_t> places;  // of its members

@@ -26,6 +26,8 @@ MOTION = ("extended.joint_positions", "extended.joint_velocities")
 """Fields of a row with the angles [rad] and velocities [rad/s] of the joints, side by side."""
 TIMEOUT = 5.0
 """Longest wait for a row [s]."""
+LOOK_AGAIN = 0.01
+"""Time after which it looks again for what does not come with a row [s]."""
 RETURN_SECONDS = 0.6
 """Duration of the return to the start pressures [s]."""
 SETTLED_SPEED = 0.02
@@ -156,8 +158,14 @@ class Arm(ArmRows):
             )
             return
         chunk, rows = self._chunk, self._rows_asked
+        end = time.monotonic() + TIMEOUT
         while not chunk.decided:
-            self.frontend.wait_for(self.newest + 1, timeout=TIMEOUT)
+            try:
+                self.frontend.wait_for(self.newest + 1, timeout=LOOK_AGAIN)
+            except TimeoutError:
+                # a rejection is told after its row; there may be no other one
+                if time.monotonic() > end:
+                    raise
         self.late, self.starved = rows if chunk.late is None else chunk.late, 0
         if chunk.begins is not None and self._planned_until is not None:
             self.starved = max(0, chunk.begins - 1 - self._planned_until)
