@@ -2,6 +2,7 @@
 
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -42,7 +43,7 @@ def chunks(seed: int = 1) -> np.ndarray:
 def test_an_answer_in_no_time_moves_the_arm_as_single_actions_do(
     pacing: Pacing, repeat: int, observation: str
 ) -> None:
-    common = {"factor": COARSE, "repeat": repeat, "observation": observation}
+    common: dict[str, Any] = {"factor": COARSE, "repeat": repeat, "observation": observation}
     with closing(opened(pacing, task=TaskSettings(**common))) as environment:
         environment.reset(seed=1)
         for action in chunks()[:, :4].reshape(-1, MUSCLES):
@@ -173,7 +174,7 @@ def test_a_policy_of_single_actions_is_the_rolled_out_one_whose_chunks_have_one_
         with TableTennisEnvironment(task=its_task) as environment:
             play(environment, policy, range(1))
             played.append(environment.rig.arm.frontend.history().desired)
-    np.testing.assert_array_equal(*played)
+    np.testing.assert_array_equal(played[0], played[1])
 
 
 def test_a_policy_that_answers_30_ms_late_returns_balls() -> None:
