@@ -281,9 +281,10 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
 /// Places and slopes (doubles) of the plan of a chunk, in the first `most` iterations from its
 /// begin: of one number, from this place and slope. `ends`: the last iteration of the way to each
 /// row, counted from its begin.
-nb::tuple plan_of_rows(double place, double slope, const std::vector<double>& rows,
-                       const std::vector<std::int64_t>& ends, nb::handle profile,
-                       std::size_t most) {
+std::pair<nb::bytes, nb::bytes> plan_of_rows(double place, double slope,
+                                             const std::vector<double>& rows,
+                                             const std::vector<std::int64_t>& ends,
+                                             nb::handle profile, std::size_t most) {
   const o80::Profile shape = profile_of_rows(profile);
   std::pair<std::vector<double>, std::vector<double>> plan;
   o80::NumberPlan way;
@@ -305,7 +306,7 @@ nb::tuple plan_of_rows(double place, double slope, const std::vector<double>& ro
   const auto bytes = [](const std::vector<double>& values) {
     return nb::bytes(values.data(), values.size() * sizeof(double));
   };
-  return nb::make_tuple(bytes(plan.first), bytes(plan.second));
+  return {bytes(plan.first), bytes(plan.second)};
 }
 
 std::uint16_t purged(const Frontend& self, nb::handle actuator) {
