@@ -424,3 +424,33 @@ def test_a_model_that_cannot_be_drawn_is_refused(
 ) -> None:
     with pytest.raises(o80.InvalidArgument, match=text):
         o80.Backend(segment, ["turn"], extended={"angles": (np.float64, 3)}, **options)
+
+
+def test_the_plan_of_chunks_is_drawn_ahead_of_the_newest_row(arm: o80.Frontend) -> None:
+    look = looks_at(arm.segment)
+    arm.burst(100)
+    look()
+    rows = [[0.2, -0.1], [0.1, 0.3], [0.0, 0.5]]
+    with arm.chunks(step=100) as plan:
+        plan.send(rows)
+        arm.burst(150)
+        plan.send([[1.0, 1.0], [0.5, 0.5]], seen=arm.latest())
+        arm.burst(30)
+        curves = look(curves=True, panels=["elbow"], window=1.0)["curves"]
+        seconds, values = (numbers(text) for text in curves["panels"]["elbow"]["planned"])
+        newest = arm.latest().time * 1e-9
+        arm.burst(200)
+    assert curves["end"] > 0.27 + 0.15, "the chart reaches ahead of the newest row"
+    gaps = np.flatnonzero(np.isnan(values))
+    assert len(gaps) == 2, "two chunks"
+    assert values[gaps - 1].tolist() == [0.5, 0.5]
+    second = slice(gaps[0] + 1, gaps[1])
+    history = arm.history()
+    ahead = seconds[second] + curves["begin"] > newest - history.time[0] * 1e-9
+    assert 20 < ahead.sum() < len(ahead)
+    wanted = np.interp(
+        seconds[second] + curves["begin"],
+        (history.time - history.time[0]) * 1e-9,
+        history.desired[:, 1],
+    )
+    np.testing.assert_allclose(values[second], wanted, atol=2e-3)

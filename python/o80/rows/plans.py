@@ -96,6 +96,13 @@ class Planned(NamedTuple):
     slopes: NDArray[np.float64]  #: (iterations,) [1/iteration]
 
 
+def is_of_chunks(entry: JournalEntry) -> bool:
+    """Whether planned_by_chunks may look at it."""
+    if entry.kind == "taken":
+        return any(command.pace == "chunk" for command in entry.commands)
+    return entry.kind == "status" and entry.status == Status.ACTIVE
+
+
 def planned_by_chunks(
     entries: Iterable[JournalEntry], history: History
 ) -> dict[str, list[Planned]]:

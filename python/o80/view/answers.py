@@ -196,10 +196,12 @@ class Shown:
             end = last if at is None else max(first, min(at + length // 2, last))
             begin = max(first, end - length)  # a run that has just begun fills its chart
             rows = source.rows(begin, end)
+            drawn = self.panels.curves(rows, panels, begin)
+            ahead = self.panels.add_plans(drawn, source.plans(rows), rows, begin)
             return {
                 "begin": source.seconds(begin),
-                "end": source.seconds(end),
-                "panels": self.panels.curves(rows, panels, begin),
+                "end": source.seconds(max(end, min(ahead, end + length // 3))),
+                "panels": drawn,
                 "marks": _marks_in(rows, source.marks(), begin),
             }
 

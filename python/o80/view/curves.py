@@ -1,6 +1,7 @@
 """Curves of rows with as many points as a page can show."""
 
 import math
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -9,10 +10,12 @@ from numpy.typing import NDArray
 from o80._core import Observation
 from o80.rows.columns import Column, columns_of, value_of
 from o80.rows.history import History, values_of
+from o80.rows.plans import Planned
 from o80.view.base64_arrays import packed
 
 STRETCHES = 400  # of a curve, about one for each pixel of its width
 MAX_PANELS = 12
+MAX_PLANS = 30  # of chunks, the newest ones
 EXACT = 2**53  # integers below are exact in a browser
 FIRST_PANELS = 3  # shown before the user chooses
 
@@ -61,6 +64,37 @@ class Panels:
                 drawn = drawn_rows(values)
                 found[panel][part] = [packed(seconds[drawn]), packed(values[drawn])]
         return found
+
+    def add_plans(
+        self,
+        drawn: dict[str, dict[str, list[str]]],
+        plans: Mapping[str, Sequence[Planned]],
+        rows: History,
+        begin: int,
+    ) -> int:
+        """Adds what chunks planned to curves() of these rows, each behind a gap; the time [ns] at
+        which the last one ends.
+        """
+        last = 0
+        for panel, of in plans.items():
+            if panel not in drawn or len(rows) < 2:
+                continue
+            period = float(rows.time[-1] - rows.time[0]) / float(
+                rows.iteration[-1] - rows.iteration[0]
+            )
+            seconds: list[NDArray[np.float64]] = []
+            values: list[NDArray[np.float64]] = []
+            for begins, places, _ in of[-MAX_PLANS:]:
+                kept = drawn_rows(places)
+                times = rows.time[-1] + (begins + kept - rows.iteration[-1]) * period
+                last = max(last, int(times[-1]))
+                seconds += [(times - begin) * 1e-9, times[-1:] * 0.0]
+                values += [places[kept], np.array([np.nan])]
+            drawn[panel]["planned"] = [
+                packed(np.concatenate(seconds)),
+                packed(np.concatenate(values)),
+            ]
+        return last
 
     @property
     def units(self) -> dict[str, str]:

@@ -1,6 +1,7 @@
 """A segment in shared memory as the source of a page."""
 
 import threading
+from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,14 +10,18 @@ from o80._core import Observation
 from o80.base.errors import Error, RowOverwritten, TimeoutError
 from o80.frontend.backend_texts import age_text, rate_text
 from o80.frontend.frontend import Frontend
+from o80.frontend.reader import Journal
 from o80.frontend.results import Halt
 from o80.frontend.segments import is_own
 from o80.rows.history import History
+from o80.rows.journal import JournalEntry
+from o80.rows.plans import Planned, is_of_chunks, planned_by_chunks
 from o80.view.source import NothingToShow, Source
 
 GUARD_ROWS = 16  # the oldest rows may be overwritten while they are read
 JOURNAL_BYTES = 1 << 20  # that are read at once
 MAX_MARKS = 1000  # the newest ones
+MAX_DECISIONS = 500  # about chunks, the newest ones
 
 
 class LiveSource(Source):
@@ -30,6 +35,8 @@ class LiveSource(Source):
         self._frontend: Frontend | None = None
         self._journal: _core.RawJournal | None = None
         self._marks: list[tuple[str, int]] = []
+        self._decisions: Journal | None = None
+        self._of_chunks: deque[JournalEntry] = deque(maxlen=MAX_DECISIONS)
         self._lock = threading.Lock()
         self._problem = ""
         self._state = "waiting"  # without a frontend
@@ -52,6 +59,8 @@ class LiveSource(Source):
             self.trusted = self._model_files or is_own(found)
             self._frontend, self._problem = found, ""
             self._journal, self._marks = _core.RawJournal(found, 0), []
+            self._decisions = Journal(found, new=True)
+            self._of_chunks.clear()
             self.key = f"{self.name} {found.epoch}"
             self.zero = self.extent_of(found)[0]
             # the former frontend is not closed: another thread may be reading with it
@@ -115,6 +124,14 @@ class LiveSource(Source):
                 self._marks += found
             del self._marks[:-MAX_MARKS]
             return list(self._marks)
+
+    def plans(self, rows: History) -> dict[str, list[Planned]]:
+        """Plans of the chunks that were sent since the view looks at this run."""
+        with self._lock:
+            entries = [] if self._decisions is None else self._decisions.read()
+            self._of_chunks += (each for each in entries if is_of_chunks(each))
+            known = list(self._of_chunks)
+        return planned_by_chunks(known, rows)
 
     def state(self) -> dict[str, Any]:
         line: dict[str, Any] = {

@@ -7,6 +7,7 @@ from typing import Any
 from o80._core import Observation
 from o80.base.errors import Error
 from o80.rows.history import History
+from o80.rows.plans import Planned
 from o80.view.world import Drawn, drawn
 
 NANOSECONDS = 1e9
@@ -77,6 +78,10 @@ class Source(ABC):
     @abstractmethod
     def marks(self) -> Sequence[tuple[str, int]]:
         """Text and iteration of the marks of this run, in their order."""
+
+    def plans(self, rows: History) -> dict[str, list[Planned]]:
+        """Plans of chunks that began among these rows, by panel, as far as they are known."""
+        return {}
 
     @abstractmethod
     def time_with(self, other: "Source", row: Observation) -> int | None:

@@ -1,4 +1,4 @@
-// Curves over time, one chart for each field: desired dashed, observed solid.
+// Curves over time, one chart for each field: desired dashed, observed solid, what chunks planned dotted.
 
 // a colour of the style sheet, which knows light and dark
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
@@ -73,7 +73,7 @@ class Chart {
     pen.beginPath();
     pen.rect(left, 0, width - left, bottom);
     pen.clip();
-    for (const part of ["extended", "observed", "desired"]) {
+    for (const part of ["planned", "extended", "observed", "desired"]) {
       if (this.parts[part]) this.curve(pen, this.parts[part], part, x, y);
     }
     for (const [seconds, text] of this.marks) this.mark(pen, text, x(seconds), bottom);
@@ -125,8 +125,8 @@ class Chart {
 
   curve(pen, { seconds, values }, part, x, y) {
     pen.strokeStyle = colour(part);
-    pen.lineWidth = 1.5;
-    pen.setLineDash(part === "desired" ? [5, 4] : []);
+    pen.lineWidth = part === "planned" ? 1 : 1.5;
+    pen.setLineDash({ desired: [5, 4], planned: [2, 3] }[part] || []);
     pen.beginPath();
     let drawing = false;
     for (let i = 0; i < seconds.length; ++i) {
