@@ -769,3 +769,24 @@ def test_a_send_looks_at_few_of_the_chunks_before_it(
             assert len(looked) <= 3
             arm.burst(2)
         assert len(plan.planned(0, 1)) == 1
+
+
+def test_each_copy_of_a_group_plays_its_own_chunk(segment: str) -> None:
+    robot = o80.robots.load("two_joints")
+    choose = random.Random(1)
+    answers = [[rows_of(choose, 0.0, 12) for _ in range(2)] for _ in range(3)]
+    with robot.inline(copies=3, history=256) as group:
+        plans = [group[copy].chunks(step=5) for copy in range(3)]
+        for number in range(2):
+            group.prepared_burst(40, []).run()
+            for copy, plan in enumerate(plans):
+                plan.send(answers[copy][number], seen=40 * number + 20)
+        group.prepared_burst(90, []).run()
+        together = [group[copy].history().desired for copy in range(3)]
+    for copy in range(3):
+        with robot.inline(segment) as arm, arm.chunks(step=5) as plan:
+            for number in range(2):
+                arm.burst(40)
+                plan.send(answers[copy][number], seen=40 * number + 20)
+            arm.burst(90)
+            assert arm.history().desired.tolist() == together[copy].tolist()

@@ -118,6 +118,8 @@ def _states(
     layout: Layout, copies: tuple[int, ...], actuators: list[int], steps: int
 ) -> NDArray[Any]:
     """Memory for targets: in each copy those of the first actuator, then of the second, ..."""
+    if copies and not actuators:
+        return np.empty((*copies, 0, steps))  # it only runs them
     kinds = state_types(actuators, layout)
     if copies and len(set(kinds)) > 1:
         names = [layout.schema["actuators"][actuator]["name"] for actuator in actuators]

@@ -102,8 +102,9 @@ class InlineGroup(Closeable):
         """Prepares a burst of the copies that is repeated: it sends targets and returns all rows.
 
         iterations: number of iterations of each burst.
-        actuators: indices or names of the actuators that get targets (None: all). Their states may
-            be of several types, see `GroupBurst`.
+        actuators: indices or names of the actuators that get targets (None: all; []: none, for
+            copies that play what was sent to them). Their states may be of several types, see
+            `GroupBurst`.
         steps: number of targets of each actuator in a burst.
         each: iterations to reach each target.
         mode, profile, start: as in `Frontend.add_command`.
