@@ -454,3 +454,21 @@ def test_the_plan_of_chunks_is_drawn_ahead_of_the_newest_row(arm: o80.Frontend) 
         history.desired[:, 1],
     )
     np.testing.assert_allclose(values[second], wanted, atol=2e-3)
+
+
+def test_a_recording_shows_what_chunks_planned(arm: o80.Frontend, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm) as recording, arm.chunks(step=50) as plan:
+        arm.burst(50)
+        for _ in range(3):
+            plan.send([[0.2, -0.1], [0.1, 0.3], [0.0, 0.5]], seen=arm.latest())
+            arm.burst(80)
+        recording.flush()
+    curves = looks_at(str(path))(curves=True, at=0.1, window=0.3, panels=["elbow"])["curves"]
+    seconds, values = (numbers(text) for text in curves["panels"]["elbow"]["planned"])
+    assert np.isnan(values).sum() >= 2, "also what another chunk took over"
+    history = arm.history()
+    times = (history.time - history.time[0]) * 1e-9
+    first = slice(0, np.flatnonzero(np.isnan(values))[0] - 70)  # until it was taken over
+    wanted = np.interp(seconds[first] + curves["begin"], times, history.desired[:, 1])
+    np.testing.assert_allclose(values[first], wanted, atol=2e-3)

@@ -11,9 +11,12 @@ from o80._core import Observation
 from o80.base.errors import Error
 from o80.recording.recorded_epoch import RecordedEpoch
 from o80.rows.history import History
+from o80.rows.journal import JournalEntry
+from o80.rows.plans import Planned, is_of_chunks, planned_by_chunks
 from o80.view.source import NothingToShow, Source
 
 AHEAD = 3_000_000_000  # [ns]: rows before and after the ones that are asked for
+MOST_ROWS_OF_PLANS = 100_000
 SAME_CLOCK = 500_000_000  # offsets to the wall clock that differ by less are of one clock [ns]
 
 Moment = tuple[str, int]  # name of a mark, and how many of this name came before
@@ -46,6 +49,7 @@ class RecordedSource(Source):
         self._chunks = epoch.chunk_times
         self._lock = threading.Lock()
         self._kept: tuple[int, int, History] | None = None
+        self._decisions: tuple[int, list[JournalEntry]] | None = None  # from an iteration on
         self._problem = ""
         self._extent: tuple[int, int] | None = None
         try:
@@ -137,6 +141,20 @@ class RecordedSource(Source):
 
     def rows(self, begin: int, end: int) -> History:
         return self._around(begin, end).select(from_time=begin, to_time=end)
+
+    def plans(self, rows: History) -> dict[str, list[Planned]]:
+        """Plans of chunks; none far before the end of a long run, whose journal takes long."""
+        if not len(rows) or not self._epoch.has_journal:
+            return {}
+        first = int(rows.iteration[0])
+        if first < self._epoch.rows - MOST_ROWS_OF_PLANS:
+            return {}
+        with self._lock:
+            if self._decisions is None or first < self._decisions[0]:
+                entries = filter(is_of_chunks, self._epoch.journal_since_row(first))
+                self._decisions = first, list(entries)
+            known = self._decisions[1]
+        return planned_by_chunks(known, rows)
 
     def _around(self, begin: int, end: int) -> History:
         with self._lock:
