@@ -751,6 +751,33 @@ def test_the_journal_and_the_rows_give_the_plans(arm: o80.Frontend, seed: int) -
     assert "planned by chunks" in [text.get_text() for text in legend.get_texts()]
 
 
+def test_plans_of_the_journal_go_on_only_from_what_was_in_force(arm: o80.Frontend) -> None:
+    arm.burst(100)
+    with arm.chunks(step=10, ease=1) as plan:
+        # it stands: the prefix does not count, and nothing is shifted
+        plan.send([[0.1, 0.1]] * 3 + [[0.3, 0.3]] * 9, seen=arm.latest(), first=3)
+        arm.burst(30)
+        arm.add_command(None, [-0.5, 0.7], iterations=25, mode="overwrite")
+        arm.pulse()
+        arm.burst(20)
+        plan.send([[0.0, 0.0], [0.2, -0.2]], seen=arm.latest())
+        arm.burst(40)
+    history = arm.history()
+    first, second = planned_by_chunks(arm.journal(), history)["shoulder"]
+    assert (first.begins, second.begins) == (101, 151)
+    assert first.places[:30] == pytest.approx(history.desired[101:131, 0], abs=1e-12)
+    assert second.places == pytest.approx(history.desired[151:171, 0], abs=1e-12)
+
+
+def test_a_row_for_another_year_fills_no_memory(arm: o80.Frontend) -> None:
+    with arm.chunks(step=10) as plan:
+        plan.send([[0.1, 0.1], [0.3, 0.3]], seen=0, due=[10, 2**31])
+        arm.burst(30)
+        assert plan.planned(0, 3).shape == (3, 2)
+        (planned,) = planned_by_chunks(arm.journal(), arm.history())["elbow"]
+        assert len(planned.places) <= 20_030
+
+
 def test_a_send_looks_at_few_of_the_chunks_before_it(
     arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -157,7 +157,9 @@ class _Part:
             return self._way.rows[-1], np.zeros_like(self._way.rows[-1])
         if self._computed is None or len(self._computed[0]) <= place:
             assert self.start is not None
-            self._computed = self._way.places(self.start, place + 1 if alone else most)
+            # a chunk may be planned for hours: not further than about what is asked for
+            wanted = place + 1 if alone else min(most, max(1024, 2 * place))
+            self._computed = self._way.places(self.start, wanted)
         places, slopes = self._computed  # (iterations, actuators)
         return places[place], slopes[place]
 

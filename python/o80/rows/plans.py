@@ -1,8 +1,9 @@
 """Plans of chunks: the rows that are reached, and the places between them (docs/chunks.md)."""
 
+from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +12,9 @@ import o80._core as _core
 from o80.base.words import Status
 from o80.rows.columns import Column, columns_of
 from o80.rows.history import History, values_of
-from o80.rows.journal import JournalCommand, JournalEntry
+from o80.rows.journal import ENDS, JournalCommand, JournalEntry
+
+MOST_AHEAD = 20_000  # of the newest row [iterations]
 
 #: places and slopes [1/iteration], of (actuators,) or (iterations, actuators)
 Moment = tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -96,11 +99,23 @@ class Planned(NamedTuple):
     slopes: NDArray[np.float64]  #: (iterations,) [1/iteration]
 
 
-def is_of_chunks(entry: JournalEntry) -> bool:
-    """Whether planned_by_chunks may look at it."""
-    if entry.kind == "taken":
-        return any(command.pace == "chunk" for command in entry.commands)
-    return entry.kind == "status" and entry.status == Status.ACTIVE
+class ChunkEntries:
+    """Entries of a journal that say what became of chunks; at most the newest `most`."""
+
+    def __init__(self, most: int | None = None) -> None:
+        self.entries: deque[JournalEntry] = deque(maxlen=most)
+        self._open: set[tuple[int | None, int | None]] = set()  # lane and id
+
+    def add(self, entries: Iterable[JournalEntry]) -> None:
+        for entry in entries:
+            chunks = [each.id for each in entry.commands if each.pace == "chunk"]
+            if entry.kind == "taken" and chunks:
+                self._open.update((entry.lane, each) for each in chunks)
+                self.entries.append(entry)
+            elif entry.kind == "status" and (entry.lane, entry.id) in self._open:
+                self.entries.append(entry)
+                if entry.status in ENDS:
+                    self._open.discard((entry.lane, entry.id))
 
 
 def planned_by_chunks(
@@ -108,55 +123,74 @@ def planned_by_chunks(
 ) -> dict[str, list[Planned]]:
     """The plans of the chunks that began in these rows, by number: "elbow", "elbow.position".
 
-    They begin where the plan of the chunk before them was, else at the desired state, with its
-    speed. Chunks whose begin or the row before it is not there are left out.
+    They begin where the plan of the chunk before them was if that was in force, else at the desired
+    state, with its speed. Chunks whose begin or the row before it is not there are left out, and
+    iterations far ahead of the newest row.
     """
     found: dict[str, list[Planned]] = {}
     iterations = history.iteration
     if not len(iterations):
         return found
     columns = {each.name: each for each in columns_of(history.schema)}
-    waiting: dict[tuple[int | None, int], tuple[JournalEntry, JournalCommand]] = {}
+    latest = int(iterations[-1]) + MOST_AHEAD
+    waiting: dict[tuple[int | None, int | None], tuple[JournalEntry, JournalCommand]] = {}
+    numbers: dict[tuple[int | None, int | None], list[str]] = {}
+    ends: dict[str, tuple[int, Status | None]] = {}  # of the last chunk of each number
     for entry in entries:
+        key = entry.lane, entry.id
         if entry.kind == "taken":
             for command in entry.commands:
                 if command.pace == "chunk":
                     waiting[entry.lane, command.id] = entry, command
-        elif entry.kind == "status" and entry.status == Status.ACTIVE and entry.id is not None:
-            begun = waiting.pop((entry.lane, entry.id), None)
-            place = int(np.searchsorted(iterations, entry.iteration - 1))
-            is_there = place < len(iterations) and iterations[place] == entry.iteration - 1
-            if begun is None or not is_there:
+        elif entry.kind == "status" and entry.status in ENDS:
+            ends |= dict.fromkeys(numbers.pop(key, ()), (entry.iteration, entry.status))
+        elif entry.kind == "status" and entry.status == Status.ACTIVE and key in waiting:
+            taken, command = waiting.pop(key)
+            begins = entry.iteration
+            place = int(np.searchsorted(iterations, begins - 1))
+            if place >= len(iterations) or iterations[place] != begins - 1:
                 continue
-            taken, command = begun
-            shift = _shift(taken, command, entry.iteration, history)
+            shift = _shift(taken, command, history)
+            numbers[key] = []
             for number, rows in _numbers(command):
                 column = columns.get(f"desired.{number}")
                 if column is None:
                     continue
-                due = np.array(command.due, np.int64) - (command.anchor or 0)
-                sent = ChunkRows(
-                    command.anchor or 0,
-                    due,
-                    command.ease or 1,
-                    command.first or 0,
-                    rows[:, None].astype(np.float64),
-                )
-                decision = decide(sent, taken.iteration, shift, stood=shift > 0)
-                way = ChunkWay(sent, decision, command.profile, rows.dtype.kind != "f")
+                way = _way(taken, command, rows, shift, begins)
                 before = found.setdefault(number, [])
-                places, slopes = way.places(_start(before, history, column, place, way.begins))
-                before.append(Planned(way.begins, places[:, 0], slopes[:, 0]))
+                start = _start(before[-1:], ends.pop(number, None), begins)
+                if start is None:
+                    start = _desired(history, column, place, command)
+                places, slopes = way.places(start, latest - begins)
+                before.append(Planned(begins, places[:, 0], slopes[:, 0]))
+                numbers[key].append(number)
     return found
 
 
-def _shift(taken: JournalEntry, command: JournalCommand, begins: int, history: History) -> int:
+def _way(
+    taken: JournalEntry, command: JournalCommand, rows: NDArray[Any], shift: int, begins: int
+) -> ChunkWay:
+    anchor = command.anchor or 0
+    due = np.array(command.due, np.int64) - anchor
+    values = rows[:, None].astype(np.float64)
+    sent = ChunkRows(anchor, due, command.ease or 1, command.first or 0, values)
+    decision = decide(sent, taken.iteration, shift, stood=shift > 0)
+    if decision.begins != begins:  # it had a prefix that did not count: the actuators stood
+        decision = decide(sent, taken.iteration, shift, stood=True)
+    return ChunkWay(sent, decision, command.profile, rows.dtype.kind != "f")
+
+
+def _indices(history: History, command: JournalCommand) -> list[int]:
+    names = [each["name"] or str(i) for i, each in enumerate(history.schema["actuators"])]
+    return [names.index(name) for name in command.actuators]
+
+
+def _shift(taken: JournalEntry, command: JournalCommand, history: History) -> int:
     """By how much its rows are later, because its actuators stood still (docs/chunks.md)."""
     last = taken.iteration - 1
-    if command.fixed or command.anchor is None or command.anchor >= last or begins > last + 1:
+    if command.fixed or command.anchor is None or command.anchor >= last:
         return 0
-    names = [actuator["name"] for actuator in history.schema["actuators"]]
-    moved = history.active[:, [names.index(name) for name in command.actuators]].any(axis=1)
+    moved = history.active[:, _indices(history, command)].any(axis=1)
     acted = history.iteration[moved & (history.iteration <= last)]
     acted_last = int(acted[-1]) if len(acted) else -1
     return last - max(acted_last, command.anchor) if acted_last < last else 0
@@ -173,13 +207,20 @@ def _numbers(command: JournalCommand) -> Iterable[tuple[str, NDArray[np.generic]
 
 
 def _start(
-    before: list[Planned], history: History, column: Column, place: int, begins: int
-) -> Moment:
-    """Place and slope in the iteration before a chunk begins."""
-    for planned in before[-1:]:
-        at = begins - planned.begins - 1
-        if 0 <= at < len(planned.places):
-            return planned.places[at : at + 1], planned.slopes[at : at + 1]
+    before: list[Planned], end: tuple[int, Status | None] | None, begins: int
+) -> Moment | None:
+    """Place and slope of the plan before, if that is in force until a chunk begins."""
+    if not before or end not in (None, (begins, Status.OVERWRITTEN)):
+        return None
+    at = begins - before[0].begins - 1
+    if not 0 <= at < len(before[0].places):
+        return None
+    return before[0].places[at : at + 1], before[0].slopes[at : at + 1]
+
+
+def _desired(history: History, column: Column, place: int, command: JournalCommand) -> Moment:
+    """Where the number was in a row, and its speed; 0 if its actuator did not act there."""
     desired = np.asarray(values_of(history, column), np.float64)
-    speed = desired[place] - desired[place - 1] if place > 0 else 0.0
+    acts = place > 0 and history.active[place, _indices(history, command)].any()
+    speed = desired[place] - desired[place - 1] if acts else 0.0
     return desired[place : place + 1], np.array([speed])

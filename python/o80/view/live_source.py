@@ -1,7 +1,6 @@
 """A segment in shared memory as the source of a page."""
 
 import threading
-from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
@@ -14,8 +13,7 @@ from o80.frontend.reader import Journal
 from o80.frontend.results import Halt
 from o80.frontend.segments import is_own
 from o80.rows.history import History
-from o80.rows.journal import JournalEntry
-from o80.rows.plans import Planned, is_of_chunks, planned_by_chunks
+from o80.rows.plans import ChunkEntries, Planned, planned_by_chunks
 from o80.view.source import NothingToShow, Source
 
 GUARD_ROWS = 16  # the oldest rows may be overwritten while they are read
@@ -36,7 +34,7 @@ class LiveSource(Source):
         self._journal: _core.RawJournal | None = None
         self._marks: list[tuple[str, int]] = []
         self._decisions: Journal | None = None
-        self._of_chunks: deque[JournalEntry] = deque(maxlen=MAX_DECISIONS)
+        self._of_chunks = ChunkEntries(MAX_DECISIONS)
         self._lock = threading.Lock()
         self._problem = ""
         self._state = "waiting"  # without a frontend
@@ -60,7 +58,7 @@ class LiveSource(Source):
             self._frontend, self._problem = found, ""
             self._journal, self._marks = _core.RawJournal(found, 0), []
             self._decisions = Journal(found, new=True)
-            self._of_chunks.clear()
+            self._of_chunks = ChunkEntries(MAX_DECISIONS)
             self.key = f"{self.name} {found.epoch}"
             self.zero = self.extent_of(found)[0]
             # the former frontend is not closed: another thread may be reading with it
@@ -128,9 +126,9 @@ class LiveSource(Source):
     def plans(self, rows: History) -> dict[str, list[Planned]]:
         """Plans of the chunks that were sent since the view looks at this run."""
         with self._lock:
-            entries = [] if self._decisions is None else self._decisions.read()
-            self._of_chunks += (each for each in entries if is_of_chunks(each))
-            known = list(self._of_chunks)
+            if self._decisions is not None:
+                self._of_chunks.add(self._decisions.read())
+            known = list(self._of_chunks.entries)
         return planned_by_chunks(known, rows)
 
     def state(self) -> dict[str, Any]:

@@ -11,8 +11,7 @@ from o80._core import Observation
 from o80.base.errors import Error
 from o80.recording.recorded_epoch import RecordedEpoch
 from o80.rows.history import History
-from o80.rows.journal import JournalEntry
-from o80.rows.plans import Planned, is_of_chunks, planned_by_chunks
+from o80.rows.plans import ChunkEntries, Planned, planned_by_chunks
 from o80.view.source import NothingToShow, Source
 
 AHEAD = 3_000_000_000  # [ns]: rows before and after the ones that are asked for
@@ -49,7 +48,7 @@ class RecordedSource(Source):
         self._chunks = epoch.chunk_times
         self._lock = threading.Lock()
         self._kept: tuple[int, int, History] | None = None
-        self._decisions: tuple[int, list[JournalEntry]] | None = None  # from an iteration on
+        self._decisions: tuple[int, ChunkEntries] | None = None  # from an iteration on
         self._problem = ""
         self._extent: tuple[int, int] | None = None
         try:
@@ -151,10 +150,11 @@ class RecordedSource(Source):
             return {}
         with self._lock:
             if self._decisions is None or first < self._decisions[0]:
-                entries = filter(is_of_chunks, self._epoch.journal_since_row(first))
-                self._decisions = first, list(entries)
+                found = ChunkEntries()
+                found.add(self._epoch.journal_since_row(first))
+                self._decisions = first, found
             known = self._decisions[1]
-        return planned_by_chunks(known, rows)
+        return planned_by_chunks(known.entries, rows)
 
     def _around(self, begin: int, end: int) -> History:
         with self._lock:
