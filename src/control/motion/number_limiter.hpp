@@ -103,8 +103,7 @@ class NumberLimiter {
   }
   /// One iteration to `next`, whatever the limits say.
   void accept(double next) noexcept {
-    const double speed = next - now_.position;
-    now_ = {next, speed, speed - now_.speed};
+    now_ = moved(next, next - now_.position);
     wanted_ = next;
     stop_known_ = false;
   }
@@ -117,7 +116,7 @@ class NumberLimiter {
     if (!has_rates_ && wanted >= span_.low && wanted <= span_.high && std::isfinite(speed)) {
       // what follow_without_jerk() does inside the bounds, if there are no other limits
       scale_ = std::max(scale_, std::abs(inside(now_.position + speed, now_.position)));
-      now_ = {wanted, speed, speed - now_.speed};
+      now_ = moved(wanted, speed);
       forget_rounding();
       return Limit::none;
     }
@@ -171,8 +170,13 @@ class NumberLimiter {
     now_.acceleration = next.moment.acceleration;
     know_stop(next.stop);
   }
+  /// Here after an iteration at this speed; a jump beyond the range of a double is no speed.
+  Moment moved(double position, double speed) const noexcept {
+    const double acceleration = speed - now_.speed;
+    return std::isfinite(acceleration) ? Moment{position, speed, acceleration} : Moment{position};
+  }
   void move(double speed) noexcept {
-    now_ = {inside(now_.position + speed, now_.position), speed, speed - now_.speed};
+    now_ = moved(inside(now_.position + speed, now_.position), speed);
     scale_ = std::max(scale_, std::abs(now_.position));
   }
   /// The shortest stop from the present state.

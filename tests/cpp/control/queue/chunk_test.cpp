@@ -1017,6 +1017,34 @@ TEST(Trajectory, ACurveThroughAParabolaHasItsSlopes) {
   EXPECT_EQ(rig.at(229), targets.back());
 }
 
+/// Any rows and profiles, as far apart as a double allows, one motion taking over from another.
+TEST(Trajectory, HugeRowsStayFinite) {
+  constexpr std::array kValues{-1.7e308, 1.7e308, 0.0, 1e-300};
+  for (unsigned seed = 0; seed < 1000; ++seed) {
+    std::mt19937 dice(seed);
+    const auto pick = [&](std::uint32_t below) {
+      return static_cast<std::uint32_t>(
+          std::uniform_int_distribution<int>(0, static_cast<int>(below) - 1)(dice));
+    };
+    Rig rig(seed % 4 == 0 ? limited_robot(limits_of(5.0, 40.0, 2000.0)) : plain_robot(1));
+    for (int i = 0; i < 4; ++i) {
+      constexpr std::array kProfiles{Profile::cubic, Profile::linear, Profile::hold,
+                                     Profile::minimum_jerk};
+      RecordHead head = over(1 + pick(5));
+      head.profile = kProfiles[pick(4)];
+      if (pick(3) > 0) head = overwriting(head);
+      std::vector<double> rows(1 + pick(9));
+      for (double& row : rows) row = kValues[pick(4)];
+      rig.add_rows(0, head, static_cast<std::uint32_t>(rows.size()), rows);
+      rig.pulse();
+      for (std::uint32_t n = 1 + pick(30); n > 0; --n) {
+        rig.step();
+        ASSERT_TRUE(std::isfinite(rig.desired())) << seed;
+      }
+    }
+  }
+}
+
 // ------------------------------------------------------------------------------ hostile
 
 TEST(ChunkHostile, HugeNumbersStayFinite) {
