@@ -14,6 +14,7 @@
 #include "bindings.hpp"
 #include "frontend.hpp"
 #include "o80/runtime/frontend.hpp"
+#include "o80/runtime/journal.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -30,7 +31,23 @@ struct BackendState {
   o80::LoopState loop;
   std::optional<HaltFields> halt;
   std::vector<RunningFields> running;  // requests
+  std::vector<std::int64_t> decision_latencies;
 };
+
+/// The decision latency of each batch in the journal that says what it was decided by [iterations];
+/// -1: not known.
+std::vector<std::int64_t> decision_latencies(const o80::UntypedFrontend& frontend) {
+  constexpr int kMost = 100'000;  // a fast writer adds entries meanwhile
+  std::vector<std::int64_t> latencies;
+  o80::Journal journal(frontend);
+  o80::JournalEntry entry;
+  for (int i = 0; i < kMost && journal.next(entry); ++i) {
+    if (entry.kind != o80::JournalKind::taken || !entry.seen) continue;
+    const o80::Iteration since = entry.seen->since;
+    latencies.push_back(since < 0 ? -1 : entry.iteration - since);
+  }
+  return latencies;
+}
 
 BackendState backend_state(const std::string& segment) {
   const Waiting waiting;
@@ -44,7 +61,7 @@ BackendState backend_state(const std::string& segment) {
     running.emplace_back(each.name, each.since, each.who, each.progress);
   }
   return {frontend.schema().head.robot.str(), o80::loop_state(frontend),
-          halt_fields(frontend.halted()), running};
+          halt_fields(frontend.halted()), running, decision_latencies(frontend)};
 }
 
 std::optional<double> seconds(std::optional<std::int64_t> nanoseconds) {
@@ -84,7 +101,8 @@ void bind_loop_state(nb::module_& m) {
       .def_ro("robot", &BackendState::robot)
       .def_ro("loop", &BackendState::loop)
       .def_ro("halt", &BackendState::halt)
-      .def_ro("running", &BackendState::running);
+      .def_ro("running", &BackendState::running)
+      .def_ro("decision_latencies", &BackendState::decision_latencies);
   m.def("backend_state", &backend_state, "segment"_a);
   m.def("loop_state", [](const Frontend& self) { return o80::loop_state(self.untyped()); });
 }

@@ -128,8 +128,11 @@ def test_info_and_plot_show_it(arm: o80.Frontend, tmp_path: Path) -> None:
     said = "decision latency of 40 batches in iterations: median 2 (2 ms), 95 % 5 (5 ms), "
     assert said + "largest 9 (9 ms)" in run_o80("info", str(path)).stdout
     assert said in run_o80("info", arm.segment).stdout
+    assert f"{arm.segment}: {said}" in run_o80("list").stdout
+    (listed,) = json.loads(run_o80("list", "--json").stdout)
     (run,) = json.loads(run_o80("info", "--json", str(path)).stdout)
     assert run["decision_latency"]["max"] == 9
+    assert listed["decision_latency"] == run["decision_latency"]
     history, found = arm.history(), decisions(arm.journal())
     figure = plot({"arm": history}, decided={"arm": found})
     *_, panel = figure.axes

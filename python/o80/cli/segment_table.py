@@ -9,7 +9,14 @@ from typing import Any
 import o80._core as _core
 from o80.base.errors import Error, SegmentError
 from o80.base.screen import Column, print_json, print_table, style
-from o80.frontend.backend_texts import age_text, halt_text, rate_text, running_texts
+from o80.frontend.backend_texts import (
+    age_text,
+    halt_text,
+    latency_percentiles,
+    latency_text,
+    rate_text,
+    running_texts,
+)
 from o80.frontend.segments import Segment
 from o80.frontend.segments import segments as all_segments
 
@@ -51,7 +58,8 @@ def print_segments(*, as_json: bool) -> None:
         return
     print_table(_COLUMNS, [_cells(row) for row in rows], _STYLES)
     for row in rows:
-        for said in (row["halted"], row["state_of_loop"], row["problem"], *row["running"]):
+        latency = latency_text(row["decision_latency"], 1e9 / (row["frequency"] or 1))
+        for said in (row["halted"], row["state_of_loop"], row["problem"], *row["running"], latency):
             if said:
                 print(f"{style(row['segment'], 'yellow')}: {said}")
     if any(row["state"] in ("killed", "failed", "stopped") for row in rows):
@@ -82,6 +90,7 @@ def _row(entry: Segment) -> dict[str, Any]:
         "state_of_loop": None,
         "halted": None,
         "running": [],
+        "decision_latency": {},
     }
     if not entry.readable:
         return row
@@ -104,6 +113,7 @@ def _row(entry: Segment) -> dict[str, Any]:
         "state_of_loop": loop.trouble if entry.alive else "",
         "halted": "",
         "running": running_texts(state.running) if entry.alive else [],
+        "decision_latency": latency_percentiles(state.decision_latencies),
     }
     if entry.alive:
         row["halted"] = halt_text(entry.name, state.halt, played=entry.played)

@@ -63,10 +63,25 @@ def starved_text(starvations: int) -> str:
     return f"plans of chunks ran out of rows {times} (docs/chunks.md)" if starvations else ""
 
 
-def latency_text(summary: dict[str, int], period: int) -> str:
+def latency_percentiles(latencies: list[int]) -> dict[str, int]:
+    """Median, p95 and max of the decision latencies of batches [iterations]; how many batches, and
+    of how many it is not known (-1). Empty without batches.
+    """
+    if not latencies:
+        return {}
+    known = sorted(each for each in latencies if each >= 0)
+    counts = {"batches": len(latencies), "unknown": len(latencies) - len(known)}
+    if not known:
+        return counts
+    last = len(known) - 1
+    shares = {"median": 50, "p95": 95, "max": 100}
+    return counts | {name: known[-(-last * share // 100)] for name, share in shares.items()}
+
+
+def latency_text(summary: dict[str, int], period: float) -> str:
     """The decision latency of batches, in one line; empty if none says what it was decided by.
 
-    summary: of `o80.rows.journal.latency_summary`. period: [ns].
+    summary: of latency_percentiles(). period: [ns].
     """
     if not summary:
         return ""

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.words import CommandEnd, Reason, Status
+from o80.frontend.backend_texts import latency_percentiles
 from o80.rows.enumerations import labelled
 from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, request_fields
 from o80.rows.record import Record
@@ -135,17 +136,12 @@ def decisions(entries: Iterable[JournalEntry | _core.JournalEntry]) -> Decisions
 
 
 def latency_summary(entries: Iterable[JournalEntry | _core.JournalEntry]) -> dict[str, int]:
-    """The decision latency of these batches [iterations]: median, p95, max; batches, and those of
-    which it is not known. Empty if no batch says by which row it was decided.
+    """The decision latency of these batches, as latency_percentiles() gives it. Empty if no batch
+    says by which row it was decided.
     """
     taken = decisions(entries)
-    if not len(taken.taken):
-        return {}
-    counts = {"batches": len(taken.taken), "unknown": len(taken.taken) - len(taken.latency)}
-    if not len(taken.latency):
-        return counts
-    found = np.percentile(taken.latency, (50, 95, 100), method="higher").astype(int).tolist()
-    return counts | dict(zip(("median", "p95", "max"), found, strict=True))
+    latencies = np.where(taken.since < 0, -1, taken.taken - taken.since)
+    return latency_percentiles(latencies.tolist())
 
 
 def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:
