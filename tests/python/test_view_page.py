@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import chromium
@@ -333,8 +334,10 @@ def test_a_recording_in_a_file_needs_no_server_and_shows_the_same(
             robot.add_command(["shoulder", "elbow"], [0.4, 1.0], iterations=2000)
             robot.burst(1000)
         recording.mark("<b>half</b>")
-        for robot in (arm, other):
-            robot.burst(2000)
+        with arm.chunks(step=100) as plan:
+            plan.send([[0.2, 0.3], [0.1, 0.6], [0.3, 0.5]])
+            for robot in (arm, other):
+                robot.burst(2000)
     write_page([str(run)], path)
     rows = o80.open(run)[first].history()
     page = browser.page("about:blank")
@@ -367,6 +370,15 @@ def test_a_recording_in_a_file_needs_no_server_and_shows_the_same(
         )
     page.wait_for("page.answer.curves.marks.length === 1")
     assert page.value("page.answer.curves.marks[0][1]") == "<b>half</b>"
+    scrub(page, 1.2)
+    page.wait_for("Math.abs(page.answer.at - 1.2) < 0.02 && (window.kept = page.answer.curves)")
+    planned = page.value("kept.panels.elbow.planned.map((each) => Array.from(each))")
+    ahead, values = (np.array(each, float)[:-1] for each in planned)
+    assert ahead[-1] - ahead[0] == pytest.approx(0.3, abs=0.002)
+    wanted = np.interp(
+        ahead + page.value("kept.begin"), (rows.time - rows.time[0]) * 1e-9, rows.desired[:, 1]
+    )
+    np.testing.assert_allclose(values, wanted, atol=2e-3)
     page.value("document.querySelectorAll('#segments .eye')[1].click()")  # a copy of the first
     page.wait_for("page.scene.robots.size === 2")
     assert page.value("performance.getEntriesByType('resource').length") == 0

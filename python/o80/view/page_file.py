@@ -1,7 +1,7 @@
 """A recording as one file that any browser opens from disk, without o80 and without a network.
 
 It is the page of `o80 view` with what it would ask for: poses 60 times a second, of each curve and
-sixtieth of a second the first, lowest and highest row, as float32.
+sixtieth of a second the first, lowest and highest row, as float32; and what chunks planned.
 """
 
 from __future__ import annotations
@@ -19,7 +19,9 @@ from numpy.typing import NDArray
 from o80.base.errors import Error, InvalidArgument, RecordingError
 from o80.rows.columns import columns_of
 from o80.rows.history import values_of
+from o80.rows.plans import Planned
 from o80.view.answers import SLACK, Shown, first_of, others_of
+from o80.view.recorded_source import MOST_ROWS_OF_PLANS
 from o80.view.server import page_text
 from o80.view.source import Source
 from o80.view.source_list import SourceList
@@ -29,6 +31,7 @@ LARGEST = 100e6  # of a file [bytes]
 BYTES_PER_NUMBER = 2.8  # in the file, as measured: compressed, as text
 MOVED = 14  # numbers of the pose of a body and of its ghost
 MAX_TRIANGLES = 4000  # of a mesh
+PLANNED = 4  # points of plans for each tick, at most
 SECONDS = 1e-9
 
 
@@ -153,6 +156,7 @@ class _Recorded:
             "iterations": numbers.add(rows.iteration[self.ticks], "f8"),
             "halted": numbers.add([bool(rows[int(tick)].halted) for tick in self.ticks], "u1"),
             "columns": self._columns(numbers),
+            "planned": self._planned(numbers),
             "others": self._others(numbers, everything),
             **self._poses(numbers),
         }
@@ -187,6 +191,39 @@ class _Recorded:
                     numbers.add(np.diff(rows, prepend=0), "u4"),
                     numbers.add(values[rows], "f8" if exact else "f4"),
                 ]
+        return found
+
+    def _planned(self, numbers: _Numbers) -> dict[str, Any]:
+        """By panel: the first point of each plan, each after the last one, and the points: their
+        times, each after the last [us], and places.
+        """
+        rows = self.rows[-MOST_ROWS_OF_PLANS:]
+        period = self.source.schema["period"]
+        stride = max(1, round(1e9 / period / RATE))
+
+        def drawn(plan: Planned) -> NDArray[np.intp]:
+            last = len(plan.places) - 1
+            return np.append(np.arange(0, last, stride), last)
+
+        def times(plan: Planned) -> NDArray[np.int64]:
+            iterations = plan.begins + drawn(plan)
+            within = np.interp(iterations, rows.iteration, rows.time - self.rows.time[0])
+            beyond = np.maximum(iterations - rows.iteration[-1], 0) * period
+            micro: NDArray[np.int64] = np.round((within + beyond) / 1000).astype(np.int64)
+            return micro
+
+        found: dict[str, Any] = {}
+        for panel, plans in self.source.plans(rows).items():
+            points = sum(len(drawn(each)) for each in plans)
+            plans = plans[:: max(1, -(-points // (PLANNED * len(self.ticks))))]
+            lengths = [len(drawn(each)) for each in plans]
+            found[panel] = [
+                numbers.add([0, *lengths[:-1]], "u4"),
+                numbers.add(
+                    np.diff(np.concatenate([times(each) for each in plans]), prepend=0), "i4"
+                ),
+                numbers.add(np.concatenate([each.places[drawn(each)] for each in plans]), "f4"),
+            ]
         return found
 
     def _kept(self, values: NDArray[Any]) -> NDArray[np.intp]:

@@ -2,6 +2,7 @@
 
 const KINDS = { f4: Float32Array, f8: Float64Array, u1: Uint8Array, u2: Uint16Array, u4: Uint32Array, i4: Int32Array };
 const STRETCHES = 400; // of a curve, about one for each pixel of its width
+const MAX_PLANS = 30; // of chunks, the newest ones
 
 // the last index whose number is at most `value`; at least 0
 function placeOf(numbers, value) {
@@ -43,6 +44,10 @@ class RecordingInFile {
     for (const source of sources) {
       source.times = summed(source.times, Float64Array, 1e-6);
       source.ticks = summed(source.ticks);
+      for (const planned of Object.values(source.planned)) {
+        planned[0] = summed(planned[0]);
+        planned[1] = summed(planned[1], Float64Array, 1e-6);
+      }
       source.tickTimes = Float64Array.from(source.ticks, (row) => source.times[row]);
       for (const parts of Object.values(source.columns)) {
         for (const column of Object.values(parts)) column[0] = summed(column[0]);
@@ -100,6 +105,7 @@ class RecordingInFile {
     const end = Math.max(source.first, Math.min(at + window / 2, source.last));
     const begin = Math.max(source.first, end - window);
     const found = {};
+    let ahead = end;
     for (const panel of panels) {
       found[panel] = {};
       for (const [part, [rows, values]] of Object.entries(source.columns[panel] ?? {})) {
@@ -110,9 +116,24 @@ class RecordingInFile {
           Float32Array.from(drawn, (i) => values[low + i]),
         ];
       }
+      if (!source.planned[panel]) continue;
+      const [firsts, times, places] = source.planned[panel];
+      const began = Array.from(firsts.keys()).filter((plan) => times[firsts[plan]] >= begin && times[firsts[plan]] <= end);
+      const [seconds, values] = [[], []];
+      for (const plan of began.slice(-MAX_PLANS)) {
+        const last = firsts[plan + 1] ?? times.length;
+        for (let i = firsts[plan]; i < last; ++i) {
+          seconds.push(times[i] - begin);
+          values.push(places[i]);
+        }
+        seconds.push(0);
+        values.push(NaN); // a gap
+        ahead = Math.max(ahead, times[last - 1]);
+      }
+      if (began.length) found[panel].planned = [Float32Array.from(seconds), Float32Array.from(values)];
     }
     const marks = source.marks.filter(([seconds]) => seconds >= begin && seconds <= end);
-    return { begin, end, panels: found, marks: marks.map(([seconds, text]) => [seconds - begin, text]).slice(-50) };
+    return { begin, end: Math.min(ahead, end + window / 3), panels: found, marks: marks.map(([seconds, text]) => [seconds - begin, text]).slice(-50) };
   }
 }
 
