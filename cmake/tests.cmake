@@ -52,6 +52,10 @@ target_compile_definitions(o80_killed PUBLIC O80_CRASH_POINTS)
 target_compile_options(o80_killed PRIVATE ${test_options})
 target_link_libraries(o80_killed PRIVATE o80_private_headers o80_warnings)
 
+# BusyMachineTest proves something on a real-time machine only: `make rt` runs it. A script is
+# replayed by hand.
+set(elsewhere "BusyMachineTest.*:Script.ReplaysAFile")
+
 foreach(folder IN LISTS test_folders)
   if(folder STREQUAL "mujoco" AND NOT TARGET mujoco_driver)
     continue()
@@ -108,10 +112,15 @@ foreach(folder IN LISTS test_folders)
         ${folder}.pages_of_${page} PROPERTIES TIMEOUT 600 ENVIRONMENT QEMU_PAGESIZE=${page}
       )
     endforeach()
+  elseif(O80_SANITIZE)
+    # a process for each program, not for each test: a sanitizer makes each start slow
+    add_test(
+      NAME ${folder}
+      COMMAND ${target} --gtest_brief=1 "--gtest_filter=-${elsewhere}"
+              "--gtest_output=xml:${PROJECT_BINARY_DIR}/reports/${folder}.xml"
+    )
+    set_tests_properties(${folder} PROPERTIES TIMEOUT 900)
   else()
-    # BusyMachineTest proves something on a real-time machine only: `make rt` runs it. A script is
-    # replayed by hand.
-    set(elsewhere "BusyMachineTest.*:Script.ReplaysAFile")
     # suites named *WithTools need programs that only `make check` asks for
     gtest_discover_tests(
       ${target}

@@ -100,6 +100,9 @@ def outcomes(names: list[str]) -> Outcomes:
     for name in ("test_cpp", "test_python", *names):
         if (report := LOGS / f"{name}.xml").exists():
             found.read_report(report)
+    for preset in {"asan", "tsan"} & set(names):
+        for report in (ROOT / "build" / preset / "reports").glob("*.xml"):
+            found.read_report(report)
     if "rt" in names and not found.read_log("rt", LOGS / "rt.log"):
         found.passed |= set((ROOT / "build/rt/machine/passed").read_text().split())
     return found

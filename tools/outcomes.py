@@ -17,15 +17,24 @@ class Outcomes:
         self.skipped: dict[str, str] = {}  # by name: the reason
 
     def read_report(self, file: Path) -> None:
-        """Adds what `ctest --output-junit` or `pytest --junit-xml` wrote."""
+        """Adds what ctest, pytest, or a program of tests in C++, named as its report, wrote."""
         for case in ET.parse(file).getroot().iter("testcase"):
-            name, of_ctest = case.get("name", ""), case.get("status")
-            if not of_ctest:
+            name, of_ctest, of_program = (
+                case.get("name", ""),
+                case.get("status"),
+                case.get("result"),
+            )
+            if of_program or not of_ctest:
                 name = f"{case.get('classname')}.{name}"
+            if of_program:
+                name = f"{file.stem}.{name}"
             skipped = case.find("skipped")
             if skipped is not None:
-                printed = case.findtext("system-out") or ""
-                told = _googletest_reason(printed) if of_ctest else skipped.get("message", "")
+                told = skipped.get("message", "")
+                if of_program:
+                    told = " ".join(told.split()[1:])  # after the place
+                elif of_ctest:
+                    told = _googletest_reason(case.findtext("system-out") or "")
                 self.skipped[name] = told
             elif all(case.find(kind) is None for kind in ("failure", "error")):
                 self.passed.add(name)

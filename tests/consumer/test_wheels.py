@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+import tomllib
 from pathlib import Path
 
 import pytest
@@ -17,12 +18,19 @@ NOT_FOR_THE_CORE = {"gymnasium", "h5py", "imageio-ffmpeg", "matplotlib", "mujoco
 
 
 class Environment:
-    """An empty virtual environment. Its programs find no compiler unless `compiler` is set."""
+    """An empty virtual environment. Its programs find no compiler unless `compiler` is set.
 
-    def __init__(self, folder: Path, *, compiler: bool = False) -> None:
+    checkout: a folder laid out as ours, with this as its `.venv`, in which ccache finds what
+    tools/setup.sh has compiled.
+    """
+
+    def __init__(
+        self, folder: Path, *, compiler: bool = False, checkout: Path | None = None
+    ) -> None:
         subprocess.run([sys.executable, "-m", "venv", "--without-pip", folder], check=True)
         self.folder = folder
         self.compiler = compiler
+        self.checkout = checkout
 
     def run(self, program: str, *words: str | Path, fails: bool = False) -> str:
         """Runs a program of the environment; returns what it prints."""
@@ -42,12 +50,14 @@ class Environment:
         }
         given |= {"HOME": str(self.folder), "PIP_CACHE_DIR": str(Path.home() / ".cache" / "pip")}
         if self.compiler:
-            path += f"{os.pathsep}{os.defpath}"
+            path += f"{os.pathsep}/usr/bin{os.pathsep}/bin"
             # the same sources are compiled for each build that pip isolates
             if shutil.which("ccache", path=os.defpath):
-                given |= {"CMAKE_CXX_COMPILER_LAUNCHER": "ccache", "CCACHE_BASEDIR": "/"}
+                given |= {"CMAKE_CXX_COMPILER_LAUNCHER": "ccache", "CCACHE_NOHASHDIR": "1"}
+                given["CCACHE_BASEDIR"] = str(self.checkout or "/")
                 given.setdefault("CCACHE_DIR", str(ROOT / "build" / "ccache"))
-            given["SKBUILD_CMAKE_BUILD_TYPE"] = "None"  # not optimised: what is shipped was built
+            if not self.checkout:  # not optimised: what is shipped was built
+                given["SKBUILD_CMAKE_BUILD_TYPE"] = "None"
         done = subprocess.run(
             [program, *words],
             env=given | {"PATH": path},
@@ -257,9 +267,7 @@ def unpack(sdist: Path, folder: Path) -> Path:
     return folder
 
 
-def test_source_distributions_that_lie_as_in_a_checkout_install_together(
-    built: Path, tmp_path: Path
-) -> None:
+def test_source_distributions_that_lie_as_in_a_checkout_install_together(built: Path) -> None:
     """The core ships enough to build it, and the arm finds it beside itself."""
     root = ROOT / "build" / "unpacked"  # the same in each run, for ccache
     shutil.rmtree(root, ignore_errors=True)
@@ -267,16 +275,21 @@ def test_source_distributions_that_lie_as_in_a_checkout_install_together(
     for folder, name in ((".", "o80"), ("robots/pam", "o80_pam"), ("apps/tt", "o80_table_tennis")):
         (sdist,) = (built / "sdists").glob(f"{name}-[0-9]*.tar.gz")
         unpacked.append(unpack(sdist, root / folder))
-    environment = Environment(tmp_path / "environment", compiler=True)
+    core, arm, application = unpacked
+    environment = Environment(root / ".venv", compiler=True, checkout=root)
+    required = tomllib.loads((core / "pyproject.toml").read_text())["build-system"]["requires"]
+    environment.install(*required, "cmake", "ninja")
+    alone = ("--no-build-isolation", "--no-deps")
+    environment.install(*alone, f"-Cbuild-dir={root}/build/pip/o80", core)
     # the simulator has the build backend of the arm, so it is not compiled here
     (simulator,) = (built / "wheels").glob("o80_mujoco-*")
-    environment.install(*unpacked, simulator)
+    environment.install("--no-build-isolation", arm, application, simulator)
     names = ["two_joints", "pam", "mujoco"]
     robots = f"import o80; print([o80.robots.load(name).name for name in {names}])"
     assert environment.python(robots) == str(names)
 
-    # and one again, alone, editable and against the o80 that is installed
-    environment.install("scikit-build-core==1.1.2", "cmake", "ninja")
-    options = ("--no-build-isolation", "--no-deps", "--editable")
-    environment.install(*options, root / "robots" / "pam")
+    # with isolation the arm is built against the core beside it; here once more, editable
+    backend = f"import sys; sys.path.insert(0, {str(arm / 'build_backend')!r}); import beside_o80"
+    assert environment.python(f"{backend}; print(beside_o80.o80())") == f"o80 @ {core.as_uri()}"
+    environment.install(*alone, "--editable", arm)
     assert environment.python(robots) == str(names)
