@@ -32,6 +32,9 @@ EASE = 0.1
 
 _LATEST = 2**31  # a row is due at most so many iterations after its anchor
 _MOST_ITERATIONS = 2**47
+# chunks that are sent, and iterations that pass, before send() looks at what became of the former
+# ones, if nobody asks for the plan
+_UNSETTLED, _UNSEEN = 16, 1000
 _ONE_NUMBER = "planned, weights and ensemble are for actuators whose state is one number"
 
 
@@ -225,6 +228,7 @@ class Chunks:
         self._kind = common_type(self._actuators, arm._layout)
         self._switches = self._kind.kind == "b" or bool(common_labels(self._actuators, arm._layout))
         self.step = _fraction(step)  #: iterations from row to row
+        self._dues = np.empty(0, np.int64)
         usual = max(math.ceil(self.step), round(EASE / arm.period))
         self.ease = usual  #: iterations of a take-over
         if ease is not None:
@@ -241,6 +245,7 @@ class Chunks:
         self._lock = threading.RLock()
         self._newest: SentChunk | None = None  # the one sent last
         self._open: list[SentChunk] = []  # those that _parts does not know yet
+        self._settled = 0  # the anchor at which these were looked at by send()
         self._parts: list[_Part] = []
         self._over = 0  # of these, so many from the first one on are over
         self._answers: dict[int, int] = {}  # for a due iteration, how many chunks had a row for it
@@ -290,13 +295,8 @@ class Chunks:
         states, count, mask = states_of(rows, self._actuators, self._single, self._arm._layout)
         first = _from_to(first, "first", 0, count - 1)
         after = self._due(count) if due is None else _iterations(due, "due") - anchor
-        if len(after) != count:
-            raise InvalidArgument(f"{count} rows need as many due iterations, got {len(after)}")
-        if not (after[0] >= 1 and np.all(np.diff(after) > 0) and after[-1] <= _LATEST):
-            raise InvalidArgument(
-                f"rows are due one after the other, after iteration {anchor}, which they answer, "
-                f"and at most 2^31 iterations later: got {(after + anchor).tolist()}"
-            )
+        if due is not None or after[-1] > _LATEST:
+            self._check_due(after, count, anchor)
         with self._lock:  # those of several threads are known in the order in which they are sent
             if weights is not None or self.ensemble is not None:
                 mixed = self._mixed(self._numbers(states), anchor + after, weights)
@@ -324,7 +324,9 @@ class Chunks:
             self._arm._open_plans.add(self._number)
             self._open.append(sent)
             self._newest = sent
-            self._settle()
+            if len(self._open) > _UNSETTLED or anchor - self._settled > _UNSEEN:
+                self._settled = anchor
+                self._settle()
         return sent
 
     def _anchor(self, seen: _core.Observation | int | None) -> int:
@@ -342,8 +344,20 @@ class Chunks:
 
     def _due(self, count: int) -> NDArray[np.int64]:
         """Iterations after the anchor: (j + 1) x step, halves up."""
-        up, down = self.step.numerator, self.step.denominator
-        return (np.arange(1, count + 1, dtype=np.int64) * (2 * up) + down) // (2 * down)
+        if len(self._dues) != count:
+            up, down = self.step.numerator, self.step.denominator
+            rows = np.arange(1, count + 1, dtype=np.int64)
+            self._dues = (rows * (2 * up) + down) // (2 * down)
+        return self._dues
+
+    def _check_due(self, after: NDArray[np.int64], count: int, anchor: int) -> None:
+        if len(after) != count:
+            raise InvalidArgument(f"{count} rows need as many due iterations, got {len(after)}")
+        if not (after[0] >= 1 and np.all(np.diff(after) > 0) and after[-1] <= _LATEST):
+            raise InvalidArgument(
+                f"rows are due one after the other, after iteration {anchor}, which they answer, "
+                f"and at most 2^31 iterations later: got {(after + anchor).tolist()}"
+            )
 
     def _mixed(
         self, new: NDArray[np.float64], due: NDArray[np.int64], weights: ArrayLike | None
