@@ -87,6 +87,8 @@ if TYPE_CHECKING:
     from o80.joining.align import align as align
     from o80.joining.latency import Latency as Latency
     from o80.joining.latency import latency as latency
+    from o80.joining.teleoperation import Joint as Joint
+    from o80.joining.teleoperation import Teleoperation as Teleoperation
     from o80.playing.playback import Playback as Playback
     from o80.playing.playback import play as play
     from o80.recording.catalogue import FoundRecording as FoundRecording
@@ -126,6 +128,7 @@ else:  # a type checker that read this would accept every name
         "base.installation": "prefix",
         "joining.align": "Aligned AlignedHistory align",
         "joining.latency": "Latency latency",
+        "joining.teleoperation": "Joint Teleoperation",
         "rows.journal": "JournalCommand JournalEntry",
         "playing.playback": "Playback play",
         "frontend.prepared_burst": "PreparedBurst",

@@ -10,8 +10,9 @@ import pytest
 from processes import run_o80
 
 import o80
+from o80.frontend.backend_texts import latency_percentiles
 from o80.joining.plot import plot
-from o80.rows.journal import decisions, latency_summary
+from o80.rows.journal import decisions, latencies_of
 
 
 def decide(arm: o80.Frontend, delays: list[int]) -> list[o80.Batch]:
@@ -107,7 +108,7 @@ def test_the_journal_says_it_and_echo_prints_it(arm: o80.Frontend, tmp_path: Pat
         assert found.iteration.tolist() == [0, 1, 5]
         assert found.latency.tolist() == [1, 4, 2]
         assert set(found.epoch.tolist()) == {arm.latest().epoch}
-    assert latency_summary(arm.journal()) == {
+    assert latency_percentiles(latencies_of(arm.journal())) == {
         "batches": 3,
         "unknown": 0,
         "median": 2,

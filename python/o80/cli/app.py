@@ -30,6 +30,7 @@ COMMANDS = {
     "diff": "diff.diff",
     "latency": "latency.latency",
     "replay": "replay.replay",
+    "teleop": "teleop.teleop",
     "mark": "mark.mark",
     "halt": "halt.halt",
     "resume": "halt.resume",

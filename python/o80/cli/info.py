@@ -14,6 +14,7 @@ from o80.base.screen import Column, print_json, print_table, style
 from o80.cli.attach import attach
 from o80.frontend.backend_texts import (
     halt_text,
+    latency_percentiles,
     latency_text,
     pace_text,
     running_texts,
@@ -21,7 +22,7 @@ from o80.frontend.backend_texts import (
     watchdog_text,
 )
 from o80.rows.actuators import ACTUATOR_HEADS, actuator_rows, field_text
-from o80.rows.journal import latency_summary
+from o80.rows.journal import latencies_of
 from o80.rows.provenance import started_with
 
 
@@ -60,7 +61,9 @@ def info(
         for said in (halt, trouble, starved, watchdog_text(schema), *running):
             if said:
                 print(said)
-        if line := latency_text(latency_summary(frontend.journal()), schema["period"]):
+        if line := latency_text(
+            latency_percentiles(latencies_of(frontend.journal())), schema["period"]
+        ):
             print(line)
         if schema["actuators"]:
             print()

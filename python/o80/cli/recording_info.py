@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import o80._core as _core
 from o80.base.screen import Column, bytes_text, plain, print_json, print_table, style
-from o80.frontend.backend_texts import age_text, latency_text, starved_text
+from o80.frontend.backend_texts import age_text, latency_percentiles, latency_text, starved_text
 from o80.rows.provenance import started_with
 
 if TYPE_CHECKING:
@@ -158,11 +158,11 @@ def _of_run(name: str, number: int) -> str:
 
 def latency_of(epoch: RecordedEpoch) -> dict[str, int]:
     """The decision latency of the batches in the last entries of its journal."""
-    from o80.rows.journal import latency_summary
+    from o80.rows.journal import latencies_of
 
     if epoch.journal_codec is None or epoch.journal_codec > _core.JOURNAL_CODEC:
         return {}
-    return latency_summary(epoch.last_entries(MAX_ENTRIES))
+    return latency_percentiles(latencies_of(epoch.last_entries(MAX_ENTRIES)))
 
 
 def starvations_of(epoch: RecordedEpoch) -> int:

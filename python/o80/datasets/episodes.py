@@ -23,7 +23,9 @@ if TYPE_CHECKING:
     from o80.recording.recorded_epoch import RecordedEpoch
 
 BEGIN, END = "episode", "episode_end"
-"""Names of the marks before and after an episode."""
+"""Names of the marks before and after an episode. The first may name a task: "episode: push"."""
+DROPPED = "_dropped"
+"""Behind the name of the first: a mark that ends an episode which is left out."""
 
 
 @dataclass(frozen=True)
@@ -129,7 +131,9 @@ def episodes_of(
 class _Span:
     number: int
     marks: Sequence["Mark"]  #: the one before it, and those in it
-    until: "Mark | None"  #: the mark that ends it
+    until: "Mark | None"  #: the mark at which it ends
+    ending: "Mark | None"  #: that, if it is a mark for the end
+    dropped: bool  #: whether it is not wanted
 
 
 def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Iterator[_Span]:
@@ -139,16 +143,18 @@ def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Itera
     for mark in marks:
         if segment not in mark.rows:
             continue
-        if open_at and mark.name in (begin, end):
-            yield _Span(number, open_at, mark)
+        begins = mark.name == begin or mark.name.startswith(f"{begin}: ")
+        if open_at and (begins or mark.name in (end, begin + DROPPED)):
+            dropped = mark.name == begin + DROPPED
+            yield _Span(number, open_at, mark, None if begins else mark, dropped)
             number += 1
             open_at = []
-        if mark.name == begin:
+        if begins:
             open_at = [mark]
         elif open_at:
             open_at.append(mark)
     if open_at:
-        yield _Span(number, open_at, None)
+        yield _Span(number, open_at, None, None, False)
 
 
 def _episode(
@@ -161,6 +167,8 @@ def _episode(
     """Raises InvalidArgument if its rows are not all there."""
     mark = span.marks[0]
     where = f"episode {span.number} (mark at row {mark.rows[segment]})"
+    if span.dropped:
+        raise InvalidArgument(f"{where}: it was thrown away")
     epoch = _epoch_at(mark, epochs)
     first = mark.rows[segment]
     last = None
@@ -179,14 +187,15 @@ def _episode(
         raise InvalidArgument(f"{where}: it has no step")
     rows = rows[: steps * every + 1 : every]
     seen, delays = _decided(taken[epoch], rows.iteration[1:], epoch.schema["period"])
-    ending = None if span.until is None or span.until.name == mark.name else span.until
+    ending = span.ending
+    task = str(mark.values.get("task", "")) or mark.name.partition(": ")[2]
     return Episode(
         rows=rows,
         rewards=_rewards(span, ending, segment, every, steps),
         seen=seen,
         delays=delays,
         terminated=ending is not None and not ending.values.get("truncated", False),
-        task=str(mark.values.get("task", "")) or epoch.schema["robot"],
+        task=task or epoch.schema["robot"],
         values=mark.values,
     )
 

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.words import CommandEnd, Reason, Status
-from o80.frontend.backend_texts import latency_percentiles
 from o80.rows.enumerations import labelled
 from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, request_fields
 from o80.rows.record import Record
@@ -135,13 +134,13 @@ def decisions(entries: Iterable[JournalEntry | _core.JournalEntry]) -> Decisions
     )
 
 
-def latency_summary(entries: Iterable[JournalEntry | _core.JournalEntry]) -> dict[str, int]:
-    """The decision latency of these batches, as latency_percentiles() gives it. Empty if no batch
-    says by which row it was decided.
+def latencies_of(entries: Iterable[JournalEntry | _core.JournalEntry]) -> list[int]:
+    """The decision latency of each batch that says what it was decided by [iterations]; -1: not
+    known.
     """
     taken = decisions(entries)
-    latencies = np.where(taken.since < 0, -1, taken.taken - taken.since)
-    return latency_percentiles(latencies.tolist())
+    latencies: list[int] = np.where(taken.since < 0, -1, taken.taken - taken.since).tolist()
+    return latencies
 
 
 def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:

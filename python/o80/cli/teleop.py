@@ -1,0 +1,164 @@
+"""``o80 teleop``: move one robot by hand, and another one follows."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import select
+import sys
+import termios
+import time
+import tty
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from o80.base.errors import BackendGone
+from o80.base.screen import complain
+from o80.cli.attach import attach
+from o80.cli.stop_request import StopRequest
+
+if TYPE_CHECKING:
+    from o80.joining.teleoperation import Teleoperation
+
+_BETWEEN_REPORTS = 0.5  # [s]
+_KEYS = "space begins and ends a demonstration, x throws it away, q ends"
+
+
+def teleop(
+    leader: Annotated[str, typer.Argument(help="Segment of the robot that is moved by hand.")],
+    follower: Annotated[str, typer.Argument(help="Segment of the robot that follows.")],
+    joint: Annotated[
+        list[str] | None,
+        typer.Option(
+            help="FOLLOWER=SCALE*LEADER+OFFSET, for example elbow=-1*elbow+0.3; again for each "
+            "joint. Without it all joints of the same name.",
+        ),
+    ] = None,
+    near: Annotated[
+        float, typer.Option(help="It begins when each joint is so near, in the joint's unit.")
+    ] = 0.15,
+    silence: Annotated[
+        float, typer.Option(help="Halt the follower after so many seconds without the leader.")
+    ] = 0.2,
+    task: Annotated[str, typer.Option(help="Name of what is demonstrated, for the data set.")] = "",
+) -> None:
+    """Move one robot by hand, and another one follows within its limits.
+
+    It follows once both are near to each other. Record demonstrations with `o80 record` beside it.
+    """
+    stop = StopRequest()
+    from o80.joining.teleoperation import Joint, Teleoperation
+
+    joints = [Joint.parse(each) for each in joint] if joint else None
+    with attach(leader) as hand, attach(follower, read_only=False) as arm, _keyboard() as keys:
+        robots = Teleoperation(hand, arm, joints=joints, near=near, silence=silence)
+        session = _Session(robots, f"episode: {task}" if task else "episode")
+        print(session.head(keys), file=sys.stderr, flush=True)
+        try:
+            while not stop.requested and not session.press(_pressed() if keys else ""):
+                robots.step()
+                session.tell()
+        except BackendGone as error:
+            complain(str(error))
+            raise typer.Exit(1) from None
+        finally:
+            session.end()
+
+
+class _Session:
+    """The side of the person: what is shown, and marks by keys."""
+
+    def __init__(self, robots: Teleoperation, episode: str) -> None:
+        self._robots = robots
+        self._episode = episode
+        self._open = False  # a demonstration
+        self._shown = 0  # of them
+        self._told = ""
+        self._tell_at = 0.0
+
+    def head(self, keys: bool) -> str:
+        robots = self._robots
+        pairs = ", ".join(
+            joint.follower if joint.follower == joint.leader else f"{joint.follower}={joint.leader}"
+            for joint in robots.joints
+        )
+        text = f"{robots.follower.segment} follows {robots.leader.segment}: {pairs}"
+        return f"{text}\n{_KEYS}" if keys else text
+
+    def press(self, key: str) -> bool:
+        """Acts on a key; True if it ends the session."""
+        if key == " ":
+            self._mark("episode_end" if self._open else self._episode)
+            self._open = not self._open
+            self._shown += self._open
+        elif key in ("x", "\x7f") and self._open:
+            self._mark("episode_dropped")
+            self._open = False
+            self._shown -= 1
+        return key == "q"
+
+    def tell(self) -> None:
+        """Says what has changed; distances again and again while it waits."""
+        robots = self._robots
+        if robots.engaged:
+            state = "follows"
+            if self._open:
+                state += f", demonstration {self._shown} (space ends it)"
+            elif self._shown:
+                state += f", {self._demonstrations()}"
+        else:
+            state = f"does not follow: {robots.why}"
+            if robots.far:
+                state += ", " + ", ".join(
+                    f"{name} to {wanted:.2f} from {here:.2f}"
+                    for name, (wanted, here) in robots.far.items()
+                )
+        now = time.monotonic()
+        terminal = sys.stderr.isatty()
+        same = state == self._told if terminal else state.split(",")[0] == self._told.split(",")[0]
+        if same or (terminal and now < self._tell_at):
+            return
+        self._told, self._tell_at = state, now + _BETWEEN_REPORTS / 5
+        begin, end = ("\r\033[K", "") if terminal else ("", "\n")
+        print(f"{begin}{state}", end=end, file=sys.stderr, flush=True)
+
+    def end(self) -> None:
+        """Says how late the follower was."""
+        if self._open:
+            with contextlib.suppress(BackendGone):
+                self._mark("episode_end")
+        print(end="\r\033[K" if sys.stderr.isatty() else "", file=sys.stderr, flush=True)
+        delay = None
+        with contextlib.suppress(BackendGone):
+            delay = self._robots.delay()
+        measured = "not measured: too little motion" if delay is None else str(delay)
+        print(f"{self._demonstrations()}; delay from hand to motor {measured}")
+
+    def _demonstrations(self) -> str:
+        return f"{self._shown} demonstration{'' if self._shown == 1 else 's'}"
+
+    def _mark(self, text: str) -> None:
+        self._robots.follower.mark(text)
+
+
+@contextlib.contextmanager
+def _keyboard() -> Iterator[bool]:
+    """Keys come one by one, without being shown; False where there is no keyboard."""
+    if not sys.stdin.isatty():
+        yield False
+        return
+    before = termios.tcgetattr(sys.stdin)
+    try:
+        tty.setcbreak(sys.stdin)
+        yield True
+    finally:
+        termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)
+
+
+def _pressed() -> str:
+    """The key that was pressed; empty for none."""
+    if not select.select([sys.stdin], [], [], 0)[0]:
+        return ""
+    return os.read(sys.stdin.fileno(), 1).decode(errors="replace") or "q"

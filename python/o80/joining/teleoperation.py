@@ -1,0 +1,237 @@
+"""Teleoperation: one robot, moved by hand, commands the joints of another."""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80._core as _core
+from o80.base.argument_checks import number
+from o80.base.errors import BackendGone, Error, InvalidArgument, TimeoutError
+from o80.rows.columns import Column, columns_of, value_of
+from o80.rows.history import values_of
+
+if TYPE_CHECKING:
+    from o80.frontend.frontend import Frontend
+    from o80.joining.latency import Latency
+    from o80.rows.actuators import Actuator
+
+NEAR = 0.15
+"""Largest difference of a joint at which the follower begins to follow, in its unit."""
+HELD = 0.5
+"""So long all joints must be near before it does [s]."""
+SILENCE = 0.2
+"""After so long without a row of the leader the follower is halted [s]."""
+FASTEST = 200.0  # set-points a second
+_JOINT = re.compile(r"([\w.\[\]]+)=(?:([^*=]+)\*)?([\w.\[\]]+?)([+-][\d.]+(?:e[+-]?\d+)?)?")
+
+
+@dataclass(frozen=True)
+class Joint:
+    """A joint of the follower, which goes to scale x the leader's + offset."""
+
+    follower: str
+    leader: str
+    scale: float = 1.0
+    offset: float = 0.0
+
+    @classmethod
+    def parse(cls, text: str) -> Self:
+        """From "elbow", "elbow=lower", "elbow=-1*lower" or "elbow=-1*lower+0.3"."""
+        found = _JOINT.fullmatch(text if "=" in text else f"{text}={text}")
+        try:
+            if found is None:
+                raise ValueError
+            follower, scale, leader, offset = found.groups()
+            return cls(follower, leader, float(scale or 1), float(offset or 0))
+        except ValueError:
+            raise InvalidArgument(
+                f"a joint is written FOLLOWER=SCALE*LEADER+OFFSET, for example "
+                f"elbow=-1*elbow+0.3, not '{text}'"
+            ) from None
+
+
+class Teleoperation:
+    """One robot, the leader, is moved by hand; the joints of another, the follower, go where it is.
+
+    leader, follower: frontends, both real-time, or both bursting and burst by the caller. It
+        closes neither.
+    joints: those that follow (None: all that both have, by name).
+    near: the follower begins to follow when all its joints have been so near to their targets for
+        0.5 s, in the unit of each.
+    silence: after so long without a row of the leader the follower is halted [s].
+
+    Call step() again and again. Used by one thread. Raises InvalidArgument.
+    """
+
+    def __init__(
+        self,
+        leader: Frontend,
+        follower: Frontend,
+        *,
+        joints: Iterable[Joint] | None = None,
+        near: float = NEAR,
+        silence: float = SILENCE,
+    ) -> None:
+        self.leader, self.follower = leader, follower
+        self.near, self.silence = number(near, "near"), number(silence, "silence")
+        if not (0 < self.near < math.inf and 0 < self.silence < math.inf):
+            raise InvalidArgument(f"near and silence must be positive, got {near} and {silence}")
+        given = {each.name: each for each in leader.actuators}
+        taken = {each.name: each for each in follower.actuators}
+        if joints is None:
+            joints = [Joint(name, name) for name in taken if name in given]
+            if not joints:
+                raise InvalidArgument(
+                    f"'{leader.segment}' ({', '.join(given)}) and '{follower.segment}' "
+                    f"({', '.join(taken)}) have no joint of the same name: say which follow which"
+                )
+        self.joints = list(joints)
+        names = [joint.follower for joint in self.joints]
+        if len(set(names)) != len(names) or not names:
+            raise InvalidArgument(f"name each joint of the follower once, got {names}")
+        for joint in self.joints:
+            ends = ((leader, given, joint.leader), (follower, taken, joint.follower))
+            for robot, known, name in ends:
+                if name not in known:
+                    raise InvalidArgument(
+                        f"'{robot.segment}' has no joint '{name}', it has {', '.join(known)}"
+                    )
+            _check_units(joint, given[joint.leader], taken[joint.follower])
+        self._from = [_column(leader, given[joint.leader]) for joint in self.joints]
+        self._to = [_column(follower, taken[joint.follower]) for joint in self.joints]
+        self._fields = [taken[name].numbers[0].name for name in names]
+        self._scale = np.array([joint.scale for joint in self.joints])
+        self._offset = np.array([joint.offset for joint in self.joints])
+        self._low = np.array([taken[name].minimum for name in names])
+        self._high = np.array([taken[name].maximum for name in names])
+        self._stride = max(1, round(1 / (FASTEST * leader.period)))  # rows of the leader
+        self._every = max(self._stride * leader.period, follower.period)
+        self._last = leader.published  # row that was read
+        self._near_since: int | None = None  # time of a row of the leader [ns]
+        self.engaged = False  #: whether the follower follows
+        self.why = ""  #: it does not
+        self.far: dict[str, tuple[float, float]] = {}
+        """By joint of the follower that is not near: where it should be, and where it is."""
+
+    def step(self) -> bool:
+        """Waits for the next row of the leader and commands by it; whether the follower follows.
+
+        If the leader is silent or halted while the follower follows, it halts the follower and
+        says why in `why`; it goes on when that was resumed and is near again.
+        Raises BackendGone, and what pulse raises.
+        """
+        try:
+            seen = self._next_row()
+        except (TimeoutError, BackendGone) as error:
+            gone = isinstance(error, BackendGone)
+            how = "has ended" if gone else f"has published nothing for {self.silence:g} s"
+            self._let_go(f"the leader '{self.leader.segment}' {how}")
+            if gone:
+                raise
+            return False
+        if seen.halted:
+            self._let_go(f"the leader '{self.leader.segment}' is halted")
+            return False
+        if (halt := self.follower.halted) is not None:
+            self.engaged, self._near_since = False, None
+            self.why = f"'{self.follower.segment}' is halted: {halt.text or halt.cause}"
+            return False
+        wanted = self.targets(seen)
+        if not self.engaged:
+            self._look_whether_near(seen, wanted)
+        if self.engaged:
+            for joint, field, place in zip(self.joints, self._fields, wanted.tolist(), strict=True):
+                state = {field: place} if field else place
+                self.follower.add_command(joint.follower, state, every=self._every)
+            self.follower.pulse(seen=seen)
+        return self.engaged
+
+    def targets(self, seen: _core.Observation) -> NDArray[np.float64]:
+        """Where a row of the leader wants the joints of the follower, within their bounds."""
+        places = _places(seen, self._from)
+        targets: NDArray[np.float64] = np.clip(
+            self._scale * places + self._offset, self._low, self._high
+        )
+        return targets
+
+    def delay(self, seconds: float = 30.0) -> Latency | None:
+        """How much later the follower shows what the leader did in the last seconds, measured at
+        the joint that moved most; None if nothing moved enough.
+        """
+        from o80.joining.latency import latency
+
+        rows = self.leader.history(seconds=seconds)
+        moved = [float(np.ptp(values_of(rows, column))) for column in self._from]
+        chosen = int(np.argmax(np.abs(self._scale) * moved))
+        try:
+            return latency(
+                (self.leader, self._from[chosen].name),
+                (self.follower, self._to[chosen].name),
+                seconds=seconds,
+            )
+        except Error:
+            return None
+
+    def _next_row(self) -> _core.Observation:
+        """The newest row; of a fast leader not each of them."""
+        if self.leader.bursting:
+            seen = self.leader.latest()
+        else:
+            self._wait_for_row(1)
+            with contextlib.suppress(TimeoutError):
+                self._wait_for_row(self._stride)
+            seen = self.leader.latest()
+        self._last = seen.iteration
+        return seen
+
+    def _wait_for_row(self, after: int) -> None:
+        self.leader.wait_for(max(self._last + after, self.leader.oldest), self.silence)
+
+    def _let_go(self, why: str) -> None:
+        self.why, self._near_since = why, None
+        if self.engaged:
+            self.engaged = False
+            self.follower.halt(why)
+
+    def _look_whether_near(self, seen: _core.Observation, wanted: NDArray[np.float64]) -> None:
+        here = _places(self.follower.latest(), self._to)
+        distant = np.abs(wanted - here) > self.near
+        self.far = {
+            self.joints[i].follower: (float(wanted[i]), float(here[i]))
+            for i in np.flatnonzero(distant)
+        }
+        if self.far:
+            self._near_since = None
+            self.why = "move the leader to where the follower is"
+            return
+        if self._near_since is None:
+            self._near_since = seen.time
+        self.engaged = seen.time - self._near_since >= HELD * 1e9
+        self.why = "" if self.engaged else "near"
+
+
+def _check_units(joint: Joint, leader: Actuator, follower: Actuator) -> None:
+    one, other = leader.numbers[0].unit, follower.numbers[0].unit
+    if one != other and joint.scale == 1:
+        raise InvalidArgument(
+            f"'{joint.leader}' is in {one or 'no unit'} and '{joint.follower}' in "
+            f"{other or 'no unit'}: give a scale, {joint.follower}=SCALE*{joint.leader}"
+        )
+
+
+def _column(robot: Frontend, actuator: Actuator) -> Column:
+    """The observed first number of an actuator."""
+    path = ".".join(filter(None, ("observed", actuator.name, actuator.numbers[0].name)))
+    return next(column for column in columns_of(robot.schema) if column.name == path)
+
+
+def _places(row: _core.Observation, columns: list[Column]) -> NDArray[np.float64]:
+    return np.array([value_of(row, column) for column in columns], np.float64)

@@ -1,0 +1,303 @@
+"""Teleoperation: a robot that is moved by hand, and another one that follows."""
+
+import os
+import pty
+import random
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import o80
+from o80.datasets.episodes import episodes_of
+from o80.drivers import Desired, Reading
+
+SECOND = 1000  # iterations
+
+
+class Arm:
+    """Is where it is told to be; the one that a test moves stands for a hand."""
+
+    actuators = ("wrist", "elbow", "lamp")
+    of_the_world = False
+
+    def __init__(self) -> None:
+        self.places = np.zeros(3)
+
+    def write(self, desired: Desired) -> None:
+        self.places = np.array(desired.states)
+
+    def read(self, reading: Reading) -> None:
+        reading.observed = self.places
+
+
+class Follower(Arm):
+    """With limits, and joints of another order."""
+
+    actuators = ("elbow", "gripper", "wrist")
+    limits = dict.fromkeys(
+        actuators, o80.Limits(minimum=-1.0, maximum=1.0, speed=2.0, acceleration=15.0, jerk=500.0)
+    )
+
+
+def engage(robots: o80.Teleoperation) -> None:
+    for _ in range(100):
+        robots.leader.burst(10)
+        robots.follower.burst(10)
+        if robots.step():
+            return
+    raise AssertionError(robots.why)
+
+
+@pytest.mark.parametrize(
+    ("text", "joint"),
+    [
+        ("elbow", o80.Joint("elbow", "elbow")),
+        ("elbow=lower", o80.Joint("elbow", "lower")),
+        ("elbow=-1*lower+0.3", o80.Joint("elbow", "lower", -1.0, 0.3)),
+        ("a=2.5e-1*b[0]-.3", o80.Joint("a", "b[0]", 0.25, -0.3)),
+        ("gripper=left.tip", o80.Joint("gripper", "left.tip")),
+    ],
+)
+def test_a_joint_is_written_as_text(text: str, joint: o80.Joint) -> None:
+    assert o80.Joint.parse(text) == joint
+
+
+@pytest.mark.parametrize("text", ["", "=", "a=", "a=b*c", "a=two*b", "a=b+", "a=b=c", "a b"])
+def test_another_text_is_refused(text: str) -> None:
+    with pytest.raises(o80.InvalidArgument, match=r"FOLLOWER=SCALE\*LEADER\+OFFSET"):
+        o80.Joint.parse(text)
+
+
+def test_it_follows_a_hand_within_its_limits(segment: str) -> None:
+    choose = random.Random(3)
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        robots = o80.Teleoperation(hand, arm)
+        assert [joint.follower for joint in robots.joints] == ["elbow", "wrist"]
+        engage(robots)
+        for _ in range(300):
+            if choose.random() < 0.1:
+                places = [choose.uniform(-1.5, 1.5) for _ in range(3)]
+                hand.add_command(None, places, duration=choose.uniform(0.05, 0.5), mode="overwrite")
+            hand.burst(5)
+            assert robots.step()
+            arm.burst(5)
+        for _ in range(600):  # the hand rests
+            hand.burst(5)
+            robots.step()
+            arm.burst(5)
+        wrist, elbow, _ = hand.latest().observed
+        assert arm.latest().observed.tolist() == [np.clip(elbow, -1, 1), 0, np.clip(wrist, -1, 1)]
+        rows = arm.history()
+        speed = np.abs(np.diff(rows.desired, axis=0)).max() * SECOND
+        assert 0.5 < speed <= 2.0 * (1 + 1e-9)
+        assert not rows.clamped.any(), "targets are within the bounds"
+        assert robots.follower.halted is None
+
+
+def test_scale_and_offset_and_near(segment: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        joints = [o80.Joint("gripper", "lamp", -2.0, 0.6)]
+        robots = o80.Teleoperation(hand, arm, joints=joints, near=0.1)
+        for _ in range(100):
+            hand.burst(10)
+            assert not robots.step()
+            arm.burst(10)
+        assert robots.far == {"gripper": (0.6, 0.0)}
+        assert robots.why == "move the leader to where the follower is"
+        assert arm.latest().desired.tolist() == [0, 0, 0], "nothing moves before"
+        hand.add_command("lamp", 0.28, iterations=10)
+        hand.burst(10)
+        engage(robots)
+        assert robots.far == {}
+        hand.add_command("lamp", 0.1, iterations=10)
+        for _ in range(200):
+            hand.burst(5)
+            robots.step()
+            arm.burst(5)
+        assert arm.latest().observed[1] == pytest.approx(0.4)
+        # a halt ends it; after the resume both have to be near again
+        number = arm.halt("enough")
+        arm.burst(1)
+        hand.add_command("lamp", 0.3, iterations=10)
+        hand.burst(10)
+        assert not robots.step()
+        assert robots.why == f"'{arm.segment}' is halted: enough"
+        arm.resume(number)
+        arm.burst(1)
+        for _ in range(100):
+            hand.burst(10)
+            assert not robots.step()
+            arm.burst(10)
+        assert list(robots.far) == ["gripper"]
+        assert arm.latest().observed[1] == pytest.approx(0.4)
+
+
+def test_batches_say_by_which_row_of_the_leader_they_were_decided(segment: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        robots = o80.Teleoperation(hand, arm)
+        engage(robots)
+        arm.burst(1)
+        taken = [each for each in arm.journal() if each.kind == "taken" and each.commands]
+        assert taken[-1].seen is not None
+        assert (taken[-1].seen.epoch, taken[-1].seen.iteration) == (
+            hand.latest().epoch,
+            hand.latest().iteration,
+        )
+
+
+def leader(segment: str) -> o80.Backend:
+    backend = o80.Backend(segment, ["elbow"], frequency=200)
+    backend.publish([0.0])
+    return backend
+
+
+def test_silence_of_the_leader_halts_the_follower(segment: str) -> None:
+    with (
+        leader(f"{segment}-1") as backend,
+        o80.Frontend(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        robots = o80.Teleoperation(hand, arm)
+        while not robots.engaged:
+            backend.step()
+            backend.publish([0.0])
+            robots.step()
+            arm.burst(1)
+        assert not robots.step()
+        assert robots.why == f"the leader '{segment}-1' has published nothing for 0.2 s"
+        arm.burst(1)
+        assert arm.halted is not None
+        assert arm.halted.text == robots.why
+        assert not robots.step()  # once is enough
+        arm.resume(arm.halted.number)
+        arm.burst(1)
+        assert arm.halted is None
+        assert not robots.step()
+        arm.burst(1)
+        assert arm.halted is None
+
+
+@pytest.mark.parametrize("how", ["halt", "end"])
+def test_a_leader_that_halts_or_ends_halts_the_follower(segment: str, how: str) -> None:
+    with (
+        leader(f"{segment}-1") as backend,
+        o80.Frontend(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        robots = o80.Teleoperation(hand, arm)
+        while not robots.engaged:
+            backend.step()
+            backend.publish([0.0])
+            robots.step()
+            arm.burst(1)
+        if how == "halt":
+            backend.halt("a servo is silent")
+            backend.step()
+            backend.publish([0.0])
+            robots.step()
+        else:
+            backend.close()
+            with pytest.raises(o80.BackendGone):
+                robots.step()
+        arm.burst(1)
+        assert arm.halted is not None
+        said = "is halted" if how == "halt" else "has ended"
+        assert arm.halted.text == f"the leader '{segment}-1' {said}"
+
+
+@pytest.mark.parametrize(
+    ("joints", "text"),
+    [
+        (["elbow", "elbow"], "once"),
+        (["elbow=foot"], "has no joint 'foot', it has wrist, elbow, lamp"),
+        (["foot=elbow"], "has no joint 'foot', it has elbow, gripper, wrist"),
+        ([], "once"),
+    ],
+)
+def test_wrong_joints_are_refused(segment: str, joints: list[str], text: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+        pytest.raises(o80.InvalidArgument, match=text),
+    ):
+        o80.Teleoperation(hand, arm, joints=map(o80.Joint.parse, joints))
+
+
+def test_robots_without_a_common_joint_are_refused(segment: str) -> None:
+    with (
+        o80.Backend(f"{segment}-1", ["left"]) as one,
+        o80.Backend(f"{segment}-2", ["right"]) as other,
+    ):
+        one.publish([0.0])
+        other.publish([0.0])
+        with (
+            o80.Frontend(f"{segment}-1") as hand,
+            o80.Frontend(f"{segment}-2") as arm,
+            pytest.raises(o80.InvalidArgument, match="have no joint of the same name"),
+        ):
+            o80.Teleoperation(hand, arm)
+
+
+def test_the_command_marks_demonstrations_by_keys(segment: str, tmp_path: Path) -> None:
+    one, other = f"{segment}-1", f"{segment}-2"
+    robot = o80.robots.load("two_joints")
+    main, side = pty.openpty()
+    words = ["o80", "teleop", one, other, "--task", "wave", "--silence", "60"]
+    with (
+        robot.start(one, frequency=200) as leads,
+        robot.start(other, frequency=200) as follows,
+        leads.frontend() as hand,
+        follows.frontend() as arm,
+        o80.Recording(tmp_path / "run.mcap", arm) as recording,
+        subprocess.Popen(words, stdin=side, stdout=subprocess.PIPE, stderr=side) as command,
+    ):
+        os.close(side)
+        shown = b""
+
+        def until(text: str) -> None:
+            nonlocal shown
+            while text.encode() not in shown:
+                shown += os.read(main, 4096)
+            shown = shown.partition(text.encode())[2]
+
+        def press(key: str) -> None:
+            os.write(main, key.encode())
+
+        try:
+            until("follows")
+            until("q ends")
+            until("follows")  # after the head
+            for thrown_away in (False, True):
+                press(" ")
+                until("demonstration 1" if not thrown_away else "demonstration 2")
+                hand.add_command("elbow", 0.0 if thrown_away else 0.5, duration=0.5)
+                hand.pulse_and_wait(timeout=60)
+                press("x" if thrown_away else " ")
+                until("1 demonstration")
+            press("q")
+            assert command.stdout is not None
+            said = command.stdout.read().decode()
+            assert command.wait(60) == 0
+        finally:
+            command.kill()
+            os.close(main)
+        recording.flush()
+        assert arm.latest().desired[1] == pytest.approx(0.0, abs=0.2)
+    assert said.startswith("1 demonstration; delay from hand to motor")
+    episodes = episodes_of(o80.open(tmp_path / "run.mcap"))
+    (kept,) = episodes.all
+    assert (kept.task, kept.terminated) == ("wave", True)
+    assert np.ptp(kept.rows.observed[:, 1]) > 0.3
+    assert len(episodes.left_out) == 1
+    assert "thrown away" in episodes.left_out[0]
