@@ -156,6 +156,27 @@ def test_batches_say_by_which_row_of_the_leader_they_were_decided(segment: str) 
         )
 
 
+def test_a_follower_that_another_controls_does_not_follow(segment: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+        o80.Frontend(f"{segment}-2") as other,
+    ):
+        robots = o80.Teleoperation(hand, other)
+        for _ in range(100):
+            hand.burst(10)
+            robots.step()
+            arm.burst(10)
+        assert robots.engaged
+        with arm.control():
+            robots.step()
+            arm.burst(2)
+            assert not robots.step()
+            assert "rejects commands" in robots.why
+            assert "has exclusive control" in robots.why
+        assert arm.halted is None
+
+
 def leader(segment: str) -> o80.Backend:
     backend = o80.Backend(segment, ["elbow"], frequency=200)
     backend.publish([0.0])
@@ -232,6 +253,15 @@ def test_wrong_joints_are_refused(segment: str, joints: list[str], text: str) ->
         pytest.raises(o80.InvalidArgument, match=text),
     ):
         o80.Teleoperation(hand, arm, joints=map(o80.Joint.parse, joints))
+
+
+def test_a_robot_cannot_follow_itself(segment: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(segment) as arm,
+        o80.Frontend(segment) as other,
+        pytest.raises(o80.InvalidArgument, match="cannot follow itself"),
+    ):
+        o80.Teleoperation(other, arm)
 
 
 def test_robots_without_a_common_joint_are_refused(segment: str) -> None:

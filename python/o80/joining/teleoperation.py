@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 import o80._core as _core
 from o80.base.argument_checks import number
 from o80.base.errors import BackendGone, Error, InvalidArgument, TimeoutError
+from o80.base.words import Status
 from o80.rows.columns import Column, columns_of, value_of
 from o80.rows.history import values_of
 
@@ -80,6 +81,8 @@ class Teleoperation:
         near: float = NEAR,
         silence: float = SILENCE,
     ) -> None:
+        if leader.segment == follower.segment:
+            raise InvalidArgument(f"'{leader.segment}' cannot follow itself")
         self.leader, self.follower = leader, follower
         self.near, self.silence = number(near, "near"), number(silence, "silence")
         if not (0 < self.near < math.inf and 0 < self.silence < math.inf):
@@ -116,6 +119,7 @@ class Teleoperation:
         self._every = max(self._stride * leader.period, follower.period)
         self._last = leader.published  # row that was read
         self._near_since: int | None = None  # time of a row of the leader [ns]
+        self._sent: _core.Batch | None = None
         self.engaged = False  #: whether the follower follows
         self.why = ""  #: it does not
         self.far: dict[str, tuple[float, float]] = {}
@@ -140,9 +144,8 @@ class Teleoperation:
         if seen.halted:
             self._let_go(f"the leader '{self.leader.segment}' is halted")
             return False
-        if (halt := self.follower.halted) is not None:
-            self.engaged, self._near_since = False, None
-            self.why = f"'{self.follower.segment}' is halted: {halt.text or halt.cause}"
+        if why := self._refused():
+            self.engaged, self._near_since, self.why = False, None, why
             return False
         wanted = self.targets(seen)
         if not self.engaged:
@@ -151,7 +154,7 @@ class Teleoperation:
             for joint, field, place in zip(self.joints, self._fields, wanted.tolist(), strict=True):
                 state = {field: place} if field else place
                 self.follower.add_command(joint.follower, state, every=self._every)
-            self.follower.pulse(seen=seen)
+            self._sent = self.follower.pulse(seen=seen)
         return self.engaged
 
     def targets(self, seen: _core.Observation) -> NDArray[np.float64]:
@@ -194,6 +197,15 @@ class Teleoperation:
 
     def _wait_for_row(self, after: int) -> None:
         self.leader.wait_for(max(self._last + after, self.leader.oldest), self.silence)
+
+    def _refused(self) -> str:
+        """Why the follower takes no commands; empty if it does."""
+        if (halt := self.follower.halted) is not None:
+            return f"'{self.follower.segment}' is halted: {halt.text or halt.cause}"
+        sent, self._sent = self._sent, None
+        if sent is not None and sent[0].status == Status.REJECTED:
+            return f"'{self.follower.segment}' rejects commands: {sent[0].text or sent[0].reason}"
+        return ""
 
     def _let_go(self, why: str) -> None:
         self.why, self._near_since = why, None
