@@ -111,6 +111,8 @@ if TYPE_CHECKING:
     from o80.rows.provenance import ProvenanceFile as ProvenanceFile
     from o80.rows.record import Record as Record
     from o80.rows.record import States as States
+    from o80.view.pictures import Pictures as Pictures
+    from o80.view.pictures import write_film as write_film
     from o80.view.view import View as View
 else:  # a type checker that read this would accept every name
     # Imported when they are first used: they need NumPy, which takes most of the time of
@@ -128,6 +130,7 @@ else:  # a type checker that read this would accept every name
         "base.installation": "prefix",
         "joining.align": "Aligned AlignedHistory align",
         "joining.latency": "Latency latency",
+        "view.pictures": "Pictures write_film",
         "joining.teleoperation": "Joint Teleoperation",
         "rows.journal": "JournalCommand JournalEntry",
         "playing.playback": "Playback play",

@@ -23,8 +23,8 @@ FLOORS = (
     ("rows",),
     ("drivers", "frontend"),
     ("groups", "recording"),
-    ("datasets", "joining", "learning", "playing", "robots", "view"),
-    ("replaying",),
+    ("datasets", "joining", "playing", "robots", "view"),
+    ("learning", "replaying"),
     ("cli",),
 )
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}

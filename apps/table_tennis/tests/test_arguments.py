@@ -69,7 +69,7 @@ def test_without_a_renderer_the_error_names_the_extra(monkeypatch: pytest.Monkey
     monkeypatch.setitem(sys.modules, "OpenGL", None)
     with closing(gymnasium.make(o80_table_tennis.ACCELERATED, render_mode="rgb_array")) as made:
         made.reset(seed=1)
-        with pytest.raises(o80.MissingExtra, match=r'pip install "o80-table-tennis\[rendering\]"'):
+        with pytest.raises(o80.MissingExtra, match=r'pip install "o80\[rendering\]"'):
             made.render()
 
 

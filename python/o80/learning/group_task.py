@@ -8,11 +8,13 @@ import numpy as np
 from gymnasium import Space, spaces
 from numpy.typing import NDArray
 
+from o80.base.arrays import Image
 from o80.base.errors import InvalidArgument
 from o80.groups.gather import Gather
 from o80.groups.group_burst import GroupBurst
 from o80.groups.inline_group import InlineGroup
 from o80.learning.task import Index, Task
+from o80.view.pictures import Pictures
 
 
 class GroupTask(Task):
@@ -48,6 +50,13 @@ class GroupTask(Task):
         )
         self.group, self.burst, self.seen = group, burst, seen
         self._has_flags = seen.flags.shape[1] > 0
+        self._pictures: Pictures | None = None
+        if "model" in group[0].schema and type(self).render is GroupTask.render:
+            frames = 1 / (group[0].period * burst.rows.shape[1])
+            self.metadata = dict(self.metadata) | {
+                "render_modes": ["rgb_array"],
+                "render_fps": frames,
+            }
 
     def targets(self, actions: Any) -> Any:
         """The targets (n, steps, actuators) of a burst, of the actions (n, ...) of n copies.
@@ -78,6 +87,14 @@ class GroupTask(Task):
         raised: NDArray[np.bool_] = np.logical_or.reduce(self.seen.flags, axis=1)
         return raised
 
+    def render(self, copy: int) -> Image:
+        """A picture (height, width, 3) of the robot's model as the newest row of a copy says."""
+        if self._pictures is None:
+            self._pictures = Pictures(self.group[copy], model_files=True)
+        return self._pictures.draw(self.group[copy].latest())
+
     def close(self) -> None:
         """Closes the group."""
+        if self._pictures is not None:
+            self._pictures.close()
         self.group.close()

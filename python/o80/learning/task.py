@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium import Space
@@ -46,7 +46,7 @@ class Task(ABC):
     An argument `copies` of a method is an index of arrays over all copies.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: Mapping[str, Any] = {"render_modes": []}
     """Metadata of the environments: modes of rendering, among others."""
 
     def __init__(

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.arrays import Image
 from o80.base.errors import Error, MissingExtra
 from o80.view.base64_arrays import packed, packed_indices
 from o80.view.foreign_model import compiled
@@ -96,6 +97,20 @@ class Scene:
         """Names of the moving bodies; of one without a name, its number."""
         names = (self._model.body(body).name for body in self._moving)
         return [name or f"body_{body}" for name, body in zip(names, self._moving, strict=True)]
+
+    @property
+    def model(self) -> Any:
+        """The compiled model."""
+        return self._model
+
+    def picture(self, row: bytes, renderer: Any, camera: str | int) -> Image:
+        """A fresh picture (height, width, 3) of the observed positions."""
+        with self._lock:
+            self._pose(row, [place.observed for place in self._places], [])
+            self._mujoco.mj_camlight(self._model, self._data)
+            renderer.update_scene(self._data, camera)
+            picture: Image = renderer.render().copy()
+            return picture
 
     def observed(self, row: bytes) -> NDArray[np.float64]:
         """Observed positions and quaternions of the moving bodies (bodies, 7)."""

@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import ctypes.util
-import importlib
-import os
-import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from o80.base.arrays import FloatArray, Image
-from o80.base.extras import needed
 from o80.base.lifecycle import Closeable
+from o80.view.pictures import SHADOWS, renderer_of_mujoco, write_film
 
 from ..world.arm import JOINT_NAMES
 from ..world.ball import BALL_RADIUS
@@ -30,8 +26,6 @@ TITLE_HEIGHT = 28
 FRAMES_PER_SECOND = 25.0
 SLOW = 2.0
 """So many times slower than it was is what a film shows."""
-SHADOWS = 1024
-"""Size of the map of shadows [pixels]: finer ones take software renderers much longer."""
 OTHER_BALL = (0.95, 0.95, 0.92, 0.8)
 """Colour of the balls beside the one that is played."""
 
@@ -44,11 +38,7 @@ class Scene(Closeable):
     """
 
     def __init__(self, *, balls: int = 1, size: tuple[int, int] = SIZE) -> None:
-        needed("OpenGL", "rendering", "a picture", package="o80-table-tennis")
-        _choose_renderer()
-        import mujoco
-
-        self._mujoco = mujoco
+        self._mujoco = mujoco = renderer_of_mujoco()
         self._model = _model_with(balls)
         self._model.vis.quality.shadowsize = SHADOWS
         self._model.vis.quality.offsamples = 4
@@ -80,32 +70,6 @@ class Scene(Closeable):
 
     def _free_joint(self, ball: int) -> int:
         return int(self._model.joint(_ball_name(ball)).qposadr[0])
-
-
-def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float) -> int:
-    """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has.
-
-    Needs the extra `rendering`; raises o80.MissingExtra.
-    """
-    imageio_ffmpeg: Any = needed(
-        "imageio_ffmpeg", "rendering", "a film", package="o80-table-tennis"
-    )
-    writer: Any = None
-    frames = 0
-    try:
-        for picture in pictures:
-            if writer is None:
-                height, width = picture.shape[:2]
-                writer = imageio_ffmpeg.write_frames(
-                    str(path), (width, height), fps=frames_per_second, macro_block_size=2
-                )
-                writer.send(None)
-            writer.send(np.ascontiguousarray(picture))
-            frames += 1
-    finally:
-        if writer is not None:
-            writer.close()
-    return frames
 
 
 def film_episode(path: Path, joints: FloatArray, balls: FloatArray, *, period: float) -> int:
@@ -165,18 +129,6 @@ def write_picture(path: Path, picture: Image) -> None:
     from matplotlib.image import imsave
 
     imsave(path, picture)
-
-
-def _choose_renderer() -> None:
-    """EGL if it is there, else OSMesa: neither needs a screen.
-
-    MuJoCo looks at the variable when it is first imported; if that is past, its choice is replaced.
-    """
-    usual = "egl" if ctypes.util.find_library("EGL") else "osmesa"
-    chosen = os.environ.setdefault("MUJOCO_GL", usual)
-    contexts: Any = sys.modules.get("mujoco.rendering.classic.gl_context")
-    if contexts is not None and chosen in ("egl", "osmesa"):
-        contexts.GLContext = importlib.import_module(f"mujoco.{chosen}").GLContext
 
 
 def _ball_name(ball: int) -> str:

@@ -1,0 +1,127 @@
+"""Pictures and films of a robot's model, drawn without a screen."""
+
+from __future__ import annotations
+
+import ctypes.util
+import importlib
+import os
+import sys
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+import o80._core as _core
+from o80.base.arrays import Image
+from o80.base.errors import InvalidArgument
+from o80.base.extras import needed
+from o80.base.lifecycle import Closeable
+from o80.view.scene import Scene
+from o80.view.world import drawn
+
+SHADOWS = 1024
+"""Size of the map of shadows [pixels]: finer ones take software renderers much longer."""
+
+
+class Modelled(Protocol):
+    """A robot with a model: a frontend, or a run of a recording."""
+
+    @property
+    def schema(self) -> dict[str, Any]:
+        """The description of the robot."""
+
+    @property
+    def model(self) -> str:
+        """The model (MJCF); empty if the driver names none."""
+
+
+class Pictures(Closeable):
+    """Draws rows of a robot as its model looks, without a screen.
+
+    robot: a frontend, or a run of a recording (`o80.open(file)["arm"].epochs[0]`).
+    size: width and height [pixels].
+    camera: name or number of one of the model's (None: the first one, or from outside).
+    model_files: read the files (meshes) that the model names. Only for models that you trust.
+
+    Needs the extra `rendering`, and EGL or OSMesa; MUJOCO_GL chooses between them. Raises
+    o80.MissingExtra, and InvalidArgument for a robot without a model and for an unknown camera.
+    """
+
+    def __init__(
+        self,
+        robot: Modelled,
+        *,
+        size: tuple[int, int] = (480, 360),
+        camera: str | int | None = None,
+        model_files: bool = False,
+    ) -> None:
+        mujoco = renderer_of_mujoco()
+        what = drawn(robot.schema, robot.model, trusted=model_files)
+        if what is None:
+            raise InvalidArgument(f"'{robot.schema['robot']}' has no model that could be drawn")
+        self._scene = Scene(robot.schema, what)
+        model = self._scene.model
+        cameras = [model.camera(i).name for i in range(model.ncam)]
+        if camera is None:
+            camera = 0 if cameras else -1
+        if camera not in cameras and camera not in range(-1, len(cameras)):
+            known = ", ".join(map(str, cameras)) or "none"
+            raise InvalidArgument(f"the model has no camera {camera!r}; it has: {known}")
+        self._camera = camera
+        model.vis.quality.shadowsize = SHADOWS
+        model.vis.global_.offwidth = max(size[0], model.vis.global_.offwidth)
+        model.vis.global_.offheight = max(size[1], model.vis.global_.offheight)
+        self._renderer = mujoco.Renderer(model, size[1], size[0])
+
+    def draw(self, row: _core.Observation) -> Image:
+        """A fresh picture (height, width, 3) of where a row observed the robot."""
+        if self._renderer is None:
+            raise InvalidArgument("these pictures were closed; make new ones")
+        bytes_of_row: Any = row
+        return self._scene.picture(bytes(memoryview(bytes_of_row)), self._renderer, self._camera)
+
+    def close(self) -> None:
+        """Gives the renderer back; may be called twice."""
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
+
+
+def renderer_of_mujoco() -> Any:
+    """The module mujoco, drawing with EGL if that is there, else with OSMesa: without a screen.
+
+    MuJoCo looks at the variable when it is first imported; if that is past, its choice is replaced.
+    Raises o80.MissingExtra.
+    """
+    needed("OpenGL", "rendering", "a picture")
+    usual = "egl" if ctypes.util.find_library("EGL") else "osmesa"
+    chosen = os.environ.setdefault("MUJOCO_GL", usual)
+    contexts: Any = sys.modules.get("mujoco.rendering.classic.gl_context")
+    if contexts is not None and chosen in ("egl", "osmesa"):
+        contexts.GLContext = importlib.import_module(f"mujoco.{chosen}").GLContext
+    return needed("mujoco", "rendering", "a picture")
+
+
+def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float) -> int:
+    """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has.
+
+    Needs the extra `rendering`; raises o80.MissingExtra.
+    """
+    imageio_ffmpeg: Any = needed("imageio_ffmpeg", "rendering", "a film")
+    writer: Any = None
+    frames = 0
+    try:
+        for picture in pictures:
+            if writer is None:
+                height, width = picture.shape[:2]
+                writer = imageio_ffmpeg.write_frames(
+                    str(path), (width, height), fps=frames_per_second, macro_block_size=2
+                )
+                writer.send(None)
+            writer.send(np.ascontiguousarray(picture))
+            frames += 1
+    finally:
+        if writer is not None:
+            writer.close()
+    return frames
