@@ -105,6 +105,7 @@ void Simulation::step(std::uint32_t number) noexcept {
 }
 
 void Simulation::impose_joints(std::uint32_t number) noexcept {
+  if (now_.joints.empty() && !balls_) return;  // the next step begins with the kinematics
   const bool last = number + 1 == steps_;
   const double share = static_cast<double>(number + 1) / steps_;
   for (std::size_t i = 0; i < now_.joints.size(); ++i) {
