@@ -534,6 +534,24 @@ def test_fields_are_given_by_name(segment: str) -> None:
         assert robot.frontend.latest().desired["position"].tolist() == [0.3, 0.0]
 
 
+def test_a_chunk_moves_actuators_of_several_groups(segment: str) -> None:
+    groups = {"joints": (float, ["left", "right"]), "gripper": float}
+    with o80.Backend(segment, groups, bursting=True) as backend:
+        backend.publish(np.zeros_like(backend._observed))
+        with o80.Frontend(segment) as arm, arm.chunks(["gripper", "left"], step=5) as plan:
+            robot = Stepped(backend, arm)
+            plan.send([[0.1, 0.4], [0.2, 0.5]])
+            robot.run(5)
+            plan.send([[0.3, 0.6], [0.4, 0.7]])  # behind the first one
+            robot.run(1)
+            now = arm.published
+            planned = plan.planned(now, step=1)
+            robot.run(len(planned))
+            rows = arm.history(since=now + 1).desired
+            assert np.column_stack([rows.gripper, rows.joints[:, 0]]).tolist() == planned.tolist()
+            assert planned[-1].tolist() == [0.4, 0.7]
+
+
 def test_a_chunk_that_waits_is_planned(arm: o80.Frontend) -> None:
     arm.burst(10)
     with arm.chunks(step=10, ease=10) as plan:

@@ -226,6 +226,9 @@ class Chunks:
         self._arm = arm
         self._actuators, self._single = arm._chosen(actuators)
         self._kind = common_type(self._actuators, arm._layout)
+        schema = arm._layout.schema
+        begin, described = schema["row"]["desired"], schema["actuators"]
+        self._places = [begin + described[each]["offset"] for each in self._actuators]  # in a row
         self._switches = self._kind.kind == "b" or bool(common_labels(self._actuators, arm._layout))
         self.step = _fraction(step)  #: iterations from row to row
         self._dues = np.empty(0, np.int64)
@@ -554,8 +557,8 @@ class Chunks:
             former = part
 
     def _desired(self, row: _core.Observation) -> NDArray[np.float64]:
-        desired = row.desired
-        return np.array([desired[actuator] for actuator in self._actuators], np.float64)
+        numbers = [np.ndarray((), self._kind, row, at) for at in self._places]
+        return np.array(numbers, np.float64)
 
     def _motion(self, iteration: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Desired places and differences of a row, from the history; 0 for what does not act."""
