@@ -7,6 +7,7 @@
 #include <memory>
 
 #include "bindings.hpp"
+#include "describe/table.hpp"
 #include "frontend.hpp"
 #include "loop_options.hpp"
 #include "o80/base/error.hpp"
@@ -57,6 +58,7 @@ std::shared_ptr<o80::Description> description_of(const o80::RobotLibrary& librar
                                                  const o80::OptionValues& options) {
   auto description = std::make_shared<o80::Description>();
   description->schema = o80::DriverInstance(*library.table, options).describe();
+  o80::check(description->schema);
   description->layout = o80::row_layout(description->schema);
   return description;
 }

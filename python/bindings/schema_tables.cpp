@@ -118,7 +118,8 @@ nb::dict of_field(const Schema& schema, const TypeRow& type, const FieldRow& fie
   found["help"] = text(field.help.view());
   if (field.resting != 0) found["rest"] = number(field.rest);
   if (field.origin != Origin::robot) {
-    found["origin"] = field.origin == Origin::clock ? "clock" : "world";
+    constexpr const char* kOrigins[] = {"robot", "clock", "world", "absent"};
+    found["origin"] = kOrigins[static_cast<int>(field.origin)];
   }
   if (field.has_default != 0) {
     found["default"] =

@@ -100,6 +100,7 @@ if TYPE_CHECKING:
     from o80.replaying.replay import replay as replay
     from o80.replaying.report import ReplayReport as ReplayReport
     from o80.replaying.report import RunReport as RunReport
+    from o80.robots.robot import face as face
     from o80.rows.actuators import Actuator as Actuator
     from o80.rows.actuators import IntegralBounds as IntegralBounds
     from o80.rows.actuators import Limits as Limits
@@ -143,6 +144,7 @@ else:  # a type checker that read this would accept every name
         "recording.reader": "RecordingFile open",
         "recording.recording": "Recording",
         "replaying.replay": "replay",
+        "robots.robot": "face",
         "replaying.report": "ReplayReport RunReport",
         "frontend.segments": "Segment clean segments",
         "frontend.stopping": "halt stop",

@@ -111,7 +111,7 @@ void check_field(const Schema& schema, std::uint32_t type_index, const FieldRow&
   if (field.resting > 1 || !std::isfinite(field.rest) || (field.resting == 1 && !moves)) {
     refuse(name + "cannot rest: rests_at() needs a numeric field and a finite value");
   }
-  if (field.origin > Origin::world) refuse(name + "has an unknown origin");
+  if (field.origin > Origin::absent) refuse(name + "has an unknown origin");
   switch (field.kind) {
     case Kind::structure:
       // a nested type comes before the type that contains it, so there is no cycle

@@ -8,13 +8,14 @@
 
 #include "o80/base/nearest_name.hpp"
 #include "o80/describe/describe.hpp"
+#include "o80/describe/face.hpp"
 
 namespace o80 {
 
 /// One option of a robot: a field of its described Config, or of a described struct in it.
 struct Option {
   std::string name;
-  std::string kind;  // "number", "integer", "boolean", "text", "one of: a, b"
+  std::string kind;  // "number", "integer", "boolean", "text", "one of: a, b", "seed", "face"
   std::string default_text;
   std::string help;
   std::string unit;
@@ -34,6 +35,8 @@ template <class T>
 std::string option_kind() {
   if constexpr (std::is_same_v<T, Seed>) {
     return std::string(kSeedKind);
+  } else if constexpr (std::is_same_v<T, Face>) {
+    return std::string(kFaceKind);
   } else if constexpr (std::is_same_v<T, bool>) {
     return "boolean";
   } else if constexpr (std::is_integral_v<T>) {
@@ -60,6 +63,8 @@ template <class T>
 std::string option_text(const T& value) {
   if constexpr (std::is_same_v<T, Seed>) {
     return option_text(value.value);
+  } else if constexpr (std::is_same_v<T, Face>) {
+    return "";  // there is none unless it is given
   } else if constexpr (std::is_same_v<T, bool>) {
     return value ? "true" : "false";
   } else if constexpr (std::is_arithmetic_v<T>) {
@@ -93,6 +98,9 @@ template <class T>
 bool parse_option(std::string_view text, T& value) {
   if constexpr (std::is_same_v<T, Seed>) {
     return parse_option(text, value.value);
+  } else if constexpr (std::is_same_v<T, Face>) {
+    if (!text.empty()) value.schema = face_from(text);
+    return true;
   } else if constexpr (std::is_same_v<T, bool>) {
     const bool yes = text == "true" || text == "1" || text == "yes" || text == "True";
     const bool no = text == "false" || text == "0" || text == "no" || text == "False";

@@ -63,7 +63,8 @@ using FieldHelpText = FixedText<119>;
 enum class Origin : std::uint8_t {
   robot,  // its commands, its options and its former states
   clock,  // the time or the load of the machine, which differ from run to run
-  world   // a sensor: what no replay can repeat
+  world,  // a sensor: what no replay can repeat
+  absent  // none: a simulation has the field because the robot has it whose face it takes
 };
 constexpr Origin of_the_clock() { return Origin::clock; }
 constexpr Origin of_the_world() { return Origin::world; }

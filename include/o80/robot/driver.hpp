@@ -39,6 +39,7 @@ class Desired {
   T at(Place<T> place) const {
     return unpack<T>(view_.states + place.offset);
   }
+  const std::byte* bytes() const { return view_.states; }
   /// True if a command or braking gave this state; otherwise it is held or follows the observed
   /// state (when_idle).
   bool active(std::size_t actuator) const {
@@ -219,6 +220,8 @@ class Reading {
 /// - `Extended`, the type of further sensor values
 /// - `Requests` with `on(const Each&)`, which returns void or Served; a request that is answered
 ///   with `Served::running` ends by `Reading::ended`
+/// - `Served on(std::uint32_t request, const std::byte* payload)` serves the requests that
+///   `describe` adds to the schema: their numbers follow those of `Requests`
 /// - `wait(std::int64_t due)` waits for the robot's tick instead of the clock
 /// - `halt()` is called when a halt begins
 /// - `resume()` is called before a halt is cleared; it returns void or Served and may refuse

@@ -90,14 +90,17 @@ typename D::Config config_of(const OptionValue* values, std::uint32_t count) {
   return config;
 }
 
+inline RequestAnswer answer_of(const Served& served, FaultText* text) {
+  set_fault(text, served.text.data());
+  return static_cast<RequestAnswer>(served.kind);
+}
+
 template <Driver D, class Request>
 RequestAnswer serve(D& driver, const std::byte* payload, FaultText* text) {
   if constexpr (requires {
                   { driver.on(unpack<Request>(payload)) } -> std::same_as<Served>;
                 }) {
-    const Served served = driver.on(unpack<Request>(payload));
-    set_fault(text, served.text.data());
-    return static_cast<RequestAnswer>(served.kind);
+    return answer_of(driver.on(unpack<Request>(payload)), text);
   } else {
     driver.on(unpack<Request>(payload));
     return RequestAnswer::done;
@@ -187,14 +190,19 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
     };
     t.request = [](void* robot, std::uint32_t index, const std::byte* payload, FaultText* text) {
       return driving::guarded<RequestAnswer>(text, RequestAnswer::failed, [&] {
+        D& driver = *static_cast<D*>(robot);
         RequestAnswer answer = RequestAnswer::rejected;
         std::uint32_t i = 0;
-        [&]<class... Each>(Requests<Each...>) {
-          (void)((i++ == index &&
-                  (answer = driving::serve<D, Each>(*static_cast<D*>(robot), payload, text),
-                   true)) ||
-                 ...);
+        const bool known = [&]<class... Each>(Requests<Each...>) {
+          return (
+              (i++ == index && (answer = driving::serve<D, Each>(driver, payload, text), true)) ||
+              ...);
         }(RequestsOf<D>{});
+        if constexpr (requires {
+                        { driver.on(index, payload) } -> std::same_as<Served>;
+                      }) {
+          if (!known) answer = driving::answer_of(driver.on(index, payload), text);
+        }
         return answer;
       });
     };
@@ -213,9 +221,7 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
           if constexpr (requires {
                           { driver.resume() } -> std::same_as<Served>;
                         }) {
-            const Served served = driver.resume();
-            driving::set_fault(text, served.text.data());
-            return static_cast<RequestAnswer>(served.kind);
+            return driving::answer_of(driver.resume(), text);
           } else {
             driver.resume();
             return RequestAnswer::done;

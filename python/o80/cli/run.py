@@ -32,8 +32,22 @@ def run(context: typer.Context) -> None:
 
     if (place := robots.place_of(robot)) is not None:
         os.execv(sys.executable, [sys.executable, "-u", "-m", "o80.run_driver", place, *flags])
+    flags = _with_face(flags)
     program = Path(prefix()) / "bin" / "o80-run"
     os.execv(program, [str(program), str(robots.path_of(robot)), *flags])
+
+
+def _with_face(flags: list[str]) -> list[str]:
+    """The flags; in --like the text of a face instead of the name of a robot."""
+    joined: list[str] = []
+    for flag in flags:
+        joined.append(f"{joined.pop()}={flag}" if joined and joined[-1] == "--like" else flag)
+    for at, flag in enumerate(joined):
+        if flag.startswith("--like="):
+            import o80.robots.robot as robots
+
+            joined[at] = f"--like={robots.face_text(flag.removeprefix('--like='))}"
+    return joined
 
 
 def _print_robots() -> None:

@@ -18,6 +18,7 @@ from o80.base.installation import announced, prefix
 from o80.base.loop_options import did_you_mean, loop_options, loop_texts, names_of, text_of
 from o80.base.words import StaleWord
 from o80.frontend.frontend import Frontend
+from o80.robots.face import compared, described, is_text_of_face, text_of_face
 from o80.robots.process import Process, start_process
 
 if TYPE_CHECKING:
@@ -41,7 +42,7 @@ class Option:
     """One option of a robot, a field of its described Config."""
 
     name: str
-    kind: str  #: number, integer, boolean, text, "one of: a, b", or "3 x number"
+    kind: str  #: number, integer, boolean, text, seed, face, "one of: a, b", or "3 x number"
     default: str  #: as text
     help: str
     unit: str
@@ -93,6 +94,25 @@ def load(name_or_path: str | os.PathLike[str] | type[Any]) -> "Robot":
     if (announced_class := _announced_class(place)) is not None:
         return PythonRobot(announced_class)
     return Robot(_core.load_robot(str(path_of(name_or_path))))
+
+
+def face(of: Any) -> dict[str, Any]:
+    """The face of a robot: what a program sees of it, as plain data to compare and to save.
+
+    Groups, actuators with their limits, sensor values and requests, without those of simulations
+    (reset, snapshot, restore). A script that runs on one robot runs on each with an equal face.
+
+    of: a Robot, a frontend, a recorded segment, or the name of a running segment, of a robot, of a
+        recording (FILE.mcap, FILE.mcap:SEGMENT) or of a JSON file.
+
+    Raises InvalidArgument, DriverError, RecordingError.
+    """
+    return compared(described(of, load))
+
+
+def face_text(of: Any) -> str:
+    """The text of an option that takes a face; such a text, and an empty one, stay as they are."""
+    return of if of == "" or is_text_of_face(of) else text_of_face(described(of, load))
 
 
 def is_place(text: str) -> bool:
@@ -379,7 +399,7 @@ class Robot:
                 raise InvalidArgument(
                     f"option '{name}' of robot '{self.name}' must be a {kinds[name]}, got {value!r}"
                 )
-            texts.append((name, text_of(value)))
+            texts.append((name, face_text(value) if kinds[name] == "face" else text_of(value)))
         return texts
 
     def __reduce__(self) -> tuple[Any, ...]:

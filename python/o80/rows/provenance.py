@@ -113,4 +113,9 @@ def started_with(provenance: Provenance) -> list[str]:
 
 
 def _assignments(options: dict[str, str]) -> str:
-    return ", ".join(f"{plain(name)}={plain(text)}" for name, text in options.items())
+    """Names and texts; of a text with several lines, as that of a face, the first one."""
+    lines = {name: text.partition("\n") for name, text in options.items()}
+    return ", ".join(
+        f"{plain(name)}={plain(' '.join(first.split()) if more else first)}{'...' if more else ''}"
+        for name, (first, more, _) in lines.items()
+    )

@@ -264,7 +264,7 @@ TEST(Table, TheOriginOfAFieldIsKeptAndAnUnknownOneIsRefused) {
   EXPECT_EQ(origin(2), Origin::world);
   EXPECT_EQ(schema_from_bytes(to_bytes(schema)), schema);
 
-  origin(0) = static_cast<Origin>(3);
+  origin(0) = static_cast<Origin>(4);
   EXPECT_THROW(schema_from_bytes(to_bytes(schema)), Error);
 }
 
