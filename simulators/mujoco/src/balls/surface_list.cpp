@@ -1,8 +1,6 @@
 #include "balls/surface_list.hpp"
 
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <string_view>
 
 #include "engine/names.hpp"
@@ -15,29 +13,16 @@ namespace {
 /// "0.8" => 0.8 three times; "0.7 0.7 0.9" => these; a fourth number is the friction. False if the
 /// text is none of these.
 bool parse_bounce(std::string_view text, SurfaceEntry& entry) {
-  std::array<double, 4> numbers{};
-  std::size_t count = 0;
-  const char* at = text.data();
-  const char* const end = at + text.size();
-  while (at != end) {
-    if (*at == ' ') {
-      ++at;
-      continue;
-    }
-    double number = 0;
-    const auto [rest, error] = std::from_chars(at, end, number);
-    if (error != std::errc() || count == numbers.size() || (rest != end && *rest != ' '))
-      return false;
-    numbers[count++] = number;
-    at = rest;
-  }
+  const auto numbers = numbers_of(text);
+  const std::size_t count = numbers ? numbers->size() : 0;
   if (count == 1) {
-    entry.restitution.fill(numbers[0]);
+    entry.restitution.fill(numbers->front());
     return true;
   }
-  std::copy_n(numbers.begin(), 3, entry.restitution.begin());
-  if (count == 4) entry.friction = numbers[3];
-  return count >= 3;
+  if (count != 3 && count != 4) return false;
+  std::copy_n(numbers->begin(), 3, entry.restitution.begin());
+  if (count == 4) entry.friction = numbers->back();
+  return true;
 }
 
 void check(const SurfaceEntry& entry) {
@@ -52,14 +37,9 @@ void check(const SurfaceEntry& entry) {
   }
 }
 
-std::string without_spaces_at_end(std::string_view text) {
-  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
-  return std::string(text);
-}
-
 SurfaceEntry parsed_entry(const std::string& text, const Restitution& common) {
   const auto equals = text.find('=');
-  SurfaceEntry entry{.geom = without_spaces_at_end(text.substr(0, equals)), .restitution = common};
+  SurfaceEntry entry{.geom = trimmed(text.substr(0, equals)), .restitution = common};
   if (equals != std::string::npos &&
       !parse_bounce(std::string_view(text).substr(equals + 1), entry)) {
     throw DriverError("surfaces: '" + text +

@@ -3,20 +3,31 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <utility>
 
 #include "driver/steps_in_period.hpp"
 
 namespace o80::mujoco {
 namespace {
 
+/// The type of the states of joints. Its units say "rad or m" only where there are both.
+std::uint32_t type_of_states(Schema& schema, const std::vector<JointPlace>& joints) {
+  const std::uint32_t type = describing::type_of<JointState>(schema);
+  const auto slides = std::ranges::count(joints, true, &JointPlace::slides);
+  if (slides != 0 && slides != std::ssize(joints)) return type;
+  FieldRow* fields = schema.fields.data() + schema.types[type].first_field;
+  fields[0].unit = UnitText(slides != 0 ? "m" : "rad");
+  fields[1].unit = UnitText(slides != 0 ? "m/s" : "rad/s");
+  return type;
+}
+
 /// Adds an array of actuators, named as the members of the model; returns the place of each.
 template <class T, class Member>
-std::vector<Place<T>> add_group(Schema& schema, std::string_view group,
+std::vector<Place<T>> add_group(Schema& schema, std::string_view group, std::uint32_t type,
                                 const std::vector<Member>& members) {
-  if (members.empty()) return {};
   const auto first = static_cast<std::uint32_t>(schema.actuators.size());
   const auto count = static_cast<std::uint32_t>(members.size());
-  schema.add_actuators(group, describing::type_of<T>(schema), count);
+  schema.add_actuators(group, type, count);
   std::vector<Place<T>> places(count);
   for (std::uint32_t i = 0; i < count; ++i) {
     schema.actuator(first + i).name(members[i].name).when_idle(WhenIdle::hold);
@@ -26,10 +37,12 @@ std::vector<Place<T>> add_group(Schema& schema, std::string_view group,
 }
 
 /// Adds the states of joints as a sensor value; returns the place of each.
-std::vector<Place<JointState>> add_joint_sensors(Schema& schema, std::size_t count) {
+std::vector<Place<JointState>> add_joint_sensors(Schema& schema,
+                                                 const std::vector<JointPlace>& joints) {
+  const std::size_t count = joints.size();
   FieldRow field = scalar_field("joints", Kind::structure, "in the model's order",
                                 static_cast<std::uint32_t>(count));
-  field.type = describing::type_of<JointState>(schema);
+  field.type = type_of_states(schema, joints);
   const std::uint32_t first = schema.add_sensor(field);
   std::vector<Place<JointState>> places(count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -38,19 +51,58 @@ std::vector<Place<JointState>> add_joint_sensors(Schema& schema, std::size_t cou
   return places;
 }
 
+/// Adds the actuators of joints that are driven, at the begin of the states.
+void add_face(const JointFace& face, Schema& schema) {
+  const Schema& own = face.schema;
+  for (const GroupRow& group : own.groups) {
+    const TypeRow& type = own.types[group.type];
+    const auto first = own.fields.begin() + type.first_field;
+    const std::uint32_t added = schema.add_type(type.name.view(), {first, first + type.fields});
+    schema.add_actuators(group.name.view(), added, group.count);
+  }
+  for (std::uint32_t i = 0; i < own.actuators.size(); ++i) {
+    schema.actuator(i).name(own.actuators[i].name.view());
+  }
+  schema.limits = own.limits;
+  schema.integrals = own.integrals;
+}
+
+/// The requests that only these simulations have.
+struct BallRequests {
+  using Actuators = RunTimeActuators;
+  using Requests = o80::Requests<ClearContacts, FlyOut>;
+};
+
 }  // namespace
 
-MujocoDriver::MujocoDriver(const Config& config) : simulation_(config), steps_(config.steps) {
+MujocoDriver::MujocoDriver(const Config& config)
+    : simulation_(config), steps_(config.steps), is_like_(!config.like.empty()) {
   Schema schema;
   places_ = add_to(schema);
 }
 
 MujocoDriver::Places MujocoDriver::add_to(Schema& schema) const {
   Places places;
-  add_actuators(schema, places);
-  add_sensors(schema, places);
+  if (is_like_) {
+    take_face(schema);
+  } else {
+    describe_types<BallRequests>(schema);
+    add_actuators(schema, places);
+    add_sensors(schema, places);
+  }
   show(schema, places);
   return places;
+}
+
+/// Takes all from the other robot, but for its name, and puts the requests of simulations first.
+void MujocoDriver::take_face(Schema& schema) const {
+  Schema own = face()->schema;
+  const std::vector<RequestRow> others = std::exchange(own.requests, {});
+  describe_types<MujocoDriver>(own);
+  own.requests.insert(own.requests.end(), others.begin(), others.end());
+  own.head.robot = schema.head.robot;
+  if (schema.head.period != 0) own.head.period = schema.head.period;
+  schema = std::move(own);
 }
 
 /// Names the model for viewers, and the values that move its joints and balls.
@@ -62,16 +114,25 @@ void MujocoDriver::show(Schema& schema, const Places& places) const {
     schema.shown.joint(model.joints[i].name, places.joints[i].offset);
   }
   for (std::size_t i = 0; i < places.joint_sensors.size(); ++i) {
+    if (face() && face()->moves(model.joints[i].position)) continue;
     schema.shown.joint(model.joints[i].name, places.joint_sensors[i].offset, ShownFrom::extended);
   }
+  if (face()) face()->show(*model.model, schema.shown);
   if (const Balls* balls = simulation_.balls()) places.balls.show(schema.shown, *balls);
 }
 
 void MujocoDriver::add_actuators(Schema& schema, Places& places) const {
   const Model& model = simulation_.model();
-  if (model.controls.empty()) places.joints = add_group<JointState>(schema, "joints", model.joints);
+  if (face()) add_face(*face(), schema);
+  if (model.imposed && !model.joints.empty()) {
+    const std::uint32_t type = type_of_states(schema, model.joints);
+    places.joints = add_group<JointState>(schema, "joints", type, model.joints);
+  }
   const auto first_control = static_cast<std::uint32_t>(schema.actuators.size());
-  places.controls = add_group<double>(schema, "controls", model.controls);
+  if (!model.controls.empty()) {
+    places.controls =
+        add_group<double>(schema, "controls", describing::type_of<double>(schema), model.controls);
+  }
   for (std::uint32_t i = 0; i < model.controls.size(); ++i) {
     const ControlPlace& control = model.controls[i];
     if (!control.limited) continue;
@@ -86,8 +147,8 @@ void MujocoDriver::add_sensors(Schema& schema, Places& places) const {
   if (const Balls* balls = simulation_.balls()) places.balls.add_sensors(schema, *balls);
   places.clock.offset = schema.add_sensor(scalar_field(
       "clock", Kind::int64, "iterations since the start or a reset; a restore sets it back too"));
-  if (!model.controls.empty() && !model.joints.empty()) {
-    places.joint_sensors = add_joint_sensors(schema, model.joints.size());
+  if (!model.imposed && !model.joints.empty()) {
+    places.joint_sensors = add_joint_sensors(schema, model.joints);
   }
   if (simulation_.integrates()) {
     places.engine_contacts.offset = schema.add_sensor(
@@ -101,12 +162,28 @@ void MujocoDriver::add_sensors(Schema& schema, Places& places) const {
 }
 
 void MujocoDriver::describe(Schema& schema) const {
-  (void)add_to(schema);
   const std::int64_t requested = schema.asked_period();
+  (void)add_to(schema);
+  if (is_like_) {  // any rate, as the other robot
+    constexpr std::int64_t kDefault = 1'000'000;
+    if (schema.head.period == 0) schema.period(kDefault);
+    period_ = schema.head.period;
+    return;
+  }
   const double timestep = simulation_.timestep();
   const std::uint32_t steps =
       requested == 0 ? std::max(1U, steps_) : steps_in_period(requested, timestep, steps_);
   schema.period(std::llround(steps * (timestep * 1e9)));
+}
+
+/// With the face of another robot its period is a whole number of steps of the engine, which are at
+/// most as long as those of the model.
+void MujocoDriver::start() {
+  if (!is_like_) return;
+  const double period = static_cast<double>(period_) * 1e-9;
+  const double most = std::ceil(period / simulation_.timestep() * (1 - kPeriodTolerance));
+  simulation_.steps(steps_ > 0 ? steps_ : static_cast<std::uint32_t>(std::max(1.0, most)), period);
+  steps_known_ = true;
 }
 
 // desired => targets => one iteration
@@ -123,6 +200,7 @@ void MujocoDriver::write(const Desired<MujocoDriver>& desired) {
   for (std::size_t i = 0; i < places_.controls.size(); ++i) {
     targets.controls[i] = desired.at(places_.controls[i]);
   }
+  std::copy_n(desired.bytes(), targets.states.size(), targets.states.begin());
   if (Balls* balls = simulation_.balls()) places_.balls.write(desired, *balls);
   simulation_.advance();
 }
@@ -134,8 +212,17 @@ void MujocoDriver::read(Reading<MujocoDriver>& reading) {
   for (std::size_t i = 0; i < places_.controls.size(); ++i) {
     reading.observe(places_.controls[i], simulation_.control(i));
   }
+  if (face()) {
+    const std::vector<std::byte>& states = simulation_.targets().states;
+    std::ranges::copy(states, reading.observed_bytes());
+    face()->observe(simulation_.data(), reading.observed_bytes());
+  }
   if (const Balls* balls = simulation_.balls()) places_.balls.read(*balls, reading);
-  read_sensors(reading);
+  if (is_like_) {
+    face()->extend(simulation_.data(), reading.time(), reading.extended_bytes());
+  } else {
+    read_sensors(reading);
+  }
   if (reading.fresh()) go_on_from_targets(reading);
   if (simulation_.diverged()) {
     reading.fault(
@@ -165,6 +252,10 @@ void MujocoDriver::read_sensors(Reading<MujocoDriver>& reading) const {
 void MujocoDriver::go_on_from_targets(Reading<MujocoDriver>& reading) {
   const Targets& targets = simulation_.targets();
   std::byte* desired = reading.desired_bytes();
+  // joints that are driven go on from where they are, as those of a robot; a restore is exact
+  const std::byte* states =
+      std::exchange(restored_, false) ? targets.states.data() : reading.observed_bytes();
+  std::copy_n(states, targets.states.size(), desired);
   for (std::size_t i = 0; i < places_.joints.size(); ++i) {
     pack(targets.joints[i], desired + places_.joints[i].offset);
   }
@@ -185,16 +276,21 @@ Served MujocoDriver::on(const Snapshot& snapshot) noexcept {
 
 Served MujocoDriver::on(const Restore& restore) noexcept {
   if (restore.slot >= simulation_.slots()) return no_such_slot();
-  if (simulation_.restore(restore.slot)) return Served::start_afresh();
+  if (simulation_.restore(restore.slot)) {
+    restored_ = true;
+    return Served::start_afresh();
+  }
   return Served::rejected("this slot holds no snapshot: send the request snapshot first");
 }
 
-Served MujocoDriver::on(const ClearContacts& which) noexcept {
-  return clear_contacts(simulation_.balls(), which);
-}
-
-Served MujocoDriver::on(const FlyOut& request) noexcept {
-  return fly_out(simulation_.balls(), request);
+/// The requests about balls, or those of the other robot.
+Served MujocoDriver::on(std::uint32_t request, const std::byte* payload) noexcept {
+  if (is_like_) {
+    return Served::rejected(
+        "this simulation only describes the request; the robot itself serves it");
+  }
+  return request == 3 ? clear_contacts(simulation_.balls(), unpack<ClearContacts>(payload))
+                      : fly_out(simulation_.balls(), unpack<FlyOut>(payload));
 }
 
 Served MujocoDriver::no_such_slot() const noexcept {

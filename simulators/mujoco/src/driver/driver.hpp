@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "balls/ball_requests.hpp"
@@ -16,13 +17,13 @@ class MujocoDriver {
  public:
   using Config = mujoco::Config;
   using Actuators = RunTimeActuators;
-  using Requests = o80::Requests<Reset, Snapshot, Restore, ClearContacts, FlyOut>;
+  using Requests = o80::Requests<Reset, Snapshot, Restore>;  // describe() adds others
 
   /// Throws DriverError.
   explicit MujocoDriver(const Config& config);
 
   void describe(Schema& schema) const;
-  void start() {}
+  void start();
   void write(const Desired<MujocoDriver>& desired);
   void read(Reading<MujocoDriver>& reading);
   void stop() noexcept {}
@@ -37,8 +38,7 @@ class MujocoDriver {
   bool load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept {
     return simulation_.load_snapshot(slot, bytes);
   }
-  Served on(const ClearContacts& which) noexcept;
-  Served on(const FlyOut& request) noexcept;
+  Served on(std::uint32_t request, const std::byte* payload) noexcept;
 
  private:
   using Number = Place<double>;
@@ -53,15 +53,20 @@ class MujocoDriver {
     std::vector<Number> sensors;
   };
   Places add_to(Schema& schema) const;
+  void take_face(Schema& schema) const;
   void add_actuators(Schema& schema, Places& places) const;
   void add_sensors(Schema& schema, Places& places) const;
   void show(Schema& schema, const Places& places) const;
   void read_sensors(Reading<MujocoDriver>& reading) const;
   void go_on_from_targets(Reading<MujocoDriver>& reading);
   Served no_such_slot() const noexcept;
+  const std::optional<JointFace>& face() const noexcept { return simulation_.model().face; }
 
   Simulation simulation_;
   std::uint32_t steps_;  // 0: as many as the period holds
+  bool is_like_;         // it has the face of another robot
+  bool restored_ = false;
+  mutable std::int64_t period_ = 0;  // as described, with the face of another robot [ns]
   Places places_;
   bool steps_known_ = false;
 };

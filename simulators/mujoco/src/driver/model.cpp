@@ -70,8 +70,8 @@ std::vector<JointPlace> joints_in(const mjModel& model, const std::vector<std::s
   std::vector<JointPlace> joints;
   joints.reserve(ids.size());
   for (const int id : ids) {
-    joints.push_back(
-        {name_of(model, mjOBJ_JOINT, id, "joint"), model.jnt_qposadr[id], model.jnt_dofadr[id]});
+    joints.push_back({name_of(model, mjOBJ_JOINT, id, "joint"), model.jnt_qposadr[id],
+                      model.jnt_dofadr[id], model.jnt_type[id] == mjJNT_SLIDE});
   }
   return joints;
 }
@@ -105,11 +105,28 @@ std::vector<ControlPlace> controls_in(const mjModel& model) {
   return controls;
 }
 
+void check_options(const Config& config) {
+  if (config.like.empty()) {
+    if (config.limits.empty() || config.mode == JointMode::actuated) return;
+    throw DriverError(
+        "limits are for mode=actuated: mode imposed has none, control those of the "
+        "model");
+  }
+  if (!config.limits.empty())
+    throw DriverError("with like the limits are those of the other robot");
+  if (config.mode == JointMode::control)
+    throw DriverError("like drives the joints: leave out mode=control");
+  if (has_balls(config.ball_options)) {
+    throw DriverError("with like all actuators are those of the other robot: leave out balls");
+  }
+}
+
 }  // namespace
 
 Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
              const std::function<void(mjModel&)>& finish) {
   check_version(mj_version(), mj_versionString());
+  check_options(config);
   const SpecPointer spec = parsed(config.model);
   edit(*spec);
   ModelPointer own = compiled(config.model, *spec);
@@ -126,9 +143,19 @@ Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
   finish(*own);
   model = shared(std::move(own));
   if (!config.keyframe.empty()) keyframe = find(*model, mjOBJ_KEY, config.keyframe, "keyframe");
-  joints = joints_in(*model, entries_of(config.joints));
   sensors = sensors_in(*model);
+  const bool actuated = config.mode == JointMode::actuated || !config.like.empty();
+  joints = joints_in(*model, actuated ? std::vector<std::string>{} : entries_of(config.joints));
+  imposed = config.mode == JointMode::imposed && !actuated;
   if (config.mode == JointMode::control) controls = controls_in(*model);
+  if (actuated) face = joint_face(*model, config);
+}
+
+void Model::timestep(double step) {
+  if (step == model->opt.timestep) return;
+  ModelPointer own(mj_copyModel(nullptr, model.get()));
+  own->opt.timestep = step;
+  model = shared(std::move(own));
 }
 
 }  // namespace o80::mujoco

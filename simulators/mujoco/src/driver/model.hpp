@@ -1,10 +1,12 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "driver/config.hpp"
+#include "driver/joint_face.hpp"
 #include "engine/shared_models.hpp"
 
 namespace o80::mujoco {
@@ -14,6 +16,7 @@ struct JointPlace {
   std::string name;
   int position;  // in qpos
   int velocity;  // in qvel
+  bool slides;   // else it turns
 };
 
 /// One sensor of the model: a number or a vector.
@@ -44,8 +47,13 @@ struct Model {
   std::string file;  // absolute path of the model
   int keyframe = -1;
   std::vector<JointPlace> joints;
-  std::vector<ControlPlace> controls;  // empty if joints are imposed
+  bool imposed;                        // joints are set; else the inputs of actuators are
+  std::vector<ControlPlace> controls;  // of mode control
+  std::optional<JointFace> face;       // of mode actuated, or of another robot
   std::vector<SensorPlace> sensors;
+
+  /// Changes the step of the engine [s].
+  void timestep(double step);
 };
 
 }  // namespace o80::mujoco

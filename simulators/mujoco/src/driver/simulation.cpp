@@ -20,7 +20,8 @@ Simulation::Simulation(const Config& config)
           config, [&](mjSpec& spec) { add_extra_balls(spec, config.ball_options); },
           [&](mjModel& model) { switch_off_contacts(model, config.ball_options); }) {
   if (has_balls(config.ball_options)) balls_.emplace(*model_.model, config.ball_options);
-  now_.targets.joints.resize(model_.controls.empty() ? model_.joints.size() : 0);
+  now_.targets.joints.resize(model_.imposed ? model_.joints.size() : 0);
+  if (model_.face) now_.targets.states.resize(model_.face->schema.head.block);
   now_.targets.controls.resize(model_.controls.size());
   now_.joints.resize(now_.targets.joints.size());
   const std::size_t moved = now_.joints.size() + (balls_ ? balls_->degrees_of_freedom() : 0);
@@ -49,6 +50,7 @@ void Simulation::add_slots(std::uint32_t count) {
 void Simulation::reset() noexcept {
   now_.clock = 0;
   mj_resetDataKeyframe(model_.model.get(), data_.get(), model_.keyframe);
+  if (model_.face) model_.face->hold(*data_);
   if (integrates_ || !model_.sensors.empty()) {
     mj_forward(model_.model.get(), data_.get());
   } else {
@@ -87,6 +89,7 @@ void Simulation::advance() noexcept {
   for (std::size_t i = 0; i < now_.targets.controls.size(); ++i) {
     data_->ctrl[model_.controls[i].address] = now_.targets.controls[i];
   }
+  if (model_.face) model_.face->drive(now_.targets.states.data(), *data_);
   if (balls_) balls_->begin_iteration(period());
   for (std::uint32_t number = 0; number < steps_; ++number) step(number);
   now_.joints = now_.targets.joints;

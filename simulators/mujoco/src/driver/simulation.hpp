@@ -22,6 +22,7 @@ O80_DESCRIBE(JointState, (position, "[rad or m]"), (velocity, "[rad/s or m/s]", 
 struct Targets {
   std::vector<JointState> joints;
   std::vector<double> controls;
+  std::vector<std::byte> states;  // of mode actuated, as desired
 };
 
 /// A model in motion: its joints are imposed or controlled, the engine integrates the rest.
@@ -40,6 +41,11 @@ class Simulation {
   double period() const noexcept { return timestep() * steps_; }
   /// Sets the steps of the engine in an iteration, at least 1.
   void steps(std::uint32_t count) noexcept { steps_ = count; }
+  /// The same, and changes the engine's so that they last one period [s].
+  void steps(std::uint32_t count, double period) {
+    steps_ = count;
+    model_.timestep(period / count);
+  }
   /// Targets of the next `advance`.
   Targets& targets() noexcept { return now_.targets; }
   /// Null if the options name none.
@@ -61,6 +67,7 @@ class Simulation {
   /// Fills a slot; false if there is no such slot, or if the bytes are those of another model.
   bool load_snapshot(std::size_t slot, std::span<const std::byte> bytes) noexcept;
 
+  const mjData& data() const noexcept { return *data_; }
   JointState joint(std::size_t i) const noexcept;
   double control(std::size_t i) const noexcept;
   std::span<const double> sensor(std::size_t i) const noexcept;

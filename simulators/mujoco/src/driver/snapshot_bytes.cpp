@@ -25,6 +25,7 @@ void Simulation::each_part(Slot& slot, Bytes& bytes) noexcept {
   bytes(slot.state.engine_contacts);
   bytes(slot.state.targets.joints);
   bytes(slot.state.targets.controls);
+  bytes(slot.state.targets.states);
   bytes(slot.state.joints);
   bytes(slot.balls.targets);
   bytes(slot.balls.balls);

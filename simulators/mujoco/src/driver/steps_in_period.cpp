@@ -9,9 +9,6 @@
 namespace o80::mujoco {
 namespace {
 
-/// Share of a period: the rounding of a printed frequency.
-constexpr double kPeriodTolerance = 1e-5;
-
 // times in [ns]
 
 [[noreturn]] void refuse_steps(double period, double step, std::uint32_t steps) {

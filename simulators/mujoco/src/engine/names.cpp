@@ -1,5 +1,7 @@
 #include "engine/names.hpp"
 
+#include <charconv>
+
 #include "o80/base/error.hpp"
 #include "o80/base/nearest_name.hpp"
 
@@ -16,6 +18,8 @@ int count_of(const mjModel& model, mjtObj kind) {
       return static_cast<int>(model.ngeom);
     case mjOBJ_KEY:
       return static_cast<int>(model.nkey);
+    case mjOBJ_ACTUATOR:
+      return static_cast<int>(model.nactuator);
     default:
       return 0;
   }
@@ -23,17 +27,37 @@ int count_of(const mjModel& model, mjtObj kind) {
 
 }  // namespace
 
+std::string trimmed(std::string_view text) {
+  while (!text.empty() && text.front() == ' ') text.remove_prefix(1);
+  while (!text.empty() && text.back() == ' ') text.remove_suffix(1);
+  return std::string(text);
+}
+
 std::vector<std::string> entries_of(std::string_view list) {
   std::vector<std::string> entries;
   while (!list.empty()) {
     const auto comma = list.find(',');
-    std::string_view entry = list.substr(0, comma);
+    const std::string entry = trimmed(list.substr(0, comma));
     list.remove_prefix(comma == std::string_view::npos ? list.size() : comma + 1);
-    while (!entry.empty() && entry.front() == ' ') entry.remove_prefix(1);
-    while (!entry.empty() && entry.back() == ' ') entry.remove_suffix(1);
-    if (!entry.empty()) entries.emplace_back(entry);
+    if (!entry.empty()) entries.push_back(entry);
   }
   return entries;
+}
+
+std::optional<std::vector<double>> numbers_of(std::string_view text) {
+  std::vector<double> numbers;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (at != end) {
+    if (*at == ' ') {
+      ++at;
+      continue;
+    }
+    const auto [rest, error] = std::from_chars(at, end, numbers.emplace_back());
+    if (error != std::errc() || (rest != end && *rest != ' ')) return std::nullopt;
+    at = rest;
+  }
+  return numbers;
 }
 
 std::string name_of(const mjModel& model, mjtObj kind, int id, const char* fallback) {

@@ -2,6 +2,7 @@
 
 #include <mujoco/mujoco.h>
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -10,8 +11,14 @@
 
 namespace o80::mujoco {
 
+/// Without spaces around it.
+std::string trimmed(std::string_view text);
+
 /// The entries of a comma-separated list, without spaces around them.
 std::vector<std::string> entries_of(std::string_view list);
+
+/// Numbers separated by spaces; none if the text has anything else.
+std::optional<std::vector<double>> numbers_of(std::string_view text);
 
 /// The name of an element; `<fallback>_<id>` if the model gives none.
 std::string name_of(const mjModel& model, mjtObj kind, int id, const char* fallback);

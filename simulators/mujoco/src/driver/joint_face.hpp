@@ -1,0 +1,59 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "driver/config.hpp"
+#include "engine/servos.hpp"
+#include "o80/describe/schema.hpp"
+
+namespace o80::mujoco {
+
+/// The joints of a model as actuators of o80, each driven by its servo, with the face that the
+/// model gives (mode actuated) or that of another robot (like).
+struct JointFace {
+  /// One input of the model's actuators.
+  struct Input {
+    std::uint32_t offset;  // of the number that it takes, in the states
+    Line line;             // from that number to ctrl
+    int control;           // address in ctrl
+    int position;          // address in qpos of what it holds after a reset; -1: it takes 0
+    Line hold;             // from there to ctrl
+  };
+  /// Where a number of a row comes from.
+  struct Number {
+    std::uint32_t offset;
+    Quantity quantity;  // none: a sensor
+    int joint;          // id
+    int address;        // in qpos, in qvel and its forces, or in sensordata
+    Line line;          // from the number to that of the joint
+  };
+
+  /// The actuators; with like also sensor values, requests and the period (0: any).
+  Schema schema;
+  std::vector<Input> inputs;
+  std::vector<Number> states;
+  std::vector<Number> sensors;
+  std::vector<std::uint32_t> capture_times;
+  std::vector<std::byte> absent;  // sensor values: NaN or 0 where the model has none
+
+  /// True if a state has the position of this address in qpos.
+  bool moves(int position) const noexcept;
+  /// Names the joints that the states move, for viewers.
+  void show(const mjModel& model, ShownModel& shown) const;
+  /// Sets the inputs as the states say.
+  void drive(const std::byte* block, mjData& data) const noexcept;
+  /// Sets the inputs so that the joints stay.
+  void hold(mjData& data) const noexcept;
+  /// Observed numbers of the states; those that no joint has are left.
+  void observe(const mjData& data, std::byte* block) const noexcept;
+  void extend(const mjData& data, std::int64_t time, std::byte* extended) const noexcept;
+};
+
+/// Throws DriverError: a joint or its actuator is missing, or it cannot do what the face says.
+JointFace joint_face(const mjModel& model, const Config& config);
+
+}  // namespace o80::mujoco

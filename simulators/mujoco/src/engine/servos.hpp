@@ -1,0 +1,41 @@
+#pragma once
+
+#include <mujoco/mujoco.h>
+
+#include <cstdint>
+#include <limits>
+#include <vector>
+
+namespace o80::mujoco {
+
+/// A number of a joint: what an actuator of the model is told, or what is read.
+enum class Quantity : std::uint8_t { position, velocity, effort, none };
+
+/// From one number to another: factor x number + shift.
+struct Line {
+  double factor = 1;
+  double shift = 0;
+  double of(double number) const noexcept { return factor * number + shift; }
+  double back(double number) const noexcept { return (number - shift) / factor; }
+};
+
+struct Range {
+  double low = -std::numeric_limits<double>::infinity();
+  double high = std::numeric_limits<double>::infinity();
+};
+
+/// An actuator of the model that drives a hinge or a slide.
+struct Servo {
+  int actuator, joint;  // ids
+  int control;          // address in ctrl
+  Quantity commanded;   // of the joint
+  Line input;           // from that number, in [rad], [m], ... of the joint, to ctrl
+  Range allowed;    // values of that number, by ctrlrange; of a position also by the joint's range
+  Range positions;  // the joint's range
+};
+
+/// The servos of a model, in the order of its actuators. An actuator belongs to them if it acts on
+/// one hinge or slide, has one input, and a force that is linear in it.
+std::vector<Servo> servos_in(const mjModel& model);
+
+}  // namespace o80::mujoco
