@@ -9,7 +9,7 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = (".", "simulators/mujoco", "robots/pam", "devices", "apps/table_tennis")
+PACKAGES = (".", "simulators/mujoco", "robots/pam", "robots/arms", "devices", "apps/table_tennis")
 
 
 def requirements(kind: str, extras: list[str]) -> list[str]:

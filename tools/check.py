@@ -12,7 +12,7 @@ from sources import ROOT
 from steps import LOGS, PYTHON, Step, build, ctest, pytest, run_beside, times, use_tools
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
-PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_devices", "o80_table_tennis")
+PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_arms", "o80_devices", "o80_table_tennis")
 TYPED = (  # beside the packages
     "tools",
     "benchmarks",
@@ -26,6 +26,7 @@ TYPED_TESTS = (
     "tests/processes",
     "tests/consumer",
     "tests/tools",
+    "robots/arms/tests",
     "robots/pam/tests",
     "simulators/mujoco/tests",
     "devices/tests",

@@ -82,7 +82,7 @@ install_tools() {
   say "installed what running ${1:+and testing }needs"
 }
 
-# install_package NAME FOLDER [DEFINITION...]: one of the five packages, whose requirements are there
+# install_package NAME FOLDER [DEFINITION...]: one of the packages, whose requirements are there
 install_package() {
   local name=$1 folder=$2
   shift 2
@@ -105,6 +105,8 @@ install_others() {
   once table_tennis "$(package_state apps/table_tennis)" \
     install_package o80-table-tennis ./apps/table_tennis
   once pam "$headers $(package_state robots/pam)" install_package o80-pam ./robots/pam "$checkout"
+  once arms "$headers $(package_state robots/arms)" \
+    install_package o80-arms ./robots/arms "$checkout"
   once mujoco "$headers $(package_state simulators/mujoco)" \
     install_package o80-mujoco ./simulators/mujoco "$checkout"
   case $purpose in

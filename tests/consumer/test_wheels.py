@@ -14,6 +14,7 @@ import pytest
 pytestmark = [pytest.mark.check, pytest.mark.timeout(1500)]
 
 ROOT = Path(__file__).resolve().parents[2]
+OTHERS = ("o80_mujoco", "o80_pam", "o80_arms", "o80_devices", "o80_table_tennis")
 NOT_FOR_THE_CORE = {"gymnasium", "h5py", "imageio-ffmpeg", "matplotlib", "mujoco-core"}
 
 
@@ -129,7 +130,7 @@ def readme_program(package: str) -> str:
 def test_there_is_a_wheel_of_every_package_for_every_machine_of_the_platform(built: Path) -> None:
     wheels = {file.name.partition("-")[0]: file.name for file in (built / "wheels").iterdir()}
 
-    assert set(wheels) == {"o80", "o80_mujoco", "o80_pam", "o80_devices", "o80_table_tennis"}
+    assert set(wheels) == {"o80", *OTHERS}
     assert wheels["o80_table_tennis"].endswith("-py3-none-any.whl")
     assert "-manylinux_2_35_" in wheels["o80_mujoco"]
     assert "-py3-none-manylinux_2_35_" in wheels["o80_pam"]
@@ -246,7 +247,7 @@ def test_robots_of_packages_are_found_in_spawned_processes(everything: Environme
     assert "('pam', 'mujoco')" in everything.run("python", "spawned.py")
 
 
-@pytest.mark.parametrize("package", ["o80_mujoco", "o80_pam", "o80_devices", "o80_table_tennis"])
+@pytest.mark.parametrize("package", OTHERS)
 def test_a_source_distribution_becomes_a_wheel(built: Path, tmp_path: Path, package: str) -> None:
     (sdist,) = (built / "sdists").glob(f"{package}-[0-9]*.tar.gz")
     builder = Environment(tmp_path / "builder", compiler=True)

@@ -12,7 +12,7 @@ import o80
 
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED = Path(o80.__file__).parent
-OTHERS = ("simulators/mujoco", "robots/pam", "devices", "apps/table_tennis")
+OTHERS = ("simulators/mujoco", "robots/pam", "robots/arms", "devices", "apps/table_tennis")
 
 
 def pyproject(folder: str = ".") -> dict[str, Any]:
@@ -58,7 +58,7 @@ def test_the_installed_package_is_that_of_the_tree(folder: str) -> None:
 def test_packages_share_one_build_backend_and_license() -> None:
     backends = {
         (ROOT / folder / "build_backend" / "beside_o80.py").read_text()
-        for folder in ("simulators/mujoco", "robots/pam")
+        for folder in ("simulators/mujoco", "robots/pam", "robots/arms")
     }
     licenses = {(ROOT / folder / "LICENSE").read_text() for folder in (".", *OTHERS)}
 

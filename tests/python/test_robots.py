@@ -66,13 +66,15 @@ def test_robots_of_further_folders_are_found(
     assert o80.robots.load("other_joints").path.parent == tmp_path
 
 
-@pytest.mark.parametrize("name", ["mujoco", "pam"])
+@pytest.mark.parametrize(
+    ("name", "package"), [("mujoco", "o80-mujoco"), ("pam", "o80-pam"), ("so101", "o80-arms")]
+)
 def test_a_robot_whose_package_is_missing_names_it(
-    name: str, monkeypatch: pytest.MonkeyPatch
+    name: str, package: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("o80.robots.robot.announced", lambda group: {})
 
-    with pytest.raises(o80.DriverError, match=f"`pip install o80-{name}`.*O80_ROBOT_PATH"):
+    with pytest.raises(o80.DriverError, match=f"`pip install {package}`.*O80_ROBOT_PATH"):
         o80.robots.load(name)
 
 

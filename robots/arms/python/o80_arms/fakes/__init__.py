@@ -1,0 +1,1 @@
+"""Counterparts of the arms that speak their wire protocols."""

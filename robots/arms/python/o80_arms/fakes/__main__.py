@@ -1,0 +1,86 @@
+"""A fake SO-101: `python -m o80_arms.fakes` prints what to type, and obeys its terminal."""
+
+import argparse
+import json
+import sys
+import tempfile
+from pathlib import Path
+
+from o80_arms.fakes.feetech import TEMPERATURE, TORQUE, VOLTAGE, FakeChain
+
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+RANGES = ((795, 3300), (910, 3185), (944, 3151), (967, 3128), (228, 3867), (2030, 3500))
+WORDS = """\
+unplug N, plug_in N       the power of servo N and of those behind it
+cut, plug                 the USB cable
+silent N, damages SHARE   a servo that does not answer; damaged answers
+heat N C, voltage N V, overload N, torque_off N, pull N STEPS_PER_S STRENGTH"""
+
+
+def calibration() -> dict[str, dict[str, int]]:
+    """The content of LeRobot's file for this arm."""
+    return {
+        joint: {
+            "id": number,
+            "drive_mode": 0,
+            "homing_offset": 0,
+            "range_min": smallest,
+            "range_max": largest,
+        }
+        for number, (joint, (smallest, largest)) in enumerate(zip(JOINTS, RANGES, strict=True), 1)
+    }
+
+
+def obey(chain: FakeChain, words: list[str]) -> None:
+    """Breaks something, or mends it. Raises ValueError, KeyError, IndexError."""
+    verb, *numbers = words
+    if verb in ("cut", "plug"):
+        getattr(chain, verb)()
+        return
+    if verb == "damages":
+        chain.damages = float(numbers[0])
+        return
+    number = int(numbers[0])
+    servo = chain.servos[number]
+    match verb:
+        case "unplug" | "plug_in":
+            getattr(chain, verb)(number)
+        case "silent":
+            chain.silent ^= {number}
+        case "heat":
+            servo.put(TEMPERATURE, int(numbers[1]))
+        case "voltage":
+            servo.put(VOLTAGE, round(10 * float(numbers[1])))
+        case "overload":
+            servo.alarms |= 32
+        case "torque_off":
+            servo.put(TORQUE, 0)
+        case "pull":
+            servo.pull, servo.needs = float(numbers[1]), float(numbers[2])
+        case _:
+            raise ValueError(verb)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, epilog=WORDS)
+    parser.add_argument("--latency", type=float, default=0.001, help="of the adapter [s]")
+    latency = parser.parse_args().latency
+    with tempfile.TemporaryDirectory() as folder:
+        file, port = Path(folder) / "fake.json", Path(folder) / "tty"
+        file.write_text(json.dumps(calibration(), indent=4))
+        with FakeChain(port, latency=latency, bus_time=True) as chain:
+            for number, (smallest, largest) in enumerate(RANGES, 1):
+                chain.servos[number].calibrate(0, smallest, largest)
+                chain.servos[number].stand_at((smallest + largest) // 2)
+            command = f"o80 run so101 --port {port} --calibration {file}"
+            # a program in Python may be late
+            print(f"{command} --answer-timeout 0.1\n{WORDS}", flush=True)
+            for line in sys.stdin:
+                try:
+                    obey(chain, line.split() or [""])
+                except (ValueError, KeyError, IndexError):
+                    print(WORDS, flush=True)
+
+
+if __name__ == "__main__":
+    main()

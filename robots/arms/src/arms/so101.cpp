@@ -1,0 +1,596 @@
+#include "arms/so101.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdarg>
+#include <cstdio>
+#include <cstdlib>
+#include <stdexcept>
+#include <thread>
+
+namespace o80::arms {
+namespace {
+
+constexpr double kDegree = std::numbers::pi / 180.0;
+// half of the range of each joint in the arm's published model [rad]
+constexpr std::array kModelHalf{110 * kDegree, 100 * kDegree, 97 * kDegree, 95 * kDegree,
+                                160 * kDegree};
+constexpr std::int64_t kDefaultPeriod = 6'666'667;  // 150 Hz [ns]
+constexpr double kMostSpeed = 2.5;                  // [rad/s]
+constexpr double kMostTorque = 2.94;                // of an STS3215 with 12 V [Nm]
+constexpr double kReach = 0.15;    // of a gripper's goal beyond where it stands [1]
+constexpr int kMissesToHalt = 3;   // transfers
+constexpr int kAlarmsToHalt = 2;   // answers: one may be damaged and pass its checksum
+constexpr int kJumpsToHalt = 3;    // readings
+constexpr int kBacklash = 40;      // [steps]
+constexpr int kEdge = 10;          // outside the range without moving when it is clamped [steps]
+constexpr int kAgreement = 10;     // of two readings of an arm that stands [steps]
+constexpr int kGentleSpeed = 300;  // [steps/s]
+constexpr int kFullSpeed = 2500;   // half more than kMostSpeed [steps/s]
+constexpr int kGentleAcceleration = 20;  // [100 steps/s^2]
+constexpr int kFullAcceleration = 254;
+constexpr double kGentleStrength = 0.3;
+constexpr double kSettleTime = 0.5;                // [s]
+constexpr std::int64_t kSecond = 1'000'000'000;    // [ns]
+constexpr std::int64_t kLongestGap = 100'000'000;  // in which a servo is believed to move [ns]
+constexpr std::int64_t kStartWait = 100'000'000;   // for a transfer in start() [ns]
+
+/// Returns at this moment of the monotonic clock [ns].
+void sleep_until(std::int64_t moment) {
+  std::this_thread::sleep_for(std::chrono::nanoseconds(moment - now()));
+}
+std::uint16_t with_sign(int position) { return feetech::with_sign_bit(position, 15); }
+bool has(FeetechChain::Mask mask, std::size_t servo) { return (mask >> servo & 1) != 0; }
+FeetechChain::Mask bit(std::size_t servo) { return FeetechChain::Mask{1} << servo; }
+
+std::string range_of(const Calibration& calibration) {
+  return "offset " + std::to_string(calibration.offset) + ", range " +
+         std::to_string(calibration.smallest) + ".." + std::to_string(calibration.largest);
+}
+
+}  // namespace
+
+So101::So101(const Config& config) : config_(config), period_(kDefaultPeriod) {
+  for (const double share : {config.strength, config.gripper_strength}) {
+    if (!(share > 0.0 && share <= 1.0)) {
+      throw InvalidArgument("a strength must be above 0 and at most 1, got " +
+                            std::to_string(share));
+    }
+  }
+  const std::string path =
+      find_calibration(config.calibration, {"so_follower", "so101_follower", "so100_follower"});
+  if (!path.empty()) {
+    calibration_ = read_calibration(path, {kJointNames.begin(), kJointNames.end()});
+    config_.calibration = path;
+  }
+}
+
+void So101::describe(Schema& schema) const {
+  if (schema.asked_period() != 0) period_ = schema.asked_period();
+  schema.period(period_);
+  schema.of_the_world();
+  for (std::uint32_t i = 0; i < kServos; ++i) schema.actuator(i).name(kJointNames[i]);
+  for (std::uint32_t i = 0; i < kGripper; ++i) {
+    const double half =
+        calibration_.empty() ? kModelHalf[i] : calibration_[i].width() / 2 * Calibration::kStep;
+    const double bound = std::min(half, kModelHalf[i]);
+    schema.actuator(i).unit("rad").limits({.minimum = -bound,
+                                           .maximum = bound,
+                                           .speed = kMostSpeed,
+                                           .acceleration = 20.0,
+                                           .jerk = 1000.0,
+                                           .error = 0.35});
+  }
+  // it may close on something, so it has no limit of error
+  schema.actuator(kGripper).unit("1").limits({.minimum = 0.0,
+                                              .maximum = 1.0,
+                                              .speed = 2.0,
+                                              .acceleration = 20.0,
+                                              .jerk = 1000.0,
+                                              .noise = 0.05});
+}
+
+// ---------------------------------------------------------------------------------------------
+// start: it may wait, and throws
+
+void So101::refuse(std::size_t servo, const std::string& why) const {
+  throw std::runtime_error(std::string(kJointNames[servo]) + " (servo " +
+                           std::to_string(servo + 1) + ") " + why);
+}
+
+void So101::start() {
+  if (calibration_.empty()) {
+    throw std::runtime_error(
+        "no calibration is given, and there is not exactly one: --calibration NAME chooses one, "
+        "`o80 arms calibrate --take NAME` makes one from what the servos hold");
+  }
+  const std::string port = config_.port.empty() ? only_port() : config_.port;
+  lasting_name_ = lasting_name(port);
+  chain_.open(SerialPort::open(port), config_.answer_timeout);
+  check_servos();
+  check_calibration();
+  check_rate();
+  find_place();
+  begin_to_hold();
+}
+
+/// Who they are, and how they are.
+void So101::check_servos() {
+  Mask silent = 0;
+  for (std::size_t i = 0; i < kServos; ++i) {
+    if (!chain_.ping(i)) silent |= bit(i);
+  }
+  if (silent == chain_.all()) {
+    throw std::runtime_error(
+        "no servo answers: is the power supply on? `o80 arms` lists what each port has");
+  }
+  const auto read = [&](std::size_t servo, feetech::Register where) {
+    const std::optional<int> value = chain_.read(servo, where);
+    if (!value) refuse(servo, "does not answer: look at its plug and the one before it");
+    return *value;
+  };
+  int firmware = -1;
+  for (std::size_t i = 0; i < kServos; ++i) {
+    const int model = read(i, feetech::kModel);
+    if (model != feetech::kSts3215) {
+      refuse(i, "is of model " + std::to_string(model) + ", but an STS3215 (777) is needed");
+    }
+    const int its_firmware = read(i, feetech::kFirmware);
+    if (i > 0 && its_firmware != firmware) {
+      refuse(i, "has another firmware than those before it: bring all to the same version");
+    }
+    firmware = its_firmware;
+    if (read(i, feetech::kMode) != 0) {
+      refuse(i, "is not in position mode: `o80 arms calibrate` sets it");
+    }
+    Servo& servo = servos_[i];
+    servo.speed_unit = (read(i, feetech::kPhase) & 4) != 0 ? 1 : 50;
+    servo.weak = read(i, feetech::kWeak);
+    servo.hottest = read(i, feetech::kHottest);
+    servo.least_voltage = 0.1 * read(i, feetech::kLeastVoltage);
+    servo.most_voltage = 0.1 * read(i, feetech::kMostVoltage);
+  }
+}
+
+void So101::check_calibration() {
+  for (std::size_t i = 0; i < kServos; ++i) {
+    const auto read = [&](feetech::Register where) { return chain_.read(i, where).value_or(-1); };
+    const Calibration own{.offset = feetech::signed_by_bit(read(feetech::kOffset), 11),
+                          .smallest = read(feetech::kSmallest),
+                          .largest = read(feetech::kLargest)};
+    if (own == calibration_[i]) continue;
+    throw std::runtime_error(std::string(kJointNames[i]) + ": the file '" + config_.calibration +
+                             "' says " + range_of(calibration_[i]) + "; the servo says " +
+                             range_of(own) +
+                             ". `o80 arms calibrate --write NAME` puts the file into the servos, "
+                             "`--take NAME` makes a new file from them");
+  }
+}
+
+/// A rate that the bus does not reach would be a row of missed readings.
+void So101::check_rate() {
+  constexpr int kTransfers = 20;
+  std::array<std::int64_t, kTransfers> times{};
+  for (std::int64_t& each : times) {
+    chain_.request(0, {});
+    chain_.collect(now() + kStartWait);
+    each = now() - chain_.asked_at();
+  }
+  std::ranges::sort(times);
+  const std::int64_t most = times[kTransfers - 1 - kTransfers / 20];
+  if (config_.answer_timeout > 0.0 || most <= period_) return;
+  std::array<char, 200> text{};
+  std::snprintf(text.data(), text.size(),
+                "the bus answers in %.1f ms (95 %%): %.0f Hz are possible, %.0f Hz were asked for; "
+                "is this an ESP32 board, or an FTDI adapter with a latency of 16 ms?",
+                static_cast<double>(most) * 1e-6, std::floor(0.9e9 / static_cast<double>(most)),
+                1e9 / static_cast<double>(period_));
+  throw std::runtime_error(text.data());
+}
+
+/// Two complete readings that agree, inside what the servos do not clamp.
+void So101::find_place() {
+  constexpr int kTries = 10;
+  bool known = false;
+  bool agree = false;
+  std::size_t differs = 0;
+  for (int i = 0; i < kTries && !agree; ++i) {
+    chain_.request(0, {});
+    const FeetechChain::Transfer transfer = chain_.collect(now() + kStartWait);
+    if (transfer.answered != chain_.all()) continue;
+    agree = known;
+    for (std::size_t k = 0; k < kServos; ++k) {
+      if (std::abs(chain_[k].position - servos_[k].position) > kAgreement)
+        agree = false, differs = k;
+      servos_[k].position = chain_[k].position;
+      servos_[k].seen_at = complete_at_ = chain_.asked_at();
+    }
+    known = true;
+  }
+  if (!agree) refuse(differs, "gave no two readings that agree: is something moving it?");
+  for (std::size_t i = 0; i < kServos; ++i) {
+    const Calibration& range = calibration_[i];
+    const int position = servos_[i].position;
+    if (position < range.smallest - kEdge || position > range.largest + kEdge) {
+      refuse(i, "stands at step " + std::to_string(position) + ", outside its range " +
+                    std::to_string(range.smallest) + ".." + std::to_string(range.largest) +
+                    ": move it inside by hand, or calibrate it again");
+    }
+    name_alarm(i);
+    if (why_[0] != 0) throw std::runtime_error(why_.data());
+  }
+}
+
+/// Gentle registers and goals, read back, before torque.
+void So101::begin_to_hold() {
+  const auto check = [&](std::size_t servo, feetech::Register where, int wanted) {
+    if (chain_.read(servo, where) == wanted) return;
+    refuse(servo, "does not keep what is written to its register " +
+                      std::to_string(static_cast<int>(where.address)));
+  };
+  approach(chain_.all());
+  chain_.send_queued();
+  for (std::size_t i = 0; i < kServos; ++i) {
+    check(i, feetech::kStrength, strength_of(i, kGentleStrength));
+    check(i, feetech::kGoal, with_sign(held_places_[i]));
+  }
+  chain_.queue(feetech::kTorque, chain_.all(), 1);
+  chain_.send_queued();
+  for (std::size_t i = 0; i < kServos; ++i) check(i, feetech::kTorque, 1);
+  held_ = chain_.all();
+  started_ = true;
+  while (settling_ > 0 && why_[0] == 0) {
+    chain_.request(0, {});
+    const FeetechChain::Transfer transfer = chain_.collect(deadline());
+    take(transfer);
+    if (transfer.asked) look_for_trouble(transfer);
+    settle();
+    sleep_until(chain_.asked_at() + period_);
+  }
+}
+
+// ---------------------------------------------------------------------------------------------
+// loop
+
+std::uint16_t So101::strength_of(std::size_t servo, double share) const noexcept {
+  const double most = servo == kGripper ? config_.gripper_strength : config_.strength;
+  return static_cast<std::uint16_t>(std::lround(share * most * 1000.0));
+}
+
+void So101::set_motion(Mask servos, int speed, int acceleration, double strength) noexcept {
+  OfServos<std::uint16_t> speeds{};
+  OfServos<std::uint16_t> strengths{};
+  for (std::size_t i = 0; i < kServos; ++i) {
+    speeds[i] = static_cast<std::uint16_t>(std::max(1, speed / servos_[i].speed_unit));
+    strengths[i] = strength_of(i, strength);
+  }
+  chain_.queue(feetech::kAcceleration, servos, static_cast<std::uint16_t>(acceleration));
+  chain_.queue(feetech::kSpeed, servos, speeds);
+  chain_.queue(feetech::kStrength, servos, strengths);
+}
+
+/// Gentle registers, and goals where the servos stand.
+void So101::approach(Mask servos) noexcept {
+  set_motion(servos, kGentleSpeed, kGentleAcceleration, kGentleStrength);
+  OfServos<std::uint16_t> goals{};
+  for (std::size_t i = 0; i < kServos; ++i) {
+    const Calibration& range = calibration_[i];
+    held_places_[i] = std::clamp(servos_[i].position, range.smallest, range.largest);
+    goals[i] = with_sign(held_places_[i]);
+  }
+  goals_ = held_places_;
+  chain_.queue(feetech::kGoal, servos, goals);
+  settling_ = static_cast<int>(kSettleTime * 1e9 / static_cast<double>(period_));
+}
+
+/// Switches the torque on where the servos stand, with the next request.
+void So101::hold(Mask servos) noexcept {
+  if (servos == 0) return;
+  chain_.queue(feetech::kTorque, servos, 0);  // ends an overload
+  approach(servos);
+  chain_.queue(feetech::kTorque, servos, 1);
+  held_ |= servos;
+  relaxed_ = false;
+  for (std::size_t i = 0; i < kServos; ++i) {
+    if (has(servos, i)) servos_[i].without_torque = false;
+  }
+}
+
+/// Full strength when the arm has stood for half a second.
+void So101::settle() noexcept {
+  if (settling_ == 0 || !link_.fresh) return;
+  for (std::size_t i = 0; i < kServos; ++i) {
+    const bool stands = std::abs(servos_[i].position - held_places_[i]) <= kBacklash;
+    if (!stands && has(held_, i) && goals_[i] == held_places_[i]) {
+      because(
+          "%s moved when its torque was switched on, and is held with little strength: look "
+          "what pulls at it",
+          kJointNames[i]);
+    }
+  }
+  if (why_[0] == 0 && --settling_ == 0) set_motion(held_, kFullSpeed, kFullAcceleration, 1.0);
+}
+
+int So101::goal_of(std::size_t servo, const So101State& desired) const noexcept {
+  const Calibration& range = calibration_[servo];
+  double steps = 0.0;
+  if (servo == kGripper) {
+    // no farther than where it closes firmly on something
+    const double stands = range.share(servos_[servo].position);
+    steps = range.steps_of_share(std::clamp(desired.gripper, stands - kReach, stands + kReach));
+  } else {
+    steps = range.steps(desired.joints[servo]);
+  }
+  return std::clamp(static_cast<int>(std::lround(steps)), range.smallest, range.largest);
+}
+
+void So101::write(const Desired<So101>& desired) noexcept {
+  wrote_ = true;
+  if (!chain_.port().is_open()) return reopen();
+  settle();
+  for (std::size_t i = 0; i < kServos; ++i) {
+    if (has(held_, i)) goals_[i] = goal_of(i, desired.states);
+  }
+  chain_.request(held_, goals_);
+}
+
+/// Looks every half second whether the adapter is there again.
+void So101::reopen() noexcept {
+  if (++closed_ * period_ < kSecond / 2) return;
+  closed_ = 0;
+  static_cast<void>(chain_.port().reopen(lasting_name_.c_str()));
+}
+
+std::int64_t So101::deadline() const noexcept {
+  const std::int64_t asked = chain_.is_asking() ? chain_.asked_at() : now();
+  if (config_.answer_timeout > 0.0) {
+    return asked + static_cast<std::int64_t>(config_.answer_timeout * 1e9);
+  }
+  return asked + (failed_before_ ? period_ : period_ * 5 / 4);
+}
+
+void So101::read(Reading<So101>& reading) noexcept {
+  // row 0 and fresh starts have readings of their own
+  if (!wrote_) chain_.request(0, {});
+  wrote_ = false;
+  const FeetechChain::Transfer transfer = chain_.collect(deadline());
+  take(transfer);
+  if (transfer.asked) look_for_trouble(transfer);
+  if (!chain_.port().is_open()) because("the adapter %s is gone", lasting_name_.c_str());
+
+  for (std::size_t i = 0; i < kServos; ++i) {
+    const ServoState& state = chain_[i];
+    const double place = servos_[i].position;
+    if (i == kGripper) {
+      reading.observed.gripper = calibration_[i].share(place);
+    } else {
+      reading.observed.joints[i] = calibration_[i].angle(place);
+    }
+    Measured& measured = reading.extended.measured;
+    measured.velocity[i] = state.speed * Calibration::kStep;
+    measured.effort[i] = state.load * 1e-3 * kMostTorque;
+    measured.temperature[i] = state.temperature;
+    measured.voltage[i] = 0.1 * state.voltage;
+    reading.extended.health[i] = health_of(i);
+  }
+  link_.age = now() - complete_at_;
+  link_.capture_time = reading.time() - link_.age;
+  reading.extended.link = link_;
+  if (!link_.fresh) reading.missed();
+  if (why_[0] != 0) reading.halt(why_.data());
+}
+
+/// Answers => what is known of each servo.
+void So101::take(const FeetechChain::Transfer& transfer) noexcept {
+  link_.late += transfer.late;
+  link_.damaged += transfer.damaged;
+  link_.fresh = transfer.asked && transfer.answered == chain_.all();
+  failed_before_ = transfer.answered != chain_.all();
+  for (std::size_t i = 0; transfer.asked && i < kServos; ++i) {
+    Servo& servo = servos_[i];
+    if (!has(transfer.answered, i)) {
+      ++servo.missed;
+      ++link_.lost;
+      continue;
+    }
+    servo.missed = 0;
+    if (!is_plausible(i)) {
+      ++servo.jumped;
+      ++link_.damaged;
+      link_.fresh = false;
+      continue;
+    }
+    servo.jumped = 0;
+    servo.position = chain_[i].position;
+    servo.seen_at = chain_.asked_at();
+    if (has(transfer.torque_known, i)) servo.without_torque = !chain_[i].torque;
+    servo.alarmed = chain_[i].status != 0 ? servo.alarmed + 1 : 0;
+  }
+  if (link_.fresh) complete_at_ = chain_.asked_at();
+}
+
+/// Whether it can have come there since it was seen: a damaged answer may pass its checksum.
+bool So101::is_plausible(std::size_t servo) const noexcept {
+  const std::int64_t unseen = chain_.asked_at() - servos_[servo].seen_at;
+  const std::int64_t since = std::clamp(unseen, period_, std::max(period_, kLongestGap));
+  // by hand it is moved faster
+  const double speed = (relaxed_ ? 8.0 : 2.0) * kMostSpeed / Calibration::kStep;
+  const double most = speed * static_cast<double>(since) * 1e-9 + kBacklash;
+  return std::abs(chain_[servo].position - servos_[servo].position) <= most;
+}
+
+void So101::look_for_trouble(const FeetechChain::Transfer& transfer) noexcept {
+  const auto lost = [](const Servo& servo) { return servo.missed >= kMissesToHalt; };
+  const auto first = std::ranges::find_if(servos_, lost);
+  if (std::ranges::all_of(servos_, lost)) {
+    because("no servo answers: is the power supply on?");
+  } else if (first != servos_.end()) {
+    const auto i = static_cast<std::size_t>(first - servos_.begin());
+    because("%s (servo %zu) does not answer: look at its plug and the one before it",
+            kJointNames[i], i + 1);
+  }
+  for (std::size_t i = 0; i < kServos; ++i) {
+    Servo& servo = servos_[i];
+    // one that comes back may stand elsewhere, with a goal that it forgot
+    if (lost(servo)) held_ &= ~bit(i);
+    if (servo.jumped >= kJumpsToHalt) {
+      // its goal is from before the jump: it would go there
+      if (has(held_, i)) chain_.queue(feetech::kGoal, bit(i), with_sign(chain_[i].position));
+      held_ &= ~bit(i);
+      because("%s is read where it cannot be: has its encoder lost a turn?", kJointNames[i]);
+    }
+    if (servo.alarmed >= kAlarmsToHalt) name_alarm(i);
+    if (has(held_, i) && servo.without_torque) {
+      held_ &= ~bit(i);
+      because("somebody switched the torque of servo %zu (%s) off", i + 1, kJointNames[i]);
+    }
+  }
+  damaged_in_window_ += transfer.damaged > 0 ? 1 : 0;
+  const std::int64_t window = std::max<std::int64_t>(kSecond / period_, 20);
+  if (damaged_in_window_ * 20 > window) {
+    because("more than 5 %% of the answers of a second are damaged: look at the cables");
+  }
+  if (++window_ >= window) window_ = damaged_in_window_ = 0;
+}
+
+/// The halt for what the status byte of a servo says, if anything.
+void So101::name_alarm(std::size_t servo) noexcept {
+  const ServoState& state = chain_[servo];
+  const char* const name = kJointNames[servo];
+  if ((state.status & feetech::overload_alarm) != 0) {
+    because("%s is overloaded and has only %d %% of its strength: free it", name,
+            servos_[servo].weak);
+  } else if ((state.status & feetech::heat_alarm) != 0) {
+    servos_[servo].was_hot = true;
+    because("%s is too hot (%d C): it has switched itself off", name, state.temperature);
+  } else if ((state.status & feetech::voltage_alarm) != 0) {
+    because("%.1f V at %s, at least %.1f V and at most %.1f V needed: wrong or weak supply",
+            0.1 * state.voltage, name, servos_[servo].least_voltage, servos_[servo].most_voltage);
+  } else if ((state.status & feetech::current_alarm) != 0) {
+    because("%s draws too much current: free it", name);
+  } else if ((state.status & feetech::encoder_alarm) != 0) {
+    because("the encoder of %s reports a failure: switch the servo off and on", name);
+  }
+}
+
+Health So101::health_of(std::size_t servo) const noexcept {
+  const ServoState& state = chain_[servo];
+  const auto alarmed = [&](feetech::Alarm alarm) { return (state.status & alarm) != 0; };
+  if (servos_[servo].missed >= kMissesToHalt) return Health::silent;
+  if (servos_[servo].without_torque && !relaxed_) return Health::torque_off;
+  if (alarmed(feetech::overload_alarm)) return Health::overload;
+  if (alarmed(feetech::current_alarm)) return Health::current;
+  if (alarmed(feetech::heat_alarm) || state.temperature + 5 >= servos_[servo].hottest) {
+    return Health::heat;
+  }
+  if (alarmed(feetech::encoder_alarm)) return Health::encoder;
+  return alarmed(feetech::voltage_alarm) ? Health::voltage : Health::ok;
+}
+
+/// Servos that do not hold although they should, or have less strength.
+So101::Mask So101::troubled() const noexcept {
+  Mask found = relaxed_ ? 0 : chain_.all() & ~held_;
+  for (std::size_t i = 0; i < kServos; ++i) {
+    if (servos_[i].without_torque || chain_[i].status != 0) found |= bit(i);
+  }
+  return found;
+}
+
+/// Why the arm cannot be held now; null if it can.
+const char* So101::why_not_ready() noexcept {
+  const auto say = [&](const char* format, auto... values) {
+    std::snprintf(not_ready_.data(), not_ready_.size(), format, values...);
+    return not_ready_.data();
+  };
+  if (!chain_.port().is_open()) return say("the adapter %s is gone", lasting_name_.c_str());
+  for (std::size_t i = 0; i < kServos; ++i) {
+    const char* const name = kJointNames[i];
+    const int status = chain_[i].status;
+    Servo& servo = servos_[i];
+    if (servo.missed > 0) return say("%s (servo %zu) does not answer", name, i + 1);
+    if ((status & feetech::voltage_alarm) != 0) {
+      return say("%.1f V at %s: wrong or weak supply", 0.1 * chain_[i].voltage, name);
+    }
+    servo.was_hot = servo.was_hot && chain_[i].temperature > servo.hottest - 10;
+    if (servo.was_hot) return say("%s is still too hot: wait", name);
+    if (servo.position < calibration_[i].smallest - kEdge ||
+        servo.position > calibration_[i].largest + kEdge) {
+      return say("%s stands outside its range: move it inside by hand", name);
+    }
+  }
+  return nullptr;
+}
+
+Served So101::resume() noexcept {
+  if (const char* const why = why_not_ready()) return Served::rejected(why);
+  begin_anew();
+  hold(relaxed_ ? chain_.all() : troubled());
+  return Served::done();
+}
+
+/// Forgets why it was halted. What cannot be is believed from now on: o80 judges it.
+void So101::begin_anew() noexcept {
+  why_[0] = 0;
+  window_ = damaged_in_window_ = 0;
+  for (std::size_t i = 0; i < kServos; ++i) {
+    servos_[i].position = chain_[i].position;
+    servos_[i].alarmed = servos_[i].jumped = 0;
+  }
+}
+
+Served So101::on(const Hold& /*request*/) noexcept {
+  if (const char* const why = why_not_ready()) return Served::rejected(why);
+  hold(relaxed_ ? chain_.all() : troubled());
+  return Served::start_afresh();
+}
+
+Served So101::on(const Relax& /*request*/) noexcept {
+  chain_.queue(feetech::kTorque, chain_.all(), 0);
+  held_ = 0;
+  settling_ = 0;
+  relaxed_ = true;
+  return Served::start_afresh();
+}
+
+Served So101::on(const Strength& request) noexcept {
+  if (!(request.share > 0.0 && request.share <= 1.0)) {
+    return Served::rejected("the share must be above 0 and at most 1");
+  }
+  config_.strength = request.share;
+  if (settling_ == 0) set_motion(held_, kFullSpeed, kFullAcceleration, 1.0);
+  return Served::done();
+}
+
+Served So101::on(const Recover& /*request*/) noexcept {
+  if (const char* const why = why_not_ready()) return Served::rejected(why);
+  if (!relaxed_) hold(troubled());
+  return Served::done();
+}
+
+void So101::stop() noexcept {
+  if (!started_) return;
+  if (config_.at_stop == AtStop::relax) {
+    chain_.queue(feetech::kTorque, chain_.all(), 0);
+    chain_.send_queued();
+  } else if (!relaxed_) {
+    // a gripper that presses on would overheat with nobody to see it
+    chain_.queue(feetech::kGoal, bit(kGripper) & held_,
+                 static_cast<std::uint16_t>(servos_[kGripper].position));
+    chain_.send_queued();
+    std::fprintf(stderr,
+                 "six servos hold, and nobody watches their heat: `o80 arms relax` "
+                 "switches their torque off\n");
+  }
+  chain_.port().close();
+}
+
+/// The first reason stays until somebody resumes: another text would be another halt.
+void So101::because(const char* format, ...) noexcept {
+  if (why_[0] != 0) return;
+  std::va_list values;
+  va_start(values, format);
+  std::vsnprintf(why_.data(), why_.size(), format, values);
+  va_end(values);
+}
+
+}  // namespace o80::arms
