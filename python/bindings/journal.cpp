@@ -190,6 +190,7 @@ void bind_journal(nb::module_& m) {
       .def_ro("halt", &JournalEntry::halt)
       .def_prop_ro("cause", word(&JournalEntry::cause))
       .def_ro("cut", &JournalEntry::cut)
+      .def_ro("follows", &JournalEntry::follows)
       .def_ro("text", &JournalEntry::text)
       .def_ro("unknown", &JournalEntry::unknown)
       .def_ro("actuator", &JournalEntry::actuator)

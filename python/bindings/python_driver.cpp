@@ -191,6 +191,7 @@ void take_report(PythonDriver& self, nb::handle told, o80::ReadingView* reading)
   const nb::tuple report = nb::cast<nb::tuple>(told);
   reading->finished = nb::cast<bool>(report[0]) ? 1 : 0;
   reading->missed = nb::cast<bool>(report[1]) ? 1 : 0;
+  reading->follows = reading->desired != nullptr && nb::cast<bool>(report[6]) ? 1 : 0;
   if (reading->desired != nullptr && nb::cast<bool>(report[2])) {
     reading->has_desired = 1;
     const auto fresh = self.fresh->span();

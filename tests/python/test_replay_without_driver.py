@@ -4,13 +4,14 @@ import os
 import random
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 from test_replay import Flipped, o80_replay
 
 import o80
+from o80.drivers import Reading
 from o80.replaying.recorded_run import runs_in
 from o80.replaying.replay import replay_runs
 
@@ -269,3 +270,56 @@ def test_rows_of_another_robot_are_refused(recorded: Path) -> None:
         replay.run(block.rows[1:3].tobytes())
     replay.close()
     o80.clean(name)
+
+
+class Guided:
+    """An arm that somebody pushes about."""
+
+    actuators = ("elbow",)
+    limits: ClassVar = {"elbow": o80.Limits(error=0.3, speed=1000.0)}
+    requests: ClassVar = {"relax": {}, "hold": {}, "push": {"to": float}}
+
+    def __init__(self) -> None:
+        self.place: float = 0.0
+        self.relaxed = False
+
+    def read(self, reading: Reading) -> None:
+        reading.observed = [self.place]
+        if self.relaxed:
+            reading.follow()
+
+    def on_relax(self, _: o80.Record) -> o80.StartAfresh:
+        self.relaxed = True
+        return o80.StartAfresh()
+
+    def on_hold(self, _: o80.Record) -> o80.StartAfresh:
+        self.relaxed = False
+        return o80.StartAfresh()
+
+    def on_push(self, fields: o80.Record) -> None:
+        self.place = float(fields["to"])
+
+
+def test_a_driver_may_let_actuators_follow_until_the_next_fresh_start(tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.robots.load(Guided).inline() as arm, o80.Recording(path, arm):
+        arm.burst(5)
+        arm.request("relax")
+        arm.burst(5)
+        for step in range(1, 11):
+            arm.request("push", to=0.2 * step)
+            arm.burst(2)
+        row = arm.latest()
+        assert (row.desired[0], row.observed[0], arm.halted) == (2.0, 2.0, None)
+        arm.request("hold")
+        arm.request("push", to=2.1)
+        assert arm.burst(5).desired[0] == 2.0
+        arm.request("push", to=2.5)
+        with pytest.raises(o80.BackendHalted, match="error limit"):
+            arm.burst(5)
+    (whole,) = report = o80.replay(path)
+    assert report.identical, report
+    # a replay cannot begin in a row in which it follows: the next such row is that of the hold
+    (part,) = report = o80.replay(path, since=8)
+    assert report.identical, report
+    assert part.rows < whole.rows - 20

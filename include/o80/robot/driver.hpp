@@ -172,6 +172,10 @@ class Reading {
     pack(desired, view_.desired);
     view_.has_desired = 1;
   }
+  /// From this fresh start to the next one every actuator without a command follows the observed
+  /// state, whatever its when_idle: an arm without torque, guided by hand. No effect in other
+  /// readings.
+  void follow() { view_.follows = fresh() ? 1 : 0; }
   std::byte* desired_bytes() {
     view_.has_desired = fresh() ? 1 : 0;
     return view_.desired;

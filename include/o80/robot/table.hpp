@@ -13,7 +13,7 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kRobotTableVersion = 7;
+inline constexpr std::uint32_t kRobotTableVersion = 8;
 
 /// Reason for the failure of a call.
 struct FaultText {
@@ -95,6 +95,7 @@ struct ReadingView {
   std::int64_t time;          // [ns]
   std::uint32_t finished;     // set it to end the loop in order
   std::uint32_t has_desired;  // set it if `desired` was filled
+  std::uint32_t follows;      // set it in a fresh start if idle actuators follow from now on
   std::uint32_t missed;       // set it if this tick of the robot brought no reading
   std::uint32_t halted;       // set it to halt the backend
   std::uint32_t reported;     // set it if a request has changed

@@ -96,6 +96,7 @@ struct JournalEntry {
   bool cut = false;
   std::string text;                            // of a halt, and of the end of a failed backend
   std::uint16_t actuator = 0;                  // interrupted
+  bool follows = false;                        // fresh_start: idle actuators follow from now on
   bool before_step = false;                    // interrupted before the step of the iteration
   BackendState state = BackendState::running;  // ended
   /// Parts of it, or of its records, that this o80 does not know ("entry kind 30"): a newer o80

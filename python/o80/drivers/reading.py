@@ -124,7 +124,7 @@ class Reading:
         self.fresh = fresh
         """True in the reading of a fresh start: after a reset or a resume. Not in row 0."""
         self._runs = runs
-        self._finished = self._missed = self._has_desired = False
+        self._finished = self._missed = self._has_desired = self._follows = False
         self._halt: str | None = None
         self._interrupted: list[int] = []
         self._reports: list[tuple[int, int, str]] = []
@@ -172,6 +172,10 @@ class Reading:
         fill(self._desired, desired, "desired")
         self._has_desired = True
 
+    def follow(self) -> None:
+        """In a fresh start: until the next one, all actuators without a command follow."""
+        self._follows = True
+
     def runs(self, request: str) -> bool:
         """True if a request was answered with o80.Running and has not ended."""
         return self._runs[numbered(request, self._requests, "request")]
@@ -201,6 +205,7 @@ class Reading:
             self._finished
             or self._missed
             or self._has_desired
+            or self._follows
             or self._halt is not None
             or self._interrupted
             or self._reports
@@ -213,6 +218,7 @@ class Reading:
             self._halt,
             self._interrupted,
             self._reports,
+            self._follows,
         )
 
 

@@ -187,7 +187,7 @@ def find_fresh_start(run: RecordedRun, since: int) -> Start | None:
     for entry in run.entries():
         if entry.kind == "taken":
             taken = (entry.iteration, entry.lane, len(entry.records))
-        elif entry.kind == "fresh_start" and entry.iteration in begun:
+        elif entry.kind == "fresh_start" and entry.iteration in begun and not entry.follows:
             is_alone = taken[:2] != (entry.iteration, entry.lane) or taken[2] == 1
             if is_alone and entry.iteration >= since and not purges.reach_past(entry.number):
                 return Start(entry.iteration, entry.number, "fresh start")

@@ -78,6 +78,7 @@ class JournalEntry:
     burst: int | None = None  #: iterations that a burst may run; -1 until its batch has ended
     seen: _core.Seen | None = None  #: by which row a batch was decided, as its sender says
     cut: bool = False  #: of burst_ended: it ended early
+    follows: bool = False  #: of fresh_start: idle actuators follow from there on
     commands: tuple[JournalCommand, ...] = ()
     commands_lost: bool = False  #: they were overwritten before they were read
     status: Status | None = None
@@ -194,6 +195,7 @@ class EntryDecoder:
             burst=native.burst if native.burst != 0 else None,
             seen=native.seen,
             cut=native.cut,
+            follows=native.follows,
             commands=tuple(self._command(record) for record in native.records),
             commands_lost=native.records_lost,
             status=native.status if has_status else None,

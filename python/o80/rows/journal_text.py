@@ -56,13 +56,14 @@ class JournalText:
             return f"the robot keeps its state in slot {entry.slot}"
         if entry.kind == "ended":
             return "the backend ended" + (f": {entry.text}" if entry.text else "")
+        if entry.kind == "fresh_start":
+            return "fresh start" + (": idle actuators follow" if entry.follows else "")
         said = {
             "control_taken": f"{who}took control",
             "control_released": f"{who}released control",
             "control_lost": f"{who}lost control",
             "died": f"{who}died",
             "silent": f"{who}gave no sign of life",
-            "fresh_start": "fresh start",
             "order_lost": "the ticket counter is damaged",
             "stopping": "stopping: all commands are dropped",
         }

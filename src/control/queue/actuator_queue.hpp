@@ -137,7 +137,9 @@ class ActuatorQueue {
   }
 
   /// Sets the desired state, at rest. Numbers that are not finite keep their last desired value.
-  void restart(const std::byte* state) noexcept {
+  /// `follows`: until the next restart it follows when idle, whatever its when_idle.
+  void restart(const std::byte* state, bool follows = false) noexcept {
+    follows_now_ = follows;
     layout_->copy_finite(desired_, state);
     motion_.restart(desired_);
     in_force_ = false;
@@ -155,7 +157,7 @@ class ActuatorQueue {
     return motion_.brake(desired_, true);
   }
   const StateLayout& layout() const noexcept { return *layout_; }
-  bool follows() const noexcept { return when_idle_ == WhenIdle::follow; }
+  bool follows() const noexcept { return when_idle_ == WhenIdle::follow || follows_now_; }
   /// As Motion::difference().
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept {
     return motion_.difference(offset, order);
@@ -289,6 +291,7 @@ class ActuatorQueue {
   double period_;  // [s]
   Profile usual_profile_;
   WhenIdle when_idle_;
+  bool follows_now_ = false;
 
   LaneLists queue_;
   Runs runs_ = Runs::nothing;

@@ -82,11 +82,15 @@ class Controller {
   Controller(const Controller&) = delete;
 
   /// The first start or a fresh start: sets the desired block to `wanted`, or to `observed` if
-  /// that is null. All commands end as purged (fresh_start) at iteration `row`.
-  void restart(const std::byte* observed, const std::byte* wanted, Iteration row) noexcept {
+  /// that is null. All commands end as purged (fresh_start) at iteration `row`. `follows`: until
+  /// the next one, every actuator without a command follows the observed state.
+  void restart(const std::byte* observed, const std::byte* wanted, Iteration row,
+               bool follows = false) noexcept {
     const std::byte* source = wanted != nullptr ? wanted : observed;
     drop(kEveryActuator, {Status::purged, Reason::fresh_start}, row);
-    each(kEveryActuator, [&](std::uint32_t i) { actuators_[i].restart(of(i, source)); });
+    each(kEveryActuator, [&](std::uint32_t i) { actuators_[i].restart(of(i, source), follows); });
+    for (std::uint32_t i = 0; i < actuators_.size(); ++i) set(follow_, i, actuators_[i].follows());
+    all_follow_ = follows;
     fresh_row_ = row;
     for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_, &starved_mask_})
       std::ranges::fill(*mask, 0);
@@ -213,8 +217,8 @@ class Controller {
   /// True if nothing acts, and a restart() with the desired block would change nothing later.
   bool shows_all() noexcept {
     const auto is_zero = [](std::uint64_t word) { return word == 0; };
-    return std::ranges::all_of(starved_mask_, is_zero) && !pending() && waiting_.empty() &&
-           std::ranges::all_of(busy_, is_zero) &&
+    return !all_follow_ && std::ranges::all_of(starved_mask_, is_zero) && !pending() &&
+           waiting_.empty() && std::ranges::all_of(busy_, is_zero) &&
            std::ranges::all_of(actuators_, &ActuatorQueue::shows_all);
   }
   /// True if a direct value keeps a number away from its rest value; O(actuators).
@@ -307,8 +311,9 @@ class Controller {
 
   /// One bit for each actuator.
   using Mask = std::vector<std::uint64_t>;
-  static void set(Mask& mask, std::size_t i) noexcept {
-    mask[i / 64] |= std::uint64_t{1} << (i % 64);
+  static void set(Mask& mask, std::size_t i, bool to = true) noexcept {
+    const std::uint64_t bit = std::uint64_t{1} << (i % 64);
+    mask[i / 64] = to ? mask[i / 64] | bit : mask[i / 64] & ~bit;
   }
 
   BlockPool& pool_;
@@ -328,6 +333,7 @@ class Controller {
   Mask busy_;                     // has commands, or is not known to be at rest
   Mask stepped_;                  // has its desired state from given_ already
   Mask follow_;                   // follows the observed state when idle
+  bool all_follow_ = false;       // since the last fresh start, whatever the schema says
   std::vector<Waiting> waiting_;  // in the order in which they begin
   Mask of_chunk_;                 // actuators of the chunk that is being taken, or of all that wait
   Iteration fresh_row_ = 0;       // of the last fresh start

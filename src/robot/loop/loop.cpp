@@ -110,7 +110,8 @@ bool Loop::read_into_view() noexcept {
   view_.iteration = backend_.iteration();
   view_.time = backend_.time();
   const std::uint32_t finished = view_.finished;  // stays set
-  view_.finished = view_.has_desired = view_.missed = view_.halted = view_.reported = 0;
+  view_.finished = view_.has_desired = view_.follows = view_.missed = view_.halted =
+      view_.reported = 0;
   view_.halt_text.text[0] = 0;
   // reports change only while requests run, and by drivers that say so
   if (const bool any = backend_.runs_any(); any || reported_) {

@@ -79,6 +79,7 @@ bool Loop::read_fresh(FreshReading& reading) noexcept {
   const bool reads = read_into_view();
   std::ranges::fill(interrupted_, 0);  // there is nothing to interrupt
   reading.has_desired = view_.has_desired != 0;
+  reading.follows = view_.follows != 0;
   if (!reads && reading.may_fail) {
     unread_ = fault_;
     fault_.clear();

@@ -120,9 +120,10 @@ bool UntypedBackend::Body::read_again(FreshReading& reading, Judged judged,
 
 Outcome UntypedBackend::Body::begin_afresh(std::uint32_t lane,
                                            const FreshReading& reading) noexcept {
-  controller.restart(reading.observed, reading.has_desired ? reading.desired : nullptr, current);
+  const std::byte* wanted = reading.has_desired ? reading.desired : nullptr;
+  controller.restart(reading.observed, wanted, current, reading.follows);
   if (recorded_ != nullptr) recorded_->fresh_start(current);
-  journal.fresh_start(lane);
+  journal.fresh_start(lane, reading.follows);
   readings_.begin(reading.observed);
   read_at_ = time();
   publish(true);

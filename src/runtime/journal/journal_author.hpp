@@ -103,9 +103,10 @@ class JournalAuthor {
   // halts
   void halt(JournalKind halt_or_reason, const Halt& halt) noexcept;
   void resume(std::uint32_t lane, std::uint64_t sender, std::uint64_t halt) noexcept;
-  void fresh_start(std::uint32_t lane) noexcept {
+  /// `follows`: actuators without a command follow from now on.
+  void fresh_start(std::uint32_t lane, bool follows = false) noexcept {
     acts();
-    note(JournalKind::fresh_start, lane, 0);
+    note(JournalKind::fresh_start, lane, 0, follows ? 1 : 0);
   }
   /// A snapshot of the driver; left out if it is larger than an entry may be.
   void kept(const KeptState& state) noexcept;

@@ -204,6 +204,9 @@ void JournalDecoder::fill(JournalEntry& entry) {
     case JournalKind::silent:
       name(entry, head.id);
       break;
+    case JournalKind::fresh_start:
+      entry.follows = head.what != 0;
+      break;
     case JournalKind::interrupted:
       entry.actuator = static_cast<std::uint16_t>(head.id);
       entry.before_step = head.what != 0;

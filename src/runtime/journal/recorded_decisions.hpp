@@ -60,6 +60,11 @@ class RecordedDecisions {
   /// True if the robot makes a fresh start before the batches of this iteration: a request that ran
   /// has ended.
   bool begins_with_fresh_start(Iteration iteration) const noexcept;
+  /// True if idle actuators follow from the fresh start on that is made now.
+  bool fresh_start_follows() const noexcept {
+    return !entries_.empty() && entries_.front().kind == JournalKind::fresh_start &&
+           entries_.front().follows;
+  }
   /// The next actuator that was interrupted after the step of this iteration. `interrupt` removes
   /// it.
   std::optional<std::uint16_t> interrupt_due(Iteration iteration) const noexcept;

@@ -99,6 +99,7 @@ bool DriverlessReplay::read_fresh(FreshReading& reading) noexcept {
   // a driver may give the desired states of a fresh start; otherwise they are the observed ones
   std::memcpy(reading.desired, row + layout.desired, layout.block);
   reading.has_desired = true;
+  reading.follows = recorded_.fresh_start_follows();
   return true;
 }
 
