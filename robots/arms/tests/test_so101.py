@@ -445,6 +445,45 @@ def test_strength_is_that_of_the_joints(arm: FakeArm) -> None:
         robot.request("strength", share=1.5)
 
 
+def test_a_relaxed_arm_is_guided_by_hand_and_held_where_it_is_then(arm: FakeArm) -> None:
+    robot = arm.started()
+    robot.request("relax")
+    robot.burst(1)
+    assert [servo.get((40, 1)) for servo in arm.line.servos.values()] == [0] * 6
+    arm.servo("elbow_flex").pull = 900.0  # by hand, 1.4 rad/s
+    row = robot.burst(RATE // 2)
+    assert robot.halted is None, "neither torque nor error are of interest now"
+    assert row.observed.joints[2] > 0.7
+    assert row.desired.joints[2] == pytest.approx(row.observed.joints[2], abs=0.02)
+    assert row.extended.health.tolist() == ["ok"] * 6
+    robot.add_command("wrist_roll", 0.5, duration=1.0)
+    batch = robot.pulse()
+    robot.burst(2)
+    assert batch.statuses == [o80.Status.INTERRUPTED]
+    arm.servo("elbow_flex").pull = 0.0
+    before = arm.shown
+    robot.burst(2)
+    robot.request("hold")
+    row = robot.burst(RATE)
+    assert arm.shown == before
+    assert [servo.get((40, 1)) for servo in arm.line.servos.values()] == [1] * 6
+    robot.add_command("elbow_flex", 0.0, duration=1.0)
+    assert robot.burst(2 * RATE).observed.joints[2] == pytest.approx(0.0, abs=2 * STEP)
+
+
+def test_an_arm_that_is_halted_may_be_relaxed_and_resume_holds_it(arm: FakeArm) -> None:
+    robot = arm.started()
+    number = robot.halt("enough")
+    robot.burst(30)
+    robot.request("relax")
+    robot.burst(2)
+    assert [servo.get((40, 1)) for servo in arm.line.servos.values()] == [0] * 6
+    assert robot.halted is not None
+    robot.resume(number)
+    robot.burst(2)
+    assert [servo.get((40, 1)) for servo in arm.line.servos.values()] == [1] * 6
+
+
 def test_recover_ends_an_overload(arm: FakeArm) -> None:
     robot = arm.started()
     arm.servo("shoulder_lift").alarms = 32

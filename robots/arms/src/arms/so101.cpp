@@ -328,7 +328,9 @@ void So101::write(const Desired<So101>& desired) noexcept {
   wrote_ = true;
   if (!chain_.port().is_open()) return reopen();
   settle();
+  commanded_ = 0;
   for (std::size_t i = 0; i < kServos; ++i) {
+    if (desired.active(i)) commanded_ |= bit(i);
     if (has(held_, i)) goals_[i] = goal_of(i, desired.states);
   }
   chain_.request(held_, goals_);
@@ -372,6 +374,12 @@ void So101::read(Reading<So101>& reading) noexcept {
     measured.temperature[i] = state.temperature;
     measured.voltage[i] = 0.1 * state.voltage;
     reading.extended.health[i] = health_of(i);
+  }
+  if (relaxed_) {
+    reading.follow();
+    for (std::size_t i = 0; i < kServos; ++i) {
+      if (has(commanded_, i)) reading.interrupt(i);  // nothing would move
+    }
   }
   link_.age = now() - complete_at_;
   link_.capture_time = reading.time() - link_.age;

@@ -77,7 +77,7 @@ struct Hold {
 };
 struct Relax {
   static constexpr std::string_view kHelp =
-      "switch the torque off: the arm sinks, and can be guided by hand";
+      "switch the torque off: the arm sinks, can be guided by hand, and desired follows it";
   static constexpr bool kWhileHalted = true;
 };
 struct Strength {
@@ -181,6 +181,7 @@ class So101 {
   OfServos<int> goals_{};        // sent last [steps]
   OfServos<int> held_places_{};  // while the arm settles [steps]
   std::string lasting_name_;     // of the port
+  Mask commanded_ = 0;           // active in the last iteration
   Mask held_ = 0;                // servos that get goals
   bool started_ = false;
   bool relaxed_ = false;
