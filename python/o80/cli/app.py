@@ -72,11 +72,16 @@ def root(
 def run_app(words: list[str]) -> None:
     """Runs the command that `words` begin with, or shows which there are.
 
-    Only the module of that command is imported: others need what takes long to import.
+    Only the module of that command is imported: others need what takes long to import. Installed
+    packages add commands by entry points of the group `o80.commands`, each a typer.Typer.
     """
     progress.of_a_command = True
     named = words[0] if words else ""
-    for name in [named] if named in COMMANDS else COMMANDS:
+    added = {} if named in COMMANDS else installation.announced("o80.commands")
+    for name in [named] if named in COMMANDS or named in added else [*COMMANDS, *added]:
+        if name in added:
+            app.add_typer(added[name].load(), name=name)
+            continue
         module, function = COMMANDS[name].split(".")
         command = getattr(importlib.import_module(f"o80.cli.{module}"), function)
         if name == "run":  # options of robots are not typer's

@@ -165,8 +165,9 @@ def test_a_start_that_cannot_be_right_is_refused_and_switches_no_torque_on(
     arm: FakeArm, wrong: Callable[[FakeArm], None], words: str
 ) -> None:
     wrong(arm)
+    silent = wrong in (unpowered, unplugged)
     with pytest.raises(o80.Error, match=words):
-        arm.started()
+        arm.started(**{"answer_timeout": 0.1} if silent else {})
     assert all(servo.get((40, 1)) == 0 for servo in arm.line.servos.values())
 
 
@@ -179,7 +180,7 @@ def test_without_a_calibration_it_says_how_to_get_one(
 
 
 def test_a_rate_that_the_bus_cannot_reach_is_refused(arm: FakeArm) -> None:
-    arm.line.latency = 0.02  # never less, on any machine
+    arm.line.latency = 0.008  # never less, on any machine
     with pytest.raises(o80.DriverError, match=r"the bus answers in .* Hz are possible, 150 Hz"):
         arm.started(answer_timeout=0.0)
 
@@ -220,7 +221,7 @@ def test_a_silent_servo_halts_after_three_transfers_and_returns_where_it_stands(
     robot.burst(100)
     arm.line.unplug(3)
     halt = halted(robot, "elbow_flex (servo 3) does not answer: look at its plug", 3)
-    row = robot.burst(30)
+    row = robot.burst(20)
     assert not row.extended.link.fresh
     assert row.extended.health.tolist()[2:] == ["silent"] * 4
     with pytest.raises(o80.BackendHalted, match=r"elbow_flex \(servo 3\) does not answer"):
@@ -229,7 +230,7 @@ def test_a_silent_servo_halts_after_three_transfers_and_returns_where_it_stands(
     for number in (3, 4, 5, 6):  # they sank, and know nothing of their goals
         arm.line.servos[number].stand_at(2080)
     before = arm.shown
-    robot.burst(50)
+    robot.burst(20)
     assert arm.shown[2:] == before[2:], "goals would switch its torque on"
     assert robot.halted == halt
     robot.resume(accept_reading=True)

@@ -52,7 +52,7 @@ class FeetechChain {
   }
 
   // before the loop: these wait for answers, with several tries
-  /// `patience`: for an answer, if it is more than 0.05 [s].
+  /// `patience`: for an answer, if it is more than 0.1 [s].
   void open(SerialPort port, double patience = 0.0);
   bool ping(std::size_t servo);
   std::optional<int> read(std::size_t servo, feetech::Register where);
@@ -78,7 +78,7 @@ class FeetechChain {
 
  private:
   static constexpr std::int64_t kQuiet = 3'000'000;  // longest answer of all, USB included [ns]
-  static constexpr std::int64_t kSetUpWait = 50'000'000;  // for an answer before the loop [ns]
+  static constexpr std::int64_t kSetUpWait = 100'000'000;  // for an answer before the loop [ns]
   static constexpr int kTries = 3;
   static constexpr int kMissing = 3;                    // transfers without an answer
   static constexpr std::int64_t kRarely = 100'000'000;  // between questions from then on [ns]

@@ -1,34 +1,20 @@
 """A fake SO-101: `python -m o80_arms.fakes` prints what to type, and obeys its terminal."""
 
 import argparse
-import json
 import sys
 import tempfile
 from pathlib import Path
 
+from o80_arms import calibration
+from o80_arms.calibration import JOINTS, Calibration
 from o80_arms.fakes.feetech import TEMPERATURE, TORQUE, VOLTAGE, FakeChain
 
-JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 RANGES = ((795, 3300), (910, 3185), (944, 3151), (967, 3128), (228, 3867), (2030, 3500))
 WORDS = """\
 unplug N, plug_in N       the power of servo N and of those behind it
 cut, plug                 the USB cable
 silent N, damages SHARE   a servo that does not answer; damaged answers
 heat N C, voltage N V, overload N, torque_off N, pull N STEPS_PER_S STRENGTH"""
-
-
-def calibration() -> dict[str, dict[str, int]]:
-    """The content of LeRobot's file for this arm."""
-    return {
-        joint: {
-            "id": number,
-            "drive_mode": 0,
-            "homing_offset": 0,
-            "range_min": smallest,
-            "range_max": largest,
-        }
-        for number, (joint, (smallest, largest)) in enumerate(zip(JOINTS, RANGES, strict=True), 1)
-    }
 
 
 def obey(chain: FakeChain, words: list[str]) -> None:
@@ -67,7 +53,8 @@ def main() -> None:
     latency = parser.parse_args().latency
     with tempfile.TemporaryDirectory() as folder:
         file, port = Path(folder) / "fake.json", Path(folder) / "tty"
-        file.write_text(json.dumps(calibration(), indent=4))
+        ranges = dict(zip(JOINTS, RANGES, strict=True))
+        calibration.write(file, {joint: Calibration(0, *each) for joint, each in ranges.items()})
         with FakeChain(port, latency=latency, bus_time=True) as chain:
             for number, (smallest, largest) in enumerate(RANGES, 1):
                 chain.servos[number].calibrate(0, smallest, largest)

@@ -95,7 +95,7 @@ class FakeServo:
 
     @property
     def shown(self) -> int:
-        return round(self.encoder) - to_signed(self.get(OFFSET), 11)
+        return (round(self.encoder) - to_signed(self.get(OFFSET), 11)) % TURN
 
     def stand_at(self, position: int) -> None:
         """Moves the axis to where the servo shows this position."""
@@ -156,7 +156,7 @@ class FakeServo:
         fastest = self.get(SPEED) * unit or 3000
         change = (self.get(ACCELERATION) * 100 or 1e6) * seconds
         goal = max(self.get(SMALLEST), min(self.get(LARGEST), to_signed(self.get(GOAL), 15)))
-        way = goal - (self.encoder - to_signed(self.get(OFFSET), 11))
+        way = goal - (self.encoder - to_signed(self.get(OFFSET), 11)) % TURN
         braking = math.sqrt(2 * (change / seconds) * abs(way)) if seconds else 0.0
         wanted = math.copysign(min(fastest, braking, abs(way) / seconds), way)
         self.speed += max(-change, min(change, wanted - self.speed))
@@ -312,15 +312,16 @@ class FakeChain:
             self._sync_write(parameters[0], parameters[1], parameters[2:])
             return b""
         found = []
-        for each in self.servos if number == EVERYBODY else [number]:
+        for each in list(self.servos) if number == EVERYBODY else [number]:
             if not self._hears(each):
                 continue
             servo = self.servos[each]
             if instruction == 3:
                 servo.write(parameters[0], parameters[1:])
+                self.servos = {each.get(ID): each for each in self.servos.values()}
             data = servo.read(*parameters) if instruction == 2 else b""
             if instruction == 1 or number != EVERYBODY:
-                found.append(self._packet(each, data))
+                found.append(self._packet(each, servo, data))
         return b"".join(found)
 
     def _hears(self, number: int) -> bool:
@@ -347,7 +348,7 @@ class FakeChain:
             if positions := self.false.get(number):
                 at = POSITION[0] - address
                 data[at : at + 2] = positions.pop(0).to_bytes(2, "little")
-            found.append(self._packet(number, bytes(data)))
+            found.append(self._packet(number, self.servos[number], bytes(data)))
         answers = b"".join(found)
         if self.bus_time:
             time.sleep(BYTE * len(answers))
@@ -358,8 +359,8 @@ class FakeChain:
         self._held = [(at, held) for at, held in self._held if at > self.reads]
         return due + answers
 
-    def _packet(self, number: int, data: bytes) -> bytes:
-        body = bytes([number, len(data) + 2, self.servos[number].status]) + data
+    def _packet(self, number: int, servo: FakeServo, data: bytes) -> bytes:
+        body = bytes([number, len(data) + 2, servo.status]) + data
         packet = bytearray(b"\xff\xff" + body + bytes([checksum(body)]))
         if self.damages and self._dice.random() < self.damages:
             self.damaged += 1

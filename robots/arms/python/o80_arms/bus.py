@@ -1,0 +1,175 @@
+"""A line with Feetech servos, for set-up: one question at a time, each in its own time."""
+
+import errno
+import fcntl
+import os
+import select
+import termios
+import time
+import tty
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import o80
+
+WAIT = 0.05  # for an answer [s]
+TRIES = 3
+EVERYBODY = 254
+
+
+class BusError(o80.Error):
+    """A line that cannot be used, or a servo that does not do what it is told."""
+
+
+@dataclass(frozen=True)
+class Register:
+    """Where a number of a servo lies; its sign is a bit of its own, if it has one."""
+
+    address: int
+    size: int
+    sign: int | None = None
+
+
+FIRMWARE, MODEL, ID = Register(0, 2), Register(3, 2), Register(5, 1)
+SMALLEST, LARGEST, LEAST_VOLTAGE = Register(9, 2), Register(11, 2), Register(15, 1)
+RETURN_DELAY, PHASE, GAIN = Register(7, 1), Register(18, 1), Register(21, 1)
+OFFSET, MODE, TORQUE, GOAL = Register(31, 2, 11), Register(33, 1), Register(40, 1), Register(42, 2)
+LOCK, POSITION = Register(55, 1), Register(56, 2, 15)
+VOLTAGE, TEMPERATURE = Register(62, 1), Register(63, 1)
+TURN = 4096
+
+
+class Bus:
+    """Questions to the servos of a port, which is open for this process alone."""
+
+    def __init__(self, port: Path, wait: float | None = None) -> None:
+        self.port, self.wait = port, WAIT if wait is None else wait
+        owner = owner_of(port)
+        if owner:
+            raise BusError(f"{owner} has {port} open: stop it first")
+        try:
+            self._line = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
+        except PermissionError:
+            raise BusError(
+                f"you may not use {port}: `sudo usermod -aG dialout $USER`, then log in again"
+            ) from None
+        except OSError as error:
+            raise BusError(f"cannot open {port} ({os.strerror(error.errno or 0)})") from None
+        try:
+            fcntl.flock(self._line, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            tty.setraw(self._line)
+            attributes = termios.tcgetattr(self._line)
+            attributes[4] = attributes[5] = termios.B1000000
+            termios.tcsetattr(self._line, termios.TCSANOW, attributes)
+        except (OSError, termios.error) as error:
+            os.close(self._line)
+            busy = isinstance(error, OSError) and error.errno in (errno.EAGAIN, errno.EACCES)
+            why = "another process has it open" if busy else "it is no serial line of 1 Mbaud"
+            raise BusError(f"cannot use {port}: {why}") from None
+        self._question = 0
+
+    def close(self) -> None:
+        os.close(self._line)
+
+    def scan(self, servos: Iterable[int] = range(1, 13)) -> list[int]:
+        """Numbers of the servos that answer a ping."""
+        return [servo for servo in servos if self._ask(servo, 1, b"", 0) is not None]
+
+    def read(self, servo: int, register: Register) -> int:
+        """A number of a servo. Raises BusError."""
+        for _ in range(TRIES):
+            # a number of bytes of its own for each question: an answer to another is known by it
+            self._question = (self._question + 1) % 8
+            size = register.size + self._question
+            if answer := self._ask(servo, 2, bytes([register.address, size]), size):
+                raw = int.from_bytes(answer[: register.size], "little")
+                sign = register.sign
+                return raw if sign is None else (-1 if raw >> sign & 1 else 1) * (raw % (1 << sign))
+        raise BusError(f"servo {servo} at {self.port} does not answer: look at its plug")
+
+    def write(self, servo: int, register: Register, value: int) -> None:
+        """Writes a number, and reads it back. Raises BusError."""
+        for _ in range(TRIES):
+            self.send(servo, register, value)
+            if self.read(servo, register) == value:
+                return
+        raise BusError(
+            f"servo {servo} at {self.port} does not keep {value} in its register {register.address}"
+        )
+
+    def send(self, servo: int, register: Register, value: int) -> None:
+        """Writes a number, whatever becomes of it."""
+        raw = value if value >= 0 else -value | 1 << (register.sign or 0)
+        self._ask(servo, 3, bytes([register.address]) + raw.to_bytes(register.size, "little"), 0)
+
+    @contextmanager
+    def unlocked(self, servo: int) -> Iterator[None]:
+        """Makes what is written meanwhile last when the power goes off. The torque is off."""
+        self.write(servo, TORQUE, 0)
+        self.write(servo, LOCK, 0)
+        yield
+        self.write(servo, LOCK, 1)
+
+    def answers(self, request: bytes, size: int | None = None) -> bytes:
+        """All that comes back within the wait; with a size: that many bytes, or none."""
+        self._send(request)
+        received = self._received(lambda received: len(received) == size)
+        return received if size is None or len(received) == size else b""
+
+    def _ask(self, servo: int, instruction: int, parameters: bytes, size: int) -> bytes | None:
+        """Data of the answer, if it has this many bytes."""
+        self._send(packet(servo, instruction, parameters))
+        head = bytes([0xFF, 0xFF, servo, size + 2])
+
+        def data(received: bytes) -> bytes | None:
+            begin = received.find(head)
+            found = received[begin + 2 : begin + size + 6]
+            whole = begin >= 0 and len(found) == size + 4 and sum(found) & 0xFF == 0xFF
+            return found[3:-1] if whole else None
+
+        return data(self._received(lambda received: data(received) is not None))
+
+    def _send(self, request: bytes) -> None:
+        termios.tcflush(self._line, termios.TCIFLUSH)
+        try:
+            os.write(self._line, request)
+        except OSError:
+            raise BusError(f"the adapter {self.port} is gone") from None
+
+    def _received(self, is_enough: Callable[[bytes], bool]) -> bytes:
+        received, end = b"", time.monotonic() + self.wait
+        while not is_enough(received):
+            left = end - time.monotonic()
+            if left <= 0 or not select.select([self._line], [], [], left)[0]:
+                break
+            with suppress(BlockingIOError):
+                part = os.read(self._line, 4096)
+                if not part:
+                    raise BusError(f"the adapter {self.port} is gone")
+                received += part
+        return received
+
+
+def packet(servo: int, instruction: int, parameters: bytes) -> bytes:
+    body = bytes([servo, len(parameters) + 2, instruction]) + parameters
+    return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
+
+
+def ports() -> list[Path]:
+    """Adapters that may have servos."""
+    return sorted([*Path("/dev").glob("ttyACM*"), *Path("/dev").glob("ttyUSB*")])
+
+
+def owner_of(port: Path) -> str:
+    """The process that has a port open, "'lerobot-teleop' (pid 4711)"; empty if none is seen."""
+    file = str(port.resolve())
+    for process in Path("/proc").glob("[0-9]*"):
+        if process.name == str(os.getpid()):
+            continue
+        with suppress(OSError):
+            if any(os.readlink(each) == file for each in (process / "fd").iterdir()):
+                name = (process / "comm").read_text().strip()
+                return f"'{name}' (pid {process.name})"
+    return ""

@@ -1,0 +1,127 @@
+"""Calibrations of an SO-101 as LeRobot keeps them: a file, and the same numbers in the servos."""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import o80
+from o80_arms.bus import LARGEST, MODE, OFFSET, SMALLEST, TURN, Bus
+
+JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+MODEL_RANGES = (220, 200, 194, 190, 320, 110)  # of the published arm [deg]
+FOLDERS = ("so_follower", "so101_follower", "so100_follower")  # LeRobot's, the newest first
+LARGEST_OFFSET = 2047  # that a servo can keep
+
+
+class CalibrationError(o80.Error):
+    """A calibration that does not exist, or is none."""
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Numbers that a servo and LeRobot's file hold of a joint [steps]."""
+
+    offset: int
+    smallest: int
+    largest: int
+
+    @classmethod
+    def of_servo(cls, bus: Bus, servo: int) -> Self:
+        return cls(bus.read(servo, OFFSET), bus.read(servo, SMALLEST), bus.read(servo, LARGEST))
+
+    @classmethod
+    def of_motion(cls, smallest: int, largest: int) -> Self:
+        """From the range that a joint was moved through, in steps of its encoder without offset.
+
+        The middle of the range becomes the middle of what the servo shows, so that the step from
+        4095 to 0 is as far away as it can be.
+        """
+        offset = (smallest + largest) // 2 % TURN - (TURN // 2 - 1)
+        offset = min(offset, LARGEST_OFFSET)
+        middle, half = TURN // 2 - 1, min((largest - smallest) // 2, TURN // 2 - 1)
+        return cls(offset, middle - half, middle + half)
+
+    def write(self, bus: Bus, servo: int) -> None:
+        with bus.unlocked(servo):
+            for register, value in (
+                (OFFSET, self.offset),
+                (SMALLEST, self.smallest),
+                (LARGEST, self.largest),
+                (MODE, 0),
+            ):
+                bus.write(servo, register, value)
+
+    def __str__(self) -> str:
+        return f"offset {self.offset}, range {self.smallest}..{self.largest}"
+
+
+def folder() -> Path:
+    """The folder in which LeRobot keeps the calibrations of robots."""
+    if own := os.environ.get("HF_LEROBOT_CALIBRATION"):
+        return Path(own) / "robots"
+    cache = Path(os.environ.get("HF_HOME", Path.home() / ".cache" / "huggingface"))
+    return Path(os.environ.get("HF_LEROBOT_HOME", cache / "lerobot")) / "calibration" / "robots"
+
+
+def files() -> list[Path]:
+    """Calibrations that LeRobot has of such arms."""
+    return [file for each in FOLDERS for file in sorted((folder() / each).glob("*.json"))]
+
+
+def find(name: str) -> Path:
+    """The file of a name, or a path. Raises CalibrationError."""
+    if "/" in name or name.endswith(".json"):
+        return Path(name)
+    found = [file for file in files() if file.stem == name]
+    if not found:
+        raise CalibrationError(f"there is no calibration '{name}' in {folder() / FOLDERS[0]}")
+    return found[0]
+
+
+def place_for(name: str) -> Path:
+    """The file in which a calibration of this name is written."""
+    own = "/" in name or name.endswith(".json")
+    return Path(name) if own else folder() / FOLDERS[0] / f"{name}.json"
+
+
+def read(file: Path) -> dict[str, Calibration]:
+    """The joints of a file. Raises CalibrationError."""
+    try:
+        content = json.loads(file.read_text())
+        return {
+            joint: Calibration(each["homing_offset"], each["range_min"], each["range_max"])
+            for joint, each in ((joint, content[joint]) for joint in JOINTS)
+        }
+    except (OSError, ValueError, KeyError, TypeError) as error:
+        raise CalibrationError(f"{file} is no calibration of an SO-101 ({error!r})") from None
+
+
+def write(file: Path, joints: dict[str, Calibration]) -> None:
+    """Writes a file that LeRobot reads too."""
+    content = {
+        joint: {
+            "id": number,
+            "drive_mode": 0,
+            "homing_offset": joints[joint].offset,
+            "range_min": joints[joint].smallest,
+            "range_max": joints[joint].largest,
+        }
+        for number, joint in enumerate(JOINTS, 1)
+    }
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text(json.dumps(content, indent=4))
+
+
+def doubts(joints: dict[str, Calibration]) -> list[str]:
+    """Sentences on what is strange about the ranges: 0 is the middle of what was moved by hand."""
+    found = []
+    for joint, degrees in zip(JOINTS, MODEL_RANGES, strict=True):
+        moved = (joints[joint].largest - joints[joint].smallest) * 360 / (TURN - 1)
+        if joint not in ("wrist_roll", "gripper") and moved < 0.85 * degrees:
+            found.append(
+                f"{joint} was moved through {moved:.0f} of {degrees} deg when it was calibrated: "
+                f"its zero is off by up to {(degrees - moved) / 2:.0f} deg"
+            )
+    return found

@@ -1,0 +1,268 @@
+"""``o80 arms``: lists arms, calibrates them, numbers their servos, checks what is not known."""
+
+import select
+import statistics
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+import o80
+from o80_arms import bus as registers
+from o80_arms import calibration
+from o80_arms.bus import EVERYBODY, TURN, Bus, BusError, packet
+from o80_arms.calibration import JOINTS, Calibration
+
+STS3215 = 777
+SERVOS = range(1, len(JOINTS) + 1)
+app = typer.Typer(help="List arms of bus servos, calibrate them, number their servos.")
+Port = Annotated[Path | None, typer.Option(help="Port of the adapter (default: the only one).")]
+
+
+@contextmanager
+def opened(port: Path | None) -> Iterator[Bus]:
+    """The bus of a port, or of the only one."""
+    found = [port] if port else registers.ports()
+    if len(found) != 1:
+        names = ", ".join(map(str, found)) or "none"
+        raise BusError(f"--port must say which adapter; there are: {names}")
+    bus = Bus(found[0])
+    try:
+        yield bus
+    finally:
+        bus.close()
+
+
+@app.callback(invoke_without_command=True)
+def arms(
+    context: typer.Context,
+    port: Annotated[list[Path] | None, typer.Option(help="Look at this port only.")] = None,
+) -> None:
+    """Lists the arms of all ports."""
+    if context.invoked_subcommand is not None:
+        return
+    found = port or registers.ports()
+    if not found:
+        print("No serial adapter is plugged in: is the USB cable in, has the adapter power?")
+    for each in found:
+        print(f"{each}: {told_of(each)}")
+
+
+def told_of(port: Path) -> str:
+    """Describes the servos of a port, or says why it cannot."""
+    try:
+        with opened(port) as bus:
+            servos = bus.scan()
+            if not servos:
+                return "no servo answers: is the power supply on?"
+            told = [f"servos {', '.join(map(str, servos))}"]
+            models = {bus.read(servo, registers.MODEL) for servo in servos}
+            told.append("STS3215" if models == {STS3215} else f"models {sorted(models)}")
+            volts = [bus.read(servo, registers.VOLTAGE) / 10 for servo in servos]
+            told.append(f"{min(volts)} V")
+            on = sum(bus.read(servo, registers.TORQUE) == 1 for servo in servos)
+            told.append(f"torque on in {on}" if on else "torque off")
+            if servos == list(SERVOS):
+                told.append(calibration_of(bus))
+            return ", ".join(told)
+    except BusError as error:
+        return str(error)
+
+
+def calibration_of(bus: Bus) -> str:
+    """The name of that of LeRobot's files which the servos hold."""
+    held = held_by(bus)
+    for file in calibration.files():
+        with suppress(calibration.CalibrationError):
+            if calibration.read(file) == held:
+                return f"calibration {file.stem}"
+    return "no file has its calibration: `o80 arms calibrate --take NAME`"
+
+
+def held_by(bus: Bus) -> dict[str, Calibration]:
+    pairs = zip(JOINTS, SERVOS, strict=True)
+    return {joint: Calibration.of_servo(bus, servo) for joint, servo in pairs}
+
+
+@app.command()
+def relax(port: Port = None) -> None:
+    """Switch the torque of all servos off. The arm sinks: hold it."""
+    with opened(port) as bus:
+        servos = bus.scan()
+        for servo in servos:
+            bus.write(servo, registers.TORQUE, 0)
+    print(f"{len(servos)} servos are without torque")
+
+
+@app.command()
+def calibrate(
+    port: Port = None,
+    name: Annotated[
+        str | None, typer.Option(help="Move the joints by hand; name of the new file.")
+    ] = None,
+    take: Annotated[
+        str | None, typer.Option(help="Make a file of this name from what the servos hold.")
+    ] = None,
+    write: Annotated[
+        str | None, typer.Option(help="Put the file of this name into the servos.")
+    ] = None,
+) -> None:
+    """Calibrate an SO-101, or bring its servos and LeRobot's file to the same.
+
+    The torque is switched off where something is written: the arm sinks.
+    """
+    given = [each for each in (name, take, write) if each]
+    if len(given) != 1:
+        raise o80.InvalidArgument("give one of --name, --take and --write")
+    with opened(port) as bus:
+        if write:
+            file = calibration.find(write)
+            joints = calibration.read(file)
+            put(bus, joints)
+        else:
+            joints = moved_by_hand(bus) if name else held_by(bus)
+            file = calibration.place_for(given[0])
+            if file.exists() and calibration.read(file) != joints:
+                file.rename(file.with_suffix(".json.old"))
+            calibration.write(file, joints)
+    for joint, each in joints.items():
+        print(f"{joint:14} {each}")
+    for doubt in calibration.doubts(joints):
+        print(doubt)
+    print(f"{'read from' if write else 'written to'} {file}")
+
+
+def put(bus: Bus, joints: dict[str, Calibration]) -> None:
+    for servo, joint in zip(SERVOS, JOINTS, strict=True):
+        joints[joint].write(bus, servo)
+
+
+def moved_by_hand(bus: Bus) -> dict[str, Calibration]:
+    """Ranges through which somebody moves the joints, written into the servos."""
+    for servo in SERVOS:
+        bus.write(servo, registers.TORQUE, 0)
+    print("Move each joint to both of its ends, slowly. Then press Enter.")
+    ranges = watch(bus, pressed_enter)
+    joints = {joint: Calibration.of_motion(*each) for joint, each in ranges.items()}
+    for joint, (smallest, largest) in ranges.items():
+        if largest - smallest < 200:
+            raise BusError(f"{joint} was not moved: nothing was written, begin again")
+    put(bus, joints)
+    return joints
+
+
+def watch(bus: Bus, is_over: Callable[[], bool]) -> dict[str, tuple[int, int]]:
+    """The range of each joint until it is over, in steps of its encoder without offset.
+
+    A jump of more than half a turn is the step from 4095 to 0, or back.
+    """
+
+    def encoder(servo: int) -> int:
+        return bus.read(servo, registers.POSITION) + bus.read(servo, registers.OFFSET)
+
+    place = {servo: encoder(servo) for servo in SERVOS}
+    ranges = {servo: (start, start) for servo, start in place.items()}
+    while True:
+        over = is_over()  # what is read afterwards belongs to the motion, too
+        for servo, before in place.items():
+            step = (encoder(servo) - before + TURN // 2) % TURN - TURN // 2
+            place[servo] = now = before + step
+            ranges[servo] = min(ranges[servo][0], now), max(ranges[servo][1], now)
+        if over:
+            return {joint: ranges[servo] for joint, servo in zip(JOINTS, SERVOS, strict=True)}
+
+
+def pressed_enter() -> bool:
+    """True if a line is there to be read from the terminal."""
+    if not select.select([sys.stdin], [], [], 0)[0]:
+        return False
+    sys.stdin.readline()
+    return True
+
+
+@app.command()
+def number(port: Port = None) -> None:
+    """Number the servos of a kit: connect one after the other, each alone."""
+    with opened(port) as bus:
+        for servo, joint in reversed(list(zip(SERVOS, JOINTS, strict=True))):
+            print(f"Connect the servo of {joint}, and no other.", flush=True)
+            give_number(bus, servo)
+            print(f"{joint} has the number {servo}", flush=True)
+    print("Connect all of them, then `o80 arms calibrate --name NAME`.")
+
+
+def give_number(bus: Bus, servo: int) -> None:
+    """Waits until one servo is there that was not there before, and numbers it."""
+    told = False
+    while True:
+        found = answering(bus)
+        if found is None or len(found) > 1:
+            if not told:
+                print("Several servos answer: leave one only.", flush=True)
+            told = True
+        elif found and found[0] != servo + 1:  # the one before may still be connected
+            break
+    bus.write(found[0], registers.TORQUE, 0)
+    bus.write(found[0], registers.LOCK, 0)
+    bus.send(found[0], registers.ID, servo)  # it answers by its new number from here on
+    bus.write(servo, registers.ID, servo)
+    bus.write(servo, registers.LOCK, 1)
+
+
+def answering(bus: Bus) -> list[int] | None:
+    """Numbers of the servos that answer a ping to all; None if their answers collide."""
+    received = bus.answers(packet(EVERYBODY, 1, b""))
+    found = []
+    while received:
+        head, received = received[:6], received[6:]
+        if len(head) < 6 or head[:2] != b"\xff\xff" or sum(head[2:]) & 0xFF != 0xFF:
+            return None
+        found.append(head[2])
+    return found
+
+
+@app.command()
+def check(port: Port = None) -> None:
+    """Find out what is not known of real servos: report what it prints. Nothing moves far."""
+    with opened(port) as bus:
+        servos = bus.scan()
+        if not servos:
+            raise BusError("no servo answers: is the power supply on?")
+        print("servo firmware phase delay gain volts heat")
+        for servo in servos:
+            firmware = bus.read(servo, registers.FIRMWARE)
+            rest = (registers.PHASE, registers.RETURN_DELAY, registers.GAIN)
+            values = [f"{firmware & 255}.{firmware >> 8}", *(bus.read(servo, r) for r in rest)]
+            volts = bus.read(servo, registers.VOLTAGE) / 10
+            print(servo, *values, volts, bus.read(servo, registers.TEMPERATURE))
+        print(f"readings of all at once: {readings_take(bus, servos)}")
+        behind = bus.answers(packet(EVERYBODY, 0x82, bytes([56, 2, servos[0], 250, servos[-1]])))
+        goes_on = behind.find(bytes([0xFF, 0xFF, servos[-1], 4])) >= 0
+        print(f"a reading of all goes on behind a silent servo: {yes(goes_on)}")
+        if bus.read(servos[-1], registers.TORQUE) == 0:
+            bus.write(servos[-1], registers.GOAL, bus.read(servos[-1], registers.POSITION))
+            print(f"a goal switches torque on: {yes(bus.read(servos[-1], registers.TORQUE) == 1)}")
+            bus.write(servos[-1], registers.TORQUE, 0)
+        else:
+            print("the torque is on: `o80 arms relax` first, to see whether a goal switches it on")
+
+
+def readings_take(bus: Bus, servos: list[int]) -> str:
+    request = packet(EVERYBODY, 0x82, bytes([56, 8, *servos]))
+    size = len(servos) * (8 + 6)
+    times = []
+    for _ in range(100):
+        begin = time.perf_counter()
+        if bus.answers(request, size):
+            times.append(1e3 * (time.perf_counter() - begin))
+    worst = statistics.quantiles(times, n=20)[-1] if len(times) > 1 else float("nan")
+    middle = statistics.median(times) if times else float("nan")
+    return f"{middle:.1f} ms, 95 % below {worst:.1f} ms, {100 - len(times)} of 100 missed"
+
+
+def yes(is_so: bool) -> str:
+    return "yes" if is_so else "no"

@@ -1,0 +1,167 @@
+"""The command `o80 arms`, against fake servos."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import fake_so101
+import numpy as np
+import pytest
+from fake_so101 import JOINTS, FakeArm
+from typer.testing import CliRunner, Result
+
+import o80
+from o80_arms import calibration, cli
+from o80_arms.bus import Bus, BusError
+from o80_arms.calibration import Calibration
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """LeRobot's folder of calibrations."""
+    monkeypatch.setenv("HF_LEROBOT_CALIBRATION", str(tmp_path / "lerobot"))
+    monkeypatch.setattr("o80_arms.bus.WAIT", 20.0)  # a busy machine
+    return tmp_path / "lerobot" / "robots"
+
+
+def run(*words: str | Path) -> Result:
+    return CliRunner().invoke(cli.app, [str(word) for word in words])
+
+
+def test_o80_has_the_command() -> None:
+    program = Path(sys.executable).parent / "o80"
+    told = subprocess.run([program, "arms", "--help"], capture_output=True, text=True)
+    assert "calibrate" in told.stdout, told.stderr
+    assert "arms" in subprocess.run([program, "--help"], capture_output=True, text=True).stdout
+
+
+def test_it_lists_what_is_at_a_port(arm: FakeArm, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("o80_arms.bus.WAIT", 0.3)  # six numbers are of nobody
+    told = run("--port", arm.line.port).output
+    assert "servos 1, 2, 3, 4, 5, 6, STS3215, 5.2 V, torque off" in told
+    assert "no file has its calibration: `o80 arms calibrate --take NAME`" in told
+    run("calibrate", "--port", arm.line.port, "--take", "black")
+    assert "calibration black" in run("--port", arm.line.port).output
+    arm.line.unplug(1)
+    monkeypatch.setattr("o80_arms.bus.WAIT", 0.01)
+    assert "no servo answers: is the power supply on?" in run("--port", arm.line.port).output
+
+
+def test_a_port_that_is_in_use_names_its_user(arm: FakeArm) -> None:
+    program = f"line = open({str(arm.line.port)!r}, 'rb', 0); print(flush=True); input()"
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as other:
+        assert other.stdout is not None
+        other.stdout.readline()
+        used = rf"' \(pid {other.pid}\) has {arm.line.port} open: stop it first"
+        with pytest.raises(BusError, match=used):
+            Bus(arm.line.port)
+        with pytest.raises(o80.DriverError, match=used):
+            arm.started()
+        other.communicate(b"\n")
+
+
+def test_take_makes_the_file_that_lerobot_would_make(arm: FakeArm, folder: Path) -> None:
+    run("calibrate", "--port", arm.line.port, "--take", "black")
+    arm.line.wait_until_closed()
+    file = folder / "so_follower" / "black.json"
+    assert json.loads(file.read_text()) == fake_so101.calibration()
+    assert arm.started(calibration="black").latest().extended.link.fresh
+
+
+def test_write_puts_a_file_into_the_servos_for_good(arm: FakeArm) -> None:
+    other = {**fake_so101.calibration()}
+    other["elbow_flex"] = {**other["elbow_flex"], "homing_offset": -7, "range_max": 3000}
+    arm.file.write_text(json.dumps(other))
+    with pytest.raises(o80.DriverError, match=r"elbow_flex: the file .* --write"):
+        arm.started()
+    arm.line.wait_until_closed()
+    assert run("calibrate", "--port", arm.line.port, "--write", arm.file).exit_code == 0
+    arm.line.wait_until_closed()
+    arm.line.unplug(1)
+    arm.line.plug_in(1)
+    assert arm.started().latest().extended.link.fresh
+
+
+def test_a_calibration_by_hand_has_its_middle_far_from_the_end_of_the_encoder(
+    arm: FakeArm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends = {joint: (500.0 * i, 500.0 * i + 2300) for i, joint in enumerate(JOINTS, 1)}
+    # some ranges go past 4095
+    path = [*np.linspace(0.5, 0, 30), *np.linspace(0, 1, 60)]
+
+    def moved_on() -> bool:
+        share = path.pop(0)
+        for joint, (smallest, largest) in ends.items():
+            arm.servo(joint).encoder = smallest + share * (largest - smallest)
+        return not path
+
+    monkeypatch.setattr(cli, "pressed_enter", moved_on)
+    moved_on()
+    with cli.opened(arm.line.port) as bus:
+        joints = cli.moved_by_hand(bus)
+        assert cli.held_by(bus) == joints
+    for joint, (smallest, largest) in ends.items():
+        found = joints[joint]
+        assert (found.smallest, found.largest) == (2047 - 1150, 2047 + 1150), joint
+        servo = arm.servo(joint)
+        servo.encoder = (smallest + largest) / 2
+        assert servo.shown == 2047
+    calibration.write(arm.file, joints)
+    row = arm.started().latest()
+    assert row.observed.joints == pytest.approx(np.zeros(5), abs=1e-9)
+
+
+def test_doubts_about_a_range_name_the_error_of_its_zero() -> None:
+    whole = {joint: Calibration(0, 500, 3500) for joint in JOINTS}
+    assert calibration.doubts(whole) == []
+    half = {**whole, "shoulder_lift": Calibration(0, 1000, 2490)}
+    assert calibration.doubts(half) == [
+        "shoulder_lift was moved through 131 of 200 deg when it was calibrated: its zero is off "
+        "by up to 35 deg"
+    ]
+
+
+def test_an_offset_that_a_servo_cannot_keep_is_one_step_less() -> None:
+    assert Calibration.of_motion(4095 - 1000, 4095 + 1000).offset == 2047
+
+
+def test_servos_are_numbered_one_after_the_other(
+    arm: FakeArm, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("o80_arms.bus.WAIT", 0.3)  # a servo that has another number is silent
+    every = list(arm.line.servos.values())
+    for servo in every:
+        servo.put((5, 1), 1)  # as delivered
+        servo.keep()
+    asked: list[list[int] | None] = [[], None, [1, 1]]  # none, two at once; then what is there
+
+    def answering(line: Bus) -> list[int] | None:
+        return asked.pop(0) if asked else real(line)
+
+    real = cli.answering
+    monkeypatch.setattr(cli, "answering", answering)
+    for number in range(6, 0, -1):
+        arm.line.servos = {1: every[number - 1]}
+        with cli.opened(arm.line.port) as bus:
+            cli.give_number(bus, number)
+        assert list(arm.line.servos) == [number]
+        arm.line.unplug(number)
+        arm.line.plug_in(number)
+        assert every[number - 1].get((5, 1)) == number
+        asked = [[number]]  # it is still connected
+    assert capsys.readouterr().out == "Several servos answer: leave one only.\n"
+
+
+def test_relax_and_check(arm: FakeArm, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("o80_arms.bus.WAIT", 0.3)
+    arm.servo("elbow_flex").put((40, 1), 1)
+    told = run("relax", "--port", arm.line.port)
+    assert "6 servos are without torque" in told.output
+    assert arm.servo("elbow_flex").get((40, 1)) == 0
+    told = run("check", "--port", arm.line.port)
+    assert "goes on behind a silent servo: no" in told.output
+    assert "a goal switches torque on: yes" in told.output
+    assert all(servo.get((40, 1)) == 0 for servo in arm.line.servos.values())
