@@ -2,6 +2,7 @@
 
 import random
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -505,3 +506,67 @@ def test_what_remains_at_the_end(arm: FakeArm, at_stop: str, torque: int) -> Non
     gripper = arm.servo("gripper")
     if torque:
         assert gripper.get((42, 2)) == pytest.approx(gripper.shown, abs=2)
+
+
+def test_it_may_go_back_to_where_it_was_started_before_it_relaxes(arm: FakeArm) -> None:
+    before = arm.shown
+    robot = arm.started(at_stop="rest")
+    robot.add_command("elbow_flex", -0.5, duration=1.0)
+    robot.burst(2 * RATE)
+    arm.line.goals.clear()
+    robot.close()
+    arm.line.wait_until_closed()
+    assert np.abs(np.subtract(arm.shown, before)).max() <= 2
+    elbow = np.array([goals[3] for goals in arm.line.goals]) * STEP
+    assert np.abs(np.diff(elbow)).max() * RATE < 0.5 + 1.01 * STEP * RATE
+    assert [servo.get((40, 1)) for servo in arm.line.servos.values()] == [0] * 6
+
+
+def test_after_a_halt_it_moves_nowhere_when_it_is_stopped(arm: FakeArm) -> None:
+    robot = arm.started(at_stop="rest")
+    robot.add_command("elbow_flex", -0.5, duration=1.0)
+    robot.burst(2 * RATE)
+    robot.halt("something is in the way")
+    robot.burst(2)
+    there = arm.shown
+    robot.close()
+    arm.line.wait_until_closed()
+    assert arm.shown == there
+    assert [servo.get((40, 1)) for servo in arm.line.servos.values()] == [1] * 6
+
+
+def test_its_run_is_replayed_without_it(arm: FakeArm, tmp_path: Path) -> None:
+    file = tmp_path / "run.mcap"
+    robot = arm.started()
+    with o80.Recording(file, robot):
+        robot.add_command("elbow_flex", 0.4, duration=0.3)
+        robot.burst(60)
+        robot.request("relax")
+        arm.servo("wrist_flex").pull = 400.0
+        robot.burst(60)
+        arm.servo("wrist_flex").pull = 0.0
+        robot.request("hold")
+        arm.line.late = [0, 0, 1]
+        robot.burst(6)
+        arm.servo("shoulder_lift").alarms = 32
+        halted(robot, "overloaded", 30)
+        robot.resume()
+        robot.add_command("wrist_flex", 0.0, speed=1.0)
+        robot.burst(60)
+    robot.close()
+    report = o80.replay(file)
+    assert report.identical, report
+
+
+def test_in_real_time_it_runs_moves_and_gives_the_port_back(arm: FakeArm) -> None:
+    """Nothing here is counted in time: a fake in Python, on a busy machine, is late."""
+    arm.line.tick = None
+    options = {**arm.options, "answer_timeout": 0.1}
+    robot = o80.robots.load("so101")
+    with robot.start(gap=30.0, **options) as process, process.frontend() as started:
+        started.add_command("elbow_flex", 0.3, duration=0.5)
+        row = started.pulse_and_wait(timeout=60.0)
+        assert row.desired.joints[2] == pytest.approx(0.3)
+    arm.line.wait_until_closed()
+    assert arm.servo("elbow_flex").get((40, 1)) == 1
+    arm.started().close()

@@ -30,6 +30,7 @@ constexpr int kFullSpeed = 2500;   // half more than kMostSpeed [steps/s]
 constexpr int kGentleAcceleration = 20;  // [100 steps/s^2]
 constexpr int kFullAcceleration = 254;
 constexpr double kGentleStrength = 0.3;
+constexpr double kRestSpeed = 0.5;                 // [rad/s]
 constexpr double kSettleTime = 0.5;                // [s]
 constexpr std::int64_t kSecond = 1'000'000'000;    // [ns]
 constexpr std::int64_t kLongestGap = 100'000'000;  // in which a servo is believed to move [ns]
@@ -229,6 +230,7 @@ void So101::begin_to_hold() {
                       std::to_string(static_cast<int>(where.address)));
   };
   approach(chain_.all());
+  start_places_ = held_places_;
   chain_.send_queued();
   for (std::size_t i = 0; i < kServos; ++i) {
     check(i, feetech::kStrength, strength_of(i, kGentleStrength));
@@ -539,6 +541,7 @@ Served So101::resume() noexcept {
 /// Forgets why it was halted. What cannot be is believed from now on: o80 judges it.
 void So101::begin_anew() noexcept {
   why_[0] = 0;
+  halted_ = false;
   window_ = damaged_in_window_ = 0;
   for (std::size_t i = 0; i < kServos; ++i) {
     servos_[i].position = chain_[i].position;
@@ -575,9 +578,34 @@ Served So101::on(const Recover& /*request*/) noexcept {
   return Served::done();
 }
 
+/// Moves the joints slowly to where the arm stood when it was started; false if something is wrong.
+bool So101::goes_to_rest() noexcept {
+  if (halted_ || relaxed_ || held_ != chain_.all()) return false;
+  const OfServos<int> from = goals_;
+  double most = 0.0;  // [rad]
+  for (std::size_t i = 0; i < kGripper; ++i) {
+    most = std::max(most, std::abs(start_places_[i] - from[i]) * Calibration::kStep);
+  }
+  const double seconds = std::max(1.0, most * std::numbers::pi / 2.0 / kRestSpeed);
+  const int steps = static_cast<int>(seconds * 1e9 / static_cast<double>(period_));
+  for (int step = 1; step <= steps && why_[0] == 0; ++step) {
+    const double share = 0.5 - 0.5 * std::cos(std::numbers::pi * step / steps);
+    for (std::size_t i = 0; i < kGripper; ++i) {
+      goals_[i] = from[i] + static_cast<int>(std::lround(share * (start_places_[i] - from[i])));
+    }
+    chain_.request(held_, goals_);
+    const FeetechChain::Transfer transfer = chain_.collect(deadline());
+    take(transfer);
+    if (transfer.asked) look_for_trouble(transfer);
+    sleep_until(chain_.asked_at() + period_);
+  }
+  return why_[0] == 0;
+}
+
 void So101::stop() noexcept {
   if (!started_) return;
-  if (config_.at_stop == AtStop::relax) {
+  const bool relaxes = config_.at_stop == AtStop::relax;
+  if (relaxes || (config_.at_stop == AtStop::rest && goes_to_rest())) {
     chain_.queue(feetech::kTorque, chain_.all(), 0);
     chain_.send_queued();
   } else if (!relaxed_) {

@@ -32,8 +32,8 @@ enum class Health : std::uint8_t {
 O80_DESCRIBE_ENUM(Health, ok, voltage, encoder, heat, current, overload, torque_off, silent);
 
 /// What remains when the process has ended.
-enum class AtStop : std::uint8_t { hold, relax };
-O80_DESCRIBE_ENUM(AtStop, hold, relax);
+enum class AtStop : std::uint8_t { hold, relax, rest };
+O80_DESCRIBE_ENUM(AtStop, hold, relax, rest);
 
 struct So101State {
   std::array<double, kServos - 1> joints;
@@ -120,6 +120,7 @@ class So101 {
   void start();
   void write(const Desired<So101>& desired) noexcept;
   void read(Reading<So101>& reading) noexcept;
+  void halt() noexcept { halted_ = true; }
   Served resume() noexcept;
   void stop() noexcept;
 
@@ -171,6 +172,7 @@ class So101 {
   Mask troubled() const noexcept;
   const char* why_not_ready() noexcept;
   void begin_anew() noexcept;
+  bool goes_to_rest() noexcept;
   [[gnu::format(printf, 2, 3)]] void because(const char* format, ...) noexcept;
 
   Config config_;
@@ -178,12 +180,14 @@ class So101 {
   mutable std::int64_t period_;           // [ns]
   FeetechChain chain_{kServos};
   OfServos<Servo> servos_{};
-  OfServos<int> goals_{};        // sent last [steps]
-  OfServos<int> held_places_{};  // while the arm settles [steps]
-  std::string lasting_name_;     // of the port
-  Mask commanded_ = 0;           // active in the last iteration
-  Mask held_ = 0;                // servos that get goals
+  OfServos<int> goals_{};         // sent last [steps]
+  OfServos<int> start_places_{};  // where the arm stood when it was started [steps]
+  OfServos<int> held_places_{};   // while the arm settles [steps]
+  std::string lasting_name_;      // of the port
+  Mask commanded_ = 0;            // active in the last iteration
+  Mask held_ = 0;                 // servos that get goals
   bool started_ = false;
+  bool halted_ = false;
   bool relaxed_ = false;
   bool wrote_ = false;            // since the last reading
   int settling_ = 0;              // iterations until full strength
@@ -196,12 +200,14 @@ class So101 {
   std::array<char, 200> why_{};  // of the halt, until somebody resumes
   std::array<char, 200> not_ready_{};
 };
-O80_DESCRIBE(So101::Config, (port, "of the adapter; by default the only one that is plugged in"),
-             (calibration, "LeRobot's, by name or path; by default the only one that is there"),
-             (at_stop, "what remains when the process has ended: hold or relax"),
-             (strength, "of the joints, above 0 up to 1 [1]"),
-             (gripper_strength, "above 0 up to 1 [1]"),
-             (answer_timeout,
-              "after which an answer counts as missing; 0: a quarter more than a period [s]"));
+O80_DESCRIBE(
+    So101::Config, (port, "of the adapter; by default the only one that is plugged in"),
+    (calibration, "LeRobot's, by name or path; by default the only one that is there"),
+    (at_stop,
+     "what remains when the process has ended: hold; relax; rest: back to where it was started, "
+     "then relax"),
+    (strength, "of the joints, above 0 up to 1 [1]"), (gripper_strength, "above 0 up to 1 [1]"),
+    (answer_timeout,
+     "after which an answer counts as missing; 0: a quarter more than a period [s]"));
 
 }  // namespace o80::arms

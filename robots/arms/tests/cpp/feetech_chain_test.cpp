@@ -10,6 +10,9 @@
 #include "count_allocations.hpp"
 
 namespace o80::arms {
+
+std::size_t allocations_of_this_thread() { return allocations; }
+
 namespace {
 
 using testing::ElementsAre;
