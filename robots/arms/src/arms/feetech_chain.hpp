@@ -77,7 +77,7 @@ class FeetechChain {
   const ServoState& operator[](std::size_t servo) const noexcept { return states_[servo]; }
 
  private:
-  static constexpr std::int64_t kQuiet = 3'000'000;  // longest answer of all, USB included [ns]
+  static constexpr std::int64_t kQuiet = 2'000'000;  // longer than an answer, USB included [ns]
   static constexpr std::int64_t kSetUpWait = 100'000'000;  // for an answer before the loop [ns]
   static constexpr int kTries = 3;
   static constexpr int kMissing = 3;                    // transfers without an answer
