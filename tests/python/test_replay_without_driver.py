@@ -314,6 +314,8 @@ def test_a_driver_may_let_actuators_follow_until_the_next_fresh_start(tmp_path: 
         arm.request("hold")
         arm.request("push", to=2.1)
         assert arm.burst(5).desired[0] == 2.0
+        fresh = [entry for entry in arm.journal() if entry.kind == "fresh_start"]
+        assert [entry.follows for entry in fresh] == [True, False]
         arm.request("push", to=2.5)
         with pytest.raises(o80.BackendHalted, match="error limit"):
             arm.burst(5)

@@ -79,7 +79,7 @@ def calibration_of(bus: Bus) -> str:
     for file in calibration.files():
         with suppress(calibration.CalibrationError):
             if calibration.read(file) == held:
-                return f"calibration {file.stem}"
+                return "; ".join([f"calibration {file.stem}", *calibration.doubts(held)])
     return "no file has its calibration: `o80 arms calibrate --take NAME`"
 
 

@@ -52,10 +52,11 @@ std::string range_of(const Calibration& calibration) {
 }  // namespace
 
 So101::So101(const Config& config) : config_(config), period_(kDefaultPeriod) {
-  for (const double share : {config.strength, config.gripper_strength}) {
+  for (const double share : {config.strength, config.gripper_strength, config.speed_share}) {
     if (!(share > 0.0 && share <= 1.0)) {
-      throw InvalidArgument("a strength must be above 0 and at most 1, got " +
-                            std::to_string(share));
+      throw InvalidArgument(
+          "a strength and the share of speed must be above 0 and at most 1, got " +
+          std::to_string(share));
     }
   }
   const std::string path =
@@ -77,7 +78,7 @@ void So101::describe(Schema& schema) const {
     const double bound = std::min(half, kModelHalf[i]);
     schema.actuator(i).unit("rad").limits({.minimum = -bound,
                                            .maximum = bound,
-                                           .speed = kMostSpeed,
+                                           .speed = kMostSpeed * config_.speed_share,
                                            .acceleration = 20.0,
                                            .jerk = 1000.0,
                                            .error = 0.35});
@@ -85,7 +86,7 @@ void So101::describe(Schema& schema) const {
   // it may close on something, so it has no limit of error
   schema.actuator(kGripper).unit("1").limits({.minimum = 0.0,
                                               .maximum = 1.0,
-                                              .speed = 2.0,
+                                              .speed = 2.0 * config_.speed_share,
                                               .acceleration = 20.0,
                                               .jerk = 1000.0,
                                               .noise = 0.05});

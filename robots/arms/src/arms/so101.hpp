@@ -107,6 +107,7 @@ class So101 {
     AtStop at_stop = AtStop::hold;
     double strength = 1.0;
     double gripper_strength = 0.5;
+    double speed_share = 1.0;
     double answer_timeout = 0.0;
   };
   using Actuators = So101State;
@@ -207,6 +208,7 @@ O80_DESCRIBE(
      "what remains when the process has ended: hold; relax; rest: back to where it was started, "
      "then relax"),
     (strength, "of the joints, above 0 up to 1 [1]"), (gripper_strength, "above 0 up to 1 [1]"),
+    (speed_share, "of the limits of speed: less on the first day, above 0 up to 1 [1]"),
     (answer_timeout,
      "after which an answer counts as missing; 0: a quarter more than a period [s]"));
 
