@@ -556,7 +556,8 @@ class Chunks:
                     part.begin((place, np.zeros_like(place)), known=False)
             former = part
 
-    def _desired(self, row: _core.Observation) -> NDArray[np.float64]:
+    def _desired(self, row: Any) -> NDArray[np.float64]:
+        """Desired places in an observation, read from its memory."""
         numbers = [np.ndarray((), self._kind, row, at) for at in self._places]
         return np.array(numbers, np.float64)
 
