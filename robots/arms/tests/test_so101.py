@@ -93,15 +93,26 @@ def test_nothing_moves_at_the_start_whatever_the_goals_were(
 
 def test_an_arm_that_is_pulled_when_it_is_switched_on_has_little_strength(arm: FakeArm) -> None:
     lift = arm.servo("shoulder_lift")
-    lift.put((40, 1), 1)
-    lift.put((42, 2), 2100)
-    lift.needs, lift.pull = 0.5, 200.0
+    lift.needs, lift.pull = 0.5, 150.0
     robot = arm.started()
     robot.burst(1)
     assert robot.halted is not None
     assert "shoulder_lift moved when its torque was switched on" in robot.halted.text
     assert lift.get((48, 2)) == 300
     assert lift.get((40, 1)) == 1, "or it would fall"
+
+
+def test_torque_that_is_on_stays_on_with_its_strength(arm: FakeArm) -> None:
+    """As after a stop that holds: with 30 % of its strength the arm would sink."""
+    for servo in arm.line.servos.values():
+        servo.put((42, 2), 2100)
+        servo.put((40, 1), 1)
+        servo.needs, servo.pull = 0.4, 500.0
+    before = arm.shown
+    robot = arm.started(gripper_strength=1.0)
+    robot.burst(RATE)
+    assert robot.halted is None
+    assert np.abs(np.subtract(arm.shown, before)).max() <= 1
 
 
 def unpowered(arm: FakeArm) -> None:
@@ -263,12 +274,17 @@ def test_two_transfers_without_an_answer_are_no_halt(arm: FakeArm) -> None:
 
 def test_an_adapter_that_is_gone_halts_at_once_and_is_opened_again(arm: FakeArm) -> None:
     robot = arm.started()
+    robot.add_command("elbow_flex", -0.5, duration=0.5)
+    robot.burst(RATE // 4)
     arm.line.cut()
     halted(robot, "the adapter", 1)
+    robot.burst(30)
     with pytest.raises(o80.BackendHalted, match="is gone"):
         robot.resume()
     arm.line.plug()
+    before = arm.shown
     robot.burst(RATE)
+    assert np.abs(np.subtract(arm.shown, before)).max() <= 30, "but for what it still had to do"
     resumed(robot, arm)
 
 
@@ -489,10 +505,14 @@ def test_an_arm_that_is_halted_may_be_relaxed_and_resume_holds_it(arm: FakeArm) 
 
 def test_recover_ends_an_overload(arm: FakeArm) -> None:
     robot = arm.started()
-    arm.servo("shoulder_lift").alarms = 32
+    lift = arm.servo("shoulder_lift")
+    lift.alarms, lift.needs, lift.pull = 32, 0.25, 900.0  # it sinks
     halted(robot, "overloaded", 3)
+    robot.burst(20)
+    before = arm.shown
     robot.request("recover")
-    assert robot.burst(2).extended.health[1] == "ok"
+    assert robot.burst(20).extended.health[1] == "ok"
+    assert np.abs(np.subtract(arm.shown, before)).max() <= 10, "it is not lifted to where it was"
     assert robot.halted is not None, "it may move when somebody resumes"
 
 

@@ -221,7 +221,8 @@ void So101::find_place() {
   }
 }
 
-/// Gentle registers and goals, read back, before torque.
+/// Goals and gentle registers, read back, before torque. Torque that is found on stays as it is:
+/// with less strength the arm would sink.
 void So101::begin_to_hold() {
   const auto check = [&](std::size_t servo, feetech::Register where, int wanted) {
     if (chain_.read(servo, where) == wanted) return;
@@ -232,7 +233,7 @@ void So101::begin_to_hold() {
   start_places_ = held_places_;
   chain_.send_queued();
   for (std::size_t i = 0; i < kServos; ++i) {
-    check(i, feetech::kStrength, strength_of(i, kGentleStrength));
+    if (!holds(i)) check(i, feetech::kStrength, strength_of(i, kGentleStrength));
     check(i, feetech::kGoal, with_sign(held_places_[i]));
   }
   chain_.queue(feetech::kTorque, chain_.all(), 1);
@@ -270,9 +271,18 @@ void So101::set_motion(Mask servos, int speed, int acceleration, double strength
   chain_.queue(feetech::kStrength, servos, strengths);
 }
 
-/// Gentle registers, and goals where the servos stand.
+/// Its torque is on, and nothing is wrong with it.
+bool So101::holds(std::size_t servo) const noexcept {
+  return chain_[servo].torque && chain_[servo].status == 0;
+}
+
+/// Goals where the servos stand, and gentle registers for those that do not hold yet.
 void So101::approach(Mask servos) noexcept {
-  set_motion(servos, kGentleSpeed, kGentleAcceleration, kGentleStrength);
+  Mask gentle = servos;
+  for (std::size_t i = 0; i < kServos; ++i) {
+    if (holds(i)) gentle &= ~bit(i);
+  }
+  set_motion(gentle, kGentleSpeed, kGentleAcceleration, kGentleStrength);
   OfServos<std::uint16_t> goals{};
   for (std::size_t i = 0; i < kServos; ++i) {
     const Calibration& range = calibration_[i];
@@ -287,7 +297,11 @@ void So101::approach(Mask servos) noexcept {
 /// Switches the torque on where the servos stand, with the next request.
 void So101::hold(Mask servos) noexcept {
   if (servos == 0) return;
-  chain_.queue(feetech::kTorque, servos, 0);  // ends an overload
+  Mask failing = servos;
+  for (std::size_t i = 0; i < kServos; ++i) {
+    if (chain_[i].status == 0) failing &= ~bit(i);
+  }
+  chain_.queue(feetech::kTorque, failing, 0);  // ends an overload
   approach(servos);
   chain_.queue(feetech::kTorque, servos, 1);
   held_ |= servos;
@@ -359,7 +373,10 @@ void So101::read(Reading<So101>& reading) noexcept {
   const FeetechChain::Transfer transfer = chain_.collect(deadline());
   take(transfer);
   if (transfer.asked) look_for_trouble(transfer);
-  if (!chain_.port().is_open()) because("the adapter %s is gone", lasting_name_.c_str());
+  if (!chain_.port().is_open()) {
+    because("the adapter %s is gone", lasting_name_.c_str());
+    held_ = 0;  // goals of before would move it when the adapter is there again
+  }
 
   for (std::size_t i = 0; i < kServos; ++i) {
     const ServoState& state = chain_[i];
@@ -522,8 +539,8 @@ const char* So101::why_not_ready() noexcept {
     }
     servo.was_hot = servo.was_hot && chain_[i].temperature > servo.hottest - 10;
     if (servo.was_hot) return say("%s is still too hot: wait", name);
-    if (servo.position < calibration_[i].smallest - kEdge ||
-        servo.position > calibration_[i].largest + kEdge) {
+    const int position = chain_[i].position;
+    if (position < calibration_[i].smallest - kEdge || position > calibration_[i].largest + kEdge) {
       return say("%s stands outside its range: move it inside by hand", name);
     }
   }
@@ -574,7 +591,7 @@ Served So101::on(const Strength& request) noexcept {
 Served So101::on(const Recover& /*request*/) noexcept {
   if (const char* const why = why_not_ready()) return Served::rejected(why);
   if (!relaxed_) hold(troubled());
-  return Served::done();
+  return Served::start_afresh();  // desired states of before would move what has sunk
 }
 
 /// Moves the joints slowly to where the arm stood when it was started; false if something is wrong.
@@ -605,8 +622,10 @@ void So101::stop() noexcept {
   if (!started_) return;
   const bool relaxes = config_.at_stop == AtStop::relax;
   if (relaxes || (config_.at_stop == AtStop::rest && goes_to_rest())) {
-    chain_.queue(feetech::kTorque, chain_.all(), 0);
-    chain_.send_queued();
+    for (int i = 0; i < 3; ++i) {  // nobody answers to it
+      chain_.queue(feetech::kTorque, chain_.all(), 0);
+      chain_.send_queued();
+    }
   } else if (!relaxed_) {
     // a gripper that presses on would overheat with nobody to see it
     chain_.queue(feetech::kGoal, bit(kGripper) & held_,

@@ -159,6 +159,7 @@ class So101 {
   // loop
   std::uint16_t strength_of(std::size_t servo, double share) const noexcept;
   void set_motion(Mask servos, int speed, int acceleration, double strength) noexcept;
+  bool holds(std::size_t servo) const noexcept;
   void approach(Mask servos) noexcept;
   void hold(Mask servos) noexcept;
   void settle() noexcept;

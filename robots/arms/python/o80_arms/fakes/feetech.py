@@ -141,16 +141,12 @@ class FakeServo:
     def pass_time(self, seconds: float) -> None:
         if self.status & 4:
             self.put(TORQUE, 0)
-        if not self.powered or self.get(TORQUE) == 0:
-            self.encoder += self.pull * seconds
-            self.speed = self.pull
-            return
-        strength = self.get(STRENGTH) / 1000
+        strength = self.get(STRENGTH) / 1000 if self.powered and self.get(TORQUE) else 0.0
         if self.status & 32:
             strength *= self.get(WEAK) / 100
-        if strength < self.needs:
+        if strength == 0 or strength < self.needs:
             self.encoder += self.pull * seconds
-            self.speed = self.pull
+            self.speed = 0.0  # of the motor's own motion
             return
         unit = 1 if self.get(PHASE) & 4 else 50
         fastest = self.get(SPEED) * unit or 3000
