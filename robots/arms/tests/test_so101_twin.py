@@ -5,6 +5,7 @@ import random
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,7 +81,9 @@ def test_a_script_asks_the_same_of_both_bit_for_bit(package: Path, arm: FakeArm,
                     place = (
                         choose.uniform(0.2, 0.8) if joint == "gripper" else choose.uniform(-1, 1)
                     )
-                    pace = choose.choice([{"duration": choose.uniform(0.5, 1)}, {"speed": 0.8}, {}])
+                    pace: Any = choose.choice(
+                        [{"duration": choose.uniform(0.5, 1)}, {"speed": 0.8}, {}]
+                    )
                     robot.add_command(
                         joint, place, mode=choose.choice(["queue", "overwrite"]), **pace
                     )

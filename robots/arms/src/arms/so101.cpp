@@ -5,254 +5,27 @@
 #include <cstdarg>
 #include <cstdio>
 #include <cstdlib>
-#include <stdexcept>
-#include <thread>
+
+#include "arms/so101_numbers.hpp"
 
 namespace o80::arms {
 namespace {
 
-// as far as each joint of the arm's published model goes both ways [rad]
-constexpr std::array kModelHalf{1.9198, 1.7453, 1.69, 1.658, 2.7438};
-constexpr std::int64_t kDefaultPeriod = 6'666'667;  // 150 Hz [ns]
-constexpr double kMostSpeed = 2.5;                  // [rad/s]
-constexpr double kMostTorque = 2.94;                // of an STS3215 with 12 V [Nm]
-constexpr double kReach = 0.15;    // of a gripper's goal beyond where it stands [1]
-constexpr int kMissesToHalt = 3;   // transfers
-constexpr int kAlarmsToHalt = 2;   // answers: one may be damaged and pass its checksum
-constexpr int kJumpsToHalt = 3;    // readings
-constexpr int kBacklash = 40;      // [steps]
-constexpr int kEdge = 10;          // outside the range without moving when it is clamped [steps]
-constexpr int kAgreement = 10;     // of two readings of an arm that stands [steps]
-constexpr int kGentleSpeed = 300;  // [steps/s]
-constexpr int kFullSpeed = 2500;   // half more than kMostSpeed [steps/s]
+constexpr double kMostTorque = 2.94;     // of an STS3215 with 12 V [Nm]
+constexpr double kReach = 0.15;          // of a gripper's goal beyond where it stands [1]
+constexpr int kMissesToHalt = 3;         // transfers
+constexpr int kAlarmsToHalt = 2;         // answers: one may be damaged and pass its checksum
+constexpr int kJumpsToHalt = 3;          // readings
+constexpr int kGentleSpeed = 300;        // [steps/s]
+constexpr int kFullSpeed = 2500;         // half more than kMostSpeed [steps/s]
 constexpr int kGentleAcceleration = 20;  // [100 steps/s^2]
 constexpr int kFullAcceleration = 254;
-constexpr double kGentleStrength = 0.3;
 constexpr double kRestSpeed = 0.5;                 // [rad/s]
 constexpr double kSettleTime = 0.5;                // [s]
 constexpr std::int64_t kSecond = 1'000'000'000;    // [ns]
 constexpr std::int64_t kLongestGap = 100'000'000;  // in which a servo is believed to move [ns]
-constexpr std::int64_t kStartWait = 100'000'000;   // for a transfer in start() [ns]
-
-/// Returns at this moment of the monotonic clock [ns].
-void sleep_until(std::int64_t moment) {
-  std::this_thread::sleep_for(std::chrono::nanoseconds(moment - now()));
-}
-std::uint16_t with_sign(int position) { return feetech::with_sign_bit(position, 15); }
-bool has(FeetechChain::Mask mask, std::size_t servo) { return (mask >> servo & 1) != 0; }
-FeetechChain::Mask bit(std::size_t servo) { return FeetechChain::Mask{1} << servo; }
-
-std::string range_of(const Calibration& calibration) {
-  return "offset " + std::to_string(calibration.offset) + ", range " +
-         std::to_string(calibration.smallest) + ".." + std::to_string(calibration.largest);
-}
 
 }  // namespace
-
-So101::So101(const Config& config) : config_(config), period_(kDefaultPeriod) {
-  for (const double share : {config.strength, config.gripper_strength, config.speed_share}) {
-    if (!(share > 0.0 && share <= 1.0)) {
-      throw InvalidArgument(
-          "a strength and the share of speed must be above 0 and at most 1, got " +
-          std::to_string(share));
-    }
-  }
-  const std::string path =
-      find_calibration(config.calibration, {"so_follower", "so101_follower", "so100_follower"});
-  if (!path.empty()) {
-    calibration_ = read_calibration(path, {kJointNames.begin(), kJointNames.end()});
-    config_.calibration = path;
-  }
-}
-
-void So101::describe(Schema& schema) const {
-  if (schema.asked_period() != 0) period_ = schema.asked_period();
-  schema.period(period_);
-  schema.of_the_world();
-  for (std::uint32_t i = 0; i < kServos; ++i) schema.actuator(i).name(kJointNames[i]);
-  for (std::uint32_t i = 0; i < kGripper; ++i) {
-    const double half =
-        calibration_.empty() ? kModelHalf[i] : calibration_[i].width() / 2 * Calibration::kStep;
-    const double bound = std::min(half, kModelHalf[i]);
-    schema.actuator(i).unit("rad").limits({.minimum = -bound,
-                                           .maximum = bound,
-                                           .speed = kMostSpeed * config_.speed_share,
-                                           .acceleration = 20.0,
-                                           .jerk = 1000.0,
-                                           .error = 0.35});
-  }
-  // it may close on something, so it has no limit of error
-  schema.actuator(kGripper).unit("1").limits({.minimum = 0.0,
-                                              .maximum = 1.0,
-                                              .speed = 2.0 * config_.speed_share,
-                                              .acceleration = 20.0,
-                                              .jerk = 1000.0,
-                                              .noise = 0.05});
-}
-
-// ---------------------------------------------------------------------------------------------
-// start: it may wait, and throws
-
-void So101::refuse(std::size_t servo, const std::string& why) const {
-  throw std::runtime_error(std::string(kJointNames[servo]) + " (servo " +
-                           std::to_string(servo + 1) + ") " + why);
-}
-
-void So101::start() {
-  if (calibration_.empty()) {
-    throw std::runtime_error(
-        "no calibration is given, and there is not exactly one: --calibration NAME chooses one, "
-        "`o80 arms calibrate --take NAME` makes one from what the servos hold");
-  }
-  const std::string port = config_.port.empty() ? only_port() : config_.port;
-  lasting_name_ = lasting_name(port);
-  chain_.open(SerialPort::open(port), config_.answer_timeout);
-  check_servos();
-  check_calibration();
-  check_rate();
-  find_place();
-  begin_to_hold();
-}
-
-/// Who they are, and how they are.
-void So101::check_servos() {
-  Mask silent = 0;
-  for (std::size_t i = 0; i < kServos; ++i) {
-    if (!chain_.ping(i)) silent |= bit(i);
-  }
-  if (silent == chain_.all()) {
-    throw std::runtime_error(
-        "no servo answers: is the power supply on? `o80 arms` lists what each port has");
-  }
-  const auto read = [&](std::size_t servo, feetech::Register where) {
-    const std::optional<int> value = chain_.read(servo, where);
-    if (!value) refuse(servo, "does not answer: look at its plug and the one before it");
-    return *value;
-  };
-  int firmware = -1;
-  for (std::size_t i = 0; i < kServos; ++i) {
-    const int model = read(i, feetech::kModel);
-    if (model != feetech::kSts3215) {
-      refuse(i, "is of model " + std::to_string(model) + ", but an STS3215 (777) is needed");
-    }
-    const int its_firmware = read(i, feetech::kFirmware);
-    if (i > 0 && its_firmware != firmware) {
-      refuse(i, "has another firmware than those before it: bring all to the same version");
-    }
-    firmware = its_firmware;
-    if (read(i, feetech::kMode) != 0) {
-      refuse(i, "is not in position mode: `o80 arms calibrate` sets it");
-    }
-    Servo& servo = servos_[i];
-    servo.speed_unit = (read(i, feetech::kPhase) & 4) != 0 ? 1 : 50;
-    servo.weak = read(i, feetech::kWeak);
-    servo.hottest = read(i, feetech::kHottest);
-    servo.least_voltage = 0.1 * read(i, feetech::kLeastVoltage);
-    servo.most_voltage = 0.1 * read(i, feetech::kMostVoltage);
-  }
-}
-
-void So101::check_calibration() {
-  for (std::size_t i = 0; i < kServos; ++i) {
-    const auto read = [&](feetech::Register where) { return chain_.read(i, where).value_or(-1); };
-    const Calibration own{.offset = feetech::signed_by_bit(read(feetech::kOffset), 11),
-                          .smallest = read(feetech::kSmallest),
-                          .largest = read(feetech::kLargest)};
-    if (own == calibration_[i]) continue;
-    throw std::runtime_error(std::string(kJointNames[i]) + ": the file '" + config_.calibration +
-                             "' says " + range_of(calibration_[i]) + "; the servo says " +
-                             range_of(own) +
-                             ". `o80 arms calibrate --write NAME` puts the file into the servos, "
-                             "`--take NAME` makes a new file from them");
-  }
-}
-
-/// A rate that the bus does not reach would be a row of missed readings.
-void So101::check_rate() {
-  constexpr int kTransfers = 20;
-  std::array<std::int64_t, kTransfers> times{};
-  for (std::int64_t& each : times) {
-    chain_.request(0, {});
-    chain_.collect(now() + kStartWait);
-    each = now() - chain_.asked_at();
-  }
-  std::ranges::sort(times);
-  const std::int64_t most = times[kTransfers - 1 - kTransfers / 20];
-  if (config_.answer_timeout > 0.0 || most <= period_) return;
-  std::array<char, 200> text{};
-  std::snprintf(text.data(), text.size(),
-                "the bus answers in %.1f ms (95 %%): %.0f Hz are possible, %.0f Hz were asked for; "
-                "is this an ESP32 board, or an FTDI adapter with a latency of 16 ms?",
-                static_cast<double>(most) * 1e-6, std::floor(0.9e9 / static_cast<double>(most)),
-                1e9 / static_cast<double>(period_));
-  throw std::runtime_error(text.data());
-}
-
-/// Two complete readings that agree, inside what the servos do not clamp.
-void So101::find_place() {
-  constexpr int kTries = 10;
-  bool known = false;
-  bool agree = false;
-  std::size_t differs = 0;
-  for (int i = 0; i < kTries && !agree; ++i) {
-    chain_.request(0, {});
-    const FeetechChain::Transfer transfer = chain_.collect(now() + kStartWait);
-    if (transfer.answered != chain_.all()) continue;
-    agree = known;
-    for (std::size_t k = 0; k < kServos; ++k) {
-      if (std::abs(chain_[k].position - servos_[k].position) > kAgreement)
-        agree = false, differs = k;
-      servos_[k].position = chain_[k].position;
-      servos_[k].seen_at = complete_at_ = chain_.asked_at();
-    }
-    known = true;
-  }
-  if (!agree) refuse(differs, "gave no two readings that agree: is something moving it?");
-  for (std::size_t i = 0; i < kServos; ++i) {
-    const Calibration& range = calibration_[i];
-    const int position = servos_[i].position;
-    if (position < range.smallest - kEdge || position > range.largest + kEdge) {
-      refuse(i, "stands at step " + std::to_string(position) + ", outside its range " +
-                    std::to_string(range.smallest) + ".." + std::to_string(range.largest) +
-                    ": move it inside by hand, or calibrate it again");
-    }
-    name_alarm(i);
-    if (why_[0] != 0) throw std::runtime_error(why_.data());
-  }
-}
-
-/// Goals and gentle registers, read back, before torque. Torque that is found on stays as it is:
-/// with less strength the arm would sink.
-void So101::begin_to_hold() {
-  const auto check = [&](std::size_t servo, feetech::Register where, int wanted) {
-    if (chain_.read(servo, where) == wanted) return;
-    refuse(servo, "does not keep what is written to its register " +
-                      std::to_string(static_cast<int>(where.address)));
-  };
-  approach(chain_.all());
-  start_places_ = held_places_;
-  chain_.send_queued();
-  for (std::size_t i = 0; i < kServos; ++i) {
-    if (!holds(i)) check(i, feetech::kStrength, strength_of(i, kGentleStrength));
-    check(i, feetech::kGoal, with_sign(held_places_[i]));
-  }
-  chain_.queue(feetech::kTorque, chain_.all(), 1);
-  chain_.send_queued();
-  for (std::size_t i = 0; i < kServos; ++i) check(i, feetech::kTorque, 1);
-  held_ = chain_.all();
-  started_ = true;
-  while (settling_ > 0 && why_[0] == 0) {
-    chain_.request(0, {});
-    const FeetechChain::Transfer transfer = chain_.collect(deadline());
-    take(transfer);
-    if (transfer.asked) look_for_trouble(transfer);
-    settle();
-    sleep_until(chain_.asked_at() + period_);
-  }
-}
-
-// ---------------------------------------------------------------------------------------------
-// loop
 
 std::uint16_t So101::strength_of(std::size_t servo, double share) const noexcept {
   const double most = servo == kGripper ? config_.gripper_strength : config_.strength;

@@ -148,7 +148,7 @@ class So101 {
     bool was_hot = false;  // too hot to be resumed
   };
 
-  // start
+  // so101_start.cpp
   void check_servos();
   void check_calibration();
   void check_rate();
@@ -156,7 +156,7 @@ class So101 {
   void begin_to_hold();
   [[noreturn]] void refuse(std::size_t servo, const std::string& why) const;
 
-  // loop
+  // so101.cpp
   std::uint16_t strength_of(std::size_t servo, double share) const noexcept;
   void set_motion(Mask servos, int speed, int acceleration, double strength) noexcept;
   bool holds(std::size_t servo) const noexcept;
