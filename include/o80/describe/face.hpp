@@ -52,9 +52,8 @@ class FaceLine {
       value = static_cast<T>(number);
     } else {
       const std::string_view digits = text();
-      const char* end = digits.data() + digits.size();
-      const std::from_chars_result read = std::from_chars(digits.data(), end, value);
-      if (read.ec == std::errc() && read.ptr == end) return;
+      const auto read = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+      if (read.ec == std::errc() && read.ptr == digits.data() + digits.size()) return;
       throw InvalidArgument("'" + std::string(digits) + "' must be a number in the text of a face");
     }
   }

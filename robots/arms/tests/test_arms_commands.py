@@ -165,3 +165,17 @@ def test_relax_and_check(arm: FakeArm, monkeypatch: pytest.MonkeyPatch) -> None:
     assert "goes on behind a silent servo: no" in told.output
     assert "a goal switches torque on: yes" in told.output
     assert all(servo.get((40, 1)) == 0 for servo in arm.line.servos.values())
+
+
+def test_a_leader_has_its_own_calibrations(
+    arm: FakeArm, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run("calibrate", "--port", arm.line.port, "--take", "blue", "--leader")
+    file = folder.parent / "teleoperators" / "so_leader" / "blue.json"
+    assert calibration.read(file)["elbow_flex"].smallest == 900
+    refused = run("calibrate", "--port", arm.line.port, "--write", "blue")
+    assert "there is no calibration 'blue'" in str(refused.exception)
+    done = run("calibrate", "--port", arm.line.port, "--write", "blue", "--leader")
+    assert f"read from {file}" in done.output
+    monkeypatch.setattr("o80_arms.bus.WAIT", 0.3)  # six numbers are of nobody
+    assert "calibration blue" in run("--port", arm.line.port).output

@@ -1,4 +1,4 @@
-"""Arms of bus servos: `o80.robots.load("so101")`, and their simulations: "so101_twin"."""
+"""Arms of bus servos as robots: "so101", "so101_leader" for the hand, "so101_twin" simulated."""
 
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -12,6 +12,11 @@ def so101() -> Path:
     # an editable installation has two folders: the sources, and what was built
     files = [Path(folder) / "lib" / "so101.so" for folder in __path__]
     return next((file for file in files if file.exists()), files[0])
+
+
+def so101_leader() -> tuple[str, Callable[[], dict[str, bool]]]:
+    """The arm that is moved by hand: `o80 teleop so101_leader so101`."""
+    return "so101", lambda: {"leader": True}
 
 
 def so101_twin() -> tuple[str, Callable[[], dict[str, str]]]:

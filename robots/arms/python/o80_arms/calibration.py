@@ -2,6 +2,7 @@
 
 import json
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
@@ -11,7 +12,9 @@ from o80_arms.bus import LARGEST, MODE, OFFSET, SMALLEST, TURN, Bus
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 MODEL_RANGES = (220, 200, 194, 190, 320, 110)  # of the published arm [deg]
-FOLDERS = ("so_follower", "so101_follower", "so100_follower")  # LeRobot's, the newest first
+# LeRobot's folders, the newest first
+FOLLOWERS = tuple(f"robots/{name}_follower" for name in ("so", "so101", "so100"))
+LEADERS = tuple(f"teleoperators/{name}_leader" for name in ("so", "so101", "so100"))
 LARGEST_OFFSET = 2047  # that a servo can keep
 
 
@@ -58,32 +61,34 @@ class Calibration:
 
 
 def folder() -> Path:
-    """The folder in which LeRobot keeps the calibrations of robots."""
+    """The folder in which LeRobot keeps calibrations."""
     if own := os.environ.get("HF_LEROBOT_CALIBRATION"):
-        return Path(own) / "robots"
+        return Path(own)
     cache = Path(os.environ.get("HF_HOME", Path.home() / ".cache" / "huggingface"))
-    return Path(os.environ.get("HF_LEROBOT_HOME", cache / "lerobot")) / "calibration" / "robots"
+    return Path(os.environ.get("HF_LEROBOT_HOME", cache / "lerobot")) / "calibration"
 
 
 def files() -> list[Path]:
     """Calibrations that LeRobot has of such arms."""
-    return [file for each in FOLDERS for file in sorted((folder() / each).glob("*.json"))]
+    return [
+        file for each in FOLLOWERS + LEADERS for file in sorted((folder() / each).glob("*.json"))
+    ]
 
 
-def find(name: str) -> Path:
-    """The file of a name, or a path. Raises CalibrationError."""
+def find(name: str, folders: Sequence[str]) -> Path:
+    """The file of a name in these folders, or a path. Raises CalibrationError."""
     if "/" in name or name.endswith(".json"):
         return Path(name)
-    found = [file for file in files() if file.stem == name]
-    if not found:
-        raise CalibrationError(f"there is no calibration '{name}' in {folder() / FOLDERS[0]}")
-    return found[0]
+    for each in folders:
+        if (file := folder() / each / f"{name}.json").exists():
+            return file
+    raise CalibrationError(f"there is no calibration '{name}' in {folder() / folders[0]}")
 
 
-def place_for(name: str) -> Path:
+def place_for(name: str, folders: Sequence[str]) -> Path:
     """The file in which a calibration of this name is written."""
     own = "/" in name or name.endswith(".json")
-    return Path(name) if own else folder() / FOLDERS[0] / f"{name}.json"
+    return Path(name) if own else folder() / folders[0] / f"{name}.json"
 
 
 def read(file: Path) -> dict[str, Calibration]:

@@ -110,6 +110,7 @@ def calibrate(
     write: Annotated[
         str | None, typer.Option(help="Put the file of this name into the servos.")
     ] = None,
+    leader: Annotated[bool, typer.Option("--leader", help="The arm is moved by hand.")] = False,
 ) -> None:
     """Calibrate an SO-101, or bring its servos and LeRobot's file to the same.
 
@@ -118,14 +119,15 @@ def calibrate(
     given = [each for each in (name, take, write) if each]
     if len(given) != 1:
         raise o80.InvalidArgument("give one of --name, --take and --write")
+    folders = calibration.LEADERS if leader else calibration.FOLLOWERS
     with opened(port) as bus:
         if write:
-            file = calibration.find(write)
+            file = calibration.find(write, folders)
             joints = calibration.read(file)
             put(bus, joints)
         else:
             joints = moved_by_hand(bus) if name else held_by(bus)
-            file = calibration.place_for(given[0])
+            file = calibration.place_for(given[0], folders)
             if file.exists() and calibration.read(file) != joints:
                 file.rename(file.with_suffix(".json.old"))
             calibration.write(file, joints)

@@ -106,19 +106,19 @@ Calibration of_joint(const Fields& fields, int id) {
   return found;
 }
 
-/// Where LeRobot keeps calibrations of robots.
+/// Where LeRobot keeps calibrations.
 fs::path calibrations() {
   const auto variable = [](const char* name) {
     const char* const text = std::getenv(name);
     return fs::path(text == nullptr ? "" : text);
   };
   const fs::path own = variable("HF_LEROBOT_CALIBRATION");
-  if (!own.empty()) return own / "robots";
+  if (!own.empty()) return own;
   const fs::path lerobot = variable("HF_LEROBOT_HOME");
-  if (!lerobot.empty()) return lerobot / "calibration" / "robots";
+  if (!lerobot.empty()) return lerobot / "calibration";
   const fs::path hub = variable("HF_HOME");
   const fs::path cache = hub.empty() ? variable("HOME") / ".cache" / "huggingface" : hub;
-  return cache / "lerobot" / "calibration" / "robots";
+  return cache / "lerobot" / "calibration";
 }
 
 }  // namespace

@@ -313,7 +313,9 @@ const char* So101::why_not_ready() noexcept {
     servo.was_hot = servo.was_hot && chain_[i].temperature > servo.hottest - 10;
     if (servo.was_hot) return say("%s is still too hot: wait", name);
     const int position = chain_[i].position;
-    if (position < calibration_[i].smallest - kEdge || position > calibration_[i].largest + kEdge) {
+    const bool inside =
+        position >= calibration_[i].smallest - kEdge && position <= calibration_[i].largest + kEdge;
+    if (!inside && !config_.leader) {
       return say("%s stands outside its range: move it inside by hand", name);
     }
   }
@@ -323,7 +325,7 @@ const char* So101::why_not_ready() noexcept {
 Served So101::resume() noexcept {
   if (const char* const why = why_not_ready()) return Served::rejected(why);
   begin_anew();
-  hold(relaxed_ ? chain_.all() : troubled());
+  if (!config_.leader) hold(relaxed_ ? chain_.all() : troubled());
   return Served::done();
 }
 
@@ -339,6 +341,7 @@ void So101::begin_anew() noexcept {
 }
 
 Served So101::on(const Hold& /*request*/) noexcept {
+  if (config_.leader) return Served::rejected("a leader is moved by hand: it gets no torque");
   if (const char* const why = why_not_ready()) return Served::rejected(why);
   hold(relaxed_ ? chain_.all() : troubled());
   return Served::start_afresh();

@@ -104,6 +104,7 @@ class So101 {
   struct Config {
     std::string port;
     std::string calibration;
+    bool leader = false;
     AtStop at_stop = AtStop::hold;
     double strength = 1.0;
     double gripper_strength = 0.5;
@@ -154,6 +155,7 @@ class So101 {
   void check_rate();
   void find_place();
   void begin_to_hold();
+  void let_go();
   [[noreturn]] void refuse(std::size_t servo, const std::string& why) const;
 
   // so101.cpp
@@ -205,6 +207,7 @@ class So101 {
 O80_DESCRIBE(
     So101::Config, (port, "of the adapter; by default the only one that is plugged in"),
     (calibration, "LeRobot's, by name or path; by default the only one that is there"),
+    (leader, "it is moved by hand: its torque stays off"),
     (at_stop,
      "what remains when the process has ended: hold; relax; rest: back to where it was started, "
      "then relax"),

@@ -32,8 +32,13 @@ So101::So101(const Config& config) : config_(config), period_(kDefaultPeriod) {
           std::to_string(share));
     }
   }
-  const std::string path =
-      find_calibration(config.calibration, {"so_follower", "so101_follower", "so100_follower"});
+  const std::vector<std::string> folders =
+      config.leader
+          ? std::vector<std::string>{"teleoperators/so_leader", "teleoperators/so101_leader",
+                                     "teleoperators/so100_leader"}
+          : std::vector<std::string>{"robots/so_follower", "robots/so101_follower",
+                                     "robots/so100_follower"};
+  const std::string path = find_calibration(config.calibration, folders);
   if (!path.empty()) {
     calibration_ = read_calibration(path, {kJointNames.begin(), kJointNames.end()});
     config_.calibration = path;
@@ -44,7 +49,10 @@ void So101::describe(Schema& schema) const {
   if (schema.asked_period() != 0) period_ = schema.asked_period();
   schema.period(period_);
   schema.of_the_world();
-  for (std::uint32_t i = 0; i < kServos; ++i) schema.actuator(i).name(kJointNames[i]);
+  for (std::uint32_t i = 0; i < kServos; ++i) {
+    schema.actuator(i).name(kJointNames[i]);
+    if (config_.leader) schema.actuator(i).when_idle(WhenIdle::follow);
+  }
   for (std::uint32_t i = 0; i < kGripper; ++i) {
     const double half =
         calibration_.empty() ? kModelHalf[i] : calibration_[i].width() / 2 * Calibration::kStep;
@@ -85,7 +93,15 @@ void So101::start() {
   check_calibration();
   check_rate();
   find_place();
+  if (config_.leader) return let_go();
   begin_to_hold();
+}
+
+/// A leader has no torque, and is followed.
+void So101::let_go() {
+  chain_.queue(feetech::kTorque, chain_.all(), 0);
+  chain_.send_queued();
+  relaxed_ = started_ = true;
 }
 
 /// Who they are, and how they are.
@@ -185,7 +201,8 @@ void So101::find_place() {
   for (std::size_t i = 0; i < kServos; ++i) {
     const Calibration& range = calibration_[i];
     const int position = servos_[i].position;
-    if (position < range.smallest - kEdge || position > range.largest + kEdge) {
+    const bool inside = position >= range.smallest - kEdge && position <= range.largest + kEdge;
+    if (!inside && !config_.leader) {
       refuse(i, "stands at step " + std::to_string(position) + ", outside its range " +
                     std::to_string(range.smallest) + ".." + std::to_string(range.largest) +
                     ": move it inside by hand, or calibrate it again");

@@ -81,15 +81,15 @@ TEST_F(CalibrationFile, IsRefusedWithWhatIsWrong) {
 }
 
 TEST_F(CalibrationFile, IsFoundByNameOrAloneOrByPath) {
-  EXPECT_EQ(find_calibration("", {"new", "old"}), "");
+  EXPECT_EQ(find_calibration("", {"robots/new", "robots/old"}), "");
   const std::string black = file(kPan);
-  EXPECT_EQ(find_calibration("", {"new", "old"}), black);
+  EXPECT_EQ(find_calibration("", {"robots/new", "robots/old"}), black);
   const std::string white = file(kPan, "new/white.json");
-  EXPECT_EQ(find_calibration("", {"new", "old"}), "") << "nobody knows which";
-  EXPECT_EQ(find_calibration("black", {"new", "old"}), black);
-  EXPECT_EQ(find_calibration("white", {"new", "old"}), white);
-  EXPECT_EQ(find_calibration("./mine.json", {"new"}), "./mine.json");
-  EXPECT_THAT([] { find_calibration("blue", {"new", "old"}); },
+  EXPECT_EQ(find_calibration("", {"robots/new", "robots/old"}), "") << "nobody knows which";
+  EXPECT_EQ(find_calibration("black", {"robots/new", "robots/old"}), black);
+  EXPECT_EQ(find_calibration("white", {"robots/new", "robots/old"}), white);
+  EXPECT_EQ(find_calibration("./mine.json", {"robots/new"}), "./mine.json");
+  EXPECT_THAT([] { find_calibration("blue", {"robots/new", "robots/old"}); },
               ThrowsMessage<std::runtime_error>(
                   AllOf(HasSubstr("no calibration 'blue'"), HasSubstr("--take blue"))));
 }
