@@ -112,7 +112,7 @@ fs::path calibrations() {
     const char* const text = std::getenv(name);
     return fs::path(text == nullptr ? "" : text);
   };
-  const fs::path own = variable("HF_LEROBOT_CALIBRATION");
+  fs::path own = variable("HF_LEROBOT_CALIBRATION");
   if (!own.empty()) return own;
   const fs::path lerobot = variable("HF_LEROBOT_HOME");
   if (!lerobot.empty()) return lerobot / "calibration";
