@@ -157,9 +157,10 @@ std::string find_calibration(const std::string& name, const std::vector<std::str
     if (!name.empty() && !files.empty()) return files[0];
   }
   if (name.empty()) return files.size() == 1 ? files[0] : "";
+  const std::string leader = folders[0].starts_with("teleoperators") ? " --leader" : "";
   throw std::runtime_error(
       "there is no calibration '" + name + "' in " + (calibrations() / folders[0]).string() +
-      ": `o80 arms calibrate --take " + name + "` makes it from what the servos hold");
+      ": `o80 arms calibrate --take " + name + leader + "` makes it from what the servos hold");
 }
 
 }  // namespace o80::arms

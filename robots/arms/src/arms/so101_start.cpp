@@ -84,7 +84,8 @@ void So101::start() {
   if (calibration_.empty()) {
     throw std::runtime_error(
         "no calibration is given, and there is not exactly one: --calibration NAME chooses one, "
-        "`o80 arms calibrate --take NAME` makes one from what the servos hold");
+        "`o80 arms calibrate --take NAME` makes one from what the servos hold (of a leader with "
+        "--leader)");
   }
   const std::string port = config_.port.empty() ? only_port() : config_.port;
   lasting_name_ = lasting_name(port);
@@ -149,11 +150,11 @@ void So101::check_calibration() {
                           .smallest = read(feetech::kSmallest),
                           .largest = read(feetech::kLargest)};
     if (own == calibration_[i]) continue;
-    throw std::runtime_error(std::string(kJointNames[i]) + ": the file '" + config_.calibration +
-                             "' says " + range_of(calibration_[i]) + "; the servo says " +
-                             range_of(own) +
-                             ". `o80 arms calibrate --write NAME` puts the file into the servos, "
-                             "`--take NAME` makes a new file from them");
+    throw std::runtime_error(
+        std::string(kJointNames[i]) + ": the file '" + config_.calibration + "' says " +
+        range_of(calibration_[i]) + "; the servo says " + range_of(own) +
+        ". `o80 arms calibrate --write NAME` puts the file into the servos, "
+        "`--take NAME` makes a new file from them (of a leader with --leader)");
   }
 }
 

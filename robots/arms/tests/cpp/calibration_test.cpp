@@ -91,7 +91,9 @@ TEST_F(CalibrationFile, IsFoundByNameOrAloneOrByPath) {
   EXPECT_EQ(find_calibration("./mine.json", {"robots/new"}), "./mine.json");
   EXPECT_THAT([] { find_calibration("blue", {"robots/new", "robots/old"}); },
               ThrowsMessage<std::runtime_error>(
-                  AllOf(HasSubstr("no calibration 'blue'"), HasSubstr("--take blue"))));
+                  AllOf(HasSubstr("no calibration 'blue'"), HasSubstr("--take blue`"))));
+  EXPECT_THAT([] { find_calibration("blue", {"teleoperators/new"}); },
+              ThrowsMessage<std::runtime_error>(HasSubstr("--take blue --leader`")));
 }
 
 }  // namespace
