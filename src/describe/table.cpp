@@ -421,7 +421,7 @@ void check(const Schema& schema) {
   // also limits that belong to no actuator: with a NaN a schema would not equal itself
   for (const LimitRow& limit : schema.limits) {
     for (const double value : {limit.minimum, limit.maximum, limit.speed, limit.acceleration,
-                               limit.jerk, limit.error, limit.rest}) {
+                               limit.jerk, limit.error, limit.rest, double{limit.noise}}) {
       if (std::isnan(value)) refuse("a limit is NaN");
     }
   }

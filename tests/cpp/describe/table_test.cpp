@@ -161,9 +161,10 @@ TEST(Table, RefusesWhatCannotBeUsed) {
        {"Gelenk", "\xc3\xa4rm", "\xe2\x82\xac", "\xf0\x9f\xa6\xbe", "\xed\x9f\xbf"}) {
     EXPECT_EQ(refusal([&](Schema& s) { s.types[0].name = NameText(text); }), "") << text;
   }
-  EXPECT_THAT(refusal([](Schema& s) { s.limits.push_back(Limits{.error = std::nan("")}.row()); }),
-              HasSubstr("NaN"))
-      << "nor one that no actuator has: the schema would not equal itself";
+  for (const Limits& limits : {Limits{.error = std::nan("")}, Limits{.noise = std::nan("")}}) {
+    EXPECT_THAT(refusal([&](Schema& s) { s.limits.push_back(limits.row()); }), HasSubstr("NaN"))
+        << "nor one that no actuator has: the schema would not equal itself";
+  }
   EXPECT_THAT(refusal([](Schema& s) { s.actuators[0].type = 99; }), HasSubstr("missing type"));
   EXPECT_THAT(refusal([](Schema& s) { s.actuators[8].offset = 4000; }),
               HasSubstr("outside the row"));
