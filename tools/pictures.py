@@ -1,4 +1,4 @@
-"""Draws the pictures of README.md and of docs anew: docs/pictures/*.png. Needs chromium.
+"""Draws the pictures of README.md and docs anew: docs/pictures/*.png. Needs tools of make check.
 
 python tools/pictures.py
 """
@@ -45,6 +45,17 @@ def draw_table_tennis(path: Path) -> None:
     balls = np.array(seen[::SHOWN])
     with Scene(balls=len(balls), size=SIZE) as scene:
         write_picture(path, scene.draw(arm, balls, camera="close"))
+
+
+def draw_so101(path: Path) -> None:
+    """The simulated SO-101, in the middle of a large picture."""
+    twin = o80.robots.load("so101_twin")
+    with twin.inline() as arm, o80.Pictures(arm, size=(1600, 1000), model_files=True) as pictures:
+        for joint, place in {"shoulder_pan": 0.7, "shoulder_lift": 0.2, "elbow_flex": -0.5}.items():
+            arm.add_command(joint, place, duration=1.0)
+        arm.add_command("wrist_flex", 0.9, duration=1.0)
+        arm.add_command("gripper", 0.5, duration=1.0)
+        write_picture(path, pictures.draw(arm.burst(300))[230:680, 340:980])
 
 
 def draw_first_minute(path: Path) -> None:
@@ -125,6 +136,7 @@ def draw_view(path: Path) -> None:
 
 if __name__ == "__main__":
     draw_table_tennis(FOLDER / "table_tennis.png")
+    draw_so101(FOLDER / "so101.png")
     draw_first_minute(FOLDER / "first_minute.png")
     draw_recording(FOLDER / "recording.png")
     draw_view(FOLDER / "view.png")

@@ -41,7 +41,8 @@ class Pictures(Closeable):
 
     robot: a frontend, or a run of a recording (`o80.open(file)["arm"].epochs[0]`).
     size: width and height [pixels].
-    camera: name or number of one of the model's (None: the first one, or from outside).
+    camera: name or number of one of the model's; -1: from outside (None: the first one that stands
+        in the world, or from outside).
     model_files: read the files (meshes) that the model names. Only for models that you trust.
 
     Needs the extra `rendering`, and EGL or OSMesa; MUJOCO_GL chooses between them. Raises
@@ -64,7 +65,7 @@ class Pictures(Closeable):
         model = self._scene.model
         cameras = [model.camera(i).name for i in range(model.ncam)]
         if camera is None:
-            camera = 0 if cameras else -1
+            camera = next((i for i in range(model.ncam) if model.cam_bodyid[i] == 0), -1)
         if camera not in cameras and camera not in range(-1, len(cameras)):
             known = ", ".join(map(str, cameras)) or "none"
             raise InvalidArgument(f"the model has no camera {camera!r}; it has: {known}")

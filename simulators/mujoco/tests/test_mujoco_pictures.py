@@ -17,7 +17,7 @@ pytestmark = pytest.mark.check  # they need the extra `rendering`
 PENDULUM = Path(__file__).parent / "models" / "pendulum.xml"
 TWO = """<mujoco><worldbody><light pos="0 0 3"/><camera name="near" pos="0 -2 0.5" euler="80 0 0"/>
 <camera name="far" pos="0 -6 0.5" euler="80 0 0"/><geom type="plane" size="2 2 1" rgba="1 1 1 1"/>
-<body name="bar" pos="0 0 0.5"><joint name="turn" type="hinge" axis="0 1 0"/>
+<body name="bar" pos="0 0 0.5"><camera name="hand" pos="0.6 0 0"/><joint name="turn" type="hinge" axis="0 1 0"/>
 <geom type="capsule" fromto="0 0 0 0.5 0 0" size="0.1" rgba="1 0 0 1"/></body>
 </worldbody></mujoco>"""
 
@@ -46,7 +46,7 @@ def test_cameras_and_sizes(model: Path) -> None:
     with o80.robots.load("mujoco").inline(model=model) as robot:
         row = robot.latest()
         shown = {}
-        for camera in ("near", "far", 0, None, -1):
+        for camera in ("hand", "near", "far", 0, None, -1):
             with o80.Pictures(robot, size=(900, 700), camera=camera) as pictures:
                 shown[camera] = pictures.draw(row)
         assert shown["near"].shape == (700, 900, 3)
@@ -54,7 +54,7 @@ def test_cameras_and_sizes(model: Path) -> None:
         assert (shown[None] == shown["near"]).all()
         assert (shown["far"] != shown["near"]).any()
         assert (shown[-1] != shown["near"]).any()
-        with pytest.raises(o80.InvalidArgument, match=r"no camera 'top'; it has: near, far"):
+        with pytest.raises(o80.InvalidArgument, match=r"no camera 'top'; it has: near, far, hand"):
             o80.Pictures(robot, camera="top")
         with pytest.raises(o80.InvalidArgument, match="were closed"):
             pictures.draw(row)
