@@ -105,13 +105,15 @@ install_others() {
   once table_tennis "$(package_state apps/table_tennis)" \
     install_package o80-table-tennis ./apps/table_tennis
   once pam "$headers $(package_state robots/pam)" install_package o80-pam ./robots/pam "$checkout"
-  once arms "$headers $(package_state robots/arms)" \
-    install_package o80-arms ./robots/arms "$checkout"
   once mujoco "$headers $(package_state simulators/mujoco)" \
     install_package o80-mujoco ./simulators/mujoco "$checkout"
   case $purpose in
     demo | learn) ;;
-    *) once devices "$(package_state devices)" install_package o80-devices ./devices ;;
+    *)
+      once devices "$(package_state devices)" install_package o80-devices ./devices
+      once arms "$headers $(package_state robots/arms)" \
+        install_package o80-arms ./robots/arms "$checkout"
+      ;;
   esac
 }
 
