@@ -5,6 +5,7 @@
 #include <string>
 #include <string_view>
 
+#include "describe/table.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
 #include "o80/base/error.hpp"
@@ -20,8 +21,10 @@ struct Config {
   bool fast = true;
   Gear gear = Gear::low;
   std::array<float, 3> offsets{};
+  Face like;
 };
-O80_DESCRIBE(Config, address, (gain, "of the loop [Nm/rad]"), count, small, fast, gear, offsets);
+O80_DESCRIBE(Config, address, (gain, "of the loop [Nm/rad]"), count, small, fast, gear, offsets,
+             like);
 
 namespace {
 
@@ -36,6 +39,11 @@ void run(Bytes bytes) {
   try {
     set_option(config, name, text);
   } catch (const InvalidArgument&) {
+    return;
+  }
+  try {  // as a simulation does, and o80 then checks what it describes
+    if (!config.like.empty()) check(config.like.schema);
+  } catch (const Error&) {
     return;
   }
   // what was read prints as something that reads back the same
