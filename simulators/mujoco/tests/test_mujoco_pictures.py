@@ -17,7 +17,8 @@ pytestmark = pytest.mark.check  # they need the extra `rendering`
 PENDULUM = Path(__file__).parent / "models" / "pendulum.xml"
 TWO = """<mujoco><worldbody><light pos="0 0 3"/><camera name="near" pos="0 -2 0.5" euler="80 0 0"/>
 <camera name="far" pos="0 -6 0.5" euler="80 0 0"/><geom type="plane" size="2 2 1" rgba="1 1 1 1"/>
-<body name="bar" pos="0 0 0.5"><camera name="hand" pos="0.6 0 0"/><joint name="turn" type="hinge" axis="0 1 0"/>
+<body name="bar" pos="0 0 0.5"><camera name="hand" pos="0.6 0 0"/>
+<joint name="turn" type="hinge" axis="0 1 0"/>
 <geom type="capsule" fromto="0 0 0 0.5 0 0" size="0.1" rgba="1 0 0 1"/></body>
 </worldbody></mujoco>"""
 
