@@ -82,7 +82,7 @@ def test_it_follows_a_hand_within_its_limits(segment: str) -> None:
         for _ in range(300):
             if choose.random() < 0.1:
                 places = [choose.uniform(-1.5, 1.5) for _ in range(3)]
-                hand.add_command(None, places, duration=choose.uniform(0.05, 0.5), mode="overwrite")
+                hand.add_command(None, places, duration=choose.uniform(0.5, 1.5), mode="overwrite")
             hand.burst(5)
             assert robots.step()
             arm.burst(5)
@@ -117,7 +117,7 @@ def test_scale_and_offset_and_near(segment: str) -> None:
         hand.burst(10)
         engage(robots)
         assert robots.far == {}
-        hand.add_command("lamp", 0.1, iterations=10)
+        hand.add_command("lamp", 0.1, iterations=200)
         for _ in range(200):
             hand.burst(5)
             robots.step()
@@ -138,6 +138,36 @@ def test_scale_and_offset_and_near(segment: str) -> None:
             arm.burst(10)
         assert list(robots.far) == ["gripper"]
         assert arm.latest().observed[1] == pytest.approx(0.4)
+
+
+def test_a_leader_that_jumps_is_not_followed(segment: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        robots = o80.Teleoperation(hand, arm)
+        engage(robots)
+        hand.add_command("elbow", 0.8)  # an encoder that lost a turn, a reset
+        for _ in range(200):
+            hand.burst(5)
+            assert not robots.step()
+            arm.burst(5)
+        assert robots.far == {"elbow": (0.8, 0.0)}
+        assert arm.latest().desired.tolist() == [0, 0, 0]
+
+
+def test_a_leader_that_stands_still_between_bursts_floods_nobody(segment: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        robots = o80.Teleoperation(hand, arm)
+        engage(robots)
+        for _ in range(5):
+            assert robots.step()
+        arm.burst(1)
+        taken = [each for each in arm.journal() if each.kind == "taken" and each.commands]
+        assert len(taken) == 1
 
 
 def test_batches_say_by_which_row_of_the_leader_they_were_decided(segment: str) -> None:
@@ -169,6 +199,7 @@ def test_a_follower_that_another_controls_does_not_follow(segment: str) -> None:
             arm.burst(10)
         assert robots.engaged
         with arm.control():
+            hand.burst(1)
             robots.step()
             arm.burst(2)
             assert not robots.step()
@@ -183,18 +214,23 @@ def leader(segment: str) -> o80.Backend:
     return backend
 
 
+def engaged_by(backend: o80.Backend, hand: o80.Frontend, arm: o80.Frontend) -> o80.Teleoperation:
+    robots = o80.Teleoperation(hand, arm)
+    while not robots.engaged:
+        backend.step()
+        backend.publish([0.0])
+        robots.step()
+        arm.burst(1)
+    return robots
+
+
 def test_silence_of_the_leader_halts_the_follower(segment: str) -> None:
     with (
         leader(f"{segment}-1") as backend,
         o80.Frontend(f"{segment}-1") as hand,
         o80.robots.load(Follower).inline(f"{segment}-2") as arm,
     ):
-        robots = o80.Teleoperation(hand, arm)
-        while not robots.engaged:
-            backend.step()
-            backend.publish([0.0])
-            robots.step()
-            arm.burst(1)
+        robots = engaged_by(backend, hand, arm)
         assert not robots.step()
         assert robots.why == f"the leader '{segment}-1' has published nothing for 0.2 s"
         arm.burst(1)
@@ -216,12 +252,7 @@ def test_a_leader_that_halts_or_ends_halts_the_follower(segment: str, how: str) 
         o80.Frontend(f"{segment}-1") as hand,
         o80.robots.load(Follower).inline(f"{segment}-2") as arm,
     ):
-        robots = o80.Teleoperation(hand, arm)
-        while not robots.engaged:
-            backend.step()
-            backend.publish([0.0])
-            robots.step()
-            arm.burst(1)
+        robots = engaged_by(backend, hand, arm)
         if how == "halt":
             backend.halt("a servo is silent")
             backend.step()

@@ -386,6 +386,32 @@ def test_a_recording_in_a_file_needs_no_server_and_shows_the_same(
     page.close()
 
 
+def test_a_file_draws_plans_late_in_a_long_run(
+    browser: Chromium, segment: str, tmp_path: Path
+) -> None:
+    run, path = tmp_path / "run.mcap", tmp_path / "run.html"
+    with (
+        o80.robots.load("two_joints").inline(segment, frequency=1) as arm,
+        o80.Recording(run, arm),
+        arm.chunks(step=1) as plan,
+    ):
+        arm.burst(3000)
+        plan.send([[0.01, 0.02], [0.02, 0.03], [0.0, 0.0]])
+        arm.burst(20)
+    write_page([str(run)], path)
+    page = browser.page(path.as_uri())
+    page.wait_for(SHOWN)
+    click(page, "play")
+    scrub(page, 3002)
+    ahead = page.wait_for(
+        "Math.abs(page.answer.at - 3002) < 1 && page.answer.curves"
+        " && Array.from(page.answer.curves.panels.elbow.planned[0])"
+        ".map((seconds) => seconds + page.answer.curves.begin)"
+    )
+    assert ahead[:3] == pytest.approx([3001, 3002, 3003], abs=0.1)
+    page.close()
+
+
 def test_a_file_opens_on_the_robot_that_a_page_opens_on(
     browser: Chromium, segment: str, tmp_path: Path
 ) -> None:

@@ -347,11 +347,12 @@ class Chunks:
 
     def _due(self, count: int) -> NDArray[np.int64]:
         """Iterations after the anchor: (j + 1) x step, halves up."""
-        if len(self._dues) != count:
+        dues = self._dues  # another thread may send a chunk of another length
+        if len(dues) != count:
             up, down = self.step.numerator, self.step.denominator
             rows = np.arange(1, count + 1, dtype=np.int64)
-            self._dues = (rows * (2 * up) + down) // (2 * down)
-        return self._dues
+            dues = self._dues = (rows * (2 * up) + down) // (2 * down)
+        return dues
 
     def _check_due(self, after: NDArray[np.int64], count: int, anchor: int) -> None:
         if len(after) != count:

@@ -118,6 +118,7 @@ class Teleoperation:
         self._stride = max(1, round(1 / (FASTEST * leader.period)))  # rows of the leader
         self._every = max(self._stride * leader.period, follower.period)
         self._last = leader.published  # row that was read
+        self._wanted = np.full(len(self.joints), np.nan)  # by that row
         self._near_since: int | None = None  # time of a row of the leader [ns]
         self._sent: _core.Batch | None = None
         self.engaged = False  #: whether the follower follows
@@ -129,7 +130,8 @@ class Teleoperation:
         """Waits for the next row of the leader and commands by it; whether the follower follows.
 
         If the leader is silent or halted while the follower follows, it halts the follower and
-        says why in `why`; it goes on when that was resumed and is near again.
+        says why in `why`; it goes on when that was resumed and is near again. If the leader jumps
+        by more than `near` from row to row, the follower stays at its last target until it is.
         Raises BackendGone, and what pulse raises.
         """
         try:
@@ -145,9 +147,15 @@ class Teleoperation:
             self._let_go(f"the leader '{self.leader.segment}' is halted")
             return False
         if why := self._refused():
-            self.engaged, self._near_since, self.why = False, None, why
+            self.engaged, self._near_since, self.why, self.far = False, None, why, {}
             return False
+        if seen.iteration == self._last:
+            return self.engaged
         wanted = self.targets(seen)
+        jumped = bool(np.any(np.abs(wanted - self._wanted) > self.near))
+        self._last, self._wanted = seen.iteration, wanted
+        if jumped:
+            self.engaged, self._near_since = False, None
         if not self.engaged:
             self._look_whether_near(seen, wanted)
         if self.engaged:
@@ -185,18 +193,18 @@ class Teleoperation:
 
     def _next_row(self) -> _core.Observation:
         """The newest row; of a fast leader not each of them."""
-        if self.leader.bursting:
-            seen = self.leader.latest()
-        else:
-            self._wait_for_row(1)
+        if self.leader.bursting:  # it may stand still
             with contextlib.suppress(TimeoutError):
-                self._wait_for_row(self._stride)
-            seen = self.leader.latest()
-        self._last = seen.iteration
-        return seen
+                self._wait_for_row(1, 0.01)
+        else:
+            self._wait_for_row(1, self.silence)
+            with contextlib.suppress(TimeoutError):
+                self._wait_for_row(self._stride, self.silence)
+        return self.leader.latest()
 
-    def _wait_for_row(self, after: int) -> None:
-        self.leader.wait_for(max(self._last + after, self.leader.oldest), self.silence)
+    def _wait_for_row(self, after: int, timeout: float) -> None:
+        if self.leader.published < self._last + after:
+            self.leader.wait_for(self._last + after, timeout)
 
     def _refused(self) -> str:
         """Why the follower takes no commands; empty if it does."""
@@ -208,7 +216,7 @@ class Teleoperation:
         return ""
 
     def _let_go(self, why: str) -> None:
-        self.why, self._near_since = why, None
+        self.why, self._near_since, self.far = why, None, {}
         if self.engaged:
             self.engaged = False
             self.follower.halt(why)

@@ -194,8 +194,8 @@ class _Recorded:
         return found
 
     def _planned(self, numbers: _Numbers) -> dict[str, Any]:
-        """By panel: the first point of each plan, each after the last one, and the points: their
-        times, each after the last [us], and places.
+        """By panel: the first point of each plan, each after the last one, and the points: times
+        [s] and places.
         """
         rows = self.rows[-MOST_ROWS_OF_PLANS:]
         period = self.source.schema["period"]
@@ -205,12 +205,12 @@ class _Recorded:
             last = len(plan.places) - 1
             return np.append(np.arange(0, last, stride), last)
 
-        def times(plan: Planned) -> NDArray[np.int64]:
+        def times(plan: Planned) -> NDArray[np.float64]:
             iterations = plan.begins + drawn(plan)
             within = np.interp(iterations, rows.iteration, rows.time - self.rows.time[0])
             beyond = np.maximum(iterations - rows.iteration[-1], 0) * period
-            micro: NDArray[np.int64] = np.round((within + beyond) / 1000).astype(np.int64)
-            return micro
+            seconds: NDArray[np.float64] = (within + beyond) * SECONDS
+            return seconds
 
         found: dict[str, Any] = {}
         for panel, plans in self.source.plans(rows).items():
@@ -219,9 +219,7 @@ class _Recorded:
             lengths = [len(drawn(each)) for each in plans]
             found[panel] = [
                 numbers.add([0, *lengths[:-1]], "u4"),
-                numbers.add(
-                    np.diff(np.concatenate([times(each) for each in plans]), prepend=0), "i4"
-                ),
+                numbers.add(np.concatenate([times(each) for each in plans]), "f8"),
                 numbers.add(np.concatenate([each.places[drawn(each)] for each in plans]), "f4"),
             ]
         return found

@@ -44,10 +44,7 @@ class RecordingInFile {
     for (const source of sources) {
       source.times = summed(source.times, Float64Array, 1e-6);
       source.ticks = summed(source.ticks);
-      for (const planned of Object.values(source.planned)) {
-        planned[0] = summed(planned[0]);
-        planned[1] = summed(planned[1], Float64Array, 1e-6);
-      }
+      for (const planned of Object.values(source.planned)) planned[0] = summed(planned[0]);
       source.tickTimes = Float64Array.from(source.ticks, (row) => source.times[row]);
       for (const parts of Object.values(source.columns)) {
         for (const column of Object.values(parts)) column[0] = summed(column[0]);
