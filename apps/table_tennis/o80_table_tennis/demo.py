@@ -241,12 +241,14 @@ def _say_where(settings: DemoSettings, console: Console) -> None:
     """Prints what was written, and how to look at it."""
     recording = settings.recording
     arm = next(iter(o80.open(recording)))
+    program = Path(sys.executable).with_name("o80")  # in `make demo` no shell finds it by its name
+    command = program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else "o80"
     lines = (
         f"report, plots and film: {settings.output}",
         f"recording of every row: {recording}; of the learned policy: {settings.learned_recording}",
-        f"  o80 view {recording}      # arm, table and balls in the browser, back in time too",
-        f"  o80 replay {recording}    # repeats all of it and compares bit for bit",
-        f"  o80 plot {recording} --segment {arm} --fields agonist_1,extended.joint_positions",
+        f"  {command} view {recording}      # arm, table, balls in the browser, back in time too",
+        f"  {command} replay {recording}    # repeats all of it and compares bit for bit",
+        f"  {command} plot {recording} --segment {arm} --fields agonist_1,extended.joint_positions",
     )
     for line in lines:
         console.print(line, soft_wrap=True, highlight=False)

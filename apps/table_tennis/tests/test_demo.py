@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
@@ -56,6 +57,13 @@ def played(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
 def report(played: tuple[Path, str]) -> dict[str, Any]:
     content: dict[str, Any] = json.loads((played[0] / "report.json").read_text())
     return content
+
+
+def test_what_it_says_to_type_is_found_in_a_terminal(played: tuple[Path, str]) -> None:
+    typed = [line.split()[0] for line in played[1].splitlines() if line.startswith("  ")]
+    programs = [word for word in typed if word.endswith("o80")]
+    assert len(programs) == 3
+    assert all(shutil.which(program, path=os.defpath) for program in programs)
 
 
 @pytest.mark.parametrize("mode", MODES)
