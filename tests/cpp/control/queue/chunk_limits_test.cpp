@@ -1,0 +1,115 @@
+// Chunks under limits: within them, and at their last row in the end.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "control/chunk_rig.hpp"
+
+namespace o80::test {
+namespace {
+
+TEST(ChunkLimits, AFirstAnswerThatComesLateDoesNotThrowTheArm) {
+  for (const std::uint32_t first : {0U, 8U}) {
+    ChunkRig rig;
+    std::vector<double> rows;
+    for (int i = 1; i <= 40; ++i) rows.push_back(0.2 * (1.0 - std::cos(std::numbers::pi * i / 40)));
+    rig.run_to(351);
+    rig.chunk(rows, every(10, 40), {.anchor = 1, .ease = 50, .first = first});
+    rig.run_to(800);
+    double fastest = 0.0;
+    for (Iteration i = 352; i < 800; ++i) {
+      fastest = std::max(fastest, std::abs(rig.at(i) - rig.at(i - 1)));
+    }
+    EXPECT_LE(fastest, 1.2 * 0.2 * std::numbers::pi / 400) << first;
+    EXPECT_DOUBLE_EQ(rig.at(799), 0.4);
+  }
+}
+
+TEST(ChunkLimits, ALowJerkLimitDoesNotLeadAstray) {
+  // a sine within the limits, a new chunk every 0.1 s: it is followed as its plan is
+  ChunkRig rig(limited_robot(limits_of(5.0, 20.0, 100.0)));
+  const auto sine = [](double t) { return 0.5 * std::sin(2.0 * t); };
+  std::vector<std::uint32_t> due = every(20, 50);
+  double worst = 0.0;
+  for (Iteration now = 1; now < 30'000; now += 100) {
+    rig.run_to(now);
+    const Iteration anchor = std::max<Iteration>(0, now - 1);
+    std::vector<double> rows;
+    for (const std::uint32_t each : due)
+      rows.push_back(sine(1e-3 * static_cast<double>(anchor + each)));
+    rig.chunk(rows, due, {.anchor = anchor, .ease = 100});
+    if (now < 3000) continue;
+    for (Iteration i = now - 100; i < now; ++i) {
+      worst = std::max(worst, std::abs(rig.at(i) - sine(1e-3 * static_cast<double>(i))));
+    }
+  }
+  EXPECT_LT(worst, 0.025);
+}
+
+TEST(ChunkLimits, RowsWithinBoundsWithATakeOverOutsideAreClampedAndReached) {
+  Schema schema = plain_robot(1);
+  schema.actuator(0).limits({.minimum = 0.0, .maximum = 0.505});
+  ChunkRig rig(std::move(schema));
+  rig.reach(101, 0.5, 0.0009);
+  rig.add(0, overwriting(over(3)), {0.505});
+  rig.pulse();
+  rig.run_to(103);
+  rig.chunk({0.503, 0.3}, every(10, 2), {.anchor = 102, .ease = 10});
+  bool clamped = false;
+  while (rig.next < 125) {
+    rig.run_to(rig.next + 1);
+    clamped = clamped || rig.clamped();
+    EXPECT_LE(rig.desired(), 0.505);
+  }
+  EXPECT_TRUE(clamped);
+  EXPECT_EQ(rig.at(112), 0.503);
+  EXPECT_EQ(rig.at(122), 0.3);
+}
+
+/// Random chunks under random limits: all differences within them, all ends at the last row.
+TEST(ChunkLimits, RandomScriptsStayWithinLimitsAndEndAtTheirLastRow) {
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    std::mt19937 dice(seed);
+    const auto draw = [&](double low, double high) {
+      return std::exp(std::uniform_real_distribution<double>(std::log(low), std::log(high))(dice));
+    };
+    const double speed = draw(0.1, 10.0);
+    const double acceleration = draw(1.0, 100.0);
+    const double jerk = seed % 2 == 0 ? draw(10.0, 10'000.0) : kNoLimit;
+    ChunkRig rig(limited_robot(limits_of(speed, acceleration, jerk)));
+    ChunkScript script(seed);
+    script.run(rig, 1500);
+    rig.run_to(rig.next + 12'000);
+    const double v = speed * 1e-3 * (1 + 1e-6) + 1e-14;
+    const double a = acceleration * 1e-6 * (1 + 1e-6) + 1e-14;
+    const double j = std::isfinite(jerk) ? jerk * 1e-9 * (1 + 1e-6) + 1e-13 : 2 * a;
+    double before = 0.0;
+    double change = 0.0;
+    for (Iteration i = 1; i < rig.next; ++i) {
+      const double now = rig.at(i) - (i == 1 ? 0.0 : rig.at(i - 1));
+      ASSERT_LE(std::abs(now), v) << seed << " at " << i;
+      ASSERT_LE(std::abs(now - before), a) << seed << " at " << i;
+      ASSERT_LE(std::abs(now - before - change), j) << seed << " at " << i;
+      change = now - before;
+      before = now;
+    }
+    const ChunkScript::Sent* last = nullptr;
+    for (const ChunkScript::Sent& sent : script.all) {
+      const StatusChange end = rig.witness.last(sent.id);
+      ASSERT_EQ(rig.witness.ends_of(sent.id), 1U);
+      if (end.status != Status::completed) continue;
+      ASSERT_EQ(rig.at(end.iteration), sent.rows.back()) << seed;
+      last = &sent;
+    }
+    if (last == &script.all.back()) {
+      EXPECT_EQ(rig.desired(), last->rows.back());
+    }
+    EXPECT_TRUE(rig.all_blocks_back()) << seed;
+  }
+}
+
+}  // namespace
+}  // namespace o80::test

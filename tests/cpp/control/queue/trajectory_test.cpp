@@ -1,0 +1,125 @@
+// Trajectories: rows that are played as those of a chunk, when their queue reaches them.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "control/chunk_rig.hpp"
+
+namespace o80::test {
+namespace {
+
+/// A trajectory is a chunk that is anchored where its queue reaches it.
+TEST(Trajectory, ItsRowsArePlayedAsThoseOfAChunk) {
+  for (unsigned seed = 0; seed < 200; ++seed) {
+    std::mt19937 dice(seed);
+    const auto pick = [&](std::int64_t low, std::int64_t high) {
+      return std::uniform_int_distribution<std::int64_t>(low, high)(dice);
+    };
+    const auto place = [&] { return std::uniform_real_distribution<double>(-1.0, 1.0)(dice); };
+    const bool limited = seed % 2 == 1;
+    const auto robot = [&] {
+      return limited ? limited_robot(limits_of(5.0, 40.0, 2000.0)) : plain_robot(1);
+    };
+    const auto profile = std::array{Profile::cubic, Profile::linear, Profile::hold}[seed % 3];
+    // under limits the span of 16 rows is known in the first iteration
+    const auto rows = static_cast<std::uint32_t>(pick(1, limited ? 16 : 30));
+    if (profile == Profile::linear && rows == 1) continue;  // a command
+    std::vector<double> targets;
+    for (std::uint32_t i = 0; i < rows; ++i)
+      targets.push_back(i > 0 && pick(0, 4) == 0 ? targets.back() : place());
+    const std::int64_t each = pick(1, 25);
+    std::vector<std::uint32_t> due = every(static_cast<std::uint32_t>(each), rows);
+    std::vector<std::int64_t> times;
+    const bool is_timed = rows > 1 && pick(0, 1) == 0;
+    for (std::uint32_t i = 0; is_timed && i < rows; ++i) {
+      due[i] = (i == 0 ? 0 : due[i - 1]) + static_cast<std::uint32_t>(pick(1, 30));
+      // rounded halves up
+      times.push_back(due[i] * kMillisecond + pick(-kMillisecond / 2, kMillisecond / 2 - 1));
+    }
+    // behind a motion that goes on, or one that has ended
+    const Iteration start = 60;
+    const std::int64_t before = pick(20, 80);
+    const double to = place();
+    ChunkRig trajectory(robot());
+    ChunkRig chunk(robot());
+    for (ChunkRig* rig : {&trajectory, &chunk}) {
+      rig->run_to(10);
+      rig->add(0, over(before), {to});
+      rig->pulse();
+      rig->run_to(start);
+    }
+    RecordHead head = overwriting(is_timed ? paced(Pace::duration, 0) : over(each));
+    head.profile = profile;
+    trajectory.add_rows(0, head, rows, targets, times);
+    const CommandId id = record_id(trajectory.pulse(), 0);
+    chunk.chunk(targets, due, {.anchor = start - 1, .ease = 1, .fixed = 1}, profile);
+    const Iteration last = start + due.back() + 3000;
+    trajectory.run_to(last);
+    chunk.run_to(last);
+    for (Iteration i = start; i < last; ++i)
+      ASSERT_EQ(trajectory.at(i), chunk.at(i)) << seed << ' ' << i;
+    EXPECT_EQ(trajectory.witness.last(id).status, Status::completed) << seed;
+    EXPECT_EQ(trajectory.desired(), targets.back()) << seed;
+    for (std::uint32_t i = 0; i < rows && !limited; ++i) {
+      EXPECT_EQ(trajectory.at(start - 1 + due[i]), targets[i]) << seed;
+    }
+    EXPECT_TRUE(trajectory.all_blocks_back());
+  }
+}
+
+TEST(Trajectory, ACurveThroughAParabolaHasItsSlopes) {
+  // Steffen's slope of three points is that of their parabola
+  ChunkRig rig;
+  rig.run_to(100);
+  std::vector<double> targets;
+  const auto parabola = [](double t) { return 1e-4 * t * t; };
+  for (int i = 1; i <= 10; ++i) targets.push_back(parabola(10.0 * i));
+  rig.add_rows(
+      0,
+      [] {
+        RecordHead head = over(10);
+        head.profile = Profile::cubic;
+        return head;
+      }(),
+      10, targets);
+  rig.pulse();
+  rig.run_to(230);
+  for (Iteration t = 20; t <= 90; ++t) {
+    EXPECT_NEAR(rig.at(99 + t), parabola(static_cast<double>(t)), 1e-12) << t;
+  }
+  EXPECT_EQ(rig.at(199), targets.back());
+  EXPECT_EQ(rig.at(229), targets.back());
+}
+
+/// Any rows and profiles, as far apart as a double allows, one motion taking over from another.
+TEST(Trajectory, HugeRowsStayFinite) {
+  constexpr std::array kValues{-1.7e308, 1.7e308, 0.0, 1e-300};
+  for (unsigned seed = 0; seed < 1000; ++seed) {
+    std::mt19937 dice(seed);
+    const auto pick = [&](std::uint32_t below) {
+      return static_cast<std::uint32_t>(
+          std::uniform_int_distribution<int>(0, static_cast<int>(below) - 1)(dice));
+    };
+    Rig rig(seed % 4 == 0 ? limited_robot(limits_of(5.0, 40.0, 2000.0)) : plain_robot(1));
+    for (int i = 0; i < 4; ++i) {
+      constexpr std::array kProfiles{Profile::cubic, Profile::linear, Profile::hold,
+                                     Profile::minimum_jerk};
+      RecordHead head = over(1 + pick(5));
+      head.profile = kProfiles[pick(4)];
+      if (pick(3) > 0) head = overwriting(head);
+      std::vector<double> rows(1 + pick(9));
+      for (double& row : rows) row = kValues[pick(4)];
+      rig.add_rows(0, head, static_cast<std::uint32_t>(rows.size()), rows);
+      rig.pulse();
+      for (std::uint32_t n = 1 + pick(30); n > 0; --n) {
+        rig.step();
+        ASSERT_TRUE(std::isfinite(rig.desired())) << seed;
+      }
+    }
+  }
+}
+
+}  // namespace
+}  // namespace o80::test
