@@ -7,6 +7,7 @@
 
 #include "bindings.hpp"
 #include "errors.hpp"
+#include "interpreter.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/move.hpp"
 #include "o80/runtime/not_completed.hpp"
@@ -33,13 +34,29 @@ nb::object exception_of(const std::exception_ptr& thrown) {
   return nb::borrow(nb::python_error().value());
 }
 
+/// Calls Python; the interpreter may end meanwhile.
+nb::object called(const nb::object& callable, const nb::tuple& arguments) {
+  // nothing of C++ that a forced unwinding would have to leave stands between the two
+  PyObject* const result =
+      call_python([&] { return PyObject_CallObject(callable.ptr(), arguments.ptr()); });
+  if (result == nullptr) throw nb::python_error();
+  return nb::steal(result);
+}
+
+nb::object imported(const char* module) {
+  PyObject* const found = call_python([&] { return PyImport_ImportModule(module); });
+  if (found == nullptr) throw nb::python_error();
+  return nb::steal(found);
+}
+
 /// Raises CopyFailed from the error of the first copy.
 void set_copy_failed(const o80::CopyFailed& failed) {
   nb::dict errors;
   for (const o80::CopyFailed::Failure& failure : failed.failures()) {
     errors[nb::int_(failure.copy)] = exception_of(failure.error);
   }
-  const nb::object error = python_error("CopyFailed")(failed.what(), errors);
+  const nb::object error =
+      called(python_error("CopyFailed"), nb::make_tuple(failed.what(), errors));
   const nb::object first = errors[nb::int_(failed.failures().front().copy)];
   PyException_SetCause(error.ptr(), nb::object(first).release().ptr());
   PyErr_SetObject(reinterpret_cast<PyObject*>(Py_TYPE(error.ptr())), error.ptr());
@@ -49,7 +66,8 @@ void set_copy_failed(const o80::CopyFailed& failed) {
 nb::object observation_of(const o80::UntypedObservation& row) {
   auto description =
       std::make_shared<o80::Description>(o80::Description{row.schema(), row.layout()});
-  nb::object layout = nb::module_::import_("o80.rows.layout").attr("Layout")(nb::cast(description));
+  nb::object layout =
+      called(imported("o80.rows.layout").attr("Layout"), nb::make_tuple(description));
   auto decoder = std::make_shared<const Decoder>(std::move(description), std::move(layout));
   return nb::cast(Observation(std::move(decoder), o80::UntypedObservation(row)));
 }
@@ -62,8 +80,8 @@ void set_not_completed(const o80::NotCompleted& error) {
     actuators.append(nb::tuple(nb::cast(end.actuators)));
   }
   const nb::object type = python_error("NotCompleted");
-  const nb::object raised =
-      type(error.what(), handles, actuators, observation_of(error.observation()));
+  const nb::object raised = called(
+      type, nb::make_tuple(error.what(), handles, actuators, observation_of(error.observation())));
   PyErr_SetObject(type.ptr(), raised.ptr());
 }
 
@@ -71,12 +89,13 @@ void set_not_reached(const o80::NotReached& error) {
   const nb::object miss = python_error("Miss");
   nb::list misses;
   for (const o80::Miss& each : error.misses()) {
-    misses.append(miss(each.actuator, each.field, each.target, each.observed, each.distance,
-                       each.tolerance, each.unit));
+    misses.append(called(miss, nb::make_tuple(each.actuator, each.field, each.target, each.observed,
+                                              each.distance, each.tolerance, each.unit)));
   }
   const nb::object type = python_error("NotReached");
-  const nb::object raised = type(error.what(), nb::cast(error.batch()), nb::list(), misses,
-                                 observation_of(error.observation()));
+  const nb::object raised =
+      called(type, nb::make_tuple(error.what(), error.batch(), nb::list(), misses,
+                                  observation_of(error.observation())));
   PyErr_SetObject(type.ptr(), raised.ptr());
 }
 
@@ -121,15 +140,13 @@ void translate(const std::exception_ptr& thrown, void*) {
 
 }  // namespace
 
-nb::object python_error(const char* name) {
-  return nb::module_::import_("o80.base.errors").attr(name);
-}
+nb::object python_error(const char* name) { return imported("o80.base.errors").attr(name); }
 
 void set_error(const nb::object& type, const char* text) {
   // the text may come from memory that other processes write: invalid UTF-8 must not hide the error
   const auto length = static_cast<Py_ssize_t>(std::strlen(text));
   const nb::object decoded = nb::steal(PyUnicode_DecodeUTF8(text, length, "replace"));
-  if (decoded.is_valid()) PyErr_SetObject(type.ptr(), decoded.ptr());
+  if (decoded.is_valid()) call_python([&] { PyErr_SetObject(type.ptr(), decoded.ptr()); });
 }
 
 void raise_python(const char* name, const std::string& text) {

@@ -53,8 +53,9 @@ Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
     return call_python(call);
   } catch (nb::python_error& error) {
     try {
-      const nb::object said =
-          nb::module_::import_("o80.drivers.adapter").attr("fault_of")(error.value());
+      const nb::object said = call_python([&] {
+        return nb::module_::import_("o80.drivers.adapter").attr("fault_of")(error.value());
+      });
       set_text(fault, shown_text(said));
     } catch (...) {
       set_text(fault, error.what());

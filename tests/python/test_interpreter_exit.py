@@ -117,6 +117,38 @@ def test_daemon_threads_in_every_wait_neither_crash_nor_keep_the_interpreter(
             o80.clean(entry.name)
 
 
+TRANSLATING = """
+import builtins, sys, threading, time, o80
+arm = o80.robots.load("two_joints").inline({name!r})
+reader = o80.Frontend({name!r})
+imported, translating = builtins.__import__, threading.Event()
+
+def slow(name, *rest):  # a thread may lose the interpreter while it looks for the class of an error
+    if name == "o80.base.errors" and threading.current_thread() is waiting:
+        translating.set()
+        time.sleep(0.3)
+    return imported(name, *rest)
+
+class Late:  # the interpreter takes its time to end
+    def __del__(self, sleep=time.sleep):
+        sleep(1.0)
+
+sys.late = Late()  # what a function of this module may use lives until the process ends
+builtins.__import__ = slow
+waiting = threading.Thread(target=reader.wait_for, args=(10**12,), daemon=True)
+waiting.start()
+reader.close()
+translating.wait()
+builtins.__import__ = imported
+"""
+
+
+def test_the_interpreter_may_end_while_an_error_becomes_one_of_python(segment: str) -> None:
+    ended = run(TRANSLATING.format(name=segment))
+    assert crashes(ended) == [], ended.stderr
+    assert ended.returncode == 0, ended.stderr
+
+
 HOT = """
 import threading, o80
 arm = o80.robots.load("two_joints").inline()

@@ -7,6 +7,8 @@ inline. Prints rates, lateness and returns; writes a recording, plots, a film an
 
 from __future__ import annotations
 
+import shlex
+import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -237,12 +239,20 @@ def main(
     _say_where(settings, console)
 
 
+def command_of_o80() -> str:
+    """The command that finds the program `o80` beside this Python, in this terminal and folder."""
+    program = Path(sys.executable).with_name("o80")
+    if shutil.which("o80") == str(program):
+        return "o80"
+    inside = program.is_relative_to(Path.cwd())
+    return shlex.quote(str(program.relative_to(Path.cwd()) if inside else program))
+
+
 def _say_where(settings: DemoSettings, console: Console) -> None:
     """Prints what was written, and how to look at it."""
-    recording = settings.recording
-    arm = next(iter(o80.open(recording)))
-    program = Path(sys.executable).with_name("o80")  # in `make demo` no shell finds it by its name
-    command = program.relative_to(Path.cwd()) if program.is_relative_to(Path.cwd()) else "o80"
+    recording = shlex.quote(str(settings.recording))
+    arm = next(iter(o80.open(settings.recording)))
+    command = command_of_o80()
     lines = (
         f"report, plots and film: {settings.output}",
         f"recording of every row: {recording}; of the learned policy: {settings.learned_recording}",
