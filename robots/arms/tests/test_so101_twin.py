@@ -25,7 +25,8 @@ def stand_in() -> str:
         for i, (joint, limit) in enumerate(zip(JOINTS, limits, strict=True))
     )
     servos = "".join(
-        f'<position name="{joint}" joint="{joint}" kp="300" kv="9" inheritrange="1"/>'
+        f'<position name="{joint}" joint="{joint}" kp="300" kv="9" inheritrange="1" '
+        'forcerange="-4 4"/>'
         for joint in JOINTS
     )
     return (
@@ -62,8 +63,53 @@ def test_the_twin_has_the_face_of_the_arm(package: Path) -> None:
         )
         assert row.extended.link.fresh
         assert np.isfinite(row.extended.measured.velocity).all()
-        with pytest.raises(o80.errors.Error, match="the robot itself serves it"):
-            twin.request("relax")
+
+
+def test_it_serves_what_the_arm_is_asked(package: Path) -> None:
+    with o80.robots.load("so101_twin").inline() as twin:
+        for joint, place in PLACES.items():
+            twin.add_command(joint, place, duration=1.0)
+        stood = twin.burst(300)
+
+        twin.request("relax")
+        sunk = twin.burst(150)  # it sinks, and the desired states go with it
+        assert np.abs(sunk.observed.joints - stood.observed.joints).max() > 0.1
+        rows = twin.history(since=stood.iteration + 2).rows
+        assert (rows["desired"]["joints"][1:] == rows["observed"]["joints"][:-1]).all()
+        twin.request("snapshot", slot=0)
+        lower = twin.burst(20).observed.joints
+        twin.request("restore", slot=0)
+        assert (twin.burst(20).observed.joints == lower).all()  # it is relaxed again
+
+        twin.request("hold")
+        held = twin.burst(1).desired.joints
+        assert (twin.burst(150).desired.joints == held).all()
+        np.testing.assert_allclose(twin.latest().observed.joints, held, atol=0.02)
+        twin.request("strength", share=0.001)
+        with pytest.raises(o80.BackendHalted, match="error limit"):
+            twin.burst(300)
+        twin.request("recover")
+        twin.resume()
+        twin.request("strength", share=1.0)
+        stood = twin.burst(1)
+        np.testing.assert_allclose(twin.burst(100).observed.joints, stood.desired.joints, atol=0.02)
+        for share in (0.0, 1.1, np.nan):
+            with pytest.raises(o80.RequestRejected, match="above 0"):
+                twin.request("strength", share=share)
+        (run,) = o80.replay(twin)
+        assert run.identical, run
+
+
+def test_a_halted_twin_may_be_relaxed_and_resume_holds_it(package: Path) -> None:
+    with o80.robots.load("so101_twin").inline() as twin:
+        twin.burst(2)
+        twin.halt("look")
+        twin.request("relax")
+        sunk = twin.burst(50)
+        twin.resume()
+        twin.burst(1)
+        assert (twin.burst(100).desired.joints == twin.latest().desired.joints).all()
+        assert np.abs(twin.latest().observed.joints - sunk.observed.joints).max() < 0.2
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -224,6 +224,7 @@ void MujocoDriver::read(Reading<MujocoDriver>& reading) {
     read_sensors(reading);
   }
   if (reading.fresh()) go_on_from_targets(reading);
+  if (reading.fresh() && simulation_.relaxed()) reading.follow();
   if (simulation_.diverged()) {
     reading.fault(
         "the simulation diverged: a position, velocity or acceleration is not finite or too large. "
@@ -283,12 +284,34 @@ Served MujocoDriver::on(const Restore& restore) noexcept {
   return Served::rejected("this slot holds no snapshot: send the request snapshot first");
 }
 
-/// The requests about balls, or those of the other robot.
-Served MujocoDriver::on(std::uint32_t request, const std::byte* payload) noexcept {
-  if (is_like_) {
+/// The requests of arms, as far as a model has what they mean.
+Served MujocoDriver::serve_as_arm(JointFace::Word word, const std::byte* payload) noexcept {
+  using Word = JointFace::Word;
+  if (word == Word::none) {
     return Served::rejected(
         "this simulation only describes the request; the robot itself serves it");
   }
+  if (word == Word::strength) {
+    const auto share = unpack<double>(payload);
+    if (!(share > 0 && share <= 1)) {
+      return Served::rejected("the share must be above 0 and at most 1");
+    }
+    simulation_.strength(share);
+    return Served::done();
+  }
+  if (word != Word::recover) simulation_.relax(word == Word::relax);
+  return Served::start_afresh();
+}
+
+/// As an arm, it holds then.
+Served MujocoDriver::resume() noexcept {
+  simulation_.relax(false);
+  return Served::done();
+}
+
+/// The requests about balls, or those of the other robot.
+Served MujocoDriver::on(std::uint32_t request, const std::byte* payload) noexcept {
+  if (is_like_) return serve_as_arm(face()->words[request - 3], payload);
   return request == 3 ? clear_contacts(simulation_.balls(), unpack<ClearContacts>(payload))
                       : fly_out(simulation_.balls(), unpack<FlyOut>(payload));
 }

@@ -27,6 +27,7 @@ class MujocoDriver {
   void write(const Desired<MujocoDriver>& desired);
   void read(Reading<MujocoDriver>& reading);
   void stop() noexcept {}
+  Served resume() noexcept;
 
   Served on(const Reset& reset) noexcept;
   Served on(const Snapshot& snapshot) noexcept;
@@ -60,6 +61,7 @@ class MujocoDriver {
   void read_sensors(Reading<MujocoDriver>& reading) const;
   void go_on_from_targets(Reading<MujocoDriver>& reading);
   Served no_such_slot() const noexcept;
+  Served serve_as_arm(JointFace::Word word, const std::byte* payload) noexcept;
   const std::optional<JointFace>& face() const noexcept { return simulation_.model().face; }
 
   Simulation simulation_;

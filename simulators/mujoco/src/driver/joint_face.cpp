@@ -16,7 +16,9 @@
 namespace o80::mujoco {
 namespace {
 
+using Input = JointFace::Input;
 using Number = JointFace::Number;
+using Word = JointFace::Word;
 
 /// An entry of the option `joints`: `elbow`, `elbow=j2` or `jaw=j6 0 1`.
 struct Named {
@@ -109,6 +111,10 @@ class Builder {
       describe(config.limits);
     }
     for (std::uint32_t i = 0; i < schema().actuators.size(); ++i) drive(i);
+    for (RequestRow& request : schema().requests) {
+      face.words.push_back(word_of(request));
+      if (face.words.back() == Word::none) request.help = HelpText(kAbsent);
+    }
     if (is_like_ && schema().head.extended != kNoType) {
       face.absent.resize(schema().types[schema().head.extended].size);
       serve(schema().head.extended, 0, kNoType);
@@ -234,10 +240,32 @@ class Builder {
       const std::string_view name = request.name.view();
       return name == "reset" || name == "snapshot" || name == "restore";
     });
-    for (RequestRow& request : schema().requests) request.help = HelpText(kAbsent);
     for (FieldRow& field : schema().fields) {
       if (field.origin != Origin::clock) field.origin = Origin::robot;  // a simulation repeats
     }
+  }
+
+  /// A force can be taken away only where it follows from the input at once.
+  Word word_of(const RequestRow& request) const {
+    const std::string_view name = request.name.view();
+    if (!std::ranges::all_of(face.inputs, [&](const Input& input) {
+          return model_.actuator_dyntype[input.actuator] == mjDYN_NONE;
+        })) {
+      return Word::none;
+    }
+    if (request.type == kNoType || face.schema.types[request.type].fields == 0) {
+      return name == "hold"      ? Word::hold
+             : name == "relax"   ? Word::relax
+             : name == "recover" ? Word::recover
+                                 : Word::none;
+    }
+    const TypeRow& type = face.schema.types[request.type];
+    const FieldRow& first = face.schema.fields[type.first_field];
+    const bool is_one_number = type.fields == 1 && first.rows == 0 && first.kind == Kind::float64;
+    const bool have_most = std::ranges::all_of(face.inputs, [&](const Input& input) {
+      return !input.weakens || model_.actuator_forcelimited[input.actuator] != 0;
+    });
+    return name == "strength" && is_one_number && have_most ? Word::strength : Word::none;
   }
 
   // from the numbers of an actuator to those of its joint
@@ -286,8 +314,9 @@ class Builder {
   void add_input(std::uint32_t offset, const Servo& servo, const Line& own) {
     const Line line{servo.input.factor * own.factor, servo.input.of(own.shift)};
     const bool holds = servo.commanded == Quantity::position;
-    face.inputs.push_back(
-        {offset, line, servo.control, holds ? model_.jnt_qposadr[servo.joint] : -1, servo.input});
+    face.inputs.push_back({offset, line, servo.control,
+                           holds ? model_.jnt_qposadr[servo.joint] : -1, servo.input,
+                           servo.actuator, own.factor == 1});
   }
 
   const Servo& servo_for(const ActuatorRow& actuator, const Named& named, int joint) const {
@@ -469,6 +498,26 @@ void JointFace::drive(const std::byte* block, mjData& data) const noexcept {
 void JointFace::hold(mjData& data) const noexcept {
   for (const Input& input : inputs) {
     data.ctrl[input.control] = input.hold.of(input.position < 0 ? 0 : data.qpos[input.position]);
+  }
+}
+
+// force = gain x input + bias
+void JointFace::weaken(double share, const mjModel& model, mjData& data) const noexcept {
+  for (const Input& input : inputs) {
+    if (!input.weakens && share > 0) continue;
+    const int id = input.actuator;
+    const int joint = model.actuator_trnid[2 * id];
+    const double gear = model.actuator_gear[6 * model.actuator_outadr[id]];
+    const double gain = model.actuator_gainprm[mjNGAIN * id];
+    const mjtNum* bias = model.actuator_biasprm + mjNBIAS * id;
+    const double given = model.actuator_biastype[id] == mjBIAS_NONE
+                             ? 0
+                             : bias[0] + gear * (bias[1] * data.qpos[model.jnt_qposadr[joint]] +
+                                                 bias[2] * data.qvel[model.jnt_dofadr[joint]]);
+    const double force = std::clamp(gain * data.ctrl[input.control] + given,
+                                    share * model.actuator_forcerange[2 * id],
+                                    share * model.actuator_forcerange[2 * id + 1]);
+    data.ctrl[input.control] = (force - given) / gain;
   }
 }
 

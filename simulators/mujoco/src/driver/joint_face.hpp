@@ -22,7 +22,11 @@ struct JointFace {
     int control;           // address in ctrl
     int position;          // address in qpos of what it holds after a reset; -1: it takes 0
     Line hold;             // from there to ctrl
+    int actuator;          // id
+    bool weakens;          // by the request strength: not a gripper, which has one of its own
   };
+  /// A request of arms that a simulation serves too.
+  enum class Word : std::uint8_t { none, hold, relax, strength, recover };
   /// Where a number of a row comes from.
   struct Number {
     std::uint32_t offset;
@@ -38,6 +42,7 @@ struct JointFace {
   std::vector<Number> states;
   std::vector<Number> sensors;
   std::vector<std::uint32_t> capture_times;
+  std::vector<Word> words;        // of the requests
   std::vector<std::byte> absent;  // sensor values: NaN or 0 where the model has none
 
   /// True if a state has the position of this address in qpos.
@@ -46,6 +51,9 @@ struct JointFace {
   void show(const mjModel& model, ShownModel& shown) const;
   /// Sets the inputs as the states say.
   void drive(const std::byte* block, mjData& data) const noexcept;
+  /// Changes the inputs so that no actuator gives more than this share of its largest force; for 0
+  /// none gives any.
+  void weaken(double share, const mjModel& model, mjData& data) const noexcept;
   /// Sets the inputs so that the joints stay.
   void hold(mjData& data) const noexcept;
   /// Observed numbers of the states; those that no joint has are left.

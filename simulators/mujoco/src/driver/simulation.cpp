@@ -49,6 +49,8 @@ void Simulation::add_slots(std::uint32_t count) {
 
 void Simulation::reset() noexcept {
   now_.clock = 0;
+  now_.relaxed = false;
+  now_.strength = 1;
   mj_resetDataKeyframe(model_.model.get(), data_.get(), model_.keyframe);
   if (model_.face) model_.face->hold(*data_);
   if (integrates_ || !model_.sensors.empty()) {
@@ -98,6 +100,8 @@ void Simulation::advance() noexcept {
 }
 
 void Simulation::step(std::uint32_t number) noexcept {
+  const double strength = now_.relaxed ? 0 : now_.strength;
+  if (strength < 1) model_.face->weaken(strength, *model_.model, *data_);
   if (integrates_) {
     mj_step(model_.model.get(), data_.get());
   } else {

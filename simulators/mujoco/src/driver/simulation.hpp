@@ -48,6 +48,10 @@ class Simulation {
   }
   /// Targets of the next `advance`.
   Targets& targets() noexcept { return now_.targets; }
+  /// Actuators that hold nothing, or give less than they can; until a reset.
+  void relax(bool relaxed) noexcept { now_.relaxed = relaxed; }
+  bool relaxed() const noexcept { return now_.relaxed; }
+  void strength(double share) noexcept { now_.strength = share; }
   /// Null if the options name none.
   Balls* balls() noexcept { return balls_ ? &*balls_ : nullptr; }
   const Balls* balls() const noexcept { return balls_ ? &*balls_ : nullptr; }
@@ -85,6 +89,8 @@ class Simulation {
   struct State {
     std::int64_t clock = 0;  // [iterations]
     std::uint32_t engine_contacts = 0;
+    bool relaxed = false;
+    double strength = 1;  // share of the largest forces
     Targets targets;
     std::vector<JointState> joints;  // imposed ones, at the end of the last iteration
   };

@@ -23,6 +23,8 @@ void Simulation::each_part(Slot& slot, Bytes& bytes) noexcept {
   bytes.copy(slot.data->sensordata, static_cast<std::size_t>(model_.model->nsensordata));
   bytes(slot.state.clock);
   bytes(slot.state.engine_contacts);
+  bytes(slot.state.relaxed);
+  bytes(slot.state.strength);
   bytes(slot.state.targets.joints);
   bytes(slot.state.targets.controls);
   bytes(slot.state.targets.states);
