@@ -75,7 +75,16 @@ class Scene:
         address = int(self._model.jnt_qposadr[found])
         follows = None if extended else _following(schema, value["offset"])
         body = int(self._model.jnt_bodyid[found])
-        return _Place(value["name"], body, address, 1 if joint else 3, observed, desired, follows)
+        share = None if extended or not joint else _share(schema, value["offset"])
+        factor, shift = 1.0, 0.0
+        if share is not None and self._model.jnt_limited[found]:
+            low, high = (float(end) for end in self._model.jnt_range[found])
+            factor = (high - low) / (share[1] - share[0])
+            shift = low - share[0] * factor
+        count = 1 if joint else 3
+        return _Place(
+            value["name"], body, address, count, observed, desired, follows, factor, shift
+        )
 
     def poses(self, row: bytes, active: NDArray[np.bool_]) -> dict[str, Any]:
         """Positions and quaternions of the moving bodies (bodies, 7), observed and desired.
@@ -123,7 +132,8 @@ class Scene:
         for place, offset in zip(self._places, offsets, strict=True):
             numbers = np.frombuffer(row, np.float64, place.count, offset)
             if np.isfinite(numbers).all():
-                self._data.qpos[place.address : place.address + place.count] = numbers
+                where = slice(place.address, place.address + place.count)
+                self._data.qpos[where] = place.factor * numbers + place.shift
             elif self._floats:
                 lost.append(self._moving.index(place.body))
             else:
@@ -203,6 +213,8 @@ class _Place:
     observed: int
     desired: int
     follows: int | None  #: the actuator, if without a command it follows what is observed
+    factor: float  #: from the numbers to those in qpos
+    shift: float
 
     def wanted(self, active: NDArray[np.bool_]) -> int:
         """Where the desired value lies; what only follows has no desired value of its own."""
@@ -217,6 +229,16 @@ def _following(schema: dict[str, Any], offset: int) -> int | None:
         if actuator["offset"] <= offset:
             found = index if actuator["when_idle"] == "follow" else None
     return found
+
+
+def _share(schema: dict[str, Any], offset: int) -> tuple[float, float] | None:
+    """The bounds of an actuator whose state is a number without unit, as that of a gripper."""
+    for actuator in schema["actuators"]:
+        fields = schema["groups"][actuator["group"]]["type"]["fields"]
+        low, high = actuator["limits"][0]["minimum"], actuator["limits"][0]["maximum"]
+        if actuator["offset"] == offset and fields[0]["unit"] == "1" and None not in (low, high):
+            return low, high
+    return None
 
 
 def _mujoco() -> Any:

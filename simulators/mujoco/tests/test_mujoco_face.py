@@ -15,6 +15,8 @@ from o80.datasets.export import write
 from o80.drivers import Desired, Reading
 from o80.robots.robot import face_text
 from o80.testing import check_robot
+from o80.view.scene import Scene
+from o80.view.world import drawn
 
 MODELS = Path(__file__).parent / "models"
 TWO_JOINTS = MODELS / "two_joints.xml"
@@ -91,6 +93,14 @@ def gripping(tmp_path: Path) -> Path:
     model = tmp_path / "gripping.xml"
     model.write_text(GRIPPING)
     return model
+
+
+def last_angle(robot: o80.Frontend, row: Any) -> float:
+    """The angle [rad] of the last joint of a chain, as viewers draw it."""
+    what = drawn(robot.schema, robot.model, trusted=False)
+    assert what is not None
+    before, last = Scene(robot.schema, what).observed(bytes(row))[-2:, 3:]
+    return float(2 * np.arccos(abs(before @ last)))
 
 
 def written(folder: Path, actuators: str, joint: str = "") -> Path:
@@ -244,6 +254,8 @@ def test_the_model_serves_what_it_has_and_marks_the_rest(gripping: Path) -> None
         twin.add_command(None, [0.5, 0.3, 0.5], duration=0.5)
         row = twin.pulse_and_wait()
         assert row.observed.gripper == pytest.approx(0.5, abs=0.1)  # of the range of its joint
+        turned = np.radians(100 * row.observed.gripper)
+        assert last_angle(twin, row) == pytest.approx(turned)
         seen = row.extended
         assert np.isfinite(seen.measured.velocity).all()
         assert np.isnan(seen.measured.temperature).all()

@@ -480,9 +480,24 @@ bool JointFace::moves(int position) const noexcept {
   });
 }
 
+/// Viewers spread a share with bounds over the joint's range.
+bool JointFace::is_shown(const mjModel& model, const Number& number) const {
+  if (number.line.factor == 1) return true;
+  for (const ActuatorRow& actuator : schema.actuators) {
+    if (actuator.offset != number.offset) continue;
+    const LimitRow& row = schema.limits[actuator.first_limit];
+    const mjtNum* range = model.jnt_range + 2 * number.joint;
+    const double slack = 1e-3 * (range[1] - range[0]);
+    return schema.fields[schema.types[actuator.type].first_field].unit.view() == "1" &&
+           std::abs(number.line.of(row.minimum) - range[0]) <= slack &&
+           std::abs(number.line.of(row.maximum) - range[1]) <= slack;
+  }
+  return false;
+}
+
 void JointFace::show(const mjModel& model, ShownModel& shown) const {
   for (const Number& number : states) {
-    if (number.quantity != Quantity::position || number.line.factor != 1) continue;
+    if (number.quantity != Quantity::position || !is_shown(model, number)) continue;
     shown.joint(name_of(model, mjOBJ_JOINT, number.joint, "joint"), number.offset);
   }
 }

@@ -47,6 +47,7 @@ struct JointFace {
 
   /// True if a state has the position of this address in qpos.
   bool moves(int position) const noexcept;
+  bool is_shown(const mjModel& model, const Number& number) const;
   /// Names the joints that the states move, for viewers.
   void show(const mjModel& model, ShownModel& shown) const;
   /// Sets the inputs as the states say.
