@@ -110,8 +110,9 @@ def episodes_of(
     if not found:
         why = f": {left_out[0]}" if left_out else f": it has no mark '{begin}'"
         raise InvalidArgument(
-            f"{recording.path} holds no episode of '{chosen.name}'{why}. A program marks the "
-            f'beginning of each with recording.mark("{begin}")'
+            f"{recording.path} holds no episode of '{chosen.name}'{why}. While it is recorded, "
+            f"mark the beginning of each: `o80 mark {chosen.name} {begin}` in a terminal, a key of "
+            f'`o80 teleop`, or recording.mark("{begin}") in a program'
         )
     schema = found[0].rows.schema
     return Episodes(
