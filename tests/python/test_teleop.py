@@ -268,6 +268,54 @@ def test_a_leader_that_halts_or_ends_halts_the_follower(segment: str, how: str) 
         assert arm.halted.text == f"the leader '{segment}-1' {said}"
 
 
+def test_while_the_follower_is_halted_it_waits_for_rows_of_the_leader(segment: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+        leader(f"{segment}-3") as silent,
+        o80.Frontend(f"{segment}-3") as still,
+    ):
+        robots = o80.Teleoperation(hand, arm)
+        arm.halt("look")
+        arm.burst(1)
+        hand.burst(1)
+        robots.step()
+        assert robots.why == f"'{segment}-2' is halted: look"
+        waiting = o80.Teleoperation(still, arm)
+        silent.step()
+        silent.publish([0.0])
+        waiting.step()
+        assert "is halted: look" in waiting.why
+        waiting.step()  # no further row
+        assert waiting.why == f"the leader '{segment}-3' has published nothing for 0.2 s"
+
+
+@pytest.mark.parametrize("how", ["halted", "far", "following"])
+def test_a_follower_that_ends_ends_it(segment: str, how: str) -> None:
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.Frontend(f"{segment}-1") as seen,
+    ):
+        arm = o80.robots.load(Follower).inline(f"{segment}-2")
+        with arm, o80.Frontend(f"{segment}-2") as other:
+            robots = o80.Teleoperation(seen, other)
+            for _ in range(100):
+                hand.burst(10)
+                robots.step()
+                arm.burst(10)
+            if how == "far":
+                hand.add_command("elbow", 0.8)
+                hand.burst(1)
+                assert not robots.step()
+            if how == "halted":
+                arm.halt()
+                arm.burst(1)
+            arm.close()
+            hand.burst(1)
+            with pytest.raises(o80.BackendGone):
+                robots.step()
+
+
 @pytest.mark.parametrize(
     ("joints", "text"),
     [
@@ -339,6 +387,9 @@ def test_the_command_marks_demonstrations_by_keys(segment: str, tmp_path: Path) 
             until("follows")
             until("q ends")
             until("follows")  # after the head
+            arm.add_command("elbow", 0.0)
+            with pytest.raises(o80.NotCompleted, match="exclusive control"):
+                arm.pulse_and_wait(timeout=60)
             for thrown_away in (False, True):
                 press(" ")
                 until("demonstration 1" if not thrown_away else "demonstration 2")

@@ -52,7 +52,12 @@ def teleop(
     from o80.joining.teleoperation import Joint, Teleoperation
 
     joints = [Joint.parse(each) for each in joint] if joint else None
-    with attach(leader) as hand, attach(follower, read_only=False) as arm, _keyboard() as keys:
+    with (
+        attach(leader) as hand,
+        attach(follower, read_only=False) as arm,
+        arm.control(),  # a second hand would pull it to and fro
+        _keyboard() as keys,
+    ):
         robots = Teleoperation(hand, arm, joints=joints, near=near, silence=silence)
         session = _Session(robots, f"episode: {task}" if task else "episode")
         print(session.head(keys), file=sys.stderr, flush=True)

@@ -146,14 +146,18 @@ class Teleoperation:
         if seen.halted:
             self._let_go(f"the leader '{self.leader.segment}' is halted")
             return False
-        if why := self._refused():
+        is_new, self._last = seen.iteration != self._last, seen.iteration
+        why = self._refused()
+        if why or not self.engaged:  # else a pulse says so
+            self._raise_if_the_follower_has_ended()
+        if why:
             self.engaged, self._near_since, self.why, self.far = False, None, why, {}
             return False
-        if seen.iteration == self._last:
+        if not is_new:
             return self.engaged
         wanted = self.targets(seen)
         jumped = bool(np.any(np.abs(wanted - self._wanted) > self.near))
-        self._last, self._wanted = seen.iteration, wanted
+        self._wanted = wanted
         if jumped:
             self.engaged, self._near_since = False, None
         if not self.engaged:
@@ -206,6 +210,10 @@ class Teleoperation:
         if self.leader.published < self._last + after:
             self.leader.wait_for(self._last + after, timeout)
 
+    def _raise_if_the_follower_has_ended(self) -> None:
+        with contextlib.suppress(TimeoutError):
+            self.follower.wait_for(self.follower.published + 1, 0.0)
+
     def _refused(self) -> str:
         """Why the follower takes no commands; empty if it does."""
         if (halt := self.follower.halted) is not None:
@@ -235,7 +243,7 @@ class Teleoperation:
         if self._near_since is None:
             self._near_since = seen.time
         self.engaged = seen.time - self._near_since >= HELD * 1e9
-        self.why = "" if self.engaged else "near"
+        self.why = "" if self.engaged else "both are near since less than half a second"
 
 
 def _check_units(joint: Joint, leader: Actuator, follower: Actuator) -> None:
