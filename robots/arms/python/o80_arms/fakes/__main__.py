@@ -2,14 +2,10 @@
 
 import argparse
 import sys
-import tempfile
-from pathlib import Path
 
-from o80_arms import calibration
-from o80_arms.calibration import JOINTS, Calibration
+from o80_arms.fakes.arms import so101
 from o80_arms.fakes.feetech import TEMPERATURE, TORQUE, VOLTAGE, FakeChain
 
-RANGES = ((795, 3300), (910, 3185), (944, 3151), (967, 3128), (228, 3867), (2030, 3500))
 WORDS = """\
 unplug N, plug_in N       the power of servo N and of those behind it
 cut, plug                 the USB cable
@@ -51,22 +47,14 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, epilog=WORDS)
     parser.add_argument("--latency", type=float, default=0.001, help="of the adapter [s]")
     latency = parser.parse_args().latency
-    with tempfile.TemporaryDirectory() as folder:
-        file, port = Path(folder) / "fake.json", Path(folder) / "tty"
-        ranges = dict(zip(JOINTS, RANGES, strict=True))
-        calibration.write(file, {joint: Calibration(0, *each) for joint, each in ranges.items()})
-        with FakeChain(port, latency=latency, bus_time=True) as chain:
-            for number, (smallest, largest) in enumerate(RANGES, 1):
-                chain.servos[number].calibrate(0, smallest, largest)
-                chain.servos[number].stand_at((smallest + largest) // 2)
-            command = f"o80 run so101 --port {port} --calibration {file}"
-            # a program in Python may be late
-            print(f"{command} --answer-timeout 0.1\n{WORDS}", flush=True)
-            for line in sys.stdin:
-                try:
-                    obey(chain, line.split() or [""])
-                except (ValueError, KeyError, IndexError):
-                    print(WORDS, flush=True)
+    with so101(latency=latency) as fake:
+        words = " ".join(f"--{name.replace('_', '-')} {it}" for name, it in fake.options.items())
+        print(f"o80 run so101 {words}\n{WORDS}", flush=True)
+        for line in sys.stdin:
+            try:
+                obey(fake.chain, line.split() or [""])
+            except (ValueError, KeyError, IndexError):
+                print(WORDS, flush=True)
 
 
 if __name__ == "__main__":
