@@ -82,6 +82,13 @@ install_tools() {
   say "installed what running ${1:+and testing }needs"
 }
 
+# the judge of the arms, alone: what it requires would bring torch of another version
+lerobot="lerobot==0.4.4 deepdiff==8.6.2 orderly-set==5.5.0"
+install_lerobot() {
+  say "installing LeRobot's package"
+  pip install --no-deps --upgrade --target .venv/lerobot $lerobot
+}
+
 # install_package NAME FOLDER [DEFINITION...]: one of the packages, whose requirements are there
 install_package() {
   local name=$1 folder=$2
@@ -167,6 +174,7 @@ install_programs() {
         qemu-user-static relacy-dev spin strace rt-tests qemu-system-x86 busybox-static \
         cpio chromium
       need_renderer
+      once lerobot "$lerobot" install_lerobot
       ;;
   esac
 }
