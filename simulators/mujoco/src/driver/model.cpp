@@ -127,21 +127,29 @@ Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
              const std::function<void(mjModel&)>& finish) {
   check_version(mj_version(), mj_versionString());
   check_options(config);
-  const SpecPointer spec = parsed(config.model);
-  edit(*spec);
-  ModelPointer own = compiled(config.model, *spec);
-  mjcf = text_of(*spec);
-  own = without_drawings(*spec, std::move(own));
-  file = absolute(config.model);
   if (!(config.timestep >= 0 && std::isfinite(config.timestep))) {
     throw DriverError("timestep must be finite and positive [s], or 0 for the model's, got " +
                       std::to_string(config.timestep));
   }
-  if (config.timestep > 0) own->opt.timestep = config.timestep;
-  // a simulation that diverges is a fault, not a silent restart
-  own->opt.disableflags |= mjDSBL_AUTORESET;
-  finish(*own);
-  model = shared(std::move(own));
+  const auto prepare = [&](mjModel& each) {
+    if (config.timestep > 0) each.opt.timestep = config.timestep;
+    // a simulation that diverges is a fault, not a silent restart
+    each.opt.disableflags |= mjDSBL_AUTORESET;
+    finish(each);
+  };
+  const SpecPointer spec = parsed(config.model);
+  edit(*spec);
+  ModelPointer full = compiled(config.model, *spec);
+  prepare(*full);
+  file = absolute(config.model);
+  MadeModel made = shared(file, *full, [&] {
+    std::string text = text_of(*spec);
+    ModelPointer light = without_drawings(*spec, std::move(full));
+    prepare(*light);
+    return MadeModel{std::move(light), std::move(text)};
+  });
+  model = std::move(made.model);
+  mjcf = std::move(made.mjcf);
   if (!config.keyframe.empty()) keyframe = find(*model, mjOBJ_KEY, config.keyframe, "keyframe");
   sensors = sensors_in(*model);
   const bool actuated = config.mode == JointMode::actuated || !config.like.empty();
@@ -151,11 +159,6 @@ Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
   if (actuated) face = joint_face(*model, config);
 }
 
-void Model::timestep(double step) {
-  if (step == model->opt.timestep) return;
-  ModelPointer own(mj_copyModel(nullptr, model.get()));
-  own->opt.timestep = step;
-  model = shared(std::move(own));
-}
+void Model::timestep(double step) { model = with_timestep(std::move(model), step); }
 
 }  // namespace o80::mujoco

@@ -3,40 +3,85 @@
 #include <cstddef>
 #include <functional>
 #include <mutex>
-#include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
 namespace o80::mujoco {
 namespace {
 
 struct InUse {
-  std::size_t hash;
+  std::string file;
+  std::size_t hash;  // of the model that it was made of
+  std::weak_ptr<const mjModel> model;
+  std::string mjcf;
+};
+
+/// The newer model keeps the older one alive.
+struct InAnotherStep {
+  const mjModel* of;
+  double step;
   std::weak_ptr<const mjModel> model;
 };
 
-std::string bytes_of(const mjModel& model) {
-  std::string bytes(static_cast<std::size_t>(mj_sizeModel(&model)), '\0');
-  mj_saveModel(&model, nullptr, bytes.data(), static_cast<mjtSize>(bytes.size()));
-  return bytes;
+std::mutex mutex;
+std::vector<InUse> models;
+std::vector<InAnotherStep> in_another_step;
+
+std::size_t hash_of(const void* begin, std::size_t size) {
+  return std::hash<std::string_view>{}({static_cast<const char*>(begin), size});
+}
+
+/// Of sizes, options and all arrays.
+std::size_t hash_of(const mjModel& model) {
+  const std::size_t parts[] = {
+      hash_of(&model, offsetof(mjModel, buffer)),
+      hash_of(model.buffer, static_cast<std::size_t>(model.nbuffer)),
+  };
+  return hash_of(parts, sizeof(parts));
+}
+
+template <class Known>
+void forget_unused(std::vector<Known>& known) {
+  std::erase_if(known, [](const Known& each) { return each.model.expired(); });
 }
 
 }  // namespace
 
-SharedModel shared(ModelPointer model) {
-  static std::mutex mutex;
-  static std::vector<InUse> all;
-  const std::string bytes = bytes_of(*model);
-  const std::size_t hash = std::hash<std::string>{}(bytes);
-  const std::scoped_lock lock(mutex);
-  std::erase_if(all, [](const InUse& each) { return each.model.expired(); });
-  for (const InUse& each : all) {
-    if (each.hash != hash) continue;
-    SharedModel found = each.model.lock();
-    if (found && bytes_of(*found) == bytes) return found;
+MadeModel shared(const std::string& file, const mjModel& compiled,
+                 const std::function<MadeModel()>& make) {
+  const std::size_t hash = hash_of(compiled);
+  {
+    const std::scoped_lock lock(mutex);
+    forget_unused(models);
+    for (const InUse& each : models) {
+      if (each.hash != hash || each.file != file) continue;
+      if (SharedModel found = each.model.lock()) return {std::move(found), each.mjcf};
+    }
   }
-  SharedModel own(std::move(model));
-  all.push_back({hash, own});
-  return own;
+  MadeModel made = make();
+  const std::scoped_lock lock(mutex);
+  models.push_back({file, hash, made.model, made.mjcf});
+  return made;
+}
+
+SharedModel with_timestep(SharedModel model, double step) {
+  if (step == model->opt.timestep) return model;
+  const std::scoped_lock lock(mutex);
+  forget_unused(in_another_step);
+  for (const InAnotherStep& each : in_another_step) {
+    if (each.of != model.get() || each.step != step) continue;
+    if (SharedModel found = each.model.lock()) return found;
+  }
+  ModelPointer own(mj_copyModel(nullptr, model.get()));
+  own->opt.timestep = step;
+  const mjModel* of = model.get();
+  SharedModel made(own.release(), [kept = std::move(model)](mjModel* each) mutable {
+    mj_deleteModel(each);
+    kept.reset();  // this function lives as long as `in_another_step` knows the model
+  });
+  in_another_step.push_back({of, step, made});
+  return made;
 }
 
 }  // namespace o80::mujoco

@@ -1,6 +1,8 @@
 #pragma once
 
+#include <functional>
 #include <memory>
+#include <string>
 
 #include "engine/pointers.hpp"
 
@@ -9,9 +11,20 @@ namespace o80::mujoco {
 /// A compiled model that nobody changes.
 using SharedModel = std::shared_ptr<const mjModel>;
 
-/// The same model; if an equal one (byte by byte) is in use in this process, that one, and `model`
-/// is deleted. Copies of a simulation so need the memory of one model, most of which are its
-/// textures. May be called by several threads.
-SharedModel shared(ModelPointer model);
+/// What the copies of a simulation have in common.
+struct MadeModel {
+  SharedModel model;
+  std::string mjcf;  // as text
+};
+
+/// What `make` returns; or what it returned for an equal model of this file (equal in a hash of all
+/// its bytes), if that is still in use in this process. Copies of a simulation so need the memory
+/// of one model, most of which are its meshes and textures, and the time to make it once. May be
+/// called by several threads.
+MadeModel shared(const std::string& file, const mjModel& compiled,
+                 const std::function<MadeModel()>& make);
+
+/// The model with another step of the engine [s]: one for all that ask while it is in use.
+SharedModel with_timestep(SharedModel model, double step);
 
 }  // namespace o80::mujoco

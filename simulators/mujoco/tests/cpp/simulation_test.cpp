@@ -56,13 +56,27 @@ TEST(Simulation, SharesItsModelWithEqualOnesOnly) {
   EXPECT_EQ(slower.timestep(), 0.004);
 }
 
+TEST(Simulation, SharesItsModelWithCopiesThatTakeTheSameStep) {
+  Simulation one(config_of(court()));
+  one.steps(3, 0.005);
+  Simulation copy(config_of(court()));
+  copy.steps(3, 0.005);
+  EXPECT_EQ(copy.model().model, one.model().model);
+  EXPECT_EQ(copy.model().mjcf, one.model().mjcf);
+  EXPECT_DOUBLE_EQ(copy.timestep(), 0.005 / 3);
+  copy.steps(2, 0.005);
+  EXPECT_DOUBLE_EQ(copy.timestep(), 0.0025);
+  EXPECT_DOUBLE_EQ(one.timestep(), 0.005 / 3);
+}
+
 TEST(Simulation, DeletesAModelWithItsLastUser) {
   std::weak_ptr<const mjModel> model;
   {
     const Simulation one(config_of(court()));
     {
-      const Simulation copy(config_of(court()));
+      Simulation copy(config_of(court()));
       model = copy.model().model;
+      copy.steps(3, 0.005);
     }
     EXPECT_FALSE(model.expired());
   }
