@@ -43,6 +43,10 @@ def test_it_serves_what_the_arm_is_asked(package: Path) -> None:
         assert np.abs(sunk.observed.joints - stood.observed.joints).max() > 0.1
         rows = twin.history(since=stood.iteration + 2).rows
         assert (rows["desired"]["joints"][1:] == rows["observed"]["joints"][:-1]).all()
+        with pytest.raises(o80.NotCompleted, match="interrupted"):
+            twin.add_command("elbow_flex", 0.0, duration=1.0)
+            twin.pulse_and_wait(timeout=60)
+        assert twin.halted is None
         twin.request("snapshot", slot=0)
         lower = twin.burst(20).observed.joints
         twin.request("restore", slot=0)

@@ -79,6 +79,7 @@ MujocoDriver::MujocoDriver(const Config& config)
     : simulation_(config), steps_(config.steps), is_like_(!config.like.empty()) {
   Schema schema;
   places_ = add_to(schema);
+  commanded_.reserve(schema.actuators.size());
 }
 
 MujocoDriver::Places MujocoDriver::add_to(Schema& schema) const {
@@ -193,6 +194,11 @@ void MujocoDriver::write(const Desired<MujocoDriver>& desired) {
         steps_in_period(std::llround(desired.period() * 1e9), simulation_.timestep(), steps_));
     steps_known_ = true;
   }
+  commanded_.clear();
+  const std::size_t relaxed = simulation_.relaxed() ? face()->schema.actuators.size() : 0;
+  for (std::uint32_t i = 0; i < relaxed; ++i) {
+    if (desired.active(i)) commanded_.push_back(i);
+  }
   Targets& targets = simulation_.targets();
   for (std::size_t i = 0; i < places_.joints.size(); ++i) {
     targets.joints[i] = desired.at(places_.joints[i]);
@@ -225,6 +231,8 @@ void MujocoDriver::read(Reading<MujocoDriver>& reading) {
   }
   if (reading.fresh()) go_on_from_targets(reading);
   if (reading.fresh() && simulation_.relaxed()) reading.follow();
+  for (const std::uint32_t actuator : commanded_)
+    reading.interrupt(actuator);  // nothing would move
   if (simulation_.diverged()) {
     reading.fault(
         "the simulation diverged: a position, velocity or acceleration is not finite or too large. "

@@ -68,7 +68,8 @@ class MujocoDriver {
   std::uint32_t steps_;  // 0: as many as the period holds
   bool is_like_;         // it has the face of another robot
   bool restored_ = false;
-  mutable std::int64_t period_ = 0;  // as described, with the face of another robot [ns]
+  std::vector<std::uint32_t> commanded_;  // actuators of a relaxed robot, in the last iteration
+  mutable std::int64_t period_ = 0;       // as described, with the face of another robot [ns]
   Places places_;
   bool steps_known_ = false;
 };
