@@ -47,10 +47,6 @@ std::vector<Found> found(Answers& answers, const Bytes& bytes, std::size_t step)
 
 TEST(FeetechRequests, AreThePacketsOfTheManual) {
   Requests requests;
-  requests.ping(1);
-  EXPECT_THAT(Bytes(requests.bytes().begin(), requests.bytes().end()),
-              ElementsAre(0xFF, 0xFF, 0x01, 0x02, 0x01, 0xFB));
-  requests.clear();
   requests.read(1, 0x38, 2);
   EXPECT_THAT(Bytes(requests.bytes().begin(), requests.bytes().end()),
               ElementsAre(0xFF, 0xFF, 0x01, 0x04, 0x02, 0x38, 0x02, 0xBE));
