@@ -77,7 +77,7 @@ class Answers : public arms::Answers {
       const std::span<const std::uint8_t> packet = rest();
       const std::size_t length = packet[3];
       if (packet[0] != kHeader || packet[1] != kHeader || packet[2] == kHeader) {
-        skip_to_header();
+        skip_to_header(packet[0] == kHeader && packet[1] == kHeader);
         continue;
       }
       if (length < 2 || length > kLongest) {

@@ -65,6 +65,9 @@ class Requests {
   void put(std::uint8_t byte) noexcept {
     if (fits_) bytes_[size_++] = byte;
   }
+  std::span<std::uint8_t> packet_from(std::size_t begin) noexcept {
+    return std::span(bytes_).subspan(begin, size_ - begin);
+  }
   void put(Register where, int value) noexcept {
     const int raw = where.sign_bit > 0 ? with_sign_bit(value, where.sign_bit) : value;
     for (int i = 0; i < where.size; ++i) put(static_cast<std::uint8_t>(raw >> 8 * i & 0xFF));
@@ -116,12 +119,12 @@ class Answers {
     lost_track_ = true;
     ++damaged_;
   }
-  /// Looks for a header one byte later. A header whose second byte is the first of the next one is
+  /// Looks for a header one byte later. `shifted`: this one only begins a byte too early, which is
   /// no damage.
-  void skip_to_header() noexcept {
-    const bool shifted = bytes_[begin_] == kHeader && bytes_[begin_ + 1] == kHeader;
-    if (!shifted && !lost_track_) ++damaged_;
+  void skip_to_header(bool shifted) noexcept {
     ++begin_;
+    if (shifted) return;
+    if (!lost_track_) ++damaged_;
     lost_track_ = true;
   }
 
