@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_so101 import JOINTS, FakeArm
+from fake_arm import JOINTS, FakeArm
 
 import o80
 

@@ -54,6 +54,7 @@ void ServoArm::approach(Mask servos) noexcept {
     held_places_[i] = std::clamp(servos_[i].position, range.smallest, range.largest);
   }
   goals_ = held_places_;
+  chain_->watch(false);  // servos that it has stopped take no goal
   chain_->queue(chain_->goal(), servos, goals_);
   settling_ = static_cast<int>(kSettleTime * 1e9 / static_cast<double>(period_));
 }
@@ -61,13 +62,10 @@ void ServoArm::approach(Mask servos) noexcept {
 /// Switches the torque on where the servos stand, with the next request.
 void ServoArm::hold(Mask servos) noexcept {
   if (servos == 0) return;
-  Mask failing = servos;
-  for (std::size_t i = 0; i < kServos; ++i) {
-    if ((*chain_)[i].status == 0) failing &= ~bit(i);
-  }
-  chain_->queue_recovery(failing);
+  chain_->queue_recovery(servos & failing());
   approach(servos);
   chain_->queue_torque(servos, true);
+  chain_->watch(true);
   held_ |= servos;
   relaxed_ = false;
   for (std::size_t i = 0; i < kServos; ++i) {
@@ -220,7 +218,7 @@ void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
       because("%s is read where it cannot be: has its encoder lost a turn?", kJointNames[i]);
     }
     if (servo.alarmed >= kAlarmsToHalt) name_alarm(i);
-    if (has(held_, i) && servo.without_torque) {
+    if (has(held_, i) && servo.without_torque && (*chain_)[i].status == 0) {
       held_ &= ~bit(i);
       because("somebody switched the torque of servo %zu (%s) off", i + 1, kJointNames[i]);
     }
@@ -237,9 +235,11 @@ void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
 void ServoArm::name_alarm(std::size_t servo) noexcept {
   const ServoState& state = (*chain_)[servo];
   const char* const name = kJointNames[servo];
-  if ((state.status & overload_alarm) != 0) {
-    because("%s is overloaded and has only %d %% of its strength: free it", name,
-            chain_->strength_of_overloaded(servo));
+  const int weak = chain_->strength_of_overloaded(servo);
+  if ((state.status & overload_alarm) != 0 && weak == 0) {
+    because("%s is overloaded and has switched itself off: free it", name);
+  } else if ((state.status & overload_alarm) != 0) {
+    because("%s is overloaded and has only %d %% of its strength: free it", name, weak);
   } else if ((state.status & heat_alarm) != 0) {
     servos_[servo].was_hot = true;
     because("%s is too hot (%d C): it has switched itself off", name, state.temperature);
@@ -257,7 +257,7 @@ Health ServoArm::health_of(std::size_t servo) const noexcept {
   const ServoState& state = (*chain_)[servo];
   const auto alarmed = [&](Alarm alarm) { return (state.status & alarm) != 0; };
   if (servos_[servo].missed >= kMissesToHalt) return Health::silent;
-  if (servos_[servo].without_torque && !relaxed_) return Health::torque_off;
+  if (servos_[servo].without_torque && !relaxed_ && state.status == 0) return Health::torque_off;
   if (alarmed(overload_alarm)) return Health::overload;
   if (alarmed(current_alarm)) return Health::current;
   if (alarmed(heat_alarm) || state.temperature + 5 >= state.hottest) {
@@ -267,12 +267,17 @@ Health ServoArm::health_of(std::size_t servo) const noexcept {
   return alarmed(voltage_alarm) ? Health::voltage : Health::ok;
 }
 
+/// Servos that report a failure.
+ServoArm::Mask ServoArm::failing() const noexcept {
+  Mask found = 0;
+  for (std::size_t i = 0; i < kServos; ++i) found |= (*chain_)[i].status != 0 ? bit(i) : 0;
+  return found;
+}
+
 /// Servos that do not hold although they should, or have less strength.
 ServoArm::Mask ServoArm::troubled() const noexcept {
-  Mask found = relaxed_ ? 0 : chain_->all() & ~held_;
-  for (std::size_t i = 0; i < kServos; ++i) {
-    if (servos_[i].without_torque || (*chain_)[i].status != 0) found |= bit(i);
-  }
+  Mask found = failing() | (relaxed_ ? 0 : chain_->all() & ~held_);
+  for (std::size_t i = 0; i < kServos; ++i) found |= servos_[i].without_torque ? bit(i) : 0;
   return found;
 }
 
@@ -288,6 +293,10 @@ const char* ServoArm::why_not_ready() noexcept {
     const int status = (*chain_)[i].status;
     Servo& servo = servos_[i];
     if (servo.missed > 0) return say("%s (servo %zu) does not answer", name, i + 1);
+    if (status != 0 && chain_->recovery_restarts()) {
+      return say("%s (servo %zu) reports a failure: `recover` restarts it, and it sinks", name,
+                 i + 1);
+    }
     if ((status & voltage_alarm) != 0) {
       return say("%.1f V at %s: wrong or weak supply", (*chain_)[i].voltage, name);
     }
@@ -306,7 +315,10 @@ const char* ServoArm::why_not_ready() noexcept {
 Served ServoArm::resume() noexcept {
   if (const char* const why = why_not_ready()) return Served::rejected(why);
   begin_anew();
-  if (!config_.leader) hold(relaxed_ ? chain_->all() : troubled());
+  if (!config_.leader) {
+    chain_->watch(true);
+    hold(relaxed_ ? chain_->all() : troubled());
+  }
   return Served::done();
 }
 
@@ -346,6 +358,11 @@ Served ServoArm::on(const Strength& request) noexcept {
 }
 
 Served ServoArm::on(const Recover& /*request*/) noexcept {
+  if (failing() != 0 && chain_->recovery_restarts()) {
+    chain_->queue_recovery(failing());
+    held_ &= ~failing();
+    return Served::done();
+  }
   if (const char* const why = why_not_ready()) return Served::rejected(why);
   if (!relaxed_) hold(troubled());
   return Served::start_afresh();  // desired states of before would move what has sunk
@@ -380,10 +397,12 @@ void ServoArm::stop() noexcept {
   const bool relaxes = config_.at_stop == AtStop::relax;
   if (relaxes || (config_.at_stop == AtStop::rest && goes_to_rest())) {
     for (int i = 0; i < 3; ++i) {  // nobody answers to it
+      chain_->watch(false);
       chain_->queue_torque(chain_->all(), false);
       chain_->send_queued();
     }
   } else if (!relaxed_) {
+    chain_->watch(false);
     // a gripper that presses on would overheat with nobody to see it
     chain_->queue(chain_->goal(), bit(kGripper) & held_, servos_[kGripper].position);
     chain_->send_queued();

@@ -197,6 +197,7 @@ class ServoArm {
   void look_for_trouble(const ServoChain::Transfer& transfer) noexcept;
   void name_alarm(std::size_t servo) noexcept;
   Health health_of(std::size_t servo) const noexcept;
+  Mask failing() const noexcept;
   Mask troubled() const noexcept;
   const char* why_not_ready() noexcept;
   void begin_anew() noexcept;

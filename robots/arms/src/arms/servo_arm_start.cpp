@@ -208,6 +208,7 @@ void ServoArm::begin_to_hold() {
   chain_->queue_torque(chain_->all(), true);
   chain_->send_queued();
   for (std::size_t i = 0; i < kServos; ++i) check(i, {chain_->torque(), 1});
+  chain_->watch(true);
   held_ = chain_->all();
   started_ = true;
   while (settling_ > 0 && why_[0] == 0) {

@@ -109,6 +109,7 @@ void ServoChain::request(Mask servos, std::span<const int> goals) noexcept {
   if (unanswered_ >= kMissing && now() - asked_at_ < kRarely) return;
 
   // queued, goals, question => one system call
+  if (watched_ && now() - asked_at_ > kPause) queue_watchdog(true);
   queue(goal_, servos, goals);
   ask(variant_);
   asked_at_ = now();

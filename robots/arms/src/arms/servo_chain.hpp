@@ -86,10 +86,15 @@ class ServoChain {
   void queue(Register where, Mask servos, int value) noexcept;
   void queue_torque(Mask servos, bool on) noexcept { queue(torque_, servos, on ? 1 : 0); }
   /// How fast [steps/s, steps/s^2] and with which share of its strength each servo moves.
-  void queue_motion(Mask servos, double speed, double acceleration,
-                    std::span<const double> strengths) noexcept;
-  /// Ends the failures of servos, as far as that can be done with their torque.
+  virtual void queue_motion(Mask servos, double speed, double acceleration,
+                            std::span<const double> strengths) noexcept;
+  /// Ends the failures of servos.
   virtual void queue_recovery(Mask servos) noexcept = 0;
+  /// It restarts them: they have forgotten what they were told, and have no torque.
+  virtual bool recovery_restarts() const noexcept { return false; }
+  /// Servos that can do so stop when nothing was asked of them for 0.1 s. Switching it on ends a
+  /// stop, too.
+  void watch(bool on) noexcept { queue_watchdog(watched_ = on); }
   /// Goals in steps for some of the servos.
   void request(Mask servos, std::span<const int> goals) noexcept;
   /// Waits for answers until this moment of the monotonic clock [ns].
@@ -128,6 +133,7 @@ class ServoChain {
   virtual void ask(std::uint8_t variant) noexcept = 0;
   /// Takes the data of an answer.
   virtual void take(std::size_t servo, const Answer& answer) noexcept = 0;
+  virtual void queue_watchdog(bool /*on*/) noexcept {}
   /// A number in an answer to the question.
   int number(std::size_t servo, const Answer& answer, Register where) const noexcept;
   /// A number of a servo in its set-up. Throws std::runtime_error if it does not answer.
@@ -143,6 +149,7 @@ class ServoChain {
  private:
   static constexpr std::int64_t kQuiet = 2'000'000;  // longer than an answer, USB included [ns]
   static constexpr std::int64_t kSetUpWait = 100'000'000;  // for an answer before the loop [ns]
+  static constexpr std::int64_t kPause = 50'000'000;  // after which servos may have stopped [ns]
   static constexpr int kTries = 3;
   static constexpr int kMissing = 3;                    // transfers without an answer
   static constexpr std::int64_t kRarely = 100'000'000;  // between questions from then on [ns]
@@ -159,6 +166,7 @@ class ServoChain {
   SerialPort port_;
   std::int64_t set_up_wait_ = kSetUpWait;  // [ns]
   std::uint8_t variant_ = 0;               // another one after each failed transfer
+  bool watched_ = false;                   // by the servos
   bool asking_ = false;                    // between `request` and `collect`
   int unanswered_ = 0;                     // transfers in a row
   std::int64_t heard_at_ = 0;              // [ns]

@@ -1,13 +1,15 @@
-"""A fake SO-101: `python -m o80_arms.fakes` prints what to type, and obeys its terminal."""
+"""A fake arm: `python -m o80_arms.fakes` prints what to type, and obeys its terminal."""
 
 import argparse
 import sys
 import tempfile
 from pathlib import Path
+from typing import Any
 
 from o80_arms import calibration
 from o80_arms.calibration import JOINTS, Calibration
-from o80_arms.fakes.feetech import TEMPERATURE, TORQUE, VOLTAGE, FakeChain
+from o80_arms.fakes import dynamixel, feetech
+from o80_arms.fakes.chain import FakeChain
 
 RANGES = ((795, 3300), (910, 3185), (944, 3151), (967, 3128), (228, 3867), (2030, 3500))
 WORDS = """\
@@ -17,7 +19,7 @@ silent N, damages SHARE   a servo that does not answer; damaged answers
 heat N C, voltage N V, overload N, torque_off N, pull N STEPS_PER_S STRENGTH"""
 
 
-def obey(chain: FakeChain, words: list[str]) -> None:
+def obey(chain: FakeChain[Any], words: list[str]) -> None:
     """Breaks something, or mends it. Raises ValueError, KeyError, IndexError."""
     verb, *numbers = words
     if verb in ("cut", "plug"):
@@ -34,13 +36,13 @@ def obey(chain: FakeChain, words: list[str]) -> None:
         case "silent":
             chain.silent ^= {number}
         case "heat":
-            servo.put(TEMPERATURE, int(numbers[1]))
+            servo.put(servo.TEMPERATURE, int(numbers[1]))
         case "voltage":
-            servo.put(VOLTAGE, round(10 * float(numbers[1])))
+            servo.put(servo.VOLTAGE, round(10 * float(numbers[1])))
         case "overload":
-            servo.alarms |= 32
+            servo.overload()
         case "torque_off":
-            servo.put(TORQUE, 0)
+            servo.put(servo.TORQUE, 0)
         case "pull":
             servo.pull, servo.needs = float(numbers[1]), float(numbers[2])
         case _:
@@ -49,17 +51,19 @@ def obey(chain: FakeChain, words: list[str]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, epilog=WORDS)
+    parser.add_argument("arm", nargs="?", choices=["so101", "koch"], default="so101")
     parser.add_argument("--latency", type=float, default=0.001, help="of the adapter [s]")
-    latency = parser.parse_args().latency
+    given = parser.parse_args()
+    kind = dynamixel if given.arm == "koch" else feetech
     with tempfile.TemporaryDirectory() as folder:
         file, port = Path(folder) / "fake.json", Path(folder) / "tty"
         ranges = dict(zip(JOINTS, RANGES, strict=True))
         calibration.write(file, {joint: Calibration(0, *each) for joint, each in ranges.items()})
-        with FakeChain(port, latency=latency, bus_time=True) as chain:
+        with kind.FakeChain(port, latency=given.latency, bus_time=True) as chain:
             for number, (smallest, largest) in enumerate(RANGES, 1):
                 chain.servos[number].calibrate(0, smallest, largest)
                 chain.servos[number].stand_at((smallest + largest) // 2)
-            command = f"o80 run so101 --port {port} --calibration {file}"
+            command = f"o80 run {given.arm} --port {port} --calibration {file}"
             # a program in Python may be late
             print(f"{command} --answer-timeout 0.1\n{WORDS}", flush=True)
             for line in sys.stdin:

@@ -1,4 +1,4 @@
-"""Feetech STS3215 servos on a pseudo-terminal, as their clients see them.
+"""Bus servos on a pseudo-terminal, as their clients see them, whatever their protocol.
 
 `FakeChain` answers in a thread of its own. Its time passes by the clock, or by a period for each
 reading of all servos, so that a test depends on no clock. Its methods break things.
@@ -11,78 +11,55 @@ import select
 import threading
 import time
 import tty
+from collections.abc import Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Self
+from typing import ClassVar, Generic, Self, TypeVar
 
-MODEL = 777
 TURN = 4096
 BYTE = 10e-6  # on a line of 1 Mbaud [s]
 EVERYBODY = 254
-
-# registers: address, size
-FIRMWARE, MODEL_NUMBER, ID, SMALLEST, LARGEST = (0, 2), (3, 2), (5, 1), (9, 2), (11, 2)
-HOTTEST, MOST_VOLTAGE, LEAST_VOLTAGE, PHASE = (13, 1), (14, 1), (15, 1), (18, 1)
-OFFSET, MODE, WEAK = (31, 2), (33, 1), (34, 1)
-TORQUE, ACCELERATION, GOAL, SPEED, STRENGTH = (40, 1), (41, 1), (42, 2), (46, 2), (48, 2)
-LOCK, POSITION, MOVED, LOAD = (55, 1), (56, 2), (58, 2), (60, 2)
-VOLTAGE, TEMPERATURE, STATUS, MOVING = (62, 1), (63, 1), (65, 1), (66, 1)
-EEPROM = range(5, 40)
-AS_DELIVERED = {
-    FIRMWARE: 0x0903,
-    MODEL_NUMBER: MODEL,
-    LARGEST: 4095,
-    HOTTEST: 70,
-    MOST_VOLTAGE: 80,
-    LEAST_VOLTAGE: 40,
-    (16, 2): 1000,
-    PHASE: 12,
-    WEAK: 20,
-    STRENGTH: 1000,
-    LOCK: 1,
-    VOLTAGE: 52,
-    TEMPERATURE: 25,
-}
-
-
-def to_signed(raw: int, bit: int) -> int:
-    magnitude = raw & ((1 << bit) - 1)
-    return -magnitude if raw >> bit & 1 else magnitude
-
-
-def from_signed(value: int, bit: int) -> int:
-    return -value | 1 << bit if value < 0 else value
-
-
-def checksum(body: bytes) -> int:
-    return ~sum(body) & 0xFF
+Register = tuple[int, int]  # address, size
 
 
 class FakeServo:
     """Registers, and a motor that follows its goal within speed, acceleration and strength."""
 
-    def __init__(self, number: int, *, goal_switches_on: bool = True) -> None:
-        self.goal_switches_on = goal_switches_on
+    MODEL: ClassVar[Register]
+    ID: ClassVar[Register]
+    MODE: ClassVar[Register]
+    TORQUE: ClassVar[Register]
+    GOAL: ClassVar[Register]
+    POSITION: ClassVar[Register]
+    VOLTAGE: ClassVar[Register]
+    TEMPERATURE: ClassVar[Register]
+    KEPT: ClassVar[int]  # registers below are as before when the power comes back
+    AS_DELIVERED: ClassVar[dict[Register, int]]
+
+    def __init__(self, number: int) -> None:
         self.encoder = TURN / 2  # where the axis is [steps]
         self.speed = 0.0  # [steps/s]
         self.pull = 0.0  # what pulls at it: moves it where it has no strength [steps/s]
         self.needs = 0.0  # strength that it takes to withstand the pull, 0 to 1
         self.alarms = 0  # that the back door has set
+        self.unheard = 0.0  # since the last instruction [s]
         self.powered = True
         self.registers = bytearray(256)
-        for register, value in AS_DELIVERED.items():
+        for register, value in self.AS_DELIVERED.items():
             self.put(register, value)
-        self.put(ID, number)
+        self.put(self.ID, number)
         self.eeprom = bytes(self.registers)
         self.power_up()
 
-    def get(self, register: tuple[int, int]) -> int:
+    def get(self, register: Register) -> int:
         address, size = register
         return int.from_bytes(self.registers[address : address + size], "little")
 
-    def put(self, register: tuple[int, int], value: int) -> None:
+    def put(self, register: Register, value: int) -> None:
         address, size = register
-        self.registers[address : address + size] = value.to_bytes(size, "little")
+        self.registers[address : address + size] = (value % (1 << 8 * size)).to_bytes(
+            size, "little"
+        )
 
     def power_up(self) -> None:
         """Sets the registers as they are after the power was off."""
@@ -90,93 +67,80 @@ class FakeServo:
         self.powered, self.speed, self.alarms = True, 0.0, 0
 
     def keep(self) -> None:
-        """The registers below 40 become those after the power was off."""
-        self.eeprom = bytes(self.registers[:40]) + self.eeprom[40:]
+        """The registers that last become those after the power was off."""
+        self.eeprom = bytes(self.registers[: self.KEPT]) + self.eeprom[self.KEPT :]
+
+    # what a protocol says of them
+    @property
+    def torque(self) -> int:
+        return self.get(self.TORQUE)
+
+    @property
+    def strength(self) -> float:
+        """Share of its strength that its registers allow."""
+        raise NotImplementedError
 
     @property
     def shown(self) -> int:
-        return (round(self.encoder) - to_signed(self.get(OFFSET), 11)) % TURN
-
-    def stand_at(self, position: int) -> None:
-        """Moves the axis to where the servo shows this position."""
-        self.encoder = float(position + to_signed(self.get(OFFSET), 11))
-        self.speed = 0.0
-
-    def calibrate(self, offset: int, smallest: int, largest: int) -> None:
-        self.put(OFFSET, from_signed(offset, 11))
-        self.put(SMALLEST, smallest)
-        self.put(LARGEST, largest)
-        self.keep()
-
-    def write(self, address: int, data: bytes) -> None:
-        for at, byte in enumerate(data, address):
-            if at >= 5:  # the others are read only
-                self.registers[at] = byte
-        touched = range(address, address + len(data))
-        if GOAL[0] in touched and self.goal_switches_on and TORQUE[0] not in touched:
-            self.put(TORQUE, 1)
-        if TORQUE[0] in touched:
-            if self.get(TORQUE) == 128:
-                self.put(OFFSET, from_signed(round(self.encoder) - TURN // 2, 11))
-                self.put(TORQUE, 0)
-            if self.get(TORQUE) == 0:
-                self.alarms &= ~32
-        if any(at in EEPROM for at in touched) and self.get(LOCK) == 0:
-            self.keep()
-
-    def read(self, address: int, size: int) -> bytes:
-        self.put(POSITION, from_signed(self.shown, 15))
-        self.put(MOVED, from_signed(round(self.speed), 15))
-        self.put(MOVING, int(abs(self.speed) > 0.5))
-        self.put(STATUS, self.status)
-        return bytes(self.registers[address : address + size])
+        """Its position [steps]."""
+        raise NotImplementedError
 
     @property
     def status(self) -> int:
-        volts = self.get(VOLTAGE)
-        wrong = not self.get(LEAST_VOLTAGE) <= volts <= self.get(MOST_VOLTAGE)
-        hot = self.get(TEMPERATURE) >= self.get(HOTTEST)
-        return self.alarms | (1 if wrong else 0) | (4 if hot else 0)
+        """The byte that comes with each answer."""
+        raise NotImplementedError
+
+    def stand_at(self, position: int) -> None:
+        """Moves the axis to where the servo shows this position."""
+        raise NotImplementedError
+
+    def calibrate(self, offset: int, smallest: int, largest: int) -> None:
+        raise NotImplementedError
+
+    def overload(self) -> None:
+        """Something has blocked it for too long."""
+        raise NotImplementedError
+
+    def write(self, address: int, data: bytes) -> None:
+        raise NotImplementedError
+
+    def read(self, address: int, size: int) -> bytes:
+        raise NotImplementedError
 
     def pass_time(self, seconds: float) -> None:
-        if self.status & 4:
-            self.put(TORQUE, 0)
-        strength = self.get(STRENGTH) / 1000 if self.powered and self.get(TORQUE) else 0.0
-        if self.status & 32:
-            strength *= self.get(WEAK) / 100
+        raise NotImplementedError
+
+    def move(
+        self, seconds: float, strength: float, way: float, fastest: float, acceleration: float
+    ) -> None:
+        """Moves the axis a part of the way to its goal, or as it is pulled."""
         if strength == 0 or strength < self.needs:
             self.encoder += self.pull * seconds
             self.speed = 0.0  # of the motor's own motion
             return
-        unit = 1 if self.get(PHASE) & 4 else 50
-        fastest = self.get(SPEED) * unit or 3000
-        change = (self.get(ACCELERATION) * 100 or 1e6) * seconds
-        goal = max(self.get(SMALLEST), min(self.get(LARGEST), to_signed(self.get(GOAL), 15)))
-        way = goal - (self.encoder - to_signed(self.get(OFFSET), 11)) % TURN
-        braking = math.sqrt(2 * (change / seconds) * abs(way)) if seconds else 0.0
-        wanted = math.copysign(min(fastest, braking, abs(way) / seconds), way)
-        self.speed += max(-change, min(change, wanted - self.speed))
+        wanted = min(fastest, math.sqrt(2 * acceleration * abs(way)), abs(way) / seconds)
+        change = acceleration * seconds
+        self.speed += max(-change, min(change, math.copysign(wanted, way) - self.speed))
         self.encoder += self.speed * seconds
 
 
-class FakeChain:
+Servo = TypeVar("Servo", bound=FakeServo)
+
+
+class FakeChain(Generic[Servo]):
     """Servos on a pseudo-terminal. `port` is its name, which stays when it is plugged in again."""
 
     def __init__(
         self,
         port: Path,
-        servos: int = 6,
+        servos: Sequence[Servo],
         *,
         tick: float | None = None,
         latency: float = 0.0,
         bus_time: bool = False,
-        goal_switches_on: bool = True,
     ) -> None:
         self.port = port
-        self.servos = {
-            number: FakeServo(number, goal_switches_on=goal_switches_on)
-            for number in range(1, servos + 1)
-        }
+        self.servos = dict(enumerate(servos, 1))
         self.tick, self.latency, self.bus_time = tick, latency, bus_time
         self.reads = 0  # of all servos at once
         self.damaged = 0  # answers
@@ -249,7 +213,10 @@ class FakeChain:
             with self._lock:
                 master = self._master
             watched = [self._wake] if master < 0 else [self._wake, master]
-            ready, _, _ = select.select(watched, [], [])
+            ready, _, _ = select.select(watched, [], [], 0.05)
+            if not ready:
+                self._follow_clock(silent=True)
+                continue
             if self._wake in ready:
                 if os.read(self._wake, 1) == b"x":
                     return
@@ -277,74 +244,58 @@ class FakeChain:
                     os.write(master, answers)
             return True
 
-    @staticmethod
-    def _requests(received: bytearray) -> list[bytes]:
-        """Bodies of the whole packets, which are removed: id, length, instruction, parameters."""
-        found = []
-        while (begin := received.find(b"\xff\xff")) >= 0:
-            del received[:begin]
-            if len(received) < 4 or len(received) < received[3] + 4:
-                break
-            body = bytes(received[2 : received[3] + 4])
-            if sum(body) & 0xFF == 0xFF:
-                found.append(body[:-1])
-                del received[: body[1] + 4]
-            else:
-                del received[:2]
-        return found
+    def _requests(self, received: bytearray) -> list[bytes]:
+        """The whole packets, which are removed: id, instruction, parameters."""
+        raise NotImplementedError
 
-    def _answer(self, body: bytes) -> bytes:
-        number, _, instruction, *rest = body
-        parameters = bytes(rest)
+    def _serve_request(self, number: int, instruction: int, parameters: bytes) -> bytes:
+        raise NotImplementedError
+
+    def _packet(self, number: int, status: int, data: bytes) -> bytes:
+        """An answer."""
+        raise NotImplementedError
+
+    def _answer(self, request: bytes) -> bytes:
         if self.bus_time:
-            time.sleep(BYTE * (len(body) + 3))
-        if self.tick is None:
-            clock = time.monotonic()
-            self._pass_time(clock - self._passed)
-            self._passed = clock
-        if instruction == 0x82:
-            return self._sync_read(parameters[0], parameters[1], parameters[2:])
-        if instruction == 0x83:
-            self._sync_write(parameters[0], parameters[1], parameters[2:])
-            return b""
-        found = []
-        for each in list(self.servos) if number == EVERYBODY else [number]:
-            if not self._hears(each):
-                continue
-            servo = self.servos[each]
-            if instruction == 3:
-                servo.write(parameters[0], parameters[1:])
-                self.servos = {each.get(ID): each for each in self.servos.values()}
-            data = servo.read(*parameters) if instruction == 2 else b""
-            if instruction == 1 or number != EVERYBODY:
-                found.append(self._packet(each, servo, data))
-        return b"".join(found)
+            time.sleep(BYTE * (len(request) + 6))
+        self._follow_clock(silent=False)
+        return self._serve_request(request[0], request[1], request[2:])
 
     def _hears(self, number: int) -> bool:
         servo = self.servos.get(number)
         return servo is not None and servo.powered and number not in self.silent
 
-    def _sync_write(self, address: int, size: int, data: bytes) -> None:
+    def _answer_of(self, number: int, servo: Servo, data: bytes) -> bytes:
+        packet = bytearray(self._packet(number, servo.status, data))
+        if self.damages and self._dice.random() < self.damages:
+            self.damaged += 1
+            packet[self._dice.randrange(len(packet))] ^= 1 << self._dice.randrange(8)
+        return bytes(packet)
+
+    def _write_all(self, address: int, size: int, data: bytes) -> None:
         each = [data[i : i + size + 1] for i in range(0, len(data), size + 1)]
         for value in each:
             if self._hears(value[0]):
                 self.servos[value[0]].write(address, value[1:])
-        if address == GOAL[0]:
-            self.goals.append({value[0]: int.from_bytes(value[1:3], "little") for value in each})
+        if any(servo.GOAL[0] == address for servo in self.servos.values()):
+            goals = {value[0]: int.from_bytes(value[1:], "little", signed=True) for value in each}
+            self.goals.append(goals)
 
-    def _sync_read(self, address: int, size: int, numbers: bytes) -> bytes:
+    def _read_all(self, blocks: Sequence[tuple[int, int, int]]) -> bytes:
+        """Answers of servos in their order, each with an address and a size."""
         self.reads += 1
         if self.tick is not None:
-            self._pass_time(self.tick)
+            self.pass_time(self.tick, silent=False)
         found = []
-        for number in numbers:
+        for number, address, size in blocks:
             if not self._hears(number):
                 break  # those behind it wait for it
-            data = bytearray(self.servos[number].read(address, size))
+            servo = self.servos[number]
+            data = bytearray(servo.read(address, size))
             if positions := self.false.get(number):
-                at = POSITION[0] - address
+                at = servo.POSITION[0] - address
                 data[at : at + 2] = positions.pop(0).to_bytes(2, "little")
-            found.append(self._packet(number, self.servos[number], bytes(data)))
+            found.append(self._answer_of(number, servo, bytes(data)))
         answers = b"".join(found)
         if self.bus_time:
             time.sleep(BYTE * len(answers))
@@ -355,17 +306,18 @@ class FakeChain:
         self._held = [(at, held) for at, held in self._held if at > self.reads]
         return due + answers
 
-    def _packet(self, number: int, servo: FakeServo, data: bytes) -> bytes:
-        body = bytes([number, len(data) + 2, servo.status]) + data
-        packet = bytearray(b"\xff\xff" + body + bytes([checksum(body)]))
-        if self.damages and self._dice.random() < self.damages:
-            self.damaged += 1
-            packet[self._dice.randrange(len(packet))] ^= 1 << self._dice.randrange(8)
-        return bytes(packet)
+    def pass_time(self, seconds: float, *, silent: bool = True) -> None:
+        """Lets time pass; the servos hear nothing meanwhile, or are spoken to all the time."""
+        with self._lock:
+            while seconds > 0:
+                step = min(seconds, 0.01)
+                for servo in self.servos.values():
+                    servo.unheard = servo.unheard + step if silent else 0.0
+                    servo.pass_time(step)
+                seconds -= step
 
-    def _pass_time(self, seconds: float) -> None:
-        while seconds > 0:
-            step = min(seconds, 0.01)
-            for servo in self.servos.values():
-                servo.pass_time(step)
-            seconds -= step
+    def _follow_clock(self, *, silent: bool) -> None:
+        if self.tick is None:
+            clock = time.monotonic()
+            self.pass_time(clock - self._passed, silent=silent)
+            self._passed = clock
