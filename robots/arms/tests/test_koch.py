@@ -88,6 +88,22 @@ def test_a_start_that_cannot_be_right_is_refused(
     assert sum(arm.torque) <= sum(before)
 
 
+def test_turns_that_servos_count_or_forget_do_not_matter(arm: FakeArm) -> None:
+    """Without power a servo forgets its turns, wherever its encoder goes from 4095 to 0."""
+    arm.servo("elbow_flex").encoder += 4096
+    arm.servo("gripper").encoder -= 4096
+    before = arm.shown
+    robot = arm.started()
+    assert np.abs(np.subtract(arm.shown, before)).max() <= 1
+    place = (2100 - (900 + 3100) / 2) * 2 * np.pi / 4095
+    assert robot.latest().observed.joints[2] == pytest.approx(place)
+    robot.add_command(["elbow_flex", "gripper"], [0.2, 0.4], duration=1.0)
+    row = robot.burst(300)
+    assert row.observed.joints[2] == pytest.approx(0.2, abs=0.01)
+    assert row.observed.gripper == pytest.approx(0.4, abs=0.01)
+    assert arm.servo("elbow_flex").shown > 4096
+
+
 def test_an_overload_ends_with_a_restart_when_somebody_asks_for_it(arm: FakeArm) -> None:
     robot = arm.started()
     lift = arm.servo("shoulder_lift")

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstdlib>
 #include <stdexcept>
 #include <string>
 
@@ -11,7 +12,9 @@ namespace {
 
 constexpr double kSpeedUnit = 0.229 * 4096 / 60;             // [steps/s]
 constexpr double kAccelerationUnit = 214.577 * 4096 / 3600;  // [steps/s^2]
-constexpr int kWatchdogTime = 5;                             // 0.1 s [20 ms]
+constexpr int kTurn = 4096;                                  // [steps]
+constexpr int kSlack = 200;  // outside a range of a whole turn without being another turn [steps]
+constexpr int kWatchdogTime = 5;  // 0.1 s [20 ms]
 constexpr int kShutdowns =
     dynamixel::heat_failure | dynamixel::shock_failure | dynamixel::overload_failure;
 
@@ -71,9 +74,26 @@ void DynamixelChain::keep(std::size_t servo, const Setting& setting) {
 }
 
 Calibration DynamixelChain::calibration_of(std::size_t servo) {
-  return {.offset = needed(servo, dynamixel::kOffset),
-          .smallest = needed(servo, dynamixel::kSmallest),
-          .largest = needed(servo, dynamixel::kLargest)};
+  const Calibration found{.offset = needed(servo, dynamixel::kOffset),
+                          .smallest = needed(servo, dynamixel::kSmallest),
+                          .largest = needed(servo, dynamixel::kLargest)};
+  middles_[servo] = static_cast<int>(found.middle());
+  return found;
+}
+
+Setting DynamixelChain::goal(std::size_t servo, int position) const noexcept {
+  return {dynamixel::kGoal, position + turns_[servo]};
+}
+
+/// A servo forgets its turns when it loses its power: the position counts that is nearest to the
+/// middle of the range.
+int DynamixelChain::without_turns(std::size_t servo, int position) noexcept {
+  const int off = position - turns_[servo] - middles_[servo];
+  if (std::abs(off) > kTurn / 2 + kSlack) {
+    turns_[servo] =
+        kTurn * static_cast<int>(std::floor((position - middles_[servo] + kTurn / 2.0) / kTurn));
+  }
+  return position - turns_[servo];
 }
 
 Setting DynamixelChain::speed(std::size_t /*servo*/, double speed) const noexcept {
@@ -130,7 +150,7 @@ void DynamixelChain::ask(std::uint8_t variant) noexcept {
 
 void DynamixelChain::take(std::size_t servo, const Answer& answer) noexcept {
   ServoState& state = states_[servo];
-  state.position = number(servo, answer, dynamixel::kPosition);
+  state.position = without_turns(servo, number(servo, answer, dynamixel::kPosition));
   state.speed = kSpeedUnit * number(servo, answer, dynamixel::kVelocity);
   state.effort =
       models_[servo].torque * static_cast<std::int16_t>(number(servo, answer, dynamixel::kCurrent));

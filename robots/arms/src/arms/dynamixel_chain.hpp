@@ -31,6 +31,7 @@ class DynamixelChain : public ServoChain {
   void queue_recovery(Mask servos) noexcept override;
   bool recovery_restarts() const noexcept override { return true; }
 
+  Setting goal(std::size_t servo, int position) const noexcept override;
   Setting speed(std::size_t servo, double speed) const noexcept override;
   Setting acceleration(double acceleration) const noexcept override;
   Setting strength(std::size_t servo, double share) const noexcept override;
@@ -38,6 +39,7 @@ class DynamixelChain : public ServoChain {
 
  private:
   void keep(std::size_t servo, const Setting& setting);
+  int without_turns(std::size_t servo, int position) noexcept;
   void queue_watchdog(bool on) noexcept override;
   void ask(std::uint8_t variant) noexcept override;
   void take(std::size_t servo, const Answer& answer) noexcept override;
@@ -46,6 +48,8 @@ class DynamixelChain : public ServoChain {
   dynamixel::Answers answers_;
   std::array<Model, kMost> models_{};
   std::size_t stiff_;
+  std::array<int, kMost> middles_{};   // of the calibrated ranges [steps]
+  std::array<int, kMost> turns_{};     // that a servo counts too many [steps]
   std::array<int, kMost> most_{};      // of the register that limits the strength
   std::array<int, kMost> failures_{};  // bits of dynamixel::Failure
   Mask unnamed_ = 0;                   // servos with a failure that was not read yet

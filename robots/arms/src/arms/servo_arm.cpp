@@ -55,7 +55,7 @@ void ServoArm::approach(Mask servos) noexcept {
   }
   goals_ = held_places_;
   chain_->watch(false);  // servos that it has stopped take no goal
-  chain_->queue(chain_->goal(), servos, goals_);
+  chain_->queue_goals(servos, goals_);
   settling_ = static_cast<int>(kSettleTime * 1e9 / static_cast<double>(period_));
 }
 
@@ -213,7 +213,8 @@ void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
     if (lost(servo)) held_ &= ~bit(i);
     if (servo.jumped >= kJumpsToHalt) {
       // its goal is from before the jump: it would go there
-      if (has(held_, i)) chain_->queue(chain_->goal(), bit(i), (*chain_)[i].position);
+      goals_[i] = (*chain_)[i].position;
+      chain_->queue_goals(bit(i) & held_, goals_);
       held_ &= ~bit(i);
       because("%s is read where it cannot be: has its encoder lost a turn?", kJointNames[i]);
     }
@@ -404,7 +405,8 @@ void ServoArm::stop() noexcept {
   } else if (!relaxed_) {
     chain_->watch(false);
     // a gripper that presses on would overheat with nobody to see it
-    chain_->queue(chain_->goal(), bit(kGripper) & held_, servos_[kGripper].position);
+    goals_[kGripper] = servos_[kGripper].position;
+    chain_->queue_goals(bit(kGripper) & held_, goals_);
     chain_->send_queued();
     std::fprintf(stderr,
                  "six servos hold, and nobody watches their heat: `o80 arms relax` "

@@ -203,11 +203,11 @@ void ServoArm::begin_to_hold() {
   chain_->send_queued();
   for (std::size_t i = 0; i < kServos; ++i) {
     if (!holds(i)) check(i, chain_->strength(i, strength_of(i, kGentleStrength)));
-    check(i, {chain_->goal(), held_places_[i]});
+    check(i, chain_->goal(i, held_places_[i]));
   }
   chain_->queue_torque(chain_->all(), true);
   chain_->send_queued();
-  for (std::size_t i = 0; i < kServos; ++i) check(i, {chain_->torque(), 1});
+  for (std::size_t i = 0; i < kServos; ++i) check(i, chain_->torque(true));
   chain_->watch(true);
   held_ = chain_->all();
   started_ = true;

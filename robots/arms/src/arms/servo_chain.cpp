@@ -77,6 +77,12 @@ void ServoChain::queue(Register where, Mask servos, int value) noexcept {
   queue(where, servos, values);
 }
 
+void ServoChain::queue_goals(Mask servos, std::span<const int> goals) noexcept {
+  std::array<int, kMost> values{};
+  for (std::size_t i = 0; i < goals.size(); ++i) values[i] = goal(i, goals[i]).value;
+  queue(goal_, servos, values);
+}
+
 void ServoChain::queue_motion(Mask servos, double speed, double acceleration,
                               std::span<const double> strengths) noexcept {
   // servos of one register => one packet
@@ -110,7 +116,7 @@ void ServoChain::request(Mask servos, std::span<const int> goals) noexcept {
 
   // queued, goals, question => one system call
   if (watched_ && now() - asked_at_ > kPause) queue_watchdog(true);
-  queue(goal_, servos, goals);
+  queue_goals(servos, goals);
   ask(variant_);
   asked_at_ = now();
   asking_ = send_queued();

@@ -84,6 +84,7 @@ class ServoChain {
   /// Puts a value for some servos into the next request.
   void queue(Register where, Mask servos, std::span<const int> values) noexcept;
   void queue(Register where, Mask servos, int value) noexcept;
+  void queue_goals(Mask servos, std::span<const int> goals) noexcept;
   void queue_torque(Mask servos, bool on) noexcept { queue(torque_, servos, on ? 1 : 0); }
   /// How fast [steps/s, steps/s^2] and with which share of its strength each servo moves.
   virtual void queue_motion(Mask servos, double speed, double acceleration,
@@ -104,14 +105,16 @@ class ServoChain {
   std::int64_t asked_at() const noexcept { return asked_at_; }
 
   // what a servo understands
+  virtual Setting goal(std::size_t /*servo*/, int position) const noexcept {
+    return {goal_, position};
+  }
   virtual Setting speed(std::size_t servo, double speed) const noexcept = 0;
   virtual Setting acceleration(double acceleration) const noexcept = 0;
   virtual Setting strength(std::size_t servo, double share) const noexcept = 0;
   /// What remains of its strength when it is overloaded [%].
   virtual int strength_of_overloaded(std::size_t servo) const noexcept = 0;
 
-  const Register& goal() const noexcept { return goal_; }
-  const Register& torque() const noexcept { return torque_; }
+  Setting torque(bool on) const noexcept { return {torque_, on ? 1 : 0}; }
   SerialPort& port() noexcept { return port_; }
   std::size_t count() const noexcept { return count_; }
   Mask all() const noexcept { return (Mask{1} << count_) - 1; }

@@ -103,6 +103,18 @@ TEST_F(DynamixelLine, ReadingsHaveASignAndTellTheTorqueOfEachServoInTurn) {
   EXPECT_TRUE(chain[0].torque && chain[1].torque);
 }
 
+TEST_F(DynamixelLine, ATurnThatAServoCountsTooManyIsNoneOfItsPositionAndOneOfItsGoal) {
+  for (const int position : {-5, 4091, -4101, 8187}) {  // the middle of its range is 0 here
+    transfer(position);
+    EXPECT_EQ(chain[0].position, -5);
+    EXPECT_EQ(chain.goal(0, 7).value, position + 12);
+  }
+  transfer(2 * 4096 - 2200);
+  EXPECT_EQ(chain[0].position, -2200) << "it has gone on beyond its range";
+  transfer(2 * 4096 - 2300);
+  EXPECT_EQ(chain[0].position, 4096 - 2300) << "it has lost its power";
+}
+
 TEST_F(DynamixelLine, AFailureIsNamedByTheNextAnswerAtTheLatest) {
   for (int i = 0; i < 2; ++i) {  // whichever servo is asked for more
     transfer(1000, dynamixel::overload_failure);
