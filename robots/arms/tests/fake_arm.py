@@ -8,7 +8,6 @@ from typing import Any
 
 import o80
 from o80_arms.fakes import dynamixel, feetech
-from o80_arms.fakes.chain import FakeServo
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 OFFSETS = (-12, 30, 0, 1200, -1, 5)
@@ -48,7 +47,7 @@ class FakeArm:
         return self.line.servos[JOINTS.index(joint) + 1]
 
     @property
-    def servos(self) -> list[FakeServo]:
+    def servos(self) -> list[Any]:
         return list(self.line.servos.values())
 
     @property

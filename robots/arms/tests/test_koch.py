@@ -1,4 +1,4 @@
-"""What a Koch arm has of its own: settings that torque locks, restarts, and a watchdog."""
+"""A Koch arm's own: settings that torque locks, restarts, and a watchdog."""
 
 import os
 import signal

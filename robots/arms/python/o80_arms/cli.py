@@ -134,7 +134,7 @@ def calibrate(
 
 
 def doubts(bus: Bus, joints: dict[str, Calibration]) -> list[str]:
-    """What is strange about ranges, of an arm whose model is published."""
+    """Sentences on what is strange about ranges, of an arm whose model is published."""
     return [] if isinstance(bus, DynamixelBus) else calibration.doubts(joints)
 
 

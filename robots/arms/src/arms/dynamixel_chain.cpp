@@ -85,11 +85,12 @@ Setting DynamixelChain::goal(std::size_t servo, int position) const noexcept {
   return {dynamixel::kGoal, position + turns_[servo]};
 }
 
-/// A servo forgets its turns when it loses its power: the position counts that is nearest to the
-/// middle of the range.
+/// A servo forgets its turns when it loses its power, and has no torque then: the position counts
+/// that is nearest to the middle of the range.
 int DynamixelChain::without_turns(std::size_t servo, int position) noexcept {
-  const int off = position - turns_[servo] - middles_[servo];
-  if (std::abs(off) > kTurn / 2 + kSlack) {
+  const bool is_off = std::abs(position - turns_[servo] - middles_[servo]) > kTurn / 2 + kSlack;
+  if (!placed_[servo] || (is_off && !states_[servo].torque)) {
+    placed_[servo] = true;
     turns_[servo] =
         kTurn * static_cast<int>(std::floor((position - middles_[servo] + kTurn / 2.0) / kTurn));
   }

@@ -50,6 +50,7 @@ class DynamixelChain : public ServoChain {
   std::size_t stiff_;
   std::array<int, kMost> middles_{};   // of the calibrated ranges [steps]
   std::array<int, kMost> turns_{};     // that a servo counts too many [steps]
+  std::array<bool, kMost> placed_{};   // its turns are known
   std::array<int, kMost> most_{};      // of the register that limits the strength
   std::array<int, kMost> failures_{};  // bits of dynamixel::Failure
   Mask unnamed_ = 0;                   // servos with a failure that was not read yet

@@ -39,10 +39,10 @@ class DynamixelLine : public testing::Test {
     return std::span(question).last(2 + 10).subspan(5 * servo, 5);
   }
   /// An answer to such a question, of a servo that stands there.
-  static Bytes answer(std::span<const std::uint8_t> asked, int position, int failure = 0) {
+  Bytes answer(std::span<const std::uint8_t> asked, int position, int failure = 0) const {
     Bytes registers(256);
     registers[dynamixel::kFailure.address] = static_cast<std::uint8_t>(failure);
-    registers[dynamixel::kTorque.address] = 1;
+    registers[dynamixel::kTorque.address] = torque ? 1 : 0;
     for (std::size_t i = 0; i < 4; ++i) {
       registers[dynamixel::kPosition.address + i] = static_cast<std::uint8_t>(position >> 8 * i);
     }
@@ -77,6 +77,7 @@ class DynamixelLine : public testing::Test {
   static constexpr std::array<int, 2> kGoals{2048, -100};
   static constexpr std::array kModels{DynamixelChain::kXl430, DynamixelChain::kXl330};
   DynamixelChain chain{kModels, 0};
+  bool torque = true;
   int end = -1;
 };
 
@@ -103,16 +104,19 @@ TEST_F(DynamixelLine, ReadingsHaveASignAndTellTheTorqueOfEachServoInTurn) {
   EXPECT_TRUE(chain[0].torque && chain[1].torque);
 }
 
-TEST_F(DynamixelLine, ATurnThatAServoCountsTooManyIsNoneOfItsPositionAndOneOfItsGoal) {
-  for (const int position : {-5, 4091, -4101, 8187}) {  // the middle of its range is 0 here
-    transfer(position);
-    EXPECT_EQ(chain[0].position, -5);
-    EXPECT_EQ(chain.goal(0, 7).value, position + 12);
-  }
-  transfer(2 * 4096 - 2200);
-  EXPECT_EQ(chain[0].position, -2200) << "it has gone on beyond its range";
-  transfer(2 * 4096 - 2300);
-  EXPECT_EQ(chain[0].position, 4096 - 2300) << "it has lost its power";
+TEST_F(DynamixelLine, TurnsThatAServoCountsAreInItsGoalOnlyAndNeverChangeWhileItHolds) {
+  transfer(8187);  // the middle of its range is 0 here
+  EXPECT_EQ(chain[0].position, -5);
+  EXPECT_EQ(chain.goal(0, 7).value, 8192 + 7);
+  const auto all_tell = [&](int position) { transfer(position), transfer(position); };
+  all_tell(8192 - 2300);
+  EXPECT_EQ(chain[0].position, -2300) << "it was pushed beyond its range";
+  torque = false;  // as after a loss of power
+  all_tell(8192 - 2200);
+  EXPECT_EQ(chain[0].position, -2200);
+  all_tell(8192 - 2300);
+  EXPECT_EQ(chain[0].position, 4096 - 2300);
+  EXPECT_EQ(chain.goal(0, 7).value, 4096 + 7);
 }
 
 TEST_F(DynamixelLine, AFailureIsNamedByTheNextAnswerAtTheLatest) {
