@@ -137,6 +137,16 @@ def test_an_overload_ends_with_a_restart_when_somebody_asks_for_it(arm: FakeArm)
     assert robot.burst(300).observed.joints[1] == pytest.approx(0.2, abs=0.01)
 
 
+def test_servos_that_a_killed_process_left_and_others_relaxed_are_held_again(arm: FakeArm) -> None:
+    for servo in arm.servos:
+        servo.put(WATCHDOG, 255)  # takes no goal, no strength
+        servo.put(PWM, 0)
+    robot = arm.started()
+    robot.burst(2)
+    assert arm.strengths == [1.0] * 5 + [0.5]
+    assert arm.torque == [1] * 6
+
+
 def test_a_process_that_is_killed_leaves_an_arm_that_stops(arm: FakeArm) -> None:
     robot = o80.robots.load("koch")
     options = {**arm.options, "answer_timeout": 0.1}

@@ -44,6 +44,7 @@ bool ServoArm::holds(std::size_t servo) const noexcept {
 
 /// Goals where the servos stand, and gentle registers for those that do not hold yet.
 void ServoArm::approach(Mask servos) noexcept {
+  chain_->watch(false);  // servos that it has stopped take neither goal nor strength
   Mask gentle = servos;
   for (std::size_t i = 0; i < kServos; ++i) {
     if (holds(i)) gentle &= ~bit(i);
@@ -54,7 +55,6 @@ void ServoArm::approach(Mask servos) noexcept {
     held_places_[i] = std::clamp(servos_[i].position, range.smallest, range.largest);
   }
   goals_ = held_places_;
-  chain_->watch(false);  // servos that it has stopped take no goal
   chain_->queue_goals(servos, goals_);
   settling_ = static_cast<int>(kSettleTime * 1e9 / static_cast<double>(period_));
 }
