@@ -595,7 +595,10 @@ def test_its_run_is_replayed_without_it(arm: FakeArm, tmp_path: Path) -> None:
         halted(robot, "overloaded", 30)
         if arm.kind == "koch":
             robot.request("recover")
-            robot.burst(10)
+            robot.burst(5)
+            while not robot.burst(1).extended.link.fresh:
+                pass
+            robot.burst(30)
         robot.resume(accept_reading=True)
         robot.add_command("wrist_flex", 0.0, speed=1.0)
         robot.burst(60)

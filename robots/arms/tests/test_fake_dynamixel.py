@@ -86,6 +86,7 @@ def test_an_overload_is_told_until_a_restart(client: Client, arm: FakeArm) -> No
     assert client.read(2, 70)[1] == 128
     assert client.read(2, 70)[0] & 0xFF == 32
     assert client.packets.reboot(client.port, 2)[0] == sdk.COMM_SUCCESS
+    arm.line.pass_time(0.1)
     assert client.read(2, 70)[0] & 0xFF == client.read(2, 70)[1] == 0
 
 

@@ -19,6 +19,7 @@ KOCH = (XL430, XL430, XL330, XL330, XL330, XL330)
 LEADER = (1190,) * 6
 SPEED_UNIT, ACCELERATION_UNIT = 0.229 * 4096 / 60, 214.577 * 4096 / 3600  # [steps/s, /s^2]
 RANGE_ERROR, ACCESS_ERROR, ALERT = 4, 7, 128
+RESTART = 0.05  # [s]
 
 
 class FakeServo(chain.FakeServo):
@@ -47,6 +48,7 @@ class FakeServo(chain.FakeServo):
 
     def __init__(self, number: int, model: int) -> None:
         self.error = 0  # of the last instruction
+        self.starts = 0.0  # so long until it has restarted [s]
         super().__init__(number)
         self.put(self.MODEL, model)
         if model == XL430:
@@ -119,7 +121,15 @@ class FakeServo(chain.FakeServo):
     def status(self) -> int:
         return self.error | (ALERT if self.failures else 0)
 
+    def restart(self) -> None:
+        self.powered, self.starts = False, RESTART
+        self.put(self.TORQUE, 0)
+
     def pass_time(self, seconds: float) -> None:
+        if self.starts > 0:
+            self.starts -= seconds
+            if self.starts <= 0:
+                self.power_up()
         if self.failures & self.get(SHUTDOWN):
             self.put(self.TORQUE, 0)
         limit = self.get(WATCHDOG)
@@ -192,7 +202,7 @@ class FakeChain(chain.FakeChain[FakeServo]):
             elif instruction == 3:
                 servo.write(two[0], parameters[2:])
             elif instruction == 8:
-                servo.power_up()
+                servo.restart()
             wanted = answers == 2 or instruction in (1, 2)
             if wanted and (instruction == 1 or number != EVERYBODY):
                 found.append(self._answer_of(each, servo, data))
