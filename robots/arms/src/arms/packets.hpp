@@ -74,7 +74,7 @@ class Requests {
   }
 
  private:
-  std::array<std::uint8_t, 512> bytes_{};
+  std::array<std::uint8_t, 1024> bytes_{};
   std::size_t size_ = 0;
   bool fits_ = true;
 };

@@ -29,7 +29,7 @@ class DynamixelLine : public testing::Test {
   ~DynamixelLine() override { ::close(end); }
 
   Bytes sent() const {
-    Bytes bytes(512);
+    Bytes bytes(1024);
     const ssize_t size = recv(end, bytes.data(), bytes.size(), 0);
     bytes.resize(size > 0 ? static_cast<std::size_t>(size) : 0);
     return bytes;

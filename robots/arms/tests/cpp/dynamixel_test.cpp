@@ -92,11 +92,12 @@ TEST(DynamixelRequests, HaveNoHeaderInsideAndAnswersLoseItsStuffing) {
 TEST(DynamixelRequests, LeaveOutWhatDoesNotFit) {
   Requests requests;
   std::array<Value, 70> many{};
-  requests.sync_write(kGoal, many);
-  const std::size_t size = requests.bytes().size();
-  EXPECT_TRUE(requests.fits());
-  requests.sync_write(kGoal, many);
-  EXPECT_FALSE(requests.fits());
+  std::size_t size = 0;
+  while (requests.fits()) {
+    size = requests.bytes().size();
+    requests.sync_write(kGoal, many);
+  }
+  EXPECT_GT(size, 500U);
   EXPECT_EQ(requests.bytes().size(), size) << "half a packet would be garbage to the servos";
 }
 
