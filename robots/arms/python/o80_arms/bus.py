@@ -8,7 +8,7 @@ import termios
 import time
 import tty
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -268,10 +268,12 @@ class DynamixelBus(Bus):
 def bus_at(port: Path) -> Bus:
     """The bus of a port, by the protocol in which one of its servos answers; else of Feetech."""
     for protocol in (Bus, DynamixelBus):
-        bus = protocol(port)
-        if any(bus.scan([servo]) for servo in SERVOS):
-            return bus
-        bus.close()
+        with ExitStack() as opened:
+            bus = protocol(port)
+            opened.callback(bus.close)
+            if any(bus.scan([servo]) for servo in SERVOS):
+                opened.pop_all()
+                return bus
     return Bus(port)
 
 

@@ -156,13 +156,27 @@ TEST_F(DynamixelLine, ALateDamagedOrRepeatedAnswerNeverCounts) {
   }
 }
 
-TEST_F(DynamixelLine, AWatchedChainThatPausedClearsTheStopBeforeItsGoals) {
+TEST_F(DynamixelLine, AWatchedChainThatPausedEndsTheStopOfItsServosBeforeItsGoals) {
   chain.watch(true);
-  chain.request(chain.all(), kGoals);
+  chain.send_queued();
+  sent();
+  chain.request(chain.all(), kGoals);  // the first one: the pause before it has no end
   const Bytes bytes = sent();
+  const std::size_t watchdogs = 2 * (10U + 4 + 2 * 2);
+  ASSERT_EQ(bytes.size(), watchdogs + 24 + 20);
   EXPECT_EQ(bytes[8], 98);
-  EXPECT_EQ(bytes.size() % 18, (24U + 20U) % 18) << "watchdog packets before the goals";
-  EXPECT_EQ(bytes[bytes.size() - 44 + 8], 116);
+  EXPECT_EQ(bytes[watchdogs + 8], 116);
+}
+
+TEST_F(DynamixelLine, ServosThatAreRestartedDoNotAnswerIntoTheQuestionBehind) {
+  chain.queue_recovery(2);
+  chain.request(0, {});
+  const Bytes bytes = sent();
+  EXPECT_THAT(Bytes(bytes.begin() + 7, bytes.begin() + 14),
+              testing::ElementsAre(0x83, 68, 0, 1, 0, 2, 1));
+  EXPECT_EQ(bytes[16 + 4], 2);
+  EXPECT_EQ(bytes[16 + 7], 8);
+  EXPECT_EQ(bytes[16 + 10 + 7], 0x92);
 }
 
 TEST_F(DynamixelLine, NothingAllocates) {
