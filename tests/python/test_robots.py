@@ -67,7 +67,8 @@ def test_robots_of_further_folders_are_found(
 
 
 @pytest.mark.parametrize(
-    ("name", "package"), [("mujoco", "o80-mujoco"), ("pam", "o80-pam"), ("so101", "o80-arms")]
+    ("name", "package"),
+    [("mujoco", "o80-mujoco"), ("pam", "o80-pam"), ("so101", "o80-arms"), ("koch", "o80-arms")],
 )
 def test_a_robot_whose_package_is_missing_names_it(
     name: str, package: str, monkeypatch: pytest.MonkeyPatch

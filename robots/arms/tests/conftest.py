@@ -1,18 +1,19 @@
-"""The arm, and the model of its twin, that the tests of this folder share."""
+"""The arms, and the model of a twin, that the tests of this folder share."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
-from fake_so101 import FakeArm
+from fake_arm import FakeArm
 from stand_in import stand_in
 
 
 @pytest.fixture
-def arm(tmp_path: Path) -> Iterator[FakeArm]:
+def arm(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[FakeArm]:
+    """An SO-101, or the arm of the name that a test gives."""
     with ExitStack() as stack:
-        yield FakeArm(tmp_path, stack)
+        yield FakeArm(tmp_path, stack, getattr(request, "param", "so101"))
 
 
 @pytest.fixture

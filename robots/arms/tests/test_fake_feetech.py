@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import pytest
 import scservo_sdk as sdk
-from fake_so101 import FakeArm
+from fake_arm import FakeArm
 
 PROTOCOL = 0  # numbers little-endian
 GOAL, POSITION, TORQUE, LOCK, OFFSET = 42, 56, 40, 55, 31

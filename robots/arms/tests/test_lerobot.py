@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_so101 import JOINTS, FakeArm
+from fake_arm import JOINTS, FakeArm
 from typer.testing import CliRunner
 
 from o80_arms import cli

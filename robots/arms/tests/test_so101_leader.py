@@ -1,4 +1,4 @@
-"""The SO-101 that is moved by hand, and the one that follows it."""
+"""The arm that is moved by hand, and the one that follows it."""
 
 from contextlib import ExitStack
 from pathlib import Path
@@ -6,30 +6,28 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_so101 import JOINTS, FakeArm
+from fake_arm import JOINTS, FakeArm
 
 import o80
-from o80_arms.fakes.feetech import GOAL, TORQUE
 
 
-@pytest.fixture
-def hand(tmp_path: Path) -> Any:
+@pytest.fixture(params=["so101", "koch_leader"])
+def hand(tmp_path: Path, request: pytest.FixtureRequest) -> Any:
     (tmp_path / "leader").mkdir()
     with ExitStack() as stack:
-        yield FakeArm(tmp_path / "leader", stack)
-
-
-def torque(arm: FakeArm) -> list[int]:
-    return [servo.get(TORQUE) for servo in arm.line.servos.values()]
+        yield FakeArm(tmp_path / "leader", stack, request.param)
 
 
 def test_it_has_no_torque_and_is_followed_by_its_desired_states(hand: FakeArm) -> None:
-    hand.servo("elbow_flex").put(GOAL, 2100)
-    hand.servo("elbow_flex").put(TORQUE, 1)
+    elbow = hand.servo("elbow_flex")
+    elbow.put(elbow.GOAL, 2100)
+    elbow.put(elbow.TORQUE, 1)
     hand.servo("wrist_roll").stand_at(40)  # a hand may hold it outside its range
-    with o80.robots.load("so101_leader").inline(**hand.options) as leader:
-        assert torque(hand) == [0] * 6
-        hand.servo("elbow_flex").stand_at(2200)
+    with o80.robots.load(f"{hand.kind.removesuffix('_leader')}_leader").inline(
+        **hand.options
+    ) as leader:
+        assert hand.torque == [0] * 6
+        elbow.stand_at(2200)
         row = leader.burst(4)
         assert row.observed.joints[2] != 0
         assert row.desired.joints.tolist() == row.observed.joints.tolist()
@@ -45,12 +43,14 @@ def test_it_has_no_torque_and_is_followed_by_its_desired_states(hand: FakeArm) -
         leader.burst(1)
         leader.resume(number)
         leader.burst(2)
-        assert torque(hand) == [0] * 6, "no resume gives it torque"
+        assert hand.torque == [0] * 6, "no resume gives it torque"
 
 
 def test_a_follower_goes_where_the_hand_is(hand: FakeArm, arm: FakeArm) -> None:
     with (
-        o80.robots.load("so101_leader").inline(**hand.options) as leader,
+        o80.robots.load(f"{hand.kind.removesuffix('_leader')}_leader").inline(
+            **hand.options
+        ) as leader,
         arm.started() as follower,
     ):
         robots = o80.Teleoperation(leader, follower)
@@ -69,4 +69,4 @@ def test_a_follower_goes_where_the_hand_is(hand: FakeArm, arm: FakeArm) -> None:
         there, here = leader.latest().observed, follower.latest().observed
         np.testing.assert_allclose(here.joints, there.joints, atol=0.02)
         assert here.gripper == pytest.approx(there.gripper, abs=0.02)
-        assert all(on == 1 for on in torque(arm))
+        assert all(on == 1 for on in arm.torque)

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from fake_so101 import JOINTS, FakeArm
+from fake_arm import JOINTS, FakeArm
 
 import o80
 
@@ -43,8 +43,8 @@ def test_it_serves_what_the_arm_is_asked(package: Path) -> None:
         assert np.abs(sunk.observed.joints - stood.observed.joints).max() > 0.1
         rows = twin.history(since=stood.iteration + 2).rows
         assert (rows["desired"]["joints"][1:] == rows["observed"]["joints"][:-1]).all()
+        twin.add_command("elbow_flex", 0.0, duration=1.0)
         with pytest.raises(o80.NotCompleted, match="interrupted"):
-            twin.add_command("elbow_flex", 0.0, duration=1.0)
             twin.pulse_and_wait(timeout=60)
         assert twin.halted is None
         twin.request("snapshot", slot=0)

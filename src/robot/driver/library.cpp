@@ -33,8 +33,8 @@ fs::path bundled_folder() {
 }
 
 /// Robots of the other packages of o80's repository, and these packages.
-constexpr std::array<std::pair<std::string_view, std::string_view>, 3> kPackaged{
-    {{"mujoco", "o80-mujoco"}, {"pam", "o80-pam"}, {"so101", "o80-arms"}}};
+constexpr std::array<std::pair<std::string_view, std::string_view>, 4> kPackaged{
+    {{"koch", "o80-arms"}, {"mujoco", "o80-mujoco"}, {"pam", "o80-pam"}, {"so101", "o80-arms"}}};
 
 /// Installed versions of a missing shared library ("libx.so.4.0.1"). A wheel puts it into package
 /// "x", beside the package of the robot, which is a folder or a few above the robot's library.

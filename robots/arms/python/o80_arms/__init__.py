@@ -1,4 +1,4 @@
-"""Arms of bus servos as robots: "so101", "so101_leader" for the hand, "so101_twin" simulated."""
+"""Arms of bus servos as robots: "so101" and "koch", "..._leader" for the hand, "so101_twin"."""
 
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -9,14 +9,28 @@ from o80.errors import DriverError
 
 def so101() -> Path:
     """The robot library, which o80 loads."""
+    return _library("so101")
+
+
+def koch() -> Path:
+    """The robot library, which o80 loads."""
+    return _library("koch")
+
+
+def _library(robot: str) -> Path:
     # an editable installation has two folders: the sources, and what was built
-    files = [Path(folder) / "lib" / "so101.so" for folder in __path__]
+    files = [Path(folder) / "lib" / f"{robot}.so" for folder in __path__]
     return next((file for file in files if file.exists()), files[0])
 
 
 def so101_leader() -> tuple[str, Callable[[], dict[str, bool]]]:
     """The arm that is moved by hand: `o80 teleop so101_leader so101`."""
     return "so101", lambda: {"leader": True}
+
+
+def koch_leader() -> tuple[str, Callable[[], dict[str, bool]]]:
+    """The Koch arm that is moved by hand: `o80 teleop koch_leader koch`."""
+    return "koch", lambda: {"leader": True}
 
 
 def so101_twin() -> tuple[str, Callable[[], dict[str, str]]]:

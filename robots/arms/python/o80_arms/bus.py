@@ -1,4 +1,4 @@
-"""A line with Feetech servos, for set-up: one question at a time, each in its own time."""
+"""A line with servos, for set-up: one question at a time, each in its own time."""
 
 import errno
 import fcntl
@@ -8,15 +8,18 @@ import termios
 import time
 import tty
 from collections.abc import Callable, Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import ClassVar
 
 import o80
+from o80_arms import dynamixel
 
 WAIT = 0.05  # for an answer [s]
 TRIES = 3
 EVERYBODY = 254
+SERVOS = range(1, 7)  # of an arm
 
 
 class BusError(o80.Error):
@@ -32,17 +35,22 @@ class Register:
     sign: int | None = None
 
 
-FIRMWARE, MODEL, ID = Register(0, 2), Register(3, 2), Register(5, 1)
-SMALLEST, LARGEST, LEAST_VOLTAGE = Register(9, 2), Register(11, 2), Register(15, 1)
-RETURN_DELAY, PHASE, GAIN = Register(7, 1), Register(18, 1), Register(21, 1)
-OFFSET, MODE, TORQUE, GOAL = Register(31, 2, 11), Register(33, 1), Register(40, 1), Register(42, 2)
-LOCK, POSITION = Register(55, 1), Register(56, 2, 15)
-VOLTAGE, TEMPERATURE = Register(62, 1), Register(63, 1)
 TURN = 4096
 
 
 class Bus:
-    """Questions to the servos of a port, which is open for this process alone."""
+    """Questions to Feetech servos of a port, which is open for this process alone."""
+
+    MODELS: ClassVar = {777: "STS3215"}
+    FIRMWARE, MODEL, ID = Register(0, 2), Register(3, 2), Register(5, 1)
+    SMALLEST, LARGEST, LEAST_VOLTAGE = Register(9, 2), Register(11, 2), Register(15, 1)
+    RETURN_DELAY, PHASE, GAIN = Register(7, 1), Register(18, 1), Register(21, 1)
+    OFFSET, MODE, TORQUE = Register(31, 2, 11), Register(33, 1), Register(40, 1)
+    GOAL, LOCK, POSITION = Register(42, 2, 15), Register(55, 1), Register(56, 2, 15)
+    VOLTAGE, TEMPERATURE = Register(62, 1), Register(63, 1)
+    modes = (0,) * 6  # of the servos of an arm
+    PING = 0  # bytes in the answer to a ping
+    OFFSET_SIGN = -1  # shown position = encoder - offset
 
     def __init__(self, port: Path, wait: float | None = None) -> None:
         self.port, self.wait = port, WAIT if wait is None else wait
@@ -75,7 +83,7 @@ class Bus:
 
     def scan(self, servos: Iterable[int] = range(1, 13)) -> list[int]:
         """Numbers of the servos that answer a ping."""
-        return [servo for servo in servos if self._ask(servo, 1, b"", 0) is not None]
+        return [servo for servo in servos if self._ask(servo, 1, b"", self.PING) is not None]
 
     def read(self, servo: int, register: Register) -> int:
         """A number of a servo. Raises BusError."""
@@ -83,10 +91,8 @@ class Bus:
             # a number of bytes of its own for each question: an answer to another is known by it
             self._question = (self._question + 1) % 8
             size = register.size + self._question
-            if answer := self._ask(servo, 2, bytes([register.address, size]), size):
-                raw = int.from_bytes(answer[: register.size], "little")
-                sign = register.sign
-                return raw if sign is None else (-1 if raw >> sign & 1 else 1) * (raw % (1 << sign))
+            if answer := self._ask(servo, 2, self._numbers(register.address, size), size):
+                return self._value(register, answer[: register.size])
         raise BusError(f"servo {servo} at {self.port} does not answer: look at its plug")
 
     def write(self, servo: int, register: Register, value: int) -> None:
@@ -101,16 +107,59 @@ class Bus:
 
     def send(self, servo: int, register: Register, value: int) -> None:
         """Writes a number, whatever becomes of it."""
-        raw = value if value >= 0 else -value | 1 << (register.sign or 0)
-        self._ask(servo, 3, bytes([register.address]) + raw.to_bytes(register.size, "little"), 0)
+        self._ask(servo, 3, self._numbers(register.address) + self._bytes(register, value), 0)
 
     @contextmanager
     def unlocked(self, servo: int) -> Iterator[None]:
         """Makes what is written meanwhile last when the power goes off. The torque is off."""
-        self.write(servo, TORQUE, 0)
-        self.write(servo, LOCK, 0)
+        self.write(servo, self.TORQUE, 0)
+        self.write(servo, self.LOCK, 0)
         yield
-        self.write(servo, LOCK, 1)
+        self.write(servo, self.LOCK, 1)
+
+    def relax(self, servo: int) -> None:
+        self.write(servo, self.TORQUE, 0)
+
+    def read_all(self, servos: list[int], size: int) -> tuple[bytes, int]:
+        """The question for the positions of servos and what follows, and the size of its answer."""
+        request = packet(EVERYBODY, 0x82, bytes([self.POSITION.address, size, *servos]))
+        return request, len(servos) * (size + 6)
+
+    def answered(self, received: bytes, servo: int) -> bool:
+        """Whether an answer of this servo is there."""
+        return received.find(bytes([0xFF, 0xFF, servo])) >= 0
+
+    @staticmethod
+    def dotted(firmware: int) -> str:
+        return f"{firmware & 255}.{firmware >> 8}"
+
+    # the protocol
+    @staticmethod
+    def _numbers(*numbers: int) -> bytes:
+        """Addresses and sizes in a request."""
+        return bytes(numbers)
+
+    @staticmethod
+    def _value(register: Register, data: bytes) -> int:
+        raw, sign = int.from_bytes(data, "little"), register.sign
+        return raw if sign is None else (-1 if raw >> sign & 1 else 1) * (raw % (1 << sign))
+
+    @staticmethod
+    def _bytes(register: Register, value: int) -> bytes:
+        raw = value if value >= 0 else -value | 1 << (register.sign or 0)
+        return raw.to_bytes(register.size, "little")
+
+    @staticmethod
+    def _packet(servo: int, instruction: int, parameters: bytes) -> bytes:
+        return packet(servo, instruction, parameters)
+
+    @staticmethod
+    def _data(received: bytes, servo: int, size: int) -> bytes | None:
+        """Data of the first answer of a servo that has this many bytes."""
+        begin = received.find(bytes([0xFF, 0xFF, servo, size + 2]))
+        found = received[begin + 2 : begin + size + 6]
+        whole = begin >= 0 and len(found) == size + 4 and sum(found) & 0xFF == 0xFF
+        return found[3:-1] if whole else None
 
     def answers(self, request: bytes, size: int | None = None) -> bytes:
         """All that comes back within the wait; with a size: that many bytes, or none."""
@@ -120,16 +169,9 @@ class Bus:
 
     def _ask(self, servo: int, instruction: int, parameters: bytes, size: int) -> bytes | None:
         """Data of the answer, if it has this many bytes."""
-        self._send(packet(servo, instruction, parameters))
-        head = bytes([0xFF, 0xFF, servo, size + 2])
-
-        def data(received: bytes) -> bytes | None:
-            begin = received.find(head)
-            found = received[begin + 2 : begin + size + 6]
-            whole = begin >= 0 and len(found) == size + 4 and sum(found) & 0xFF == 0xFF
-            return found[3:-1] if whole else None
-
-        return data(self._received(lambda received: data(received) is not None))
+        self._send(self._packet(servo, instruction, parameters))
+        received = self._received(lambda received: self._data(received, servo, size) is not None)
+        return self._data(received, servo, size)
 
     def _send(self, request: bytes) -> None:
         termios.tcflush(self._line, termios.TCIFLUSH)
@@ -155,6 +197,84 @@ class Bus:
 def packet(servo: int, instruction: int, parameters: bytes) -> bytes:
     body = bytes([servo, len(parameters) + 2, instruction]) + parameters
     return b"\xff\xff" + body + bytes([~sum(body) & 0xFF])
+
+
+class DynamixelBus(Bus):
+    """Questions to Dynamixel servos."""
+
+    MODELS: ClassVar = {1060: "XL430-W250", 1190: "XL330-M077", 1200: "XL330-M288"}
+    FIRMWARE, MODEL, ID = Register(6, 1), Register(0, 2), Register(7, 1)
+    SMALLEST, LARGEST, LEAST_VOLTAGE = Register(52, 4), Register(48, 4), Register(34, 2)
+    RETURN_DELAY, PHASE, GAIN = Register(9, 1), Register(10, 1), Register(84, 2)
+    OFFSET, MODE, TORQUE = Register(20, 4, 31), Register(11, 1), Register(64, 1)
+    GOAL, POSITION, FAILURE = Register(116, 4, 31), Register(132, 4, 31), Register(70, 1)
+    VOLTAGE, TEMPERATURE, WATCHDOG = Register(144, 2), Register(146, 1), Register(98, 1)
+    modes = (4, 4, 4, 4, 4, 5)
+    PING = 3
+    OFFSET_SIGN = 1  # shown position = encoder + offset
+
+    @contextmanager
+    def unlocked(self, servo: int) -> Iterator[None]:
+        self.write(servo, self.TORQUE, 0)
+        yield
+
+    def relax(self, servo: int) -> None:
+        """Without torque a servo that has switched itself off can be restarted."""
+        self.write(servo, self.TORQUE, 0)
+        self.write(servo, self.WATCHDOG, 0)
+        if self.read(servo, self.FAILURE):
+            self._ask(servo, 8, b"", 0)
+
+    def read_all(self, servos: list[int], size: int) -> tuple[bytes, int]:
+        parameters = self._numbers(self.POSITION.address, size) + bytes(servos)
+        return dynamixel.packet(EVERYBODY, 0x82, parameters), len(servos) * (size + 11)
+
+    def answered(self, received: bytes, servo: int) -> bool:
+        while found := dynamixel.unpacked(received):
+            number, _, received = found
+            if number == servo:
+                return True
+        return False
+
+    @staticmethod
+    def dotted(firmware: int) -> str:
+        return str(firmware)
+
+    @staticmethod
+    def _numbers(*numbers: int) -> bytes:
+        return b"".join(number.to_bytes(2, "little") for number in numbers)
+
+    @staticmethod
+    def _value(register: Register, data: bytes) -> int:
+        return int.from_bytes(data, "little", signed=register.sign is not None)
+
+    @staticmethod
+    def _bytes(register: Register, value: int) -> bytes:
+        return value.to_bytes(register.size, "little", signed=register.sign is not None)
+
+    @staticmethod
+    def _packet(servo: int, instruction: int, parameters: bytes) -> bytes:
+        return dynamixel.packet(servo, instruction, parameters)
+
+    @staticmethod
+    def _data(received: bytes, servo: int, size: int) -> bytes | None:
+        while found := dynamixel.unpacked(received):
+            number, body, received = found
+            if number == servo and body[0] == 0x55 and len(body) == size + 2:
+                return body[2:]
+        return None
+
+
+def bus_at(port: Path) -> Bus:
+    """The bus of a port, by the protocol in which one of its servos answers; else of Feetech."""
+    for protocol in (Bus, DynamixelBus):
+        with ExitStack() as opened:
+            bus = protocol(port)
+            opened.callback(bus.close)
+            if any(bus.scan([servo]) for servo in SERVOS):
+                opened.pop_all()
+                return bus
+    return Bus(port)
 
 
 def ports() -> list[Path]:

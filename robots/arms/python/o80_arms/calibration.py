@@ -1,4 +1,4 @@
-"""Calibrations of an SO-101 as LeRobot keeps them: a file, and the same numbers in the servos."""
+"""Calibrations of an arm as LeRobot keeps them: a file, and the same numbers in the servos."""
 
 import json
 import os
@@ -8,18 +8,17 @@ from pathlib import Path
 from typing import Self
 
 import o80
-from o80_arms.bus import LARGEST, MODE, OFFSET, SMALLEST, TURN, Bus
+from o80_arms.bus import TURN, Bus, DynamixelBus
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
 MODEL_RANGES = (220, 200, 194, 190, 320, 110)  # of the published arm [deg]
-# LeRobot's folders, the newest first
-FOLLOWERS = tuple(f"robots/{name}_follower" for name in ("so", "so101", "so100"))
-LEADERS = tuple(f"teleoperators/{name}_leader" for name in ("so", "so101", "so100"))
-LARGEST_OFFSET = 2047  # that a servo can keep
 
 
 class CalibrationError(o80.Error):
     """A calibration that does not exist, or is none."""
+
+
+LARGEST_OFFSET = 2047  # that an STS3215 can keep
 
 
 @dataclass(frozen=True)
@@ -32,27 +31,26 @@ class Calibration:
 
     @classmethod
     def of_servo(cls, bus: Bus, servo: int) -> Self:
-        return cls(bus.read(servo, OFFSET), bus.read(servo, SMALLEST), bus.read(servo, LARGEST))
+        return cls(*(bus.read(servo, each) for each in (bus.OFFSET, bus.SMALLEST, bus.LARGEST)))
 
     @classmethod
-    def of_motion(cls, smallest: int, largest: int) -> Self:
+    def of_motion(cls, smallest: int, largest: int, bus: Bus | type[Bus] = Bus) -> Self:
         """From the range that a joint was moved through, in steps of its encoder without offset.
 
         The middle of the range becomes the middle of what the servo shows, so that the step from
         4095 to 0 is as far away as it can be.
         """
-        offset = (smallest + largest) // 2 % TURN - (TURN // 2 - 1)
-        offset = min(offset, LARGEST_OFFSET)
+        offset = min((smallest + largest) // 2 % TURN - (TURN // 2 - 1), LARGEST_OFFSET)
         middle, half = TURN // 2 - 1, min((largest - smallest) // 2, TURN // 2 - 1)
-        return cls(offset, middle - half, middle + half)
+        return cls(-bus.OFFSET_SIGN * offset, middle - half, middle + half)
 
     def write(self, bus: Bus, servo: int) -> None:
         with bus.unlocked(servo):
             for register, value in (
-                (OFFSET, self.offset),
-                (SMALLEST, self.smallest),
-                (LARGEST, self.largest),
-                (MODE, 0),
+                (bus.OFFSET, self.offset),
+                (bus.SMALLEST, self.smallest),
+                (bus.LARGEST, self.largest),
+                (bus.MODE, bus.modes[servo - 1]),
             ):
                 bus.write(servo, register, value)
 
@@ -68,11 +66,18 @@ def folder() -> Path:
     return Path(os.environ.get("HF_LEROBOT_HOME", cache / "lerobot")) / "calibration"
 
 
-def files() -> list[Path]:
-    """Calibrations that LeRobot has of such arms."""
+def folders_of(bus: Bus, leader: bool) -> list[str]:
+    """LeRobot's folders for such arms, the newest first."""
+    names = ("koch",) if isinstance(bus, DynamixelBus) else ("so", "so101", "so100")
     return [
-        file for each in FOLLOWERS + LEADERS for file in sorted((folder() / each).glob("*.json"))
+        f"teleoperators/{name}_leader" if leader else f"robots/{name}_follower" for name in names
     ]
+
+
+def files(bus: Bus) -> list[Path]:
+    """Calibrations that LeRobot has of such arms."""
+    folders = folders_of(bus, False) + folders_of(bus, True)
+    return [file for each in folders for file in sorted((folder() / each).glob("*.json"))]
 
 
 def find(name: str, folders: Sequence[str]) -> Path:
@@ -100,7 +105,7 @@ def read(file: Path) -> dict[str, Calibration]:
             for joint, each in ((joint, content[joint]) for joint in JOINTS)
         }
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise CalibrationError(f"{file} is no calibration of an SO-101 ({error!r})") from None
+        raise CalibrationError(f"{file} is no calibration of an arm ({error!r})") from None
 
 
 def write(file: Path, joints: dict[str, Calibration]) -> None:

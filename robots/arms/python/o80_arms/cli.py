@@ -12,25 +12,22 @@ from typing import Annotated
 import typer
 
 import o80
-from o80_arms import bus as registers
 from o80_arms import calibration
-from o80_arms.bus import EVERYBODY, TURN, Bus, BusError, packet
+from o80_arms.bus import EVERYBODY, SERVOS, TURN, Bus, BusError, DynamixelBus, bus_at, packet, ports
 from o80_arms.calibration import JOINTS, Calibration
 
-STS3215 = 777
-SERVOS = range(1, len(JOINTS) + 1)
 app = typer.Typer(help="List arms of bus servos, calibrate them, number their servos.")
 Port = Annotated[Path | None, typer.Option(help="Port of the adapter (default: the only one).")]
 
 
 @contextmanager
-def opened(port: Path | None) -> Iterator[Bus]:
+def opened(port: Path | None, kind: Callable[[Path], Bus] = bus_at) -> Iterator[Bus]:
     """The bus of a port, or of the only one."""
-    found = [port] if port else registers.ports()
+    found = [port] if port else ports()
     if len(found) != 1:
         names = ", ".join(map(str, found)) or "none"
         raise BusError(f"--port must say which adapter; there are: {names}")
-    bus = Bus(found[0])
+    bus = kind(found[0])
     try:
         yield bus
     finally:
@@ -45,7 +42,7 @@ def arms(
     """Lists the arms of all ports."""
     if context.invoked_subcommand is not None:
         return
-    found = port or registers.ports()
+    found = port or ports()
     if not found:
         print("No serial adapter is plugged in: is the USB cable in, has the adapter power?")
     for each in found:
@@ -60,11 +57,11 @@ def told_of(port: Path) -> str:
             if not servos:
                 return "no servo answers: is the power supply on?"
             told = [f"servos {', '.join(map(str, servos))}"]
-            models = {bus.read(servo, registers.MODEL) for servo in servos}
-            told.append("STS3215" if models == {STS3215} else f"models {sorted(models)}")
-            volts = [bus.read(servo, registers.VOLTAGE) / 10 for servo in servos]
+            models = {bus.read(servo, bus.MODEL) for servo in servos}
+            told.append(", ".join(bus.MODELS.get(each, f"model {each}") for each in sorted(models)))
+            volts = [bus.read(servo, bus.VOLTAGE) / 10 for servo in servos]
             told.append(f"{min(volts)} V")
-            on = sum(bus.read(servo, registers.TORQUE) == 1 for servo in servos)
+            on = sum(bus.read(servo, bus.TORQUE) == 1 for servo in servos)
             told.append(f"torque on in {on}" if on else "torque off")
             if servos == list(SERVOS):
                 told.append(calibration_of(bus))
@@ -76,10 +73,10 @@ def told_of(port: Path) -> str:
 def calibration_of(bus: Bus) -> str:
     """The name of that of LeRobot's files which the servos hold."""
     held = held_by(bus)
-    for file in calibration.files():
+    for file in calibration.files(bus):
         with suppress(calibration.CalibrationError):
             if calibration.read(file) == held:
-                return "; ".join([f"calibration {file.stem}", *calibration.doubts(held)])
+                return "; ".join([f"calibration {file.stem}", *doubts(bus, held)])
     return "no file has its calibration: `o80 arms calibrate --take NAME`"
 
 
@@ -94,7 +91,7 @@ def relax(port: Port = None) -> None:
     with opened(port) as bus:
         servos = bus.scan()
         for servo in servos:
-            bus.write(servo, registers.TORQUE, 0)
+            bus.relax(servo)
     print(f"{len(servos)} servos are without torque")
 
 
@@ -112,15 +109,15 @@ def calibrate(
     ] = None,
     leader: Annotated[bool, typer.Option("--leader", help="The arm is moved by hand.")] = False,
 ) -> None:
-    """Calibrate an SO-101, or bring its servos and LeRobot's file to the same.
+    """Calibrate an arm, or bring its servos and LeRobot's file to the same.
 
     The torque is switched off where something is written: the arm sinks.
     """
     given = [each for each in (name, take, write) if each]
     if len(given) != 1:
         raise o80.InvalidArgument("give one of --name, --take and --write")
-    folders = calibration.LEADERS if leader else calibration.FOLLOWERS
     with opened(port) as bus:
+        folders = calibration.folders_of(bus, leader)
         if write:
             file = calibration.find(write, folders)
             joints = calibration.read(file)
@@ -131,11 +128,14 @@ def calibrate(
             if file.exists() and calibration.read(file) != joints:
                 file.rename(file.with_suffix(".json.old"))
             calibration.write(file, joints)
-    for joint, each in joints.items():
-        print(f"{joint:14} {each}")
-    for doubt in calibration.doubts(joints):
-        print(doubt)
+        told = [*(f"{joint:14} {each}" for joint, each in joints.items()), *doubts(bus, joints)]
+    print(*told, sep="\n")
     print(f"{'read from' if write else 'written to'} {file}")
+
+
+def doubts(bus: Bus, joints: dict[str, Calibration]) -> list[str]:
+    """Sentences on what is strange about ranges, of an arm whose model is published."""
+    return [] if isinstance(bus, DynamixelBus) else calibration.doubts(joints)
 
 
 def put(bus: Bus, joints: dict[str, Calibration]) -> None:
@@ -146,10 +146,10 @@ def put(bus: Bus, joints: dict[str, Calibration]) -> None:
 def moved_by_hand(bus: Bus) -> dict[str, Calibration]:
     """Ranges through which somebody moves the joints, written into the servos."""
     for servo in SERVOS:
-        bus.write(servo, registers.TORQUE, 0)
+        bus.write(servo, bus.TORQUE, 0)
     print("Move each joint to both of its ends, slowly. Then press Enter.")
     ranges = watch(bus, pressed_enter)
-    joints = {joint: Calibration.of_motion(*each) for joint, each in ranges.items()}
+    joints = {joint: Calibration.of_motion(*each, bus) for joint, each in ranges.items()}
     for joint, (smallest, largest) in ranges.items():
         if largest - smallest < 200:
             raise BusError(f"{joint} was not moved: nothing was written, begin again")
@@ -164,7 +164,7 @@ def watch(bus: Bus, is_over: Callable[[], bool]) -> dict[str, tuple[int, int]]:
     """
 
     def encoder(servo: int) -> int:
-        return bus.read(servo, registers.POSITION) + bus.read(servo, registers.OFFSET)
+        return bus.read(servo, bus.POSITION) - bus.OFFSET_SIGN * bus.read(servo, bus.OFFSET)
 
     place = {servo: encoder(servo) for servo in SERVOS}
     ranges = {servo: (start, start) for servo, start in place.items()}
@@ -188,8 +188,8 @@ def pressed_enter() -> bool:
 
 @app.command()
 def number(port: Port = None) -> None:
-    """Number the servos of a kit: connect one after the other, each alone."""
-    with opened(port) as bus:
+    """Number the Feetech servos of a kit: connect one after the other, each alone."""
+    with opened(port, Bus) as bus:
         for servo, joint in reversed(list(zip(SERVOS, JOINTS, strict=True))):
             print(f"Connect the servo of {joint}, and no other.", flush=True)
             give_number(bus, servo)
@@ -208,11 +208,11 @@ def give_number(bus: Bus, servo: int) -> None:
             told = True
         elif found and found[0] != servo + 1:  # the one before may still be connected
             break
-    bus.write(found[0], registers.TORQUE, 0)
-    bus.write(found[0], registers.LOCK, 0)
-    bus.send(found[0], registers.ID, servo)  # it answers by its new number from here on
-    bus.write(servo, registers.ID, servo)
-    bus.write(servo, registers.LOCK, 1)
+    bus.write(found[0], bus.TORQUE, 0)
+    bus.write(found[0], bus.LOCK, 0)
+    bus.send(found[0], bus.ID, servo)  # it answers by its new number from here on
+    bus.write(servo, bus.ID, servo)
+    bus.write(servo, bus.LOCK, 1)
 
 
 def answering(bus: Bus) -> list[int] | None:
@@ -236,26 +236,36 @@ def check(port: Port = None) -> None:
             raise BusError("no servo answers: is the power supply on?")
         print("servo firmware phase delay gain volts heat")
         for servo in servos:
-            firmware = bus.read(servo, registers.FIRMWARE)
-            rest = (registers.PHASE, registers.RETURN_DELAY, registers.GAIN)
-            values = [f"{firmware & 255}.{firmware >> 8}", *(bus.read(servo, r) for r in rest)]
-            volts = bus.read(servo, registers.VOLTAGE) / 10
-            print(servo, *values, volts, bus.read(servo, registers.TEMPERATURE))
+            values = [bus.read(servo, each) for each in (bus.PHASE, bus.RETURN_DELAY, bus.GAIN)]
+            firmware = bus.dotted(bus.read(servo, bus.FIRMWARE))
+            volts = bus.read(servo, bus.VOLTAGE) / 10
+            print(servo, firmware, *values, volts, bus.read(servo, bus.TEMPERATURE))
         print(f"readings of all at once: {readings_take(bus, servos)}")
-        behind = bus.answers(packet(EVERYBODY, 0x82, bytes([56, 2, servos[0], 250, servos[-1]])))
-        goes_on = behind.find(bytes([0xFF, 0xFF, servos[-1], 4])) >= 0
+        behind = bus.answers(bus.read_all([servos[0], 250, servos[-1]], 2)[0])
+        goes_on = bus.answered(behind, servos[-1])
         print(f"a reading of all goes on behind a silent servo: {yes(goes_on)}")
-        if bus.read(servos[-1], registers.TORQUE) == 0:
-            bus.write(servos[-1], registers.GOAL, bus.read(servos[-1], registers.POSITION))
-            print(f"a goal switches torque on: {yes(bus.read(servos[-1], registers.TORQUE) == 1)}")
-            bus.write(servos[-1], registers.TORQUE, 0)
+        if bus.read(servos[-1], bus.TORQUE):
+            print("the torque is on: `o80 arms relax` first, to see what it has to do with a goal")
         else:
-            print("the torque is on: `o80 arms relax` first, to see whether a goal switches it on")
+            print(told_of_torque(bus, servos[-1]))
+
+
+def told_of_torque(bus: Bus, servo: int) -> str:
+    """Whether torque begins with a goal (Feetech), or a goal with torque (Dynamixel)."""
+    place = bus.read(servo, bus.POSITION)
+    if not isinstance(bus, DynamixelBus):
+        bus.write(servo, bus.GOAL, place)
+        told = f"a goal switches torque on: {yes(bus.read(servo, bus.TORQUE) == 1)}"
+    else:
+        bus.write(servo, bus.GOAL, place + 5)
+        bus.write(servo, bus.TORQUE, 1)
+        told = f"torque makes the place the goal: {yes(bus.read(servo, bus.GOAL) != place + 5)}"
+    bus.write(servo, bus.TORQUE, 0)
+    return told
 
 
 def readings_take(bus: Bus, servos: list[int]) -> str:
-    request = packet(EVERYBODY, 0x82, bytes([56, 8, *servos]))
-    size = len(servos) * (8 + 6)
+    request, size = bus.read_all(servos, 8)
     times = []
     for _ in range(100):
         begin = time.perf_counter()

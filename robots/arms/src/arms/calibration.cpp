@@ -31,6 +31,8 @@ class CalibrationText {
   }
 
  private:
+  static constexpr long kLargest = 1'044'479;  // offset of a Dynamixel servo [steps]
+
   /// Calls visit(key) behind each key of an object.
   template <class Visit>
   void each(Visit&& visit) {
@@ -69,7 +71,7 @@ class CalibrationText {
     char* end = nullptr;
     const long value = std::strtol(text_.c_str() + at_, &end, 10);
     const auto stop = static_cast<std::size_t>(end - text_.c_str());
-    if (stop == at_ || value < -4096 || value > 4096) fail("a whole number of a servo");
+    if (stop == at_ || std::abs(value) > kLargest) fail("a whole number of a servo");
     at_ = stop;
     return static_cast<int>(value);
   }

@@ -86,7 +86,7 @@ class Line : public testing::Test {
 };
 
 TEST_F(Line, GoalsQueuedWritesAndTheQuestionLeaveInOneSystemCall) {
-  chain.queue(feetech::kTorque, chain.all(), 1);
+  chain.queue_torque(chain.all(), true);
   chain.request(chain.all(), kGoals);
   const Bytes bytes = sent();
   EXPECT_THAT(Bytes(bytes.begin(), bytes.begin() + 12),
@@ -99,13 +99,13 @@ TEST_F(Line, GoalsQueuedWritesAndTheQuestionLeaveInOneSystemCall) {
 TEST_F(Line, ReadingsAreThoseOfTheAnswers) {
   chain.request(0, {});
   const std::uint8_t size = asked(sent());
-  send(answer(2, 0x8005, size, feetech::heat_alarm));
+  send(answer(2, 0x8005, size, heat_alarm));
   send(answer(1, 1234, size));
   const FeetechChain::Transfer done = chain.collect(now() + kLong);
   EXPECT_EQ(done.answered, chain.all());
   EXPECT_EQ(chain[0].position, 1234);
   EXPECT_EQ(chain[1].position, -5);
-  EXPECT_EQ(chain[1].status, feetech::heat_alarm);
+  EXPECT_EQ(chain[1].status, heat_alarm);
 }
 
 TEST_F(Line, TheTorqueSwitchIsReadInEveryTenthTransfer) {
@@ -161,7 +161,7 @@ TEST_F(Line, WhereNobodyAnswersItAsksRarely) {
 TEST_F(Line, NothingIsSentWhileTheLineIsNotSilentAfterAFailure) {
   fail();
   send({0xFF});
-  chain.queue(feetech::kTorque, chain.all(), 1);
+  chain.queue_torque(chain.all(), true);
   chain.request(chain.all(), kGoals);
   EXPECT_FALSE(chain.is_asking());
   EXPECT_THAT(sent(), IsEmpty()) << "it would collide with a servo that still answers";

@@ -47,10 +47,6 @@ std::vector<Found> found(Answers& answers, const Bytes& bytes, std::size_t step)
 
 TEST(FeetechRequests, AreThePacketsOfTheManual) {
   Requests requests;
-  requests.ping(1);
-  EXPECT_THAT(Bytes(requests.bytes().begin(), requests.bytes().end()),
-              ElementsAre(0xFF, 0xFF, 0x01, 0x02, 0x01, 0xFB));
-  requests.clear();
   requests.read(1, 0x38, 2);
   EXPECT_THAT(Bytes(requests.bytes().begin(), requests.bytes().end()),
               ElementsAre(0xFF, 0xFF, 0x01, 0x04, 0x02, 0x38, 0x02, 0xBE));
@@ -68,11 +64,12 @@ TEST(FeetechRequests, AreThePacketsOfTheManual) {
 TEST(FeetechRequests, LeaveOutWhatDoesNotFit) {
   Requests requests;
   std::array<Value, 100> many{};
-  requests.sync_write(kGoal, many);
-  const std::size_t size = requests.bytes().size();
-  EXPECT_TRUE(requests.fits());
-  requests.sync_write(kGoal, many);
-  EXPECT_FALSE(requests.fits());
+  std::size_t size = 0;
+  while (requests.fits()) {
+    size = requests.bytes().size();
+    requests.sync_write(kGoal, many);
+  }
+  EXPECT_GT(size, 500U);
   EXPECT_EQ(requests.bytes().size(), size) << "half a packet would be garbage to the servos";
 }
 

@@ -51,7 +51,7 @@ class PerfectServos {
 
  private:
   using Registers = std::array<std::uint8_t, 128>;
-  static void put(Registers& registers, feetech::Register where, int value) {
+  static void put(Registers& registers, Register where, int value) {
     registers[where.address] = static_cast<std::uint8_t>(value);
     if (where.size == 2) registers[where.address + 1] = static_cast<std::uint8_t>(value >> 8);
   }
@@ -74,7 +74,6 @@ class PerfectServos {
   void obey(const std::vector<std::uint8_t>& body) {
     const std::size_t size = body.size() > 4 ? body[4] : 0;
     if (silent) return;
-    if (body[2] == 1) send(body[0], {});
     if (body[2] == 2) send(body[0], {at(body[0]) + body[3], size});
     for (std::size_t i = 5; body[2] == 0x82 && i < body.size(); ++i) {
       send(body[i], {at(body[i]) + body[3], size});
@@ -117,7 +116,7 @@ class DriverOfSo101 : public testing::Test {
   ~DriverOfSo101() override { std::filesystem::remove(file); }
 
   void iterate() {
-    std::array<std::byte, sizeof(So101State)> states{};
+    std::array<std::byte, sizeof(ArmState)> states{};
     pack(desired, states.data());
     const std::uint64_t active = 0;
     driver.write(Desired<So101>({states.data(), &active, ++iteration, 0, 6'666'667}));
@@ -139,9 +138,9 @@ class DriverOfSo101 : public testing::Test {
   PerfectServos servos;
   std::string file = calibration();
   So101 driver{{.port = servos.port(), .calibration = file, .answer_timeout = 0.3}};
-  So101State desired{};
-  So101State row{};
-  So101Sensors sensors{};
+  ArmState desired{};
+  ArmState row{};
+  ArmSensors sensors{};
   FaultText halt{};
   bool is_halted = false;
   std::uint64_t interrupted = 0;

@@ -1,5 +1,5 @@
 """Counterparts of the arms that speak their wire protocols."""
 
-from o80_arms.fakes.arms import FakeSO101, so101
+from o80_arms.fakes.arms import FakeArm, koch, so101
 
-__all__ = ["FakeSO101", "so101"]
+__all__ = ["FakeArm", "koch", "so101"]

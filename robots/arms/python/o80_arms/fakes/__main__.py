@@ -1,10 +1,11 @@
-"""A fake SO-101: `python -m o80_arms.fakes` prints what to type, and obeys its terminal."""
+"""A fake arm: `python -m o80_arms.fakes` prints what to type, and obeys its terminal."""
 
 import argparse
 import sys
+from typing import Any
 
-from o80_arms.fakes.arms import so101
-from o80_arms.fakes.feetech import TEMPERATURE, TORQUE, VOLTAGE, FakeChain
+from o80_arms.fakes import koch, so101
+from o80_arms.fakes.chain import FakeChain
 
 WORDS = """\
 unplug N, plug_in N       the power of servo N and of those behind it
@@ -13,7 +14,7 @@ silent N, damages SHARE   a servo that does not answer; damaged answers
 heat N C, voltage N V, overload N, torque_off N, pull N STEPS_PER_S STRENGTH"""
 
 
-def obey(chain: FakeChain, words: list[str]) -> None:
+def obey(chain: FakeChain[Any], words: list[str]) -> None:
     """Breaks something, or mends it. Raises ValueError, KeyError, IndexError."""
     verb, *numbers = words
     if verb in ("cut", "plug"):
@@ -30,13 +31,13 @@ def obey(chain: FakeChain, words: list[str]) -> None:
         case "silent":
             chain.silent ^= {number}
         case "heat":
-            servo.put(TEMPERATURE, int(numbers[1]))
+            servo.put(servo.TEMPERATURE, int(numbers[1]))
         case "voltage":
-            servo.put(VOLTAGE, round(10 * float(numbers[1])))
+            servo.put(servo.VOLTAGE, round(10 * float(numbers[1])))
         case "overload":
-            servo.alarms |= 32
+            servo.overload()
         case "torque_off":
-            servo.put(TORQUE, 0)
+            servo.put(servo.TORQUE, 0)
         case "pull":
             servo.pull, servo.needs = float(numbers[1]), float(numbers[2])
         case _:
@@ -45,11 +46,13 @@ def obey(chain: FakeChain, words: list[str]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, epilog=WORDS)
+    parser.add_argument("arm", nargs="?", choices=["so101", "koch"], default="so101")
     parser.add_argument("--latency", type=float, default=0.001, help="of the adapter [s]")
-    latency = parser.parse_args().latency
-    with so101(latency=latency) as fake:
+    given = parser.parse_args()
+    make = koch if given.arm == "koch" else so101
+    with make(latency=given.latency) as fake:
         words = " ".join(f"--{name.replace('_', '-')} {it}" for name, it in fake.options.items())
-        print(f"o80 run so101 {words}\n{WORDS}", flush=True)
+        print(f"o80 run {given.arm} {words}\n{WORDS}", flush=True)
         for line in sys.stdin:
             try:
                 obey(fake.chain, line.split() or [""])

@@ -1,29 +1,30 @@
-"""A fake SO-101: its servos, and the calibration with which o80 finds them."""
+"""Fake arms: their servos, and the calibration with which o80 finds them."""
 
 import tempfile
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from o80_arms import calibration
 from o80_arms.calibration import JOINTS, Calibration
-from o80_arms.fakes.feetech import FakeChain
+from o80_arms.fakes import dynamixel, feetech
+from o80_arms.fakes.chain import FakeChain
 
 RANGES = ((795, 3300), (910, 3185), (944, 3151), (967, 3128), (228, 3867), (2030, 3500))
 
 
 @dataclass(frozen=True)
-class FakeSO101:
+class FakeArm:
     """Servos on a pseudo-terminal, and the file with their calibration."""
 
-    chain: FakeChain
+    chain: FakeChain[Any]
     file: Path
 
     @property
     def options(self) -> dict[str, Any]:
-        """Options of the robot "so101"; a program in Python may answer late."""
+        """Options of the robot; a program in Python may answer late."""
         return {
             "port": str(self.chain.port),
             "calibration": str(self.file),
@@ -31,24 +32,29 @@ class FakeSO101:
         }
 
 
-@contextmanager
-def so101(*, latency: float = 0.001, tick: float | None = None) -> Iterator[FakeSO101]:
-    """A calibrated arm that stands in the middle of its ranges.
+def so101(*, latency: float = 0.001, tick: float | None = None) -> AbstractContextManager[FakeArm]:
+    """A calibrated SO-101 that stands in the middle of its ranges.
 
     latency: of the adapter [s]. tick: time that passes with each reading [s]; the bus then takes
     none, so that bursts are fast and repeatable. None: time passes by the clock.
     """
+    return _arm(feetech.FakeChain, latency, tick)
+
+
+def koch(*, latency: float = 0.001, tick: float | None = None) -> AbstractContextManager[FakeArm]:
+    """A calibrated Koch, as `so101`."""
+    return _arm(dynamixel.FakeChain, latency, tick)
+
+
+@contextmanager
+def _arm(make: Any, latency: float, tick: float | None) -> Iterator[FakeArm]:
     with tempfile.TemporaryDirectory() as folder:
         file, port = Path(folder) / "fake.json", Path(folder) / "tty"
         ranges = dict(zip(JOINTS, RANGES, strict=True))
         calibration.write(file, {joint: Calibration(0, *each) for joint, each in ranges.items()})
-        chain = (
-            FakeChain(port, latency=latency, bus_time=True)
-            if tick is None
-            else FakeChain(port, tick=tick)
-        )
-        with chain:
+        timing = {"latency": latency, "bus_time": True} if tick is None else {"tick": tick}
+        with make(port, **timing) as chain:
             for number, (smallest, largest) in enumerate(RANGES, 1):
                 chain.servos[number].calibrate(0, smallest, largest)
                 chain.servos[number].stand_at((smallest + largest) // 2)
-            yield FakeSO101(chain, file)
+            yield FakeArm(chain, file)

@@ -1,4 +1,4 @@
-#include "arms/so101.hpp"
+#include "arms/servo_arm.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -6,20 +6,19 @@
 #include <cstdio>
 #include <cstdlib>
 
-#include "arms/so101_numbers.hpp"
+#include "arms/servo_arm_numbers.hpp"
 
 namespace o80::arms {
 namespace {
 
-constexpr double kMostTorque = 2.94;     // of an STS3215 with 12 V [Nm]
-constexpr double kReach = 0.15;          // of a gripper's goal beyond where it stands [1]
-constexpr int kMissesToHalt = 3;         // transfers
-constexpr int kAlarmsToHalt = 2;         // answers: one may be damaged and pass its checksum
-constexpr int kJumpsToHalt = 3;          // readings
-constexpr int kGentleSpeed = 300;        // [steps/s]
-constexpr int kFullSpeed = 2500;         // half more than kMostSpeed [steps/s]
-constexpr int kGentleAcceleration = 20;  // [100 steps/s^2]
-constexpr int kFullAcceleration = 254;
+constexpr double kReach = 0.15;                 // of a gripper's goal beyond where it stands [1]
+constexpr int kMissesToHalt = 3;                // transfers
+constexpr int kAlarmsToHalt = 2;                // answers: one may be damaged and pass its checksum
+constexpr int kJumpsToHalt = 3;                 // readings
+constexpr double kGentleSpeed = 300.0;          // [steps/s]
+constexpr double kFullSpeed = 2500.0;           // half more than kMostSpeed [steps/s]
+constexpr double kGentleAcceleration = 2000.0;  // [steps/s^2]
+constexpr double kFullAcceleration = 25'400.0;
 constexpr double kRestSpeed = 0.5;                 // [rad/s]
 constexpr double kSettleTime = 0.5;                // [s]
 constexpr std::int64_t kSecond = 1'000'000'000;    // [ns]
@@ -27,56 +26,46 @@ constexpr std::int64_t kLongestGap = 100'000'000;  // in which a servo is believ
 
 }  // namespace
 
-std::uint16_t So101::strength_of(std::size_t servo, double share) const noexcept {
-  const double most = servo == kGripper ? config_.gripper_strength : config_.strength;
-  return static_cast<std::uint16_t>(std::lround(share * most * 1000.0));
+double ServoArm::strength_of(std::size_t servo, double share) const noexcept {
+  return share * (servo == kGripper ? config_.gripper_strength : config_.strength);
 }
 
-void So101::set_motion(Mask servos, int speed, int acceleration, double strength) noexcept {
-  OfServos<std::uint16_t> speeds{};
-  OfServos<std::uint16_t> strengths{};
-  for (std::size_t i = 0; i < kServos; ++i) {
-    speeds[i] = static_cast<std::uint16_t>(std::max(1, speed / servos_[i].speed_unit));
-    strengths[i] = strength_of(i, strength);
-  }
-  chain_.queue(feetech::kAcceleration, servos, static_cast<std::uint16_t>(acceleration));
-  chain_.queue(feetech::kSpeed, servos, speeds);
-  chain_.queue(feetech::kStrength, servos, strengths);
+void ServoArm::set_motion(Mask servos, double speed, double acceleration,
+                          double strength) noexcept {
+  OfServos<double> strengths{};
+  for (std::size_t i = 0; i < kServos; ++i) strengths[i] = strength_of(i, strength);
+  chain_->queue_motion(servos, speed, acceleration, strengths);
 }
 
 /// Its torque is on, and nothing is wrong with it.
-bool So101::holds(std::size_t servo) const noexcept {
-  return chain_[servo].torque && chain_[servo].status == 0;
+bool ServoArm::holds(std::size_t servo) const noexcept {
+  return (*chain_)[servo].torque && (*chain_)[servo].status == 0;
 }
 
 /// Goals where the servos stand, and gentle registers for those that do not hold yet.
-void So101::approach(Mask servos) noexcept {
+void ServoArm::approach(Mask servos) noexcept {
+  chain_->watch(false);  // servos that it has stopped take neither goal nor strength
   Mask gentle = servos;
   for (std::size_t i = 0; i < kServos; ++i) {
     if (holds(i)) gentle &= ~bit(i);
   }
   set_motion(gentle, kGentleSpeed, kGentleAcceleration, kGentleStrength);
-  OfServos<std::uint16_t> goals{};
   for (std::size_t i = 0; i < kServos; ++i) {
     const Calibration& range = calibration_[i];
     held_places_[i] = std::clamp(servos_[i].position, range.smallest, range.largest);
-    goals[i] = with_sign(held_places_[i]);
   }
   goals_ = held_places_;
-  chain_.queue(feetech::kGoal, servos, goals);
+  chain_->queue_goals(servos, goals_);
   settling_ = static_cast<int>(kSettleTime * 1e9 / static_cast<double>(period_));
 }
 
 /// Switches the torque on where the servos stand, with the next request.
-void So101::hold(Mask servos) noexcept {
+void ServoArm::hold(Mask servos) noexcept {
   if (servos == 0) return;
-  Mask failing = servos;
-  for (std::size_t i = 0; i < kServos; ++i) {
-    if (chain_[i].status == 0) failing &= ~bit(i);
-  }
-  chain_.queue(feetech::kTorque, failing, 0);  // ends an overload
+  chain_->queue_recovery(servos & failing());
   approach(servos);
-  chain_.queue(feetech::kTorque, servos, 1);
+  chain_->queue_torque(servos, true);
+  chain_->watch(true);
   held_ |= servos;
   relaxed_ = false;
   for (std::size_t i = 0; i < kServos; ++i) {
@@ -85,7 +74,7 @@ void So101::hold(Mask servos) noexcept {
 }
 
 /// Full strength when the arm has stood for half a second.
-void So101::settle() noexcept {
+void ServoArm::settle() noexcept {
   if (settling_ == 0 || !link_.fresh) return;
   for (std::size_t i = 0; i < kServos; ++i) {
     const bool stands = std::abs(servos_[i].position - held_places_[i]) <= kBacklash;
@@ -99,7 +88,7 @@ void So101::settle() noexcept {
   if (why_[0] == 0 && --settling_ == 0) set_motion(held_, kFullSpeed, kFullAcceleration, 1.0);
 }
 
-int So101::goal_of(std::size_t servo, const So101State& desired) const noexcept {
+int ServoArm::goal_of(std::size_t servo, const ArmState& desired) const noexcept {
   const Calibration& range = calibration_[servo];
   double steps = 0.0;
   if (servo == kGripper) {
@@ -112,79 +101,69 @@ int So101::goal_of(std::size_t servo, const So101State& desired) const noexcept 
   return std::clamp(static_cast<int>(std::lround(steps)), range.smallest, range.largest);
 }
 
-void So101::write(const Desired<So101>& desired) noexcept {
+void ServoArm::send(const ArmState& desired) noexcept {
   wrote_ = true;
-  if (!chain_.port().is_open()) return reopen();
+  if (!chain_->port().is_open()) return reopen();
   settle();
-  commanded_ = 0;
   for (std::size_t i = 0; i < kServos; ++i) {
-    if (desired.active(i)) commanded_ |= bit(i);
-    if (has(held_, i)) goals_[i] = goal_of(i, desired.states);
+    if (has(held_, i)) goals_[i] = goal_of(i, desired);
   }
-  chain_.request(held_, goals_);
+  chain_->request(held_, goals_);
 }
 
 /// Looks every half second whether the adapter is there again.
-void So101::reopen() noexcept {
+void ServoArm::reopen() noexcept {
   if (++closed_ * period_ < kSecond / 2) return;
   closed_ = 0;
-  static_cast<void>(chain_.port().reopen(lasting_name_.c_str()));
+  static_cast<void>(chain_->port().reopen(lasting_name_.c_str()));
 }
 
-std::int64_t So101::deadline() const noexcept {
-  const std::int64_t asked = chain_.is_asking() ? chain_.asked_at() : now();
+std::int64_t ServoArm::deadline() const noexcept {
+  const std::int64_t asked = chain_->is_asking() ? chain_->asked_at() : now();
   if (config_.answer_timeout > 0.0) {
     return asked + static_cast<std::int64_t>(config_.answer_timeout * 1e9);
   }
   return asked + (failed_before_ ? period_ : period_ * 5 / 4);
 }
 
-void So101::read(Reading<So101>& reading) noexcept {
+void ServoArm::receive(ArmState& observed, ArmSensors& sensors, std::int64_t time) noexcept {
   // row 0 and fresh starts have readings of their own
-  if (!wrote_) chain_.request(0, {});
+  if (!wrote_) chain_->request(0, {});
   wrote_ = false;
-  const FeetechChain::Transfer transfer = chain_.collect(deadline());
+  const ServoChain::Transfer transfer = chain_->collect(deadline());
   take(transfer);
   if (transfer.asked) look_for_trouble(transfer);
-  if (!chain_.port().is_open()) {
+  if (!chain_->port().is_open()) {
     because("the adapter %s is gone", lasting_name_.c_str());
     held_ = 0;  // goals of before would move it when the adapter is there again
   }
 
   for (std::size_t i = 0; i < kServos; ++i) {
-    const ServoState& state = chain_[i];
+    const ServoState& state = (*chain_)[i];
     const double place = servos_[i].position;
     if (i == kGripper) {
-      reading.observed.gripper = calibration_[i].share(place);
+      observed.gripper = calibration_[i].share(place);
     } else {
-      reading.observed.joints[i] = calibration_[i].angle(place);
+      observed.joints[i] = calibration_[i].angle(place);
     }
-    Measured& measured = reading.extended.measured;
+    Measured& measured = sensors.measured;
     measured.velocity[i] = state.speed * Calibration::kStep;
-    measured.effort[i] = state.load * 1e-3 * kMostTorque;
+    measured.effort[i] = state.effort;
     measured.temperature[i] = state.temperature;
-    measured.voltage[i] = 0.1 * state.voltage;
-    reading.extended.health[i] = health_of(i);
-  }
-  if (relaxed_) {
-    reading.follow();
-    for (std::size_t i = 0; i < kServos; ++i) {
-      if (has(commanded_, i)) reading.interrupt(i);  // nothing would move
-    }
+    measured.voltage[i] = state.voltage;
+    sensors.health[i] = health_of(i);
   }
   link_.age = now() - complete_at_;
-  link_.capture_time = reading.time() - link_.age;
-  reading.extended.link = link_;
-  if (!link_.fresh) reading.missed();
-  if (why_[0] != 0) reading.halt(why_.data());
+  link_.capture_time = time - link_.age;
+  sensors.link = link_;
 }
 
 /// Answers => what is known of each servo.
-void So101::take(const FeetechChain::Transfer& transfer) noexcept {
+void ServoArm::take(const ServoChain::Transfer& transfer) noexcept {
   link_.late += transfer.late;
   link_.damaged += transfer.damaged;
-  link_.fresh = transfer.asked && transfer.answered == chain_.all();
-  failed_before_ = transfer.answered != chain_.all();
+  link_.fresh = transfer.asked && transfer.answered == chain_->all();
+  failed_before_ = transfer.answered != chain_->all();
   for (std::size_t i = 0; transfer.asked && i < kServos; ++i) {
     Servo& servo = servos_[i];
     if (!has(transfer.answered, i)) {
@@ -200,25 +179,25 @@ void So101::take(const FeetechChain::Transfer& transfer) noexcept {
       continue;
     }
     servo.jumped = 0;
-    servo.position = chain_[i].position;
-    servo.seen_at = chain_.asked_at();
-    if (has(transfer.torque_known, i)) servo.without_torque = !chain_[i].torque;
-    servo.alarmed = chain_[i].status != 0 ? servo.alarmed + 1 : 0;
+    servo.position = (*chain_)[i].position;
+    servo.seen_at = chain_->asked_at();
+    if (has(transfer.torque_known, i)) servo.without_torque = !(*chain_)[i].torque;
+    servo.alarmed = (*chain_)[i].status != 0 ? servo.alarmed + 1 : 0;
   }
-  if (link_.fresh) complete_at_ = chain_.asked_at();
+  if (link_.fresh) complete_at_ = chain_->asked_at();
 }
 
 /// Whether it can have come there since it was seen: a damaged answer may pass its checksum.
-bool So101::is_plausible(std::size_t servo) const noexcept {
-  const std::int64_t unseen = chain_.asked_at() - servos_[servo].seen_at;
+bool ServoArm::is_plausible(std::size_t servo) const noexcept {
+  const std::int64_t unseen = chain_->asked_at() - servos_[servo].seen_at;
   const std::int64_t since = std::clamp(unseen, period_, std::max(period_, kLongestGap));
   // by hand it is moved faster
   const double speed = (relaxed_ ? 8.0 : 2.0) * kMostSpeed / Calibration::kStep;
   const double most = speed * static_cast<double>(since) * 1e-9 + kBacklash;
-  return std::abs(chain_[servo].position - servos_[servo].position) <= most;
+  return std::abs((*chain_)[servo].position - servos_[servo].position) <= most;
 }
 
-void So101::look_for_trouble(const FeetechChain::Transfer& transfer) noexcept {
+void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
   const auto lost = [](const Servo& servo) { return servo.missed >= kMissesToHalt; };
   const auto first = std::ranges::find_if(servos_, lost);
   if (std::ranges::all_of(servos_, lost)) {
@@ -234,12 +213,13 @@ void So101::look_for_trouble(const FeetechChain::Transfer& transfer) noexcept {
     if (lost(servo)) held_ &= ~bit(i);
     if (servo.jumped >= kJumpsToHalt) {
       // its goal is from before the jump: it would go there
-      if (has(held_, i)) chain_.queue(feetech::kGoal, bit(i), with_sign(chain_[i].position));
+      goals_[i] = (*chain_)[i].position;
+      chain_->queue_goals(bit(i) & held_, goals_);
       held_ &= ~bit(i);
       because("%s is read where it cannot be: has its encoder lost a turn?", kJointNames[i]);
     }
     if (servo.alarmed >= kAlarmsToHalt) name_alarm(i);
-    if (has(held_, i) && servo.without_torque) {
+    if (has(held_, i) && servo.without_torque && (*chain_)[i].status == 0) {
       held_ &= ~bit(i);
       because("somebody switched the torque of servo %zu (%s) off", i + 1, kJointNames[i]);
     }
@@ -253,66 +233,77 @@ void So101::look_for_trouble(const FeetechChain::Transfer& transfer) noexcept {
 }
 
 /// The halt for what the status byte of a servo says, if anything.
-void So101::name_alarm(std::size_t servo) noexcept {
-  const ServoState& state = chain_[servo];
+void ServoArm::name_alarm(std::size_t servo) noexcept {
+  const ServoState& state = (*chain_)[servo];
   const char* const name = kJointNames[servo];
-  if ((state.status & feetech::overload_alarm) != 0) {
-    because("%s is overloaded and has only %d %% of its strength: free it", name,
-            servos_[servo].weak);
-  } else if ((state.status & feetech::heat_alarm) != 0) {
+  const int weak = chain_->strength_of_overloaded(servo);
+  if ((state.status & overload_alarm) != 0 && weak == 0) {
+    because("%s is overloaded and has switched itself off: free it", name);
+  } else if ((state.status & overload_alarm) != 0) {
+    because("%s is overloaded and has only %d %% of its strength: free it", name, weak);
+  } else if ((state.status & heat_alarm) != 0) {
     servos_[servo].was_hot = true;
     because("%s is too hot (%d C): it has switched itself off", name, state.temperature);
-  } else if ((state.status & feetech::voltage_alarm) != 0) {
+  } else if ((state.status & voltage_alarm) != 0) {
     because("%.1f V at %s, at least %.1f V and at most %.1f V needed: wrong or weak supply",
-            0.1 * state.voltage, name, servos_[servo].least_voltage, servos_[servo].most_voltage);
-  } else if ((state.status & feetech::current_alarm) != 0) {
+            state.voltage, name, state.least_voltage, state.most_voltage);
+  } else if ((state.status & current_alarm) != 0) {
     because("%s draws too much current: free it", name);
-  } else if ((state.status & feetech::encoder_alarm) != 0) {
+  } else if ((state.status & encoder_alarm) != 0) {
     because("the encoder of %s reports a failure: switch the servo off and on", name);
   }
 }
 
-Health So101::health_of(std::size_t servo) const noexcept {
-  const ServoState& state = chain_[servo];
-  const auto alarmed = [&](feetech::Alarm alarm) { return (state.status & alarm) != 0; };
+Health ServoArm::health_of(std::size_t servo) const noexcept {
+  const ServoState& state = (*chain_)[servo];
+  const auto alarmed = [&](Alarm alarm) { return (state.status & alarm) != 0; };
   if (servos_[servo].missed >= kMissesToHalt) return Health::silent;
-  if (servos_[servo].without_torque && !relaxed_) return Health::torque_off;
-  if (alarmed(feetech::overload_alarm)) return Health::overload;
-  if (alarmed(feetech::current_alarm)) return Health::current;
-  if (alarmed(feetech::heat_alarm) || state.temperature + 5 >= servos_[servo].hottest) {
+  if (servos_[servo].without_torque && !relaxed_ && state.status == 0) return Health::torque_off;
+  if (alarmed(overload_alarm)) return Health::overload;
+  if (alarmed(current_alarm)) return Health::current;
+  if (alarmed(heat_alarm) || state.temperature + 5 >= state.hottest) {
     return Health::heat;
   }
-  if (alarmed(feetech::encoder_alarm)) return Health::encoder;
-  return alarmed(feetech::voltage_alarm) ? Health::voltage : Health::ok;
+  if (alarmed(encoder_alarm)) return Health::encoder;
+  return alarmed(voltage_alarm) ? Health::voltage : Health::ok;
+}
+
+/// Servos that report a failure.
+ServoArm::Mask ServoArm::failing() const noexcept {
+  Mask found = 0;
+  for (std::size_t i = 0; i < kServos; ++i) found |= (*chain_)[i].status != 0 ? bit(i) : 0;
+  return found;
 }
 
 /// Servos that do not hold although they should, or have less strength.
-So101::Mask So101::troubled() const noexcept {
-  Mask found = relaxed_ ? 0 : chain_.all() & ~held_;
-  for (std::size_t i = 0; i < kServos; ++i) {
-    if (servos_[i].without_torque || chain_[i].status != 0) found |= bit(i);
-  }
+ServoArm::Mask ServoArm::troubled() const noexcept {
+  Mask found = failing() | (relaxed_ ? 0 : chain_->all() & ~held_);
+  for (std::size_t i = 0; i < kServos; ++i) found |= servos_[i].without_torque ? bit(i) : 0;
   return found;
 }
 
 /// Why the arm cannot be held now; null if it can.
-const char* So101::why_not_ready() noexcept {
+const char* ServoArm::why_not_ready() noexcept {
   const auto say = [&](const char* format, auto... values) {
     std::snprintf(not_ready_.data(), not_ready_.size(), format, values...);
     return not_ready_.data();
   };
-  if (!chain_.port().is_open()) return say("the adapter %s is gone", lasting_name_.c_str());
+  if (!chain_->port().is_open()) return say("the adapter %s is gone", lasting_name_.c_str());
   for (std::size_t i = 0; i < kServos; ++i) {
     const char* const name = kJointNames[i];
-    const int status = chain_[i].status;
+    const int status = (*chain_)[i].status;
     Servo& servo = servos_[i];
     if (servo.missed > 0) return say("%s (servo %zu) does not answer", name, i + 1);
-    if ((status & feetech::voltage_alarm) != 0) {
-      return say("%.1f V at %s: wrong or weak supply", 0.1 * chain_[i].voltage, name);
+    if (status != 0 && chain_->recovery_restarts()) {
+      return say("%s (servo %zu) reports a failure: `recover` restarts it, and it sinks", name,
+                 i + 1);
     }
-    servo.was_hot = servo.was_hot && chain_[i].temperature > servo.hottest - 10;
+    if ((status & voltage_alarm) != 0) {
+      return say("%.1f V at %s: wrong or weak supply", (*chain_)[i].voltage, name);
+    }
+    servo.was_hot = servo.was_hot && (*chain_)[i].temperature > (*chain_)[i].hottest - 10;
     if (servo.was_hot) return say("%s is still too hot: wait", name);
-    const int position = chain_[i].position;
+    const int position = (*chain_)[i].position;
     const bool inside =
         position >= calibration_[i].smallest - kEdge && position <= calibration_[i].largest + kEdge;
     if (!inside && !config_.leader) {
@@ -322,40 +313,43 @@ const char* So101::why_not_ready() noexcept {
   return nullptr;
 }
 
-Served So101::resume() noexcept {
+Served ServoArm::resume() noexcept {
   if (const char* const why = why_not_ready()) return Served::rejected(why);
   begin_anew();
-  if (!config_.leader) hold(relaxed_ ? chain_.all() : troubled());
+  if (!config_.leader) {
+    chain_->watch(true);
+    hold(relaxed_ ? chain_->all() : troubled());
+  }
   return Served::done();
 }
 
 /// Forgets why it was halted. What cannot be is believed from now on: o80 judges it.
-void So101::begin_anew() noexcept {
+void ServoArm::begin_anew() noexcept {
   why_[0] = 0;
   halted_ = false;
   window_ = damaged_in_window_ = 0;
   for (std::size_t i = 0; i < kServos; ++i) {
-    servos_[i].position = chain_[i].position;
+    servos_[i].position = (*chain_)[i].position;
     servos_[i].alarmed = servos_[i].jumped = 0;
   }
 }
 
-Served So101::on(const Hold& /*request*/) noexcept {
+Served ServoArm::on(const Hold& /*request*/) noexcept {
   if (config_.leader) return Served::rejected("a leader is moved by hand: it gets no torque");
   if (const char* const why = why_not_ready()) return Served::rejected(why);
-  hold(relaxed_ ? chain_.all() : troubled());
+  hold(relaxed_ ? chain_->all() : troubled());
   return Served::start_afresh();
 }
 
-Served So101::on(const Relax& /*request*/) noexcept {
-  chain_.queue(feetech::kTorque, chain_.all(), 0);
+Served ServoArm::on(const Relax& /*request*/) noexcept {
+  chain_->queue_torque(chain_->all(), false);
   held_ = 0;
   settling_ = 0;
   relaxed_ = true;
   return Served::start_afresh();
 }
 
-Served So101::on(const Strength& request) noexcept {
+Served ServoArm::on(const Strength& request) noexcept {
   if (!(request.share > 0.0 && request.share <= 1.0)) {
     return Served::rejected("the share must be above 0 and at most 1");
   }
@@ -364,15 +358,20 @@ Served So101::on(const Strength& request) noexcept {
   return Served::done();
 }
 
-Served So101::on(const Recover& /*request*/) noexcept {
+Served ServoArm::on(const Recover& /*request*/) noexcept {
+  if (failing() != 0 && chain_->recovery_restarts()) {
+    chain_->queue_recovery(failing());
+    held_ &= ~failing();
+    return Served::done();
+  }
   if (const char* const why = why_not_ready()) return Served::rejected(why);
   if (!relaxed_) hold(troubled());
   return Served::start_afresh();  // desired states of before would move what has sunk
 }
 
 /// Moves the joints slowly to where the arm stood when it was started; false if something is wrong.
-bool So101::goes_to_rest() noexcept {
-  if (halted_ || relaxed_ || held_ != chain_.all()) return false;
+bool ServoArm::goes_to_rest() noexcept {
+  if (halted_ || relaxed_ || held_ != chain_->all()) return false;
   const OfServos<int> from = goals_;
   double most = 0.0;  // [rad]
   for (std::size_t i = 0; i < kGripper; ++i) {
@@ -385,37 +384,39 @@ bool So101::goes_to_rest() noexcept {
     for (std::size_t i = 0; i < kGripper; ++i) {
       goals_[i] = from[i] + static_cast<int>(std::lround(share * (start_places_[i] - from[i])));
     }
-    chain_.request(held_, goals_);
-    const FeetechChain::Transfer transfer = chain_.collect(deadline());
+    chain_->request(held_, goals_);
+    const ServoChain::Transfer transfer = chain_->collect(deadline());
     take(transfer);
     if (transfer.asked) look_for_trouble(transfer);
-    sleep_until(chain_.asked_at() + period_);
+    sleep_until(chain_->asked_at() + period_);
   }
   return why_[0] == 0;
 }
 
-void So101::stop() noexcept {
+void ServoArm::stop() noexcept {
   if (!started_) return;
   const bool relaxes = config_.at_stop == AtStop::relax;
   if (relaxes || (config_.at_stop == AtStop::rest && goes_to_rest())) {
     for (int i = 0; i < 3; ++i) {  // nobody answers to it
-      chain_.queue(feetech::kTorque, chain_.all(), 0);
-      chain_.send_queued();
+      chain_->watch(false);
+      chain_->queue_torque(chain_->all(), false);
+      chain_->send_queued();
     }
   } else if (!relaxed_) {
+    chain_->watch(false);
     // a gripper that presses on would overheat with nobody to see it
-    chain_.queue(feetech::kGoal, bit(kGripper) & held_,
-                 static_cast<std::uint16_t>(servos_[kGripper].position));
-    chain_.send_queued();
+    goals_[kGripper] = servos_[kGripper].position;
+    chain_->queue_goals(bit(kGripper) & held_, goals_);
+    chain_->send_queued();
     std::fprintf(stderr,
                  "six servos hold, and nobody watches their heat: `o80 arms relax` "
                  "switches their torque off\n");
   }
-  chain_.port().close();
+  chain_->port().close();
 }
 
 /// The first reason stays until somebody resumes: another text would be another halt.
-void So101::because(const char* format, ...) noexcept {
+void ServoArm::because(const char* format, ...) noexcept {
   if (why_[0] != 0) return;
   std::va_list values;
   va_start(values, format);

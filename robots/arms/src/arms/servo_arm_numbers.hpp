@@ -5,9 +5,9 @@
 #include <cstdint>
 #include <thread>
 
-#include "arms/feetech_chain.hpp"
+#include "arms/servo_chain.hpp"
 
-// Numbers of the driver of an SO-101, and what its two sources share.
+// Numbers of the driver of an arm, and what its two sources share.
 
 namespace o80::arms {
 
@@ -16,9 +16,8 @@ inline constexpr double kGentleStrength = 0.3;
 inline constexpr int kBacklash = 40;  // [steps]
 inline constexpr int kEdge = 10;      // outside the range without moving when clamped [steps]
 
-inline std::uint16_t with_sign(int position) { return feetech::with_sign_bit(position, 15); }
-inline bool has(FeetechChain::Mask mask, std::size_t servo) { return (mask >> servo & 1) != 0; }
-inline FeetechChain::Mask bit(std::size_t servo) { return FeetechChain::Mask{1} << servo; }
+inline bool has(ServoChain::Mask mask, std::size_t servo) { return (mask >> servo & 1) != 0; }
+inline ServoChain::Mask bit(std::size_t servo) { return ServoChain::Mask{1} << servo; }
 /// Returns at this moment of the monotonic clock [ns].
 inline void sleep_until(std::int64_t moment) {
   std::this_thread::sleep_for(std::chrono::nanoseconds(moment - now()));

@@ -5,14 +5,12 @@
 #include <cstdlib>
 #include <stdexcept>
 
-#include "arms/so101.hpp"
-#include "arms/so101_numbers.hpp"
+#include "arms/servo_arm.hpp"
+#include "arms/servo_arm_numbers.hpp"
 
 namespace o80::arms {
 namespace {
 
-// as far as each joint of the arm's published model goes both ways [rad]
-constexpr std::array kModelHalf{1.9198, 1.7453, 1.69, 1.658, 2.7438};
 constexpr std::int64_t kDefaultPeriod = 6'666'667;  // 150 Hz [ns]
 constexpr int kAgreement = 10;                      // of two readings of an arm that stands [steps]
 constexpr std::int64_t kStartWait = 100'000'000;    // for a transfer [ns]
@@ -24,7 +22,8 @@ std::string range_of(const Calibration& calibration) {
 
 }  // namespace
 
-So101::So101(const Config& config) : config_(config), period_(kDefaultPeriod) {
+ServoArm::ServoArm(const Config& config, const ArmKind& kind)
+    : config_(config), kind_(kind), chain_(kind.chain(config.leader)), period_(kDefaultPeriod) {
   for (const double share : {config.strength, config.gripper_strength, config.speed_share}) {
     if (!(share > 0.0 && share <= 1.0)) {
       throw InvalidArgument(
@@ -32,12 +31,12 @@ So101::So101(const Config& config) : config_(config), period_(kDefaultPeriod) {
           std::to_string(share));
     }
   }
-  const std::vector<std::string> folders =
-      config.leader
-          ? std::vector<std::string>{"teleoperators/so_leader", "teleoperators/so101_leader",
-                                     "teleoperators/so100_leader"}
-          : std::vector<std::string>{"robots/so_follower", "robots/so101_follower",
-                                     "robots/so100_follower"};
+  std::vector<std::string> folders;
+  for (const char* const name : kind.names) {
+    if (name == nullptr) continue;
+    folders.push_back(config.leader ? "teleoperators/" + std::string(name) + "_leader"
+                                    : "robots/" + std::string(name) + "_follower");
+  }
   const std::string path = find_calibration(config.calibration, folders);
   if (!path.empty()) {
     calibration_ = read_calibration(path, {kJointNames.begin(), kJointNames.end()});
@@ -45,7 +44,7 @@ So101::So101(const Config& config) : config_(config), period_(kDefaultPeriod) {
   }
 }
 
-void So101::describe(Schema& schema) const {
+void ServoArm::describe(Schema& schema) const {
   if (schema.asked_period() != 0) period_ = schema.asked_period();
   schema.period(period_);
   schema.of_the_world();
@@ -55,8 +54,8 @@ void So101::describe(Schema& schema) const {
   }
   for (std::uint32_t i = 0; i < kGripper; ++i) {
     const double half =
-        calibration_.empty() ? kModelHalf[i] : calibration_[i].width() / 2 * Calibration::kStep;
-    const double bound = std::min(half, kModelHalf[i]);
+        calibration_.empty() ? kind_.farthest[i] : calibration_[i].width() / 2 * Calibration::kStep;
+    const double bound = std::min(half, kind_.farthest[i]);
     schema.actuator(i).unit("rad").limits({.minimum = -bound,
                                            .maximum = bound,
                                            .speed = kMostSpeed * config_.speed_share,
@@ -75,12 +74,12 @@ void So101::describe(Schema& schema) const {
 
 // start() may wait, and throws
 
-void So101::refuse(std::size_t servo, const std::string& why) const {
+void ServoArm::refuse(std::size_t servo, const std::string& why) const {
   throw std::runtime_error(std::string(kJointNames[servo]) + " (servo " +
                            std::to_string(servo + 1) + ") " + why);
 }
 
-void So101::start() {
+void ServoArm::start() {
   if (calibration_.empty()) {
     throw std::runtime_error(
         "no calibration is given, and there is not exactly one: --calibration NAME chooses one, "
@@ -89,7 +88,7 @@ void So101::start() {
   }
   const std::string port = config_.port.empty() ? only_port() : config_.port;
   lasting_name_ = lasting_name(port);
-  chain_.open(SerialPort::open(port), config_.answer_timeout);
+  chain_->open(SerialPort::open(port), config_.answer_timeout);
   check_servos();
   check_calibration();
   check_rate();
@@ -99,56 +98,34 @@ void So101::start() {
 }
 
 /// A leader has no torque, and is followed.
-void So101::let_go() {
-  chain_.queue(feetech::kTorque, chain_.all(), 0);
-  chain_.send_queued();
+void ServoArm::let_go() {
+  chain_->queue_torque(chain_->all(), false);
+  chain_->send_queued();
   relaxed_ = started_ = true;
 }
 
 /// Who they are, and how they are.
-void So101::check_servos() {
+void ServoArm::check_servos() {
   Mask silent = 0;
   for (std::size_t i = 0; i < kServos; ++i) {
-    if (!chain_.ping(i)) silent |= bit(i);
+    if (!chain_->find(i)) silent |= bit(i);
   }
-  if (silent == chain_.all()) {
+  if (silent == chain_->all()) {
     throw std::runtime_error(
         "no servo answers: is the power supply on? `o80 arms` lists what each port has");
   }
-  const auto read = [&](std::size_t servo, feetech::Register where) {
-    const std::optional<int> value = chain_.read(servo, where);
-    if (!value) refuse(servo, "does not answer: look at its plug and the one before it");
-    return *value;
-  };
-  int firmware = -1;
   for (std::size_t i = 0; i < kServos; ++i) {
-    const int model = read(i, feetech::kModel);
-    if (model != feetech::kSts3215) {
-      refuse(i, "is of model " + std::to_string(model) + ", but an STS3215 (777) is needed");
+    try {
+      chain_->set_up(i);
+    } catch (const std::runtime_error& error) {
+      refuse(i, error.what());
     }
-    const int its_firmware = read(i, feetech::kFirmware);
-    if (i > 0 && its_firmware != firmware) {
-      refuse(i, "has another firmware than those before it: bring all to the same version");
-    }
-    firmware = its_firmware;
-    if (read(i, feetech::kMode) != 0) {
-      refuse(i, "is not in position mode: `o80 arms calibrate` sets it");
-    }
-    Servo& servo = servos_[i];
-    servo.speed_unit = (read(i, feetech::kPhase) & 4) != 0 ? 1 : 50;
-    servo.weak = read(i, feetech::kWeak);
-    servo.hottest = read(i, feetech::kHottest);
-    servo.least_voltage = 0.1 * read(i, feetech::kLeastVoltage);
-    servo.most_voltage = 0.1 * read(i, feetech::kMostVoltage);
   }
 }
 
-void So101::check_calibration() {
+void ServoArm::check_calibration() {
   for (std::size_t i = 0; i < kServos; ++i) {
-    const auto read = [&](feetech::Register where) { return chain_.read(i, where).value_or(-1); };
-    const Calibration own{.offset = feetech::signed_by_bit(read(feetech::kOffset), 11),
-                          .smallest = read(feetech::kSmallest),
-                          .largest = read(feetech::kLargest)};
+    const Calibration own = chain_->calibration_of(i);
     if (own == calibration_[i]) continue;
     throw std::runtime_error(
         std::string(kJointNames[i]) + ": the file '" + config_.calibration + "' says " +
@@ -159,13 +136,13 @@ void So101::check_calibration() {
 }
 
 /// A rate that the bus does not reach would be a row of missed readings.
-void So101::check_rate() {
+void ServoArm::check_rate() {
   constexpr int kTransfers = 20;
   std::array<std::int64_t, kTransfers> times{};
   for (std::int64_t& each : times) {
-    chain_.request(0, {});
-    chain_.collect(now() + kStartWait);
-    each = now() - chain_.asked_at();
+    chain_->request(0, {});
+    chain_->collect(now() + kStartWait);
+    each = now() - chain_->asked_at();
   }
   std::ranges::sort(times);
   const std::int64_t most = times[kTransfers - 1 - kTransfers / 20];
@@ -180,21 +157,21 @@ void So101::check_rate() {
 }
 
 /// Two complete readings that agree, inside what the servos do not clamp.
-void So101::find_place() {
+void ServoArm::find_place() {
   constexpr int kTries = 10;
   bool known = false;
   bool agree = false;
   std::size_t differs = 0;
   for (int i = 0; i < kTries && !agree; ++i) {
-    chain_.request(0, {});
-    const FeetechChain::Transfer transfer = chain_.collect(now() + kStartWait);
-    if (transfer.answered != chain_.all()) continue;
+    chain_->request(0, {});
+    const ServoChain::Transfer transfer = chain_->collect(now() + kStartWait);
+    if (transfer.answered != chain_->all()) continue;
     agree = known;
     for (std::size_t k = 0; k < kServos; ++k) {
-      if (std::abs(chain_[k].position - servos_[k].position) > kAgreement)
+      if (std::abs((*chain_)[k].position - servos_[k].position) > kAgreement)
         agree = false, differs = k;
-      servos_[k].position = chain_[k].position;
-      servos_[k].seen_at = complete_at_ = chain_.asked_at();
+      servos_[k].position = (*chain_)[k].position;
+      servos_[k].seen_at = complete_at_ = chain_->asked_at();
     }
     known = true;
   }
@@ -215,31 +192,32 @@ void So101::find_place() {
 
 /// Goals and gentle registers, read back, before torque. Torque that is found on stays as it is:
 /// with less strength the arm would sink.
-void So101::begin_to_hold() {
-  const auto check = [&](std::size_t servo, feetech::Register where, int wanted) {
-    if (chain_.read(servo, where) == wanted) return;
+void ServoArm::begin_to_hold() {
+  const auto check = [&](std::size_t servo, const Setting& wanted) {
+    if (chain_->read(servo, wanted.where) == wanted.value) return;
     refuse(servo, "does not keep what is written to its register " +
-                      std::to_string(static_cast<int>(where.address)));
+                      std::to_string(static_cast<int>(wanted.where.address)));
   };
-  approach(chain_.all());
+  approach(chain_->all());
   start_places_ = held_places_;
-  chain_.send_queued();
+  chain_->send_queued();
   for (std::size_t i = 0; i < kServos; ++i) {
-    if (!holds(i)) check(i, feetech::kStrength, strength_of(i, kGentleStrength));
-    check(i, feetech::kGoal, with_sign(held_places_[i]));
+    if (!holds(i)) check(i, chain_->strength(i, strength_of(i, kGentleStrength)));
+    check(i, chain_->goal(i, held_places_[i]));
   }
-  chain_.queue(feetech::kTorque, chain_.all(), 1);
-  chain_.send_queued();
-  for (std::size_t i = 0; i < kServos; ++i) check(i, feetech::kTorque, 1);
-  held_ = chain_.all();
+  chain_->queue_torque(chain_->all(), true);
+  chain_->send_queued();
+  for (std::size_t i = 0; i < kServos; ++i) check(i, chain_->torque(true));
+  chain_->watch(true);
+  held_ = chain_->all();
   started_ = true;
   while (settling_ > 0 && why_[0] == 0) {
-    chain_.request(0, {});
-    const FeetechChain::Transfer transfer = chain_.collect(deadline());
+    chain_->request(0, {});
+    const ServoChain::Transfer transfer = chain_->collect(deadline());
     take(transfer);
     if (transfer.asked) look_for_trouble(transfer);
     settle();
-    sleep_until(chain_.asked_at() + period_);
+    sleep_until(chain_->asked_at() + period_);
   }
 }
 

@@ -1,0 +1,3 @@
+#include "arms/koch.hpp"
+
+O80_ROBOT(koch, o80::arms::Koch);
