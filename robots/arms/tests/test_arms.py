@@ -13,7 +13,8 @@ import o80_arms
 
 STEP = 2 * np.pi / 4095  # [rad]
 RATE = 150
-both = pytest.mark.parametrize("arm", ["so101", "koch"], indirect=True)
+KOCH = pytest.param("koch", marks=pytest.mark.check)  # the same manners: test_koch.py has its own
+both = pytest.mark.parametrize("arm", ["so101", KOCH], indirect=True)
 
 
 def degrees_of_lerobot(position: int, joint: str) -> float:

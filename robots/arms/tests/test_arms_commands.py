@@ -25,7 +25,8 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path / "lerobot" / "robots"
 
 
-both = pytest.mark.parametrize("arm", ["so101", "koch"], indirect=True)
+KOCH = pytest.param("koch", marks=pytest.mark.check)  # the same manners: test_koch.py has its own
+both = pytest.mark.parametrize("arm", ["so101", KOCH], indirect=True)
 
 
 def run(*words: str | Path) -> Result:
