@@ -1,5 +1,6 @@
 """Both arms against fake servos: nothing moves at their start, nothing old passes as fresh."""
 
+import json
 import random
 from collections.abc import Callable
 from pathlib import Path
@@ -192,6 +193,22 @@ def test_a_start_that_cannot_be_right_is_refused_and_switches_no_torque_on(
     with pytest.raises(o80.Error, match=words):
         arm.started(**{"answer_timeout": 0.1} if silent else {})
     assert not any(arm.torque)
+
+
+def test_a_joint_that_was_moved_too_little_when_it_was_calibrated_is_named(
+    arm: FakeArm, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with arm.started():
+        assert capfd.readouterr().err == ""
+    content = json.loads(arm.file.read_text())
+    content["shoulder_lift"].update(range_min=1500, range_max=2700)
+    arm.file.write_text(json.dumps(content))
+    arm.servo("shoulder_lift").calibrate(content["shoulder_lift"]["homing_offset"], 1500, 2700)
+    with arm.started():
+        assert capfd.readouterr().err.splitlines()[-1] == (
+            "shoulder_lift was moved through 105 of 200 deg when it was calibrated: "
+            "its zero is off by up to 47 deg"
+        )
 
 
 @both

@@ -15,6 +15,7 @@
 namespace o80::arms {
 
 inline constexpr std::size_t kServos = 6;
+inline constexpr std::size_t kRoll = 4;
 inline constexpr std::size_t kGripper = 5;
 inline constexpr std::array<const char*, kServos> kJointNames{
     "shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper"};
@@ -174,6 +175,7 @@ class ServoArm {
   // servo_arm_start.cpp
   void check_servos();
   void check_calibration();
+  void tell_doubts() const;
   void check_rate();
   void find_place();
   void begin_to_hold();

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <numbers>
 #include <stdexcept>
 
 #include "arms/servo_arm.hpp"
@@ -132,6 +133,23 @@ void ServoArm::check_calibration() {
         range_of(calibration_[i]) + "; the servo says " + range_of(own) +
         ". `o80 arms calibrate --write NAME` puts the file into the servos, "
         "`--take NAME` makes a new file from them (of a leader with --leader)");
+  }
+  tell_doubts();
+}
+
+/// The zero of a joint is the middle of what a person moved. `o80 arms` says the same.
+void ServoArm::tell_doubts() const {
+  constexpr double kWholeTurn = 3.1;  // [rad]: what a joint can do is not known
+  constexpr double kEnough = 0.85;
+  constexpr double kDegrees = 180.0 / std::numbers::pi;
+  for (std::size_t i = 0; i < kRoll; ++i) {
+    const double all = 2 * kind_.farthest[i];
+    const double moved = calibration_[i].width() * Calibration::kStep;
+    if (kind_.farthest[i] > kWholeTurn || moved >= kEnough * all) continue;
+    std::fprintf(stderr,
+                 "%s was moved through %.0f of %.0f deg when it was calibrated: its zero is off by "
+                 "up to %.0f deg\n",
+                 kJointNames[i], moved * kDegrees, all * kDegrees, (all - moved) / 2 * kDegrees);
   }
 }
 
