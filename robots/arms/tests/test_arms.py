@@ -211,6 +211,22 @@ def test_a_joint_that_was_moved_too_little_when_it_was_calibrated_is_named(
         )
 
 
+def test_an_adapter_that_is_gone_at_any_moment_of_the_start_ends_it(arm: FakeArm) -> None:
+    robot = arm.started()
+    needed = arm.line.requests
+    robot.close()
+    assert needed > 100
+    for share in np.linspace(0.02, 0.95, 9):
+        arm.line.wait_until_closed()
+        for servo in arm.servos:
+            servo.power_up()
+        arm.line.cut_at = arm.line.requests + int(share * needed)
+        with pytest.raises(o80.Error, match="is gone" if share > 0.4 else None):
+            arm.started(answer_timeout=0.05)
+        arm.line.cut_at = None
+        arm.line.plug()
+
+
 @both
 def test_without_a_calibration_it_says_how_to_get_one(
     arm: FakeArm, monkeypatch: pytest.MonkeyPatch

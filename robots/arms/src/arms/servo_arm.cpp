@@ -103,7 +103,7 @@ int ServoArm::goal_of(std::size_t servo, const ArmState& desired) const noexcept
 
 void ServoArm::send(const ArmState& desired) noexcept {
   wrote_ = true;
-  if (!chain_->port().is_open()) return reopen();
+  if (!chain_->has_port()) return reopen();
   settle();
   for (std::size_t i = 0; i < kServos; ++i) {
     if (has(held_, i)) goals_[i] = goal_of(i, desired);
@@ -133,7 +133,7 @@ void ServoArm::receive(ArmState& observed, ArmSensors& sensors, std::int64_t tim
   const ServoChain::Transfer transfer = chain_->collect(deadline());
   take(transfer);
   if (transfer.asked) look_for_trouble(transfer);
-  if (!chain_->port().is_open()) {
+  if (!chain_->has_port()) {
     because("the adapter %s is gone", lasting_name_.c_str());
     held_ = 0;  // goals of before would move it when the adapter is there again
   }
@@ -288,7 +288,7 @@ const char* ServoArm::why_not_ready() noexcept {
     std::snprintf(not_ready_.data(), not_ready_.size(), format, values...);
     return not_ready_.data();
   };
-  if (!chain_->port().is_open()) return say("the adapter %s is gone", lasting_name_.c_str());
+  if (!chain_->has_port()) return say("the adapter %s is gone", lasting_name_.c_str());
   for (std::size_t i = 0; i < kServos; ++i) {
     const char* const name = kJointNames[i];
     const int status = (*chain_)[i].status;
@@ -387,6 +387,7 @@ bool ServoArm::goes_to_rest() noexcept {
     chain_->request(held_, goals_);
     const ServoChain::Transfer transfer = chain_->collect(deadline());
     take(transfer);
+    if (!chain_->has_port()) return false;
     if (transfer.asked) look_for_trouble(transfer);
     sleep_until(chain_->asked_at() + period_);
   }
@@ -395,8 +396,10 @@ bool ServoArm::goes_to_rest() noexcept {
 
 void ServoArm::stop() noexcept {
   if (!started_) return;
-  const bool relaxes = config_.at_stop == AtStop::relax;
-  if (relaxes || (config_.at_stop == AtStop::rest && goes_to_rest())) {
+  const bool asks_to_relax =
+      config_.at_stop == AtStop::relax || (config_.at_stop == AtStop::rest && goes_to_rest());
+  const bool is_there = chain_->has_port();
+  if (asks_to_relax && is_there) {
     for (int i = 0; i < 3; ++i) {  // nobody answers to it
       chain_->watch(false);
       chain_->queue_torque(chain_->all(), false);
@@ -408,9 +411,13 @@ void ServoArm::stop() noexcept {
     goals_[kGripper] = servos_[kGripper].position;
     chain_->queue_goals(bit(kGripper) & held_, goals_);
     chain_->send_queued();
+    const auto holding = std::ranges::count_if(
+        servos_, [](const Servo& servo) { return servo.missed == 0 && !servo.without_torque; });
     std::fprintf(stderr,
-                 "six servos hold, and nobody watches their heat: `o80 arms relax` "
-                 "switches their torque off\n");
+                 "%s%d servos hold, and nobody watches their heat: `o80 arms relax` "
+                 "switches their torque off\n",
+                 is_there ? "" : "the adapter is gone; ",
+                 is_there ? static_cast<int>(holding) : static_cast<int>(kServos));
   }
   chain_->port().close();
 }

@@ -178,6 +178,7 @@ class ServoArm {
   void tell_doubts() const;
   void check_rate();
   void find_place();
+  void refuse_if_gone() const;
   void begin_to_hold();
   void let_go();
   [[noreturn]] void refuse(std::size_t servo, const std::string& why) const;

@@ -174,6 +174,11 @@ void ServoArm::check_rate() {
   throw std::runtime_error(text.data());
 }
 
+void ServoArm::refuse_if_gone() const {
+  if (chain_->has_port()) return;
+  throw std::runtime_error("the adapter " + lasting_name_ + " is gone");
+}
+
 /// Two complete readings that agree, inside what the servos do not clamp.
 void ServoArm::find_place() {
   constexpr int kTries = 10;
@@ -193,6 +198,7 @@ void ServoArm::find_place() {
     }
     known = true;
   }
+  refuse_if_gone();
   if (!agree) refuse(differs, "gave no two readings that agree: is something moving it?");
   for (std::size_t i = 0; i < kServos; ++i) {
     const Calibration& range = calibration_[i];
@@ -212,7 +218,10 @@ void ServoArm::find_place() {
 /// with less strength the arm would sink.
 void ServoArm::begin_to_hold() {
   const auto check = [&](std::size_t servo, const Setting& wanted) {
-    if (chain_->read(servo, wanted.where) == wanted.value) return;
+    const std::optional<int> found = chain_->read(servo, wanted.where);
+    if (found == wanted.value) return;
+    refuse_if_gone();
+    if (!found) refuse(servo, "does not answer: look at its plug and the one before it");
     refuse(servo, "does not keep what is written to its register " +
                       std::to_string(static_cast<int>(wanted.where.address)));
   };
@@ -233,6 +242,7 @@ void ServoArm::begin_to_hold() {
     chain_->request(0, {});
     const ServoChain::Transfer transfer = chain_->collect(deadline());
     take(transfer);
+    refuse_if_gone();
     if (transfer.asked) look_for_trouble(transfer);
     settle();
     sleep_until(chain_->asked_at() + period_);

@@ -116,6 +116,7 @@ class ServoChain {
 
   Setting torque(bool on) const noexcept { return {torque_, on ? 1 : 0}; }
   SerialPort& port() noexcept { return port_; }
+  bool has_port() const noexcept { return port_.is_open(); }
   std::size_t count() const noexcept { return count_; }
   Mask all() const noexcept { return (Mask{1} << count_) - 1; }
   const ServoState& operator[](std::size_t servo) const noexcept { return states_[servo]; }

@@ -143,6 +143,8 @@ class FakeChain(Generic[Servo]):
         self.servos = dict(enumerate(servos, 1))
         self.tick, self.latency, self.bus_time = tick, latency, bus_time
         self.reads = 0  # of all servos at once
+        self.requests = 0
+        self.cut_at: int | None = None  # the request at which the adapter is unplugged
         self.damaged = 0  # answers
         self.goals: list[dict[int, int]] = []  # of each sync write of goals
         self.silent: set[int] = set()
@@ -256,6 +258,11 @@ class FakeChain(Generic[Servo]):
         raise NotImplementedError
 
     def _answer(self, request: bytes) -> bytes:
+        self.requests += 1
+        if self.requests == self.cut_at:
+            self.cut()
+        if self._master < 0:
+            return b""
         if self.bus_time:
             time.sleep(BYTE * (len(request) + 6))
         self._follow_clock(silent=False)
