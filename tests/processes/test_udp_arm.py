@@ -16,6 +16,7 @@ import o80
 
 WAIT = 60.0  # [s] longer than any wait should take
 NEVER = "1000000"  # ticks: a busy machine is no reason for a halt
+PATIENT = "6000"  # ticks without a reading, for the same reason
 
 
 @pytest.fixture
@@ -95,7 +96,7 @@ def test_a_restart_of_the_arm_halts_the_robot_and_resume_goes_on(
 ) -> None:
     with (
         fake_arm(build_prefix, "--faults", "restart 50-90") as fake,
-        robot(build_prefix, segment, fake, "--tolerated", "10"),
+        robot(build_prefix, segment, fake, "--tolerated", PATIENT),
         o80.Frontend(segment) as arm,
     ):
         end = time.monotonic() + WAIT
