@@ -97,6 +97,28 @@ def test_a_fresh_start_ends_an_episode(segment: str, tmp_path: Path) -> None:
     assert first.rows.iteration[-1] < second.rows.iteration[0]
 
 
+def test_an_episode_that_a_fresh_start_cuts_is_said(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        recording.mark("episode")
+        arm.burst(10)
+        arm.halt("look")
+        arm.burst(1)
+        arm.resume()
+        arm.burst(5)
+        recording.mark("episode_end")
+    found = episodes(path)
+    (only,) = found.all
+    cut = int(only.rows.iteration[-1]) + 1
+    assert cut <= 12
+    assert not only.terminated
+    (why,) = found.left_out
+    assert f"ends at row {cut}, where the robot made a fresh start" in why
+
+
 def test_rewards_of_all_steps_may_come_with_the_last_mark(segment: str, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     rewards = [0.0, 0.5, 1.0]

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import o80
+from o80.cli.teleop import _Session
 from o80.datasets.episodes import episodes_of
 from o80.drivers import Desired, Reading
 
@@ -314,6 +315,92 @@ def test_a_follower_that_ends_ends_it(segment: str, how: str) -> None:
             hand.burst(1)
             with pytest.raises(o80.BackendGone):
                 robots.step()
+
+
+def test_a_leader_that_is_read_as_nothing_is_not_followed(segment: str) -> None:
+    with (
+        leader(f"{segment}-1") as backend,
+        o80.Frontend(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        robots = engaged_by(backend, hand, arm)
+        backend.step()
+        backend.publish([np.nan])
+        assert not robots.step()
+        arm.burst(5)
+        assert arm.halted is None
+        for _ in range(200):
+            backend.step()
+            backend.publish([np.nan])
+            assert not robots.step()
+
+
+def test_who_waits_gives_signs_of_life(segment: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    given: list[str] = []
+    monkeypatch.setattr(o80.Frontend, "keep_alive", lambda self: given.append(self.segment))
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        robots = o80.Teleoperation(hand, arm)
+        hand.add_command("elbow", 0.8)  # far away
+        for _ in range(3):
+            hand.burst(1)
+            assert not robots.step()
+        assert given == [arm.segment] * 3
+        arm.halt()
+        arm.burst(1)
+        hand.burst(1)
+        assert not robots.step()
+        assert given == [arm.segment] * 4
+
+
+def test_demonstrations_are_of_a_robot_that_follows(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+        o80.Frontend(f"{segment}-2") as other,
+        o80.Recording(path, arm) as recording,
+    ):
+        robots = o80.Teleoperation(hand, other)
+        other.mark("episode: of a session that was killed")
+        arm.burst(1)
+        session = _Session(robots, "episode: wave")
+        arm.burst(1)
+        session.press(" ")  # nothing follows yet
+        for _ in range(100):
+            hand.burst(10)
+            arm.burst(10)
+            robots.step()
+        assert robots.engaged
+        for how in ("kept", "halted", "thrown away", "open at the end"):
+            session.press(" ")
+            arm.burst(20)
+            if how == "kept":
+                session.press(" ")
+            if how == "thrown away":
+                session.press("x")
+            if how == "halted":
+                arm.halt()
+                arm.burst(1)
+                hand.burst(1)
+                robots.step()
+                session.tell()
+                arm.resume()
+                while not robots.engaged:
+                    hand.burst(10)
+                    arm.burst(10)
+                    robots.step()
+            arm.burst(20)
+        session.end()
+        arm.burst(1)
+        recording.flush()
+    found = episodes_of(o80.open(path))
+    (kept,) = found.all
+    assert (kept.task, kept.terminated, len(kept)) == ("wave", True, 20)
+    assert len(found.left_out) == 4
+    assert all("thrown away" in why for why in found.left_out)
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import signal
 import sys
 import termios
 import time
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
     from o80.joining.teleoperation import Teleoperation
 
 _BETWEEN_REPORTS = 0.5  # [s]
+_LONGEST_TASK = 900  # a mark holds 976 bytes
 _KEYS = "space begins and ends a demonstration, x throws it away, q ends"
 
 
@@ -52,20 +54,31 @@ def teleop(
     from o80.joining.teleoperation import Joint, Teleoperation
 
     joints = [Joint.parse(each) for each in joint] if joint else None
+    if not task.isprintable() or len(task.encode()) > _LONGEST_TASK:
+        raise typer.BadParameter(
+            f"give one line of at most {_LONGEST_TASK} bytes", param_hint="--task"
+        )
     with (
         attach(leader) as hand,
         attach(follower, read_only=False) as arm,
-        arm.control(),  # a second hand would pull it to and fro
+        contextlib.ExitStack() as controls,  # a second hand would pull it to and fro
         _keyboard() as keys,
     ):
         robots = Teleoperation(hand, arm, joints=joints, near=near, silence=silence)
+        controls.enter_context(arm.control())
         session = _Session(robots, f"episode: {task}" if task else "episode")
         print(session.head(keys), file=sys.stderr, flush=True)
+        halted = False
         try:
             while not stop.requested and not session.press(_pressed() if keys else ""):
                 robots.step()
                 session.tell()
+                before, halted = halted, arm.halted is not None
+                if before and not halted:  # a watchdog that halts ends it
+                    controls.close()
+                    controls.enter_context(arm.control())
         except BackendGone as error:
+            session.clear()
             complain(str(error))
             raise typer.Exit(1) from None
         finally:
@@ -82,6 +95,7 @@ class _Session:
         self._shown = 0  # of them
         self._told = ""
         self._tell_at = 0.0
+        self._mark("episode_dropped")  # what a session left open that was killed
 
     def head(self, keys: bool) -> str:
         robots = self._robots
@@ -94,19 +108,28 @@ class _Session:
 
     def press(self, key: str) -> bool:
         """Acts on a key; True if it ends the session."""
-        if key == " ":
+        if key == " " and (self._open or self._robots.engaged):
             self._mark("episode_end" if self._open else self._episode)
             self._open = not self._open
             self._shown += self._open
-        elif key in ("x", "\x7f") and self._open:
-            self._mark("episode_dropped")
+        elif key in ("x", "\x7f"):
+            self._throw_away()
+        elif key == "q" and self._open:
+            self._mark("episode_end")
+            self._open = False
+        return key == "q"
+
+    def _throw_away(self) -> None:
+        if self._open:
             self._open = False
             self._shown -= 1
-        return key == "q"
+            self._mark("episode_dropped")
 
     def tell(self) -> None:
         """Says what has changed; distances again and again while it waits."""
         robots = self._robots
+        if not robots.engaged:
+            self._throw_away()  # a demonstration of a robot that follows nobody
         if robots.engaged:
             state = "follows"
             if self._open:
@@ -130,16 +153,19 @@ class _Session:
         print(f"{begin}{state}", end=end, file=sys.stderr, flush=True)
 
     def end(self) -> None:
-        """Says how late the follower was."""
-        if self._open:
-            with contextlib.suppress(BackendGone):
-                self._mark("episode_end")
-        print(end="\r\033[K" if sys.stderr.isatty() else "", file=sys.stderr, flush=True)
+        """Says how late the follower was. What was not ended by a key is thrown away."""
+        with contextlib.suppress(BackendGone):
+            self._throw_away()
+        self.clear()
         delay = None
         with contextlib.suppress(BackendGone):
             delay = self._robots.delay()
         measured = "not measured: too little motion" if delay is None else str(delay)
         print(f"{self._demonstrations()}; delay from hand to motor {measured}")
+
+    def clear(self) -> None:
+        """Clears the line of the state, in a terminal."""
+        print(end="\r\033[K" if sys.stderr.isatty() else "", file=sys.stderr, flush=True)
 
     def _demonstrations(self) -> str:
         return f"{self._shown} demonstration{'' if self._shown == 1 else 's'}"
@@ -155,8 +181,13 @@ def _keyboard() -> Iterator[bool]:
         yield False
         return
     before = termios.tcgetattr(sys.stdin)
-    try:
+
+    def take(*_: object) -> None:
         tty.setcbreak(sys.stdin)
+
+    signal.signal(signal.SIGCONT, take)  # a shell had the terminal meanwhile
+    try:
+        take()
         yield True
     finally:
         termios.tcsetattr(sys.stdin, termios.TCSADRAIN, before)

@@ -78,7 +78,7 @@ class Episodes:
     frequency: float  #: steps a second [1/s]
     names: Mapping[str, Sequence[str]]  #: of the numbers in desired, observed and extended
     all: Sequence[Episode]
-    left_out: Sequence[str]  #: why an episode is missing, a sentence for each
+    left_out: Sequence[str]  #: why an episode, or the end of one, is missing: a sentence for each
 
 
 def episodes_of(
@@ -104,7 +104,7 @@ def episodes_of(
     found = []
     for span in _spans(recording.marks, chosen.name, begin, end):
         try:
-            found.append(_episode(span, epochs, chosen.name, every, taken))
+            found.append(_episode(span, epochs, chosen.name, every, taken, left_out))
         except InvalidArgument as error:
             left_out.append(str(error))
     if not found:
@@ -164,6 +164,7 @@ def _episode(
     segment: str,
     every: int,
     taken: Mapping["RecordedEpoch", Decisions],
+    left_out: list[str],
 ) -> Episode:
     """Raises InvalidArgument if its rows are not all there."""
     mark = span.marks[0]
@@ -179,8 +180,17 @@ def _episode(
     if not len(rows) or rows.iteration[0] != first:
         raise InvalidArgument(f"{where}: its first row is not in the recording")
     fresh = np.flatnonzero(rows.fresh[1:])
+    is_cut = False
     if len(fresh):
         rows = rows[: 1 + int(fresh[0])]
+        began = int(rows.iteration[-1]) + 1
+        if span.ending is not None and last is not None and last > began:
+            is_cut = True
+            left_out.append(
+                f"{where}: it ends at row {began}, where the robot made a fresh start (a resume, "
+                f"a reset, a request); the rows up to its mark '{span.ending.name}' at row {last} "
+                f"are left out"
+            )
     if len(rows) != rows.iteration[-1] - first + 1:
         raise InvalidArgument(f"{where}: it has a gap")
     steps = (len(rows) - 1) // every
@@ -195,7 +205,7 @@ def _episode(
         rewards=_rewards(span, ending, segment, every, steps),
         seen=seen,
         delays=delays,
-        terminated=ending is not None and not ending.values.get("truncated", False),
+        terminated=ending is not None and not is_cut and not ending.values.get("truncated", False),
         task=task or epoch.schema["robot"],
         values=mark.values,
     )

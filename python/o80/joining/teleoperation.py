@@ -148,15 +148,16 @@ class Teleoperation:
             return False
         is_new, self._last = seen.iteration != self._last, seen.iteration
         why = self._refused()
-        if why or not self.engaged:  # else a pulse says so
+        if why or not self.engaged:  # else a pulse does both
             self._raise_if_the_follower_has_ended()
+            self.follower.keep_alive()
         if why:
             self.engaged, self._near_since, self.why, self.far = False, None, why, {}
             return False
         if not is_new:
             return self.engaged
         wanted = self.targets(seen)
-        jumped = bool(np.any(np.abs(wanted - self._wanted) > self.near))
+        jumped = not bool(np.all(np.abs(wanted - self._wanted) <= self.near))  # or is not finite
         self._wanted = wanted
         if jumped:
             self.engaged, self._near_since = False, None
@@ -231,7 +232,7 @@ class Teleoperation:
 
     def _look_whether_near(self, seen: _core.Observation, wanted: NDArray[np.float64]) -> None:
         here = _places(self.follower.latest(), self._to)
-        distant = np.abs(wanted - here) > self.near
+        distant = ~(np.abs(wanted - here) <= self.near)
         self.far = {
             self.joints[i].follower: (float(wanted[i]), float(here[i]))
             for i in np.flatnonzero(distant)
