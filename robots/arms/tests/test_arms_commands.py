@@ -140,6 +140,41 @@ def test_doubts_about_a_range_name_the_error_of_its_zero() -> None:
     ]
 
 
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("[]", "list indices"),
+        ("{}", "'shoulder_pan' is missing"),
+        ('{"shoulder_pan": {"homing_offset": 0, "range_min": 0}}', "'range_max' is missing"),
+        ("range 2000..2000", "shoulder_pan has offset 0, range 2000..2000"),
+        ("range 1.5..2000", "shoulder_pan has offset 0, range 1.5..2000"),
+    ],
+)
+def test_a_file_that_is_no_calibration_is_refused_with_a_cure(
+    tmp_path: Path, text: str, why: str
+) -> None:
+    file = tmp_path / "black.json"
+    if text.startswith("range"):
+        smallest, largest = text.removeprefix("range ").split("..")
+        numbers = {"homing_offset": 0, "range_min": float(smallest), "range_max": int(largest)}
+        if smallest == "2000":
+            numbers["range_min"] = 2000
+        text = json.dumps(dict.fromkeys(JOINTS, numbers))
+    file.write_text(text)
+    with pytest.raises(calibration.CalibrationError, match="--take NAME") as refused:
+        calibration.read(file)
+    assert why in str(refused.value)
+
+
+def test_nothing_is_written_if_a_servo_cannot_keep_all(arm: FakeArm) -> None:
+    joints = {joint: Calibration(0, 500, 3500) for joint in JOINTS}
+    calibration.write(arm.file, {**joints, "gripper": Calibration(2048, 500, 3500)})
+    before = [servo.shown for servo in arm.servos]
+    refused = run("calibrate", "--write", arm.file, "--port", arm.line.port)
+    assert "keeps offsets of at most 2047, not 2048" in str(refused.exception)
+    assert [servo.shown for servo in arm.servos] == before
+
+
 def test_an_offset_that_a_servo_cannot_keep_is_one_step_less() -> None:
     assert Calibration.of_motion(4095 - 1000, 4095 + 1000).offset == 2047
 

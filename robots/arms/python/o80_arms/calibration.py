@@ -3,7 +3,7 @@
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from pathlib import Path
 from typing import Self
 
@@ -11,6 +11,7 @@ import o80
 from o80_arms.bus import TURN, Bus, DynamixelBus
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
+KEYS = ("homing_offset", "range_min", "range_max")  # in LeRobot's files
 MODEL_RANGES = (220, 200, 194, 190, 320, 110)  # of the published arm [deg]
 
 
@@ -99,13 +100,20 @@ def place_for(name: str, folders: Sequence[str]) -> Path:
 def read(file: Path) -> dict[str, Calibration]:
     """The joints of a file. Raises CalibrationError."""
     try:
-        content = json.loads(file.read_text())
-        return {
-            joint: Calibration(each["homing_offset"], each["range_min"], each["range_max"])
-            for joint, each in ((joint, content[joint]) for joint in JOINTS)
-        }
+        content = json.loads(file.read_text(encoding="utf-8-sig"))
+        joints = {joint: Calibration(*(content[joint][each] for each in KEYS)) for joint in JOINTS}
+        for joint, each in joints.items():
+            numbers = each.offset, each.smallest, each.largest
+            whole = all(isinstance(number, int) for number in numbers)
+            if not whole or not 0 <= each.smallest < each.largest < TURN:
+                raise ValueError(f"{joint} has {each}")
+        return joints
     except (OSError, ValueError, KeyError, TypeError) as error:
-        raise CalibrationError(f"{file} is no calibration of an arm ({error!r})") from None
+        why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
+        raise CalibrationError(
+            f"{file} is no calibration of an arm: {why}. `o80 arms calibrate --take NAME` makes "
+            f"one from what the servos hold"
+        ) from None
 
 
 def write(file: Path, joints: dict[str, Calibration]) -> None:
@@ -114,9 +122,7 @@ def write(file: Path, joints: dict[str, Calibration]) -> None:
         joint: {
             "id": number,
             "drive_mode": 0,
-            "homing_offset": joints[joint].offset,
-            "range_min": joints[joint].smallest,
-            "range_max": joints[joint].largest,
+            **dict(zip(KEYS, astuple(joints[joint]), strict=True)),
         }
         for number, joint in enumerate(JOINTS, 1)
     }

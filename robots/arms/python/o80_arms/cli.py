@@ -14,7 +14,7 @@ import typer
 import o80
 from o80_arms import calibration
 from o80_arms.bus import EVERYBODY, SERVOS, TURN, Bus, BusError, DynamixelBus, bus_at, packet, ports
-from o80_arms.calibration import JOINTS, Calibration
+from o80_arms.calibration import JOINTS, LARGEST_OFFSET, Calibration
 
 app = typer.Typer(help="List arms of bus servos, calibrate them, number their servos.")
 Port = Annotated[Path | None, typer.Option(help="Port of the adapter (default: the only one).")]
@@ -62,7 +62,7 @@ def told_of(port: Path) -> str:
             volts = [bus.read(servo, bus.VOLTAGE) / 10 for servo in servos]
             told.append(f"{min(volts)} V")
             on = sum(bus.read(servo, bus.TORQUE) == 1 for servo in servos)
-            told.append(f"torque on in {on}" if on else "torque off")
+            told.append(f"torque on in {on} of {len(servos)}" if on else "torque off")
             if servos == list(SERVOS):
                 told.append(calibration_of(bus))
             return ", ".join(told)
@@ -126,7 +126,7 @@ def calibrate(
             joints = moved_by_hand(bus) if name else held_by(bus)
             file = calibration.place_for(given[0], folders)
             if file.exists() and calibration.read(file) != joints:
-                file.rename(file.with_suffix(".json.old"))
+                print(f"the one before is now {file.rename(file.with_suffix('.json.old'))}")
             calibration.write(file, joints)
         told = [*(f"{joint:14} {each}" for joint, each in joints.items()), *doubts(bus, joints)]
     print(*told, sep="\n")
@@ -139,6 +139,12 @@ def doubts(bus: Bus, joints: dict[str, Calibration]) -> list[str]:
 
 
 def put(bus: Bus, joints: dict[str, Calibration]) -> None:
+    for joint, each in joints.items():
+        if abs(each.offset) > LARGEST_OFFSET and not isinstance(bus, DynamixelBus):
+            raise BusError(
+                f"{joint}: a servo keeps offsets of at most {LARGEST_OFFSET}, not {each.offset}: "
+                "calibrate the arm anew; nothing was written"
+            )
     for servo, joint in zip(SERVOS, JOINTS, strict=True):
         joints[joint].write(bus, servo)
 

@@ -32,6 +32,10 @@ ServoArm::ServoArm(const Config& config, const ArmKind& kind)
           std::to_string(share));
     }
   }
+  if (!(config.answer_timeout >= 0.0 && config.answer_timeout < 10.0)) {
+    throw InvalidArgument("answer_timeout must be at least 0 and below 10 s, got " +
+                          std::to_string(config.answer_timeout));
+  }
   std::vector<std::string> folders;
   for (const char* const name : kind.names) {
     if (name == nullptr) continue;
