@@ -99,6 +99,11 @@ inline void read_face_line(FaceLine line, Schema& schema) {
   if (what == "face") {
     line(number, schema.head.robot, schema.head.period, schema.head.block);
     if (number != 1) throw InvalidArgument("the face is of another version of o80");
+    const std::int64_t period = schema.head.period;
+    if (period != 0 && (period < 1'000 || period > 1'000'000'000'000)) {
+      throw InvalidArgument("the period of the face must be from 1000 to 1e12 ns, or 0, got " +
+                            std::to_string(period));
+    }
   } else if (what == "field") {  // of the type that follows
     FieldRow& field = schema.fields.emplace_back();
     line(field.name, field.kind, field.offset, field.size, field.rows, field.columns, field.type,

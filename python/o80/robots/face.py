@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from o80.base.errors import InvalidArgument, TimeoutError
+from o80.base.errors import InvalidArgument, TimeoutError, exception_text
 from o80.frontend.frontend import Frontend
 from o80.frontend.segments import segments
 from o80.rows.layout import dtype_of_type
@@ -29,6 +29,7 @@ _INTEGERS = [f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64
 _KINDS = ["bool", *_INTEGERS, "float32", "float64", "enum", "struct"]
 _ORIGINS = ("robot", "clock", "world", "absent")
 _NO_TYPE = 2**32 - 1
+_MOST_OF_A_REASON = 200  # characters
 _BEGIN = "face\t1\t"
 
 
@@ -56,13 +57,18 @@ def _named(name: str, load: Callable[[Any], Any]) -> Any:
     if name.endswith(".json"):
         try:
             return json.loads(Path(name).read_text())
-        except (OSError, ValueError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise InvalidArgument(f"{name} holds no description of a robot: {error}") from None
     file, _, segment = name.rpartition(":") if ".mcap:" in name else (name, "", "")
     if file.endswith(".mcap") or (os.sep in file and Path(file).is_dir()):
         from o80.recording.reader import open as opened
 
-        return opened(file)[segment] if segment else opened(file)
+        recording = opened(file)
+        if segment and segment not in recording:
+            raise InvalidArgument(
+                f"{file} has no segment '{segment}', it has: {', '.join(recording) or 'none'}"
+            )
+        return recording[segment] if segment else recording
     if any(each.name == name and each.alive for each in segments()):
         with contextlib.suppress(TimeoutError), Frontend(name, 0.0, read_only=True) as frontend:
             return frontend.schema
@@ -100,8 +106,11 @@ def text_of_face(schema: Mapping[str, Any]) -> str:
     """The text that include/o80/describe/face.hpp reads."""
     try:
         return "\n".join(_Writer(schema).lines())
-    except (KeyError, TypeError, ValueError, IndexError, AttributeError) as error:
-        raise InvalidArgument(f"the description is not complete: {error!r}") from None
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+        why = exception_text(error)[:_MOST_OF_A_REASON]
+        raise InvalidArgument(f"the description is not complete: {why}") from None
+    except RecursionError:
+        raise InvalidArgument("the description is nested too deeply") from None
 
 
 def is_text_of_face(text: object) -> bool:

@@ -335,6 +335,41 @@ def test_a_damaged_face_is_refused_and_never_crashes(gripping: Path) -> None:
     assert refused > 500
 
 
+@pytest.mark.parametrize("period", [1, -5, 10**18])
+def test_a_face_with_a_period_that_no_loop_has_is_refused(gripping: Path, period: int) -> None:
+    face = {**o80.robots.load(Gripping).describe(), "period": period}
+    with pytest.raises(o80.InvalidArgument, match="the period of the face must be from 1000"):
+        SIMULATION.describe(model=gripping, joints="lift=j2", like=face_text(face))
+
+
+@pytest.mark.parametrize(
+    ("wrong", "why"),
+    [
+        ("[" * 100_000, "holds no description"),
+        ('{"groups": [{"count": 1e400}]}', "not complete"),
+        ('{"groups": [{"name": "a", "count": 1, "array": 0, "type": {"name": "", "size": 8, '
+         '"fields": [{"name": "", "kind": {}, "size": 8, "shape": []}]}}]}', "not complete"),
+        ('{"groups": [{"name": "a", "count": 1, "array": 0, "type": {"name": "", "size": 0, '
+         '"fields": [{"name": "", "kind": "enum", "size": 0, "shape": []}]}}]}', "not complete"),
+    ],
+)  # fmt: skip
+def test_a_broken_file_of_a_face_is_refused_in_words(tmp_path: Path, wrong: str, why: str) -> None:
+    file = tmp_path / "face.json"
+    file.write_text(wrong)
+    with pytest.raises(o80.InvalidArgument, match=why) as refused:
+        face_text(str(file))
+    assert len(str(refused.value)) < 500
+
+
+def test_a_recording_without_the_segment_says_which_it_has(tmp_path: Path) -> None:
+    path = tmp_path / "x.mcap"
+    with SIMULATION.inline(model=TWO_JOINTS) as arm, o80.Recording(path, arm):
+        arm.burst(2)
+        name = arm.segment
+    with pytest.raises(o80.InvalidArgument, match=f"has no segment 'nope', it has: {name}"):
+        o80.face(f"{path}:nope")
+
+
 def test_a_model_that_allows_less_is_refused(tmp_path: Path) -> None:
     model = tmp_path / "narrow.xml"
     narrow = 'name="elbow" range="-90 90"/>'
