@@ -4,14 +4,14 @@ import os
 import random
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
 from test_replay import Flipped, o80_replay
 
 import o80
-from o80.drivers import Reading
+from o80.drivers import Desired, Reading
 from o80.replaying.recorded_run import runs_in
 from o80.replaying.replay import replay_runs
 
@@ -325,3 +325,72 @@ def test_a_driver_may_let_actuators_follow_until_the_next_fresh_start(tmp_path: 
     (part,) = report = o80.replay(path, since=8)
     assert report.identical, report
     assert part.rows < whole.rows - 20
+
+
+class Limp:
+    """A relaxed arm: what it is told is interrupted at once, because nothing would move."""
+
+    actuators = NAMES
+    limits: ClassVar = {
+        "shoulder": o80.Limits(minimum=-3.0, maximum=3.0, speed=2.0, acceleration=40.0),
+        "elbow": o80.Limits(speed=2.0, error=0.3),
+        "wrist": o80.Limits(minimum=-3.0, maximum=3.0, speed=2.0),
+    }
+    requests: ClassVar[dict[str, dict[str, type]]] = {"relax": {}}
+    of_the_world = False
+
+    def __init__(self) -> None:
+        self.relaxed = False
+        self.commanded: list[int] = []
+
+    def write(self, desired: Desired) -> None:
+        self.commanded = np.flatnonzero(desired.active).tolist()
+
+    def read(self, reading: Reading) -> None:
+        sinks = 0.001 * (reading.iteration % 50) if self.relaxed else 0.0
+        reading.observed = [-sinks, sinks, 0.5 * sinks]
+        if self.relaxed:
+            reading.follow()
+            for i in self.commanded:
+                reading.interrupt(i)
+
+    def on_relax(self, _: o80.Record) -> o80.StartAfresh:
+        self.relaxed = True
+        return o80.StartAfresh()
+
+
+@pytest.mark.parametrize("kind", ["set-points", "commands", "trajectories", "chunks", "anything"])
+def test_what_is_interrupted_as_it_begins_is_replayed(kind: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    choose = random.Random(kind)
+
+    def send(arm: o80.Frontend, what: str) -> None:
+        modes: list[Literal["queue", "overwrite"]] = ["queue", "overwrite"]
+        mode = choose.choice(modes)
+        names = choose.sample(NAMES, choose.randrange(1, 4))
+        rows = np.linspace([0.0] * len(names), [choose.uniform(-2, 2)] * len(names), 60)
+        if what == "set-points":
+            arm.add_command(names, list(rows[30]), every=0.01, mode=mode)
+        elif what == "commands":
+            arm.add_command(names, list(rows[-1]), iterations=choose.randrange(1, 200), mode=mode)
+        else:
+            arm.add_trajectory(rows, actuators=names, iterations=2, mode=mode)
+        arm.pulse()
+
+    with o80.robots.load(Limp).inline(frequency=100.0) as arm, o80.Recording(path, arm):
+        arm.burst(5)
+        arm.request("relax")
+        with arm.chunks(["elbow", "wrist"], step=2) as plan:
+            for _ in range(200):
+                what = kind
+                if kind == "anything":
+                    what = choose.choice(["", "set-points", "commands", "trajectories", "chunks"])
+                if what == "chunks":
+                    plan.send(np.linspace([0.0, 0.0], [2.0, 1.0], 60), seen=plan.wait())
+                elif what:
+                    send(arm, what)
+                arm.burst(choose.randrange(1, 4) if kind == "anything" else 1)
+        assert arm.halted is None
+    for driver in (True, False):
+        report = o80.replay(path, robot=f"{__file__}:Limp", driver=driver)
+        assert report.identical, report

@@ -202,7 +202,7 @@ bool UntypedBackend::Body::suits_followers(const StagedBatch& sent) noexcept {
 bool UntypedBackend::Body::may_begin(std::uint32_t actuator, std::uint32_t lane,
                                      CommandId id) noexcept {
   if (recorded_ != nullptr) {
-    if (recorded_->interrupt_due(current) != actuator) return true;
+    if (recorded_->interrupt_due(current, true) != actuator) return true;
     recorded_->interrupt(current, static_cast<std::uint16_t>(actuator), {});
   } else {
     const auto fault = followed_.find_of(actuator);

@@ -111,10 +111,11 @@ bool RecordedDecisions::begins_with_fresh_start(Iteration iteration) const noexc
   return false;
 }
 
-std::optional<std::uint16_t> RecordedDecisions::interrupt_due(Iteration iteration) const noexcept {
+std::optional<std::uint16_t> RecordedDecisions::interrupt_due(Iteration iteration,
+                                                              bool before_step) const noexcept {
   const JournalEntry* entry = next(iteration);
-  const bool is_due =
-      entry != nullptr && entry->kind == JournalKind::interrupted && entry->iteration == iteration;
+  const bool is_due = entry != nullptr && entry->kind == JournalKind::interrupted &&
+                      entry->iteration == iteration && entry->before_step == before_step;
   return is_due ? std::optional(entry->actuator) : std::nullopt;
 }
 

@@ -65,9 +65,9 @@ class RecordedDecisions {
     return !entries_.empty() && entries_.front().kind == JournalKind::fresh_start &&
            entries_.front().follows;
   }
-  /// The next actuator that was interrupted after the step of this iteration. `interrupt` removes
-  /// it.
-  std::optional<std::uint16_t> interrupt_due(Iteration iteration) const noexcept;
+  /// The next actuator that was interrupted in this iteration, before its step or after it.
+  /// `interrupt` removes it.
+  std::optional<std::uint16_t> interrupt_due(Iteration iteration, bool before_step) const noexcept;
 
   // the driver of the replay
   void fresh_start(Iteration iteration);

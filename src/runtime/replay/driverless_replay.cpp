@@ -79,7 +79,7 @@ bool DriverlessReplay::publish() noexcept {
   if (row == nullptr) return false;
   std::memcpy(backend_.observed(), row + layout.observed, layout.block);
   std::memcpy(backend_.extended(), row + layout.extended, layout.extended_size);
-  while (const std::optional<std::uint16_t> actuator = recorded_.interrupt_due(next())) {
+  while (const std::optional<std::uint16_t> actuator = recorded_.interrupt_due(next(), false)) {
     backend_.interrupt(*actuator);
   }
   return backend_.publish();
