@@ -360,7 +360,7 @@ class Limp:
 
 
 @pytest.mark.parametrize("kind", ["set-points", "commands", "trajectories", "chunks", "anything"])
-def test_what_is_interrupted_as_it_begins_is_replayed(kind: str, tmp_path: Path) -> None:
+def test_nothing_drifts_while_a_driver_follows_and_interrupts(kind: str, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     choose = random.Random(kind)
 
@@ -391,6 +391,13 @@ def test_what_is_interrupted_as_it_begins_is_replayed(kind: str, tmp_path: Path)
                     send(arm, what)
                 arm.burst(choose.randrange(1, 4) if kind == "anything" else 1)
         assert arm.halted is None
+        rows = arm.history(since=6)  # the row of the fresh start
+    before, last = rows.observed[:-2], rows.observed[1:-1]
+    moved, active = np.abs(rows.desired[2:] - last), rows.active[2:]
+    assert active.any()
+    assert (moved[~active] == 0.0).all()
+    # a command begins where its actuator was observed, or was desired because it followed
+    assert (moved <= 0.02 + np.abs(last - before) + 1e-9).all(), "one iteration at the speed limit"
     for driver in (True, False):
         report = o80.replay(path, robot=f"{__file__}:Limp", driver=driver)
         assert report.identical, report

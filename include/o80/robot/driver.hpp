@@ -173,8 +173,8 @@ class Reading {
     view_.has_desired = 1;
   }
   /// From this fresh start to the next one every actuator without a command follows the observed
-  /// state, whatever its when_idle: an arm without torque, guided by hand. No effect in other
-  /// readings.
+  /// state, whatever its when_idle, and after interrupt() the next command begins there: an arm
+  /// without torque, guided by hand. No effect in other readings.
   void follow() { view_.follows = fresh() ? 1 : 0; }
   std::byte* desired_bytes() {
     view_.has_desired = fresh() ? 1 : 0;

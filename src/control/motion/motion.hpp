@@ -165,18 +165,25 @@ class Motion {
       }
     }
   }
-  /// One iteration of braking. Numbers with a rest value go to it, unless they are held; if it
-  /// `follows`, the others are at `state`, the observed one. True while a number moves.
+  /// Numbers without a rest value are at `state`, the observed one; the others stay.
+  void follow(std::byte* state) noexcept {
+    for (Number& each : numbers_) {
+      if (each.motion.has_rest()) {
+        publish(each, state);
+      } else {
+        each.motion.restart(layout_.number(each.number, state));
+      }
+    }
+  }
+  /// One iteration of braking, unless it `follows`. Numbers with a rest value go to it, unless they
+  /// are held. True while a number moves.
   bool brake(std::byte* state, bool follows) noexcept {
     bool moves = false;
     for (Number& each : numbers_) {
-      if (follows && !each.motion.has_rest()) {
-        each.motion.restart(layout_.number(each.number, state));
-        continue;
-      }
+      if (follows && !each.motion.has_rest()) continue;
       const double before = each.motion.position();
       moves = each.motion.brake() || moves;
-      if (follows || each.motion.position() != before) publish(each, state);
+      if (each.motion.position() != before) publish(each, state);
     }
     return moves;
   }

@@ -149,11 +149,16 @@ class ActuatorQueue {
     layout_->copy_finite(desired_, state);
     motion_.trace(desired_);
   }
+  /// What comes next begins where it is observed. Numbers with a rest value stay.
+  void begin_at(const std::byte* observed) noexcept {
+    layout_->copy_finite(desired_, observed);
+    in_force_ = false;
+    motion_.follow(desired_);
+  }
   /// For an idle actuator that follows: numbers without a rest value become the observed ones, the
   /// others go to it. True while one of these moves.
   bool follow(const std::byte* observed) noexcept {
-    layout_->copy_finite(desired_, observed);
-    in_force_ = false;
+    begin_at(observed);
     return motion_.brake(desired_, true);
   }
   const StateLayout& layout() const noexcept { return *layout_; }

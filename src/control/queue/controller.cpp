@@ -29,7 +29,7 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
   const auto count = static_cast<std::uint32_t>(schema.actuators.size());
   const std::uint32_t words = mask_words(count);
   for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_, &starved_mask_, &busy_,
-                     &stepped_, &follow_, &dropped_, &of_chunk_}) {
+                     &stepped_, &follow_, &interrupted_, &dropped_, &of_chunk_}) {
     mask->resize(words);
   }
   actuators_.reserve(count);
@@ -75,6 +75,10 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
     const Waiting begun = waiting_.front();
     waiting_.erase(waiting_.begin());
     begin_chunk(begun.group, begun.lane, iteration);
+  }
+  for (std::uint32_t word = 0; all_follow_ && word < interrupted_.size(); ++word) {
+    each_bit(std::exchange(interrupted_[word], 0), word * 64,
+             [&](std::uint32_t i) { actuators_[i].begin_at(of(i, observed)); });
   }
   if (ledger_.open_groups() > 0) step_groups(iteration, observed, late_budget);
   const bool gives = given_.acts(iteration);

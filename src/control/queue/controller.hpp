@@ -92,7 +92,8 @@ class Controller {
     for (std::uint32_t i = 0; i < actuators_.size(); ++i) set(follow_, i, actuators_[i].follows());
     all_follow_ = follows;
     fresh_row_ = row;
-    for (Mask* mask : {&active_mask_, &clamped_mask_, &braking_mask_, &starved_mask_})
+    for (Mask* mask :
+         {&active_mask_, &clamped_mask_, &braking_mask_, &starved_mask_, &interrupted_})
       std::ranges::fill(*mask, 0);
   }
 
@@ -163,9 +164,11 @@ class Controller {
     drop(kEveryActuator, {Status::halted, Reason::halted}, iteration);
   }
   /// Ends all commands of an actuator as interrupted. Targets that have begun no longer reach it.
+  /// While every actuator follows, its next command begins where it is observed.
   void interrupt(std::uint32_t actuator, Iteration iteration) noexcept {
     if (was_given_) set(dropped_, actuator);
     drop(actuator, {Status::interrupted}, iteration);
+    if (all_follow_) each(actuator, [&](std::uint32_t i) { set(interrupted_, i); });
   }
 
   /// Reports the end statuses of dropped commands, at most kStatusesPerIteration minus those that
@@ -334,6 +337,7 @@ class Controller {
   Mask stepped_;                  // has its desired state from given_ already
   Mask follow_;                   // follows the observed state when idle
   bool all_follow_ = false;       // since the last fresh start, whatever the schema says
+  Mask interrupted_;              // while all follow: since the last step
   std::vector<Waiting> waiting_;  // in the order in which they begin
   Mask of_chunk_;                 // actuators of the chunk that is being taken, or of all that wait
   Iteration fresh_row_ = 0;       // of the last fresh start

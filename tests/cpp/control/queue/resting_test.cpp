@@ -76,6 +76,26 @@ TEST(Resting, ADirectValueOfAnotherThatLeavesItOutEndsIt) {
   EXPECT_FALSE(rig.controller.acts(1));
 }
 
+TEST(Resting, OfInterruptedCommandsWhileAllFollowTheFieldGoesOnAndTheOthersBeginAtTheReading) {
+  Rig rig(joint(0.0, {.speed = 1000.0}));
+  rig.controller.restart(rig.observed.data(), nullptr, rig.next, true);
+  double velocity = 0.0;
+  for (int i = 0; i <= 3; ++i) {
+    rig.observe(0, 10.0 * i);
+    rig.add(0, over(10), {0.0, 10.0});
+    rig.pulse();
+    rig.step();
+    EXPECT_DOUBLE_EQ(rig.desired(), 9.0 * i);
+    EXPECT_GT(rig.desired(kVelocity), velocity);
+    EXPECT_LE(rig.desired(kVelocity), velocity + 1.0);
+    velocity = rig.desired(kVelocity);
+    rig.controller.interrupt(0, rig.next - 1);
+  }
+  rig.step();
+  EXPECT_EQ(rig.desired(), 30.0);
+  EXPECT_DOUBLE_EQ(rig.desired(kVelocity), velocity - 1.0);
+}
+
 TEST(Resting, OfAnActuatorThatFollowsTheFieldRestsAndTheOthersFollow) {
   Schema schema = joint(0.0, {.speed = 1000.0});
   schema.actuator(0).when_idle(WhenIdle::follow);
