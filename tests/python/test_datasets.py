@@ -183,6 +183,22 @@ def test_a_recording_without_episodes_is_refused(arm: o80.Frontend, tmp_path: Pa
 # ---------------------------------------------------------------------------- LeRobot
 
 
+def test_thirty_rows_a_second_are_thirty_although_a_period_is_in_whole_ns(
+    segment: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment, frequency=150) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        recording.mark("episode")
+        arm.burst(50)
+    for every, fps in ((5, 30), (7, pytest.approx(150 / 7))):
+        root = tmp_path / f"set{every}"
+        lerobot.write(root, episodes(path, every=every))
+        assert json.loads((root / "meta/info.json").read_text())["fps"] == fps
+
+
 def test_a_lerobot_data_set_has_the_documented_files(recorded: Path, tmp_path: Path) -> None:
     """Checked against the loader of LeRobot: datasets/io_utils.py and dataset_metadata.py."""
     root = tmp_path / "set"
