@@ -79,7 +79,7 @@ def observed(arm: FakeArm) -> list[float]:
 
 
 def registers_of(arm: FakeArm, joint: str) -> dict[str, int]:
-    """What LeRobot sets when it connects."""
+    """Registers that LeRobot sets when it connects."""
     if arm.kind == "koch":
         gains = {"Position_P_Gain": 1500, "Position_I_Gain": 0, "Position_D_Gain": 600}
         mode = {"Operating_Mode": 5 if joint == "gripper" else 4}
