@@ -5,12 +5,13 @@
 #include <algorithm>
 #include <vector>
 
+#include "packet_rig.hpp"
+
 namespace o80::arms::dynamixel {
 namespace {
 
 using testing::ElementsAre;
 using testing::ElementsAreArray;
-using Bytes = std::vector<std::uint8_t>;
 
 Bytes sent(const Requests& requests) { return {requests.bytes().begin(), requests.bytes().end()}; }
 
@@ -22,31 +23,6 @@ Bytes packet(std::uint8_t id, const Bytes& body) {
   whole.push_back(static_cast<std::uint8_t>(sum & 0xFF));
   whole.push_back(static_cast<std::uint8_t>(sum >> 8));
   return whole;
-}
-
-Bytes operator+(Bytes first, const Bytes& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
-
-struct Heard {
-  std::uint8_t id, status;
-  Bytes data;
-  bool operator==(const Heard&) const = default;
-};
-
-/// Answers in bytes that arrive `step` at a time.
-std::vector<Heard> heard(Answers& answers, const Bytes& bytes, std::size_t step) {
-  std::vector<Heard> all;
-  for (std::size_t at = 0; at < bytes.size(); at += step) {
-    const std::size_t count = std::min(step, bytes.size() - at);
-    std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), count, answers.room().begin());
-    answers.arrived(count);
-    while (const auto each = answers.next()) {
-      all.push_back({each->id, each->status, {each->data.begin(), each->data.end()}});
-    }
-  }
-  return all;
 }
 
 TEST(DynamixelRequests, HaveTheSumOfTheManualsPing) {

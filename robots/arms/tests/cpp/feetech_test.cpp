@@ -5,11 +5,12 @@
 #include <algorithm>
 #include <vector>
 
+#include "packet_rig.hpp"
+
 namespace o80::arms::feetech {
 namespace {
 
 using testing::ElementsAre;
-using Bytes = std::vector<std::uint8_t>;
 
 Bytes answer(std::uint8_t id, std::uint8_t status, const Bytes& data) {
   Bytes packet{0xFF, 0xFF, id, static_cast<std::uint8_t>(data.size() + 2), status};
@@ -18,31 +19,6 @@ Bytes answer(std::uint8_t id, std::uint8_t status, const Bytes& data) {
   for (std::size_t i = 2; i < packet.size(); ++i) sum = static_cast<std::uint8_t>(sum + packet[i]);
   packet.push_back(static_cast<std::uint8_t>(~sum));
   return packet;
-}
-
-Bytes operator+(Bytes first, const Bytes& second) {
-  first.insert(first.end(), second.begin(), second.end());
-  return first;
-}
-
-struct Found {
-  std::uint8_t id, status;
-  Bytes data;
-  bool operator==(const Found&) const = default;
-};
-
-/// Answers in bytes that arrive `step` at a time.
-std::vector<Found> found(Answers& answers, const Bytes& bytes, std::size_t step) {
-  std::vector<Found> all;
-  for (std::size_t at = 0; at < bytes.size(); at += step) {
-    const std::size_t count = std::min(step, bytes.size() - at);
-    std::copy_n(bytes.begin() + static_cast<std::ptrdiff_t>(at), count, answers.room().begin());
-    answers.arrived(count);
-    while (const auto each = answers.next()) {
-      all.push_back({each->id, each->status, {each->data.begin(), each->data.end()}});
-    }
-  }
-  return all;
 }
 
 TEST(FeetechRequests, AreThePacketsOfTheManual) {
@@ -79,8 +55,8 @@ TEST(FeetechAnswers, AreFoundInAnyPiecesAndBetweenGarbage) {
                       Bytes{0xFF} + answer(3, 0, {});
   for (std::size_t step = 1; step <= bytes.size(); ++step) {
     Answers answers;
-    EXPECT_THAT(found(answers, bytes, step),
-                ElementsAre(Found{1, 0, {1, 2}}, Found{2, 32, {0xFF, 0xFF, 3}}, Found{3, 0, {}}));
+    EXPECT_THAT(heard(answers, bytes, step),
+                ElementsAre(Heard{1, 0, {1, 2}}, Heard{2, 32, {0xFF, 0xFF, 3}}, Heard{3, 0, {}}));
   }
 }
 
@@ -92,10 +68,10 @@ TEST(FeetechAnswers, AreNeverWrongWithOneBitFlippedAndThoseBehindAreFound) {
     Bytes damaged = first;
     damaged[at / 8] ^= static_cast<std::uint8_t>(1U << at % 8);
     Answers answers;
-    const std::vector<Found> all = found(answers, damaged + more, damaged.size());
+    const std::vector<Heard> all = heard(answers, damaged + more, damaged.size());
     ASSERT_FALSE(all.empty());
     // a length of one more ends with the 0xFF behind it, and the sum is right: it has another size
-    for (const Found& each : all)
+    for (const Heard& each : all)
       ASSERT_TRUE(each.id == 2 || each.data.size() != 6) << "bit " << at;
     // a length that seems greater swallows what follows, but nothing for ever
     ASSERT_GE(all.size(), 2U) << "bit " << at;
