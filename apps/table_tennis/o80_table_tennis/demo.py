@@ -8,7 +8,6 @@ inline. Prints rates, lateness and returns; writes a recording, plots, a film an
 from __future__ import annotations
 
 import shlex
-import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
@@ -240,10 +239,11 @@ def main(
 
 
 def command_of_o80() -> str:
-    """The command that finds the program `o80` beside this Python, in this terminal and folder."""
+    """The path of the program `o80` beside this Python, as one types it in this folder.
+
+    Its name alone is not enough: `make` finds programs that the terminal does not.
+    """
     program = Path(sys.executable).with_name("o80")
-    if shutil.which("o80") == str(program):
-        return "o80"
     inside = program.is_relative_to(Path.cwd())
     return shlex.quote(str(program.relative_to(Path.cwd()) if inside else program))
 
