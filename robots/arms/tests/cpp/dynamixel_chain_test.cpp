@@ -7,6 +7,8 @@
 #include <array>
 #include <vector>
 
+#include "packet_rig.hpp"
+
 namespace o80::arms {
 
 extern std::size_t allocations_of_this_thread();  // feetech_chain_test.cpp counts them
@@ -14,7 +16,6 @@ extern std::size_t allocations_of_this_thread();  // feetech_chain_test.cpp coun
 namespace {
 
 using testing::IsEmpty;
-using Bytes = std::vector<std::uint8_t>;
 
 /// A chain of two servos, and the other end of its line in the same thread: each write(2) of the
 /// chain is one packet there.

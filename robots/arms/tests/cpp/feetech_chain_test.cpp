@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "count_allocations.hpp"
+#include "packet_rig.hpp"
 
 namespace o80::arms {
 
@@ -17,7 +18,6 @@ namespace {
 
 using testing::ElementsAre;
 using testing::IsEmpty;
-using Bytes = std::vector<std::uint8_t>;
 
 constexpr std::int64_t kLong = 60'000'000'000;  // [ns]
 constexpr std::array<int, 2> kGoals{2048, 100};
