@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 import o80
+from o80_arms.dynamixel import KOCH_LEADER
 from o80_arms.fakes import dynamixel, feetech
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
@@ -24,7 +25,7 @@ class FakeArm:
         make: Any = {
             "so101": feetech.FakeChain,
             "koch": dynamixel.FakeChain,
-            "koch_leader": partial(dynamixel.FakeChain, models=dynamixel.LEADER),
+            "koch_leader": partial(dynamixel.FakeChain, models=KOCH_LEADER),
         }[kind]
         self.line: Any = stack.enter_context(make(folder / "tty", tick=1 / 150))
         for number, each in enumerate(calibration().values(), 1):

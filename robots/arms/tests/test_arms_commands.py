@@ -4,6 +4,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import fake_arm
 import numpy as np
@@ -15,6 +16,7 @@ import o80
 from o80_arms import calibration, cli
 from o80_arms.bus import Bus, BusError
 from o80_arms.calibration import Calibration
+from o80_arms.fakes.dynamixel import RATE
 
 
 @pytest.fixture(autouse=True)
@@ -179,31 +181,75 @@ def test_an_offset_that_a_servo_cannot_keep_is_one_step_less() -> None:
     assert Calibration.of_motion(4095 - 1000, 4095 + 1000).offset == 2047
 
 
+@both
 def test_servos_are_numbered_one_after_the_other(
     arm: FakeArm, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("o80_arms.bus.WAIT", 0.3)  # a servo that has another number is silent
-    every = list(arm.line.servos.values())
+    monkeypatch.setattr("o80_arms.bus.DynamixelBus.ALL", 0.1)
+    kind, models = cli.ARMS[arm.kind]
+    every, delivered = list(arm.line.servos.values()), RATE if arm.kind == "koch" else (5, 1)
     for servo in every:
-        servo.put((5, 1), 1)  # as delivered
+        servo.put(servo.ID, 1)
+        servo.put(delivered, 1)
         servo.keep()
-    asked: list[list[int] | None] = [[], None, [1, 1]]  # none, two at once; then what is there
+    plugged: list[dict[int, Any] | None] = []  # one after the other; None: two answer at once
 
-    def answering(line: Bus) -> list[int] | None:
-        return asked.pop(0) if asked else real(line)
+    def found(bus: Bus) -> list[int] | None:
+        now = plugged.pop(0) if plugged else arm.line.servos
+        if now is None:
+            return None
+        arm.line.servos = now
+        while not (there := real(bus)) and now:
+            pass  # a busy machine
+        return there
 
-    real = cli.answering
-    monkeypatch.setattr(cli, "answering", answering)
-    for number in range(6, 0, -1):
-        arm.line.servos = {1: every[number - 1]}
-        with cli.opened(arm.line.port) as bus:
-            cli.give_number(bus, number)
-        assert list(arm.line.servos) == [number]
-        arm.line.unplug(number)
-        arm.line.plug_in(number)
-        assert every[number - 1].get((5, 1)) == number
-        asked = [[number]]  # it is still connected
-    assert capsys.readouterr().out == "Several servos answer: leave one only.\n"
+    real = kind.found
+    monkeypatch.setattr(kind, "found", found)
+    other = every[0]
+    other.put(other.MODEL, 1060)
+    plugged = [{}, None, None, {1: other}]
+    with cli.opened(arm.line.port, kind) as bus:
+        for number in range(6, 0, -1):
+            servo = every[number - 1]
+            plugged.append({1: servo})
+            if number == 6:
+                servo.put(servo.ID, 7)  # whatever it had
+                plugged[-1] = {7: servo}
+            servo.put(servo.MODEL, models[number - 1])
+            before = None if number == 6 else number + 1
+            bus.number(cli.next_servo(bus, models[number - 1], before), number)
+            assert list(arm.line.servos) == [number]
+            arm.line.servos = {number: servo}
+            servo.power_up()
+            assert servo.get(servo.ID) == number
+            assert bus.scan([number]) == [number], "at our rate"
+            plugged = [{number: servo}, {}] if number % 2 else [{number: servo}]
+    told = "Several servos answer: leave one only.\nThis is another: "
+    assert capsys.readouterr().out == f"{told}{kind.MODELS.get(1060, 'model 1060')}.\n"
+
+
+def test_a_servo_with_the_number_of_the_one_before_is_taken_when_that_is_gone(
+    arm: FakeArm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there: list[list[int]] = [[3], [3], [], [3]]
+    with cli.opened(arm.line.port) as bus:
+        monkeypatch.setattr(bus, "found", lambda: there.pop(0))
+        assert cli.next_servo(bus, 777, before=3) == 3
+    assert there == []
+
+
+def test_number_says_which_servo_comes_next(arm: FakeArm, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Bus, "found", lambda bus: sorted(arm.line.servos)[-1:])
+    monkeypatch.setattr(Bus, "number", lambda bus, servo, number: arm.line.servos.pop(servo))
+    monkeypatch.setattr("o80_arms.bus.WAIT", 0.3)  # those that are numbered are silent
+    told = run("number", "so101_leader", "--port", arm.line.port).output.splitlines()
+    assert told[:2] == [
+        "Connect the servo of gripper (STS3215), and no other.",
+        "gripper has the number 6",
+    ]
+    assert told[-1] == "Connect all of them, then `o80 arms calibrate --leader --name NAME`."
+    assert len(told) == 13
 
 
 @both

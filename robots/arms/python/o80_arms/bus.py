@@ -68,15 +68,18 @@ class Bus:
         try:
             fcntl.flock(self._line, fcntl.LOCK_EX | fcntl.LOCK_NB)
             tty.setraw(self._line)
-            attributes = termios.tcgetattr(self._line)
-            attributes[4] = attributes[5] = termios.B1000000
-            termios.tcsetattr(self._line, termios.TCSANOW, attributes)
+            self._set_rate(termios.B1000000)
         except (OSError, termios.error) as error:
             os.close(self._line)
             busy = isinstance(error, OSError) and error.errno in (errno.EAGAIN, errno.EACCES)
             why = "another process has it open" if busy else "it is no serial line of 1 Mbaud"
             raise BusError(f"cannot use {port}: {why}") from None
         self._question = 0
+
+    def _set_rate(self, rate: int) -> None:
+        attributes = termios.tcgetattr(self._line)
+        attributes[4] = attributes[5] = rate
+        termios.tcsetattr(self._line, termios.TCSANOW, attributes)
 
     def close(self) -> None:
         os.close(self._line)
@@ -120,6 +123,24 @@ class Bus:
     def relax(self, servo: int) -> None:
         self.write(servo, self.TORQUE, 0)
 
+    def found(self) -> list[int] | None:
+        """Numbers of the servos that answer a ping to all; None if their answers collide."""
+        received, found = self.answers(packet(EVERYBODY, 1, b"")), []
+        while received:
+            head, received = received[:6], received[6:]
+            if len(head) < 6 or head[:2] != b"\xff\xff" or sum(head[2:]) & 0xFF != 0xFF:
+                return None
+            found.append(head[2])
+        return found
+
+    def number(self, servo: int, number: int) -> None:
+        """Gives a servo its number, for good."""
+        self.write(servo, self.TORQUE, 0)
+        self.write(servo, self.LOCK, 0)
+        self.send(servo, self.ID, number)  # it answers by its new number from here on
+        self.write(number, self.ID, number)
+        self.write(number, self.LOCK, 1)
+
     def read_all(self, servos: list[int], size: int) -> tuple[bytes, int]:
         """The question for the positions of servos and what follows, and the size of its answer."""
         request = packet(EVERYBODY, 0x82, bytes([self.POSITION.address, size, *servos]))
@@ -161,10 +182,10 @@ class Bus:
         whole = begin >= 0 and len(found) == size + 4 and sum(found) & 0xFF == 0xFF
         return found[3:-1] if whole else None
 
-    def answers(self, request: bytes, size: int | None = None) -> bytes:
+    def answers(self, request: bytes, size: int | None = None, wait: float | None = None) -> bytes:
         """All that comes back within the wait; with a size: that many bytes, or none."""
         self._send(request)
-        received = self._received(lambda received: len(received) == size)
+        received = self._received(lambda received: len(received) == size, wait)
         return received if size is None or len(received) == size else b""
 
     def _ask(self, servo: int, instruction: int, parameters: bytes, size: int) -> bytes | None:
@@ -180,8 +201,8 @@ class Bus:
         except OSError:
             raise BusError(f"the adapter {self.port} is gone") from None
 
-    def _received(self, is_enough: Callable[[bytes], bool]) -> bytes:
-        received, end = b"", time.monotonic() + self.wait
+    def _received(self, is_enough: Callable[[bytes], bool], wait: float | None = None) -> bytes:
+        received, end = b"", time.monotonic() + (self.wait if wait is None else wait)
         while not is_enough(received):
             left = end - time.monotonic()
             if left <= 0 or not select.select([self._line], [], [], left)[0]:
@@ -203,6 +224,9 @@ class DynamixelBus(Bus):
     """Questions to Dynamixel servos."""
 
     MODELS: ClassVar = {1060: "XL430-W250", 1190: "XL330-M077", 1200: "XL330-M288"}
+    RATES = (termios.B1000000, termios.B57600, termios.B115200)  # ours, as delivered, another
+    ALL = 0.8  # servos answer a ping to all one after the other, 3 ms for each number [s]
+    RATE, OUR_RATE = Register(8, 1), 3
     FIRMWARE, MODEL, ID = Register(6, 1), Register(0, 2), Register(7, 1)
     SMALLEST, LARGEST, LEAST_VOLTAGE = Register(52, 4), Register(48, 4), Register(34, 2)
     RETURN_DELAY, PHASE, GAIN = Register(9, 1), Register(10, 1), Register(84, 2)
@@ -224,6 +248,29 @@ class DynamixelBus(Bus):
         self.write(servo, self.WATCHDOG, 0)
         if self.read(servo, self.FAILURE):
             self._ask(servo, 8, b"", 0)
+
+    def found(self) -> list[int] | None:
+        """As for others, at any rate; the line has the rate of what is found."""
+        for rate in self.RATES:
+            self._set_rate(rate)
+            received, found = self.answers(dynamixel.packet(EVERYBODY, 1, b""), wait=self.ALL), []
+            while whole := dynamixel.unpacked(received):
+                found.append(whole[0])
+                received = whole[2]
+            if received:
+                return None
+            if found:
+                return found
+        return []
+
+    def number(self, servo: int, number: int) -> None:
+        """Gives a servo its number and our rate, for good."""
+        self.write(servo, self.TORQUE, 0)
+        self.send(servo, self.ID, number)
+        self.write(number, self.ID, number)
+        self.send(number, self.RATE, self.OUR_RATE)
+        self._set_rate(self.RATES[0])
+        self.write(number, self.RATE, self.OUR_RATE)
 
     def read_all(self, servos: list[int], size: int) -> tuple[bytes, int]:
         parameters = self._numbers(self.POSITION.address, size) + bytes(servos)

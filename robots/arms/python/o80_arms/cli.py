@@ -7,15 +7,23 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
 import o80
 from o80_arms import calibration
-from o80_arms.bus import EVERYBODY, SERVOS, TURN, Bus, BusError, DynamixelBus, bus_at, packet, ports
+from o80_arms.bus import SERVOS, TURN, Bus, BusError, DynamixelBus, bus_at, ports
 from o80_arms.calibration import JOINTS, LARGEST_OFFSET, Calibration
+from o80_arms.dynamixel import KOCH, KOCH_LEADER
 
+STS3215 = 777
+ARMS: dict[str, tuple[type[Bus], tuple[int, ...]]] = {
+    "so101": (Bus, (STS3215,) * 6),
+    "so101_leader": (Bus, (STS3215,) * 6),
+    "koch": (DynamixelBus, KOCH),
+    "koch_leader": (DynamixelBus, KOCH_LEADER),
+}
 app = typer.Typer(help="List arms of bus servos, calibrate them, number their servos.")
 Port = Annotated[Path | None, typer.Option(help="Port of the adapter (default: the only one).")]
 
@@ -193,44 +201,46 @@ def pressed_enter() -> bool:
 
 
 @app.command()
-def number(port: Port = None) -> None:
-    """Number the Feetech servos of a kit: connect one after the other, each alone."""
-    with opened(port, Bus) as bus:
+def number(
+    arm: Annotated[
+        Literal["so101", "so101_leader", "koch", "koch_leader"],
+        typer.Argument(help="Of which the servos are."),
+    ] = "so101",
+    port: Port = None,
+) -> None:
+    """Number the servos of a kit: connect one after the other, each alone."""
+    kind, models = ARMS[arm]
+    before = None
+    with opened(port, kind) as bus:
         for servo, joint in reversed(list(zip(SERVOS, JOINTS, strict=True))):
-            print(f"Connect the servo of {joint}, and no other.", flush=True)
-            give_number(bus, servo)
+            needed = bus.MODELS[models[servo - 1]]
+            print(f"Connect the servo of {joint} ({needed}), and no other.", flush=True)
+            bus.number(next_servo(bus, models[servo - 1], before), servo)
             print(f"{joint} has the number {servo}", flush=True)
-    print("Connect all of them, then `o80 arms calibrate --name NAME`.")
+            before = servo
+    leader = " --leader" if arm.endswith("leader") else ""
+    print(f"Connect all of them, then `o80 arms calibrate{leader} --name NAME`.")
 
 
-def give_number(bus: Bus, servo: int) -> None:
-    """Waits until one servo is there that was not there before, and numbers it."""
-    told = False
+def next_servo(bus: Bus, model: int, before: int | None) -> int:
+    """Waits until one servo is there, of this model, that is not the one before; its number."""
+    told = set()
     while True:
-        found = answering(bus)
-        if found is None or len(found) > 1:
-            if not told:
-                print("Several servos answer: leave one only.", flush=True)
-            told = True
-        elif found and found[0] != servo + 1:  # the one before may still be connected
-            break
-    bus.write(found[0], bus.TORQUE, 0)
-    bus.write(found[0], bus.LOCK, 0)
-    bus.send(found[0], bus.ID, servo)  # it answers by its new number from here on
-    bus.write(servo, bus.ID, servo)
-    bus.write(servo, bus.LOCK, 1)
-
-
-def answering(bus: Bus) -> list[int] | None:
-    """Numbers of the servos that answer a ping to all; None if their answers collide."""
-    received = bus.answers(packet(EVERYBODY, 1, b""))
-    found = []
-    while received:
-        head, received = received[:6], received[6:]
-        if len(head) < 6 or head[:2] != b"\xff\xff" or sum(head[2:]) & 0xFF != 0xFF:
-            return None
-        found.append(head[2])
-    return found
+        found = bus.found()
+        if found == []:
+            before = None  # it was disconnected
+            continue
+        doubt = "Several servos answer: leave one only."
+        if found and len(found) == 1:
+            if found[0] == before:
+                continue
+            its = bus.read(found[0], bus.MODEL)
+            if its == model:
+                return found[0]
+            doubt = f"This is another: {bus.MODELS.get(its, f'model {its}')}."
+        if doubt not in told:
+            print(doubt, flush=True)
+        told.add(doubt)
 
 
 @app.command()

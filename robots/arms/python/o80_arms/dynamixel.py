@@ -1,5 +1,8 @@
 """Packets of Dynamixel servos: `FF FF FD 00 id length instruction parameters crc`."""
 
+XL430, XL330_WEAK, XL330 = 1060, 1190, 1200
+KOCH, KOCH_LEADER = (XL430, XL430, XL330, XL330, XL330, XL330), (XL330_WEAK,) * 6
+
 
 def packet(servo: int, instruction: int, parameters: bytes) -> bytes:
     body = stuffed(bytes([instruction]) + parameters)

@@ -1,9 +1,10 @@
 """Dynamixel servos of the X series on a pseudo-terminal."""
 
+import termios
 from pathlib import Path
 from typing import ClassVar
 
-from o80_arms.dynamixel import has_crc, packet, unstuffed
+from o80_arms.dynamixel import KOCH, XL430, has_crc, packet, unstuffed
 from o80_arms.fakes import chain
 from o80_arms.fakes.chain import EVERYBODY, Register
 
@@ -14,9 +15,7 @@ LARGEST, SMALLEST, SHUTDOWN = (48, 4), (52, 4), (63, 1)
 ANSWERS, FAILURE, WATCHDOG, PWM, CURRENT = (68, 1), (70, 1), (98, 1), (100, 2), (102, 2)
 ACCELERATION, SPEED, MOVED = (108, 4), (112, 4), (128, 4)
 GOALS = (100, 102, 104, 116)  # registers that a stop by the watchdog locks
-XL430, XL330 = 1060, 1200
-KOCH = (XL430, XL430, XL330, XL330, XL330, XL330)
-LEADER = (1190,) * 6
+RATE, RATES = (8, 1), {termios.B57600: 1, termios.B115200: 2, termios.B1000000: 3}
 SPEED_UNIT, ACCELERATION_UNIT = 0.229 * 4096 / 60, 214.577 * 4096 / 3600  # [steps/s, /s^2]
 RANGE_ERROR, ACCESS_ERROR, ALERT = 4, 7, 128
 RESTART = 0.05  # [s]
@@ -30,6 +29,7 @@ class FakeServo(chain.FakeServo):
     KEPT = 64
     AS_DELIVERED: ClassVar[dict[Register, int]] = {
         FIRMWARE: 50,
+        RATE: 1,
         RETURN_DELAY: 250,
         MODE: 3,
         HOTTEST: 70,
@@ -158,7 +158,15 @@ class FakeChain(chain.FakeChain[FakeServo]):
         bus_time: bool = False,
     ) -> None:
         servos = [FakeServo(number, model) for number, model in enumerate(models, 1)]
+        for servo in servos:
+            servo.put(RATE, 3)  # as it is numbered
+            servo.keep()
         super().__init__(port, servos, tick=tick, latency=latency, bus_time=bus_time)
+
+    def _hears(self, number: int) -> bool:
+        """Also: the line has the rate of the servo."""
+        rate = RATES.get(termios.tcgetattr(self._master)[5])
+        return super()._hears(number) and self.servos[number].get(RATE) == rate
 
     def _requests(self, received: bytearray) -> list[bytes]:
         found = []
@@ -201,6 +209,7 @@ class FakeChain(chain.FakeChain[FakeServo]):
                 data = servo.read(two[0], two[1])
             elif instruction == 3:
                 servo.write(two[0], parameters[2:])
+                self.servos = {each.get(each.ID): each for each in self.servos.values()}
             elif instruction == 8:
                 servo.restart()
             wanted = answers == 2 or instruction in (1, 2)
