@@ -128,6 +128,10 @@ class Page:
             time.sleep(0.05)
         raise AssertionError(f"not in {timeout} s: {script}; the page says: {self.text()}")
 
+    def wait_for_text(self, text: str) -> None:
+        """Waits until this stands on the page."""
+        self.wait_for(f"document.body.innerText.includes({json.dumps(text)})")
+
     def text(self) -> str:
         """All visible text."""
         found: str = self.value("document.body.innerText")

@@ -230,10 +230,10 @@ def available() -> list[str]:
     return [name for name in CONDITIONS if not lacking.get(name, False)]
 
 
-def python_files() -> list[str]:
-    """Files that pytest collects by default."""
+def python_files(mark: str) -> list[str]:
+    """Files with tests of this mark."""
     listed = subprocess.run(
-        [*PYTHON, "pytest", "--collect-only", "-qq", "-m", "not check"],
+        [*PYTHON, "pytest", "--collect-only", "-qq", "-m", mark],
         cwd=ROOT,
         capture_output=True,
         text=True,
@@ -245,18 +245,19 @@ def python_files() -> list[str]:
 
 def commands_of(this: Round, chosen: argparse.Namespace) -> dict[str, list[str]]:
     """The two runners, by name."""
-    cpp = ["ctest", "--preset", "dev", "-j", str(JOBS), "-LE", "^check$"]
+    mark = "check" if chosen.check else "not check"
+    cpp = ["ctest", "--preset", "dev", "-j", str(JOBS), "-L" if chosen.check else "-LE", "^check$"]
     cpp += ["--output-junit", str(this.folder / "cpp.xml")]
     if chosen.cpp:
         cpp += ["-R", chosen.cpp]
     one_of = max(1, round(1.0 / chosen.share))
     if one_of > 1:
         cpp += ["-I", f"{this.random.randint(1, one_of)},,{one_of}"]
-    python = [*PYTHON, "pytest", "-n", str(JOBS + 1), "--dist", "loadfile", "-m", "not check"]
+    python = [*PYTHON, "pytest", "-n", str(JOBS + 1), "--dist", "loadfile", "-m", mark]
     python += [f"--junit-xml={this.folder / 'python.xml'}"]
     files = list(chosen.python)
     if not files and (this.shuffled or one_of > 1):
-        files = python_files()
+        files = python_files(mark)
         files = sorted(this.random.sample(files, max(1, len(files) // one_of)))
     if this.shuffled:
         cpp += ["--schedule-random"]
@@ -312,6 +313,7 @@ def main() -> int:
     parser.add_argument("--conditions", nargs="+", choices=CONDITIONS, help="all of these at once")
     parser.add_argument("--cpp", metavar="PATTERN", help="tests in C++ whose name matches")
     parser.add_argument("--python", nargs="+", default=[], metavar="FILE", help="tests in Python")
+    parser.add_argument("--check", action="store_true", help="the tests that `make check` adds")
     parser.add_argument("--share", type=float, default=1.0, help="part of the tests in each round")
     chosen = parser.parse_args()
     if not 0.0 < chosen.share <= 1.0:

@@ -85,11 +85,8 @@ def test_a_page_shows_the_robot_its_curves_and_its_state(browser: Chromium, segm
             page.wait_for("page.scene.frames > 0")
             print(f"answer after {answered:.2f} s, pose after {time.monotonic() - begin:.2f} s")
             page.wait_for(SHOWN)
-            text = page.text()
-            assert f"Halt {segment}" in text
-            assert "of 200 Hz" in text
-            assert "overruns" in text
-            assert "observed 0.6" in text
+            for text in (f"Halt {segment}", "of 200 Hz", "overruns", "observed 0.6 rad"):
+                page.wait_for_text(text)
             assert page.value(COLOURS) > 20, "robot, floor and background"
             # the pose of the first body: turned about y by what the shoulder says
             page.wait_for(f"Math.abs({POSE}[5] - Math.sin(0.3)) < 1e-4")
@@ -136,7 +133,7 @@ def test_the_halt_button_halts_and_the_resume_button_resumes(
         halt = arm.halted
         assert halt is not None
         assert halt.text == "from o80 view"
-        assert "halted by pid" in page.text()
+        page.wait_for_text("halted by pid")
         click(page, "resume")
         page.wait_for("document.getElementById('resume').hidden")
         assert arm.halted is None
@@ -188,7 +185,7 @@ def test_robots_of_one_world_stand_in_one_scene(browser: Chromium, segment: str)
         page.value(f"{box.format(first)}.click()")
         page.wait_for("page.scene.robots.size === 2")
         page.value(f"page.choose('{plain}')")
-        page.wait_for("document.body.innerText.includes('so it is not drawn')")
+        page.wait_for_text("so it is not drawn")
         assert page.value("page.scene.robots.size") == 2, "others are, and the page says so"
         page.close()
 
@@ -241,7 +238,7 @@ def test_the_slider_goes_back_through_the_ring_and_live_returns(
         page.wait_for("page.timeline.at !== null && page.answer.last - page.answer.at > 0.01")
         shown = arm.history(since=page.value("page.answer.iteration"))[0]
         assert page.value("page.answer.values.elbow.observed") == shown.observed[1]
-        assert "s ago" in page.text()
+        page.wait_for_text("s ago")
         before = page.value("page.answer.last")
         page.wait_for(f"page.answer.last > {before}")  # the robot goes on
         assert page.value("page.answer.iteration") == shown.iteration
@@ -275,17 +272,17 @@ def test_a_page_that_stalled_shows_a_fresh_row_at_once(
 def test_another_robot_that_takes_the_name_is_shown_anew(browser: Chromium, segment: str) -> None:
     with page_server([segment]) as server:
         page = browser.page(server.url)
-        page.wait_for("document.body.innerText.includes('waiting')")
+        page.wait_for_text("waiting")
         with o80.robots.load("two_joints").inline(segment):
             page.wait_for(SHOWN)
             assert page.value("page.scene.geoms.length") == 7
-        page.wait_for("document.body.innerText.includes('stopped')")
+        page.wait_for_text("stopped")
         assert page.value("document.getElementById('halt').disabled")
         with o80.Backend(segment, actuators=["<b>lift</b>"]) as backend:
             backend.publish([2.5])
             page.wait_for("page.charts.length && page.charts[0].name.includes('lift')")
-            assert "<b>lift</b>" in page.text(), "names are text, never HTML"
-            assert "names no model" in page.text()
+            page.wait_for_text("<b>lift</b>")  # names are text, never HTML
+            page.wait_for_text("names no model")
             assert page.value("page.scene.canvas.hidden")
         page.close()
 
@@ -302,7 +299,7 @@ def test_a_recording_is_played_and_scrubbed(
         page.wait_for(SHOWN)
         page.wait_for("page.answer.iteration > 0")
         assert page.value("document.getElementById('halt').disabled")
-        assert "4001 rows" in page.text()
+        page.wait_for_text("4001 rows")
         click(page, "play")
         page.wait_for("!page.timeline.playing")
         scrub(page, 1.0)
@@ -473,5 +470,5 @@ def test_a_page_says_when_its_server_has_ended(browser: Chromium, arm: o80.Front
     with page_server([arm.segment]) as server:
         page = browser.page(server.url)
         page.wait_for(SHOWN)
-    page.wait_for("document.body.innerText.includes('No answer')")
+    page.wait_for_text("No answer")
     page.close()
