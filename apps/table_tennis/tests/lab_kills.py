@@ -126,9 +126,12 @@ class Killer:
             outcome.stood_still.append(name)
 
     def _start_again(self, kill: Kill, outcome: Outcome) -> None:
-        lab, name = self._lab, kill.killed
+        lab, name, recording = self._lab, kill.killed, self._lab.settings.recording
+        size = recording.stat().st_size
         lab.processes.start((name,))
         lab.processes.wait_until_running(WITHIN)
+        if name == RECORDER:  # a lab that ends before would end it, too
+            wait_until(lambda: recording.stat().st_size > size, "the recorder goes on")
         lab.events.add(name, "started again")
         wait_until(lambda: self._nobody_misses(kill), f"{name} is missed no more")
         outcome.joined = True
