@@ -97,6 +97,28 @@ def test_a_late_first_answer_begins_where_the_arm_stands(arm: o80.Frontend) -> N
     assert arm.history().desired[[461, 471, 481, 491, 501]].tolist() == ROWS.tolist()
 
 
+def test_a_wait_is_a_sign_of_life_for_each_row_and_says_when_the_robot_is_halted(
+    segment: str,
+) -> None:
+    with o80.Backend(segment, ["lift"], silence=5) as backend:
+        backend.publish([0.0])
+        arm = o80.Frontend(segment)
+        plan = arm.chunks(step=2, ease=2)
+        plan.send([[0.1], [0.2]], seen=arm.latest())
+        for _ in range(30):  # the plan runs dry, and no answer comes
+            backend.publish(backend.step())
+            assert plan.wait(lead=100, timeout=0.0).iteration == arm.published
+        assert plan.starved
+        assert arm.halted is None
+        with pytest.raises(o80.TimeoutError):
+            plan.wait(lead=100, timeout=0.0)  # this row was returned
+        while arm.halted is None:
+            backend.publish(backend.step())
+        with pytest.raises(o80.BackendHalted, match=rf"'{segment}' is halted \(.*`resume` it"):
+            plan.wait(lead=100, timeout=0.0)
+        arm.close()
+
+
 def test_the_row_of_a_camera_is_an_anchor(process: o80.robots.Process) -> None:
     with process.frontend() as arm, o80.Backend(f"{process.segment}-camera", ["lens"]) as camera:
         arm.wait_for(20, WAIT)
@@ -681,6 +703,7 @@ def test_a_plan_that_cannot_be_is_refused_when_it_is_opened(
         ({"due": [9, 10.7]}, "due must be a list of whole numbers"),
         ({"weights": "ab"}, "weights must be finite numbers, got 'ab'"),
         ({"weights": [1.0, float("nan")]}, "weights must be finite numbers"),
+        ({"weights": [1.0, 1.5]}, r"weights are shares from 0 to 1, got \[1\.0, 1\.5\]"),
     ],
 )
 def test_options_of_a_chunk_that_cannot_be_are_refused(

@@ -252,14 +252,106 @@ def test_a_folder_that_exists_is_not_overwritten(recorded: Path, tmp_path: Path)
             module.write(tmp_path, episodes(recorded))
 
 
+def test_the_latency_of_another_episode_or_of_an_order_that_says_nothing_is_not_known(
+    segment: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        for _ in range(2):
+            recording.mark("episode")
+            arm.burst(2)  # nothing was sent yet
+            arm.add_command("elbow", 0.1, iterations=20)
+            arm.burst(2, seen=arm.latest())
+            arm.mark("a note changes nothing")
+            arm.burst(1)
+            arm.add_command("elbow", 0.2, iterations=20)
+            arm.burst(2)
+            recording.mark("episode_end")
+            arm.request("reset", seed=1)
+            arm.burst(1)
+    for episode in episodes(path).all:
+        assert np.isfinite(episode.delays).tolist() == [False] * 2 + [True] * 3 + [False] * 2
+
+
+def test_in_real_time_the_latency_is_that_of_the_clock(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    latencies = []
+    with (
+        o80.robots.load("two_joints").start(segment) as process,
+        process.frontend() as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        recording.mark("episode")
+        for place in (0.1, 0.2, 0.3):
+            seen = arm.wait_for(arm.published + 20, 60.0)
+            arm.add_command("elbow", place, iterations=5)
+            batch = arm.pulse(seen=seen)
+            batch.wait(60.0)
+            latencies.append(batch.decision_latency)
+        recording.mark("episode_end")
+    (episode,) = episodes(path).all
+    for latency in latencies:
+        assert latency is not None
+        assert latency.seconds is not None
+        assert np.isclose(episode.delays, latency.seconds, rtol=0, atol=1e-9).any(), latency
+
+
+def test_a_learner_gets_no_times_of_clocks_unless_it_asks(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    sensors = {"force": (np.float64, 2), "capture_time": np.int64, "heat": np.float64}
+    with o80.Backend(segment, ["lift"], extended=sensors) as backend:
+
+        def publish(time: int) -> None:
+            backend.publish([0.0], {"force": [1.0, 2.0], "capture_time": time, "heat": 30.0})
+
+        publish(10**9)
+        with o80.Recording(path, segment) as recording:
+            recording.mark("episode")
+            for time in range(4):
+                backend.step()
+                publish(10**9 + 1 + time)
+            recording.mark("episode_end")
+    assert episodes(path).names["extended"] == ["force[0]", "force[1]", "heat"]
+    found = episodes(path, fields=["capture_time", "force"])
+    assert found.names["extended"] == ["force[0]", "force[1]", "capture_time"]
+    assert found.all[0].extended[1].tolist() == [1.0, 2.0, 10**9 + 1]
+    with pytest.raises(o80.InvalidArgument, match=r"has no field 'fource'\. Did you mean 'force'"):
+        episodes(path, fields=["fource"])
+
+
+def test_marks_that_look_like_those_of_episodes_are_named(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        for mark in ("episode: one", "episode:two", "Episode", "touched", "episode-end"):
+            recording.mark(mark)
+            arm.burst(5)
+        recording.mark("episode_end")
+    found = episodes(path)
+    assert len(found.all) == 1
+    assert [said.partition(", ")[0] for said in found.left_out] == [
+        "the mark 'episode:two' at row 5",
+        "the mark 'Episode' at row 10",
+        "the mark 'episode-end' at row 20",
+    ]
+
+
 # ---------------------------------------------------------------------------- Minari
 
 
-def test_minari_reads_its_data_set(recorded: Path, tmp_path: Path) -> None:
+def test_minari_reads_its_data_set(
+    recorded: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     from minari import MinariDataset
 
     found = episodes(recorded)
-    minari.write(tmp_path / "set", found)
+    monkeypatch.chdir(tmp_path)
+    minari.write(Path("set"), found)
     read = MinariDataset(tmp_path / "set/data")
 
     assert read.total_episodes == 3

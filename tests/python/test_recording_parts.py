@@ -58,6 +58,7 @@ def test_a_stretch_of_time_is_cut_and_replayed(day: Path, segment: str, tmp_path
         assert read[name].epochs[0].gaps == [Gap(0, expected.iteration[0] - 1, "cut away")]
         assert read[name].epochs[0].provenance == epoch.provenance
     begin, end = (first + round(s * 1e9) for s in (0.7, 2.6))
+    assert [mark.row_time for mark in whole.marks] == [log_time(whole, m) for m in whole.marks]
     numbers = [m.values["number"] for m in whole.marks if begin <= log_time(whole, m) <= end]
     assert [mark.values["number"] for mark in read.marks] == numbers
     assert 1 in numbers
@@ -182,3 +183,15 @@ def test_a_robot_without_a_model_gets_no_transforms(
             assert "/tf" not in reader.topics
         complained = f"no transforms of '{segment}': the model" in capsys.readouterr().err
         assert complained == bool(model)
+
+
+def test_a_part_of_a_robot_that_nobody_commanded_has_its_journal(
+    segment: str, tmp_path: Path
+) -> None:
+    load = o80.robots.load("two_joints").inline
+    with load(segment) as arm, o80.Recording(tmp_path / "whole.mcap", arm):
+        arm.burst(50)
+    cut(tmp_path / "whole.mcap", tmp_path / "part.mcap", "0", "100")
+    assert o80.open(tmp_path / "part.mcap")[segment].epochs[0].has_journal
+    with pytest.raises(o80.InvalidArgument, match=r"--from 100 is behind the end: .* s$"):
+        cut(tmp_path / "whole.mcap", tmp_path / "no.mcap", "100")

@@ -269,6 +269,15 @@ def test_a_leader_that_halts_or_ends_halts_the_follower(segment: str, how: str) 
         assert arm.halted.text == f"the leader '{segment}-1' {said}"
 
 
+def test_a_leader_without_rows_has_no_delay(segment: str) -> None:
+    with (
+        leader(f"{segment}-1") as backend,
+        o80.Frontend(f"{segment}-1") as hand,
+        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+    ):
+        assert engaged_by(backend, hand, arm).delay(seconds=0.0) is None
+
+
 def test_while_the_follower_is_halted_it_waits_for_rows_of_the_leader(segment: str) -> None:
     with (
         o80.robots.load(Arm).inline(f"{segment}-1") as hand,

@@ -34,7 +34,11 @@ def export(
     ],
     segment: Annotated[str | None, typer.Option(help="Only this segment of a recording.")] = None,
     fields: Annotated[
-        str, typer.Option(help="Only these, for example observed.elbow,extended.effort")
+        str,
+        typer.Option(
+            help="Only these, for example observed.elbow,extended.effort; with --format: of the "
+            "sensor values"
+        ),
     ] = "",
     form: Annotated[
         Format | None,
@@ -49,9 +53,7 @@ def export(
     With --format, the episodes of a recording as a data set for learning: see docs/recording.md.
     """
     if form is not None:
-        if fields:
-            raise InvalidArgument("--fields is for rows: leave it out with --format")
-        _export_episodes(source, output, segment, form, every)
+        _export_episodes(source, output, segment, form, every, _listed(fields))
         return
     if every != 1:
         raise InvalidArgument("--every is for data sets: give --format lerobot or minari too")
@@ -66,19 +68,23 @@ def export(
         for each in found
     }
     with writing(output):
-        write(output, named, [field for field in fields.split(",") if field])
+        write(output, named, _listed(fields))
     for name, history in named.items():
         print(f"{name}: {len(history)} rows in {output}")
 
 
+def _listed(fields: str) -> list[str]:
+    return [field for field in fields.split(",") if field]
+
+
 def _export_episodes(
-    source: str, output: Path, segment: str | None, form: Format, every: int
+    source: str, output: Path, segment: str | None, form: Format, every: int, fields: list[str]
 ) -> None:
     from o80.datasets import lerobot, minari
     from o80.datasets.episodes import episodes_of
     from o80.recording.reader import open as open_recording
 
-    episodes = episodes_of(open_recording(source), segment, every=every)
+    episodes = episodes_of(open_recording(source), segment, every=every, fields=fields)
     write = {Format.LEROBOT: lerobot.write, Format.MINARI: minari.write}[form]
     with writing(output):
         write(output, episodes)

@@ -79,8 +79,8 @@ def _print_marks(marks: list[Mark]) -> None:
             if i == MARKS_AT_ENDS:
                 print(f"  ... {skipped} more, see o80.open(...).marks")
             continue
-        local = time.localtime(mark.time * 1e-9)
-        clock = f"{time.strftime('%H:%M:%S', local)}.{mark.time // 10**6 % 1000:03d}"
+        local = time.localtime(mark.row_time * 1e-9)
+        clock = f"{time.strftime('%H:%M:%S', local)}.{mark.row_time // 10**6 % 1000:03d}"
         values = ", ".join(f"{name}={_brief(value)}" for name, value in mark.values.items())
         print(plain(f"  {clock}  {mark.name}  {values}").rstrip())
 

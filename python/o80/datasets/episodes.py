@@ -3,7 +3,7 @@
 The rules are in docs/recording.md, Export for learning.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 from o80.base.argument_checks import whole
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument
-from o80.rows.columns import columns_of
+from o80.rows.columns import Column, chosen, columns_of
 from o80.rows.history import History, values_of
-from o80.rows.journal import Decisions, decisions
 
 if TYPE_CHECKING:
+    import o80._core as _core
     from o80.recording.marks import Mark
     from o80.recording.reader import RecordingFile
     from o80.recording.recorded_epoch import RecordedEpoch
@@ -42,6 +42,7 @@ class Episode:
     terminated: bool  #: it ended by itself; else it was cut off
     task: str
     values: Mapping[str, Any]  #: of the mark before it
+    sensors: Sequence[Column]  #: the columns of `extended`
 
     def __len__(self) -> int:
         return len(self.rewards)
@@ -49,20 +50,19 @@ class Episode:
     @cached
     def observed(self) -> NDArray[np.float64]:
         """The observed states: (T + 1, numbers)."""
-        return self._numbers("observed")
+        return self._numbers(_columns(self.rows.schema, "observed"))
 
     @cached
     def extended(self) -> NDArray[np.float64]:
         """Further sensor values: (T + 1, numbers)."""
-        return self._numbers("extended")
+        return self._numbers(self.sensors)
 
     @cached
     def actions(self) -> NDArray[np.float64]:
         """Actions of all steps, the desired states: (T, numbers)."""
-        return self._numbers("desired")[1:]
+        return self._numbers(_columns(self.rows.schema, "desired"))[1:]
 
-    def _numbers(self, part: str) -> NDArray[np.float64]:
-        columns = [each for each in columns_of(self.rows.schema) if _part(each.name) == part]
+    def _numbers(self, columns: Sequence[Column]) -> NDArray[np.float64]:
         numbers = np.empty((len(self.rows), len(columns)))
         for i, column in enumerate(columns):
             numbers[:, i] = values_of(self.rows, column)
@@ -88,38 +88,43 @@ def episodes_of(
     every: int = 1,
     begin: str = BEGIN,
     end: str = END,
+    fields: Sequence[str] = (),
 ) -> Episodes:
     """The episodes of one segment of a recording.
 
     segment: may be left out if there is only one with actuators.
     every: a step is so many iterations.
     begin, end: names of the marks before and after an episode.
+    fields: of the sensor values, such as "measured.velocity" (empty: all but times of clocks, and
+        what a twin lacks).
     Raises InvalidArgument.
     """
     every = whole(every, "every", 1)
-    chosen = recording[_segment(recording, segment)]
-    epochs = [epoch for epoch in chosen.epochs if epoch.rows]
-    taken = {epoch: decisions(epoch.native_journal()) for epoch in epochs}
-    left_out: list[str] = []
+    robot = recording[_segment(recording, segment)]
+    epochs = [epoch for epoch in robot.epochs if epoch.rows]
+    taken = {epoch: _Orders.of(epoch.native_journal()) for epoch in epochs}
+    _sensors(robot.name, robot.schema, fields)  # refuses fields that it lacks
+    usual = (begin, end) == (BEGIN, END)
+    left_out = _misspelt(recording.marks, robot.name) if usual else []
     found = []
-    for span in _spans(recording.marks, chosen.name, begin, end):
+    for span in _spans(recording.marks, robot.name, begin, end):
         try:
-            found.append(_episode(span, epochs, chosen.name, every, taken, left_out))
+            found.append(_episode(span, epochs, robot.name, every, taken, fields, left_out))
         except InvalidArgument as error:
             left_out.append(str(error))
     if not found:
         why = f": {left_out[0]}" if left_out else f": it has no mark '{begin}'"
         raise InvalidArgument(
-            f"{recording.path} holds no episode of '{chosen.name}'{why}. While it is recorded, "
-            f"mark the beginning of each: `o80 mark {chosen.name} {begin}` in a terminal, a key of "
+            f"{recording.path} holds no episode of '{robot.name}'{why}. While it is recorded, "
+            f"mark the beginning of each: `o80 mark {robot.name} {begin}` in a terminal, a key of "
             f'`o80 teleop`, or recording.mark("{begin}") in a program'
         )
     schema = found[0].rows.schema
     return Episodes(
-        segment=chosen.name,
+        segment=robot.name,
         robot=schema["robot"],
         frequency=1e9 / (schema["period"] * every),
-        names=_names(schema),
+        names=_names(schema, found[0].sensors),
         all=found,
         left_out=left_out,
     )
@@ -158,12 +163,26 @@ def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Itera
         yield _Span(number, open_at, None, None, False)
 
 
+def _misspelt(marks: Sequence["Mark"], segment: str) -> list[str]:
+    """Sentences about marks that look like those of episodes, and are none."""
+    return [
+        f"the mark '{mark.name}' at row {mark.rows[segment]}, which neither begins nor ends an "
+        f"episode: marks are '{BEGIN}', '{BEGIN}: TASK', '{END}' and '{BEGIN}{DROPPED}'"
+        for mark in marks
+        if segment in mark.rows
+        and mark.name.lower().startswith(BEGIN)
+        and mark.name not in (BEGIN, END, BEGIN + DROPPED)
+        and not mark.name.startswith(f"{BEGIN}: ")
+    ]
+
+
 def _episode(
     span: _Span,
     epochs: Sequence["RecordedEpoch"],
     segment: str,
     every: int,
-    taken: Mapping["RecordedEpoch", Decisions],
+    taken: Mapping["RecordedEpoch", "_Orders"],
+    fields: Sequence[str],
     left_out: list[str],
 ) -> Episode:
     """Raises InvalidArgument if its rows are not all there."""
@@ -197,7 +216,7 @@ def _episode(
     if steps < 1:
         raise InvalidArgument(f"{where}: it has no step")
     rows = rows[: steps * every + 1 : every]
-    seen, delays = _decided(taken[epoch], rows.iteration[1:], epoch.schema["period"])
+    seen, delays = taken[epoch].decided(rows.iteration[1:], epoch)
     ending = span.ending
     task = str(mark.values.get("task", "")) or mark.name.partition(": ")[2]
     return Episode(
@@ -208,17 +227,51 @@ def _episode(
         terminated=ending is not None and not is_cut and not ending.values.get("truncated", False),
         task=task or epoch.schema["robot"],
         values=mark.values,
+        sensors=_sensors(segment, epoch.schema, fields),
     )
 
 
-def _decided(
-    taken: Decisions, iterations: NDArray[np.int64], period: int
-) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """`seen` and `delays` of the newest batch that was taken at each of these iterations."""
-    newest = np.searchsorted(taken.taken, iterations, side="right") - 1
-    seen: NDArray[np.int64] = np.append(taken.since, -1)[newest]  # the last one: none yet
-    latency = np.append(taken.taken, 0)[newest] - seen
-    return seen, np.where(seen >= 0, latency * period * 1e-9, np.nan)
+@dataclass(frozen=True)
+class _Orders:
+    """When what acts changed: batches with commands, and fresh starts."""
+
+    taken: NDArray[np.int64]  #: (N,) the iteration
+    since: NDArray[np.int64]  #: (N,) the row that the batch answers; -1: not known, or none
+
+    @classmethod
+    def of(cls, entries: "Iterable[_core.JournalEntry]") -> "_Orders":
+        found = [
+            (
+                each.iteration,
+                -1 if each.seen is None or each.seen.since is None else each.seen.since,
+            )
+            for each in entries
+            if each.kind == "fresh_start"
+            or (each.kind == "taken" and any(one.kind == "command" for one in each.records))
+        ]
+        orders = np.array(found, np.int64).reshape(-1, 2)
+        return cls(orders[:, 0], orders[:, 1])
+
+    def decided(
+        self, iterations: NDArray[np.int64], epoch: "RecordedEpoch"
+    ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+        """`seen` and `delays` of the newest batch that was taken at each of these iterations."""
+        newest = np.searchsorted(self.taken, iterations, side="right") - 1
+        seen: NDArray[np.int64] = np.append(self.since, -1)[newest]  # the last one: none yet
+        taken = np.append(self.taken, 0)[newest]
+        known = seen >= 0
+        delays = np.where(known, (taken - seen) * epoch.schema["period"] * 1e-9, np.nan)
+        if known.any() and not epoch.schema["bursting"]:  # by the clock: periods may be skipped
+            rows = epoch.history(since=int(seen[known].min()), until=int(iterations[-1]))
+            delays[known] = (_times(rows, taken) - _times(rows, seen))[known]
+        return seen, delays
+
+
+def _times(rows: History, iterations: NDArray[np.int64]) -> NDArray[np.float64]:
+    """Times of the rows of these iterations [s]; NaN where one is missing."""
+    at = np.minimum(np.searchsorted(rows.iteration, iterations), len(rows) - 1)
+    times = (rows.time[at] - rows.time[0]) * 1e-9
+    return np.where(rows.iteration[at] == iterations, times, np.nan)
 
 
 def _epoch_at(mark: "Mark", epochs: Sequence["RecordedEpoch"]) -> "RecordedEpoch":
@@ -262,12 +315,30 @@ def _segment(recording: "RecordingFile", segment: str | None) -> str:
     return moving[0]
 
 
-def _part(column: str) -> str:
-    return column.partition(".")[0]
+def _columns(schema: dict[str, Any], part: str) -> list[Column]:
+    return [each for each in columns_of(schema) if each.name.partition(".")[0] == part]
 
 
-def _names(schema: dict[str, Any]) -> dict[str, list[str]]:
-    names: dict[str, list[str]] = {"desired": [], "observed": [], "extended": []}
-    for column in columns_of(schema):
-        names[_part(column.name)].append(column.name.partition(".")[2])
-    return names
+def _sensors(segment: str, schema: dict[str, Any], fields: Sequence[str]) -> list[Column]:
+    """The sensor values that a learner gets; by default no times, and nothing that is absent."""
+    every = _columns(schema, "extended")
+    if not fields:
+        times = ("capture_time", "capture_error")
+        return [
+            each
+            for each in every
+            if each.origin not in ("clock", "absent") and each.name.rpartition(".")[2] not in times
+        ]
+    names = set(chosen(segment, [each.name for each in every], fields))
+    return [each for each in every if each.name in names]
+
+
+def _names(schema: dict[str, Any], sensors: Sequence[Column]) -> dict[str, list[str]]:
+    parts = {
+        "desired": _columns(schema, "desired"),
+        "observed": _columns(schema, "observed"),
+        "extended": sensors,
+    }
+    return {
+        part: [each.name.partition(".")[2] for each in columns] for part, columns in parts.items()
+    }

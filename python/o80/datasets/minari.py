@@ -25,9 +25,10 @@ def write(path: Path, episodes: Episodes) -> None:
         raise InvalidArgument(f"{path} exists: a data set is written to a new folder")
     size = len(episodes.names["observed"]) + len(episodes.names["extended"])
     actions = len(episodes.names["desired"])
-    (path / "data").mkdir(parents=True)
+    data = path.absolute() / "data"  # of a relative one Minari makes two
+    data.mkdir(parents=True)
     storage = MinariStorage.new(
-        path / "data",
+        data,
         observation_space=Box(-np.inf, np.inf, (size,), np.float64),
         action_space=Box(-np.inf, np.inf, (actions,), np.float64),
         data_format="hdf5",

@@ -89,13 +89,10 @@ def latency_text(summary: dict[str, int], period: float) -> str:
     lacks = f"not known of {unknown} batch{'' if unknown == 1 else 'es'}"
     if not known:
         return f"decision latency {lacks}"
-    median, p95, most = (
-        f"{summary[name]} ({summary[name] * period * 1e-6:.4g} ms)"
-        for name in ("median", "p95", "max")
-    )
     return (
-        f"decision latency of {known} batch{'' if known == 1 else 'es'} in iterations: "
-        f"median {median}, 95 % {p95}, largest {most}" + (f"; {lacks}" if unknown else "")
+        f"decision latency of {known} batch{'' if known == 1 else 'es'} in iterations of "
+        f"{period * 1e-6:.4g} ms: median {summary['median']}, 95 % {summary['p95']}, largest "
+        f"{summary['max']}" + (f"; {lacks}" if unknown else "")
     )
 
 

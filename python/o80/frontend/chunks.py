@@ -17,7 +17,7 @@ import numpy as np
 import o80._core as _core
 from o80.base.argument_checks import number, text, whole, whole_or_none
 from o80.base.awaiting import in_thread
-from o80.base.errors import BackendGone, Closed, InvalidArgument, RowOverwritten
+from o80.base.errors import BackendGone, BackendHalted, Closed, InvalidArgument, RowOverwritten
 from o80.base.words import RowsWord, Status
 from o80.rows.plans import ChunkRows, ChunkWay, Decision, Moment, decide
 from o80.rows.targets import common_labels, common_type, states_of
@@ -247,6 +247,7 @@ class Chunks:
         self._closed = False
         self._lock = threading.RLock()
         self._newest: SentChunk | None = None  # the one sent last
+        self._seen = -1  # the row that `wait` returned last
         self._open: list[SentChunk] = []  # those that _parts does not know yet
         self._settled = 0  # the anchor at which these were looked at by send()
         self._parts: list[_Part] = []
@@ -369,6 +370,8 @@ class Chunks:
         shares = np.ones(len(new)) if weights is None else _finite(weights, "weights")
         if shares.shape != (len(new),):
             raise InvalidArgument(f"weights are ({len(new)},), not {shares.shape}")
+        if shares.min() < 0 or shares.max() > 1:
+            raise InvalidArgument(f"weights are shares from 0 to 1, got {shares.tolist()}")
         self._settle()
         for row, iteration in enumerate(due.tolist()):
             plan = self._plan_at(iteration)
@@ -447,7 +450,8 @@ class Chunks:
         """Waits until the chunk sent last was decided and at most `lead` iterations are planned.
 
         Returns the newest observation, or, with `grid`, the newest that lies whole steps after the
-        one that the last chunk answers. A bursting backend runs until then.
+        one that the last chunk answers; none of a backend in real time twice. A bursting backend
+        runs until then.
 
         timeout: how long to wait [s]. Raises TimeoutError, BackendGone, BackendHalted.
         """
@@ -455,17 +459,22 @@ class Chunks:
         lead = whole(lead, "lead", 0)
         end = None if timeout is None else time.monotonic() + timeout
         while True:
+            if (halt := arm.halted) is not None:
+                why = f" ({halt.text})" if halt.text else ""
+                raise BackendHalted(f"'{arm.segment}' is halted{why}: `resume` it, then send anew")
+            if not arm.bursting:
+                arm.keep_alive()
             newest = self._newest
             waits = newest is not None and not newest.decided
             ahead = max(1, 0 if waits else self.left - lead)
-            if not waits and self.left <= lead:
+            if not waits and self.left <= lead and (arm.bursting or arm.published > self._seen):
                 break
             patience = None if end is None else max(0.0, end - time.monotonic())
             if arm.bursting:
                 arm.burst(1 if waits else ahead, timeout=patience)
             else:
-                arm.keep_alive()
                 arm.wait_for(arm.published + min(ahead, 10), patience)
+        self._seen = arm.published
         if not grid or newest is None:
             return arm.latest()
         anchor = newest._sent.anchor

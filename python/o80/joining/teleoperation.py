@@ -185,6 +185,8 @@ class Teleoperation:
         from o80.joining.latency import latency
 
         rows = self.leader.history(seconds=seconds)
+        if not len(rows):
+            return None
         moved = [float(np.ptp(values_of(rows, column))) for column in self._from]
         chosen = int(np.argmax(np.abs(self._scale) * moved))
         try:

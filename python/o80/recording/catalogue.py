@@ -197,7 +197,7 @@ def _summary(path: Path) -> str:
         every = recording.marks
         skipped = max(len(every) - MARKS, 0)
         marks = [
-            (mark.name, mark.time, json.dumps(mark.values)[:1000])
+            (mark.name, mark.row_time, json.dumps(mark.values)[:1000])
             for mark in (every[: MARKS // 2] + every[MARKS // 2 + skipped :])
         ]
         found = {"finished": recording.finished, "runs": runs, "marks": marks}

@@ -6,7 +6,7 @@ A program that records writes them with `mark`; others note them in the journal 
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 from typing import IO, Any
 
@@ -16,7 +16,7 @@ from o80.base.screen import html
 from o80.recording.blocks import Messages
 from o80.recording.cdr import CdrReader, CdrWriter
 from o80.recording.file_writer import FileWriter
-from o80.recording.scan import Scan, messages_of
+from o80.recording.scan import Scan, index_of, messages_of
 
 TOPIC = "/o80/marks"
 TYPE = "o80/msg/Mark"
@@ -37,6 +37,7 @@ class Mark:
     time: int  #: wall clock, when it was recorded [ns since 1970]
     rows: Mapping[str, int]  #: newest iteration of each segment when it was made
     values: Mapping[str, Any] = field(default_factory=dict)
+    row_time: int = field(default=0, compare=False)  #: in a file: log time of its newest row [ns]
 
     def message(self) -> bytes:
         """In CDR. Raises TypeError if a value has no form in JSON."""
@@ -84,7 +85,7 @@ class Marks(list[Mark]):
             ("time", "mark", "rows", "values"),
             [
                 (
-                    datetime.fromtimestamp(each.time * 1e-9).isoformat(" ", "milliseconds"),
+                    datetime.fromtimestamp(each.row_time * 1e-9).isoformat(" ", "milliseconds"),
                     each.name,
                     ", ".join(f"{name} {row}" for name, row in each.rows.items()),
                     ", ".join(f"{name}={value}" for name, value in each.values.items()),
@@ -114,11 +115,13 @@ def marks_in(file: IO[bytes], found: Scan) -> list[Mark]:
     """All marks of a file, in their order."""
     channels = {each.id: each for each in found.channels.values() if each.topic == TOPIC}
     return [
-        Mark.of(message, channels[number].message_encoding)
+        replace(Mark.of(message, channels[number].message_encoding), row_time=int(row_time))
         for chunk in found.chunks.having(*channels)
         for number in channels
         if number in chunk.message_index_offsets
-        for message in messages_of(file, chunk, number)
+        for (row_time, _), message in zip(
+            index_of(file, chunk, number), messages_of(file, chunk, number), strict=True
+        )
     ]
 
 

@@ -118,6 +118,12 @@ class _PartWriter:
                 blocks = [*self._blocks(chunk)]
                 if blocks:
                     self._file.add_chunk(blocks)
+        for channel in found.channels.values():  # a journal may have no entry
+            if (
+                channel.metadata.get("content") == JOURNAL
+                and _run_of(channel) in self._row_channels
+            ):
+                self._channel(channel)
 
     def add_poses(self, run: Run, epoch: RecordedEpoch, poses: Poses | None) -> None:
         """Adds transforms of a run while its rows are added."""

@@ -35,6 +35,11 @@ def run(*words: str | Path) -> Result:
     return CliRunner().invoke(cli.app, [str(word) for word in words])
 
 
+def test_a_port_before_the_command_is_refused_not_ignored() -> None:
+    refused = run("--port", "/dev/ttyACM1", "relax").exception
+    assert str(refused) == "--port belongs behind relax: `o80 arms relax --port ...`"
+
+
 def test_o80_has_the_command() -> None:
     program = Path(sys.executable).parent / "o80"
     told = subprocess.run([program, "arms", "--help"], capture_output=True, text=True)

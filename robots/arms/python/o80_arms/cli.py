@@ -49,6 +49,9 @@ def arms(
 ) -> None:
     """Lists the arms of all ports."""
     if context.invoked_subcommand is not None:
+        if port:
+            word = context.invoked_subcommand
+            raise o80.InvalidArgument(f"--port belongs behind {word}: `o80 arms {word} --port ...`")
         return
     found = port or ports()
     if not found:
