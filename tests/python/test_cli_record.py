@@ -130,6 +130,7 @@ def test_a_segment_that_is_not_there_is_waited_for_and_said(tmp_path: Path) -> N
 
     assert "waiting for segment 'nobody'" in said
     assert "0 rows" in said
+    assert "nothing of 'nobody' was recorded" in said
 
 
 def test_save_writes_what_a_killed_robot_left(process: o80.robots.Process, tmp_path: Path) -> None:

@@ -227,6 +227,9 @@ class _Report:
             )
             self._missed = recorder.missed
         if last:  # sources are closed
+            for name, source in recorder.sources.items():
+                if not source.rows:
+                    complain(f"nothing of '{name}' was recorded: no row came by that name")
             return
         absent = {name for name, source in recorder.sources.items() if not source.attached}
         for name in sorted(absent - self._absent):
