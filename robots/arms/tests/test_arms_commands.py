@@ -228,7 +228,7 @@ def test_servos_are_numbered_one_after_the_other(
             arm.line.servos = {number: servo}
             servo.power_up()
             assert servo.get(servo.ID) == number
-            assert bus.scan([number]) == [number], "at our rate"
+            assert bus.read(number, bus.ID) == number, "at our rate"
             plugged = [{number: servo}, {}] if number % 2 else [{number: servo}]
     told = "Several servos answer: leave one only.\nThis is another: "
     assert capsys.readouterr().out == f"{told}{kind.MODELS.get(1060, 'model 1060')}.\n"
