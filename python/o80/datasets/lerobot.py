@@ -135,9 +135,7 @@ def _stats(values: NDArray[Any]) -> dict[str, list[float]]:
 
 
 def _info(episodes: Episodes, features: Mapping[str, Any], frames: int, tasks: int) -> Any:
-    frequency = episodes.frequency
-    whole = round(frequency)
-    is_whole = abs(frequency - whole) < 1e-6 * frequency  # a period is in whole ns
+    frequency = round(episodes.frequency, 5)  # a period is in whole ns
     return {
         "codebase_version": VERSION,
         "robot_type": episodes.robot,
@@ -147,7 +145,7 @@ def _info(episodes: Episodes, features: Mapping[str, Any], frames: int, tasks: i
         "chunks_size": 1000,
         "data_files_size_in_mb": 100,
         "video_files_size_in_mb": 200,
-        "fps": whole if is_whole else frequency,
+        "fps": int(frequency) if frequency.is_integer() else frequency,
         "splits": {"train": f"0:{len(episodes.all)}"},
         "data_path": DATA,
         "video_path": None,
