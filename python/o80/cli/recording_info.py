@@ -157,12 +157,14 @@ def _of_run(name: str, number: int) -> str:
 
 
 def latency_of(epoch: RecordedEpoch) -> dict[str, int]:
-    """The decision latency of the batches in the last entries of its journal."""
+    """The decision latency of the batches in the last entries of its journal, of recorded rows."""
     from o80.rows.journal import latencies_of
 
     if epoch.journal_codec is None or epoch.journal_codec > _core.JOURNAL_CODEC:
         return {}
-    return latency_percentiles(latencies_of(epoch.last_entries(MAX_ENTRIES)))
+    rows = range(epoch.first_row, epoch.next_row)
+    entries = [each for each in epoch.last_entries(MAX_ENTRIES) if each.iteration in rows]
+    return latency_percentiles(latencies_of(entries))
 
 
 def starvations_of(epoch: RecordedEpoch) -> int:
