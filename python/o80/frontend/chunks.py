@@ -459,7 +459,7 @@ class Chunks:
         lead = whole(lead, "lead", 0)
         end = None if timeout is None else time.monotonic() + timeout
         while True:
-            if (halt := arm.halted) is not None:
+            if (halt := arm.halted) is not None and halt.iteration is not None:  # it is in force
                 why = f" ({halt.text})" if halt.text else ""
                 raise BackendHalted(f"'{arm.segment}' is halted{why}: `resume` it, then send anew")
             if not arm.bursting:
