@@ -229,7 +229,9 @@ class _Report:
         if last:  # sources are closed
             for name, source in recorder.sources.items():
                 if not source.rows:
-                    complain(f"nothing of '{name}' was recorded: no row came by that name")
+                    complain(
+                        f"nothing of '{name}' was recorded: no robot of that name published a row"
+                    )
             return
         absent = {name for name, source in recorder.sources.items() if not source.attached}
         for name in sorted(absent - self._absent):

@@ -233,7 +233,7 @@ def _episode(
 
 @dataclass(frozen=True)
 class _Orders:
-    """When what acts changed: batches with commands, and fresh starts."""
+    """The batches with commands that were taken, and the fresh starts, in their order."""
 
     taken: NDArray[np.int64]  #: (N,) the iteration
     since: NDArray[np.int64]  #: (N,) the row that the batch answers; -1: not known, or none

@@ -467,16 +467,17 @@ class Chunks:
             newest = self._newest
             waits = newest is not None and not newest.decided
             ahead = max(1, 0 if waits else self.left - lead)
-            if not waits and self.left <= lead and (arm.bursting or arm.published > self._seen):
+            if not waits and self.left <= lead and (arm.bursting or arm.published != self._seen):
                 break
             patience = None if end is None else max(0.0, end - time.monotonic())
             if arm.bursting:
                 arm.burst(1 if waits else ahead, timeout=patience)
             else:
                 arm.wait_for(arm.published + min(ahead, 10), patience)
-        self._seen = arm.published
+        row = arm.latest()
+        self._seen = row.iteration
         if not grid or newest is None:
-            return arm.latest()
+            return row
         anchor = newest._sent.anchor
         steps = int((arm.published - anchor) / self.step)
         behind = int(self._due(steps)[-1]) if steps > 0 else 0

@@ -250,7 +250,7 @@ class DynamixelBus(Bus):
             self._ask(servo, 8, b"", 0)
 
     def found(self) -> list[int] | None:
-        """As for others, at any rate; the line has the rate of what is found."""
+        """Numbers at the first rate at which a servo answers; the line keeps that rate."""
         for rate in self.RATES:
             self._set_rate(rate)
             received, found = self.answers(dynamixel.packet(EVERYBODY, 1, b""), wait=self.ALL), []

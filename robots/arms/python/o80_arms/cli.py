@@ -207,7 +207,7 @@ def pressed_enter() -> bool:
 def number(
     arm: Annotated[
         Literal["so101", "so101_leader", "koch", "koch_leader"],
-        typer.Argument(help="Of which the servos are."),
+        typer.Argument(help="The arm that the servos are for."),
     ] = "so101",
     port: Port = None,
 ) -> None:
@@ -237,10 +237,14 @@ def next_servo(bus: Bus, model: int, before: int | None) -> int:
         if found and len(found) == 1:
             if found[0] == before:
                 continue
-            its = bus.read(found[0], bus.MODEL)
+            try:
+                its = bus.read(found[0], bus.MODEL)
+            except BusError:  # its plug has no good contact yet
+                continue
             if its == model:
                 return found[0]
-            doubt = f"This is another: {bus.MODELS.get(its, f'model {its}')}."
+            names = [bus.MODELS.get(each, str(each)) for each in (its, model)]
+            doubt = "This servo is of model {}, and one of model {} is needed.".format(*names)
         if doubt not in told:
             print(doubt, flush=True)
         told.add(doubt)

@@ -164,7 +164,7 @@ class FakeChain(chain.FakeChain[FakeServo]):
         super().__init__(port, servos, tick=tick, latency=latency, bus_time=bus_time)
 
     def _hears(self, number: int) -> bool:
-        """Also: the line has the rate of the servo."""
+        """Whether a servo hears a request: the line must have its rate."""
         rate = RATES.get(termios.tcgetattr(self._master)[5])
         return super()._hears(number) and self.servos[number].get(RATE) == rate
 
