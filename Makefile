@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo learn test check soak wheel scripts torture model fuzz rt systemd bench format clean distclean
+.PHONY: demo setup learn test check soak wheel scripts torture model fuzz rt systemd debian13 bench format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -8,10 +8,14 @@ demo:
 	@export O80_SINCE=$$(date +%s) && tools/setup.sh demo && \
 		.venv/bin/python -m o80_table_tennis.demo $(ARGS)
 
-# one seed of table tennis from scratch, about ten minutes on one processor: build/learn/report.json
+# Debian packages that demo and test need, as root or with sudo
+setup:
+	@tools/setup.sh setup
+
+# one seed of table tennis from scratch, about ten minutes on one processor: build/learn
 learn:
 	@tools/setup.sh learn
-	@.venv/bin/python -m o80_table_tennis.train --blind-share 0.3 $(ARGS)
+	@.venv/bin/python -m o80.learning train o80_table_tennis.learning:ours.json --out build/learn $(ARGS)
 
 # what a change can break; ARGS chooses tests: make test ARGS=control, ARGS=tests/python/test_bursts.py
 test:
@@ -76,6 +80,10 @@ systemd:
 	@.venv/bin/cmake --preset dev > /dev/null
 	@.venv/bin/cmake --build --preset dev
 	@.venv/bin/python tests/proofs/run.py service_machine $(ARGS)
+
+# demo and test on a bare Debian 13, as an ordinary user; as root: make debian13 ARGS=root
+debian13:
+	@tools/debian13.sh $(ARGS)
 
 format:
 	@tools/setup.sh tools

@@ -38,7 +38,7 @@ class Arm:
     """One joint that is where it was asked to be."""
 
     actuators = ("lift",)
-    of_the_world = False
+    simulated = True
 
     def __init__(self) -> None:
         self.place = np.zeros(1)
@@ -123,23 +123,10 @@ def by_chunks(world: World) -> Played:
     return played
 
 
-class Queue:
-    """The rule of LeRobot's queue."""
-
-    def __init__(self) -> None:
-        self.left: list[list[float]] = []
-
-    def merge(self, actions: Places, delay: int) -> None:
-        self.left = [[float(i), value] for i, value in enumerate(actions)][delay:]
-
-    def get(self) -> list[float] | None:
-        return self.left.pop(0) if self.left else None
-
-
 def by_queue(world: World, rule: str) -> Played:
     """One action a step, interpolated in straight lines. rule: latency, consumed or none."""
     played = Played()
-    queue = Queue()
+    queue: list[tuple[int, float]] = []  # actions with their numbers
     arrivals = iter([*world.answers, Answer(0, 10 * LENGTH, np.zeros(0))])
     coming = next(arrivals)
     newest: Answer | None = None
@@ -151,17 +138,16 @@ def by_queue(world: World, rule: str) -> Played:
             meanwhile = consumed[-1] - consumed[min(coming.seen // world.step, len(consumed) - 1)]
             delay = {"latency": latency, "consumed": min(latency, meanwhile), "none": 0}[rule]
             if len(coming.actions):
-                queue.merge(coming.actions, delay)
+                queue = list(enumerate(coming.actions))[delay:]
                 newest = coming
             coming = next(arrivals)
-        action = queue.get()
-        consumed.append(consumed[-1] + (action is not None))
+        consumed.append(consumed[-1] + bool(queue))
         after = tick + world.step
-        if action is None or newest is None:
+        if not queue or newest is None:
             played.starved += world.step
             target = place
         else:
-            number, target = action
+            number, target = queue.pop(0)
             due = newest.seen + (number + 1) * world.step
             played.misplaced.append(abs(due - after) / RATE)
         played.places[tick + 1 : after + 1] = np.linspace(place, target, world.step + 1)[1:]
@@ -207,13 +193,11 @@ def cases() -> Iterator[tuple[float, float, int]]:
 
 def plot(path: str) -> None:
     """Two seconds of each player, beside the truth."""
-    import matplotlib
-
-    matplotlib.use("Agg")
-    import matplotlib.pyplot as plt
+    from matplotlib.figure import Figure
 
     world = world_of(1, 0.3, 0.02, 50)
-    figure, (above, below) = plt.subplots(2, 1, figsize=(9, 7), sharex=True)
+    figure = Figure(figsize=(9, 7), layout="tight")
+    above, below = figure.subplots(2, 1, sharex=True)
     time = np.arange(LENGTH) / RATE
     part = slice(10 * RATE, 13 * RATE)
     above.plot(time[part], world.truth[part], "k--", label="truth")
@@ -226,7 +210,6 @@ def plot(path: str) -> None:
     below.set_xlabel("time [s]")
     above.legend()
     figure.suptitle("Answers 0.3 s late that disagree by 20 mrad")
-    figure.tight_layout()
     figure.savefig(path, dpi=110)
 
 

@@ -13,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, NamedTuple
 
 import o80
 from o80_devices.ball_launcher.launcher import Status
@@ -29,11 +29,11 @@ SLOWEST_ROWS = 0.02  # of the launcher [s]
 NAME = f"bench-gap-{os.getpid()}"
 
 
-class Cable:
+class Cable(NamedTuple):
     """pull: nothing comes through from now on. mend: the opposite."""
 
-    def __init__(self, pull: Callable[[], object], mend: Callable[[], object]) -> None:
-        self.pull, self.mend = pull, mend
+    pull: Callable[[], object]
+    mend: Callable[[], object]
 
 
 def free_port() -> int:
@@ -107,7 +107,7 @@ def measure(
             time.sleep(i / rounds() * SLOWEST_ROWS)
             begin = time.monotonic_ns()
             cable.pull()
-            row = row_where(device, lambda row: gone(row))
+            row = row_where(device, gone)
             sample(name, "ms", (row.time - begin) * 1e-6)
             cable.mend()
 

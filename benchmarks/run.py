@@ -1,4 +1,4 @@
-"""Measures the budgets of o80, each beside its limit: a table, and build/bench/results.json."""
+"""Measures the budgets of o80, each beside its limit: a table, and files in build/bench."""
 
 import argparse
 from collections.abc import Sequence
@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
+from page import PAGE, conditions, text_of
 from programs import ROOT, NotMeasuredError, Samples, run
 from results import Result, print_table, result_of, write
 from rows import ROWS, Row
@@ -23,7 +24,12 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--rounds", type=int, help=f"repetitions of each (default: {ROUNDS})")
     parser.add_argument("--built", type=Path, default=ROOT / "build" / "release", metavar="FOLDER",
                         help="where the programs were built (default: build/release)")  # fmt: skip
-    return parser.parse_args()
+    parser.add_argument("--page", action="store_true",
+                        help="write docs/results/benchmarks.md, too: of all rows")  # fmt: skip
+    requested = parser.parse_args()
+    if requested.page and (requested.rows != names or requested.quick):
+        parser.error("--page is for a run of all rows: without --rows and --quick")
+    return requested
 
 
 def plain(rows: Sequence[Row], program: str, built: Path) -> dict[str, Samples]:
@@ -60,15 +66,20 @@ def main() -> int:
     if not console.is_terminal:
         console = Console(width=150)
     chosen = [row for row in ROWS if row.name in requested.rows]
+    where = conditions()
     results = measure(chosen, rounds, requested.built.resolve(), console)
     print_table(results, console)
     path = ROOT / "build" / "bench" / "results.json"
     write(results, path)
+    pages = [path.with_name("benchmarks.md"), *([PAGE] if requested.page else [])]
+    for page in pages:
+        page.write_text(text_of(results, where))
     missed = [result.row for result in results if result.met is False]
     unknown = sum(result.met is None for result in results)
     console.print(
         f"{len(results) - len(missed) - unknown} budgets met, {len(missed)} missed, "
-        f"{unknown} not measured; figures in {path.relative_to(ROOT)}"
+        f"{unknown} not measured; figures in {path.relative_to(ROOT)}, "
+        f"table in {pages[-1].relative_to(ROOT)}"
     )
     return 0
 

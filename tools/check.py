@@ -32,6 +32,7 @@ TYPED_TESTS = (
     "devices/tests",
     "apps/table_tennis/tests",
 )
+WORKFLOW = ".github/workflows/tests.yml"
 TORTURE = ("--kills", "2000", "--halts", "300", "--seed", "77")  # the same mixes in every run
 
 
@@ -49,6 +50,7 @@ def typed() -> list[list[str]]:
 STEPS: dict[str, list[list[str]]] = {
     "format": [[sys.executable, "tools/format.py", "--check"]],
     "ruff": [["ruff", "check", "."]],
+    "workflow": [["check-jsonschema", "--builtin-schema", "vendor.github-workflows", WORKFLOW]],
     "mypy": typed(),
     "cpp": [ctest("cpp", "dev", "-L", "^check$")],
     "python": [pytest("python", "-m", "check")],
@@ -67,7 +69,7 @@ STEPS: dict[str, list[list[str]]] = {
 ON_DEMAND = {"arm64"}  # an emulator's minutes
 # Two chains of steps run at the same time: many steps wait, or keep one processor busy. Those of a
 # chain use the same build folder. The longest come first.
-QUICK = ("format", "ruff")
+QUICK = ("format", "ruff", "workflow")
 CHAINS = (
     ("python",),
     ("asan", "fuzz"),

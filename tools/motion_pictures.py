@@ -1,7 +1,4 @@
-"""Draws the pictures of docs/commands.md and docs/streaming.md anew, in docs/pictures.
-
-python tools/motion_pictures.py
-"""
+"""Draws the pictures of docs/commands.md and docs/streaming.md."""
 
 from pathlib import Path
 from typing import Any
@@ -12,7 +9,6 @@ from matplotlib.figure import Figure
 import o80
 from o80.drivers import Desired, Reading
 
-FOLDER = Path(__file__).resolve().parent.parent / "docs" / "pictures"
 FREQUENCY = 500.0
 LIMITS = o80.Limits(speed=2.0, acceleration=15.0, jerk=500.0)
 FAST = o80.Limits(speed=6.0, acceleration=200.0, jerk=20000.0)
@@ -32,7 +28,7 @@ class Joints:
 
     actuators = ("free", "limited", "fast")
     limits = {"limited": LIMITS, "fast": FAST}  # noqa: RUF012
-    of_the_world = False
+    simulated = True
 
     def __init__(self) -> None:
         self.states = np.zeros(3)
@@ -111,8 +107,3 @@ def draw_streaming(path: Path) -> None:
     axes[1, 0].set_ylabel("speed [rad/s]")
     axes[0, 0].legend(fontsize=8)
     figure.savefig(path, dpi=80)
-
-
-if __name__ == "__main__":
-    draw_paces(FOLDER / "paces.png")
-    draw_streaming(FOLDER / "streaming.png")

@@ -19,11 +19,8 @@ class Outcomes:
     def read_report(self, file: Path) -> None:
         """Adds what ctest, pytest, or a program of tests in C++, named as its report, wrote."""
         for case in ET.parse(file).getroot().iter("testcase"):
-            name, of_ctest, of_program = (
-                case.get("name", ""),
-                case.get("status"),
-                case.get("result"),
-            )
+            name = case.get("name", "")
+            of_ctest, of_program = case.get("status"), case.get("result")
             if of_program or not of_ctest:
                 name = f"{case.get('classname')}.{name}"
             if of_program:

@@ -1,4 +1,4 @@
-"""Draws the pictures of README.md and docs anew: docs/pictures/*.png. Needs tools of make check.
+"""Draws the pictures of docs anew: docs/pictures/*.png. Needs tools of make check.
 
 python tools/pictures.py
 """
@@ -6,45 +6,17 @@ python tools/pictures.py
 from pathlib import Path
 from typing import Any
 
-import gymnasium
-import numpy as np
-from matplotlib.figure import Figure
+from matplotlib.image import imsave
 
 import o80
 from chromium import Chromium
 from motion_pictures import draw_paces, draw_streaming
 from o80.plot import plot
 from o80.rows.journal import command_ends
-from o80_table_tennis.players.policies import default_policy
-from o80_table_tennis.report.rendering import Scene, write_picture
-from o80_table_tennis.settings import TaskSettings
-from o80_table_tennis.task.observations import BALL_POSITION, JOINT_POSITIONS
 from o80_table_tennis.world.scene import MODEL
 
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "pictures"
-SIZE = (800, 450)
 VIEW_SIZE = (1180, 700)
-SHOWN = 4  # every n-th step of the episode shows the ball
-
-
-def draw_table_tennis(path: Path) -> None:
-    """One accelerated episode: the arm at the hit, the ball on its whole way."""
-    environment = gymnasium.make("o80/TableTennis-v0", task=TaskSettings(factor=1.0))
-    policy = default_policy()
-    observation, _ = environment.reset(seed=1, options={"ball": 3})
-    policy.reset()
-    seen, arm = [], observation[JOINT_POSITIONS].astype(float)
-    hit = over = False
-    while not over:
-        observation, _, terminated, truncated, info = environment.step(policy.act(observation))
-        over = terminated or truncated
-        seen.append(observation[BALL_POSITION].astype(float))
-        if not hit:
-            arm, hit = observation[JOINT_POSITIONS].astype(float), info["touched"]
-    environment.close()
-    balls = np.array(seen[::SHOWN])
-    with Scene(balls=len(balls), size=SIZE) as scene:
-        write_picture(path, scene.draw(arm, balls, camera="close"))
 
 
 def draw_so101(path: Path) -> None:
@@ -55,34 +27,7 @@ def draw_so101(path: Path) -> None:
             arm.add_command(joint, place, duration=1.0)
         arm.add_command("wrist_flex", 0.9, duration=1.0)
         arm.add_command("gripper", 0.5, duration=1.0)
-        write_picture(path, pictures.draw(arm.burst(300))[230:680, 340:980])
-
-
-def draw_first_minute(path: Path) -> None:
-    """The commands of the first minute in Python: desired and observed of both joints."""
-    with o80.robots.load("two_joints").inline(frequency=500) as arm:
-        arm.add_command("elbow", 0.5, duration=0.5)
-        arm.add_command("elbow", -0.2, speed=1.0)
-        arm.add_command("shoulder", 0.4, duration=1.0, profile="minimum_jerk")
-        arm.pulse()
-        arm.burst(350)
-        arm.add_command("shoulder", -0.1, duration=0.6, profile="minimum_jerk", mode="overwrite")
-        arm.pulse()
-        arm.burst(500)
-        rows = arm.history(850)
-        names = [actuator.name for actuator in arm.actuators]
-    figure = Figure(figsize=(9, 3.4), layout="constrained")
-    axes = figure.subplots()
-    for joint, name in enumerate(names):
-        color = f"C{joint}"
-        times = rows.time * 1e-9
-        axes.plot(times, rows.desired[:, joint], "--", color=color, label=f"{name}, desired")
-        axes.plot(times, rows.observed[:, joint], color=color, label=f"{name}, observed")
-    axes.set_xlabel("time [s]")
-    axes.set_ylabel("position [rad]")
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=8)
-    figure.savefig(path, dpi=80)
+        imsave(path, pictures.draw(arm.burst(300))[230:680, 340:980])
 
 
 def draw_recording(path: Path) -> None:
@@ -135,9 +80,7 @@ def draw_view(path: Path) -> None:
 
 
 if __name__ == "__main__":
-    draw_table_tennis(FOLDER / "table_tennis.png")
     draw_so101(FOLDER / "so101.png")
-    draw_first_minute(FOLDER / "first_minute.png")
     draw_recording(FOLDER / "recording.png")
     draw_view(FOLDER / "view.png")
     draw_paces(FOLDER / "paces.png")

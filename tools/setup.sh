@@ -1,42 +1,99 @@
 #!/usr/bin/env bash
 # Sets up what a make target needs: tools/setup.sh PURPOSE, of
-#   environment   an empty .venv
+#   setup         Debian's packages for demo and test, and nothing else
+#   environment   an empty .venv, and Debian's packages for test
 #   tools         what testing needs but the packages of this repository, which C++ tests do not use
 #   test, check   what testing and checking needs
-#   demo, learn, bench, wheels, systemd
+#   demo, learn, bench, wheels, systemd, debian13
 # Nothing is done twice; stamps of what was done lie in .venv/stamps. Each message begins with the
 # seconds since the start, or since O80_SINCE (seconds of the epoch) if that is set.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
-purpose=${1:?environment, demo, learn, tools, test, check, wheels, bench or systemd}
+purpose=${1:?setup, environment, demo, learn, tools, test, check, wheels, bench, systemd or debian13}
 since=${O80_SINCE:-$(date +%s)}
-
-mkdir -p build
-exec 9> build/setup.lock
-flock 9
 
 say() { printf '== %3d s: %s\n' $(($(date +%s) - since)) "$*" >&2; }
 
-# Debian packages that are missing: asked for as root, named otherwise
-need_packages() {
-  local missing=()
-  for package in "$@"; do
-    [ "$(dpkg-query -W -f '${Status}' "$package" 2> /dev/null)" = "install ok installed" ] ||
-      missing+=("$package")
+# the Python to use: the first on the PATH that is recent enough, else the Debian package that brings it
+find_python() {
+  for python in python3 python3.{11..14}; do
+    "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2> /dev/null && return
   done
+  python=python3
+  command -v python3 > /dev/null || return 0
+  for python in python3.{13..11}; do
+    apt-cache show "$python" > /dev/null 2>&1 && return
+  done
+  say "Python 3.11 or later is needed, $(python3 -V 2>&1) is too old: use Debian 12 or later"
+  return 1
+}
+
+has_environment() { .venv/bin/python -c 'import pip' 2> /dev/null; }
+has_headers() {
+  "$1" -c 'import os, sysconfig; os.stat(sysconfig.get_path("include") + "/Python.h")' 2> /dev/null
+}
+is_installed() {
+  [ "$(dpkg-query -W -f '${Status}' "$1" 2> /dev/null)" = "install ok installed" ]
+}
+
+# Debian packages that are missing: the named ones, and those that every purpose needs. A compiler
+# or a Python from elsewhere will do, so these are checked themselves.
+find_missing() {
+  local package interpreter
+  missing=()
+  find_python || return 1
+  interpreter=$python
+  command -v ${CXX:-c++} > /dev/null || missing+=(g++)
+  command -v "$python" > /dev/null || missing+=("$python")
+  if has_environment; then
+    interpreter=.venv/bin/python
+  else
+    "$python" -c 'import ensurepip' 2> /dev/null || missing+=("$python-venv")
+  fi
+  has_headers "$interpreter" || missing+=("$python-dev")
+  for package in "${missing[@]}"; do
+    if [ "$package" != g++ ] && is_installed "$package"; then
+      say "$("$interpreter" -c 'import sys; print(sys.base_prefix)')/bin/$python does not use Debian's" \
+        "$package: install its own headers and venv, or put /usr/bin before it in the PATH"
+      return 1
+    fi
+  done
+  for package in "$@"; do
+    is_installed "$package" || [[ " ${missing[*]} " = *" $package "* ]] || missing+=("$package")
+  done
+}
+
+install_missing() {
+  # another process may be installing: wait for it
+  local apt=("$@" env DEBIAN_FRONTEND=noninteractive apt-get -qq -o DPkg::Lock::Timeout=600)
+  local install=(install -y --no-install-recommends "${missing[@]}")
+  "${apt[@]}" "${install[@]}" 2> /dev/null || { "${apt[@]}" update && "${apt[@]}" "${install[@]}"; }
+}
+
+# Debian packages that are missing: installed as root and by `make setup`, named otherwise
+need_packages() {
+  local as_root
+  find_missing "$@" || return 1
   [ ${#missing[@]} -eq 0 ] && return
-  if ! command -v apt-get > /dev/null || [ "$(id -u)" -ne 0 ]; then
-    say "missing, please install: apt-get install ${missing[*]}"
+  case $(id -u)-$purpose in
+    0-*) as_root=env ;;
+    *-setup) as_root=$(command -v sudo) || as_root= ;;
+    *) as_root= ;;
+  esac
+  if [ -z "$as_root" ] || ! command -v apt-get > /dev/null; then
+    [ "$purpose" = setup ] || local setup="run \`make setup\`, or "
+    say "Debian packages are missing: ${setup-}as root: apt-get install ${missing[*]}"
     return 1
   fi
   say "installing ${missing[*]}"
-  export DEBIAN_FRONTEND=noninteractive
-  # another process may be installing: wait for it
-  local apt=(apt-get -qq -o DPkg::Lock::Timeout=600) words=(-y --no-install-recommends)
-  "${apt[@]}" install "${words[@]}" "${missing[@]}" > build/apt.log 2>&1 ||
-    { "${apt[@]}" update && "${apt[@]}" install "${words[@]}" "${missing[@]}"; } \
-      > build/apt.log 2>&1 || { tail -n 20 build/apt.log >&2; return 1; }
+  if [ "$purpose" = setup ]; then # leaves no file: build may be made by root otherwise
+    install_missing "$as_root" || return 1
+  else
+    mkdir -p build
+    install_missing "$as_root" > build/apt.log 2>&1 || { tail -n 20 build/apt.log >&2; return 1; }
+  fi
+  find_missing
 }
 
 # runs the command only if what it depends on has changed since it last succeeded
@@ -55,13 +112,6 @@ package_state() { state_of $(find "$1" -mindepth 1 -maxdepth 1 ! -name tests); }
 pip() { .venv/bin/python -m pip -qq --disable-pip-version-check "$@"; }
 
 make_environment() {
-  local python
-  for python in python3 python3.11 python3.12 python3.13; do
-    "$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2> /dev/null && break
-    python=
-  done
-  [ -n "$python" ] || { say "Python 3.11 or later is needed"; return 1; }
-  "$python" -c 'import ensurepip' 2> /dev/null || need_packages python3-venv python3-dev
   say "making .venv"
   "$python" -m venv --clear .venv
 }
@@ -151,21 +201,29 @@ install_everything() {
   return $failed
 }
 
+# pictures without a screen, where EGL cannot make them; refused, only the film is missing
+has_renderer() { ldconfig -p | grep -q libEGL_mesa || is_installed libosmesa6; }
+need_renderer() { has_renderer || need_packages libosmesa6 || say "continuing without pictures"; }
+
+# before anything else, so that a user knows at once what is missing
 case $purpose in
-  environment | demo | learn) ;;
-  tools | test | check)
-    need_packages g++ ccache libgtest-dev libgmock-dev libaravis-0.8-0 aravis-tools
+  demo | learn | wheels) need_packages ;;
+  setup | environment | tools | test | check)
+    packages=(g++ ccache libgtest-dev libgmock-dev libaravis-0.8-0 aravis-tools)
+    [ "$purpose" != setup ] || has_renderer || packages+=(libosmesa6)
+    need_packages "${packages[@]}"
     ;;
-  wheels) need_packages g++ ;;
   bench) need_packages g++ rt-tests stress-ng libaravis-0.8-0 aravis-tools ;;
-  systemd) # what `make systemd` needs beside what `check` brings
-    need_packages systemd
-    exit
-    ;;
+  systemd) need_packages systemd ;; # beside what `check` brings
+  debian13) need_packages debootstrap ;;
   *) say "unknown purpose '$purpose'"; exit 2 ;;
 esac
-# pictures without a screen, where EGL cannot make them; refused, only the film is missing
-need_renderer() { ldconfig -p | grep -q libEGL_mesa || need_packages libosmesa6 || true; }
+case $purpose in setup | systemd | debian13) exit ;; esac
+
+mkdir -p build
+exec 9> build/setup.lock
+flock 9
+
 install_programs() {
   case $purpose in
     demo) need_renderer ;;
@@ -179,7 +237,7 @@ install_programs() {
   esac
 }
 
-.venv/bin/python -c '' 2> /dev/null || make_environment
+has_environment || make_environment
 [ "$purpose" = environment ] && exit
 case $purpose in
   tools | test) group=test ;;

@@ -212,19 +212,15 @@ CONDITIONS: dict[str, Condition] = {
 def available() -> list[str]:
     """The conditions that this machine can have."""
     root = os.geteuid() == 0
-    with contextlib.suppress(OSError):
-        (processor_groups() / "o80-soak-try").mkdir(exist_ok=True)
     trial = processor_groups() / "o80-soak-try"
+    with contextlib.suppress(OSError):
+        trial.mkdir(exist_ok=True)
     has_quota = any((trial / name).exists() for name in ("cpu.max", "cpu.cfs_quota_us"))
     with contextlib.suppress(OSError):
         trial.rmdir()
-    lacking = {
-        "quota": not has_quota,
-        "memory": not root,
-        "user": not root
-        or subprocess.run([*NOBODY, sys.executable, "-c", STARTS], capture_output=True).returncode
-        != 0,
-    }
+    as_user = [*NOBODY, sys.executable, "-c", STARTS]
+    has_user = root and subprocess.run(as_user, capture_output=True).returncode == 0
+    lacking = {"quota": not has_quota, "memory": not root, "user": not has_user}
     for name in [name for name, lacks in lacking.items() if lacks]:
         print(f"condition {name}: not possible here")
     return [name for name in CONDITIONS if not lacking.get(name, False)]

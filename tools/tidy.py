@@ -101,9 +101,7 @@ def main() -> int:
         if result.returncode == 0:
             stamp.touch()
             return True
-        print(result.stdout, flush=True)
-        if not result.stdout:
-            print(result.stderr, flush=True)
+        print(result.stdout or result.stderr, flush=True)
         return False
 
     units = units_of(arguments.build)

@@ -28,6 +28,7 @@ struct TwoEmpty {
   using Config = NoConfig;
   using Actuators = std::array<double, 2>;
   explicit TwoEmpty(const Config& /*config*/) {}
+  void describe(Schema& schema) const { schema.simulated(); }
   void start() {}
   void write(const Desired<TwoEmpty>& /*desired*/) {}
   void read(Reading<TwoEmpty>& /*reading*/) {}
@@ -40,6 +41,7 @@ struct EightWithSensors {
   using Actuators = std::array<double, 8>;
   using Extended = Sensors;
   explicit EightWithSensors(const Config& /*config*/) {}
+  void describe(Schema& schema) const { schema.simulated(); }
   void start() {}
   void write(const Desired<EightWithSensors>& desired) { now_ = desired.states; }
   void read(Reading<EightWithSensors>& reading) {

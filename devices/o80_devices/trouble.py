@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import sys
 import time
+
+from o80.base.screen import complain
 
 AGAIN = 60.0
 """The same text is not printed again for so long [s]."""
@@ -27,10 +28,10 @@ class Trouble:
         if len(self._told) > 100:  # texts that differ each time
             self._told.clear()
         self._told[text] = now
-        print(f"o80: {self._device}: {text}; tries again", file=sys.stderr, flush=True)
+        complain(f"{self._device}: {text}; tries again")
 
     def is_over(self) -> None:
         if self.text and self._told:
-            print(f"o80: {self._device}: works again", file=sys.stderr, flush=True)
+            complain(f"{self._device}: works again")
             self._told.clear()
         self.text = ""

@@ -244,7 +244,6 @@ def test_a_broken_picture_and_one_of_another_size_are_named(tmp_path: Path) -> N
 class ScriptedCameras:
     """The cameras of RIG: a ball at a new place in each image, or a board before each camera."""
 
-    of_the_world = True
     shows: ClassVar[str] = "ball"
     pictures: ClassVar[list[NDArray[np.uint8]]] = []
 

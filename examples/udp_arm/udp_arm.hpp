@@ -92,7 +92,7 @@ class UdpArm {
   }
 
   o80::Served resume() {
-    if (missed_in_a_row_ > 0) {
+    if (missed_in_a_row_ > config_.tolerated) {
       return o80::Served::rejected("the arm sends nothing in time: resume when it does");
     }
     if (state_.mode == Mode::timed_out) {

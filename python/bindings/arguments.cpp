@@ -5,6 +5,7 @@
 #include <cmath>
 #include <string>
 
+#include "base/printable.hpp"
 #include "control/batch/record.hpp"
 #include "enums.hpp"
 #include "o80/base/error.hpp"
@@ -37,17 +38,19 @@ std::string string_of(nb::handle value, const char* name) {
   return {text, static_cast<std::size_t>(size)};
 }
 
-std::string shown_text(nb::handle value) noexcept {
+std::string shown_text(nb::handle value, const char* otherwise) noexcept {
   const nb::object text = nb::steal(PyObject_Str(value.ptr()));
-  const nb::object bytes =
-      text.is_valid()
-          ? nb::steal(PyUnicode_AsEncodedString(text.ptr(), "utf-8", "backslashreplace"))
-          : nb::object();
-  if (!bytes.is_valid()) {
+  for (const char* surrogates : {"surrogateescape", "backslashreplace"}) {
+    if (!text.is_valid()) break;
+    const nb::object bytes = nb::steal(PyUnicode_AsEncodedString(text.ptr(), "utf-8", surrogates));
+    if (bytes.is_valid()) {
+      return o80::printable({PyBytes_AS_STRING(bytes.ptr()),
+                             static_cast<std::size_t>(PyBytes_GET_SIZE(bytes.ptr()))});
+    }
     PyErr_Clear();
-    return "(no text)";
   }
-  return {PyBytes_AS_STRING(bytes.ptr()), static_cast<std::size_t>(PyBytes_GET_SIZE(bytes.ptr()))};
+  PyErr_Clear();
+  return otherwise;
 }
 
 double number_of(nb::handle value, const char* name) {
@@ -66,7 +69,10 @@ std::int64_t count_of(nb::handle value, const char* name) {
   if (!index.is_valid() || !nb::try_cast<std::int64_t>(index, number)) {
     PyErr_Clear();
     throw InvalidArgument(std::string(name) + " must be a whole number, got " +
-                          nb::cast<std::string>(nb::repr(value)));
+                          nb::cast<std::string>(nb::repr(value)) +
+                          (PyFloat_Check(value.ptr()) != 0
+                               ? ": it counts iterations, which are seconds x frequency"
+                               : ""));
   }
   return number;
 }

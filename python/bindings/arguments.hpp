@@ -13,8 +13,9 @@
 
 bool truth_of(nanobind::handle value, const char* name);
 std::string string_of(nanobind::handle value, const char* name);
-/// str() of any object as UTF-8, with escapes for what has none; for texts that are only shown.
-std::string shown_text(nanobind::handle value) noexcept;
+/// str() of any object, made printable, or `otherwise`; for texts that are only shown. Bytes that
+/// Python could not decode (surrogateescape) are read as UTF-8, other surrogates are escaped.
+std::string shown_text(nanobind::handle value, const char* otherwise = "(no text)") noexcept;
 double number_of(nanobind::handle value, const char* name);
 std::int64_t count_of(nanobind::handle value, const char* name);
 

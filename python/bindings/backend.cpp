@@ -334,25 +334,28 @@ void bind_backend(nb::module_& m) {
           "request"_a)
       .def(
           "show_progress",
-          [](const Backend& self, std::uint32_t request, const std::string& text) {
-            self.in_its_thread().show_progress(request, text);
+          [](const Backend& self, std::uint32_t request, nb::handle text) {
+            self.in_its_thread().show_progress(request, shown_text(text));
           },
-          "request"_a, "text"_a)
+          "request"_a, "text"_a,
+          nb::sig("def show_progress(self, request: int, text: str) -> None"))
       .def(
           "end_request",
-          [](const Backend& self, std::uint32_t request, bool afresh,
-             const std::optional<std::string>& rejected) {
-            self.in_its_thread().end_request(request, rejected ? o80::Served::rejected(*rejected)
-                                                      : afresh ? o80::Served::start_afresh()
-                                                               : o80::Served::done());
+          [](const Backend& self, std::uint32_t request, bool afresh, nb::handle rejected) {
+            self.in_its_thread().end_request(
+                request, !rejected.is_none() ? o80::Served::rejected(shown_text(rejected))
+                         : afresh            ? o80::Served::start_afresh()
+                                             : o80::Served::done());
           },
-          "request"_a, "afresh"_a, "rejected"_a.none())
+          "request"_a, "afresh"_a, "rejected"_a.none(),
+          nb::sig(
+              "def end_request(self, request: int, afresh: bool, rejected: str | None) -> None"))
       .def(
           "halt",
-          [](const Backend& self, const std::string& text) {
-            self.checked().halt(o80::HaltCause::driver, text);
+          [](const Backend& self, nb::handle text) {
+            self.checked().halt(o80::HaltCause::driver, shown_text(text, ""));
           },
-          "text"_a)
+          "text"_a, nb::sig("def halt(self, text: object) -> None"))
       .def("ask_to_stop", [](const Backend& self) { self.checked().ask_to_stop(); })
       .def(
           "end",

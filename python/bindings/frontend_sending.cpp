@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "arguments.hpp"
+#include "base/printable.hpp"
 #include "batch.hpp"
 #include "buffer.hpp"
 #include "control/batch/batch_builder.hpp"
@@ -371,7 +372,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
       frontend, "mark", verbs::mark,
       [](const Frontend& self, nb::handle text) {
         const std::string line = string_of(text, "the text of a mark");
-        if (!nb::cast<bool>(text.attr("isprintable")())) {
+        if (o80::printable(line) != line) {
           throw o80::InvalidArgument("a mark is one line of printable text, got " +
                                      nb::cast<std::string>(nb::repr(text)));
         }

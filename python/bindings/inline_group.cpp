@@ -161,6 +161,21 @@ class Group {
     group->request(request, numbers_of<std::uint32_t>(chosen), given.span(), patience, kKeepWaiting,
                    filled.writable());
   }
+  /// By copy.
+  nb::dict halted() const {
+    nb::dict found;
+    for (const auto& [copy, halt] : group_->halted()) {
+      found[nb::int_(copy)] = nb::cast(*halt_fields(halt));
+    }
+    return found;
+  }
+  void resume(nb::handle copies, nb::handle timeout) const {
+    const Bytes chosen(copies);
+    const o80::Timeout patience = timeout_of(timeout);
+    const auto group = group_;
+    const Waiting waiting;
+    group->resume(numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting);
+  }
   void latest(nb::handle copies, nb::handle rows) const {
     const Bytes chosen(copies);
     const Bytes filled(rows, PyBUF_WRITABLE);
@@ -260,6 +275,9 @@ void bind_inline_group(nb::module_& m) {
       .def("request_index", &Group::request_index, "name"_a)
       .def("request", &Group::request, "request"_a, "copies"_a, "payloads"_a, "rows"_a,
            "timeout"_a.none())
+      .def("halted", &Group::halted,
+           nb::sig("def halted(self) -> dict[int, tuple[int, str, int, str, str]]"))
+      .def("resume", &Group::resume, "copies"_a, "timeout"_a.none())
       .def("latest", &Group::latest, "copies"_a, "rows"_a)
       .def("gather", &Group::gather, "numbers"_a, "flags"_a, "observations"_a, "raised"_a)
       .def("close", &Group::close);

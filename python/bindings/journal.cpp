@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "base/printable.hpp"
 #include "bindings.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
@@ -79,8 +80,9 @@ std::vector<o80::JournalEntry> entries_of(o80::Journal& journal, std::size_t mos
 }
 
 /// The text of a mark, which may be any bytes.
-nb::object text_of(const std::string& bytes) {
-  return nb::bytes(bytes.data(), bytes.size()).attr("decode")("utf-8", "replace");
+nb::str text_of(const std::string& bytes) {
+  const std::string clean = o80::printable(bytes);
+  return nb::str(clean.data(), clean.size());
 }
 
 /// Bytes, number of the first entry, number after the last one, whether there may be more, text and

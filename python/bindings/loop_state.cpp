@@ -66,7 +66,7 @@ BackendState backend_state(const std::string& segment) {
 
 std::optional<double> seconds(std::optional<std::int64_t> nanoseconds) {
   if (!nanoseconds) return std::nullopt;
-  return static_cast<double>(*nanoseconds) * 1e-9;
+  return static_cast<double>(*nanoseconds) / 1e9;
 }
 
 std::optional<std::tuple<std::string, double>> slow_verb(const o80::LoopState& state) {
@@ -94,6 +94,7 @@ void bind_loop_state(nb::module_& m) {
       .def_ro("recent_overruns", &LoopState::recent_overruns)
       .def_prop_ro("row_age", [](const LoopState& self) { return seconds(self.row_age); })
       .def_prop_ro("slow_verb", &slow_verb)
+      .def_ro("process_stopped", &LoopState::process_stopped)
       .def_prop_ro("stalled", &LoopState::stalled)
       .def_prop_ro("hang", &LoopState::hang)
       .def_prop_ro("trouble", &LoopState::trouble);

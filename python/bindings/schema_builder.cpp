@@ -88,7 +88,7 @@ void bind_schema_builder(nb::module_& m) {
       .def("set_limits", &SchemaBuilder::set_limits, "actuator"_a, "field"_a, "limits"_a,
            "integral"_a, "bounds"_a)
       .def("rests_at", &SchemaBuilder::rests_at, "actuator"_a, "field"_a, "value"_a)
-      .def("of_the_world", &SchemaBuilder::of_the_world)
+      .def("simulated", &SchemaBuilder::simulated)
       .def("gap", &SchemaBuilder::gap, "longest"_a)
       .def("description", &SchemaBuilder::description)
       .def("set_model", &SchemaBuilder::set_model, "mjcf"_a, "file"_a)

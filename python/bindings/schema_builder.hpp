@@ -60,7 +60,7 @@ struct SchemaBuilder {
     schema.actuator(actuator).rests_at(field, value);
   }
 
-  void of_the_world(bool is) { schema.head.of_the_world = is ? 1 : 2; }
+  void simulated(bool is) { schema.head.of_the_world = is ? 2 : 3; }
   void gap(std::int64_t longest) { schema.gap(longest); }
 
   /// The schema as readers see it.

@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "base/printable.hpp"
 #include "o80/describe/layout.hpp"
 
 namespace nb = nanobind;
@@ -19,7 +20,10 @@ constexpr const char* kKinds[] = {"bool",    "int8",   "int16",  "int32",  "int6
                                   "uint8",   "uint16", "uint32", "uint64", "float32",
                                   "float64", "enum",   "struct", "text"};
 
-nb::str text(std::string_view words) { return nb::str(words.data(), words.size()); }
+nb::str text(std::string_view words) {
+  const std::string clean = printable(words);  // another process has written them
+  return nb::str(clean.data(), clean.size());
+}
 
 nb::object number(double value) { return std::isfinite(value) ? nb::cast(value) : nb::none(); }
 
@@ -237,8 +241,8 @@ nb::dict tables_of(const Schema& schema) {
   found["bursting"] = schema.head.bursting != 0;
   found["silence"] = schema.head.silence;
   found["stale"] = text(name_of(schema.head.stale));
-  found["of_the_world"] = schema.head.of_the_world == 1;
-  found["simulated"] = schema.head.of_the_world == 2;
+  found["of_the_world"] = schema.head.of_the_world % 2 == 1;
+  found["simulated"] = schema.head.is_simulated();
   if (schema.head.gap != 0) found["gap"] = schema.head.gap * 1e-6;
   found["row"] = of_row(row_layout(schema));
   found["groups"] = list_of(schema.groups, [&](const GroupRow& group) {

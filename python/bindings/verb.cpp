@@ -35,7 +35,7 @@ void explain(const Verb& verb, PyObject* const* arguments, Py_ssize_t count, PyO
       keywords[nb::handle(PyTuple_GET_ITEM(names, i))] = nb::handle(arguments[count + i]);
     }
     const nb::object refuse = nb::module_::import_("o80.base.signatures").attr("refuse");
-    refuse(verb.text->signature, nb::handle(arguments[0]), given, keywords);
+    refuse(verb.text->signature, nb::handle(arguments[0]), given, keywords, error.value());
     error.restore();
   } catch (nb::python_error& refused) {
     refused.restore();

@@ -3,8 +3,6 @@
 `import o80` enables it if IPython was imported before; otherwise run `%load_ext o80.notebook`.
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 import sys

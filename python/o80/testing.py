@@ -36,7 +36,6 @@ def check_robot(
     *,
     seed: int = 0,
     stops_within: float = 10.0,
-    simulated: bool = False,
 ) -> list[str]:
     """Checks that a simulated robot keeps what o80 builds on, and raises AssertionError if not.
 
@@ -48,21 +47,18 @@ def check_robot(
     6. As a process of its own it stops in order, and soon.
 
     The robot is moved at random inside its limits; numbers without a minimum and a maximum stay
-    where they begin. So robots that may be hardware are not started: those that read the world, and
-    those that neither say that they are simulations (in Python of_the_world = False) nor serve the
-    requests snapshot and restore, unless `simulated` is given.
+    where they begin. So only a robot that says that it is simulated is started.
 
     robot: name, library, file or class, as for `o80.robots.load`.
     options: of the robot.
     seed: of the random commands.
     stops_within: seconds that a stop may take.
-    simulated: it is no hardware, although it serves no snapshots.
 
     Returns what was not checked, a sentence each: for example that it serves no reset. Raises
     AssertionError, which says what was found; BackendHalted and DriverError if the robot halts or
     fails when it is moved; InvalidArgument.
     """
-    return _Suite(robot, dict(options or {}), seed, stops_within).run(simulated)
+    return _Suite(robot, dict(options or {}), seed, stops_within).run()
 
 
 class _Suite:
@@ -76,14 +72,12 @@ class _Suite:
         self._served: set[str] = set()
         self._left: list[str] = []
 
-    def run(self, simulated: bool) -> list[str]:
+    def run(self) -> list[str]:
         schema = self._robot.describe(**self._options)
-        why = "" if simulated and not schema["of_the_world"] else reads_the_world(schema)
-        if why:
-            cure = "" if schema["of_the_world"] else ". If it is a simulation, give simulated=True"
+        if why := reads_the_world(schema):
             raise InvalidArgument(
                 f"check_robot moves a robot at random, so it does not start '{schema['robot']}': "
-                f"{why}{cure}"
+                f"{why}"
             )
         self._served = {request["name"] for request in schema["requests"]}
         with self._inline() as arm:

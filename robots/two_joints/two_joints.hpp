@@ -41,6 +41,7 @@ class TwoJoints {
   }
 
   void describe(o80::Schema& schema) const {
+    schema.simulated();
     const o80::Limits limits{.minimum = -config_.reach, .maximum = config_.reach};
     schema.actuator(0).name("shoulder").limits(limits).unit("rad");
     schema.actuator(1).name("elbow").limits(limits);

@@ -1,17 +1,22 @@
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
 namespace o80 {
 
-/// Makes a text from shared memory safe for a terminal: bytes other than printable ASCII become
-/// question marks.
-inline std::string printable(std::string_view text) {
-  std::string clean(text);
-  for (char& c : clean)
-    if (c < ' ' || c > '~') c = '?';
-  return clean;
-}
+/// Makes one line of valid UTF-8 from any bytes: safe for a terminal, a file and Python.
+///
+/// All letters stay. Invalid UTF-8, all characters of the Unicode categories Cc, Cf, Cs and Co,
+/// noncharacters, and separators of lines and paragraphs become question marks; other unassigned
+/// characters stay. A text that was cut inside a character ends before it. The result is not longer
+/// than the text.
+std::string printable(std::string_view text);
+
+/// The same into `to`, with at most `room` bytes and whole characters only; returns its size.
+///
+/// Realtime: yes.
+std::size_t printable(std::string_view text, char* to, std::size_t room) noexcept;
 
 }  // namespace o80

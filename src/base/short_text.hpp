@@ -5,7 +5,7 @@
 #include <charconv>
 #include <concepts>
 #include <cstddef>
-#include <cstring>
+#include <cstdint>
 #include <string_view>
 
 namespace o80 {
@@ -29,6 +29,10 @@ class ShortText {
     std::array<char, 32> digits{};
     const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), number).ptr;
     return add(std::string_view(digits.data(), static_cast<std::size_t>(end - digits.data())));
+  }
+  /// Adds a time in seconds. Divided: a product with 1e-9 has digits that are rounding errors.
+  ShortText& add_seconds(std::int64_t nanoseconds) noexcept {
+    return add(static_cast<double>(nanoseconds) / 1e9).add(" s");
   }
   std::string_view view() const noexcept { return {chars_.data(), size_}; }
 

@@ -4,10 +4,12 @@
 #include <cstring>
 #include <exception>
 
+#include "memory/os/descriptors.hpp"
 #include "o80/robot/run.hpp"
 #include "robot/driver/library.hpp"
 
 int main(int argc, char** argv) {
+  o80::open_standard_descriptors();
   if (argc < 2 || std::strcmp(argv[1], "--help") == 0 || argv[1][0] == '-') {
     std::puts("o80-run ROBOT [flags]   runs a robot; `o80-run ROBOT --help` lists its flags\n");
     for (const o80::RobotFile& robot : o80::find_robots()) {

@@ -29,7 +29,7 @@ def test_the_complete_driver_is_built_and_commanded_as_shown(tmp_path: Path) -> 
     run("cmake", "-B", "build", f"-Do80_ROOT={o80.prefix()}", folder=tmp_path)
     run("cmake", "--build", "build", folder=tmp_path)
     robot = o80.robots.load(tmp_path / "build" / "arm.so")
-    with robot.start(frequency=500, gain=30.0) as process:
+    with robot.start(frequency=500, gain=30.0, gap=0) as process:
         printed = run(sys.executable, "-c", first_block("python"), folder=tmp_path)
         assert "0.49" in printed or "0.5" in printed
         process.wait(timeout=20.0)

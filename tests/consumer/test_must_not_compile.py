@@ -56,6 +56,10 @@ struct Plain { using Actuators = std::array<double, 2>; %s };
 void serve(o80::Backend<Plain>& backend) {
   backend.on<o80::Reset>([](const o80::Reset&) { return o80::Served::done(); });
 }"""
+PARTS = """
+struct Parts { std::array<Sampled, 2> joint; double grip; };
+O80_DESCRIBE(Parts, %s, (grip, "[N]"));
+inline void add_to(o80::Schema& schema) { o80::describe_actuators<Parts>(schema); }"""
 ENDS = "void read(o80::Reading<Arm>& reading) { reading.ended<Home>(o80::Served::done()); }"
 DESCRIBE = "void describe(o80::Schema&) const {}"
 REQUESTS = "using Requests = o80::Requests<Home>; "
@@ -224,6 +228,18 @@ MISTAKES = {
         "state",
         "struct Sampled { double position; };",
         RIGHT["state"],
+    ),
+    "world_of_a_whole_robot": (
+        "every robot is of the world unless describe() calls schema.simulated(): remove",
+        "more",
+        "void describe(o80::Schema& schema) const { schema.of_the_world(); }",
+        "void describe(o80::Schema& schema) const { schema.simulated(); }",
+    ),
+    "unit_of_an_actuator_that_is_a_struct": (
+        "an actuator whose state is a struct takes no unit",
+        "state",
+        RIGHT["state"] + PARTS % '(joint, "[rad]")',
+        RIGHT["state"] + PARTS % "joint",
     ),
     "misspelt_field": (
         "positon",

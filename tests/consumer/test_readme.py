@@ -22,13 +22,27 @@ def run(*command: str, folder: Path) -> str:
     return done.stdout
 
 
-def test_the_first_minute_in_python(tmp_path: Path) -> None:
-    with_a_process, inline = blocks("python")
-    assert "(100, 2)" in run(sys.executable, "-c", with_a_process, folder=tmp_path)
-    assert "100 0.1 s" in run(sys.executable, "-c", inline, folder=tmp_path)
+def test_the_ten_lines_of_python(tmp_path: Path) -> None:
+    (program,) = blocks("python")
+    desired, rows, time = run(sys.executable, "-c", program, folder=tmp_path).splitlines()
+    assert desired.startswith("[0.1")
+    assert (rows, time) == ("(100, 2)", "0.1 s")
 
 
-def test_the_first_minute_in_cpp(tmp_path: Path) -> None:
+def test_the_names_that_a_user_needs() -> None:
+    (sentence,) = re.findall(r"needs twelve names of `o80`: (.*)", README)
+    names = re.findall(r"`(\w+)`", sentence)
+    assert len(names) == 12
+    assert not [name for name in names if not hasattr(o80, name)]
+
+
+def test_is_short_and_its_film_loads_fast() -> None:
+    assert len(README.splitlines()) <= 110
+    (film,) = re.findall(r"\((docs/pictures/\S+\.gif)\)", README)
+    assert (ROOT / film).stat().st_size < 3e6
+
+
+def test_the_robot_in_cpp(tmp_path: Path) -> None:
     (source,) = blocks("cpp")
     (lists,) = blocks("cmake")
     (tmp_path / "wheels.cpp").write_text(source)
@@ -36,7 +50,7 @@ def test_the_first_minute_in_cpp(tmp_path: Path) -> None:
     run("cmake", "-B", "build", f"-Do80_ROOT={o80.prefix()}", folder=tmp_path)
     run("cmake", "--build", "build", folder=tmp_path)
     robot = o80.robots.load(tmp_path / "build" / "wheels.so")
-    with robot.start(gain=0.2) as process, process.frontend() as wheels:
+    with robot.start(gain=0.2, gap=0) as process, process.frontend() as wheels:
         wheels.add_command(0, {"speed": 1.0}, duration=0.1)
         assert wheels.pulse_and_wait(timeout=20.0).desired["speed"][0] == 1.0
         wheels.add_command(0, {"speed": 1.0}, duration=100.0)

@@ -2,7 +2,6 @@
 // knows no type of the robot. Prints what the first actuator was asked at the end, and its status.
 
 #include <cstdio>
-#include <cstdlib>
 
 #include "o80/o80.hpp"
 

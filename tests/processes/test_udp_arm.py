@@ -58,7 +58,7 @@ def fake_arm(prefix: Path, *options: str) -> Iterator[Fake]:
 def robot(prefix: Path, segment: str, fake: Fake, *options: str) -> Iterator[subprocess.Popen[str]]:
     command = [
         str(prefix / "bin" / "o80-run"), str(prefix / "lib" / "examples" / "udp_arm.so"),
-        "--segment", segment, "--frequency", "100", "--port", fake.port, *options,
+        "--segment", segment, "--frequency", "100", "--port", fake.port, "--gap", "0", *options,
     ]  # fmt: skip
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
     try:

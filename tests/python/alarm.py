@@ -1,8 +1,19 @@
-"""SIGALRM inside a block."""
+"""Signals inside a block."""
 
 import contextlib
 import signal
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+
+
+@contextlib.contextmanager
+def handling(number: int, handler: Callable[..., object]) -> Iterator[None]:
+    """The handler of a signal, in the block."""
+    before = signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(number, before)
 
 
 @contextlib.contextmanager

@@ -85,7 +85,7 @@ CALLS = {
 }
 
 # their copies run in the calling thread and threads of its own: nobody else could let them wait
-COMPUTING = {"GroupBurst.run", "GroupRequest.run", "InlineGroup.request"}
+COMPUTING = {"GroupBurst.run", "GroupRequest.run", "InlineGroup.request", "InlineGroup.resume"}
 
 
 def waiting_methods() -> set[str]:

@@ -1,7 +1,5 @@
 """Tasks that use every part of o80.learning, for its tests."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -11,11 +11,24 @@ WAIT = 60.0  # [s] longer than any end should take
 O80 = str(Path(sys.executable).parent / "o80")
 
 
-def run_o80(*words: object, code: int = 0, **options: Any) -> "subprocess.CompletedProcess[str]":
-    """Runs the program o80, which must end with this code."""
-    command = [O80, *map(str, words)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=WAIT, **options)
-    assert done.returncode == code, done.stdout + done.stderr
+def run_program(
+    *words: object, code: int | None = 0, timeout: float = WAIT, **options: Any
+) -> "subprocess.CompletedProcess[str]":
+    """Runs a program, which must end with this code; None: with any."""
+    command = [*map(str, words)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, **options)
+    assert code in (None, done.returncode), done.stdout + done.stderr
+    return done
+
+
+def run_python(*words: object, **options: Any) -> "subprocess.CompletedProcess[str]":
+    """Runs an interpreter with these words; see run_program()."""
+    return run_program(sys.executable, *words, **options)
+
+
+def run_o80(*words: object, **options: Any) -> "subprocess.CompletedProcess[str]":
+    """Runs the program o80; see run_program()."""
+    done = run_program(O80, *words, **options)
     assert "Traceback" not in done.stderr
     return done
 

@@ -1,7 +1,5 @@
 """Models of PPO for the tests of rollouts."""
 
-from __future__ import annotations
-
 from copy import deepcopy
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Environments and policies for the tests of rollouts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

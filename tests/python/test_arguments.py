@@ -15,7 +15,6 @@ import o80
     [
         (lambda arm: arm.resume(-1), "number of a halt must be at least 1, got -1"),
         (lambda arm: arm.resume("x"), "number of a halt must be a whole number, got 'x'"),
-        (lambda arm: arm.halt(None), "reason of a halt must be a string, got None"),
         (lambda arm: arm.history("x"), "observations, must be a whole number, got 'x'"),
         (lambda arm: arm.history(since="x"), "since must be a whole number, got 'x'"),
         (lambda arm: arm.history(3, since=1), "give either n, or"),
@@ -112,3 +111,21 @@ def test_a_target_that_gives_no_field_is_refused(segment: str) -> None:
             with pytest.raises(o80.InvalidArgument, match=r"names no field.*position"):
                 frontend.add_command("a", {})
             assert frontend.added == 0
+
+
+def test_a_float_is_seconds_where_time_is_counted(segment: str) -> None:
+    half: Any = 0.5
+    with o80.robots.load("two_joints").inline(segment, frequency=500) as arm:
+        assert [arm.chunks("elbow", step=5, ease=ease).ease for ease in (0.2, 100)] == [100, 100]
+        with pytest.raises(o80.InvalidArgument, match="ease must be seconds"):
+            arm.chunks("elbow", step=5, ease=float("nan"))
+        for refused, cure in (
+            (lambda: arm.add_command("elbow", 0.1, duration=-1), "got -1 s"),
+            (lambda: arm.add_command("elbow", 0.1, until=half), "seconds x frequency"),
+            (lambda: arm.pulse(at=half), "seconds x frequency"),
+            (lambda: arm.burst(half), "seconds x frequency"),
+            (lambda: arm.wait_for(half), "seconds x frequency"),
+            (lambda: o80.robots.load("two_joints").inline(silence=half), "seconds x frequency"),
+        ):
+            with pytest.raises(o80.InvalidArgument, match=cure):
+                refused()

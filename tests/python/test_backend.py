@@ -169,16 +169,6 @@ def test_a_description_that_cannot_be_is_refused(
     assert segment not in [entry.name for entry in o80.segments()]
 
 
-def test_a_name_that_cannot_be_is_refused() -> None:
-    with pytest.raises(o80.Error):
-        o80.Backend("../arm", ["a"])
-
-
-def test_a_second_backend_of_the_name_is_refused(segment: str) -> None:
-    with o80.Backend(segment, ["a"]), pytest.raises(o80.SegmentTaken, match=segment):
-        o80.Backend(segment, ["a"])
-
-
 @pytest.mark.parametrize("observed", [[1.0], [1.0, 2.0, 3.0], ["x", "y"], {"a": 1.0}])
 def test_states_of_another_shape_are_refused(segment: str, observed: object) -> None:
     with (
@@ -186,11 +176,6 @@ def test_states_of_another_shape_are_refused(segment: str, observed: object) -> 
         pytest.raises(o80.InvalidArgument, match="observed"),
     ):
         backend.publish(observed)
-
-
-def test_row_0_comes_before_the_first_step(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend, pytest.raises(o80.InvalidArgument, match="row 0"):
-        backend.step()
 
 
 def test_bursting_steps_wait_for_a_grant(segment: str) -> None:

@@ -56,24 +56,6 @@ def test_statuses_are_words_and_strings(arm: o80.Frontend) -> None:
     assert handle.ended
 
 
-def test_a_batch_for_an_iteration_is_taken_there(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0)
-    batch = arm.pulse(at=5)
-    arm.burst(10)
-
-    assert batch.first_iteration == 5
-    assert arm.history(since=4, until=5).desired[:, 0].tolist() == [0.0, 1.0]
-
-
-def test_a_late_batch_may_be_taken_now(arm: o80.Frontend) -> None:
-    arm.burst(10)
-    arm.add_command(0, 1.0)
-
-    arm.pulse(at=5, late="now")
-
-    assert arm.burst(1).desired[0] == 1.0
-
-
 @pytest.mark.parametrize(
     ("option", "value"), [("at", -1), ("at", -7), ("at", 1.5), ("late", "never")]
 )

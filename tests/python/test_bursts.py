@@ -19,18 +19,6 @@ def test_a_burst_can_be_cancelled(bursting: o80.robots.Process) -> None:
         assert arm.burst(1, timeout=WAIT).iteration == last + 1
 
 
-def test_a_burst_that_is_not_done_in_time_goes_no_further(bursting: o80.robots.Process) -> None:
-    with bursting.frontend() as arm:
-        with pytest.raises(o80.TimeoutError):
-            arm.burst(10**15, timeout=0.01)
-        arm.add_command(0, 1.0, iterations=10**12)
-        with pytest.raises(o80.TimeoutError):
-            arm.pulse_and_wait(0.01)
-        last = arm.burst(1, timeout=WAIT).iteration
-
-        assert arm.published == last
-
-
 def test_a_group_may_return_at_once(segment: str) -> None:
     robot = o80.robots.load("two_joints")
     with (

@@ -6,11 +6,12 @@ import os
 import pty
 import signal
 import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from processes import O80
+from processes import O80, run_o80
 
 
 @pytest.fixture
@@ -28,15 +29,9 @@ def folder() -> Iterator[Path]:
 
 def o80(folder: Path, *words: str, fails: bool = False) -> str:
     """Output of a command; its errors if it should fail."""
-    done = subprocess.run(
-        [O80, *words],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env={**os.environ, "O80_DIRECTORY": str(folder), "COLUMNS": "100", "NO_COLOR": "1"},
-    )
+    environment = {"O80_DIRECTORY": str(folder), "COLUMNS": "100", "NO_COLOR": "1"}
+    done = run_o80(*words, code=None, env=os.environ | environment)
     assert (done.returncode != 0) == fails, done.stdout + done.stderr
-    assert "Traceback" not in done.stderr
     return done.stderr if fails else done.stdout
 
 
@@ -77,13 +72,10 @@ def test_help_teaches_and_lists_robots(folder: Path) -> None:
 
 
 def test_the_version_and_the_prefix_are_printed(folder: Path) -> None:
-    assert o80(folder, "--version").count(".") == 2
+    version = o80(folder, "--version")
+    assert version.count(".") == 2
+    assert version == subprocess.check_output([sys.executable, "-m", "o80", "--version"], text=True)
     assert (Path(o80(folder, "--prefix").strip()) / "bin" / "o80-run").exists()
-
-
-def test_nothing_runs_at_first(folder: Path) -> None:
-    assert "Nothing runs" in o80(folder, "list")
-    assert json.loads(o80(folder, "list", "--json")) == []
 
 
 def test_a_running_robot_is_listed(folder: Path, robot: "subprocess.Popen[str]") -> None:
@@ -192,35 +184,10 @@ def test_a_mark_stands_in_the_journal(folder: Path, robot: "subprocess.Popen[str
     assert "a mark has 1 to 976 bytes" in o80(folder, "mark", "two_joints", "", fails=True)
 
 
-def test_stop_ends_a_robot_in_order(folder: Path, robot: "subprocess.Popen[str]") -> None:
-    assert "two_joints has stopped" in o80(folder, "stop", "two_joints")
-    assert robot.wait(timeout=20) == 0
-    assert "Nothing runs" in o80(folder, "list")
-
-
 def test_stop_names_what_runs(folder: Path, robot: "subprocess.Popen[str]") -> None:
     assert "running: two_joints" in o80(folder, "stop", "arm", fails=True)
     assert "Did you mean 'two_joints'?" in o80(folder, "stop", "twojoints", fails=True)
     assert "--all" in o80(folder, "stop", fails=True)
-
-
-def test_a_killed_robot_is_shown_read_and_cleaned(
-    folder: Path, robot: "subprocess.Popen[str]"
-) -> None:
-    robot.send_signal(signal.SIGKILL)
-    robot.wait()
-    assert "killed" in o80(folder, "list")
-    assert "shoulder" in o80(folder, "info", "two_joints")
-    assert "removed two_joints" in o80(folder, "clean")
-    assert "Nothing to remove" in o80(folder, "clean")
-
-
-def test_a_second_robot_of_the_same_name_is_refused(
-    folder: Path, robot: "subprocess.Popen[str]"
-) -> None:
-    text = o80(folder, "run", "two_joints", fails=True)
-    assert f"pid {robot.pid}" in text
-    assert "--segment" in text
 
 
 def test_errors_name_the_cure(folder: Path) -> None:
@@ -244,15 +211,9 @@ def test_echo_prints_the_last_rows_of_a_dead_robot(
     robot.kill()
     robot.wait()
 
-    done = subprocess.run(
-        [O80, "echo", "two_joints", "--count", "3", "--json"],
-        capture_output=True,
-        text=True,
-        timeout=60,
-        env={**os.environ, "O80_DIRECTORY": str(folder)},
-    )
+    words = ("echo", "two_joints", "--count", "3", "--json")
+    done = run_o80(*words, code=1, env=os.environ | {"O80_DIRECTORY": str(folder)})
 
     first, *_, last = (json.loads(line)["iteration"] for line in done.stdout.splitlines())
     assert last == first + 2
     assert "was killed" in done.stderr
-    assert done.returncode == 1

@@ -134,25 +134,6 @@ def test_ctrl_c_ends_it_without_a_word(segment: str, backend: o80.Backend) -> No
     assert "Traceback" not in said
 
 
-def test_a_reader_that_leaves_ends_it_without_a_word(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment):
-        watching = subprocess.Popen(
-            [O80, "echo", segment, "--every"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        assert watching.stdout is not None
-        assert watching.stderr is not None
-        watching.stdout.readline()
-        watching.stdout.close()
-        said = watching.stderr.read()
-        watching.wait(timeout=WAIT)
-    watching.stderr.close()
-    assert "Broken" not in said
-    assert "Traceback" not in said
-
-
 def test_a_table_fits_a_terminal_of_80_columns(segment: str, backend: o80.Backend) -> None:
     parent, child = pty.openpty()
     subprocess.run(

@@ -156,20 +156,6 @@ def test_every_use_of_something_closed_says_so(things: Things, kind: str) -> Non
     assert "closed" in repr(closed)
 
 
-def test_a_stream_ends_with_its_frontend(things: Things) -> None:
-    things.frontend.close()
-
-    with pytest.raises(o80.Closed):
-        next(things.stream)
-
-
-def test_a_batch_is_still_asked_when_its_frontend_is_closed(things: Things) -> None:
-    things.frontend.close()
-
-    assert things.batch.statuses == ["completed"]
-    things.batch.wait(WAIT)
-
-
 def test_a_group_with_one_that_is_closed_does_not_begin(segment: str) -> None:
     joints = o80.robots.load("two_joints")
     with joints.inline(f"{segment}-a") as one, joints.inline(f"{segment}-b") as other:

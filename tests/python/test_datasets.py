@@ -16,13 +16,10 @@ from o80.datasets.episodes import Episodes, episodes_of
 
 
 @pytest.fixture
-def recorded(segment: str, tmp_path: Path) -> Path:
+def recorded(arm: o80.Frontend, tmp_path: Path) -> Path:
     """Three episodes of 30, 20 and 20 steps; the second ends by itself, the last is cut."""
     path = tmp_path / "run.mcap"
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
+    with o80.Recording(path, arm) as recording:
         arm.burst(5)
         recording.mark("episode", task="swing", ball=3)
         arm.add_command("elbow", 0.3, iterations=30)
@@ -70,8 +67,62 @@ def test_rewards_belong_to_the_step_in_which_they_were_marked(recorded: Path) ->
     assert second.rewards.sum() == 1.0
 
 
-def test_steps_may_be_several_iterations(recorded: Path, segment: str) -> None:
-    found = episodes(recorded, every=10)
+@pytest.mark.parametrize(
+    "values",
+    [{"reward": "high"}, {"reward": None}, {"reward": [1]}, {"rewards": 3.0}, {"rewards": ["a"]}],
+)
+def test_a_reward_that_is_no_number_is_refused(
+    arm: o80.Frontend, tmp_path: Path, values: dict[str, Any]
+) -> None:
+    path = tmp_path / "run.mcap"
+    with o80.Recording(path, arm) as recording:
+        recording.mark("episode")
+        arm.burst(10)
+        recording.mark("episode_end", **values)
+    with pytest.raises(o80.InvalidArgument, match=r"the mark 'episode_end' at row 10 has reward"):
+        episodes(path)
+
+
+class Blinking:
+    """A joint that gives no number in one row."""
+
+    actuators = ("elbow", "wrist")
+    simulated = True
+
+    def __init__(self) -> None:
+        self.rows = 0
+
+    def write(self, desired: Any) -> None: ...
+
+    def read(self, reading: Any) -> None:
+        self.rows += 1
+        reading.observed = [0.1 * self.rows, np.nan if self.rows == 5 else 1.0]
+
+
+def test_statistics_leave_out_what_is_not_finite_and_say_so(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load(Blinking).inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        arm.burst(1)
+        recording.mark("episode")
+        arm.burst(10)
+        recording.mark("episode_end", reward=1.0)
+    exported = run_o80("export", str(path), "-o", str(tmp_path / "set"), "--format", "lerobot")
+    assert "1 number is not finite, left out of the statistics" in exported.stderr
+    assert "wrist (1)" in exported.stderr
+    text = (tmp_path / "set/meta/stats.json").read_text()
+    stats = json.loads(text, parse_constant=lambda word: pytest.fail(word))
+    assert stats["observation.state"]["mean"][1] == 1.0
+    table = run_o80("export", str(path), "-o", str(tmp_path / "rows.csv"))
+    assert "1 number is not finite, left empty: observed.wrist (1)" in table.stderr
+    assert "nan" not in (tmp_path / "rows.csv").read_text()
+
+
+@pytest.mark.parametrize("every", [10, 0.01])  # iterations, or seconds
+def test_steps_may_be_several_iterations(recorded: Path, segment: str, every: float) -> None:
+    found = episodes(recorded, every=every)
     history = o80.open(recorded)[segment].history()
 
     assert found.frequency == 100
@@ -81,12 +132,9 @@ def test_steps_may_be_several_iterations(recorded: Path, segment: str) -> None:
     assert found.all[0].rewards.tolist() == [0.25, 0, 0]
 
 
-def test_a_fresh_start_ends_an_episode(segment: str, tmp_path: Path) -> None:
+def test_a_fresh_start_ends_an_episode(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
+    with o80.Recording(path, arm) as recording:
         for _ in range(2):
             recording.mark("episode")
             arm.burst(10)
@@ -97,12 +145,9 @@ def test_a_fresh_start_ends_an_episode(segment: str, tmp_path: Path) -> None:
     assert first.rows.iteration[-1] < second.rows.iteration[0]
 
 
-def test_an_episode_that_a_fresh_start_cuts_is_said(segment: str, tmp_path: Path) -> None:
+def test_an_episode_that_a_fresh_start_cuts_is_said(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
+    with o80.Recording(path, arm) as recording:
         recording.mark("episode")
         arm.burst(10)
         arm.halt("look")
@@ -119,13 +164,12 @@ def test_an_episode_that_a_fresh_start_cuts_is_said(segment: str, tmp_path: Path
     assert f"ends at row {cut}, where the robot made a fresh start" in why
 
 
-def test_rewards_of_all_steps_may_come_with_the_last_mark(segment: str, tmp_path: Path) -> None:
+def test_rewards_of_all_steps_may_come_with_the_last_mark(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
     path = tmp_path / "run.mcap"
     rewards = [0.0, 0.5, 1.0]
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
+    with o80.Recording(path, arm) as recording:
         recording.mark("episode")
         arm.burst(30)
         recording.mark("episode_end", rewards=rewards, truncated=True)
@@ -253,13 +297,10 @@ def test_a_folder_that_exists_is_not_overwritten(recorded: Path, tmp_path: Path)
 
 
 def test_the_latency_of_another_episode_or_of_an_order_that_says_nothing_is_not_known(
-    segment: str, tmp_path: Path
+    arm: o80.Frontend, tmp_path: Path
 ) -> None:
     path = tmp_path / "run.mcap"
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
+    with o80.Recording(path, arm) as recording:
         for _ in range(2):
             recording.mark("episode")
             arm.burst(2)  # nothing was sent yet
@@ -322,12 +363,11 @@ def test_a_learner_gets_no_times_of_clocks_unless_it_asks(segment: str, tmp_path
         episodes(path, fields=["fource"])
 
 
-def test_marks_that_look_like_those_of_episodes_are_named(segment: str, tmp_path: Path) -> None:
+def test_marks_that_look_like_those_of_episodes_are_named(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
     path = tmp_path / "run.mcap"
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
+    with o80.Recording(path, arm) as recording:
         for mark in ("episode: one", "episode:two", "Episode", "touched", "episode-end"):
             recording.mark(mark)
             arm.burst(5)
@@ -369,18 +409,19 @@ def test_minari_reads_its_data_set(
 # ---------------------------------------------------------------------------- command
 
 
-@pytest.mark.parametrize("form", ["lerobot", "minari"])
-def test_the_command_writes_a_data_set(form: str, recorded: Path, tmp_path: Path) -> None:
-    options = ("-o", tmp_path / "set", "--format", form, "--every", 10)
+@pytest.mark.parametrize(("form", "every"), [("lerobot", "10"), ("minari", "0.01")])
+def test_the_command_writes_a_data_set(
+    form: str, every: str, recorded: Path, tmp_path: Path
+) -> None:
+    options = ("-o", tmp_path / "set", "--format", form, "--every", every)
     said = run_o80("export", recorded, *options).stdout
     assert "3 episodes, 7 steps at 100 a second" in said
 
 
-def test_actions_come_with_the_latency_of_their_decisions(segment: str, tmp_path: Path) -> None:
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(tmp_path / "run.mcap", arm) as recording,
-    ):
+def test_actions_come_with_the_latency_of_their_decisions(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    with o80.Recording(tmp_path / "run.mcap", arm) as recording:
         recording.mark("episode")
         arm.burst(4)
         for delay in (1, 3):

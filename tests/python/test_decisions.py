@@ -79,6 +79,7 @@ SCRIPTS: list[Callable[[o80.Frontend, int], int]] = [
 ]
 
 
+# rule B11
 def test_it_changes_no_motion(segment: str) -> None:
     def rows(*, say: bool) -> o80.History:
         choose = np.random.default_rng(5)

@@ -6,20 +6,39 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
-FOLDERS = ("apps", "benchmarks", "devices", "docs", "examples", "robots", "simulators", "tests")
+FOLDERS = (
+    *("apps", "benchmarks", "devices", "docs", "examples"),
+    *("python", "robots", "simulators", "src", "tests"),
+)
 PAGES = sorted([*ROOT.glob("*.md"), *(page for f in FOLDERS for page in (ROOT / f).rglob("*.md"))])
 LINK = re.compile(r"\]\(([^)#\s]*)(?:#([^)\s]+))?\)")
 NAME = re.compile(r"`(?:(\w+)::)?(\w+)`")
-SOURCE = re.compile(r"`([\w/]+\.(?:cpp|hpp|py))`")
+SOURCE = re.compile(r"`([\w/]+\.(?:cpp|hpp|py)|\w+(?:/\w+)+)`")  # or a folder
 PAGE = re.compile(
-    r"((?:\b(?:docs(?:/\w+)?|tests/proofs/models|benchmarks)/\w+|\b[A-Z]+)\.md)(?:#([\w-]+))?"
+    r"(?<![\w./-])((?:(?:benchmarks|docs|python|src|tests)/(?:\w+/)*\w+|[A-Z]+)\.md)(?:#([\w-]+))?"
 )
+# the notes on protocols, beside their code; all sections have one form
+NOTES = [
+    ROOT / folder / "README.md"
+    for folder in ("src/memory", "src/control", "src/runtime", "python/o80/view")
+]
+FORM = [
+    *("Invariant", "Words", "Who writes", "Who reads"),
+    *("What a death leaves", "Which model proves it"),
+]
+LABEL = re.compile(r"^- \*\*(.*?)\*\*: (.*)$", re.MULTILINE)
+INSIDE = [ROOT / "ARCHITECTURE.md", *NOTES]
+LARGEST = {page: 12 * 1024 if page.parent == ROOT else 6 * 1024 for page in INSIDE}  # [bytes]
 SOURCES = [
     path
     for folder in ("apps", "devices", "include", "python", "robots", "simulators", "src", "tests")
     for path in (ROOT / folder).rglob("*")
     if path.suffix in {".hpp", ".cpp", ".py"} and path != Path(__file__)
 ]
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(ROOT))
 
 
 def without_code(page: Path) -> str:
@@ -37,7 +56,7 @@ def test_there_are_pages() -> None:
     assert len(PAGES) >= 12
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+@pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_link_leads_to_a_file_and_a_section(page: Path) -> None:
     broken = []
     for target, anchor in LINK.findall(without_code(page)):
@@ -49,19 +68,53 @@ def test_every_link_leads_to_a_file_and_a_section(page: Path) -> None:
     assert not broken
 
 
-@pytest.mark.parametrize("name", ["ARCHITECTURE.md", "tests/proofs/models/README.md"])
-def test_every_source_that_a_page_names_exists(name: str) -> None:
+@pytest.mark.parametrize("page", [*INSIDE, ROOT / "tests/proofs/models/README.md"], ids=name_of)
+def test_every_source_that_a_page_names_exists(page: Path) -> None:
     there = [f"/{source.relative_to(ROOT)}" for source in SOURCES]
-    named = set(SOURCE.findall(without_code(ROOT / name)))
-    assert named
-    assert not [path for path in named if not any(file.endswith(f"/{path}") for file in there)]
+    named = set(SOURCE.findall(without_code(page)))
+    folders = {path for path in named if (ROOT / path).is_dir()}
+    assert not [
+        path for path in named - folders if not any(file.endswith(f"/{path}") for file in there)
+    ]
 
 
-def test_every_member_and_constant_that_the_architecture_names_exists() -> None:
+@pytest.mark.parametrize("page", INSIDE, ids=name_of)
+def test_every_member_and_constant_that_a_page_about_the_inside_names_exists(page: Path) -> None:
     words = set(re.findall(r"\w+", "".join(source.read_text() for source in SOURCES)))
-    named = NAME.findall(without_code(ROOT / "ARCHITECTURE.md"))
-    assert len(named) >= 20
+    text = "".join(line for line in without_code(page).splitlines(True) if FORM[-1] not in line)
+    named = NAME.findall(text)
+    assert named
     assert not {name for pair in named for name in pair if name} - words
+
+
+@pytest.mark.parametrize("page", INSIDE, ids=name_of)
+def test_a_page_about_the_inside_is_short(page: Path) -> None:
+    assert page.stat().st_size <= LARGEST[page]
+
+
+@pytest.mark.parametrize("page", NOTES, ids=name_of)
+def test_protocols_are_described_in_one_form_with_proofs_that_exist(page: Path) -> None:
+    proofs = {path.stem for path in (ROOT / "tests").rglob("*.*")}
+    found = 0
+    for section in page.read_text().split("\n## ")[1:]:
+        labels = LABEL.findall(section)
+        if not labels:
+            continue
+        title = section.splitlines()[0]
+        assert [label for label, _ in labels] == FORM, title
+        named = {name for pair in NAME.findall(labels[-1][1]) for name in pair if name}
+        assert named, title
+        assert not named - proofs, title
+        found += 1
+    assert found >= 4
+
+
+def test_the_iteration_that_the_architecture_shows_is_that_of_the_loop() -> None:
+    loop = (ROOT / "src/robot/loop/loop.cpp").read_text()
+    (shown,) = re.findall(
+        r"```cpp\n(.*?)```", (ROOT / "ARCHITECTURE.md").read_text(), flags=re.DOTALL
+    )
+    assert all(part in loop for part in shown.split("\n\n"))
 
 
 def test_every_page_and_section_that_a_source_names_exists() -> None:
@@ -72,3 +125,42 @@ def test_every_page_and_section_that_a_source_names_exists() -> None:
             if not page.exists() or (anchor and anchor not in anchors(page)):
                 broken.append(f"{source.relative_to(ROOT)}: {name}#{anchor}")
     assert not broken
+
+
+# ---------------------------------------------------------------------------- the contract
+
+RULE = re.compile(r"^- \*\*([A-Z]\d+)\*\* .+ \((`[\w.]+`(?:, `[\w.]+`)*)\)$", re.MULTILINE)
+MENTION = re.compile(r"\brules? ([A-Z]\d+(?:, [A-Z]\d+)*)")
+MARK = re.compile(rf"^(?://|#) {MENTION.pattern}$", re.MULTILINE)
+TEST = re.compile(r"^(?:TEST\w*\(\s*(\w+),\s*(\w+)\)|(?:async )?def (test_\w+)\()", re.MULTILINE)
+SIZES = {"docs/semantics.md": 24, "docs/decisions.md": 8}  # [KiB]
+
+
+@pytest.mark.parametrize("name", SIZES)
+def test_a_page_has_the_size_that_a_reader_has_time_for(name: str) -> None:
+    assert (ROOT / name).stat().st_size <= SIZES[name] * 1024
+
+
+def test_every_rule_of_the_contract_names_the_tests_that_name_it() -> None:
+    page = (ROOT / "docs" / "semantics.md").read_text()
+    rules = RULE.findall(page)
+    numbers = [number for number, _ in rules]
+    assert len(numbers) >= 100
+    assert len(set(numbers)) == len(numbers)
+    lines = [line for line in page.splitlines() if line.startswith("- **")]
+    assert [line for line in lines if not RULE.match(line)] == [], "rules without a test"
+    wanted = {(number, test) for number, names in rules for test in re.findall(r"[\w.]+", names)}
+
+    marked: set[tuple[str, str]] = set()
+    mentioned: set[str] = set()
+    for source in SOURCES:
+        text = source.read_text()
+        mentioned.update(n for list_ in MENTION.findall(text) for n in list_.split(", "))
+        for mark in MARK.finditer(text):
+            test = TEST.search(text, mark.end())
+            assert test, f"{source.relative_to(ROOT)}: no test after '{mark[0]}'"
+            name = test[3] or f"{test[1]}.{test[2]}"
+            marked.update((number, name) for number in mark[1].split(", "))
+    assert sorted(mentioned - set(numbers)) == [], "are no rules"
+    assert sorted(wanted - marked) == [], "named by a rule, without a comment that names the rule"
+    assert sorted(marked - wanted) == [], "names a rule that does not name it"

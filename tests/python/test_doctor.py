@@ -6,13 +6,13 @@ import os
 import re
 import shlex
 import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import o80._core as _core
 import pytest
+from processes import run_o80
 
 import o80
 from o80.robots.doctor import wake_ups
@@ -463,24 +463,16 @@ def test_no_load_disturbs_a_robot_that_runs(
         assert found == WakeUps(1000.0, 0.2, failed=reason)
 
 
-def doctor(*words: str) -> "subprocess.CompletedProcess[str]":
-    program = str(Path(sys.executable).parent / "o80")
-    return subprocess.run(
-        [program, "doctor", *words], capture_output=True, text=True, timeout=120, check=False
-    )
-
-
 def test_the_command_prints_json_and_its_status_says_whether_this_computer_serves() -> None:
-    done = doctor("--json", "--seconds", "0", "--frequency", "1000")
+    done = run_o80("doctor", "--json", "--seconds", 0, "--frequency", 1000, code=None, timeout=120)
     report = json.loads(done.stdout)
     assert done.returncode == (0 if report["serves"] else 1)
     assert " ".join(report) == "serves verdict frequency findings measured loaded unread computer"
     assert report["measured"] is report["loaded"] is None
     for finding in report["findings"]:
         assert " ".join(finding) == "name seen effect cure undo delay remark"
-    text = doctor("--seconds", "0", "--frequency", "1000")
-    assert text.returncode == done.returncode
+    text = run_o80("doctor", "--seconds", 0, "--frequency", 1000, code=done.returncode, timeout=120)
     assert text.stdout.startswith(report["verdict"])
     assert text.stderr == done.stderr == ""
-    assert doctor("--frequency", "0").returncode == 2
-    assert doctor("--seconds", "nan").returncode == 2
+    run_o80("doctor", "--frequency", 0, code=2)
+    run_o80("doctor", "--seconds", "nan", code=2)

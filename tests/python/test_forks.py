@@ -1,10 +1,7 @@
 """A process that forks inside a function that o80 calls: the child touches no robot."""
 
-import subprocess
-import sys
-
 import pytest
-from processes import WAIT
+from processes import run_python
 
 START = """
 import os, signal, sys, threading, time
@@ -28,7 +25,7 @@ def goes_on():
 
 DRIVER = """
 class Forks:
-    of_the_world = False
+    simulated = True
     def __init__(self):
         if sys.argv[2] == "constructor": fork()
     @property
@@ -107,14 +104,7 @@ else:
 
 def run(program: str, segment: str, place: str) -> tuple[str, str]:
     """Standard output and error of a program with its children."""
-    ended = subprocess.run(
-        [sys.executable, "-c", START + program, segment, place],
-        capture_output=True,
-        text=True,
-        timeout=WAIT,
-        check=False,
-    )
-    assert ended.returncode == 0, ended.stderr
+    ended = run_python("-c", START + program, segment, place)
     return ended.stdout, ended.stderr
 
 

@@ -97,6 +97,9 @@ def test_names_each_of_its_files_in_the_table() -> None:
         (lambda arm: arm.purge(actuators=0), "did you mean 'actuator'?"),
         (lambda arm: arm.latest(3), "takes 1 positional argument but 2 were given"),
         (lambda arm: arm.halt(1, 2), "halt() takes from 1 to 2 positional arguments"),
+        (lambda arm: arm.add_trajectory([[0, 0]], frequency=50), ". It takes targets, actuators"),
+        (lambda arm: arm.add_trajectory(), "add_trajectory() missing 1 required positional"),
+        (lambda arm: arm.resume(1, 2.0), "give the rest by name"),
     ],
 )
 def test_refuses_wrong_arguments_in_the_words_of_python(call: object, said: str) -> None:

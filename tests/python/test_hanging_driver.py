@@ -1,5 +1,7 @@
 """Texts of `o80 list` and `o80 info` about robots whose driver hangs or is late."""
 
+import os
+import signal
 import subprocess
 import sysconfig
 import time
@@ -7,7 +9,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
-from processes import O80, WAIT
+from processes import O80, WAIT, run_o80
 
 import o80
 
@@ -22,6 +24,7 @@ class Hanging {
   struct Config { std::string verb = "none"; };
   using Actuators = std::array<double, 1>;
   explicit Hanging(const Config& config) : verb_(config.verb) {}
+  void describe(o80::Schema& schema) const { schema.simulated(); }
   void start() { hang_in("start"); }
   void write(const o80::Desired<Hanging>& desired) {
     if (desired.iteration() == 20) hang_in("write");
@@ -92,32 +95,31 @@ def hang(library: Path, segment: str) -> Iterator[Hang]:
     o80.clean(segment)
 
 
-def said(*command: str) -> str:
-    return subprocess.run([O80, *command], capture_output=True, text=True, timeout=WAIT).stdout
-
-
 def until_said(text: str, *command: str) -> str:
     """Asks again and again until the answer has the text."""
     end = time.monotonic() + WAIT
     answer = ""
     while text not in answer:
         assert time.monotonic() < end, answer
-        answer = said(*command)
+        answer = run_o80(*command, code=None).stdout
     return answer
 
 
 def test_a_start_that_does_not_return_is_listed(segment: str, hang: Hang) -> None:
-    hang("start")
+    process = hang("start")
 
     answer = until_said(f"{segment}: start() of the driver has been running for", "list")
 
     assert "hangs" in answer
+    line_with("start() of the driver has been running for", process)
+    with pytest.raises(o80.TimeoutError, match=r"still starting: start\(\) of its driver"):
+        o80.Frontend(segment, timeout=0.0)
 
 
 def test_a_verb_that_does_not_return_is_listed_and_so_are_missing_rows(
     segment: str, hang: Hang
 ) -> None:
-    hang("write")
+    process = hang("write")
 
     answer = until_said("no row for", "list")
     assert f"{segment}: no row for" in answer
@@ -126,24 +128,7 @@ def test_a_verb_that_does_not_return_is_listed_and_so_are_missing_rows(
 
     answer = until_said("no row for", "info", segment)
     assert "write() of the driver has been running for" in answer
-
-
-def test_the_process_itself_says_that_its_driver_hangs(segment: str, hang: Hang) -> None:
-    process = hang("write")
-
     assert "write() of the driver has been running for" in line_with("no row for", process)
-
-
-def test_the_process_itself_says_that_start_hangs(segment: str, hang: Hang) -> None:
-    process = hang("start")
-
-    line_with("start() of the driver has been running for", process)
-
-
-def test_the_process_itself_says_which_rate_it_reaches(segment: str, hang: Hang) -> None:
-    process = hang("late")
-
-    assert "iterations were late" in line_with("Hz reached of 1000", process)
 
 
 def test_python_tells_a_hang_from_standing_still(segment: str, hang: Hang) -> None:
@@ -157,14 +142,6 @@ def test_python_tells_a_hang_from_standing_still(segment: str, hang: Hang) -> No
         assert frontend.rate_reached == 0.0
         assert frontend.row_age is not None
         assert frontend.row_age > 1.0
-
-
-def test_a_frontend_that_waits_is_told_what_the_driver_is_doing(segment: str, hang: Hang) -> None:
-    hang("start")
-    until_said("start() of the driver", "list")
-
-    with pytest.raises(o80.TimeoutError, match=r"still starting: start\(\) of its driver"):
-        o80.Frontend(segment, timeout=0.0)
 
 
 def test_a_library_with_an_undefined_function_is_told_its_name(tmp_path: Path) -> None:
@@ -182,10 +159,42 @@ def test_a_library_with_an_undefined_function_is_told_its_name(tmp_path: Path) -
         o80.robots.load(library)
 
 
+# rule W8
+def test_a_robot_that_says_nothing_of_itself_is_guarded_as_hardware(
+    tmp_path: Path, segment: str
+) -> None:
+    """In real time it is halted after a gap, and is not resumed where it cannot have come."""
+    replaced = {
+        "schema.simulated();": "schema.actuator(0).limits({.speed = 2.0});",
+        "o80::Reading<Hanging>&) {}": "o80::Reading<Hanging>& r) { r.observed[0] = place_; }\n"
+        "  void halt() { place_ = 30.0; }\n  double place_ = 0.0;",
+    }
+    source = DRIVER
+    for part, other in replaced.items():
+        assert part in source
+        source = source.replace(part, other)
+    robot = o80.robots.load(compiled(tmp_path, "silent", source))
+    with robot.start(segment) as process, process.frontend() as arm:
+        arm.add_command(0, 0.5, iterations=10_000_000)
+        batch = arm.pulse()
+        arm.wait_for(3, timeout=WAIT)
+        os.kill(process.pid, signal.SIGSTOP)
+        time.sleep(1.0)  # what is tested, not a wait
+        os.kill(process.pid, signal.SIGCONT)
+        with pytest.raises(o80.BackendHalted, match=r"no iteration for \d.*than --gap 0\.1 s:"):
+            batch.wait(WAIT)
+        halt = arm.halted
+        assert halt is not None
+        arm.wait_for(arm.published + 100, timeout=WAIT)
+        with pytest.raises(o80.Error, match=r"was read at 30 after 0.*--accept-reading"):
+            arm.resume(halt.number)
+
+
 def test_late_iterations_are_listed_with_the_rate_that_is_reached(segment: str, hang: Hang) -> None:
-    hang("late")
+    process = hang("late")
 
     until_said("Hz reached of 1000", "list")
     answer = until_said("Hz reached of 1000", "info", segment)
 
     assert "iterations were late" in answer
+    assert "iterations were late" in line_with("Hz reached of 1000", process)

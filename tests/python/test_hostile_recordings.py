@@ -3,8 +3,6 @@
 import json
 import random
 import struct
-import subprocess
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import product
@@ -13,18 +11,24 @@ from typing import Any
 
 import numpy as np
 import pytest
+from mcap.records import ChunkIndex
+from processes import run_o80
 
 import o80
 from o80 import _core
 from o80.base.machine import Machine
-from o80.recording.epoch import EpochNote
+from o80.cli.info import info as info_command
+from o80.cli.save import repair
+from o80.recording.blocks import messages_in
+from o80.recording.epoch import EpochNote, Gap
+from o80.recording.locked_file import LockedFile
 from o80.recording.marks import Mark
+from o80.recording.scan import content_of, index_of, scan
 from o80.replaying.recorded_run import FileRun, runs_in
 from o80.rows.provenance import Provenance
 
 RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
 RECORDING = RECORDINGS / "codec_1.mcap"
-WAIT = 60.0  # [s] longer than any command should take
 
 
 def record(path: Path, segment: str) -> Path:
@@ -35,13 +39,6 @@ def record(path: Path, segment: str) -> Path:
         recording.mark("episode", task="x")
         arm.burst(20)
     return path
-
-
-def o80_command(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    program = Path(sys.executable).parent / "o80"
-    return subprocess.run(
-        [program, *words], capture_output=True, text=True, timeout=WAIT, check=False
-    )
 
 
 @pytest.mark.parametrize("name", ["../../evil", "/etc/x", "x\x1b[31m", "", ".hidden", "a" * 65])
@@ -131,7 +128,7 @@ def test_texts_of_a_recording_do_not_control_the_terminal(
             lambda self: json.dumps(json.loads(honest(self)) | {"libc": "\x1b[2J\x07 1"}),
         )
         path = record(tmp_path / "run.mcap", segment)
-    done = o80_command("replay", path)
+    done = run_o80("replay", path, code=None)
     assert "recorded it" in done.stdout
     assert not {"\x1b", "\x07"} & set(done.stdout + done.stderr)
 
@@ -236,3 +233,124 @@ def test_a_damaged_description_is_told() -> None:
         except o80.Error:
             told += 1
     assert told > 0
+
+
+def damaged(data: bytes, draw: random.Random) -> bytes:
+    """A file with flipped, cut, duplicated or spliced bytes."""
+    a, b = sorted(draw.randrange(len(data)) for _ in range(2))
+    to = draw.randrange(len(data))
+    return {
+        "flip": lambda: data[:a] + bytes([data[a] ^ (1 << draw.randrange(8))]) + data[a + 1 :],
+        "cut": lambda: data[:a],
+        "splice": lambda: data[:a] + data[b:],
+        "duplicate": lambda: data[:b] + data[a:b] + data[b:],
+        "move": lambda: data[:a] + data[to:] + data[a:b],
+        "zero": lambda: data[:a] + bytes(min(b - a, 64)) + data[min(b, a + 64) :],
+        "tail": lambda: data[:a] + data[-min(b, 400) :],
+    }[draw.choice(["flip", "cut", "splice", "duplicate", "move", "zero", "tail"])]()
+
+
+def read_all(path: Path) -> None:
+    recording = o80.open(path)
+    _ = recording.marks, recording.finished, recording.time_range
+    for name in recording:
+        for epoch in recording[name].epochs:
+            _ = epoch.gaps, epoch.end, epoch.provenance, epoch.machine, epoch.interruption
+            epoch.history()
+            epoch.journal()
+
+
+def info_of(path: Path) -> None:
+    info_command(str(path))
+
+
+def test_a_file_damaged_anywhere_is_read_or_refused_in_a_sentence(
+    segment: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = record(tmp_path / "run.mcap", segment).read_bytes()
+    sentences = set()
+    for seed in range(400):
+        path = tmp_path / f"{seed}" / "damaged.mcap"
+        path.parent.mkdir()
+        path.write_bytes(damaged(whole, random.Random(seed)))
+        for read in (read_all, info_of, repair, read_all):
+            try:
+                read(path)
+            except o80.Error as refused:
+                sentences.add(str(refused).replace(str(path), "PATH"))
+            except Exception as error:
+                raise AssertionError(f"seed {seed}: {read.__name__}") from error
+    assert all("PATH" in each for each in sentences)
+    capsys.readouterr()
+
+
+def iterations_in(path: Path, chunk: ChunkIndex, channel: int) -> set[int]:
+    if channel not in chunk.message_index_offsets:
+        return set()
+    with path.open("rb") as file:
+        messages = messages_in(content_of(file, chunk), index_of(file, chunk, channel))
+    return {int.from_bytes(each[4:12].tobytes(), "little") for each in messages}
+
+
+@pytest.mark.parametrize("finished", [True, False])
+@pytest.mark.parametrize("part", ["content", "length", "opcode", "index"])
+def test_repair_keeps_all_rows_but_those_of_a_damaged_chunk(
+    part: str, finished: bool, segment: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    whole = tmp_path / "whole.mcap"
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(whole, arm) as file:
+        for i in range(4):
+            file.flush()
+            arm.add_command("elbow", 0.1 * i, iterations=10)
+            arm.burst(25)
+            arm.mark(f"{i}")
+    rows, found = o80.open(whole)[segment].history(), scan(whole)
+    assert len(found.chunks) > 3
+    for number, chunk in enumerate(found.chunks):
+        begin, index = chunk.chunk_start_offset, min(chunk.message_index_offsets.values())
+        at = {"content": index - 1, "length": begin + 4, "opcode": begin, "index": index + 20}[part]
+        data = bytearray(whole.read_bytes() if finished else whole.read_bytes()[: found.end])
+        data[at] ^= 0x55
+        path = tmp_path / f"{number}" / "run.mcap"
+        path.parent.mkdir()
+        path.write_bytes(data)
+        if begin == found.chunks[-1].chunk_start_offset and not finished:
+            continue  # as after a kill
+        repair(path)
+        said = capsys.readouterr().out
+
+        assert (path.parent / "run.mcap.damaged").read_bytes() == data
+        repair(path)
+        assert "is complete" in capsys.readouterr().out
+        epoch = o80.open(path)[segment].epochs[0]
+        lost = iterations_in(whole, chunk, epoch._parts[0].channel)
+        if part == "index" or (finished and part != "content"):  # the summary has it
+            lost = set()
+        kept = epoch.history()
+        assert set(rows.iteration.tolist()) - set(kept.iteration.tolist()) == lost
+        same = rows.rows[np.isin(rows.iteration, kept.iteration)]
+        assert all(np.array_equal(kept.rows[name], same[name]) for name in same.dtype.names or ())
+        if lost:
+            is_end = max(lost) == rows.iteration[-1]
+            gap = Gap(min(lost), None if is_end else max(lost), "damaged")
+            assert gap in epoch.gaps
+            assert f"{segment}: {gap}" in said
+            assert "were damaged" in said
+
+
+def test_repair_overwrites_no_damaged_file_that_was_kept_and_none_that_is_written(
+    segment: str, tmp_path: Path
+) -> None:
+    path = record(tmp_path / "run.mcap", segment)
+    data = bytearray(path.read_bytes())
+    data[min(scan(path).chunks[0].message_index_offsets.values()) - 1] ^= 1
+    path.write_bytes(data)
+    lock = LockedFile(path, 0)
+    with pytest.raises(o80.RecordingError, match="being written"):
+        repair(path)
+    lock.close()
+    kept = path.with_name("run.mcap.damaged")
+    kept.write_bytes(b"kept")
+    with pytest.raises(o80.RecordingError, match="repaired before"):
+        repair(path)
+    assert (path.read_bytes(), kept.read_bytes()) == (bytes(data), b"kept")

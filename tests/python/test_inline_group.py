@@ -2,8 +2,6 @@
 
 import os
 import pickle
-import subprocess
-import sys
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,6 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from processes import run_python
 
 import o80
 from o80.rows.layout import with_padding
@@ -320,9 +319,7 @@ except KeyboardInterrupt:
 
 def test_ctrl_c_ends_a_call_between_two_iterations() -> None:
     program = CTRL_C.replace("copies=4, threads=2", "copies=4, threads=4")
-    ended = subprocess.run(
-        [sys.executable, "-W", "ignore", "-c", program], capture_output=True, text=True, timeout=60
-    )
+    ended = run_python("-W", "ignore", "-c", program, code=None)
     assert ended.stdout == "interrupted\n", ended.stderr
 
 

@@ -3,12 +3,11 @@
 import os
 import signal
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 from blocking import CALLS
-from processes import end_of
+from processes import end_of, run_python
 
 import o80
 
@@ -18,13 +17,8 @@ WORDS_OF_A_CRASH = ("Fatal", "terminate", "exception not rethrown", "Abort", "Se
 
 def run(program: str, *flags: str) -> subprocess.CompletedProcess[str]:
     """A program of its own; it must end by itself."""
-    return subprocess.run(
-        [sys.executable, *flags, "-c", program],
-        capture_output=True,
-        text=True,
-        timeout=WAIT,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
-    )
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+    return run_python(*flags, "-c", program, code=None, env=environment)
 
 
 def crashes(ended: subprocess.CompletedProcess[str]) -> list[str]:

@@ -65,17 +65,6 @@ def test_a_trajectory_has_all_its_rows(segment: str) -> None:
     assert np.array_equal(np.stack([targets["a"], targets["b"]], axis=1), rows)
 
 
-def test_an_observer_sees_commands_of_others(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend:
-        backend.publish()
-        with o80.Frontend(segment) as commander, o80.Frontend(segment, read_only=True) as observer:
-            commander.add_command("a", 2.0)
-            commander.pulse()
-            backend.step()
-            (taken,) = of_kind(observer.journal(), "taken")
-    assert taken.commands[0].targets == (2.0,)
-
-
 def test_goes_on_behind_the_entries_that_were_read(segment: str) -> None:
     with o80.Backend(segment, ["a"]) as backend:
         backend.publish()
@@ -165,12 +154,3 @@ def test_a_mark_is_noted_at_the_iteration_in_which_it_is_taken(arm: o80.Frontend
     assert (command.kind, command.text) == ("mark", "the cup is full: \u00bd l")
     assert mark[0].status == "completed"
     assert taken.iteration == mark[0].iteration == 8
-
-
-def test_a_mark_is_taken_while_the_robot_is_halted(arm: o80.Frontend) -> None:
-    number = arm.halt("wait")
-    arm.burst(1)
-    mark = arm.mark("somebody walks by")
-    arm.burst(1)
-    assert mark[0].status == "completed"
-    arm.resume(number)

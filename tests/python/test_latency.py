@@ -1,6 +1,5 @@
 """The delay between two segments that see the same motion."""
 
-import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -156,22 +155,3 @@ def test_the_command_tells_the_delay_in_a_recording(segment: str, tmp_path: Path
     assert 30 < float(said.split(": ")[1].split()[0]) < 60  # 1 / gain = 50 ms
     assert " ms" in command(f"{segment}:norm(desired)", f"{segment}:norm(observed)", *where)
     assert "write SEGMENT:FIELD" in command("arm", observed, *where, code=1)
-
-
-def test_the_programs_of_the_page_run(capsys: pytest.CaptureFixture[str]) -> None:
-    programs = re.findall(r"^```python\n(.*?)^```", PAGE.read_text(), re.MULTILINE | re.DOTALL)
-    assert len(programs) == 3
-    for program in programs:
-        exec(compile(program, str(PAGE), "exec"), {})
-    shape, other, age, *joined, capture = capsys.readouterr().out.splitlines()
-    assert joined == [
-        "[0 1 2 3 4 5 6]",
-        "[3 3 4 4 8 8]",
-        "[False  True  True  True  True  True  True]",
-    ]
-    assert (shape, other) == ("(501,)", "(501, 2)")
-    assert 0 < float(age) < 1 / 180
-    time, error, epoch = capture.split()
-    assert int(time) > 0
-    assert int(error) > 0
-    assert int(epoch) >= 0

@@ -3,6 +3,7 @@
 import ast
 import graphlib
 import re
+import statistics
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -25,11 +26,21 @@ FLOORS = (
     ("groups", "recording"),
     ("datasets", "joining", "playing", "robots", "view"),
     ("learning", "replaying"),
-    ("cli",),
+    ("cli", "hybrid"),
 )
 FLOOR_OF = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
 # the face of the package: what users import or start; nothing inside uses it
-FACE = ("__init__", "difference", "errors", "notebook", "plot", "run_driver", "stub", "testing")
+FACE = (
+    "__init__",
+    "__main__",
+    "difference",
+    "errors",
+    "notebook",
+    "plot",
+    "run_driver",
+    "stub",
+    "testing",
+)
 INCLUDE = re.compile(r'^#include "(?:o80/)?(\w+)/', re.MULTILINE)
 CAST = re.compile(r"\bcast<(.*?)>\(")
 CASTER = re.compile(r"std::(string|string_view|vector|optional|pair|tuple|shared_ptr|array)\b")
@@ -61,7 +72,7 @@ def test_a_layer_uses_only_those_before_it(layer: str) -> None:
 @pytest.mark.parametrize(("layer", "rooms"), ROOMS.items())
 def test_a_room_of_a_layer_uses_only_those_before_it(layer: str, rooms: tuple[str, ...]) -> None:
     folder = ROOT / "src" / layer
-    assert {path.name for path in folder.iterdir()} == set(rooms)
+    assert {path.name for path in folder.iterdir() if path.suffix != ".md"} == set(rooms)
     upward = [
         f"{file.relative_to(ROOT)} includes {used}"
         for place, room in enumerate(rooms)
@@ -125,7 +136,7 @@ def test_the_python_package_has_few_rooms_on_few_floors() -> None:
     rooms = {room_of(module) for module in MODULES} - set(FACE)
 
     assert rooms == set(FLOOR_OF)
-    assert len(rooms) <= 14
+    assert len(rooms) <= 15
     assert len(FLOORS) <= 8
 
 
@@ -189,3 +200,72 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
     used = {word for cast in CAST.findall(text) for word in CASTER.findall(cast)}
 
     assert used <= set(INCLUDED_CASTER.findall(text))
+
+
+# ---------------------------------------------------------------------------------- the ceilings
+
+CEILINGS = {
+    "include, src": (33_650, 0),
+    "python/bindings": (5_608, 0),
+    "python/o80": (29_510, 0),
+    "python/o80/hybrid": (2_290, 0),
+    "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
+    "python/o80/view/page": (1_225, 0),
+    "devices": (8_990, 4_589),
+    "robots/arms": (4_450, 3_095),
+    "robots/pam, robots/two_joints": (2_144, 1_208),
+    "simulators/mujoco": (5_240, 4_580),
+    "apps/table_tennis": (10_750, 6_045),
+    "benchmarks, tools": (5_380, 0),
+    "examples": (1_965, 0),
+    "tests, conftest.py": (0, 66_800),
+}
+"""Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
+LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
+LARGEST_FILE, MEDIAN_FILE = 620, 100
+
+
+def lines_by_file() -> dict[Path, int]:
+    """Lines of each source, by its path below the root."""
+    found = (path for path in ROOT.rglob("*") if path.suffix in LANGUAGES and path.is_file())
+    below = {path.relative_to(ROOT): path for path in found}
+    ours = {name: path for name, path in below.items() if name.parts[0] not in ("build", ".venv")}
+    return {name: path.read_bytes().count(b"\n") for name, path in ours.items()}
+
+
+def folder_room(source: Path) -> str:
+    """The room with the longest folder that holds the source; fails where there is none."""
+    holds = {
+        folder: room
+        for room in CEILINGS
+        for folder in room.split(", ")
+        if source.is_relative_to(folder)
+    }
+    assert holds, f"{source} lies in no room: give its folder a row in CEILINGS"
+    return holds[max(holds, key=len)]
+
+
+def test_no_room_grows_unseen() -> None:
+    lines = {room: [0, 0] for room in CEILINGS}
+    for source, count in lines_by_file().items():
+        lines[folder_room(source)]["tests" in source.parts or source.name == "conftest.py"] += count
+    for room, (product, tests) in lines.items():
+        print(f"{room:30} {product:6} {tests:6}")
+    over = [
+        f"{room}: {found} lines of {what}, the ceiling is {most}"
+        for room, counts in lines.items()
+        for what, found, most in zip(("product", "tests"), counts, CEILINGS[room], strict=True)
+        if found > most
+    ]
+    assert not over, "\n".join(over)
+
+
+def test_files_of_the_product_stay_short() -> None:
+    aside = ("tests", "examples", "benchmarks", "tools")
+    product = {
+        source: count
+        for source, count in lines_by_file().items()
+        if not set(source.parts) & set(aside) and source.name != "conftest.py"
+    }
+    assert max(product.values()) <= LARGEST_FILE, max(product, key=lambda name: product[name])
+    assert statistics.median(product.values()) <= MEDIAN_FILE

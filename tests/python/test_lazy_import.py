@@ -2,11 +2,10 @@
 
 import ast
 import importlib
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+from processes import run_python
 
 import o80
 
@@ -14,9 +13,7 @@ PUBLIC: list[str] = vars(o80)["__all__"]  # computed, so type checkers do not se
 
 
 def in_a_fresh_interpreter(program: str) -> str:
-    return subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    ).stdout.strip()
+    return run_python("-c", program).stdout.strip()
 
 
 def test_import_and_list_load_neither_numpy_nor_a_parser() -> None:
@@ -70,6 +67,7 @@ def test_dir_shows_public_names_only() -> None:
     [
         ("gymnasium", "o80.learning", "gym"),
         ("stable_baselines3", "o80.learning.stable_baselines3(None)", "stable-baselines3"),
+        ("stable_baselines3", "from o80.learning.training import Training", "stable-baselines3"),
         ("zstandard", "o80.open('run.mcap')", "record"),
     ],
 )

@@ -1,7 +1,5 @@
 """Tasks on inline groups as Gymnasium environments (o80.learning)."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from copy import deepcopy

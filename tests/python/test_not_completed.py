@@ -75,25 +75,6 @@ def test_with_check_false_they_only_wait(process: o80.robots.Process) -> None:
             batch.wait(WAIT, check=1)  # type: ignore[arg-type]
 
 
-def test_a_burst_overwrites_for_its_own_frontend_too(arm: o80.Frontend) -> None:
-    arm.add_command("elbow", 1.0, iterations=1000)
-    slow = arm.pulse()
-    arm.burst(1)
-    prepared = arm.prepared_burst(1, "elbow", mode="overwrite")
-    prepared.targets[...] = 0.5
-    prepared.run(WAIT)
-    assert slow.statuses == [o80.Status.OVERWRITTEN]
-    slow.wait(WAIT)
-
-
-def test_an_inline_robot_does_so_too(arm: o80.Frontend) -> None:
-    arm.burst(5)
-    arm.add_command("elbow", 0.5, until=3)
-    with pytest.raises(o80.NotCompleted, match="'elbow' was rejected in iteration 6") as raised:
-        arm.pulse_and_wait(WAIT)
-    assert raised.value.observation.iteration == 6
-
-
 def test_a_burst_does_not_judge_commands(arm: o80.Frontend) -> None:
     arm.burst(5)
     arm.add_command("elbow", 0.5, until=3)

@@ -1,6 +1,5 @@
 """Completions and displays of IPython and Jupyter, with their own code."""
 
-import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from IPython.core.interactiveshell import InteractiveShell
+from processes import run_python
 
 import o80
 from o80 import notebook
@@ -126,10 +126,7 @@ def test_import_turns_it_on_only_where_ipython_runs() -> None:
     """`import o80` imports no IPython."""
 
     def run(program: str) -> str:
-        done = subprocess.run(
-            [sys.executable, "-c", program], capture_output=True, text=True, check=True
-        )
-        return done.stdout
+        return run_python("-c", program).stdout
 
     assert run("import sys, o80; print('IPython' in sys.modules)") == "False\n"
     assert run("import IPython, o80; print(IPython.get_ipython())") == "None\n"

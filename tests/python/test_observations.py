@@ -223,55 +223,6 @@ def test_histories_share_no_memory(arm: o80.Frontend) -> None:
 # ---------------------------------------------------------------------------- waiting
 
 
-def test_an_overwritten_row_names_the_oldest_one(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, history=16) as arm:
-        arm.burst(100)
-
-        with pytest.raises(o80.RowOverwritten, match="85"):
-            arm.wait_for(4)
-
-
-def test_a_row_to_come_is_waited_for(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        row = arm.published + 20
-
-        assert arm.wait_for(row, timeout=WAIT).iteration == row
-
-
-def test_a_row_that_does_not_come_times_out(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.TimeoutError, match="burst"):
-        arm.wait_for(5, timeout=0.01)
-
-
-def test_a_slow_reader_is_told_what_it_missed(segment: str) -> None:
-    with (
-        o80.robots.load("two_joints").start(segment, bursting=True, history=16) as process,
-        process.frontend() as reader,
-        process.frontend() as arm,
-    ):
-        arm.burst(1)
-        with pytest.raises(o80.TimeoutError):
-            reader.wait_for_next(0.0)  # its position is now row 2
-        arm.burst(100)
-
-        observation = reader.wait_for_next(WAIT)
-
-        assert observation.iteration >= 85
-        assert observation.missed == observation.iteration - 2
-        assert reader.wait_for_next(WAIT).missed == 0
-
-
-def test_a_stream_gives_every_row(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        rows = []
-        for observation in arm.stream(timeout=WAIT):
-            rows.append(observation.iteration)
-            if len(rows) == 50:
-                break
-
-        assert rows == list(range(rows[0], rows[0] + 50))
-
-
 def test_a_stream_may_begin_in_the_past(arm: o80.Frontend) -> None:
     arm.burst(10)
     stream = arm.stream(since=3, timeout=0.0)

@@ -61,17 +61,6 @@ def test_many_observations_are_pickled_with_one_description(arm: o80.Frontend) -
     assert all(map(same, pickle.loads(many), rows))
 
 
-def test_an_observation_that_was_pickled_outlives_its_robot(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment) as arm:
-        arm.add_command(0, 0.5)
-        sent = pickle.dumps(arm.burst(1))
-
-    observation = pickle.loads(sent)
-
-    assert observation.desired.tolist() == [0.5, 0.0]
-    assert "desired" in repr(observation)
-
-
 def test_handles_are_data_also_those_of_a_timeout(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0, iterations=5)
     batch = arm.pulse()

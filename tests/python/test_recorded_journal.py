@@ -1,11 +1,12 @@
 """The journal in a recording: the same entries as a frontend reads, gaps, restarts, damage."""
 
-import subprocess
 import sys
 from pathlib import Path
+from types import FrameType
 
 import numpy as np
 import pytest
+from processes import run_o80
 
 import o80
 from o80.recording.recorded_epoch import RecordedEpoch
@@ -46,6 +47,28 @@ def test_the_journal_of_a_file_is_that_of_the_robot(arm: o80.Frontend, tmp_path:
         entry.kind for entry in entries
     }
     assert recorded(path).journal_gaps == []
+
+
+def test_decisions_that_the_log_only_counts_are_not_put_into_words(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    recorder = Recorder(tmp_path / "run.mcap", [arm.segment])
+    play(arm, 100)
+    called = []
+
+    def note(frame: FrameType, event: str, _: object) -> None:
+        if event == "call" and "/rows/journal" in frame.f_code.co_filename:
+            called.append(frame.f_code.co_name)
+
+    sys.setprofile(note)
+    try:
+        recorder.poll()
+    finally:
+        sys.setprofile(None)
+    recorder.finish()
+
+    assert recorded(tmp_path / "run.mcap").journal()
+    assert called == []
 
 
 def test_it_begins_with_what_the_segment_still_holds(arm: o80.Frontend, tmp_path: Path) -> None:
@@ -121,11 +144,6 @@ def test_decisions_without_a_row_after_them_are_recorded(segment: str, tmp_path:
             assert [entry.kind for entry in recorded(path).journal()] == ["taken"]
 
 
-def echo(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    program = Path(sys.executable).parent / "o80"
-    return subprocess.run([program, "echo", *words], capture_output=True, text=True, timeout=60)
-
-
 def test_the_command_prints_the_decisions_in_a_file(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with o80.Recording(path, arm):
@@ -133,12 +151,11 @@ def test_the_command_prints_the_decisions_in_a_file(arm: o80.Frontend, tmp_path:
         arm.burst(5)
         arm.halt("enough")
         arm.burst(1)
-    said = echo(path, "--commands").stdout
-    last = echo(path, "--commands", "--count", "1").stdout
-    rows = echo(path)
+    said = run_o80("echo", path, "--commands").stdout
+    last = run_o80("echo", path, "--commands", "--count", "1").stdout
+    rows = run_o80("echo", path, code=1)
 
     assert "elbow to 0.25 in 5 iterations: completed" in said
     assert "HALT 1 (frontend by pid" in said
     assert last.splitlines() == said.splitlines()[-1:]
-    assert rows.returncode == 1
     assert "is a recording: `o80 echo --commands" in " ".join(rows.stderr.split())

@@ -3,8 +3,6 @@
 import importlib.util
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -118,23 +116,6 @@ def test_the_recordings_hold_what_a_journal_can_tell(name: str) -> None:
         *("rejected", "halted"),
     }
     assert "unknown" not in {command.kind for command in commands}
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_recording_is_replayed_as_far_as_its_motion_rules_are_those_of_this_o80(
-    name: str,
-) -> None:
-    command = [str(Path(sys.executable).parent / "o80"), "replay", f"{name}.mcap"]
-    command += ["--ignore", "extended.homing"]  # which the robot did not have then
-    done = subprocess.run(command, cwd=RECORDINGS, capture_output=True, text=True, timeout=WAIT)
-
-    said = done.stdout + done.stderr
-    if _core.MOTION_RULES == 1:
-        assert done.returncode == 0, said
-        assert done.stdout.count("116 rows, identical") == 2, said
-    else:
-        assert done.returncode == 2, said
-        assert "it moved by motion rules 1, this o80 has motion rules" in said
 
 
 @pytest.mark.parametrize("name", NAMES)

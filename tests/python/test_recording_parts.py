@@ -1,5 +1,6 @@
 """Recordings made of others: `o80 cut` and `o80 merge`."""
 
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -211,3 +212,62 @@ def test_the_latency_in_a_part_is_that_of_its_rows(segment: str, tmp_path: Path)
     kept = o80.open(part)[segment].epochs[0]
     rows = range(kept.first_row, kept.next_row)
     assert latency_of(kept)["batches"] == sum(1 + 50 * i in rows for i in range(10)) < 5
+
+
+SHIM = r"""
+#define _GNU_SOURCE
+#include <dlfcn.h>
+#include <time.h>
+int clock_gettime(clockid_t clock, struct timespec* now) {
+  int (*real)(clockid_t, struct timespec*) = dlsym(RTLD_NEXT, "clock_gettime");
+  const int code = real(clock, now);
+  if (clock == CLOCK_REALTIME) now->tv_sec += 3600;
+  return code;
+}
+"""
+
+
+def test_robots_keep_their_distances_if_the_wall_clock_is_set_between_their_starts(
+    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    source, shim = tmp_path / "shim.c", tmp_path / "shim.so"
+    source.write_text(SHIM)
+    subprocess.run(["gcc", "-shared", "-fPIC", source, "-o", shim, "-ldl"], check=True)
+    names = [segment, f"{segment}-b"]
+    robot = o80.robots.load("two_joints")
+    with robot.start(names[0], frequency=100) as first, first.frontend() as arm:
+        with monkeypatch.context() as stepped:
+            stepped.setenv("LD_PRELOAD", str(shim))
+            second = robot.start(names[1], frequency=100)
+        with second, second.frontend() as other:
+            both, alone = tmp_path / "both.mcap", tmp_path / "alone.mcap"
+            recordings = o80.Recording(alone, [other]), o80.Recording(both, [arm, other])
+            for frontend in (arm, other):
+                frontend.wait_for(frontend.published + 50)
+            for recording in recordings[::-1]:
+                recording.close()
+            aligned = o80.align([arm, other], by=arm.segment)
+            recorded = other.published
+            other.wait_for(recorded + 50)
+            later = tmp_path / "later.mcap"
+            with o80.Recording(later, [other]):
+                other.wait_for(other.published + 1)
+    assert aligned[names[1]].found[-1]
+    apart = [o80.open(path)[names[1]].epochs[0].wall_offset for path in (both, alone)]
+    assert apart[1] - apart[0] > 3000e9  # by the wall clocks of their starts
+    cut(both, tmp_path / "part.mcap", "0", "1000")
+    merge([later, both, alone], tmp_path / "merged.mcap")
+    for name in ("part.mcap", "merged.mcap"):
+        read = o80.open(tmp_path / name)
+        offsets = {read[each].epochs[0].wall_offset for each in names}
+        assert len(offsets) == 1, name
+        begin, end = read.time_range
+        assert end - begin < 3000e9
+        for each in names:
+            assert read[each].epochs[0].rows >= o80.open(both)[each].epochs[0].rows
+    with AnyReader([tmp_path / "merged.mcap"]) as reader:
+        for connection, at, raw in reader.messages():
+            if connection.topic.endswith("joint_states"):
+                states: Any = reader.deserialize(raw, connection.msgtype)
+                stamp = states.header.stamp
+                assert stamp.sec * 10**9 + stamp.nanosec == at

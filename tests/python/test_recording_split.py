@@ -1,20 +1,17 @@
 """Recordings in several files: complete files, read as one, continued and repaired."""
 
-import subprocess
-import sys
 import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from processes import run_o80
 
 import o80
 import o80.recording.reader as reader
 from o80.recording.reader import files_of
 from o80.recording.recorder import Recorder
-
-O80 = Path(sys.executable).parent / "o80"
 
 
 def texts(entries: list[o80.JournalEntry]) -> list[str]:
@@ -28,41 +25,39 @@ def play(arm: o80.Frontend, recorder: Recorder, polls: int) -> None:
         recorder.poll()
 
 
+def in_parts(arm: o80.Frontend, folder: Path, polls: int) -> Path:
+    """A recording in several files."""
+    recorder = Recorder(folder / "run.mcap", [arm.segment], split="8k")
+    play(arm, recorder, polls)
+    recorder.finish()
+    return folder / "run.mcap"
+
+
 def messages_of(path: Path) -> int:
     with path.open("rb") as file:
         return sum(1 for _ in make_reader(file, validate_crcs=True).iter_messages())
 
 
 def test_a_folder_of_complete_files_is_read_as_one(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], split="8k")
-    play(arm, recorder, 30)
-    recorder.finish()
+    path = in_parts(arm, tmp_path, 30)
     files = sorted(path.iterdir())
     recording = o80.open(path)
     (epoch,) = recording[arm.segment].epochs
+    there = arm.history()
 
     assert len(files) > 3
     assert all(file.stat().st_size < 16_000 for file in files)
     assert all(messages_of(file) > 0 for file in files)
     assert recording.finished
-    assert epoch.history().rows.tobytes() == arm.history().rows.tobytes()
+    assert epoch.history().rows.tobytes() == there.rows.tobytes()
+    assert epoch.history(since=95, until=405).iteration.tolist() == list(range(95, 406))
+    assert (
+        epoch.history(from_time=int(there.time[-250])).rows.tobytes() == there[-250:].rows.tobytes()
+    )
+    assert epoch.history(7).rows.tobytes() == there[-7:].rows.tobytes()
     assert texts(epoch.journal()) == texts(arm.journal())
     assert (epoch.gaps, epoch.journal_gaps) == ([], [])
     assert sum(o80.open(file)[arm.segment].epochs[0].rows for file in files) == epoch.rows == 601
-
-
-def test_rows_are_chosen_across_files(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], split="8k")
-    play(arm, recorder, 30)
-    recorder.finish()
-    read, there = o80.open(path)[arm.segment], arm.history()
-
-    assert read.history(since=95, until=405).iteration.tolist() == list(range(95, 406))
-    late = int(there.time[-250])
-    assert read.history(from_time=late).time.tolist() == there.time.tolist()[-250:]
-    assert read.history(7).iteration.tolist() == there.iteration.tolist()[-7:]
 
 
 def test_files_end_after_a_time(process: o80.robots.Process, tmp_path: Path) -> None:
@@ -79,32 +74,8 @@ def test_files_end_after_a_time(process: o80.robots.Process, tmp_path: Path) -> 
     assert [mark.name for mark in o80.open(path).marks] == ["end"]
 
 
-def test_robots_restart_across_files(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [segment], split="8k")
-    rows = []
-    for _ in range(2):
-        with o80.robots.load("two_joints").inline(segment) as arm:
-            while recorder.sources[segment].newest != 0:
-                recorder.catch_up()
-            play(arm, recorder, 15)
-            rows.append(arm.history().rows.tobytes())
-        recorder.catch_up()
-    recorder.finish()
-    epochs = o80.open(path)[segment].epochs
-
-    assert [epoch.history().rows.tobytes() for epoch in epochs] == rows
-    first, second = epochs
-    assert first.history().time[-1] + first.wall_offset < (
-        second.history().time[0] + second.wall_offset
-    )
-
-
 def test_it_is_continued_wherever_its_last_file_was_cut(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], split="8k")
-    play(arm, recorder, 20)
-    recorder.finish()
+    path = in_parts(arm, tmp_path, 20)
     last = sorted(path.iterdir())[-1]
     whole = last.read_bytes()
     chance = np.random.default_rng(2)
@@ -126,10 +97,7 @@ def test_it_is_continued_wherever_its_last_file_was_cut(arm: o80.Frontend, tmp_p
 def test_a_recorder_killed_between_two_files_is_continued(
     size: int, arm: o80.Frontend, tmp_path: Path
 ) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], split="8k")
-    play(arm, recorder, 20)
-    recorder.finish()
+    path = in_parts(arm, tmp_path, 20)
     *_, before, last = sorted(path.iterdir())
     before.write_bytes(before.read_bytes()[:-100])  # not finished
     last.write_bytes(last.read_bytes()[:size])  # just created
@@ -145,16 +113,11 @@ def test_a_recorder_killed_between_two_files_is_continued(
 
 
 def test_repair_completes_every_file(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], split="8k")
-    play(arm, recorder, 20)
-    recorder.finish()
+    path = in_parts(arm, tmp_path, 20)
     for file in sorted(path.iterdir())[-2:]:
         file.write_bytes(file.read_bytes()[:-50])
-    done = subprocess.run([O80, "repair", path], capture_output=True, text=True, timeout=60)
 
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.count("is complete now") == 2
+    assert run_o80("repair", path).stdout.count("is complete now") == 2
     assert o80.open(path).finished
 
 
@@ -193,15 +156,8 @@ def test_a_split_that_is_neither_size_nor_time_is_refused(
 
 def test_the_command_writes_a_folder(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    options = ["--seconds", "0.3", "--split", "0.1s"]
-    done = subprocess.run(
-        [O80, "record", arm.segment, "-o", path, *options],
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    done = run_o80("record", arm.segment, "-o", path, "--seconds", 0.3, "--split", "0.1s")
 
-    assert done.returncode == 0, done.stderr
     assert f"in {path}" in done.stderr
     assert o80.open(path)[arm.segment].epochs[0].rows == 1
 
@@ -253,10 +209,7 @@ def test_files_that_are_deleted_while_they_are_read_do_no_harm(
 
 
 def test_a_recorder_that_may_delete_nothing_stops(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], split="8k")
-    play(arm, recorder, 10)
-    recorder.finish()
+    path = in_parts(arm, tmp_path, 10)
     there = {file: file.read_bytes() for file in path.iterdir()}
     recorder = Recorder(path, [arm.segment], proceed=True, split="8k", keep="220k")
 
@@ -293,10 +246,7 @@ def test_what_cannot_be_kept_is_refused(
 
 
 def test_files_are_read_by_their_numbers(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [arm.segment], split="8k")
-    play(arm, recorder, 5)
-    recorder.finish()
+    path = in_parts(arm, tmp_path, 5)
     for i, file in enumerate(sorted(path.iterdir())[::-1]):
         file.rename(path / f"{9999 - i}.mcap")
     for _ in range(2):

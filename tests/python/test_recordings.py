@@ -13,8 +13,9 @@ import pytest
 
 import o80
 import o80.recording.catalogue as catalogue
+from o80.base.local_time import instant as time_of
 from o80.cli.recordings import recordings as command
-from o80.recording.catalogue import INDEX, time_of
+from o80.recording.catalogue import INDEX
 
 NAMES = ("a.mcap", "monday/b.mcap", "c.mcap")
 

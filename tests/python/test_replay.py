@@ -2,7 +2,6 @@
 
 import random
 import subprocess
-import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,17 +11,17 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from processes import run_o80
 
 import o80
 from o80 import _core
 from o80.base.machine import this_machine
 from o80.recording.recorder import Recorder
 from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
-from o80.replaying.replay import replay_runs
+from o80.replaying.replay import RunReplay
 from o80.rows.columns import columns_of
 
 NAMES = ("shoulder", "elbow")
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 class Commander:
@@ -118,6 +117,7 @@ def test_a_history_without_row_0_is_not_replayed(segment: str) -> None:
     with o80.robots.load("two_joints").inline(segment, history=20) as arm:
         arm.burst(50)
         report = o80.replay(arm)
+        assert o80_replay(segment).returncode == 2
     assert not report.identical
     assert report.difference is None
     assert "the first recorded row is row 31: a replay begins at row 0" in str(report)
@@ -267,7 +267,7 @@ def test_a_flipped_bit_is_found_in_its_row_and_field(
     (place,) = [column.offset for column in columns_of(run.schema) if column.name == name]
     byte = place + data.draw(st.integers(0, 7))
     flipped = Flipped(run, row, byte, 1 << data.draw(st.integers(0, 7)))
-    (report,) = replay_runs([flipped])
+    report = RunReplay(flipped).report()
 
     assert report.difference is not None
     assert (report.difference.iteration, report.difference.field) == (row, name)
@@ -297,10 +297,10 @@ def test_what_another_build_recorded_is_compared_with_a_tolerance(run_in_file: F
     row = run_in_file.rows - 2
     run = FromElsewhere(run_in_file, row, place, 1, provenance=other)
 
-    (report,) = replay_runs([run])
+    report = RunReplay(run).report()
     assert report.identical, report
     assert any("another build of o80" in note and "1e-09" in note for note in report.notes)
-    (report,) = replay_runs([run], tolerances={})
+    report = RunReplay(run, tolerances={}).report()
     assert report.difference is not None
     assert report.difference.iteration == row
 
@@ -314,16 +314,13 @@ def test_another_machine_is_noted(run_in_file: FileRun) -> None:
     lesser = replace(machine, features=machine.features[1:])
     assert "the processors differ" in lesser.difference(machine)
     run = FromElsewhere(run_in_file, 0, 0, 0, provenance=run_in_file.provenance, machine=older)
-    (report,) = replay_runs([run])
+    report = RunReplay(run).report()
     assert report.identical, report
     assert any("glibc 2.1 recorded it" in note for note in report.notes)
 
 
 def o80_replay(*words: str) -> subprocess.CompletedProcess[str]:
-    program = Path(sys.executable).parent / "o80"
-    return subprocess.run(
-        [program, "replay", *words], capture_output=True, text=True, timeout=2 * WAIT, check=False
-    )
+    return run_o80("replay", *words, code=None)
 
 
 def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_path: Path) -> None:
@@ -336,8 +333,13 @@ def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_pat
     assert done.returncode == 1
     assert "observed." in done.stdout
 
-    assert o80_replay(str(path), "--set", "gain").returncode == 2
-    assert "'gian'" in o80_replay(str(path), "--set", "gian=2").stderr
+    for words, said in (
+        (("--set", "gain"), "NAME=VALUE"),
+        (("--set", "gian=2"), "'gian'"),
+        (("--robot", "./nowhere.so"), "nowhere.so"),
+    ):
+        done = o80_replay(str(path), *words)
+        assert (done.returncode, said in done.stderr) == (2, True), done.stderr
 
 
 def test_a_recording_in_several_files_repeats(segment: str, tmp_path: Path) -> None:
@@ -395,11 +397,3 @@ def test_a_robot_without_snapshots_is_told(segment: str, tmp_path: Path) -> None
         recorder.finish()
     with pytest.raises(o80.InvalidArgument, match="snapshots must be a positive number"):
         Recorder(tmp_path / "other.mcap", [segment], snapshots=-1.0)
-
-
-def test_the_command_says_when_rows_are_missing(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, history=20) as arm:
-        arm.burst(50)
-        done = o80_replay(segment)
-    assert done.returncode == 2
-    assert "a replay begins at row 0" in done.stdout

@@ -12,7 +12,7 @@ import pytest
 
 import o80
 from o80.replaying.recorded_run import FileRun, LiveRun, runs_in
-from o80.replaying.replay import replay_runs
+from o80.replaying.replay import RunReplay
 from o80.replaying.trust import options_of
 from o80.rows.provenance import Provenance, ProvenanceFile
 
@@ -84,7 +84,7 @@ def test_a_recorded_name_is_not_taken_for_a_path(run: FileRun, stray: Path) -> N
     for name in (str(stray), os.path.relpath(stray), "../stray.so"):
         lies = Forged(run, run.schema | {"robot": name}, run.provenance)
         with pytest.raises(o80.DriverError, match="may name any library") as refused:
-            replay_runs([lies])
+            RunReplay(lies).report()
         assert "--robot" in str(refused.value)
     assert not is_loaded(stray)
 

@@ -24,12 +24,7 @@ def test_a_rejected_request_raises_the_text_of_the_driver(arm: o80.Frontend) -> 
         arm.request("snapshot", slot=8)
 
 
-def test_fields_with_a_default_may_be_left_out(arm: o80.Frontend) -> None:
-    arm.request("reset")
-    arm.request("snapshot")
-    arm.request("restore")
-
-
+# rule B9
 def test_fields_without_a_default_must_be_given(segment: str) -> None:
     gains = {"stiffness": float, "of": {"joint": int, "axis": int}}
     with o80.Backend(segment, ["a"], requests={"set_gains": gains}, bursting=True) as backend:
@@ -55,17 +50,6 @@ def test_fields_without_a_default_must_be_given(segment: str) -> None:
     assert taken == [(1.0, 2, 3)]
 
 
-def test_a_request_may_be_part_of_a_pulse(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0)
-    arm.burst(10)
-    arm.add_request("reset", seed=1)
-    arm.add_command(0, 0.5)
-
-    observation = arm.burst(1)
-
-    assert observation.desired[0] == 0.5
-
-
 def test_purge_needs_no_pulse(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0, iterations=100)
     arm.add_command(1, 1.0, iterations=100)
@@ -75,16 +59,6 @@ def test_purge_needs_no_pulse(arm: o80.Frontend) -> None:
     arm.purge("shoulder")
 
     assert batch.statuses == [o80.Status.PURGED, o80.Status.ACTIVE]
-
-
-def test_purge_of_all_drops_all(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0, iterations=100)
-    arm.add_command(1, 1.0, iterations=100)
-    batch = arm.pulse()
-
-    arm.purge()
-
-    assert batch.statuses == [o80.Status.PURGED, o80.Status.PURGED]
 
 
 def test_a_purge_may_be_part_of_a_pulse(arm: o80.Frontend) -> None:

@@ -1,7 +1,5 @@
 """Stable-Baselines3's PPO learns from the rollouts of a collector (o80.learning.rollouts.ppo)."""
 
-from __future__ import annotations
-
 import tempfile
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Rollouts of a collector (o80.learning.rollouts)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from itertools import combinations

@@ -56,7 +56,7 @@ class Publisher:
     """A simulated robot of a layout that a test sets."""
 
     name = "publisher"
-    of_the_world = False
+    simulated = True
     requests = {  # noqa: RUF012  what a simulation serves that is replayed with its driver
         "reset": {"seed": np.uint64},
         "snapshot": {"slot": np.uint32},

@@ -57,27 +57,6 @@ def test_it_is_active_with_its_progress_until_it_ends(backend: o80.Backend, segm
         assert not backend.running("home")
 
 
-def test_who_may_only_read_sees_what_runs(backend: o80.Backend, segment: str) -> None:
-    with o80.Frontend(segment) as frontend, o80.Frontend(segment, read_only=True) as observer:
-        assert observer.running_requests == []
-        home(frontend)
-        iterate(backend, frontend, 3)
-        (seen,) = observer.running_requests
-        assert (seen.name, seen.since) == ("home", 1)
-        assert seen.progress == "looks for the index of joint 1"
-        assert "pid" in seen.who
-
-
-def test_it_may_end_as_rejected(backend: o80.Backend, segment: str) -> None:
-    with o80.Frontend(segment) as frontend:
-        batch = home(frontend)
-        iterate(backend, frontend)
-        backend.end_request("home", rejected="no index pulse within 20 s")
-        iterate(backend, frontend)
-        assert batch.handles[0].status == o80.Status.REJECTED
-        assert batch.handles[0].text == "no index pulse within 20 s"
-
-
 def test_it_may_end_with_a_fresh_start(backend: o80.Backend, segment: str) -> None:
     with o80.Frontend(segment) as frontend:
         batch = home(frontend)
@@ -148,26 +127,6 @@ def test_desired_states_are_not_followed_while_it_runs(arm: o80.Frontend) -> Non
     arm.burst(200)
     assert batch.handles[0].progress == "the shoulder moves"
     np.testing.assert_allclose(arm.latest().observed[0], 0.5 - 0.1 * 0.2, atol=1e-3)
-
-
-def test_a_halt_leaves_the_robot_where_it_is(arm: o80.Frontend) -> None:
-    arm.add_command(None, [0.5, 0.3])
-    arm.burst(1000)
-    arm.add_request("home", speed=0.1)
-    batch = arm.pulse()
-    arm.burst(100)
-    number = arm.halt()
-    arm.burst(1)
-    assert batch.statuses == [o80.Status.HALTED]
-    place = arm.latest().observed.tolist()
-    arm.burst(100)
-    assert arm.latest().observed.tolist() == place
-    arm.resume(number)
-    arm.burst(100)
-    assert arm.latest().observed.tolist() == place
-    arm.add_command(0, 1.0)
-    arm.burst(1000)
-    assert arm.latest().observed[0] > 0.9, "it follows again"
 
 
 def test_a_timeout_says_that_it_goes_on(process: o80.robots.Process) -> None:

@@ -1,7 +1,5 @@
 """Vector environments under the learners of Stable-Baselines3."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,15 +1,15 @@
 """Backends that are stopped by their name."""
 
 import os
+import signal
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from processes import WAIT, run_o80
 
 import o80
-
-WAIT = 60.0  # [s] longer than any end should take
 
 
 def entry_of(segment: str) -> o80.Segment:
@@ -47,6 +47,19 @@ def test_a_backend_that_does_not_stop_in_time_is_told_of(segment: str) -> None:
         deaf.kill()
 
 
+def test_a_suspended_robot_is_to_be_continued_not_killed(
+    process: o80.robots.Process, segment: str
+) -> None:
+    os.kill(process.pid, signal.SIGSTOP)
+    try:
+        with pytest.raises(o80.TimeoutError, match=f"`kill -CONT {process.pid}`") as refused:
+            o80.stop(segment, timeout=0.0)
+        assert "kill -9" not in str(refused.value)
+    finally:
+        os.kill(process.pid, signal.SIGCONT)
+    assert process.wait(WAIT) == 0
+
+
 @pytest.fixture
 def reused(process: o80.robots.Process, segment: str) -> o80.robots.Process:
     """A robot whose segment bears the process id of another, later process."""
@@ -74,13 +87,7 @@ def test_a_process_that_only_has_the_id_of_the_backend_is_not_signalled(
 def test_the_command_line_stops_the_others_when_one_does_not_run(
     process: o80.robots.Process, segment: str
 ) -> None:
-    stopped = subprocess.run(
-        [Path(sys.executable).with_name("o80"), "stop", "arm", segment],
-        capture_output=True,
-        text=True,
-        timeout=WAIT,
-    )
-    assert stopped.returncode == 1
+    stopped = run_o80("stop", "arm", segment, code=1)
     assert "no backend 'arm' runs" in stopped.stderr
     assert f"{segment} has stopped" in stopped.stdout
     assert process.wait(WAIT) == 0

@@ -191,13 +191,6 @@ def test_several_actuators_move_by_one_command(arm: o80.Frontend) -> None:
     assert arm.history(3).desired.tolist() == [[0.1, 0.2], [0.2, 0.4], [0.2, 0.4]]
 
 
-def test_none_names_all_actuators(arm: o80.Frontend) -> None:
-    arm.add_command(None, np.array([0.1, 0.3]))
-    arm.pulse_and_wait(timeout=WAIT)
-
-    assert arm.latest().desired.tolist() == [0.1, 0.3]
-
-
 @pytest.mark.parametrize(
     "target",
     [0.5, [0.1], [0.1, 0.2, 0.3], "ab", {"shoulder": 1.0}, np.array(0.5), np.zeros((1, 2))],
@@ -290,12 +283,6 @@ def test_a_trajectory_of_chosen_actuators(arm: o80.Frontend) -> None:
     assert arm.pulse_and_wait(timeout=WAIT).desired.tolist() == [2.0, 1.0]
 
 
-def test_a_trajectory_of_one_actuator_may_have_one_dimension(arm: o80.Frontend) -> None:
-    arm.add_trajectory([0.5, 1.0], actuators="elbow")
-
-    assert arm.pulse_and_wait(timeout=WAIT).desired.tolist() == [0.0, 1.0]
-
-
 def test_a_trajectory_may_overwrite(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0, iterations=100)
     arm.add_trajectory([0.5], 0, mode=o80.Mode.OVERWRITE)
@@ -313,6 +300,8 @@ def test_a_trajectory_may_overwrite(arm: o80.Frontend) -> None:
         (np.zeros((2, 2)), {"times": [0.1]}, "times"),
         (np.zeros((1, 2)), {"times": []}, "one for each row"),
         (np.zeros((2, 2)), {"times": [0.2, 0.1]}, "grow"),
+        (np.zeros((3, 2)), {"times": [0.1, 0.2, 0.2]}, "grow .*: row 2 is due after 0.2 s"),
+        (np.zeros((1, 2)), {"times": [0.0]}, "grow .*: row 0 is due after 0 s, the start"),
         (np.zeros((2, 2)), {"times": [0.1, float("nan")]}, "finite"),
         (np.zeros((2, 2)), {"times": [0.1, 0.2], "iterations": 1}, "one pace"),
         (np.zeros((2, 2)), {"iterations": 1, "speed": 1.0}, "one pace"),
@@ -402,10 +391,3 @@ def test_the_only_number_of_a_struct_needs_no_name(robot: Robot) -> None:
     assert robot.desired("drive", {"speed": 3.0}).drive.speed == 3.0
     with pytest.raises(o80.InvalidArgument, match="'drive' must be a number, got 'fast'"):
         robot.frontend.add_command("drive", "fast")
-
-
-def test_the_enum_of_an_actuator_has_its_name(robot: Robot) -> None:
-    modes = robot.frontend.enums["mode"]
-
-    assert robot.desired("mode", modes.TORQUE).mode == modes.TORQUE
-    assert robot.desired("mode", "IDLE").mode == modes.IDLE

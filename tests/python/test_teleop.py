@@ -3,11 +3,15 @@
 import os
 import pty
 import random
+import re
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import o80
 from o80.cli.teleop import _Session
@@ -21,7 +25,7 @@ class Arm:
     """Is where it is told to be; the one that a test moves stands for a hand."""
 
     actuators = ("wrist", "elbow", "lamp")
-    of_the_world = False
+    simulated = True
 
     def __init__(self) -> None:
         self.places = np.zeros(3)
@@ -40,6 +44,18 @@ class Follower(Arm):
     limits = dict.fromkeys(
         actuators, o80.Limits(minimum=-1.0, maximum=1.0, speed=2.0, acceleration=15.0, jerk=500.0)
     )
+
+
+@pytest.fixture
+def hand(segment: str) -> Iterator[o80.Frontend]:
+    with o80.robots.load(Arm).inline(f"{segment}-1") as leads:
+        yield leads
+
+
+@pytest.fixture
+def arm(segment: str) -> Iterator[o80.Frontend]:
+    with o80.robots.load(Follower).inline(f"{segment}-2") as follows:
+        yield follows
 
 
 def engage(robots: o80.Teleoperation) -> None:
@@ -71,128 +87,145 @@ def test_another_text_is_refused(text: str) -> None:
         o80.Joint.parse(text)
 
 
-def test_it_follows_a_hand_within_its_limits(segment: str) -> None:
+def test_it_follows_a_hand_within_its_limits(hand: o80.Frontend, arm: o80.Frontend) -> None:
     choose = random.Random(3)
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        robots = o80.Teleoperation(hand, arm)
-        assert [joint.follower for joint in robots.joints] == ["elbow", "wrist"]
-        engage(robots)
-        for _ in range(300):
-            if choose.random() < 0.1:
-                places = [choose.uniform(-1.5, 1.5) for _ in range(3)]
-                hand.add_command(None, places, duration=choose.uniform(0.5, 1.5), mode="overwrite")
-            hand.burst(5)
-            assert robots.step()
-            arm.burst(5)
-        for _ in range(600):  # the hand rests
-            hand.burst(5)
-            robots.step()
-            arm.burst(5)
-        wrist, elbow, _ = hand.latest().observed
-        assert arm.latest().observed.tolist() == [np.clip(elbow, -1, 1), 0, np.clip(wrist, -1, 1)]
-        rows = arm.history()
-        speed = np.abs(np.diff(rows.desired, axis=0)).max() * SECOND
-        assert 0.5 < speed <= 2.0 * (1 + 1e-9)
-        assert not rows.clamped.any(), "targets are within the bounds"
-        assert robots.follower.halted is None
+    robots = o80.Teleoperation(hand, arm)
+    assert [joint.follower for joint in robots.joints] == ["elbow", "wrist"]
+    engage(robots)
+    for _ in range(300):
+        if choose.random() < 0.1:
+            places = [choose.uniform(-1.5, 1.5) for _ in range(3)]
+            hand.add_command(None, places, duration=choose.uniform(0.5, 1.5), mode="overwrite")
+        hand.burst(5)
+        assert robots.step()
+        arm.burst(5)
+    for _ in range(600):  # the hand rests
+        hand.burst(5)
+        robots.step()
+        arm.burst(5)
+    wrist, elbow, _ = hand.latest().observed
+    assert arm.latest().observed.tolist() == [np.clip(elbow, -1, 1), 0, np.clip(wrist, -1, 1)]
+    rows = arm.history()
+    speed = np.abs(np.diff(rows.desired, axis=0)).max() * SECOND
+    assert 0.5 < speed <= 2.0 * (1 + 1e-9)
+    assert not rows.clamped.any(), "targets are within the bounds"
+    assert robots.follower.halted is None
 
 
-def test_scale_and_offset_and_near(segment: str) -> None:
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        joints = [o80.Joint("gripper", "lamp", -2.0, 0.6)]
-        robots = o80.Teleoperation(hand, arm, joints=joints, near=0.1)
-        for _ in range(100):
-            hand.burst(10)
-            assert not robots.step()
-            arm.burst(10)
-        assert robots.far == {"gripper": (0.6, 0.0)}
-        assert robots.why == "move the leader to where the follower is"
-        assert arm.latest().desired.tolist() == [0, 0, 0], "nothing moves before"
-        hand.add_command("lamp", 0.28, iterations=10)
-        hand.burst(10)
-        engage(robots)
-        assert robots.far == {}
-        hand.add_command("lamp", 0.1, iterations=200)
-        for _ in range(200):
-            hand.burst(5)
-            robots.step()
-            arm.burst(5)
-        assert arm.latest().observed[1] == pytest.approx(0.4)
-        # a halt ends it; after the resume both have to be near again
-        number = arm.halt("enough")
-        arm.burst(1)
-        hand.add_command("lamp", 0.3, iterations=10)
+def test_scale_and_offset_and_near(segment: str, hand: o80.Frontend, arm: o80.Frontend) -> None:
+    joints = [o80.Joint("gripper", "lamp", -2.0, 0.6)]
+    robots = o80.Teleoperation(hand, arm, joints=joints, near=0.1)
+    for _ in range(100):
         hand.burst(10)
         assert not robots.step()
-        assert robots.why == f"'{arm.segment}' is halted: enough"
-        arm.resume(number)
-        arm.burst(1)
-        for _ in range(100):
-            hand.burst(10)
-            assert not robots.step()
-            arm.burst(10)
-        assert list(robots.far) == ["gripper"]
-        assert arm.latest().observed[1] == pytest.approx(0.4)
+        arm.burst(10)
+    assert robots.far == {"gripper": (0.6, 0.0)}
+    assert robots.why == "move the leader to where the follower is"
+    assert arm.latest().desired.tolist() == [0, 0, 0], "nothing moves before"
+    hand.add_command("lamp", 0.28, iterations=10)
+    hand.burst(10)
+    engage(robots)
+    assert robots.far == {}
+    hand.add_command("lamp", 0.1, iterations=200)
+    for _ in range(200):
+        hand.burst(5)
+        robots.step()
+        arm.burst(5)
+    assert arm.latest().observed[1] == pytest.approx(0.4)
+    # a halt ends it; after the resume both have to be near again
+    number = arm.halt("enough")
+    arm.burst(1)
+    hand.add_command("lamp", 0.3, iterations=10)
+    hand.burst(10)
+    assert not robots.step()
+    assert robots.why == f"'{arm.segment}' is halted: enough"
+    arm.resume(number)
+    arm.burst(1)
+    for _ in range(100):
+        hand.burst(10)
+        assert not robots.step()
+        arm.burst(10)
+    assert list(robots.far) == ["gripper"]
+    assert arm.latest().observed[1] == pytest.approx(0.4)
 
 
-def test_a_leader_that_jumps_is_not_followed(segment: str) -> None:
+@settings(max_examples=25, deadline=None)
+@given(
+    scale=st.floats(0.01, 200).flatmap(lambda size: st.sampled_from([size, -size])),
+    offset=st.floats(-1, 1),
+    leads=st.floats(-2, 2),
+    follows=st.floats(-1, 1),
+)
+def test_the_leader_is_told_where_to_go_in_its_own_numbers(
+    scale: float, offset: float, leads: float, follows: float
+) -> None:
+    name = f"test-teleop-{os.getpid()}"
     with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
+        o80.robots.load(Arm).inline(f"{name}-1") as hand,
+        o80.robots.load(Follower).inline(f"{name}-2") as arm,
     ):
-        robots = o80.Teleoperation(hand, arm)
-        engage(robots)
-        hand.add_command("elbow", 0.8)  # an encoder that lost a turn, a reset
-        for _ in range(200):
-            hand.burst(5)
-            assert not robots.step()
-            arm.burst(5)
-        assert robots.far == {"elbow": (0.8, 0.0)}
-        assert arm.latest().desired.tolist() == [0, 0, 0]
+        robots = o80.Teleoperation(hand, arm, joints=[o80.Joint("gripper", "lamp", scale, offset)])
+        hand.add_command("lamp", leads, iterations=1)
+        hand.burst(1)
+        arm.add_command("gripper", follows, duration=2.0)
+        arm.burst(5000)
+        robots.step()
+        for move in robots.moves:
+            found = re.fullmatch(r"lamp from (\S+) to (\S+)", move)
+            assert found
+            assert float(found[1]) == pytest.approx(leads, abs=0.006)
+            hand.add_command("lamp", float(found[2]), iterations=1)
+            hand.burst(1)
+            robots.step()
+            assert robots.far == {}
+            assert robots.moves == []
 
 
-def test_a_leader_that_stands_still_between_bursts_floods_nobody(segment: str) -> None:
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        robots = o80.Teleoperation(hand, arm)
-        engage(robots)
-        for _ in range(5):
-            assert robots.step()
-        arm.burst(1)
-        taken = [each for each in arm.journal() if each.kind == "taken" and each.commands]
-        assert len(taken) == 1
+def test_the_sentence_names_the_leaders_joint(
+    hand: o80.Frontend, arm: o80.Frontend, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robots = o80.Teleoperation(hand, arm, joints=[o80.Joint("gripper", "lamp", -2.0, 0.6)])
+    session = _Session(robots, "episode")
+    hand.burst(1)
+    robots.step()
+    session.tell()
+    assert "move the leader's lamp from 0.00 to 0.30" in capsys.readouterr().err
+    with pytest.raises(o80.InvalidArgument, match="scale must not be 0"):
+        o80.Teleoperation(hand, arm, joints=[o80.Joint("gripper", "lamp", 0.0)])
 
 
-def test_batches_say_by_which_row_of_the_leader_they_were_decided(segment: str) -> None:
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        robots = o80.Teleoperation(hand, arm)
-        engage(robots)
-        arm.burst(1)
-        taken = [each for each in arm.journal() if each.kind == "taken" and each.commands]
-        assert taken[-1].seen is not None
-        assert (taken[-1].seen.epoch, taken[-1].seen.iteration) == (
-            hand.latest().epoch,
-            hand.latest().iteration,
-        )
+def test_a_leader_that_jumps_is_not_followed(hand: o80.Frontend, arm: o80.Frontend) -> None:
+    robots = o80.Teleoperation(hand, arm)
+    engage(robots)
+    hand.add_command("elbow", 0.8)  # an encoder that lost a turn, a reset
+    for _ in range(200):
+        hand.burst(5)
+        assert not robots.step()
+        arm.burst(5)
+    assert robots.far == {"elbow": (0.8, 0.0)}
+    assert arm.latest().desired.tolist() == [0, 0, 0]
 
 
-def test_a_follower_that_another_controls_does_not_follow(segment: str) -> None:
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-        o80.Frontend(f"{segment}-2") as other,
-    ):
+def test_a_leader_that_stands_still_between_bursts_floods_nobody(
+    hand: o80.Frontend, arm: o80.Frontend
+) -> None:
+    robots = o80.Teleoperation(hand, arm)
+    engage(robots)
+    for _ in range(5):
+        assert robots.step()
+    arm.burst(1)
+    taken = [each for each in arm.journal() if each.kind == "taken" and each.commands]
+    assert len(taken) == 1
+    # the batch says by which row of the leader it was decided
+    row, seen = hand.latest(), taken[0].seen
+    assert seen is not None
+    assert (seen.epoch, seen.iteration) == (row.epoch, row.iteration)
+
+
+def test_a_follower_that_another_controls_does_not_follow(
+    hand: o80.Frontend, arm: o80.Frontend
+) -> None:
+    with o80.Frontend(arm.segment) as other:
         robots = o80.Teleoperation(hand, other)
         for _ in range(100):
             hand.burst(10)
@@ -215,76 +248,68 @@ def leader(segment: str) -> o80.Backend:
     return backend
 
 
-def engaged_by(backend: o80.Backend, hand: o80.Frontend, arm: o80.Frontend) -> o80.Teleoperation:
-    robots = o80.Teleoperation(hand, arm)
-    while not robots.engaged:
-        backend.step()
-        backend.publish([0.0])
-        robots.step()
-        arm.burst(1)
-    return robots
+Led = tuple[o80.Backend, o80.Teleoperation]
 
 
-def test_silence_of_the_leader_halts_the_follower(segment: str) -> None:
-    with (
-        leader(f"{segment}-1") as backend,
-        o80.Frontend(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        robots = engaged_by(backend, hand, arm)
-        assert not robots.step()
-        assert robots.why == f"the leader '{segment}-1' has published nothing for 0.2 s"
-        arm.burst(1)
-        assert arm.halted is not None
-        assert arm.halted.text == robots.why
-        assert not robots.step()  # once is enough
-        arm.resume(arm.halted.number)
-        arm.burst(1)
-        assert arm.halted is None
-        assert not robots.step()
-        arm.burst(1)
-        assert arm.halted is None
-
-
-@pytest.mark.parametrize("how", ["halt", "end"])
-def test_a_leader_that_halts_or_ends_halts_the_follower(segment: str, how: str) -> None:
-    with (
-        leader(f"{segment}-1") as backend,
-        o80.Frontend(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        robots = engaged_by(backend, hand, arm)
-        if how == "halt":
-            backend.halt("a servo is silent")
+@pytest.fixture
+def led(segment: str, arm: o80.Frontend) -> Iterator[Led]:
+    """The backend of a leader, and its teleoperation, which follows."""
+    with leader(f"{segment}-1") as backend, o80.Frontend(f"{segment}-1") as hand:
+        robots = o80.Teleoperation(hand, arm)
+        while not robots.engaged:
             backend.step()
             backend.publish([0.0])
             robots.step()
-        else:
-            backend.close()
-            with pytest.raises(o80.BackendGone):
-                robots.step()
-        arm.burst(1)
-        assert arm.halted is not None
-        said = "is halted" if how == "halt" else "has ended"
-        assert arm.halted.text == f"the leader '{segment}-1' {said}"
+            arm.burst(1)
+        yield backend, robots
 
 
-def test_a_leader_without_rows_has_no_delay(segment: str) -> None:
-    with (
-        leader(f"{segment}-1") as backend,
-        o80.Frontend(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        assert engaged_by(backend, hand, arm).delay(seconds=0.0) is None
+def test_silence_of_the_leader_halts_the_follower(
+    segment: str, led: Led, arm: o80.Frontend
+) -> None:
+    _, robots = led
+    assert not robots.step()
+    assert robots.why == f"the leader '{segment}-1' has published nothing for 0.2 s"
+    arm.burst(1)
+    assert arm.halted is not None
+    assert arm.halted.text == robots.why
+    assert not robots.step()  # once is enough
+    arm.resume(arm.halted.number)
+    arm.burst(1)
+    assert arm.halted is None
+    assert not robots.step()
+    arm.burst(1)
+    assert arm.halted is None
 
 
-def test_while_the_follower_is_halted_it_waits_for_rows_of_the_leader(segment: str) -> None:
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-        leader(f"{segment}-3") as silent,
-        o80.Frontend(f"{segment}-3") as still,
-    ):
+@pytest.mark.parametrize("how", ["halt", "end"])
+def test_a_leader_that_halts_or_ends_halts_the_follower(
+    segment: str, led: Led, arm: o80.Frontend, how: str
+) -> None:
+    backend, robots = led
+    if how == "halt":
+        backend.halt("a servo is silent")
+        backend.step()
+        backend.publish([0.0])
+        robots.step()
+    else:
+        backend.close()
+        with pytest.raises(o80.BackendGone):
+            robots.step()
+    arm.burst(1)
+    assert arm.halted is not None
+    said = "is halted" if how == "halt" else "has ended"
+    assert arm.halted.text == f"the leader '{segment}-1' {said}"
+
+
+def test_a_leader_without_rows_has_no_delay(led: Led) -> None:
+    assert led[1].delay(seconds=0.0) is None
+
+
+def test_while_the_follower_is_halted_it_waits_for_rows_of_the_leader(
+    segment: str, hand: o80.Frontend, arm: o80.Frontend
+) -> None:
+    with leader(f"{segment}-3") as silent, o80.Frontend(f"{segment}-3") as still:
         robots = o80.Teleoperation(hand, arm)
         arm.halt("look")
         arm.burst(1)
@@ -326,52 +351,42 @@ def test_a_follower_that_ends_ends_it(segment: str, how: str) -> None:
                 robots.step()
 
 
-def test_a_leader_that_is_read_as_nothing_is_not_followed(segment: str) -> None:
-    with (
-        leader(f"{segment}-1") as backend,
-        o80.Frontend(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        robots = engaged_by(backend, hand, arm)
+def test_a_leader_that_is_read_as_nothing_is_not_followed(led: Led, arm: o80.Frontend) -> None:
+    backend, robots = led
+    backend.step()
+    backend.publish([np.nan])
+    assert not robots.step()
+    arm.burst(5)
+    assert arm.halted is None
+    for _ in range(200):
         backend.step()
         backend.publish([np.nan])
         assert not robots.step()
-        arm.burst(5)
-        assert arm.halted is None
-        for _ in range(200):
-            backend.step()
-            backend.publish([np.nan])
-            assert not robots.step()
 
 
-def test_who_waits_gives_signs_of_life(segment: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_who_waits_gives_signs_of_life(
+    segment: str, hand: o80.Frontend, arm: o80.Frontend, monkeypatch: pytest.MonkeyPatch
+) -> None:
     given: list[str] = []
     monkeypatch.setattr(o80.Frontend, "keep_alive", lambda self: given.append(self.segment))
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-    ):
-        robots = o80.Teleoperation(hand, arm)
-        hand.add_command("elbow", 0.8)  # far away
-        for _ in range(3):
-            hand.burst(1)
-            assert not robots.step()
-        assert given == [arm.segment] * 3
-        arm.halt()
-        arm.burst(1)
+    robots = o80.Teleoperation(hand, arm)
+    hand.add_command("elbow", 0.8)  # far away
+    for _ in range(3):
         hand.burst(1)
         assert not robots.step()
-        assert given == [arm.segment] * 4
+    assert given == [arm.segment] * 3
+    arm.halt()
+    arm.burst(1)
+    hand.burst(1)
+    assert not robots.step()
+    assert given == [arm.segment] * 4
 
 
-def test_demonstrations_are_of_a_robot_that_follows(segment: str, tmp_path: Path) -> None:
+def test_demonstrations_are_of_a_robot_that_follows(
+    hand: o80.Frontend, arm: o80.Frontend, tmp_path: Path
+) -> None:
     path = tmp_path / "run.mcap"
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-        o80.Frontend(f"{segment}-2") as other,
-        o80.Recording(path, arm) as recording,
-    ):
+    with o80.Frontend(arm.segment) as other, o80.Recording(path, arm) as recording:
         robots = o80.Teleoperation(hand, other)
         other.mark("episode: of a session that was killed")
         arm.burst(1)
@@ -421,12 +436,10 @@ def test_demonstrations_are_of_a_robot_that_follows(segment: str, tmp_path: Path
         ([], "once"),
     ],
 )
-def test_wrong_joints_are_refused(segment: str, joints: list[str], text: str) -> None:
-    with (
-        o80.robots.load(Arm).inline(f"{segment}-1") as hand,
-        o80.robots.load(Follower).inline(f"{segment}-2") as arm,
-        pytest.raises(o80.InvalidArgument, match=text),
-    ):
+def test_wrong_joints_are_refused(
+    hand: o80.Frontend, arm: o80.Frontend, joints: list[str], text: str
+) -> None:
+    with pytest.raises(o80.InvalidArgument, match=text):
         o80.Teleoperation(hand, arm, joints=map(o80.Joint.parse, joints))
 
 
@@ -440,11 +453,7 @@ def test_a_robot_cannot_follow_itself(segment: str) -> None:
 
 
 def test_robots_without_a_common_joint_are_refused(segment: str) -> None:
-    with (
-        o80.Backend(f"{segment}-1", ["left"]) as one,
-        o80.Backend(f"{segment}-2", ["right"]) as other,
-    ):
-        one.publish([0.0])
+    with leader(f"{segment}-1"), o80.Backend(f"{segment}-2", ["right"]) as other:
         other.publish([0.0])
         with (
             o80.Frontend(f"{segment}-1") as hand,

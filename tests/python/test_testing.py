@@ -14,7 +14,7 @@ import o80
 
 
 class Cart:
-    of_the_world = False
+    simulated = True
     actuators = ("x",)
     limits = {"x": o80.Limits(minimum=-1.0, maximum=1.0)}
     requests = {
@@ -78,9 +78,9 @@ def test_a_robot_without_requests_is_checked_as_far_as_it_goes(tmp_path: Path) -
 
 
 def test_a_robot_of_the_world_is_not_moved(tmp_path: Path) -> None:
-    real = written(tmp_path, "real_cart", ("of_the_world = False", "of_the_world = True"))
-    with pytest.raises(o80.InvalidArgument, match="not start 'cart': the robot reads the world"):
-        check_robot(real, simulated=True)
+    real = written(tmp_path, "real_cart", ("simulated = True", "simulated = False"))
+    with pytest.raises(o80.InvalidArgument, match=r"not start 'cart': .*schema\.simulated"):
+        check_robot(real)
 
 
 WRONG: dict[str, tuple[str, list[tuple[str, str]]]] = {
@@ -142,4 +142,4 @@ def test_what_is_wrong_is_said(tmp_path: Path, name: str) -> None:
     said, changes = WRONG[name]
     wrong = written(tmp_path, name, *changes)
     with pytest.raises(AssertionError, match=said):
-        check_robot(wrong, simulated=True, stops_within=0.1 if name == "stops_late" else 30.0)
+        check_robot(wrong, stops_within=0.1 if name == "stops_late" else 30.0)

@@ -1,12 +1,8 @@
 """`o80.View`: the page of a program, served by a process of its own."""
 
 import json
-import os
-import re
-import select
 import signal
 import subprocess
-import sys
 import urllib.request
 from pathlib import Path
 from typing import Any
@@ -14,6 +10,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
+from processes import O80, end_of, run_python
 
 import o80
 from o80.view import page_file
@@ -76,24 +73,7 @@ def test_a_view_ends_with_its_program(end: str) -> None:
         f"import o80, os, signal\nview = o80.View()\nprint(view._popen.pid, flush=True)\n{end}"
     )
     # the view inherits stderr: the end of that is its end
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=TIMEOUT
-    )
-    assert ends(int(done.stdout))
-
-
-def ends(process: int) -> bool:
-    """Waits for the end of a process, which may have been collected already."""
-    try:
-        descriptor = os.pidfd_open(process)
-    except ProcessLookupError:
-        return True
-    try:
-        end = select.poll()
-        end.register(descriptor, select.POLLIN)
-        return bool(end.poll(TIMEOUT * 1e3))
-    finally:
-        os.close(descriptor)
+    end_of(int(run_python("-c", program, code=None).stdout))
 
 
 def test_a_taken_port_is_an_error_of_the_program(arm: o80.Frontend) -> None:
@@ -112,7 +92,7 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_command_prints_the_address_that_is_bound(arm: o80.Frontend) -> None:
-    command = [str(Path(sys.executable).with_name("o80")), "view", arm.segment]
+    command = [O80, "view", arm.segment]
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
         assert running.stdout is not None
         assert look(running.stdout.readline().strip())["source"] == arm.segment
@@ -159,13 +139,3 @@ def test_a_curve_in_a_file_has_the_extremes_and_gaps_of_all_rows() -> None:
         assert np.fmin.reduce(of_all) == pytest.approx(np.fmin.reduce(drawn), nan_ok=True)
         assert np.fmax.reduce(of_all) == pytest.approx(np.fmax.reduce(drawn), nan_ok=True)
         assert np.isnan(of_all).any() == np.isnan(drawn).any()
-
-
-def test_the_program_of_the_page_runs(tmp_path: Path) -> None:
-    page = Path(__file__).resolve().parents[2] / "docs" / "view.md"
-    [program] = re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, timeout=TIMEOUT
-    )
-    assert done.returncode == 0, done.stderr
-    assert "/?token=" in done.stdout

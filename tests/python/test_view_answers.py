@@ -279,29 +279,6 @@ def test_segments_of_one_name_are_told_apart_by_their_file(
     assert look(source=names[2])["source"] == names[2]
 
 
-def test_a_recording_that_was_cut_is_shown_up_to_its_last_whole_chunk(
-    recording: Path, segment: str, tmp_path: Path
-) -> None:
-    cut = tmp_path / "cut.mcap"
-    whole = recording.read_bytes()
-    cut.write_bytes(whole[: len(whole) // 2])
-    rows = len(o80.open(cut)[segment].history())
-    look = looks_at(str(cut))
-    answer = look()
-    if rows:
-        assert (
-            look(key=answer["key"])["iteration"] == o80.open(cut)[segment].history().iteration[-1]
-        )
-    else:
-        assert "no row" in answer["problem"]
-
-
-def test_a_file_that_is_no_recording_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "no.mcap").write_bytes(b"nothing")
-    with pytest.raises(o80.RecordingError, match=r"no\.mcap"):
-        looks_at(str(tmp_path / "no.mcap"))
-
-
 def test_a_backend_in_python_names_a_model_and_what_moves_it(segment: str, tmp_path: Path) -> None:
     body = "<body name='{0}'><joint name='{0}' axis='0 1 0'/><geom size='0.1'/></body>"
     model = tmp_path / "arm.xml"

@@ -134,6 +134,7 @@ def test_the_halt_button_halts_and_the_resume_button_resumes(
         assert halt is not None
         assert halt.text == "from o80 view"
         page.wait_for_text("halted by pid")
+        page.wait_for_text("Go on with Resume")
         click(page, "resume")
         page.wait_for("document.getElementById('resume').hidden")
         assert arm.halted is None
@@ -283,6 +284,8 @@ def test_another_robot_that_takes_the_name_is_shown_anew(browser: Chromium, segm
             page.wait_for("page.charts.length && page.charts[0].name.includes('lift')")
             page.wait_for_text("<b>lift</b>")  # names are text, never HTML
             page.wait_for_text("names no model")
+            charts = "document.getElementById('charts').offsetWidth"
+            assert page.value(f"{charts} > 0.6 * document.body.offsetWidth"), "the curves have it"
             assert page.value("page.scene.canvas.hidden")
         page.close()
 

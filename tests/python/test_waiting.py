@@ -48,24 +48,6 @@ def test_a_killed_backend_is_an_error_and_its_history_stays(
     arm.close()
 
 
-def test_who_is_attached_learns_of_a_kill_and_goes_on_with_the_next_backend(segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with robot.start(segment) as first:
-        arm = first.frontend()
-        arm.wait_for(3, WAIT)
-        os.kill(first.pid, signal.SIGKILL)
-        with pytest.raises(o80.BackendKilled, match=f"'{segment}'.*pid {first.pid}.* was killed"):
-            arm.wait_for(10**12, WAIT)
-    with robot.start(segment) as second:
-        with pytest.raises(o80.BackendSuperseded, match="a new one has its name: attach again"):
-            arm.wait_for(10**12, WAIT)
-        arm.reattach(WAIT)
-        arm.add_command(0, 0.5)
-        assert arm.pulse_and_wait(WAIT).desired[0] == 0.5
-        assert second.pid != first.pid
-        arm.close()
-
-
 def test_dead_segments_are_listed_and_cleaned(segment: str) -> None:
     with o80.robots.load("two_joints").start(segment) as process:
         alive = next(entry for entry in o80.segments() if entry.name == segment)
@@ -80,17 +62,3 @@ def test_dead_segments_are_listed_and_cleaned(segment: str) -> None:
         assert (dead.alive, dead.life, dead.epoch) == (False, "killed", alive.epoch)
         assert o80.clean(segment) == [segment]
         assert o80.clean(segment) == []
-
-
-def test_a_timeout_carries_the_handles(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0, iterations=5)
-    batch = arm.pulse()
-
-    with pytest.raises(TimeoutError) as waited:
-        batch.wait(0.0)
-    with pytest.raises(o80.TimeoutError) as without_batch:
-        arm.wait_for(10, timeout=0.0)
-
-    assert isinstance(waited.value, o80.TimeoutError)
-    assert [handle.status for handle in waited.value.handles] == [o80.Status.QUEUED]
-    assert list(without_batch.value.handles) == []

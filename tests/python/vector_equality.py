@@ -1,7 +1,5 @@
 """Runs a vector environment beside Gymnasium's SyncVectorEnv of single ones and compares all."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from operator import methodcaller
 from typing import Any

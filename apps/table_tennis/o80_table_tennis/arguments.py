@@ -30,12 +30,8 @@ def refuse_wrong_arguments(
         raise ValueError(f"unknown render mode '{render_mode}'; there are: {', '.join(modes)}")
 
 
-def refuse_wrong_balls(rig: RigSettings, task: TaskSettings, *, plays_ball: bool) -> None:
-    """Raises ValueError for extra balls, or a ball that flies out, where these cannot be."""
-    if rig.extra_balls and not plays_ball:
-        raise ValueError(f"this task plays no ball: extra_balls must be 0, got {rig.extra_balls}")
-    if task.fly_out and not plays_ball:
-        raise ValueError("this task plays no ball: fly_out must be False")
+def refuse_wrong_balls(rig: RigSettings, task: TaskSettings) -> None:
+    """Raises ValueError for extra balls beside a ball that flies out."""
     if task.fly_out and rig.extra_balls:
         raise ValueError(
             "fly_out ends an episode at the first touch of the played ball, while extra balls "
@@ -55,13 +51,11 @@ def refuse_unless_for_copies(rig: RigSettings, task: TaskSettings) -> None:
             )
 
 
-def refuse_wrong_options(options: Mapping[str, Any], *, plays_ball: bool, period: float) -> None:
+def refuse_wrong_options(options: Mapping[str, Any], *, period: float) -> None:
     """Raises ValueError for options of `reset`; `period` is that of the twins [s]."""
-    known = OPTIONS if plays_ball else ()
-    unknown = [name for name in options if name not in known]
+    unknown = [name for name in options if name not in OPTIONS]
     if unknown:
-        there_is = ", ".join(known) or "no option, as this task plays no ball"
-        raise ValueError(f"unknown options: {', '.join(unknown)}; reset knows {there_is}")
+        raise ValueError(f"unknown options: {', '.join(unknown)}; reset knows {', '.join(OPTIONS)}")
     if "flight" in options and not np.isclose(options["flight"].period, period):
         raise ValueError(
             f"a flight in steps of {options['flight'].period} s cannot be played every "

@@ -19,12 +19,13 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from o80.base.arrays import FloatArray
-from o80.learning import Index, Outcome, Task
+from o80.learning import EVERY, Index, Outcome, Task
+from o80.learning.halts import halts_of
+from o80.view.pictures import Pictures
 
 from .arguments import refuse_unless_for_copies, refuse_wrong_balls, refuse_wrong_options
 from .balls.sources import balls_from
 from .episode_draw import EpisodeDraw, drawn_episode
-from .report.rendering import Scene
 from .rig.group_rig import GroupRig
 from .rig.rig import Rig
 from .settings import RigSettings, TaskSettings
@@ -37,6 +38,8 @@ from .world.timing import ITERATIONS
 
 Numbers = NDArray[np.intp]
 
+SIZE = (640, 480)
+"""Width and height of pictures [pixels]."""
 TEXTS = np.array([end.text for end in End], object)
 """Texts of the ends, by their numbers."""
 
@@ -69,7 +72,7 @@ class TableTennisCopies(Task):
         if copies is not None:
             refuse_unless_for_copies(rig, settings)
         self.settings, self.task = settings, settings.made()
-        refuse_wrong_balls(rig, settings, plays_ball=self.task.plays_ball)
+        refuse_wrong_balls(rig, settings)
         rig = settings.start_of(rig)
         self.observer = Observer(self.task, settings.observing(rig.step), copies or 1)
         """Observer that makes observations of states."""
@@ -92,13 +95,13 @@ class TableTennisCopies(Task):
             if self.observer.is_ball_play:
                 self._gathered = group.gather(self.observer.low, self.observer.high)
             self.rig = group
-        self.commanded = self.rig.arm.commanded()
-        """(copies, 8) normalised pressures asked for last."""
+        self.robots = self.rig.robots
         self._ends = np.zeros(self.copies, np.int64)
         self.state = State(
             self.steps,
             self.rig.arm.last_motion,
             np.zeros((self.copies, MUSCLES)),
+            self.rig.arm.commanded(),
             self.rig.arm.last_racket,
             self.rig.twin.ball,
             self.rig.twin.records,
@@ -107,7 +110,7 @@ class TableTennisCopies(Task):
         """(copies, ...) after the last step."""
         self.draws: list[EpisodeDraw] = []
         """Draws of the episodes that were begun last."""
-        self._scene: Scene | None = None
+        self._pictures: Pictures | None = None
         self._observations = np.zeros((self.copies, self.observer.size), np.float32)
         self._unobserved = self._stalled = False
         self._running = _running(self.copies)
@@ -120,8 +123,8 @@ class TableTennisCopies(Task):
         options: Mapping[str, Any],
     ) -> None:
         """Arms and twins to the start, with a drawn ball, or that of `options`."""
-        rig, plays = self._rig_settings, self.task.plays_ball
-        refuse_wrong_options(options, plays_ball=plays, period=rig.period)
+        rig = self._rig_settings
+        refuse_wrong_options(options, period=rig.period)
         self.draws = draws = [
             drawn_episode(self.task, self._balls, each, extra=rig.extra_balls, options=options)
             for each in generators
@@ -132,13 +135,13 @@ class TableTennisCopies(Task):
             twin_seeds=[draw.twin_seed for draw in draws],
             flights=[draw.balls.flights for draw in draws],
         )
-        self.commanded[copies] = self.rig.arm.commanded(copies)
+        self.state.asked[copies] = self.rig.arm.commanded(copies)
         self.state.goal[copies] = [draw.goal for draw in draws]
         self._ends[copies] = End.RUNNING
         self._look()
         if not self._gathered:
-            state, commanded = self.state.at(copies), self.commanded[copies]
-            self._observations[copies] = self.observer.begin(state, commanded, generators, copies)
+            state = self.state.at(copies)
+            self._observations[copies] = self.observer.begin(state, generators, copies)
         self._unobserved = self._stalled = False
 
     def step(self, actions: Any, copies: Index) -> None:
@@ -151,33 +154,41 @@ class TableTennisCopies(Task):
         self._stalled = rig.lateness > settings.max_late + settings.planned
         if self._stalled:
             return
-        commanded = self.commanded[copies]
+        asked = self.state.asked[copies]
         if settings.chunk_size is None:
             for _ in range(settings.repeat):
-                commanded = changed_pressures(commanded, actions, factor=settings.factor)
-                rig.step(commanded, copies)
+                asked = changed_pressures(asked, actions, factor=settings.factor)
+                self._move(asked, copies)
         else:
-            commanded = self._step_chunk(commanded, np.asarray(actions))
-        self.commanded[copies] = commanded
+            asked = self._step_chunk(asked, np.asarray(actions))
+        self.state.asked[copies] = asked
         self._ends[copies], self._some_ended = End.RUNNING, False
         self._look()
         if settings.fly_out and np.count_nonzero(self.state.record.touched):
             touched = np.zeros(self.copies, np.bool_)
             touched[copies] = np.asarray(self.state.record.touched)[copies]
-            self._fly(np.flatnonzero(touched))
+            self._fly(np.setdiff1d(np.flatnonzero(touched), [*halts_of(self.robots, self.copies)]))
         self._unobserved = True
 
-    def _step_chunk(self, commanded: FloatArray, actions: NDArray[Any]) -> FloatArray:
+    def _move(self, pressures: FloatArray, copies: Index = EVERY, **steps: int) -> None:
+        """A step of the rig; arms and twins that a halt ends show their last rows."""
+        stepped = False
+        with self.until_halted():
+            self.rig.step(pressures, copies, **steps)
+            stepped = True
+        if not stepped:
+            self.rig.see_newest()
+
+    def _step_chunk(self, asked: FloatArray, actions: NDArray[Any]) -> FloatArray:
         """Sends a chunk (1, chunk_size, 8); the pressures (1, 8) of its last row that is over when
         the policy sees again: the next chunk changes these.
         """
         settings = self.settings
         rows = []
         for action in np.repeat(actions[0], settings.repeat, axis=0):
-            commanded = changed_pressures(commanded, action[None], factor=settings.factor)
-            rows.append(commanded)
-        assert isinstance(self.rig, Rig)
-        self.rig.step(np.concatenate(rows), steps=settings.steps)
+            asked = changed_pressures(asked, action[None], factor=settings.factor)
+            rows.append(asked)
+        self._move(np.concatenate(rows), steps=settings.steps)
         return rows[settings.steps - 1]
 
     def _fly(self, touched: Numbers) -> None:
@@ -209,8 +220,9 @@ class TableTennisCopies(Task):
             self._ends[copies] = End.STALLED
             return Outcome(truncated=True)
         state = self.state.at(copies)
-        self._ends[copies] = ends = self.task.end(state)
+        ends = self.task.end(state)
         by_event = terminated(ends)
+        self._ends[copies] = np.where(np.isin(copies, [*self.halts]), End.HALTED, ends)
         return Outcome(self.task.reward(state), by_event, ~by_event & (ends != End.RUNNING))
 
     def observe(self, copies: Index) -> Any:
@@ -220,8 +232,7 @@ class TableTennisCopies(Task):
                 return np.concatenate(self._gathered, axis=1)
             return np.concatenate([part[copies] for part in self._gathered], axis=1)
         if self._unobserved:
-            state, commanded = self._of(copies), self.commanded[copies]
-            self._observations[copies] = self.observer.observe(state, commanded, copies)
+            self._observations[copies] = self.observer.observe(self._of(copies), copies)
             self._unobserved = False
         return self._observations[copies]
 
@@ -240,14 +251,13 @@ class TableTennisCopies(Task):
 
     def render(self, copy: int) -> Any:
         """A picture (480, 640, 3) of one copy."""
-        positions = self.rig.positions(copy)
-        if self._scene is None:
-            self._scene = Scene(balls=len(positions))
-        return self._scene.draw(self.rig.twin.joint_positions[copy], positions, camera=self._camera)
+        twin = self.rig.twin_of(copy)
+        if self._pictures is None:
+            self._pictures = Pictures(twin, size=SIZE, camera=self._camera)
+        return self._pictures.draw(twin.latest())
 
     def close(self) -> None:
         """Ends arms and twins; may be called twice."""
+        if self._pictures is not None:
+            self._pictures.close()
         self.rig.close()
-        if self._scene is not None:
-            self._scene.close()
-            self._scene = None

@@ -2,7 +2,7 @@
 
 Starts the arm in real time (500 Hz, a process of its own), its simulated twin (bursting, another
 one) and an environment between them, plays episodes, then plays accelerated, as processes and
-inline. Prints rates, lateness and returns; writes a recording, plots, a film and a report.
+inline. Prints rates, lateness and returns; writes recordings and a report.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 import o80
+from o80.base.screen import keep_printing
 
 from .balls.sources import balls_from
 from .ending import raise_if_terminated, unwind_on_sigterm
@@ -47,7 +48,6 @@ class DemoSettings:
     seed: int = 1
     extra_balls: int = 0
     muscle: str = "linear"
-    film: bool = True
     output: Path = Path("build/demo")
 
     def task(self) -> TaskSettings:
@@ -96,18 +96,8 @@ def run_demo(settings: DemoSettings, console: Console) -> Report:
                     record=settings.recording,
                 )
         policies = _compared(settings, modes, progress)
-        bar = progress.add_task("plots and film", total=1, returns="")
-        report = write_report(
-            settings.output,
-            modes,
-            policies,
-            _recorded(settings, modes),
-            recorded_episodes(settings.learned_recording),
-            film=settings.film,
-            begin=begin,
-        )
-        progress.update(bar, completed=1)
-    return report
+    recorded = _recorded(settings, modes)
+    return write_report(settings.output, modes, policies, recorded, begin=begin)
 
 
 def _play(
@@ -204,7 +194,6 @@ def main(
     seed: Annotated[int, typer.Option(min=0, help="Of the environments.")] = 1,
     extra_balls: Annotated[int, typer.Option(min=0, help="Balls beside the one played.")] = 0,
     muscle: Annotated[str, typer.Option(help="Model of the muscles: linear or hill.")] = "linear",
-    film: Annotated[bool, typer.Option(help="Draw a film of a return.")] = True,
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/demo"),
 ) -> None:
     """Plays table tennis in real time, then accelerated; reports rates, lateness and returns."""
@@ -217,7 +206,6 @@ def main(
         seed=seed,
         extra_balls=extra_balls,
         muscle=muscle,
-        film=film,
         output=output,
     )
     if episodes == 0 and real_time_episodes == 0:
@@ -254,7 +242,7 @@ def _say_where(settings: DemoSettings, console: Console) -> None:
     arm = next(iter(o80.open(settings.recording)))
     command = command_of_o80()
     lines = (
-        f"report, plots and film: {settings.output}",
+        f"report: {settings.output}",
         f"recording of every row: {recording}; of the learned policy: {settings.learned_recording}",
         f"  {command} view {recording}      # arm, table, balls in the browser, back in time too",
         f"  {command} replay {recording}    # repeats all of it and compares bit for bit",
@@ -266,6 +254,7 @@ def _say_where(settings: DemoSettings, console: Console) -> None:
 
 def run() -> None:
     """The program `o80-table-tennis`."""
+    keep_printing()
     typer.run(main)
 
 

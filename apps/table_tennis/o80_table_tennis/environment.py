@@ -107,7 +107,7 @@ class TableTennisEnvironment(Environment):
         self._draw, self._twin_first = copies.draws[0], self.rig.twin_row
         if self._virtual is not None:
             numbers = self._draw.balls.numbers[1:]
-            self._virtual.begin(numbers, copies.state, copies.commanded, self.np_random)
+            self._virtual.begin(numbers, copies.state, self.np_random)
         self._paid, self._number = 0.0, self._number + 1
         self._begun, self._summary = False, None
         self._first_observation = observation.copy()
@@ -124,7 +124,7 @@ class TableTennisEnvironment(Environment):
         observation, reward, terminated, truncated, info = super().step(action)
         end = End(info["end"])
         if self._virtual is not None and end is not End.STALLED:
-            self._virtual.observe(self._copies.state, self._copies.commanded)
+            self._virtual.observe(self._copies.state)
         info = self._told(info, end)
         self._paid += reward
         if self._recorder is not None and end is not End.STALLED:

@@ -10,7 +10,7 @@ import numpy as np
 
 from o80.base.arrays import FloatArray
 
-from .balls.draw import NO_BALLS, DrawnBalls, draw_balls
+from .balls.draw import DrawnBalls, draw_balls
 from .balls.sources import Flights
 from .task.task import Task
 
@@ -37,6 +37,6 @@ def drawn_episode(
     options: Mapping[str, Any],
 ) -> EpisodeDraw:
     """An episode drawn from `rng`, with `options` of `reset`."""
-    drawn = draw_balls(balls, rng, extra=extra, **options) if task.plays_ball else NO_BALLS
+    drawn = draw_balls(balls, rng, extra=extra, **options)
     goal = task.begin(rng)
     return EpisodeDraw(drawn, goal, int(rng.integers(SEEDS)), int(rng.integers(SEEDS)))

@@ -6,30 +6,39 @@ Every policy plays the same balls. Prints a table and draws where the balls land
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.console import Console
 from rich.progress import Progress
+from rich.table import Table
 
 import o80
+from o80.base.finite import json_text
+from o80.base.screen import keep_printing
 
 from .ending import unwind_on_sigterm
-from .learning.contestants import contestant
 from .learning.evaluation import VERDICT_BALLS, VERDICT_SEED, Evaluation, evaluate
 from .learning.paired import Paired
-from .learning.verdict import print_table, write_report
+from .players.conditions import Conditions
+from .players.learned_policy import LearnedPolicy, shipped_policy
+from .players.policies import DEFAULT_FACTOR, Policy, RandomPolicy, StillPolicy, default_policy
+from .rig.arm_numbers import ArmNumbers
 from .settings import Pacing
+from .world.table import TARGET
+
+COLUMNS = ("policy", "balls", "touched", "returned", "95 %", "reward", "miss", "speed")
+"""miss: median distance of returned balls from the target; speed: the median after the touch."""
 
 
 @dataclass(frozen=True)
 class Match:
-    """Balls, arm and number of episodes that all compared policies share."""
+    """Number of episodes that all compared policies share, and what replaces their conditions."""
 
-    balls: str | None
-    preset: str | None
+    changed: dict[str, str]
     count: int | None
     seed: int
 
@@ -38,13 +47,15 @@ def main(
     policies: Annotated[
         list[str],
         typer.Argument(
-            help="still, random, scripted, scripted_chunks (30 ms ahead), learned, or a file "
-            "policy.npz."
+            help="still, random, scripted, learned, or the folder or policy.npz of a training."
         ),
     ],
     balls: Annotated[
         str | None,
         typer.Option(help="wide, narrow, launcher, or recordings. [default: of the policy]"),
+    ] = None,
+    goal: Annotated[
+        str | None, typer.Option(help="return or smash. [default: of the policy]")
     ] = None,
     count: Annotated[
         int | None,
@@ -62,7 +73,8 @@ def main(
     """Plays the same balls with each policy, and compares."""
     unwind_on_sigterm()
     console = Console()
-    match = Match(balls, preset, count, seed)
+    given = {"balls": balls, "goal": goal, "preset": preset}
+    match = Match({name: each for name, each in given.items() if each is not None}, count, seed)
     pacings = [Pacing.INLINE, Pacing.REAL_TIME] if real_time else [Pacing.INLINE]
     try:
         with Progress(console=console, transient=True) as bars:
@@ -74,15 +86,33 @@ def main(
     except (ValueError, OSError, o80.Error) as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
-    print_table(played, console)
+    _print(played, console)
     paired = _paired(policies, played) if real_time else {}
     for name, pair in paired.items():
         console.print(f"{name}: {pair}", highlight=False)
     _write(played, paired, output, console)
 
 
+def named_policy(name: str, **changed: str) -> tuple[Policy, Conditions]:
+    """The policy of a name or of a training; it plays in its own conditions, but for `changed`.
+
+    Raises ValueError, o80.InvalidArgument.
+    """
+    conditions = Conditions()
+    policy: Policy = RandomPolicy() if name == "random" else StillPolicy()
+    if name == "scripted":
+        conditions = Conditions(factor=DEFAULT_FACTOR, repeat=1, observation="published")
+    elif name not in ("still", "random"):
+        learned = shipped_policy() if name == "learned" else LearnedPolicy.load(name)
+        policy, conditions = learned, learned.conditions
+    conditions = replace(conditions, **changed)  # type: ignore[arg-type]
+    if name == "scripted":
+        policy = default_policy(ArmNumbers.of_rig(conditions.rig()))
+    return policy, conditions
+
+
 def _play(name: str, match: Match, pacing: Pacing, bars: Progress, *, named: bool) -> Evaluation:
-    policy, conditions = contestant(name, balls=match.balls, preset=match.preset)
+    policy, conditions = named_policy(name, **match.changed)
     simulated = conditions.balls in ("wide", "narrow", "launcher")
     count = VERDICT_BALLS if match.count is None and simulated else match.count
     label = f"{name}, {pacing.value}" if named else name
@@ -96,6 +126,27 @@ def _play(name: str, match: Match, pacing: Pacing, bars: Progress, *, named: boo
         pacing=pacing,
         after_each=lambda _: bars.advance(bar),
     )
+
+
+def _print(played: Sequence[Evaluation], console: Console) -> None:
+    """A row for each policy."""
+    table = Table()
+    for name in COLUMNS:
+        table.add_column(name, justify="left" if name == "policy" else "right")
+    for each in played:
+        low, high = (100 * share for share in each.interval)
+        any_returned = each.returned > 0
+        table.add_row(
+            each.name,
+            str(len(each.episodes)),
+            f"{100 * each.touched:.1f} %",
+            f"{100 * each.returned:.1f} %",
+            f"{low:.1f} to {high:.1f} %",
+            f"{each.reward:.3f}",
+            f"{each.distance(TARGET):.2f} m" if any_returned else "",
+            f"{each.speed:.1f} m/s" if any_returned else "",
+        )
+    console.print(table)
 
 
 def _paired(policies: list[str], played: list[Evaluation]) -> dict[str, Paired]:
@@ -113,9 +164,10 @@ def _write(
     plot_landings(output / "landings.png", played)
     figures: dict[str, Any] = {each.name: each.as_json() for each in played}
     figures |= {f"{name}, paired": each.as_json() for name, each in paired.items()}
-    write_report(output / "evaluation.json", figures)
+    (output / "evaluation.json").write_text(json_text(figures, indent=2) + "\n")
     console.print(f"landings.png, evaluation.json: {output}", soft_wrap=True)
 
 
 if __name__ == "__main__":
+    keep_printing()
     typer.run(main)

@@ -11,13 +11,12 @@ from numbers import Real
 from o80.base.argument_checks import whole
 
 from .task.actions import FINE, largest_change
-from .task.ball_play import HitTask, ReturnTask, SmashTask
+from .task.ball_play import ReturnTask, SmashTask, observes_as_published
 from .task.end import EndRule
 from .task.full_observation import FullObservation, full_observation
 from .task.noise import NO_NOISE, NoiseSettings
 from .task.observations import ObservationBounds
 from .task.observer import Observing
-from .task.reach import ReachTask
 from .task.rewards import RewardRule, reward_rule
 from .task.task import Task, missing_members
 from .world.arm import MUSCLES
@@ -114,7 +113,7 @@ class TaskSettings:
     """The task, its balls and its rules. Raises ValueError or TypeError."""
 
     task: str | Task = "return"
-    """return, smash, hit or reach; or an object of your own, see `task.task.Task`."""
+    """return or smash; or an object of your own, see `task.task.Task`."""
     balls: str | None = None
     """Simulated shots: "narrow" (like those of the recorded ball gun), "wide", or "launcher" (those
     of the ball launcher, needs o80-devices). Or the path of a recording, or of a folder of them.
@@ -136,15 +135,15 @@ class TaskSettings:
     """Iterations the policy has to think, real time: an action acts from row k + 1 + delay."""
     observation: str | FullObservation = "published"
     """published (22 numbers), or full: with what was asked lately and a filtered ball, see
-    `task.full_observation`; the latter of the named tasks with a ball."""
+    `task.full_observation`; the latter of tasks without an `observe` of their own."""
     noise: NoiseSettings = NO_NOISE
     """Noise of the observations; `NoiseSettings.tracker()` is that of a real camera system."""
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
-    """Bounds of the published observation of the named tasks with a ball."""
+    """Bounds of the published observation of the named tasks."""
     end: EndRule = field(default_factory=EndRule)
     """End of an episode of the named tasks."""
     reward: str | RewardRule = "ordered"
-    """Reward of the named tasks with a ball: ordered, published, or a rule of `task.rewards`."""
+    """Reward of the named tasks: ordered, published, or a rule of `task.rewards`."""
     fly_out: bool = False
     """After the first touch nobody is asked any more: in the same step the ball flies to its end,
     and the episode ends. A second touch of the racket then does not happen."""
@@ -192,8 +191,12 @@ class TaskSettings:
                 f"task must be one of {', '.join(TASKS)}, or an object with the members of "
                 f"o80_table_tennis.task.task.Task; {self.task!r} has no {', '.join(missing)}"
             )
-        if self.observation != "published" and not self.made().plays_ball:
-            raise ValueError("this task plays no ball: observation must be published")
+        if self.observation != "published" and not observes_as_published(self.made()):
+            raise ValueError(
+                f"{type(self.task).__name__} has an `observe` of its own, which observation="
+                f"{self.observation!r} would replace: give observation='published', or leave out "
+                "`observe`"
+            )
 
     @property
     def action_shape(self) -> tuple[int, ...]:
@@ -234,7 +237,5 @@ class TaskSettings:
 TASKS: Mapping[str, Callable[[TaskSettings], Task]] = {
     "return": lambda s: ReturnTask(s.bounds, s.end, reward_rule(s.reward)),
     "smash": lambda s: SmashTask(s.bounds, s.end, reward_rule(s.reward)),
-    "hit": lambda s: HitTask(s.bounds, s.end, reward_rule(s.reward)),
-    "reach": lambda s: ReachTask(max_steps=s.end.max_steps),
 }
 """The tasks with a name."""

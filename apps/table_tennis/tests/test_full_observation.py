@@ -115,7 +115,7 @@ def test_extra_balls_have_estimates_of_their_own() -> None:
     np.testing.assert_allclose(np.sort(seen[:, 0]), np.sort(true[1:, 0]), atol=0.01)
 
 
-@pytest.mark.parametrize("task", ["return", "hit"])
+@pytest.mark.parametrize("task", ["return", "smash"])
 def test_gymnasium_accepts_it(task: str) -> None:
     settings = TaskSettings(task=task, observation="full", noise=NOISY)
     with closing(gymnasium.make("o80/TableTennis-v0", task=settings)) as environment:

@@ -53,7 +53,9 @@ def test_every_action_lies_in_the_box(shares: list[list[float]]) -> None:
 def test_the_arm_stays_as_it_is_without_a_ball() -> None:
     policy = HittingPolicy()
     pressures = HittingSettings().muscles.pressures(
-        ArmModel().torque(PLAYING, np.zeros(4), np.zeros(4)), PLAYING, 0.45
+        ArmModel().torque(PLAYING, np.zeros(4), np.zeros(4)),
+        PLAYING,
+        HittingSettings().control.mean_pressure,
     )
     row = observed([0.5, -1.0, 0.1], [0.0, 0.0, 0.0], pressures.ravel())
     for _ in range(5):

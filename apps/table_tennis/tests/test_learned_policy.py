@@ -1,104 +1,51 @@
-"""A learned policy is two small files, and plays with NumPy alone."""
+"""The learned policy in the package, and those of o80.learning's trainer: what they play in."""
 
 import json
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from o80_table_tennis.learning.evaluation import evaluate
 from o80_table_tennis.players.conditions import Conditions
-from o80_table_tennis.players.learned_policy import LearnedPolicy
-from o80_table_tennis.players.network import Network
-
-INPUTS, HIDDEN, ACTIONS = 7, 5, 8
+from o80_table_tennis.players.learned_policy import SHIPPED, LearnedPolicy, shipped_policy
 
 
-def network(seed: int = 1) -> Network:
-    rng = np.random.default_rng(seed)
-    sizes = [INPUTS, HIDDEN, HIDDEN, ACTIONS]
-    return Network.of_arrays(
-        {
-            "visible": np.ones(INPUTS),
-            "mean": rng.normal(size=INPUTS),
-            "scale": rng.uniform(0.5, 2.0, INPUTS),
-            **{f"weight_{i}": rng.normal(size=(sizes[i + 1], sizes[i])) for i in range(3)},
-            **{f"bias_{i}": rng.normal(size=sizes[i + 1]) for i in range(3)},
-        }
-    )
+def test_the_shipped_policy_returns_balls_in_the_conditions_of_its_training() -> None:
+    policy = shipped_policy()
+    assert policy.conditions == Conditions()
+    assert evaluate("learned", policy, policy.conditions, balls=6).returned >= 0.5
 
 
-def policy() -> LearnedPolicy:
-    return LearnedPolicy(network(), Conditions(factor=0.4, balls="narrow"), {"seed": 3})
-
-
-def test_a_saved_policy_is_the_same_when_it_is_loaded(tmp_path: Path) -> None:
-    saved = policy()
-    saved.save(tmp_path / "policy.npz")
-    for name in ("policy", "policy.npz", "policy.json"):
-        loaded = LearnedPolicy.load(tmp_path / name)
-        assert loaded.conditions == saved.conditions
-        assert loaded.training == saved.training
-        observation = np.linspace(-3, 3, INPUTS, dtype=np.float32)
-        assert loaded.act(observation).tobytes() == saved.act(observation).tobytes()
-
-
-def test_actions_lie_in_the_box_and_are_of_one_kind_for_one_and_for_many() -> None:
-    observations = np.random.default_rng(2).normal(0, 100, (50, INPUTS)).astype(np.float32)
-    many = network().act(observations)
-    assert many.dtype == np.float32
+def test_actions_are_of_one_kind_for_one_and_for_many() -> None:
+    policy = shipped_policy()
+    observations = np.random.default_rng(2).normal(0, 3, (20, 73)).astype(np.float32)
+    many = policy.act(observations)
+    assert (many.shape, many.dtype) == ((20, 8), np.dtype(np.float32))
     assert np.abs(many).max() == 1.0
     for observation, action in zip(observations, many, strict=True):
-        np.testing.assert_allclose(network().act(observation), action, atol=1e-4)
-
-
-def test_what_is_masked_changes_no_action() -> None:
-    visible = np.ones(INPUTS, np.float32)
-    visible[2:4] = 0
-    blind = replace(network(), visible=visible)
-    first = np.zeros(INPUTS, np.float32)
-    second = first.copy()
-    second[2:4] = 5.0
-    assert blind.act(first).tobytes() == blind.act(second).tobytes()
-    second[0] = 0.1
-    assert blind.act(first).tobytes() != blind.act(second).tobytes()
-
-
-def test_a_missing_file_is_named_with_what_would_make_it(tmp_path: Path) -> None:
-    with pytest.raises(FileNotFoundError, match=r"policy\.npz.*o80_table_tennis\.train"):
-        LearnedPolicy.load(tmp_path / "policy")
+        np.testing.assert_allclose(policy.act(observation), action, atol=1e-4)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda told: told.update(format=2), "format 2 is not 1"),
-        (lambda told: told["conditions"].update(wind=1), "unknown conditions: wind"),
-        (lambda told: told.pop("conditions"), "conditions"),
+        ({"name": "o80/CartPole-v0"}, "was trained for 'o80/CartPole-v0', not for 'o80_table"),
+        ({"wind": 1}, "not a policy of this version"),
     ],
 )
-def test_a_file_of_another_version_is_refused(
-    tmp_path: Path, change: Callable[[dict[str, Any]], Any], message: str
+def test_a_policy_of_another_task_is_refused(
+    tmp_path: Path, change: dict[str, Any], message: str
 ) -> None:
-    policy().save(tmp_path / "policy")
-    path = tmp_path / "policy.json"
-    told = json.loads(path.read_text())
-    change(told)
-    path.write_text(json.dumps(told))
+    (tmp_path / "policy.npz").write_bytes(SHIPPED.with_suffix(".npz").read_bytes())
+    told = json.loads(SHIPPED.with_suffix(".json").read_text())
+    told["task"] |= change
+    (tmp_path / "policy.json").write_text(json.dumps(told))
     with pytest.raises(ValueError, match=message):
-        LearnedPolicy.load(path)
-
-
-def test_arrays_that_do_not_fit_each_other_or_are_not_finite_are_refused(tmp_path: Path) -> None:
-    arrays = network().arrays()
-    with pytest.raises(ValueError, match=r"layer 1 must have shape \(5, 5\)"):
-        Network.of_arrays(arrays | {"weight_1": np.zeros((HIDDEN, HIDDEN + 1))})
-    with pytest.raises(ValueError, match="finite"):
-        Network.of_arrays(arrays | {"mean": np.full(INPUTS, np.nan)})
+        LearnedPolicy.load(tmp_path)
 
 
 def test_playing_a_policy_loads_no_learning_library() -> None:

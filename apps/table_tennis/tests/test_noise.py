@@ -24,7 +24,8 @@ def state_of(balls: FloatArray, pressures: FloatArray) -> State:
     nothing = np.zeros((*balls.shape[:-1], 8))
     racket = nothing[..., :3]
     return State(
-        np.zeros(len(balls), np.int64), nothing, pressures, racket, balls, BallRecord(1.0), racket
+        *(np.zeros(len(balls), np.int64), nothing, pressures, pressures),
+        *(racket, balls, BallRecord(1.0), racket),
     )
 
 

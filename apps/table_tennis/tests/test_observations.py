@@ -18,7 +18,7 @@ from o80_table_tennis.task.state import State
 
 
 def state_of(motion: np.ndarray, pressures: np.ndarray, ball: np.ndarray) -> State:
-    return State(0, motion, pressures, np.zeros(3), ball, BallRecord(1.0), np.zeros(3))
+    return State(0, motion, pressures, pressures, np.zeros(3), ball, BallRecord(1.0), np.zeros(3))
 
 
 def test_each_part_of_an_observation_has_its_place() -> None:

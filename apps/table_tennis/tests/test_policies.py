@@ -1,9 +1,9 @@
-"""The baselines: a still arm, random actions, a swing by the clock of the ball."""
+"""The baselines: a still arm, random actions."""
 
 import numpy as np
 import pytest
 
-from o80_table_tennis.players.policies import Policy, RandomPolicy, StillPolicy, SweepPolicy
+from o80_table_tennis.players.policies import Policy, RandomPolicy, StillPolicy
 from o80_table_tennis.task.observations import SIZE
 
 
@@ -14,7 +14,7 @@ def observed(y: float, vy: float, joint: float = 0.0) -> np.ndarray:
     return row
 
 
-@pytest.mark.parametrize("policy", [StillPolicy(), RandomPolicy(seed=1), SweepPolicy()])
+@pytest.mark.parametrize("policy", [StillPolicy(), RandomPolicy(seed=1)])
 def test_actions_lie_in_the_box(policy: Policy) -> None:
     policy.reset()
     for _ in range(20):
@@ -30,20 +30,3 @@ def test_random_actions_follow_their_seed_and_go_on_over_episodes() -> None:
     np.testing.assert_array_equal(one, again.act(observed(1, -4)))
     first.reset()
     assert not np.array_equal(one, first.act(observed(1, -4)))
-
-
-@pytest.mark.parametrize(
-    ("y", "vy", "joint", "swings"),
-    [
-        (0.7, -4.0, 0.0, True),
-        (0.9, -4.0, 0.0, False),
-        (0.7, 4.0, 0.0, False),
-        (0.7, -4, 1.3, False),
-    ],
-)
-def test_the_sweep_swings_joint_one_while_the_ball_comes_near(
-    y: float, vy: float, joint: float, swings: bool
-) -> None:
-    action = SweepPolicy(lead=0.2).act(observed(y, vy, joint))
-    assert action[:2].tolist() == ([1.0, -1.0] if swings else [0.0, 0.0])
-    assert not action[2:].any()

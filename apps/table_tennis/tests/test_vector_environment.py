@@ -41,9 +41,8 @@ TASKS = {
     "noise": TaskSettings(factor=COARSE, noise=NOISY),
     "full": TaskSettings(factor=COARSE, balls="wide", observation="full", noise=NOISY),
     "full, repeat": TaskSettings(factor=COARSE, observation="full", repeat=2),
-    "hit": TaskSettings(task="hit", factor=COARSE, end=SHORT, delay=0),
+    "short": TaskSettings(factor=COARSE, end=SHORT, delay=0),
     "smash": TaskSettings(task="smash", delay=3, factor=COARSE),
-    "reach": TaskSettings(task="reach", factor=0.2, end=SHORT),
 }
 
 

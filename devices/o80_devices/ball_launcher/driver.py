@@ -9,6 +9,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 import o80
+from o80.base.screen import complain
 from o80.drivers import Desired, Reading, option
 from o80_devices import zeromq
 from o80_devices.ball_launcher.exchange import DELIVERED_WITHIN, Exchange, Outcome
@@ -190,7 +191,7 @@ class BallLauncher:
 
     def _warn(self, what: str) -> None:
         address = self._config.address
-        print(f"the ball launcher at {address} {what}: look whether they stand still", flush=True)
+        complain(f"the ball launcher at {address} {what}: look whether they stand still")
 
 
 _PROGRESS = {

@@ -5,6 +5,7 @@ from __future__ import annotations
 from enum import Enum
 from typing import Any
 
+from o80.base.descriptors import above_standard
 from o80_devices.ball_launcher.messages import DONE, REFUSED, Request
 
 DELIVERED_WITHIN = 1000
@@ -32,6 +33,7 @@ class Exchange:
     (TCP_MAXRT). It serves one exchange.
     """
 
+    @above_standard()
     def __init__(
         self, zmq: Any, context: Any, address: str, request: Request, deliver_by: int, wait: int
     ) -> None:

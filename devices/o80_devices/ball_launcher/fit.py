@@ -23,6 +23,7 @@ import numpy as np
 
 import o80
 from o80.base.arrays import FloatArray
+from o80.base.descriptors import open_standard_streams
 from o80.errors import InvalidArgument
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.recorded_shots import Setting, Shot, recorded_shots
@@ -241,4 +242,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    open_standard_streams()
     main()

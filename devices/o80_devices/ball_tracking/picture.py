@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from o80.base.descriptors import open_standard_streams
 from o80.base.extras import needed
 from o80_devices.ball_tracking.tracker import Tracker
 from o80_devices.cameras.rig import four_cameras
@@ -59,4 +60,5 @@ def draw(path: str) -> None:
 
 
 if __name__ == "__main__":
+    open_standard_streams()
     draw(sys.argv[1] if len(sys.argv) > 1 else "tracking.png")

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from o80.base.arrays import FloatArray
+from o80.base.finite import json_text
 from o80_devices.ball_tracking.ball_row import Reason
 from o80_devices.ball_tracking.flight_track import FlightTrack, Tracked
 from o80_devices.cameras.rig import four_cameras
@@ -80,7 +81,7 @@ class Message:
 
     def encoded(self) -> bytes:
         place = None if self.place is None else [float(value) for value in self.place]
-        return json.dumps({"time": self.stamp, "obs": place}).encode()
+        return json_text({"time": self.stamp, "obs": place}).encode()
 
 
 def _is_length(value: Any) -> bool:

@@ -18,6 +18,7 @@ import numpy as np
 
 import o80
 from o80.base.arrays import FloatArray
+from o80.base.screen import keep_printing
 from o80.errors import InvalidArgument, TimeoutError
 from o80_devices.ball_tracking import colour
 from o80_devices.calibration import board as boards
@@ -256,4 +257,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    keep_printing()
     main()

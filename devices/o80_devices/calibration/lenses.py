@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from o80.base.arrays import FloatArray
+from o80.base.finite import json_text
 from o80.errors import InvalidArgument, TimeoutError
 from o80_devices.calibration.board import (
     MIN_PICTURES,
@@ -128,7 +129,7 @@ def save(lenses: Sequence[Lens], path: Path | str) -> None:
     cameras = [asdict(lens.camera) for lens in lenses]
     for camera in cameras:
         del camera["rotation"], camera["translation"]
-    Path(path).write_text(json.dumps({"format": FORMAT, "cameras": cameras}, indent=1) + "\n")
+    Path(path).write_text(json_text({"format": FORMAT, "cameras": cameras}, indent=1) + "\n")
 
 
 def load(path: Path | str) -> list[RigCamera]:

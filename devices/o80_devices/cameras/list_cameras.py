@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 
 import o80
+from o80.base.descriptors import open_standard_streams
 from o80_devices.cameras import aravis
 
 
@@ -16,4 +17,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    open_standard_streams()
     main()

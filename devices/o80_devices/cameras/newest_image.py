@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 from o80.base.arrays import Image
+from o80.base.descriptors import above_standard
 from o80_devices.cameras import aravis
 from o80_devices.cameras.pixel_formats import rgb_of
 from o80_devices.clock import Capture, ClockMap
@@ -106,7 +107,8 @@ class NewestImage:
     def _run(self) -> None:
         while not self._ends.is_set():
             try:
-                camera = aravis.Camera(self._name, self._settings)
+                with above_standard():
+                    camera = aravis.Camera(self._name, self._settings)
                 try:
                     self._receive_from(camera)
                 except BaseException:

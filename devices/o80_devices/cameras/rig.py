@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from o80.base.arrays import FloatArray
+from o80.base.finite import json_text
 from o80.errors import InvalidArgument
 from o80_devices import _vision
 
@@ -131,7 +132,7 @@ class Rig:
         return law
 
     def save(self, path: Path | str) -> None:
-        text = json.dumps({"format": FORMAT, **asdict(self)}, indent=1)
+        text = json_text({"format": FORMAT, **asdict(self)}, indent=1)
         Path(path).write_text(text + "\n")
 
     @staticmethod

@@ -23,7 +23,7 @@ class SyntheticCameras:
     Start it with a short history (`--history 4`): a row of four cameras takes 3.7 MB.
     """
 
-    of_the_world = False
+    simulated = True
     units: ClassVar = {"capture_time": "ns", "position": "m", "velocity": "m/s", "spin": "rad/s"}
 
     @dataclass
@@ -39,7 +39,7 @@ class SyntheticCameras:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self.of_the_world = bool(config.ball)  # a replay has no world to look at
+        self.simulated = not config.ball  # a replay has no world to look at
         self.rig = Rig.load(config.rig) if config.rig else four_cameras()
         sizes = {camera.size for camera in self.rig.cameras}
         if len(sizes) > 1:

@@ -10,6 +10,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from o80.base.arrays import Image
+from o80.base.descriptors import above_standard
 from o80.base.extras import needed
 from o80.drivers import Reading, option
 from o80.errors import InvalidArgument
@@ -48,7 +49,8 @@ class NewestFrame:
 
     def _run(self) -> None:
         while not self._ends.is_set():
-            capture = self._cv2.VideoCapture(self._source)
+            with above_standard():
+                capture = self._cv2.VideoCapture(self._source)
             self._set_up(capture)
             while not self._ends.is_set():
                 read, frame = capture.read()
@@ -126,7 +128,8 @@ class VideoCameras:
             self._cameras = [NewestFrame(cv2, each, self._shape) for each in self._sources]
             return
         for source in self._sources:
-            film = cv2.VideoCapture(source)
+            with above_standard():
+                film = cv2.VideoCapture(source)
             if not film.isOpened():
                 raise InvalidArgument(f"the film {source} cannot be opened")
             self._films.append(film)

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from o80.base.screen import keep_printing
 from o80_devices import zeromq
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch, LaunchModel
 from o80_devices.ball_launcher.messages import Kind, Request, State
@@ -278,4 +279,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    keep_printing()
     main()

@@ -3,8 +3,6 @@
 python -m o80_devices.fakes.qualisys --bodies racket,table --lose 0.1 --silent-every 10
 """
 
-from __future__ import annotations
-
 import argparse
 import contextlib
 import math
@@ -17,6 +15,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from threading import Event, Lock, Thread
 
+from o80.base.screen import keep_printing
 from o80_devices.fakes import numbers
 from o80_devices.motion_capture.qualisys_packets import (
     GREETING,
@@ -107,7 +106,7 @@ class FakeQualisys:
         self._begin = time.monotonic()
         self._threads = [Thread(target=self._accept, daemon=True)]
 
-    def __enter__(self) -> FakeQualisys:
+    def __enter__(self) -> "FakeQualisys":
         self._threads[0].start()
         return self
 
@@ -286,8 +285,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         try:
             while True:
                 time.sleep(0.05)
-                now = time.monotonic() - begin
-                every = given.silent_every
+                now, every = time.monotonic() - begin, given.silent_every
                 server.faults.silent = bool(every) and now > every and now % every < 2.0
                 if given.restart_every and int(now / given.restart_every) > restarted:
                     restarted += 1
@@ -297,4 +295,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    keep_printing()
     main()

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from o80.base.screen import keep_printing
 from o80_devices import zeromq
 from o80_devices.ball_tracking.robot_and_ball import RobotAndBall
 from o80_devices.ball_tracking.server_messages import Message
@@ -108,4 +109,5 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    keep_printing()
     main()

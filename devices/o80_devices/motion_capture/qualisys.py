@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
+from o80.base.descriptors import above_standard
 from o80.drivers import option
 from o80.errors import DriverError, InvalidArgument
 from o80_devices.motion_capture.frame import Frame
@@ -35,7 +36,8 @@ class QualisysConnection:
 
     def __init__(self, host: str, port: int) -> None:
         """Raises OSError or ValueError."""
-        self._packets = Packets(socket.create_connection((host, port), ANSWER))
+        with above_standard():
+            self._packets = Packets(socket.create_connection((host, port), ANSWER))
         try:
             self._expect(Type.COMMAND, GREETING)
             self._packets.send(Type.COMMAND, f"Version {VERSION}")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import difflib
 import re
-import sys
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
+from o80.base.screen import complain
 from o80.drivers import Desired, Reading, option
 from o80.errors import InvalidArgument
 from o80_devices.clock import ClockMap
@@ -209,7 +209,7 @@ class Sensor:
         if self._frames_told < FRAMES_UNTIL_TOLD:
             return
         for name in self.subjects.keys() - self._there:
-            print(f"o80: {hint(name, sorted(self._there))}", file=sys.stderr, flush=True)
+            complain(hint(name, sorted(self._there)))
 
     def _why_none(self, now: int) -> Reason:
         reason = self._frames.reason

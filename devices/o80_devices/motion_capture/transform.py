@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80.base.finite import json_text
 from o80.errors import InvalidArgument
 
 Array = NDArray[np.float64]
@@ -84,7 +85,7 @@ class Transform:
             "translation": self.translation.tolist(),
             "residuals": dict(self.residuals),
         }
-        file.write_text(json.dumps(content, indent=2) + "\n")
+        file.write_text(json_text(content, indent=2) + "\n")
 
     def of_point(self, point: Sequence[float]) -> Array:
         moved: Array = self.rotation @ np.asarray(point, float) + self.translation

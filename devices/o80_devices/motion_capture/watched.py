@@ -10,7 +10,6 @@ from __future__ import annotations
 import contextlib
 import importlib.util
 import json
-import math
 import os
 import selectors
 import subprocess
@@ -21,6 +20,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
 
+from o80.base.descriptors import above_standard
 from o80.drivers import option
 from o80.errors import DriverError, InvalidArgument
 from o80_devices.motion_capture.frame import Frame, Subject
@@ -38,6 +38,7 @@ LONGEST_LINE = 1 << 20  # [bytes]
 class ChildConnection:
     """The child process, whose frames are lines of JSON."""
 
+    @above_standard()
     def __init__(self, system: str, host: str) -> None:
         self._child = subprocess.Popen(
             [sys.executable, "-m", CHILD, system, host, str(os.getpid())],
@@ -102,7 +103,7 @@ class ChildConnection:
 
 def subject_of(position: tuple[float, ...], quaternion: tuple[float, ...]) -> Subject:
     """Some clients tell a subject that no camera sees by NaN, or by a quaternion of zeros."""
-    seen = all(map(math.isfinite, position + quaternion)) and any(quaternion)
+    seen = None not in position + quaternion and any(quaternion)  # NaN is null in JSON
     return Subject(True, position, quaternion) if seen else Subject(False)
 
 

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import ctypes
 import importlib
-import json
 import os
 import signal
 import sys
 import time
 from typing import Any
 
+from o80.base.descriptors import open_standard_streams
+from o80.base.finite import json_text
 from o80_devices.motion_capture.watched_line import STARTED
 
 PR_SET_PDEATHSIG = 1
@@ -31,7 +32,7 @@ def main() -> None:
     while True:
         connection.waitForNextFrame()
         arrival = time.monotonic_ns()
-        line = json.dumps((arrival, bodies_of(connection.rigidBodies))) + "\n"
+        line = json_text((arrival, bodies_of(connection.rigidBodies)), say=lambda _: None) + "\n"
         try:
             os.write(frames, line.encode())
         except BrokenPipeError:
@@ -49,4 +50,5 @@ def bodies_of(rigid_bodies: Any) -> dict[str, Any]:
 
 
 if __name__ == "__main__":
+    open_standard_streams()
     main()

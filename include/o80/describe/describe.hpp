@@ -40,7 +40,7 @@ template <class T>
 inline constexpr char kKey = 0;  // has a unique address for each type
 
 template <Shareable T>
-std::uint32_t type_of(Schema& schema);
+std::uint32_t type_of(Schema& schema, const FieldNote& note = "");
 
 /// The entry of one field of type T; an array becomes its element and a shape. Nested types are
 /// added first.
@@ -84,24 +84,29 @@ FieldRow field_row(Schema& schema, std::string_view name, std::size_t offset,
   }
 }
 
+/// The index of the type T. `note`: of a plain number, which then is a type of its own.
 template <Shareable T>
-std::uint32_t type_of(Schema& schema) {
+std::uint32_t type_of(Schema& schema, const FieldNote& note) {
   for (std::uint32_t i = 0; i < schema.keys.size(); ++i) {
-    if (schema.keys[i] == &kKey<T>) return i;
+    if (note.empty() && schema.keys[i] == &kKey<T>) return i;
   }
   std::vector<FieldRow> members;
   std::string_view name;
+  const auto add = [&]<class Field>(std::string_view field, Field*, std::size_t offset,
+                                    const FieldNote& said) {
+    members.push_back(field_row<Field>(schema, field, offset, said.text));
+    members.back().resting = said.rest ? 1 : 0;
+    if (said.rest) members.back().rest = said.rest->value;
+    members.back().origin = said.origin;
+  };
   if constexpr (DescribedStruct<T>) {
     name = o80_type_name(Tag<T>{});
     o80_describe(Tag<T>{}, [&]<class Field>(std::string_view field, Field T::*, std::size_t offset,
-                                            const FieldNote& note) {
-      members.push_back(field_row<Field>(schema, field, offset, note.text));
-      members.back().resting = note.rest ? 1 : 0;
-      if (note.rest) members.back().rest = note.rest->value;
-      members.back().origin = note.origin;
+                                            const FieldNote& said) {
+      add(field, static_cast<Field*>(nullptr), offset, said);
     });
   } else {
-    members.push_back(field_row<T>(schema, "", 0, ""));
+    add("", static_cast<T*>(nullptr), 0, note);
   }
   TypeRow row;
   const auto colon = name.rfind(':');
@@ -126,7 +131,7 @@ std::uint32_t type_of(Schema& schema) {
     };
   }
   schema.hooks.push_back(hooks);
-  schema.keys.push_back(&kKey<T>);
+  schema.keys.push_back(note.empty() ? &kKey<T> : nullptr);
   return static_cast<std::uint32_t>(schema.types.size() - 1);
 }
 
@@ -199,6 +204,30 @@ struct NoActuators {};
 /// The Extended type of a robot without sensor values beside its states.
 struct NoExtended {};
 
+namespace describing {
+
+template <class T>
+struct StateOf {
+  using Type = T;
+};
+template <class T, std::size_t N>
+struct StateOf<std::array<T, N>> {
+  using Type = T;
+};
+
+/// False if a field that is a struct has a note: units stand at the numbers.
+template <class Actuators>
+consteval bool notes_are_of_numbers() {
+  bool are = true;
+  o80_describe(Tag<Actuators>{}, [&]<class Field>(std::string_view, Field Actuators::*, std::size_t,
+                                                  const FieldNote& note) {
+    are = are && (note.empty() || !DescribedStruct<typename StateOf<Field>::Type>);
+  });
+  return are;
+}
+
+}  // namespace describing
+
 /// Adds the actuators of a std::array of states, or of a described struct: one actuator for each
 /// field, and one for each element of an array field.
 template <class Actuators>
@@ -213,16 +242,15 @@ void describe_actuators(Schema& schema) {
   } else {
     static_assert(DescribedStruct<Actuators>,
                   "Actuators is a std::array of states or a described struct of them");
+    static_assert(describing::notes_are_of_numbers<Actuators>(),
+                  "an actuator whose state is a struct takes no unit or other note here: write it "
+                  "at the fields of that struct");
     o80_describe(Tag<Actuators>{}, [&]<class Field>(std::string_view name, Field Actuators::*,
-                                                    std::size_t offset, std::string_view) {
-      const auto place = static_cast<std::uint32_t>(offset);
-      if constexpr (describing::ArrayOf<Field>::value) {
-        using StateType = typename describing::ArrayOf<Field>::Element;
-        schema.place_group(name, describing::type_of<StateType>(schema), place,
-                           describing::ArrayOf<Field>::kCount, true);
-      } else {
-        schema.place_group(name, describing::type_of<Field>(schema), place, 1, false);
-      }
+                                                    std::size_t offset, const FieldNote& note) {
+      using StateType = typename describing::StateOf<Field>::Type;
+      schema.place_group(name, describing::type_of<StateType>(schema, note),
+                         static_cast<std::uint32_t>(offset), describing::ArrayOf<Field>::kCount,
+                         describing::ArrayOf<Field>::value);
     });
     schema.head.block = round_up(sizeof(Actuators), 8);
   }

@@ -86,6 +86,7 @@ struct FieldNote {
   constexpr FieldNote(RestsAt where) : rest(where) {}  // NOLINT(google-explicit-constructor)
   constexpr FieldNote(std::string_view said, Origin from) : text(said), origin(from) {}
   constexpr FieldNote(Origin from) : origin(from) {}  // NOLINT(google-explicit-constructor)
+  constexpr bool empty() const { return text.empty() && !rest && origin == Origin::robot; }
   // NOLINTNEXTLINE(google-explicit-constructor)
   constexpr operator std::string_view() const { return text; }
 };
@@ -103,7 +104,9 @@ constexpr bool takes(std::index_sequence<I...>) {
 }
 
 template <class T>
-struct ArrayOf : std::false_type {};
+struct ArrayOf : std::false_type {
+  static constexpr std::size_t kCount = 1;
+};
 template <class T, std::size_t N>
 struct ArrayOf<std::array<T, N>> : std::true_type {
   using Element = T;

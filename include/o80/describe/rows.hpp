@@ -202,9 +202,12 @@ struct SchemaHead {
   Clock clock = Clock::monotonic;
   std::uint8_t bursting = 0;
   Stale stale = Stale::hold;
-  std::uint8_t of_the_world = 0;  // 1: all it observes comes from the world; 2: it is simulated
+  /// 1: of the world in real time; 2: simulated; 3: of the world also in bursts (drivers in
+  /// Python); 0: not said, in old recordings only
+  std::uint8_t of_the_world = 1;
   std::uint32_t gap = 0;     // longest time between two rows that does not halt [us]; 0: by default
   std::int64_t silence = 0;  // iterations without a sign of life until `stale`; 0: no watchdog
+  bool is_simulated() const { return of_the_world == 2; }
   bool operator==(const SchemaHead&) const = default;
 };
 

@@ -115,10 +115,17 @@ class Schema {
   std::int64_t asked_period() const { return head.period; }
   /// Sets the period of this robot [ns]. Without this call the user chooses it.
   void period(std::int64_t own) { head.period = own; }
-  /// Says that what the driver reads comes from the world (hardware, other processes): a replay
-  /// does not start the driver, and reads the recorded values instead. Single fields are marked in
-  /// O80_DESCRIBE: `o80::of_the_world()`, `o80::of_the_clock()`.
-  void of_the_world() { head.of_the_world = 1; }
+  /// Says that this robot is a simulation. Every other robot counts as hardware: in real time a gap
+  /// between two rows halts it, a reset cannot move it farther than its limits allow, and a replay
+  /// does not start its driver.
+  void simulated() { head.of_the_world = 2; }
+  /// Deleted: a robot is of the world unless describe() calls simulated().
+  template <int Unused = 0>
+  void of_the_world() const {
+    static_assert(Unused != 0,
+                  "every robot is of the world unless describe() calls schema.simulated(): remove "
+                  "this call (single fields are marked in O80_DESCRIBE: o80::of_the_world())");
+  }
   /// Sets the longest time between two rows that does not halt the robot [ns], up to an hour, where
   /// it is less than by default.
   void gap(std::int64_t longest) {

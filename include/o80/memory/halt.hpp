@@ -18,9 +18,10 @@ enum class HaltCause : std::uint32_t {
   dead_frontend,  // a commander died
   error,          // desired and observed states were further apart than an error limit
   overruns,       // too many iterations overran
-  predecessor     // the former backend was halted, or died while commands were active
+  predecessor,    // the former backend was halted, or died while commands were active
+  unreachable     // the files of the segment were removed: no frontend can attach any more
 };
-inline constexpr std::size_t kHaltCauses = 8;
+inline constexpr std::size_t kHaltCauses = 9;
 std::string_view to_text(HaltCause cause) noexcept;
 
 /// One halt and its reason.

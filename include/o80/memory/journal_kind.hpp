@@ -6,7 +6,7 @@
 
 namespace o80 {
 
-/// Kind of an entry of a journal. See ARCHITECTURE.md, The journal.
+/// Kind of an entry of a journal. See src/runtime/README.md#journal.
 enum class JournalKind : std::uint8_t {
   none,
   records,           // blocks of a batch, as they came from its lane

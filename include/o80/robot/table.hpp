@@ -8,8 +8,8 @@
 #include "o80/describe/shown_model.hpp"
 
 // Interface between a robot library and o80: plain structs and functions. Functions do not throw
-// and pass no C++ class. o80 compares versions and sizes before it uses a library. See
-// ARCHITECTURE.md, From a driver class to a robot.
+// and pass no C++ class: O80_ROBOT wraps each function of a driver class, and the wrapper makes a
+// FaultText of what the driver throws. o80 compares versions and sizes before it uses a library.
 
 namespace o80 {
 

@@ -39,15 +39,16 @@ struct BackendOptions {
   mode_t permission = 0600;      // read: may observe; write: may command
   std::optional<Stale> stale{};  // nothing: halt with `silence`, else hold
   /// Watchdog: iterations without a sign of life after which `stale` applies to a commander that
-  /// has control or commands; 0: no watchdog. See ARCHITECTURE.md, Halts.
+  /// has control or commands; 0: no watchdog (src/runtime/README.md#watchdog).
   std::int64_t silence = 0;
   Stale stale_policy() const noexcept {
     return stale.value_or(silence > 0 ? Stale::halt : Stale::hold);
   }
   /// Number of late iterations within a second that halts the backend; 0: no limit.
   std::uint32_t max_overruns = 0;
-  /// Real time only: the longest time between two rows; a longer one halts [ns]. -1: 20 periods,
-  /// and at least 0.1 s, for robots of the world with actuators, else none; 0: none.
+  /// Real time only: the longest time between two rows; a longer one halts [ns]. 0: none. -1: 20
+  /// periods, and at least 0.1 s, for the loop of a robot with actuators that is not simulated;
+  /// else none.
   std::int64_t gap = -1;
   /// Real time only: starts without a halt even if the previous backend of this name was halted, or
   /// was killed while commands acted.
@@ -62,6 +63,9 @@ struct BackendOptions {
   /// The segment has no name (`segment` is for messages): only this process can attach, until
   /// UntypedBackend::publish_as().
   bool anonymous = false;
+  /// The loop of a driver iterates, which reads the robot itself: `gap` has a default, and readings
+  /// of fresh starts are judged.
+  bool has_loop = false;
 };
 
 /// Timing of the last period, set by the loop.
@@ -79,8 +83,7 @@ enum class Step : std::uint8_t {
   ended      // the backend must end: see stop_asked() and failure()
 };
 
-/// Phase of a backend: its place between start and end. See ARCHITECTURE.md, The state of a
-/// backend.
+/// Phase of a backend: its place between start and end (src/runtime/README.md#phases).
 enum class Phase : std::uint8_t {
   starting,    // row 0 is not published yet
   ready,       // between two iterations
@@ -174,7 +177,7 @@ class UntypedBackend {
 
   /// Halts: commands end, every actuator brakes, and nothing moves again until a frontend resumes.
   /// In force from the first step begun after it. The same cause and text again are the same halt;
-  /// another text is another halt. From any thread or signal handler. See ARCHITECTURE.md, Halts.
+  /// another text is another halt. From any thread or signal handler (src/runtime/README.md#halts).
   void halt(HaltCause cause, std::string_view text) noexcept;
   /// The halt in force; its number is 0 if there is none. For the thread of the loop.
   const Halt& halted() const noexcept;

@@ -117,8 +117,9 @@ class UntypedFrontend {
                        std::span<const std::byte> states, const CommandOptions& options = {},
                        std::span<const std::uint64_t> masks = {}) const;
   /// Adds one command through `rows` states: at `times` (when each row is reached, since the start
-  /// [ns]; options.pace is then ignored), or with options.pace for each row. Its profile is cubic
-  /// (a curve through the rows), or linear at a speed, unless options.profile is given.
+  /// [ns], each in an iteration of its own; options.pace is then ignored), or with options.pace for
+  /// each row. Its profile is cubic (a curve through the rows), or linear at a speed, unless
+  /// options.profile is given.
   std::uint32_t add_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                std::span<const std::byte> states,
                                const CommandOptions& options = {.pace = iterations(1)},
@@ -218,7 +219,7 @@ class UntypedFrontend {
   /// The requests that the driver serves over several iterations, oldest first.
   std::vector<RequestUnderWay> running_requests() const;
 
-  // halts: see ARCHITECTURE.md, Halts
+  // halts: see src/runtime/README.md#halts
   /// Halts the backend and returns the number of the halt. Needs no lane and no control. In force
   /// from the first iteration begun after it. Throws ReadOnly, and BackendGone also if the backend
   /// ended meanwhile: its successor may not be halted.

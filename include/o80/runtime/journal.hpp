@@ -108,8 +108,8 @@ struct JournalEntry {
 };
 
 /// Reads the decisions of a backend from the journal in its segment, in their order: batches that
-/// it took or rejected, begins and ends of their commands, halts, control, bursts, deaths. See
-/// ARCHITECTURE.md, The journal.
+/// it took or rejected, begins and ends of their commands, halts, control, bursts, deaths
+/// (src/runtime/README.md#journal).
 ///
 /// The journal is a ring. A reader that is too slow misses entries; `missed` of the next entry says
 /// how many. The records of a batch are joined to the entry that decides on it.

@@ -27,6 +27,18 @@ def whole_or_none(value: Any, name: str, least: int | None = None) -> int | None
     return None if value is None else whole(value, name, least)
 
 
+def iterations(value: Any, name: str, period: float, least: int) -> int:
+    """A time that is counted: a whole number of iterations, or a float of seconds.
+
+    period: of an iteration [s]. Raises InvalidArgument.
+    """
+    if not isinstance(value, (float, np.floating)):
+        return whole(value, name, least)
+    if not 0 <= value < 2**62 * period:
+        raise InvalidArgument(f"{name} must be seconds from 0, or iterations, got {value!r}")
+    return max(round(float(value) / period), least)
+
+
 def number(value: Any, name: str) -> float:
     """A number, of Python or NumPy. Raises InvalidArgument."""
     try:

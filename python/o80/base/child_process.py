@@ -1,16 +1,21 @@
 """Child processes that end when their standard input does, so with this process."""
 
 import contextlib
+import math
 import os
 import select
 import signal
 import subprocess
+import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from weakref import WeakSet
 
+from o80.base.descriptors import above_standard, process_descriptor
+
 COLLECT = 1.0  # [s] for the exit code of a process that has ended
+POLL = 0.01  # [s] between checks of a process that has no descriptor
 
 
 class _Child(subprocess.Popen[bytes]):
@@ -36,7 +41,8 @@ def start_child(command: Sequence[str | Path], **options: Any) -> subprocess.Pop
     # A process group of its own: Ctrl-C reaches only this program, which ends the child in order.
     # Not a session of its own: the kernel divides processor time between sessions first, so a robot
     # alone would get as much as all programs that read it.
-    child = _Child(command, stdin=subprocess.PIPE, process_group=0, **options)
+    with above_standard():
+        child = _Child(command, stdin=subprocess.PIPE, process_group=0, **options)
     _children.add(child)
     return child
 
@@ -46,15 +52,22 @@ def ends_within(child: subprocess.Popen[bytes], timeout: float | None) -> bool:
     if child.poll() is not None:
         return True
     try:
-        life = os.pidfd_open(child.pid)
+        life = process_descriptor(child.pid)
     except ProcessLookupError:  # another thread has collected its exit code meanwhile
         return True
-    try:
-        end = select.poll()
-        end.register(life, select.POLLIN)
-        return bool(end.poll(None if timeout is None else min(max(timeout, 0.0), 1e6) * 1e3))
-    finally:
-        os.close(life)
+    if life is not None:
+        try:
+            end = select.poll()
+            end.register(life, select.POLLIN)
+            return bool(end.poll(None if timeout is None else min(max(timeout, 0.0), 1e6) * 1e3))
+        except OSError:  # refused
+            pass
+        finally:
+            os.close(life)
+    latest = math.inf if timeout is None else time.monotonic() + timeout
+    while child.poll() is None and time.monotonic() < latest:
+        time.sleep(POLL)
+    return child.returncode is not None
 
 
 def end_child(
@@ -65,11 +78,12 @@ def end_child(
         with contextlib.suppress(OSError):
             child.stdin.close()
     if also is not None:
-        child.send_signal(also)
+        with contextlib.suppress(OSError):  # refused: the end of its input ends it, too
+            child.send_signal(also)
     if not ends_within(child, grace):
         child.kill()
-    # an interrupt inside Popen may have left its lock taken
-    with contextlib.suppress(subprocess.TimeoutExpired):
+    # an interrupt inside Popen may have left its lock taken; OSError: wait4 is refused
+    with contextlib.suppress(subprocess.TimeoutExpired, OSError):
         child.wait(COLLECT)
 
 

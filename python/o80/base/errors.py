@@ -19,6 +19,11 @@ def exception_text(error: BaseException) -> str:
     return f"{type(error).__name__}: {text}" if text else type(error).__name__
 
 
+def sentence(text: object) -> str:
+    """A text with its full stop, if it does not end a sentence already: another one follows."""
+    return str(text) if str(text).endswith((".", "!", "?")) else f"{text}."
+
+
 class Error(Exception):
     """Base class of all exceptions of o80."""
 

@@ -58,14 +58,12 @@ def _close_all() -> None:
             traceback.print_exc()  # and close the others
 
 
-class Closeable:
-    """Has `close`; give the object to `close_later` too."""
+class Managed:
+    """Ends with a `with` block."""
 
-    def close(self) -> None:
+    def _leave(self, error: BaseException | None) -> None:
+        """At the end of the block; error: what has left it early."""
         raise NotImplementedError
-
-    def _close_at_exit(self) -> None:
-        self.close()
 
     def __enter__(self) -> Self:
         return self
@@ -76,6 +74,19 @@ class Closeable:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
+        self._leave(error)
+
+
+class Closeable(Managed):
+    """Has `close`; give the object to `close_later` too."""
+
+    def close(self) -> None:
+        raise NotImplementedError
+
+    def _close_at_exit(self) -> None:
+        self.close()
+
+    def _leave(self, error: BaseException | None) -> None:
         self.close()
 
 

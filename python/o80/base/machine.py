@@ -8,6 +8,8 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Self
 
+from o80.base.finite import json_text
+
 
 @dataclass(frozen=True)
 class Machine:
@@ -19,7 +21,7 @@ class Machine:
 
     def as_json(self) -> str:
         """As one line of JSON, which `from_json` reads."""
-        return json.dumps(asdict(self), sort_keys=True)
+        return json_text(asdict(self), sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
@@ -50,6 +52,15 @@ def this_machine() -> Machine:
     except (ValueError, OSError):
         libc = ""
     return Machine(libc or " ".join(platform.libc_ver()), platform.machine(), _features())
+
+
+@lru_cache
+def this_boot() -> str:
+    """Id of this boot: monotonic times of one boot are on one clock. Empty: not known."""
+    try:
+        return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
+    except OSError:
+        return ""
 
 
 def _features() -> tuple[str, ...]:

@@ -1,15 +1,23 @@
-"""Texts for terminals (tables that fit, JSON, errors on stderr) and tables for notebooks."""
+"""Texts for terminals (tables that fit, JSON, errors on stderr) and tables for notebooks.
 
-from __future__ import annotations
+Programs of o80 call `keep_printing` first: no print of theirs raises then.
+"""
 
-import json
+import errno
+import functools
+import io
 import os
 import shutil
 import sys
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
 from typing import Any, TextIO
+
+import o80._core as _core
+from o80.base.descriptors import open_standard_streams
+from o80.base.finite import json_text
 
 _CODES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33"}
 
@@ -70,13 +78,12 @@ def html(heads: Sequence[str], rows: Iterable[Sequence[Any]], above: str = "") -
 
 def print_json(value: Any) -> None:
     """Prints one JSON document."""
-    json.dump(value, sys.stdout, indent=2)
-    sys.stdout.write("\n")
+    print(json_text(value, indent=2, say=complain_once))
 
 
 def plain(text: str) -> str:
     """A text of one line, from shared memory or a recording: it must not control the terminal."""
-    return "".join(c if c.isprintable() else "?" for c in text)
+    return _core.printable(text)
 
 
 def bytes_text(size: float) -> str:
@@ -87,7 +94,88 @@ def bytes_text(size: float) -> str:
 
 
 def complain(text: str) -> None:
-    """Prints an error or a remark on stderr."""
-    sys.stdout.flush()
+    """Prints an error or a remark on stderr; raises nothing if that cannot be written."""
     said = "\n".join(map(plain, text.split("\n")))
-    print(f"{style('o80:', 'red', sys.stderr)} {said}", file=sys.stderr, flush=True)
+    with suppress(OSError, ValueError):
+        sys.stdout.flush()
+    with suppress(OSError, ValueError):
+        print(f"{style('o80:', 'red', sys.stderr)} {said}", file=sys.stderr, flush=True)
+
+
+@functools.cache
+def complain_once(text: str) -> None:
+    """Prints it on stderr unless this process has done so."""
+    complain(text)
+
+
+# ---------------------------------------------------------------------- prints that raise nothing
+
+
+class _Output(io.FileIO):
+    """A descriptor that drops what it cannot write: full device, closed pipe, closed descriptor."""
+
+    failure: OSError | None = None  #: the first one
+
+    def write(self, data: Any) -> int:
+        try:
+            written = super().write(data)
+            if written is None:
+                raise BlockingIOError(errno.EAGAIN, os.strerror(errno.EAGAIN))
+            return written
+        except OSError as error:
+            self.failure = self.failure or error
+            return memoryview(data).nbytes
+
+
+_stdout: _Output | None = None
+
+
+def keep_printing() -> None:
+    """From now on no print of this program raises: long work does not end by its messages.
+
+    Characters that the encoding lacks are replaced. Streams that somebody captures stay as they
+    are. For programs, as the first call; a library leaves the streams of its host alone.
+    """
+    global _stdout
+    open_standard_streams()
+    for name, errors in (("stdout", "replace"), ("stderr", "backslashreplace")):
+        stream = getattr(sys, name)
+        if stream is not getattr(sys, f"__{name}__"):
+            continue
+        try:
+            output = _Output(stream.fileno(), "wb", closefd=False)
+        except (AttributeError, OSError):  # there is not even /dev/null
+            continue
+        setattr(
+            sys,
+            name,
+            io.TextIOWrapper(
+                output if stream.write_through else io.BufferedWriter(output),
+                stream.encoding,
+                errors,
+                line_buffering=stream.line_buffering,
+                write_through=stream.write_through,
+            ),
+        )
+        if name == "stdout":
+            _stdout = output
+
+
+def emit(text: str, end: str = "\n") -> None:
+    """Prints one of many texts; raises SystemExit if standard output takes no more of them."""
+    print(text, end=end, flush=True)
+    if _stdout is not None and _stdout.failure is not None:
+        raise SystemExit
+
+
+def unprinted() -> int:
+    """Exit code of a program by its output: 1, and why, if something could not be printed.
+
+    0 if the reader closed the pipe: it wanted no more (`o80 list | head`).
+    """
+    sys.stdout.flush()
+    failure = None if _stdout is None else _stdout.failure
+    if failure is None or failure.errno == errno.EPIPE:
+        return 0
+    complain(f"the standard output cannot be written: {failure.strerror}")
+    return 1

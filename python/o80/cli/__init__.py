@@ -1,37 +1,45 @@
 """The command line: ``o80 run | list | info | echo | record | ...``, one command a file."""
 
-from __future__ import annotations
-
-import os
+import signal
 import sys
 
 from o80.base.errors import Error
-from o80.base.screen import complain
+from o80.base.refusals import explained
+from o80.base.screen import complain, keep_printing, unprinted
 
 __all__ = ["main"]
 
 
 def main() -> None:
     """Entry point. Exceptions of o80 become one line and exit code 1."""
+    keep_printing()
+    code: str | int | None = 0
     try:
-        _run(sys.argv[1:])
+        with explained(f"do `o80 {' '.join(sys.argv[1:2])}`"):
+            _run(sys.argv[1:])
     except Error as error:
         complain(str(error))
-        sys.exit(1)
+        code = 1
     except KeyboardInterrupt:
-        sys.exit(130)
-    except BrokenPipeError:  # `o80 echo arm | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        sys.exit(0)
+        code = 130
+    except SystemExit as end:
+        code = end.code
+    sys.exit(code or unprinted())
 
 
 def _run(words: list[str]) -> None:
+    if words[:1] == ["halt"]:
+        # first the halt: neither Ctrl-C nor the end of the terminal may come before it
+        for number in (signal.SIGINT, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP):
+            signal.signal(number, signal.SIG_IGN)
+        from o80.cli.halt import halt_words
+
+        sys.exit(halt_words(words[1:]))
     # `o80 list` is used most: without typer, which takes long to import, it starts faster
     if words in (["list"], ["list", "--json"]):
         from o80.cli.segment_table import print_segments
 
         print_segments(as_json="--json" in words)
-        sys.stdout.flush()
         return
     from o80.cli.app import run_app
 

@@ -1,7 +1,5 @@
 """The program ``o80``: one command a file."""
 
-from __future__ import annotations
-
 import importlib
 from typing import Annotated
 
@@ -26,6 +24,7 @@ COMMANDS = {
     "play": "play.play",
     "plot": "plot.plot",
     "view": "view.view",
+    "film": "film.film",
     "export": "export.export",
     "diff": "diff.diff",
     "latency": "latency.latency",
@@ -33,7 +32,7 @@ COMMANDS = {
     "teleop": "teleop.teleop",
     "mark": "mark.mark",
     "halt": "halt.halt",
-    "resume": "halt.resume",
+    "resume": "resume.resume",
     "stop": "stop.stop",
     "clean": "clean.clean",
 }

@@ -1,7 +1,5 @@
 """How commands attach: at once, or with --wait as soon as the backend starts."""
 
-from __future__ import annotations
-
 from o80.base.errors import TimeoutError
 from o80.base.screen import complain
 from o80.frontend.frontend import Frontend

@@ -1,7 +1,5 @@
 """``o80 clean``: removes dead segments."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

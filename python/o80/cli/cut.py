@@ -1,15 +1,14 @@
 """``o80 cut`` and ``o80 merge``: recordings made of others."""
 
-from __future__ import annotations
-
-import time
+import math
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from o80.base.errors import Error, MissingExtra
+from o80.base import local_time
+from o80.base.errors import Error, InvalidArgument, MissingExtra
 from o80.base.screen import complain
 
 if TYPE_CHECKING:
@@ -18,8 +17,7 @@ if TYPE_CHECKING:
     from o80.view.scene import Scene
 
 _Output = Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")]
-DAY = 86_400 * 10**9  # [ns]
-_TIME = "10:02 or 10:02:30.5 (clock of this computer), or 12.5 (seconds from its begin)"
+_TIME = "10:02, 10:02:30.5, '2026-11-24 10:02' (local time), or 12.5 (seconds from its begin)"
 
 
 def cut(
@@ -44,7 +42,6 @@ def cut(
     ] = False,
 ) -> None:
     """Write a part of a recording into a new file."""
-    from o80.base.errors import InvalidArgument
     from o80.recording.part import Selection
     from o80.recording.reader import open as open_recording
 
@@ -56,12 +53,12 @@ def cut(
             raise InvalidArgument(f"no segment '{name}' in {recording}; there are: {there}")
     selection = Selection(
         _time(begin, first, last, "--from") if begin else first,
-        _time(end, first, last, "--to") if end else last,
+        _time(end, first, last, "--to") if end else 2**63,
         frozenset(segment) if segment else None,
         every,
         transforms,
     )
-    if selection.begin > selection.end:
+    if selection.begin > (selection.end if end else last):
         if not end:
             length = f"{(last - first) * 1e-9:.4g} s"
             raise InvalidArgument(f"--from {begin} is behind the end: {recording} has {length}")
@@ -69,7 +66,7 @@ def cut(
     _write([recording], output, selection, model_files=model_files)
 
 
-def _poses(name: str, epoch: RecordedEpoch, *, model_files: bool) -> Scene | None:
+def _poses(name: str, epoch: "RecordedEpoch", *, model_files: bool) -> "Scene | None":
     from o80.view.scene import Scene
     from o80.view.world import drawn
 
@@ -96,7 +93,7 @@ def merge(
 
 
 def _write(
-    recordings: list[Path], output: Path, selection: Selection, *, model_files: bool = False
+    recordings: list[Path], output: Path, selection: "Selection", *, model_files: bool = False
 ) -> None:
     from o80.recording.part import write_part
 
@@ -109,13 +106,10 @@ def _write(
 def _time(text: str, first: int, last: int, option: str) -> int:
     """A log time [ns]; first and last: those of the recording, which may be of several days."""
     try:
-        if ":" not in text:
-            return first + round(float(text) * 1e9)
-        hours, minutes, seconds = (*text.split(":"), "0")[:3]
-        day = time.localtime(first * 1e-9)
-        midnight = time.mktime((day.tm_year, day.tm_mon, day.tm_mday, 0, 0, 0, 0, 0, -1))
-        passed = int(hours) * 3600 + int(minutes) * 60 + float(seconds)
-        at = round((midnight + passed) * 1e9)
-        return at + DAY if at < first and at + DAY <= last else at
+        seconds = float(text)
     except ValueError:
-        raise typer.BadParameter(f"write {_TIME}, not '{text}'", param_hint=option) from None
+        instant = local_time.instant(text, within=(first, last), is_end=option == "--to")
+        return local_time.nanoseconds(instant)
+    if not math.isfinite(seconds):
+        raise InvalidArgument(f"{option}: write {_TIME}, not '{text}'")
+    return first + round(seconds * 1e9)

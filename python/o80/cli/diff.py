@@ -1,7 +1,5 @@
 """``o80 diff``: compares two recordings."""
 
-from __future__ import annotations
-
 import math
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """``o80 doctor``: whether this computer can serve a robot at a rate."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated
@@ -42,7 +40,7 @@ def doctor(
     if math.isnan(frequency) or math.isnan(seconds):
         raise typer.BadParameter("--frequency and --seconds must be numbers, got nan")
 
-    def measured_by(call: Callable[[float, float, list[int]], WakeUps]) -> Measure:
+    def measured_by(call: "Callable[[float, float, list[int]], WakeUps]") -> "Measure":
         return lambda computer: call(frequency, seconds, computer.isolated) if seconds else None
 
     report = examine(Computer(), frequency, measured_by(measure), measured_by(measure_beside_load))
@@ -54,7 +52,7 @@ def doctor(
         raise typer.Exit(1)
 
 
-def _print(report: Report) -> None:
+def _print(report: "Report") -> None:
     print(style(report.verdict, "green" if report.serves else "bold"))
     for number, finding in enumerate(report.culprits, 1):
         print(f"\n{number}. {_text(finding)}")
@@ -77,7 +75,7 @@ def _print(report: Report) -> None:
     print(plain(", ".join(part for part in parts if part)))
 
 
-def _text(finding: Finding) -> str:
+def _text(finding: "Finding") -> str:
     lines = [f"{style(finding.name, 'bold')}: {plain(finding.seen)}", f"   {plain(finding.effect)}"]
     for head, commands in (("cure:", finding.cure), ("undo:", finding.undo)):
         for line in commands.splitlines():

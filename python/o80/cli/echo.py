@@ -1,8 +1,5 @@
 """``o80 echo``: prints rows of a robot."""
 
-from __future__ import annotations
-
-import json
 import math
 import sys
 import time
@@ -14,7 +11,8 @@ import typer
 import o80._core as _core
 from o80._core import Observation
 from o80.base.errors import InvalidArgument, TimeoutError
-from o80.base.screen import complain, style
+from o80.base.finite import json_text
+from o80.base.screen import complain, complain_once, emit, style
 from o80.cli.attach import attach
 from o80.cli.journal_lines import follow, print_recorded
 from o80.cli.values import RowValues, text
@@ -179,7 +177,7 @@ class _Printer:
         if self._fields:
             chosen = {path: self._values.choose(plain, path) for path in self._fields}
             plain = {"iteration": plain["iteration"], "time": plain["time"]} | chosen
-        print(json.dumps(plain) if self._as_json else self._line(row, plain), flush=True)
+        emit(json_text(plain, say=complain_once) if self._as_json else self._line(row, plain))
 
     def _line(self, row: Observation, plain: dict[str, object]) -> str:
         parts = [f"{style(f'{row.iteration:>8}', 'bold')} {row.time * 1e-9:.3f} s"]

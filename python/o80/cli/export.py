@@ -1,7 +1,5 @@
 """``o80 export``: rows in formats that data tools and learners read."""
 
-from __future__ import annotations
-
 import sys
 from enum import StrEnum
 from pathlib import Path
@@ -45,17 +43,18 @@ def export(
         typer.Option("--format", help="A data set for learning, of the marked episodes."),
     ] = None,
     every: Annotated[
-        int, typer.Option(min=1, help="With --format: iterations in a step of the data set.")
-    ] = 1,
+        str,
+        typer.Option(help="With --format: a step of the data set, iterations or seconds (0.1)."),
+    ] = "1",
 ) -> None:
     """Export rows: one column for each number, named as in observed.elbow or extended.force[2].
 
     With --format, the episodes of a recording as a data set for learning: see docs/recording.md.
     """
     if form is not None:
-        _export_episodes(source, output, segment, form, every, _listed(fields))
+        _export_episodes(source, output, segment, form, _time(every), _listed(fields))
         return
-    if every != 1:
+    if every != "1":
         raise InvalidArgument("--every is for data sets: give --format lerobot or minari too")
     from o80.datasets.export import write
 
@@ -68,9 +67,19 @@ def export(
         for each in found
     }
     with writing(output):
-        write(output, named, _listed(fields))
+        write(output, named, _listed(fields), complain)
     for name, history in named.items():
         print(f"{name}: {len(history)} rows in {output}")
+
+
+def _time(text: str) -> float:
+    """Iterations of a whole number, seconds of another one."""
+    try:
+        return int(text) if text.isdecimal() else float(text)
+    except ValueError:
+        raise typer.BadParameter(
+            f"write iterations (20) or seconds (0.1), not '{text}'", param_hint="--every"
+        ) from None
 
 
 def _listed(fields: str) -> list[str]:
@@ -78,7 +87,7 @@ def _listed(fields: str) -> list[str]:
 
 
 def _export_episodes(
-    source: str, output: Path, segment: str | None, form: Format, every: int, fields: list[str]
+    source: str, output: Path, segment: str | None, form: Format, every: float, fields: list[str]
 ) -> None:
     from o80.datasets import lerobot, minari
     from o80.datasets.episodes import episodes_of
@@ -87,7 +96,7 @@ def _export_episodes(
     episodes = episodes_of(open_recording(source), segment, every=every, fields=fields)
     write = {Format.LEROBOT: lerobot.write, Format.MINARI: minari.write}[form]
     with writing(output):
-        write(output, episodes)
+        write(output, episodes, complain)
     for why in episodes.left_out:
         complain(f"left out: {why}")
     steps = sum(len(episode) for episode in episodes.all)

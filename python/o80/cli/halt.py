@@ -1,63 +1,102 @@
-"""``o80 halt`` and ``o80 resume``: halt a robot until it is resumed."""
+"""``o80 halt``: halts a robot, whatever else is wrong with the call or the terminal.
 
-from __future__ import annotations
+It reads its words itself: an option parser would refuse what it does not know, and takes long to
+import.
+"""
 
-from typing import Annotated
+import contextlib
+import os
+import sys
+from typing import TextIO
 
-import typer
+import o80._core as _core
+from o80.base.errors import Error, InvalidArgument
 
-from o80.base.errors import InvalidArgument
-from o80.cli.attach import attach
-from o80.frontend.stopping import halt as halt_backend
+_ALIVE = ("starting", "running")
+_USAGE = """\
+Usage: o80 halt SEGMENT [TEXT...]
+       o80 halt --all [TEXT...]
+
+Halt a robot: commands end, it brakes, and nothing moves until o80 resume.
+
+SEGMENT  exact name of a segment; see o80 list
+--all    as the first word: every running robot
+TEXT     the reason, which others can read: all further words, also those that begin with a dash
+
+Not a safety function: keep an emergency stop that needs no computer.
+"""
 
 
-def halt(
-    segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
-    reason: Annotated[str, typer.Argument(help="Reason, which others can read.")] = "",
-) -> None:
-    """Halt a robot: commands end, it brakes, and nothing moves until it is resumed.
-
-    Not a safety function: keep an emergency stop that needs no computer.
-    """
-    number = halt_backend(segment, reason)
-    print(f"halt {number} of {segment}; go on with: o80 resume {segment} {number}")
+def halt(segment: str, text: list[str]) -> None:
+    """Halt a robot: commands end, it brakes, and nothing moves until it is resumed."""
+    sys.exit(halt_words([segment, *text]))
 
 
-def resume(
-    segment: Annotated[str, typer.Argument(help="Name of a segment; see o80 list.")],
-    number: Annotated[
-        str | None, typer.Argument(help="Number of the halt (default: the one in force).")
-    ] = None,
-    timeout: Annotated[
-        float, typer.Option(help="Seconds to wait until the robot is at rest.")
-    ] = 5.0,
-    accept_reading: Annotated[
-        bool,
-        typer.Option(
-            "--accept-reading",
-            help="Go on from where the robot is read to be, even if it cannot be there.",
-        ),
-    ] = False,
-) -> None:
-    """Clear a halt: the robot makes a fresh start at its present position, with empty queues."""
-    chosen = None if number is None else _number(number, segment)
-    with attach(segment, read_only=False) as frontend:
-        acting = frontend.halted
-        if acting is None:
-            print(f"{segment} is not halted")
+def halt_words(words: list[str]) -> int:
+    """Halts by the words after ``o80 halt``; returns the exit code."""
+    if not words or words[0] in ("--help", "-h"):
+        print(_USAGE, end="", file=sys.stdout if words else sys.stderr)
+        return 0 if words else 2
+    name, text = words[0], _core.printable(" ".join(words[1:]))  # also of what is no UTF-8
+    if name == "--all":
+        return _halt_all(text)
+    failed = not _halt(name, text)
+    for other in _names_in(words[1:], name):
+        _complain(f"'{other}' was not halted, it is part of the text: `o80 halt {other}` halts it")
+        failed = True
+    return int(failed)
+
+
+def _halt(name: str, text: str) -> bool:
+    try:
+        number = _core.halt(name, text, 0.0)
+    except InvalidArgument as error:
+        _complain(f"{error}. Nothing was halted: the first word must be the name of a segment")
+    except Error as error:
+        _complain(f"{error} Nothing was halted.")
+    else:
+        _print(f"halt {number} of {name}; go on with: o80 resume {name} {number}\n", sys.stdout)
+        return True
+    return False
+
+
+def _halt_all(text: str) -> int:
+    entries = [entry for entry in _core.list_segments() if not entry.played]
+    running = [entry.name for entry in entries if entry.life in (*_ALIVE, "unknown")]
+    if not running:
+        problem = _core.directory_problem()
+        _complain(problem or "nothing runs, so nothing was halted")
+        return int(bool(problem))
+    halted = [_halt(name, text) for name in running]  # each, also after one that failed
+    return int(not all(halted))
+
+
+def _names_in(words: list[str], halted: str) -> list[str]:
+    """The names of other running robots with which a text begins."""
+    running: set[str] = set()
+    with contextlib.suppress(Exception):
+        running = {entry.name for entry in _core.list_segments() if entry.life in _ALIVE}
+    names: list[str] = []
+    for word in " ".join(words).split():
+        if word not in running:
+            break
+        if word != halted:
+            names.append(word)
+    return list(dict.fromkeys(names))
+
+
+def _complain(text: str) -> None:
+    _print(f"o80: {_core.printable(text)}\n", sys.stderr)
+
+
+def _print(text: str, stream: TextIO | None) -> None:
+    """Prints past the stream's buffer: Python would complain at exit of what it cannot write."""
+    if stream is None:  # closed when the program began: its number may be that of another file
+        return
+    with contextlib.suppress(OSError, ValueError):
+        try:
+            descriptor = stream.fileno()
+        except (OSError, ValueError):  # captured by the program that calls this
+            stream.write(text)
             return
-        resumed = frontend.resume(
-            acting.number if chosen is None else chosen,
-            timeout=timeout,
-            accept_reading=accept_reading,
-        )
-        print(f"{segment} has resumed" if resumed else f"{segment} is not halted")
-
-
-def _number(text: str, segment: str) -> int:
-    if not text.isdecimal() or int(text) == 0:
-        raise InvalidArgument(
-            f"the number of a halt must be a positive whole number, got '{text}': "
-            f"`o80 info {segment}` shows it; without a number the halt in force is cleared"
-        )
-    return int(text)
+        os.write(descriptor, text.encode(stream.encoding or "ascii", "backslashreplace"))

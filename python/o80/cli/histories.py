@@ -1,7 +1,5 @@
 """Histories for commands that take a running robot or a recording."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
@@ -9,6 +7,7 @@ from functools import partial
 from pathlib import Path
 
 from o80.base.errors import BackendGone, InvalidArgument
+from o80.base.machine import this_boot
 from o80.cli.attach import attach
 from o80.recording.epoch import OVERWRITTEN, Gap, Interruption
 from o80.rows.history import History
@@ -23,6 +22,7 @@ class Named:
     number: int  #: of the run, from 0; runs of a segment in one file
     history: History
     wall_offset: int | None  #: wall clock less row time [ns]; None: not known
+    boot: str  #: id of the boot on whose clock the rows are; empty: not known
     journal: Callable[[], list[JournalEntry]]  #: what its backend decided, as far as known
     marks: list[tuple[str, int]] = field(default_factory=list)  #: name and iteration
     gaps: Callable[[], list[Gap]] = list  #: rows that are missing
@@ -45,7 +45,14 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
             oldest = int(history.iteration[0])
             gaps = [Gap(0, oldest - 1, OVERWRITTEN)] if oldest > 0 and seconds is None else []
             yield Named(
-                source, 0, history, offset, lambda: entries, marks_in(entries), lambda: gaps
+                source,
+                0,
+                history,
+                offset,
+                "" if offset is None or frontend.played else this_boot(),
+                lambda: entries,
+                marks_in(entries),
+                lambda: gaps,
             )
         return
     from o80.recording.reader import open as open_recording
@@ -65,6 +72,7 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
                 number,
                 history,
                 epoch.wall_offset,
+                epoch.boot,
                 journal,
                 of_run[number],
                 partial(getattr, epoch, "gaps"),

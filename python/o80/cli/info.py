@@ -1,7 +1,5 @@
 """``o80 info``: describes a robot and its loop, or a recording."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path

@@ -1,8 +1,5 @@
 """Prints the journal of a backend, an entry a line (``o80 echo --commands``)."""
 
-from __future__ import annotations
-
-import json
 import sys
 import time
 from dataclasses import asdict
@@ -12,7 +9,8 @@ import numpy as np
 
 import o80._core as _core
 from o80.base.errors import Error, TimeoutError
-from o80.base.screen import style
+from o80.base.finite import json_text
+from o80.base.screen import complain_once, emit, style
 from o80.frontend.frontend import Frontend
 from o80.frontend.reader import Journal
 from o80.rows.journal import JournalEntry
@@ -35,7 +33,7 @@ def follow(frontend: Frontend, count: int, as_json: bool, timeout: float | None)
     there = [(entry, lines.line(entry)) for entry in journal.read()]
     shown = there[-(count or (_BEFORE if alive else len(there))) :] if there else []
     for _, line in shown:
-        print(line, flush=True)
+        emit(line)
     if not alive:
         frontend.wait_for(frontend.published + 1, timeout=0)  # raises the reason of its end
     printed = len(shown)
@@ -46,7 +44,7 @@ def follow(frontend: Frontend, count: int, as_json: bool, timeout: float | None)
         alive = frontend.alive
         entries = journal.read()
         for entry in entries:
-            print(lines.line(entry), flush=True)
+            emit(lines.line(entry))
             printed += 1
             if count and printed >= count:
                 return
@@ -72,7 +70,7 @@ def print_recorded(path: str, count: int, as_json: bool) -> None:
             if not as_json and (len(recording) > 1 or len(epochs) > 1):
                 print(f"{name}, run {number}:", file=sys.stderr, flush=True)
             for line in found[-count:]:  # all of them if count is 0
-                print(line, flush=True)
+                emit(line)
 
 
 class _Lines:
@@ -84,7 +82,7 @@ class _Lines:
 
     def line(self, entry: JournalEntry) -> str:
         if self._as_json:
-            return json.dumps(asdict(entry), default=_plain)
+            return json_text(asdict(entry), default=_plain, say=complain_once)
         said = self._text.text(entry)
         parts = [style(f"{entry.iteration:>8}", "bold"), said]
         if entry.missed:

@@ -1,7 +1,5 @@
 """``o80 latency``: the delay between two segments that see the same motion."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -53,7 +51,7 @@ def latency(
         print(f"{second} behind {first}: {estimate(*signals, most=most, seconds=seconds)}")
 
 
-def _signal(text: str) -> str | Callable[[History], Any]:
+def _signal(text: str) -> "str | Callable[[History], Any]":
     """A field, or the length of several numbers."""
     match = re.fullmatch(r"norm\((.+)\)", text)
     if match is None:

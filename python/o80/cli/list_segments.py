@@ -1,7 +1,5 @@
 """``o80 list``: lists the backends of this machine."""
 
-from __future__ import annotations
-
 import io
 import sys
 import time
@@ -9,6 +7,7 @@ from typing import Annotated
 
 import typer
 
+from o80.base.screen import emit
 from o80.cli.segment_table import print_segments
 
 _ENTER, _LEAVE = "\033[?1049h\033[?25l", "\033[?1049l\033[?25h"  # another screen, without cursor
@@ -40,7 +39,7 @@ def _watch() -> None:
         while True:
             print(_CLEAR if terminal else "", time.strftime("%H:%M:%S"), sep="")
             print_segments(as_json=False)
-            print(end="" if terminal else "\n", flush=True)
+            emit("", end="" if terminal else "\n")
             time.sleep(1.0)
     finally:
         print(end=_LEAVE if terminal else "", flush=True)

@@ -1,7 +1,5 @@
 """``o80 mark``: note a line of text in the journal of a robot."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

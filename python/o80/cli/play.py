@@ -1,7 +1,5 @@
 """``o80 play``: puts a recording back into shared memory."""
 
-from __future__ import annotations
-
 import math
 import sys
 from pathlib import Path
@@ -124,13 +122,13 @@ def _names(path: Path, segments: list[str] | None, name: str | None) -> dict[str
     return {found[0]: name}
 
 
-def _head(playback: Playback, bursts: bool) -> str:
+def _head(playback: "Playback", bursts: bool) -> str:
     names = ", ".join(playback.names)
     how = "; rows come when a frontend requests iterations" if bursts else ""
     return f"playing {playback.duration:.1f} s of {names}{how}"
 
 
-def _follow(playback: Playback, stop: StopRequest) -> None:
+def _follow(playback: "Playback", stop: StopRequest) -> None:
     """Shows how far it is, again and again on a terminal."""
     terminal = sys.stderr.isatty()
     while not stop.requested and not playback.wait(0.05):

@@ -1,7 +1,5 @@
 """``o80 plot``: curves of a running robot or of a recording."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
@@ -44,9 +42,12 @@ def plot(
                 found[f"{source}: {name}" if name in found else name] = each
     if not found:
         raise InvalidArgument(f"{', '.join(sources)}: no rows to plot")
-    zeros, axes = origins(
-        {name: Placed(each.history, each.wall_offset) for name, each in found.items()}
-    )
+    offset_of: dict[str, int | None] = {}  # one for each boot: the wall clock may have been set
+    placed = {
+        name: Placed(each.history, offset_of.setdefault(each.boot or name, each.wall_offset))
+        for name, each in found.items()
+    }
+    zeros, axes = origins(placed)
     journals = {name: each.journal() for name, each in found.items()}
     wanted = [field for field in fields.split(",") if field]
     figure = plots.plot(

@@ -1,7 +1,5 @@
 """``o80 record``: writes rows and journals of segments to a file."""
 
-from __future__ import annotations
-
 import math
 import sys
 import time
@@ -148,7 +146,7 @@ def _say_warning(message: Warning | str, *_: Any, **__: Any) -> None:
     complain(str(message))
 
 
-def _replay_text(source: Source, frontend: Frontend, from_now: bool) -> str:
+def _replay_text(source: "Source", frontend: "Frontend", from_now: bool) -> str:
     """From which row on a run is recorded, and from where it can be replayed."""
     from o80.replaying.conditions import reads_the_world
 
@@ -182,7 +180,7 @@ def _replay_text(source: Source, frontend: Frontend, from_now: bool) -> str:
 class _Report:
     """Shows on stderr how far a recording is: one line, again and again on a terminal."""
 
-    def __init__(self, recorder: Recorder, from_now: bool) -> None:
+    def __init__(self, recorder: "Recorder", from_now: bool) -> None:
         self._recorder = recorder
         self._from_now = from_now
         self._at = time.monotonic()

@@ -1,7 +1,5 @@
 """``o80 info run.mcap``: describes a recording."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -68,7 +66,7 @@ def _brief(value: object) -> str:
     return text if len(text) <= LONGEST_VALUE else f"{text[: LONGEST_VALUE - 3]}..."
 
 
-def _print_marks(marks: list[Mark]) -> None:
+def _print_marks(marks: "list[Mark]") -> None:
     """Prints marks with time and values; of many only the first and the last ones."""
     if not marks:
         return
@@ -85,7 +83,7 @@ def _print_marks(marks: list[Mark]) -> None:
         print(plain(f"  {clock}  {mark.name}  {values}").rstrip())
 
 
-def _print_starts(runs: list[tuple[str, int, RecordedEpoch]]) -> None:
+def _print_starts(runs: "list[tuple[str, int, RecordedEpoch]]") -> None:
     """How the runs were started; those that were started alike together."""
     starts: dict[tuple[str, ...], list[str]] = {}
     for name, number, epoch in runs:
@@ -98,7 +96,7 @@ def _print_starts(runs: list[tuple[str, int, RecordedEpoch]]) -> None:
             print(f"  {line}")
 
 
-def _first_line(recording: RecordingFile) -> str:
+def _first_line(recording: "RecordingFile") -> str:
     state = "finished"
     if not recording.finished:
         state = (
@@ -111,7 +109,7 @@ def _first_line(recording: RecordingFile) -> str:
     return f"{name}: {segments}, {size}, {state}"
 
 
-def _row(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
+def _row(name: str, number: int, epoch: "RecordedEpoch") -> list[str]:
     fields = _summary(name, number, epoch)
     local = time.localtime(epoch.recorded_at * 1e-9)
     is_cut = any(gap.last is None for gap in epoch.gaps)
@@ -135,7 +133,7 @@ def _decisions(codec: int | None) -> str:
     return "recorded" if codec <= _core.JOURNAL_CODEC else f"for a newer o80 (format {codec})"
 
 
-def _summary(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
+def _summary(name: str, number: int, epoch: "RecordedEpoch") -> dict[str, Any]:
     begin, end = epoch.time_range if epoch.rows else (0, 0)
     return {
         "segment": name,
@@ -156,7 +154,7 @@ def _of_run(name: str, number: int) -> str:
     return name if number == 0 else f"{name}/{number}"
 
 
-def latency_of(epoch: RecordedEpoch) -> dict[str, int]:
+def latency_of(epoch: "RecordedEpoch") -> dict[str, int]:
     """The decision latency of the batches in the last entries of its journal, of recorded rows."""
     from o80.rows.journal import latencies_of
 
@@ -167,13 +165,13 @@ def latency_of(epoch: RecordedEpoch) -> dict[str, int]:
     return latency_percentiles(latencies_of(entries))
 
 
-def starvations_of(epoch: RecordedEpoch) -> int:
+def starvations_of(epoch: "RecordedEpoch") -> int:
     """How often a plan of chunks ran out of rows, up to the last recorded row."""
     last = epoch.history(1).starvations
     return int(last[0]) if len(last) else 0
 
 
-def _missing(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
+def _missing(name: str, number: int, epoch: "RecordedEpoch") -> list[str]:
     """Gaps and their reasons, a line each; of many the first ones."""
     of_run = _of_run(name, number)
     lines = [f"{of_run}: {epoch.interruption}"] if epoch.interruption else []
@@ -182,7 +180,7 @@ def _missing(name: str, number: int, epoch: RecordedEpoch) -> list[str]:
     return [*lines, f"{of_run}: and {more} more gaps, see --json"] if more > 0 else lines
 
 
-def _fields(name: str, number: int, epoch: RecordedEpoch) -> dict[str, Any]:
+def _fields(name: str, number: int, epoch: "RecordedEpoch") -> dict[str, Any]:
     """For tools."""
     return {
         **_summary(name, number, epoch),

@@ -1,7 +1,5 @@
 """``o80 recordings``: the recordings below a folder."""
 
-from __future__ import annotations
-
 import sys
 import time
 import warnings
@@ -11,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from o80.base import local_time
 from o80.base.screen import Column, bytes_text, complain, plain, print_json, print_table
 from o80.frontend.backend_texts import age_text
 
@@ -47,14 +46,13 @@ def recordings(
     It keeps what it found in a file .o80-recordings.sqlite there, so that the next call is quick.
     """
     from o80.recording.catalogue import recordings as find
-    from o80.recording.catalogue import time_of
 
     with warnings.catch_warnings(record=True) as remarks:
         warnings.simplefilter("always", RuntimeWarning)
         found = find(
             folder,
-            begin=time_of(begin) if begin else None,
-            end=time_of(end, is_end=True) if end else None,
+            begin=local_time.instant(begin) if begin else None,
+            end=local_time.instant(end, is_end=True) if end else None,
             text=text,
             progress=_show if sys.stderr.isatty() else None,
         )
@@ -76,7 +74,7 @@ def recordings(
         print(f"no recording in {folder}{chosen}")
 
 
-def _rows(found: FoundRecording, folder: Path) -> list[list[str]]:
+def _rows(found: "FoundRecording", folder: Path) -> list[list[str]]:
     """A row for each run; what is of the whole recording stands in the first one."""
     rows = []
     for i, run in enumerate(found.runs):
@@ -99,7 +97,7 @@ def _rows(found: FoundRecording, folder: Path) -> list[list[str]]:
     return rows or [[plain(str(found.path.relative_to(folder))), *[""] * 9, bytes_text(found.size)]]
 
 
-def _fields(found: FoundRecording) -> dict[str, object]:
+def _fields(found: "FoundRecording") -> dict[str, object]:
     marks = [{"name": name, "time": at, "values": values} for name, at, values in found.marks]
     return {**asdict(found), "path": str(found.path), "marks": marks}
 

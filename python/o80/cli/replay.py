@@ -1,14 +1,13 @@
 """``o80 replay``: starts recorded robots again and compares every row."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from o80.base.screen import plain
+from o80.base.errors import Error
+from o80.base.screen import complain, plain
 from o80.cli.diff import _tolerances
 from o80.frontend.frontend import Frontend
 
@@ -65,22 +64,26 @@ def replay(
 
     Exit code 0: all rows are identical. 1: a row differs, and the first one is printed. 2: not all
     rows could be compared (rows or decisions are missing, or this o80 moves by other rules), and
-    those that were are identical; or --robot or --set could not be used.
+    those that were are identical; or the recording or a robot could not be used.
     """
     from o80.replaying.replay import replay as replay_all
 
     is_file = recording.endswith(".mcap") or Path(recording).exists()
-    report = replay_all(
-        recording if is_file else _attached(recording),
-        segment=segment,
-        robot=_robot(robot),
-        options=_options(option),
-        since=since,
-        driver=not without_driver,
-        ignore=tuple(name for name in ignore.split(",") if name),
-        tolerances=_tolerances(tolerance) if tolerance or exact else None,
-        progress=_show if sys.stderr.isatty() else None,
-    )
+    try:
+        report = replay_all(
+            recording if is_file else _attached(recording),
+            segment=segment,
+            robot=_robot(robot),
+            options=_options(option),
+            since=since,
+            driver=not without_driver,
+            ignore=tuple(name for name in ignore.split(",") if name),
+            tolerances=_tolerances(tolerance) if tolerance or exact else None,
+            progress=_show if sys.stderr.isatty() else None,
+        )
+    except Error as error:  # 1 means that a row differs
+        complain(str(error))
+        raise typer.Exit(2) from None
     if sys.stderr.isatty():
         print("\r\033[K", end="", file=sys.stderr)
     for run in report:

@@ -1,7 +1,5 @@
 """``o80 run``: runs a robot in this process."""
 
-from __future__ import annotations
-
 import os
 import sys
 from pathlib import Path

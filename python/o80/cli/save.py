@@ -1,7 +1,5 @@
 """``o80 save`` and ``o80 repair``: recordings after the fact."""
 
-from __future__ import annotations
-
 import fnmatch
 from pathlib import Path
 from typing import Annotated
@@ -33,17 +31,24 @@ def save(
 
 
 def repair(
-    path: Annotated[Path, typer.Argument(help="A recording that was cut.")],
+    path: Annotated[Path, typer.Argument(help="A recording that was cut or damaged.")],
 ) -> None:
-    """Complete a recording whose recorder was killed, so that every MCAP reader opens it."""
-    from o80.recording.output import opened, unfinished_in
+    """Complete a recording whose recorder was killed; of a damaged one, keep what is whole."""
+    from o80.recording.output import all_files_of
+    from o80.recording.reader import open as open_recording
+    from o80.recording.repairing import REASON, repaired
 
-    unfinished = unfinished_in(path)
-    if not unfinished:
+    files = all_files_of(path)
+    was_complete = True
+    for each in files:
+        for line in repaired(each, is_last=each == files[-1]):
+            was_complete = False
+            print(line)
+    if was_complete:
         print(f"{path} is complete")
-    for each in unfinished:
-        size = each.stat().st_size
-        file = opened(each, proceed=True)
-        kept = file.kept
-        file.finish()
-        print(f"{each} is complete now: {kept} bytes kept, {size - kept} bytes behind them removed")
+    recording = open_recording(path)
+    for name in recording:
+        for epoch in recording[name].epochs:
+            for gap in epoch.gaps:
+                if gap.reason == REASON:
+                    print(f"{name}: {gap}")

@@ -1,7 +1,5 @@
 """The output of ``o80 list``. It uses neither NumPy nor typer, so that it starts fast."""
 
-from __future__ import annotations
-
 import os
 import time
 from typing import Any

@@ -1,7 +1,5 @@
 """``o80 stop``: stops backends in order."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

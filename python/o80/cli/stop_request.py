@@ -1,7 +1,5 @@
 """Ctrl-C and SIGTERM, for commands that end in order."""
 
-from __future__ import annotations
-
 import signal
 import time
 from types import FrameType

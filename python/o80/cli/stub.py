@@ -1,7 +1,5 @@
 """``o80 stub``: writes a typed Python module for a robot."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

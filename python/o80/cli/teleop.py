@@ -1,7 +1,5 @@
 """``o80 teleop``: move one robot by hand, and another one follows."""
 
-from __future__ import annotations
-
 import contextlib
 import os
 import select
@@ -88,7 +86,7 @@ def teleop(
 class _Session:
     """The side of the person: what is shown, and marks by keys."""
 
-    def __init__(self, robots: Teleoperation, episode: str) -> None:
+    def __init__(self, robots: "Teleoperation", episode: str) -> None:
         self._robots = robots
         self._episode = episode
         self._open = False  # a demonstration
@@ -138,17 +136,15 @@ class _Session:
                 state += f", {self._demonstrations()}"
         else:
             state = f"does not follow: {robots.why}"
-            if robots.far:
-                state += ", " + ", ".join(
-                    f"{name} to {wanted:.2f} from {here:.2f}"
-                    for name, (wanted, here) in robots.far.items()
-                )
+            if robots.moves:
+                state = f"does not follow: move the leader's {', '.join(robots.moves)}"
         now = time.monotonic()
         terminal = sys.stderr.isatty()
-        same = state == self._told if terminal else state.split(",")[0] == self._told.split(",")[0]
-        if same or (terminal and now < self._tell_at):
+        # places change all the time: only a terminal shows each
+        told = state if terminal else robots.why if robots.moves else state.split(",")[0]
+        if told == self._told or (terminal and now < self._tell_at):
             return
-        self._told, self._tell_at = state, now + _BETWEEN_REPORTS / 5
+        self._told, self._tell_at = told, now + _BETWEEN_REPORTS / 5
         begin, end = ("\r\033[K", "") if terminal else ("", "\n")
         print(f"{begin}{state}", end=end, file=sys.stderr, flush=True)
 

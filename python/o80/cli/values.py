@@ -1,7 +1,5 @@
 """Converts rows to plain lists, dictionaries and labels, and selects values by path."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import o80._core as _core

@@ -1,7 +1,5 @@
 """``o80 view``: robots and recordings in the browser."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -3,6 +3,7 @@
 The rules are in docs/recording.md, Export for learning.
 """
 
+import sys
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.base.argument_checks import whole
+from o80.base.argument_checks import iterations
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument
 from o80.rows.columns import Column, chosen, columns_of
@@ -58,6 +59,11 @@ class Episode:
         return self._numbers(self.sensors)
 
     @cached
+    def observations(self) -> NDArray[np.float64]:
+        """The observed states, then the sensor values: (T + 1, numbers)."""
+        return np.concatenate([self.observed, self.extended], axis=1)
+
+    @cached
     def actions(self) -> NDArray[np.float64]:
         """Actions of all steps, the desired states: (T, numbers)."""
         return self._numbers(_columns(self.rows.schema, "desired"))[1:]
@@ -85,7 +91,7 @@ def episodes_of(
     recording: "RecordingFile",
     segment: str | None = None,
     *,
-    every: int = 1,
+    every: float = 1,
     begin: str = BEGIN,
     end: str = END,
     fields: Sequence[str] = (),
@@ -93,23 +99,25 @@ def episodes_of(
     """The episodes of one segment of a recording.
 
     segment: may be left out if there is only one with actuators.
-    every: a step is so many iterations.
+    every: a step is so many iterations, or as a float so long [s].
     begin, end: names of the marks before and after an episode.
     fields: of the sensor values, such as "measured.velocity" (empty: all but times of clocks, and
         what a twin lacks).
     Raises InvalidArgument.
     """
-    every = whole(every, "every", 1)
     robot = recording[_segment(recording, segment)]
     epochs = [epoch for epoch in robot.epochs if epoch.rows]
+    step = iterations(every, "every", float(robot.schema["period"]) * 1e-9, 1)
     taken = {epoch: _Orders.of(epoch.native_journal()) for epoch in epochs}
     _sensors(robot.name, robot.schema, fields)  # refuses fields that it lacks
     usual = (begin, end) == (BEGIN, END)
     left_out = _misspelt(recording.marks, robot.name) if usual else []
     found = []
     for span in _spans(recording.marks, robot.name, begin, end):
+        if not span.dropped:
+            _refuse_wrong_rewards(span, robot.name)
         try:
-            found.append(_episode(span, epochs, robot.name, every, taken, fields, left_out))
+            found.append(_episode(span, epochs, robot.name, step, taken, fields, left_out))
         except InvalidArgument as error:
             left_out.append(str(error))
     if not found:
@@ -123,7 +131,7 @@ def episodes_of(
     return Episodes(
         segment=robot.name,
         robot=schema["robot"],
-        frequency=1e9 / (schema["period"] * every),
+        frequency=1e9 / (schema["period"] * step),
         names=_names(schema, found[0].sensors),
         all=found,
         left_out=left_out,
@@ -280,19 +288,40 @@ def _epoch_at(mark: "Mark", epochs: Sequence["RecordedEpoch"]) -> "RecordedEpoch
     return begun[-1] if begun else epochs[0]
 
 
+def _refuse_wrong_rewards(span: _Span, segment: str) -> None:
+    """Raises InvalidArgument for values `reward` and `rewards` that are no finite numbers."""
+    ending = span.ending
+    for mark in span.marks if ending is None else [*span.marks, ending]:
+        where = f"the mark '{mark.name}' at row {mark.rows[segment]}"
+        if "reward" in mark.values and not _is_number(mark.values["reward"]):
+            raise InvalidArgument(
+                f"{where} has reward={mark.values['reward']!r:.40}: a reward must be a finite "
+                "number"
+            )
+        given = mark.values.get("rewards", []) if mark is ending else []
+        if not isinstance(given, list) or not all(map(_is_number, given)):
+            raise InvalidArgument(
+                f"{where} has rewards={given!r:.40}: rewards must be a list of finite numbers"
+            )
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and abs(value) <= sys.float_info.max
+
+
 def _rewards(
     span: _Span, ending: "Mark | None", segment: str, every: int, steps: int
 ) -> NDArray[np.float64]:
     """The reward of each step: `rewards` of the last mark, or the sum of `reward` of all marks."""
     rewards = np.zeros(steps)
     given = ending.values.get("rewards") if ending is not None else None
-    if isinstance(given, list) and given:
+    if given:
         places = np.arange(len(given)) * steps // len(given)
         np.add.at(rewards, places, np.asarray(given, np.float64))
         return rewards
     first = span.marks[0].rows[segment]
     for mark in [*span.marks[1:], *([] if ending is None else [ending])]:
-        if isinstance(mark.values.get("reward"), (int, float)):
+        if "reward" in mark.values:
             step = (mark.rows[segment] - first - 1) // every
             rewards[min(max(step, 0), steps - 1)] += mark.values["reward"]
     return rewards

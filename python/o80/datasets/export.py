@@ -1,7 +1,7 @@
 """Histories as files of other formats, one column a number."""
 
 import csv
-import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
+from o80.base.finite import Say, json_text, say_not_finite, warn
 from o80.rows.columns import chosen, columns_of
 from o80.rows.history import History, columns_in
 
@@ -18,14 +19,17 @@ Columns = dict[str, NDArray[Any]]
 Labels = dict[str, dict[int, str]]
 
 
-def write(path: Path, histories: Mapping[str, History], fields: Sequence[str] = ()) -> None:
+def write(
+    path: Path, histories: Mapping[str, History], fields: Sequence[str] = (), say: Say = warn
+) -> None:
     """Writes histories, by name, in the format that the suffix of the path names.
 
     fields: such as "observed.elbow", "elbow" or "extended" (empty: all); iteration and time are
         always written.
 
     .npz: arrays `name/column`. .h5, .hdf5: a group per name with a dataset per column. .csv,
-    .parquet: one table; only for a single history. Enumerations are numbers. Their labels are in an
+    .parquet: one table; only for a single history. In .csv numbers that are not finite are empty
+    cells, and `say` gets a sentence about them. Enumerations are numbers. Their labels are in an
     array `name/column.labels` of (label, number), in the HDF5 type of the dataset, or as JSON in
     the metadata `labels` of the column of Parquet. Raises InvalidArgument, MissingExtra, OSError.
     """
@@ -40,6 +44,14 @@ def write(path: Path, histories: Mapping[str, History], fields: Sequence[str] = 
             tables[name] = {column: columns[column] for column in dict.fromkeys(wanted)}
             labels[name] = {key: labels[name][key] for key in wanted if key in labels[name]}
     WRITERS[path.suffix](path, tables, labels)
+    if path.suffix == ".csv":
+        (columns,) = tables.values()
+        say_not_finite({name: _count(each) for name, each in columns.items()}, "left empty", say)
+
+
+def _count(values: NDArray[Any]) -> int:
+    """How many are not finite."""
+    return int(np.count_nonzero(~np.isfinite(values))) if values.dtype.kind == "f" else 0
 
 
 def labels_in(history: History) -> Labels:
@@ -86,7 +98,7 @@ def _write_parquet(
     fields = []
     for column, array in zip(columns, arrays, strict=True):
         numbers = {label: number for number, label in labels[name].get(column, {}).items()}
-        metadata = {"labels": json.dumps(numbers)} if numbers else None
+        metadata = {"labels": json_text(numbers)} if numbers else None
         fields.append(arrow.field(column, array.type, metadata=metadata))
     parquet.write_table(arrow.Table.from_arrays(arrays, schema=arrow.schema(fields)), path)
 
@@ -96,14 +108,20 @@ def _write_csv(path: Path, histories: Mapping[str, Columns], _: Mapping[str, Lab
     with path.open("w", newline="", encoding="utf-8") as file:
         lines = csv.writer(file, lineterminator="\n")
         lines.writerow(columns)
-        lines.writerows(zip(*(values.tolist() for values in columns.values()), strict=True))
+        lines.writerows(zip(*map(_cells, columns.values()), strict=True))
+
+
+def _cells(values: NDArray[Any]) -> list[Any]:
+    cells: list[Any] = values.tolist()
+    return [each if math.isfinite(each) else None for each in cells] if _count(values) else cells
 
 
 def _only_table(path: Path, histories: Mapping[str, Columns]) -> tuple[str, Columns]:
     if len(histories) != 1:
         raise InvalidArgument(
             f"a {path.suffix} file holds one table, but there are {len(histories)}: "
-            f"{', '.join(histories)}. Choose one with --segment, or write .npz or .h5"
+            f"{', '.join(histories)}. Choose one with --segment, in Python "
+            f"with segment=, or write .npz or .h5"
         )
     return next(iter(histories.items()))
 

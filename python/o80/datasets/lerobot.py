@@ -4,8 +4,8 @@ Written without LeRobot, which is large; it reads the result:
 `LeRobotDataset("o80/NAME", root=path)`.
 """
 
-import json
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
+from o80.base.finite import Say, json_text, say_not_finite, warn
 from o80.datasets.episodes import Episode, Episodes
 
 VERSION = "v3.0"
@@ -23,7 +24,7 @@ TASKS = "meta/tasks.parquet"
 Columns = dict[str, NDArray[Any]]
 
 
-def write(path: Path, episodes: Episodes) -> None:
+def write(path: Path, episodes: Episodes, say: Say = warn) -> None:
     """Writes a folder, which must not exist. Raises InvalidArgument, MissingExtra, OSError.
 
     observation.state is observed, observation.environment_state the sensor values, action the
@@ -48,8 +49,22 @@ def write(path: Path, episodes: Episodes) -> None:
     _write_table(path / EPISODES, rows)
     _write_tasks(path / TASKS, tasks)
     _write_json(path / "meta/info.json", _info(episodes, features, first, len(tasks)))
+    say_not_finite(_not_finite(features, frames), "left out of the statistics", say)
     whole = {name: np.concatenate([each[name] for each in frames]) for name in features}
     _write_json(path / "meta/stats.json", {name: _stats(v) for name, v in whole.items()})
+
+
+def _not_finite(
+    features: Mapping[str, dict[str, Any]], frames: Sequence[Columns]
+) -> dict[str, int]:
+    """How many values of each number are not finite."""
+    found = {}
+    for name, each in features.items():
+        values = np.concatenate([columns[name] for columns in frames])
+        counts = (~np.isfinite(values.reshape(len(values), -1))).sum(axis=0).tolist()
+        for number, count in zip(each["names"] or [""], counts, strict=True):
+            found[f"{name} {number}".strip()] = count
+    return found
 
 
 def _features(episodes: Episodes) -> dict[str, dict[str, Any]]:
@@ -98,7 +113,8 @@ def _frames(
         "index": first + steps,
         "task_index": np.full(len(episode), task),
     }
-    return {name: columns[name].astype(each["dtype"]) for name, each in features.items()}
+    with np.errstate(over="ignore"):  # what is too large for 32 bits is infinite, and is said
+        return {name: columns[name].astype(each["dtype"]) for name, each in features.items()}
 
 
 def _row(episode: Episode, number: int, first: int, columns: Columns) -> dict[str, Any]:
@@ -119,18 +135,18 @@ def _row(episode: Episode, number: int, first: int, columns: Columns) -> dict[st
     return row
 
 
-def _stats(values: NDArray[Any]) -> dict[str, list[float]]:
-    """Statistics of each number of a column, over all frames."""
+def _stats(values: NDArray[Any]) -> dict[str, list[float | None]]:
+    """Statistics of the finite values of each number of a column; None if it has none."""
     numbers = values.reshape(len(values), -1).astype(np.float64)
-    stats: dict[str, list[float]] = {
-        "min": numbers.min(axis=0).tolist(),
-        "max": numbers.max(axis=0).tolist(),
-        "mean": numbers.mean(axis=0).tolist(),
-        "std": numbers.std(axis=0).tolist(),
-        "count": [len(values)],
-    }
+    finite = [number[np.isfinite(number)] for number in numbers.T]
+
+    def each(statistic: Callable[[NDArray[np.float64]], Any]) -> list[float | None]:
+        return [float(statistic(number)) if number.size else None for number in finite]
+
+    stats = {"min": each(np.min), "max": each(np.max), "mean": each(np.mean), "std": each(np.std)}
+    stats["count"] = [len(values)]
     for percent in (1, 10, 50, 90, 99):
-        stats[f"q{percent:02d}"] = np.percentile(numbers, percent, axis=0).tolist()
+        stats[f"q{percent:02d}"] = each(partial(np.percentile, q=percent))
     return stats
 
 
@@ -216,8 +232,8 @@ def _write_tasks(path: Path, tasks: list[str]) -> None:
         "columns": columns,
         "pandas_version": "2.0.0",
     }
-    parquet.write_table(table.replace_schema_metadata({"pandas": json.dumps(pandas)}), path)
+    parquet.write_table(table.replace_schema_metadata({"pandas": json_text(pandas)}), path)
 
 
 def _write_json(path: Path, value: Any) -> None:
-    path.write_text(json.dumps(value, indent=4) + "\n")
+    path.write_text(json_text(value, indent=4) + "\n")

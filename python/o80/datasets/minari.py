@@ -6,10 +6,11 @@ import numpy as np
 
 from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
+from o80.base.finite import Say, say_not_finite, warn
 from o80.datasets.episodes import Episode, Episodes
 
 
-def write(path: Path, episodes: Episodes) -> None:
+def write(path: Path, episodes: Episodes, say: Say = warn) -> None:
     """Writes a folder, which must not exist: `minari.MinariDataset(path / "data")` reads it.
 
     An observation is the observed numbers, then the sensor values; an action the desired numbers.
@@ -34,6 +35,9 @@ def write(path: Path, episodes: Episodes) -> None:
         data_format="hdf5",
     )
     names = episodes.names
+    wrong = sum((~np.isfinite(each.observations)).sum(axis=0) for each in episodes.all)
+    numbers = [*names["observed"], *names["extended"]]
+    say_not_finite(dict(zip(numbers, wrong.tolist(), strict=True)), "in the observations", say)
     storage.update_metadata(
         {
             "dataset_id": f"o80/{episodes.robot}/{path.name}-v0",
@@ -53,7 +57,7 @@ def _buffer(episode: Episode, number: int, kind: type) -> object:
     last = np.arange(steps) == steps - 1
     return kind(
         id=number,
-        observations=np.concatenate([episode.observed, episode.extended], axis=1),
+        observations=episode.observations,
         actions=episode.actions,
         rewards=episode.rewards,
         terminations=last & episode.terminated,

@@ -10,7 +10,8 @@ class Thermometer:
 attributes `actuators`, `dtype`, `extended`, `requests`, `limits`, `rests_at`, `when_idle`, `units`,
 `while_halted`, `model` and `joints`, of the class or of the object, describe its rows, as the
 arguments of `o80.Backend` do; `gap` is the longest time between two rows that does not halt it [s],
-if that is less than by default. See docs/drivers.md.
+if that is less than by default. A simulation says `simulated = True`: every other driver is of the
+world. See docs/drivers.md.
 """
 
 from o80.drivers.option import Seed, option

@@ -1,7 +1,5 @@
 """One driver object as the compiled loop calls it."""
 
-from __future__ import annotations
-
 import inspect
 import traceback
 from collections.abc import Mapping, Sequence
@@ -12,6 +10,7 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.argument_checks import mapping, nothing
+from o80.base.descriptors import above_standard
 from o80.base.errors import Error, InvalidArgument, RequestRejected, exception_text
 from o80.drivers.backend import KEEPS
 from o80.drivers.description import SchemaWriter
@@ -61,7 +60,13 @@ class Adapter:
         writer.set_idle(self._told("when_idle", "hold"))
         joints = mapping(self._told("joints"), "joints", "joints to what moves them")
         writer.set_model(self._told("model"), joints)
-        writer.builder.of_the_world(bool(self._told("of_the_world", True)))
+        if self._told("of_the_world") is not None:
+            raise InvalidArgument(
+                "every driver is of the world unless it says simulated = True: remove of_the_world"
+            )
+        if not isinstance(simulated := self._told("simulated", False), bool):
+            raise InvalidArgument(f"simulated must be True or False, got {simulated!r}")
+        writer.builder.simulated(simulated)
         if (gap := self._told("gap")) is not None:
             if not isinstance(gap, (int, float)) or not 1e-6 <= gap <= 3600:
                 raise InvalidArgument(f"gap must be from 0.000001 to 3600 s, got {gap!r}")
@@ -121,6 +126,7 @@ class Adapter:
 
     # ------------------------------------------------------------------ verbs
 
+    @above_standard()
     def start(self) -> None:
         if verb := self._told("start"):
             nothing(verb(), "start()")

@@ -3,8 +3,7 @@
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -66,7 +65,7 @@ KEEPS = ", or raise o80.RequestRejected to keep the halt"
 Handler = Callable[[Record], StartAfresh | Running | None]
 
 
-class Backend:
+class Backend(lifecycle.Managed):
     """A backend whose loop runs in a Python program.
 
         with o80.Backend("arm", ["shoulder", "elbow"]) as backend:
@@ -284,7 +283,8 @@ class Backend:
         In force from the first `step` begun after it. May be called from any thread. The same
         reason again is the same halt; another reason is another halt.
         """
-        self._open.halt(argument_checks.text(reason, "the reason of a halt"))
+        self._open.halt(reason)
+        argument_checks.text(reason, "the reason of a halt")
 
     def interrupt(self, actuator: int | str) -> None:
         """Ends the commands of an actuator as interrupted, in the current iteration."""
@@ -351,15 +351,7 @@ class Backend:
         """The description of the robot for frontends."""
         return self._layout.schema
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def _leave(self, error: BaseException | None) -> None:
         self.close(exception_text(error) if isinstance(error, Exception) else None)
 
     def __repr__(self) -> str:

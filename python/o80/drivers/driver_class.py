@@ -1,7 +1,5 @@
 """A driver class in Python as a robot: found by "module:Class", described for the compiled loop."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import inspect
@@ -13,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import o80._core as _core
-from o80.base.errors import DriverError, InvalidArgument
+from o80.base.errors import DriverError, Error, InvalidArgument
 from o80.drivers.adapter import Adapter, check_verbs
 from o80.drivers.option import Options
 
@@ -33,20 +31,28 @@ def found_to_run(place: str) -> type[Any]:
 
 def found(place: str) -> type[Any]:
     """The class at "module:Class" or "file.py:Class". Raises DriverError."""
+    driver: type[Any] = imported(place, "driver", DriverError, type)
+    return driver
+
+
+def imported(place: str, what: str, failure: type[Error], *kinds: type[Any]) -> Any:
+    """The object at "module:name" or "file.py:name", of one of these kinds. Raises `failure`.
+
+    what: noun for the message.
+    """
     where, _, name = place.rpartition(":")
     try:
         module = _file(Path(where)) if where.endswith(".py") else importlib.import_module(where)
     except Exception as error:
-        raise DriverError(
-            f"the driver {place!r} cannot be imported: {type(error).__name__}: {error}"
+        raise failure(
+            f"the {what} {place!r} cannot be imported: {type(error).__name__}: {error}"
         ) from error
-    driver = getattr(module, name, None)
-    if not isinstance(driver, type):
-        classes = [key for key, value in vars(module).items() if isinstance(value, type)]
-        raise DriverError(
-            f"{where} has no class '{name}'{_core.names_instead(name, sorted(classes))}"
-        )
-    return driver
+    value = getattr(module, name, None)
+    if not isinstance(value, kinds):
+        names = [key for key, each in vars(module).items() if isinstance(each, kinds)]
+        kind = "class" if kinds == (type,) else "class or function"
+        raise failure(f"{where} has no {kind} '{name}'{_core.names_instead(name, sorted(names))}")
+    return value
 
 
 def _file(path: Path) -> Any:
@@ -64,7 +70,7 @@ def _file(path: Path) -> Any:
     return module
 
 
-def place_of(driver: type[Any]) -> str:
+def place_of(driver: Any) -> str:
     """Where another process finds a class."""
     if driver.__module__ == "__main__":
         file = getattr(sys.modules["__main__"], "__file__", None)

@@ -1,7 +1,5 @@
 """The options of a driver in Python: the fields of its Config, a dataclass."""
 
-from __future__ import annotations
-
 import dataclasses
 import types
 import typing
@@ -49,7 +47,7 @@ class Options:
     """Name, kind, default, help and unit of each."""
 
     @classmethod
-    def of(cls, driver: type[Any]) -> Options:
+    def of(cls, driver: type[Any]) -> "Options":
         """Options of the class `Config` in a driver class. Raises InvalidArgument."""
         config = getattr(driver, "Config", None)
         if config is None:

@@ -1,9 +1,8 @@
 """Arguments of a driver's verbs: the desired states to write, and a reading to fill."""
 
-from __future__ import annotations
-
+import warnings
 from collections.abc import Callable, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,7 +148,13 @@ class Reading:
 
     def halt(self, reason: str) -> None:
         """Halts the robot. May be repeated with each reading; the same text is the same halt."""
-        self._halt = argument_checks.text(reason, "the reason of reading.halt")
+        self._halt = _core.printable(reason)
+        if not isinstance(cast(object, reason), str):  # an exception would end the loop instead
+            warnings.warn(
+                f"the reason of reading.halt must be a string, got {self._halt}",
+                RuntimeWarning,
+                stacklevel=2,
+            )
 
     def fault(self, reason: str) -> None:
         """Ends the loop at once; frontends raise the reason."""

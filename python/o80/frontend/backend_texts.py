@@ -1,10 +1,9 @@
 """Texts about halted, hanging and late backends."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import o80._core as _core
+from o80.base.errors import sentence
 
 
 def halt_text(
@@ -22,10 +21,8 @@ def halt_text(
     reason = f": {text}" if text else ""
     if played:
         return f"was halted{since} when it was recorded{reason}"
-    return (
-        f"halted{since} (halt {number}, cause {cause}{by}){reason}. "
-        f"Go on with: o80 resume {segment} {number}"
-    )
+    told = sentence(f"halted{since} (halt {number}, cause {cause}{by}){reason}")
+    return f"{told} Go on with: o80 resume {segment} {number}"
 
 
 def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:

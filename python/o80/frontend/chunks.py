@@ -1,7 +1,5 @@
 """Chunks: rows of targets, each for a fixed iteration, of a policy that answers late."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import math
@@ -10,14 +8,15 @@ import threading
 import time
 from collections.abc import Mapping, Sequence, Sized
 from fractions import Fraction
-from typing import TYPE_CHECKING, Any, Literal, Self
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 import o80._core as _core
-from o80.base.argument_checks import number, text, whole, whole_or_none
+from o80.base.argument_checks import iterations, number, text, whole, whole_or_none
 from o80.base.awaiting import in_thread
 from o80.base.errors import BackendGone, BackendHalted, Closed, InvalidArgument, RowOverwritten
+from o80.base.lifecycle import Managed
 from o80.base.words import RowsWord, Status
 from o80.rows.plans import ChunkRows, ChunkWay, Decision, Moment, decide
 from o80.rows.targets import common_labels, common_type, states_of
@@ -57,14 +56,14 @@ def _fraction(step: Any) -> Fraction:
     return fraction
 
 
-def _iterations(values: ArrayLike, name: str) -> NDArray[np.int64]:
+def _iterations(values: "ArrayLike", name: str) -> "NDArray[np.int64]":
     array = np.asarray(values)
     if array.ndim != 1 or array.dtype.kind not in "iu":
         raise InvalidArgument(f"{name} must be a list of whole numbers, got {values!r}")
     return array.astype(np.int64)
 
 
-def _finite(values: ArrayLike, name: str) -> NDArray[np.float64]:
+def _finite(values: "ArrayLike", name: str) -> "NDArray[np.float64]":
     try:
         array = np.asarray(values, np.float64)
     except (TypeError, ValueError):
@@ -196,17 +195,17 @@ class _Part:
 class ChunkWaits:
     """The wait of a plan as a coroutine, as those of `Frontend.aio`."""
 
-    def __init__(self, plan: Chunks) -> None:
+    def __init__(self, plan: "Chunks") -> None:
         self._plan = plan
 
     async def wait(
-        self, lead: int = 0, timeout: float | None = None, *, grid: bool = False
+        self, lead: float = 0, timeout: float | None = None, *, grid: bool = False
     ) -> _core.Observation:
         """Waits as `Chunks.wait`."""
         return await in_thread(lambda: self._plan.wait(lead, timeout, grid=grid))
 
 
-class Chunks:
+class Chunks(Managed):
     """The plan of a policy that answers with rows of targets, late, while the robot moves.
 
     See docs/chunks.md. Made by `Frontend.chunks`. Use it as a context manager.
@@ -214,11 +213,11 @@ class Chunks:
 
     def __init__(
         self,
-        arm: Commander,
+        arm: "Commander",
         actuators: int | str | Sequence[int | str] | None,
         *,
         step: float | Fraction,
-        ease: int | None = None,
+        ease: float | None = None,
         profile: RowsWord = "cubic",
         ensemble: float | None = None,
     ) -> None:
@@ -235,7 +234,7 @@ class Chunks:
         usual = max(math.ceil(self.step), round(EASE / arm.period))
         self.ease = usual  #: iterations of a take-over
         if ease is not None:
-            self.ease = _from_to(ease, "ease", 1, _LATEST)
+            self.ease = _from_to(iterations(ease, "ease", arm.period, 0), "ease", 1, _LATEST)
         # it says what a profile may be
         _core.plan_of_rows(0.0, 0.0, [0.0], [1], text(profile, "profile"), 1)
         self.profile = profile
@@ -258,14 +257,14 @@ class Chunks:
 
     def send(
         self,
-        rows: ArrayLike | Mapping[str, ArrayLike],
+        rows: "ArrayLike | Mapping[str, ArrayLike]",
         *,
         seen: _core.Observation | int | None = None,
         first: int = 0,
         fixed: bool = False,
         late: Literal["skip", "reject"] = "skip",
         due: Sequence[int] | None = None,
-        weights: ArrayLike | None = None,
+        weights: "ArrayLike | None" = None,
         final: bool = False,
     ) -> SentChunk:
         """Sends rows of targets; row j is due in iteration seen + (j + 1) x step, rounded.
@@ -346,7 +345,7 @@ class Chunks:
             )
         return since
 
-    def _due(self, count: int) -> NDArray[np.int64]:
+    def _due(self, count: int) -> "NDArray[np.int64]":
         """Iterations after the anchor: (j + 1) x step, halves up."""
         dues = self._dues  # another thread may send a chunk of another length
         if len(dues) != count:
@@ -355,7 +354,7 @@ class Chunks:
             dues = self._dues = (rows * (2 * up) + down) // (2 * down)
         return dues
 
-    def _check_due(self, after: NDArray[np.int64], count: int, anchor: int) -> None:
+    def _check_due(self, after: "NDArray[np.int64]", count: int, anchor: int) -> None:
         if len(after) != count:
             raise InvalidArgument(f"{count} rows need as many due iterations, got {len(after)}")
         if not (after[0] >= 1 and np.all(np.diff(after) > 0) and after[-1] <= _LATEST):
@@ -365,8 +364,8 @@ class Chunks:
             )
 
     def _mixed(
-        self, new: NDArray[np.float64], due: NDArray[np.int64], weights: ArrayLike | None
-    ) -> NDArray[np.float64]:
+        self, new: "NDArray[np.float64]", due: "NDArray[np.int64]", weights: "ArrayLike | None"
+    ) -> "NDArray[np.float64]":
         shares = np.ones(len(new)) if weights is None else _finite(weights, "weights")
         if shares.shape != (len(new),):
             raise InvalidArgument(f"weights are ({len(new)},), not {shares.shape}")
@@ -385,7 +384,7 @@ class Chunks:
             new[row] = plan + (new[row] - plan) * share
         return new
 
-    def _count_answers(self, due: NDArray[np.int64]) -> None:
+    def _count_answers(self, due: "NDArray[np.int64]") -> None:
         for iteration in due.tolist():
             planned = self._plan_at(iteration) is not None
             self._answers[iteration] = (self._answers.get(iteration, 0) if planned else 0) + 1
@@ -414,7 +413,7 @@ class Chunks:
         n: int | None = None,
         *,
         step: float | Fraction | None = None,
-    ) -> NDArray[np.float64]:
+    ) -> "NDArray[np.float64]":
         """Planned places for the iterations since + step, since + 2 steps, ...: at most n rows.
 
         since: an iteration or an observation, such as the one that a policy sees.
@@ -445,18 +444,19 @@ class Chunks:
         return ChunkWaits(self)
 
     def wait(
-        self, lead: int = 0, timeout: float | None = None, *, grid: bool = False
+        self, lead: float = 0, timeout: float | None = None, *, grid: bool = False
     ) -> _core.Observation:
-        """Waits until the chunk sent last was decided and at most `lead` iterations are planned.
+        """Waits until the chunk sent last was decided and at most `lead` is planned.
 
         Returns the newest observation, or, with `grid`, the newest that lies whole steps after the
         one that the last chunk answers; none of a backend in real time twice. A bursting backend
         runs until then.
 
-        timeout: how long to wait [s]. Raises TimeoutError, BackendGone, BackendHalted.
+        lead: iterations, or as a float the time [s]. timeout: how long to wait [s]. Raises
+        TimeoutError, BackendGone, BackendHalted.
         """
         arm = self._arm
-        lead = whole(lead, "lead", 0)
+        lead = iterations(lead, "lead", arm.period, 0)
         end = None if timeout is None else time.monotonic() + timeout
         while True:
             if (halt := arm.halted) is not None and halt.iteration is not None:  # it is in force
@@ -487,14 +487,14 @@ class Chunks:
     def _is_plain(self) -> bool:
         return self._kind.names is None and self._kind.shape == ()
 
-    def _numbers(self, states: NDArray[np.uint8]) -> NDArray[np.float64]:
+    def _numbers(self, states: "NDArray[np.uint8]") -> "NDArray[np.float64]":
         """The values (rows, actuators) that are sent: as the loop reads them."""
         if not self._is_plain:
             raise InvalidArgument(_ONE_NUMBER)
         values = states.view(self._kind).reshape(len(self._actuators), -1)
         return values.T.astype(np.float64)
 
-    def _plan_at(self, iteration: int) -> NDArray[np.float64] | None:
+    def _plan_at(self, iteration: int) -> "NDArray[np.float64] | None":
         """Places in an iteration; None if nothing is planned for it, or not known yet."""
         with self._lock:
             i = len(self._parts) - 1
@@ -567,12 +567,12 @@ class Chunks:
                     part.begin((place, np.zeros_like(place)), known=False)
             former = part
 
-    def _desired(self, row: Any) -> NDArray[np.float64]:
+    def _desired(self, row: Any) -> "NDArray[np.float64]":
         """Desired places in an observation, read from its memory."""
         numbers = [np.ndarray((), self._kind, row, at) for at in self._places]
         return np.array(numbers, np.float64)
 
-    def _motion(self, iteration: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _motion(self, iteration: int) -> "tuple[NDArray[np.float64], NDArray[np.float64]]":
         """Desired places and differences of a row, from the history; 0 for what does not act."""
         row = self._arm.wait_for(iteration)
         here = self._desired(row)
@@ -595,8 +595,5 @@ class Chunks:
             arm._open_plans.discard(self._number)
         self._closed = True
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, *_: Any) -> None:
+    def _leave(self, error: BaseException | None) -> None:
         self.close()

@@ -1,7 +1,5 @@
 """Commander: the part of o80.Frontend that commands, requests, bursts and halts."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager
@@ -19,6 +17,7 @@ from o80.base.errors import (
     RequestRejected,
     TimeoutError,
 )
+from o80.base.signatures import explains
 from o80.base.words import (
     LateWord,
     ModeWord,
@@ -41,6 +40,7 @@ if TYPE_CHECKING:
 Tolerance: TypeAlias = float | Mapping[str, Any] | Sequence[float | Mapping[str, Any]]
 
 
+@explains
 class Commander(Reader):
     """The part of o80.Frontend that commands, requests, bursts and halts."""
 
@@ -176,11 +176,11 @@ class Commander(Reader):
 
     def add_trajectory(
         self,
-        targets: ArrayLike | Mapping[str, ArrayLike],
+        targets: "ArrayLike | Mapping[str, ArrayLike]",
         actuators: int | str | Sequence[int | str] | None = None,
         *,
         iterations: int | None = None,
-        times: ArrayLike | None = None,
+        times: "ArrayLike | None" = None,
         speed: float | None = None,
         mode: ModeWord = "queue",
         profile: ProfileWord | RowsWord | None = None,
@@ -193,7 +193,7 @@ class Commander(Reader):
             arrays. Fields that are left out keep their desired value.
         actuators: indices or names (None: all).
         iterations: number of iterations for each row (default: 1).
-        times: when each row is reached, since the start [s]: (T,), not decreasing.
+        times: when each row is reached, since the start [s]: (T,), each in an iteration of its own.
         speed: peak speed to each row, as in add_command.
         profile: "cubic" (default, not with speed): a curve through the rows that stays between
             them, at rest at the last one; "linear" (default with speed): straight lines;
@@ -279,7 +279,7 @@ class Commander(Reader):
             )
 
     @property
-    def running_requests(self) -> list[RunningRequest]:
+    def running_requests(self) -> "list[RunningRequest]":
         """The requests that take time and have not ended, oldest first, whoever sent them."""
         from o80.frontend.results import RunningRequest
 
@@ -301,7 +301,7 @@ class Commander(Reader):
         start: StartWord = "desired",
         every: float | int | None = None,
         initial: Any = None,
-    ) -> Preview:
+    ) -> "Preview":
         """Computes what `add_command` with the same arguments would do after the newest row.
 
         The code of the loop computes it here, so the robot does the same bit for bit. Sends
@@ -490,15 +490,14 @@ class Commander(Reader):
             """
 
     @property
-    def halted(self) -> Halt | None:
+    def halted(self) -> "Halt | None":
         """The halt in force, or requested (its iteration is then None); None if there is none."""
         fields = self._halted
         if fields is None:
             return None
-        from o80.frontend.results import Halt
+        from o80.frontend.results import halt_of
 
-        number, cause, iteration, who, text = fields
-        return Halt(number, cause, None if iteration < 0 else iteration, who, text)
+        return halt_of(fields)
 
     def resume(
         self,

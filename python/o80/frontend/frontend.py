@@ -3,7 +3,6 @@
 import contextlib
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import o80._core as _core
@@ -11,6 +10,7 @@ from o80.base import lifecycle
 from o80.base.cached import cached
 from o80.base.errors import Error, InvalidArgument, SchemaMismatch, UsedAfterFork
 from o80.base.installation import announced
+from o80.base.signatures import explains
 from o80.base.words import OnErrorWord, RowsWord
 from o80.frontend.commander import Commander
 from o80.rows.layout import Layout
@@ -26,7 +26,8 @@ GROUP = "o80.frontends"
 _registered: dict[str, type["Frontend"]] = {}
 
 
-class Frontend(Commander):
+@explains
+class Frontend(Commander, lifecycle.Managed):
     """A frontend of the backend that owns a segment: sends commands, reads observations.
 
     segment: name of the segment.
@@ -104,7 +105,7 @@ class Frontend(Commander):
         actuators: int | str | Sequence[int | str] | None = None,
         *,
         step: "float | Fraction",
-        ease: int | None = None,
+        ease: float | None = None,
         profile: RowsWord = "cubic",
         ensemble: float | None = None,
     ) -> "Chunks":
@@ -112,7 +113,8 @@ class Frontend(Commander):
 
         actuators: indices or names (None: all).
         step: iterations from row to row, whole or a fraction (50 / 3: 30 rows a second at 500 Hz).
-        ease: iterations of a take-over (None: the longer of a step and 0.1 s).
+        ease: iterations of a take-over, or as a float its time [s] (None: the longer of a step and
+            0.1 s).
         profile: "cubic", "linear" or "hold" between rows.
         ensemble: mix each new row with the plan, as ACT does: share exp(-ensemble * i) of the i-th
             answer for an iteration (None: new rows replace the plan).
@@ -146,7 +148,7 @@ class Frontend(Commander):
             warnings.warn(
                 f"{added} commands were added to '{self.segment}' and never pulsed",
                 ResourceWarning,
-                stacklevel=2,
+                stacklevel=3,
             )
         if self._open_plans and not self._forked:
             with contextlib.suppress(Error):
@@ -187,15 +189,7 @@ class Frontend(Commander):
         self._reattach(attachment, decoder)
         self._description, self._decoder = attachment.description, decoder
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def _leave(self, error: BaseException | None) -> None:
         if error is not None and not self.closed and not self._forked:
             self.forget_added()
             self._purge_on_error()

@@ -1,7 +1,5 @@
 """Bursts that are repeated: options are checked and buffers looked up once."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

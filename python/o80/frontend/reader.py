@@ -4,8 +4,6 @@ Modules that most processes never need are imported when they are first used: ea
 first attach up to 3 ms slower.
 """
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +12,7 @@ import o80._core as _core
 from o80.base.argument_checks import whole
 from o80.base.cached import cached
 from o80.base.errors import Error
+from o80.base.signatures import explains
 from o80.rows.history import History, Selection
 from o80.rows.layout import Layout
 
@@ -28,6 +27,7 @@ if TYPE_CHECKING:
     from o80.rows.record import States
 
 
+@explains
 class Reader(_core.Frontend):
     """The part of o80.Frontend that describes the robot, watches the loop and reads rows."""
 
@@ -70,7 +70,7 @@ class Reader(_core.Frontend):
         return self._layout.schema
 
     @property
-    def provenance(self) -> Provenance:
+    def provenance(self) -> "Provenance":
         """How the backend was started: options, versions, and the offset to the wall clock."""
         from o80.rows.provenance import Provenance
 
@@ -88,7 +88,7 @@ class Reader(_core.Frontend):
         return self._layout.model
 
     @cached
-    def actuators(self) -> list[Actuator]:
+    def actuators(self) -> "list[Actuator]":
         """The actuators: index, name, unit, limits."""
         from o80.rows.actuators import Actuators, actuators_of
 
@@ -118,7 +118,7 @@ class Reader(_core.Frontend):
 
     # ------------------------------------------------------------------ the loop of the backend
 
-    def journal(self, since: int | None = None) -> list[JournalEntry]:
+    def journal(self, since: int | None = None) -> "list[JournalEntry]":
         """Decisions of the backend, oldest first: who sent what, when it was taken, how it ended.
 
         since: number of the first entry to return (None: the oldest that there is). To follow a
@@ -251,7 +251,7 @@ class Reader(_core.Frontend):
         return History(self._decoder, rows[:found])
 
     @property
-    def initial_states(self) -> States:
+    def initial_states(self) -> "States":
         """The observed states of row 0, before any command.
 
         If row 0 was overwritten before this frontend attached: of the oldest row at that time.
@@ -285,7 +285,7 @@ class Journal:
         """False if the backend was started without a journal."""
         return self._core.exists
 
-    def read(self) -> list[JournalEntry]:
+    def read(self) -> "list[JournalEntry]":
         """The entries since the last call."""
         entries = self._core.read(_MOST)
         found = [self._decoder.entry(entry) for entry in entries]

@@ -1,7 +1,5 @@
 """Results of a frontend that most programs never see: halts, running requests, previews."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
@@ -14,10 +12,18 @@ class Halt:
     """A halt that is in force, or requested."""
 
     number: int  #: argument of `Frontend.resume`
-    cause: str  #: frontend, driver, silence, dead_frontend, error, overruns or predecessor
+    cause: (
+        str  #: frontend, driver, silence, dead_frontend, error, overruns, predecessor, unreachable
+    )
     iteration: int | None  #: in which it began; None if it is requested and not yet in force
     who: str  #: the process that requested it; empty if the backend did
     text: str  #: the reason in words
+
+
+def halt_of(fields: tuple[int, str, int, str, str]) -> Halt:
+    """A halt from its fields, as C++ gives them."""
+    number, cause, iteration, who, text = fields
+    return Halt(number, cause, None if iteration < 0 else iteration, who, text)
 
 
 @dataclass(frozen=True)
@@ -39,4 +45,4 @@ class Preview:
     text: str  #: why, as `Handle.text` says it; empty if it is not late
     #: the desired states of all actuators, as in History.desired: (iterations, actuators), or a
     #: record of groups
-    rows: States = field(repr=False)
+    rows: "States" = field(repr=False)

@@ -3,7 +3,6 @@
 import ast
 import hashlib
 import inspect
-import json
 import keyword
 import re
 from collections.abc import Iterable, Iterator, Mapping
@@ -11,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from o80.base.errors import SchemaMismatch
+from o80.base.finite import json_text
 from o80.frontend.commander import Commander
 from o80.frontend.frontend import Frontend, class_of
 from o80.frontend.reader import Reader
@@ -107,7 +107,7 @@ def digest_of(schema: dict[str, Any]) -> str:
     named = [(each["name"], each["group"]) for each in schema["actuators"]]
     parts = [schema["groups"], schema.get("extended"), named]
     requests = [[each["name"], each["type"]] for each in schema["requests"]]
-    text = json.dumps(_typed([*parts, requests]))
+    text = json_text(_typed([*parts, requests]))
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
@@ -224,7 +224,7 @@ class Module:
     def _record(self, described: dict[str, Any], how: str) -> str:
         """The class of a record of one row, or of many, or of an array of structs."""
         kind = {"one": "", "many": "Rows", "array": "Array"}[how]
-        name, new = self._new_name(described["name"], kind, json.dumps(described))
+        name, new = self._new_name(described["name"], kind, json_text(described))
         if new:
             fields = described["fields"]
             members = {field["name"]: self._value(field, how) for field in fields}
@@ -346,7 +346,7 @@ class Module:
         fields = described["fields"]
         if is_plain(described):
             return self._given(fields[0])
-        name, new = self._new_name(described["name"], "Target", json.dumps(described))
+        name, new = self._new_name(described["name"], "Target", json_text(described))
         if new:
             members = ", ".join(f"{field['name']!r}: {self._given(field)!r}" for field in fields)
             text = f'    {name} = TypedDict("{name}", {{{members}}}, total=False)\n\n'

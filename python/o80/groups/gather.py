@@ -1,7 +1,5 @@
 """Observations and event flags that an inline group reads from its newest rows, in C++."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
@@ -12,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from o80.base.argument_checks import mapping, sequence
 from o80.base.errors import InvalidArgument
 from o80.base.loop_options import did_you_mean
-from o80.rows.columns import Column, columns_of
+from o80.rows.columns import Column, columns_at
 
 #: A path of a number, a comparison, and a value (or the label of an enumeration).
 Comparison = tuple[str, Literal["==", "!=", "<", "<=", ">", ">="], float | str]
@@ -85,7 +83,7 @@ def numbers_from(wanted: Sequence[str | Gathered], schema: dict[str, Any]) -> li
 
 
 def _numbers_of(gathered: Gathered, schema: dict[str, Any]) -> Iterator[_Number]:
-    columns = _columns_at(gathered.path, schema)
+    columns = columns_at(schema, gathered.path)
     try:
         offsets = np.broadcast_to(np.asarray(gathered.offset, np.float64), len(columns))
         scales = np.broadcast_to(np.asarray(gathered.scale, np.float64), len(columns))
@@ -113,7 +111,7 @@ def flags_from(
                 f"flag '{name}' must be a path or (path, comparison, value), got {given!r}"
             )
         path, compare, value = comparison
-        columns = _columns_at(path, schema)
+        columns = columns_at(schema, path)
         if len(columns) != 1:
             raise InvalidArgument(
                 f"flag '{name}' must compare one number, and '{path}' has {len(columns)}: "
@@ -133,23 +131,6 @@ def _value_of(value: Any, column: Column, flag: str) -> float:
             )
         return float(labels[value])
     return float(value)
-
-
-def _columns_at(path: str, schema: dict[str, Any]) -> list[Column]:
-    """The numbers of a row whose names begin with a path. Raises InvalidArgument."""
-    columns = list(columns_of(schema))
-    found = [column for column in columns if _is_below(column.name, path)]
-    if not found:
-        names = [column.name for column in columns]
-        near = did_you_mean(path, names)
-        raise InvalidArgument(
-            f"a row has no number '{path}'" + (near or f": it has {', '.join(names[:5])}")
-        )
-    return found
-
-
-def _is_below(name: str, path: str) -> bool:
-    return name == path or (name.startswith(path) and name[len(path)] in ".[")
 
 
 def _place(column: Column) -> _Place:

@@ -1,7 +1,5 @@
 """Bursts and requests of copies that are repeated."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -42,16 +40,16 @@ class GroupBurst(BurstArrays):
         timeout: for all of them together [s].
 
         Raises CopyFailed with the exception of each copy that failed (for example targets that the
-        robot cannot follow, a halt, a fault of its driver); all others are done, and the rows of
-        those that failed are not valid. TimeoutError and
-        Ctrl-C leave each copy between two iterations; some have not run at all then.
+        robot cannot follow, a halt, a fault of its driver); all others are done. All rows of a copy
+        that was halted are its last one; those of others that failed are not valid. TimeoutError
+        and Ctrl-C leave each copy between two iterations; some have not run at all then.
         """
         chosen = self._all
         if copies is not None:
             chosen = chosen_copies(copies, self._everybody).view(np.uint8)
         self._group.burst(self._compiled, chosen, timeout)
 
-    def then(self, following: GroupBurst, numbers: str | Mapping[str, str]) -> GroupBurst:
+    def then(self, following: "GroupBurst", numbers: str | Mapping[str, str]) -> "GroupBurst":
         """This burst and one of another group that follows it, copy by copy, in one call.
 
         numbers: for each field of the targets of `following` the path in the rows of this one

@@ -7,12 +7,10 @@ with o80.robots.load("two_joints").inline(copies=64) as group:
     burst.rows["observed"]
 """
 
-from __future__ import annotations
-
 import contextlib
 import warnings
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,13 +22,11 @@ from o80.base.errors import InvalidArgument, UsedAfterFork
 from o80.base.lifecycle import Closeable
 from o80.base.words import ModeWord, ProfileWord, StartWord
 from o80.frontend.frontend import Frontend
+from o80.frontend.results import Halt, halt_of
 from o80.groups.gather import Comparison, Gather, Gathered, flags_from, numbers_from
-from o80.groups.group_burst import GroupBurst, GroupRequest, chosen_copies
+from o80.groups.group_burst import Copies, GroupBurst, GroupRequest, chosen_copies
 from o80.rows.enumerations import labelled
 from o80.rows.layout import Layout, dtype_of_type, labels_of_type
-
-if TYPE_CHECKING:
-    from o80.groups.group_burst import Copies
 
 
 class InlineGroup(Closeable):
@@ -154,6 +150,23 @@ class InlineGroup(Closeable):
         return GroupRequest(
             self._group, index, labelled(given, labels_of_type(described["type"])), rows
         )
+
+    @property
+    def halted(self) -> dict[int, Halt]:
+        """The halts in force, or requested, by copy; empty if no copy is halted."""
+        found = self._group.halted()
+        return {copy: halt_of(fields) for copy, fields in found.items()} if found else {}
+
+    def resume(self, copies: Copies = None, *, timeout: float | None = None) -> None:
+        """Ends halts: each copy runs until it is at rest, then starts afresh where it is.
+
+        copies: numbers of the copies, a slice, or a mask (None: all). Those that are not halted do
+            nothing.
+        timeout: for all of them together [s].
+
+        Raises CopyFailed for copies that refuse; they stay halted, all others are resumed.
+        """
+        self._group.resume(chosen_copies(copies, self._all).view(np.uint8), timeout)
 
     def latest(self, copies: Copies = None) -> NDArray[Any]:
         """The newest row of each copy, structured like `history().rows`: (copies,)."""

@@ -1,7 +1,5 @@
 """Joins rows of several segments or recordings by time."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -74,7 +72,7 @@ class Aligned(Mapping[str, AlignedHistory]):
 
 
 def align(
-    sources: Sources,
+    sources: "Sources",
     *,
     by: str | None = None,
     period: float | None = None,
@@ -129,7 +127,7 @@ def align(
     )
 
 
-def _by_seen(sources: Mapping[str, Source], seconds: float | None) -> Aligned:
+def _by_seen(sources: "Mapping[str, Source]", seconds: float | None) -> Aligned:
     """The rows of the first source, with those of the others by which it was commanded."""
     name, *others = sources
     run = run_of(name, sources[name])

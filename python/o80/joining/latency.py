@@ -1,7 +1,5 @@
 """Estimates the delay between two segments that see the same motion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -53,8 +51,8 @@ class Latency:
 
 
 def latency(
-    first: tuple[Source, Signal],
-    second: tuple[Source, Signal],
+    first: "tuple[Source, Signal]",
+    second: "tuple[Source, Signal]",
     *,
     most: float = 0.5,
     seconds: float | None = None,
@@ -110,7 +108,7 @@ def _extent(one: Timed, other: Timed, most: float) -> tuple[int, int, float]:
     return begin, end, WIDTH * _period(one, other)
 
 
-def _smooth(source: Timed, signal: Signal, begin: int, end: int, width: float) -> FloatArray:
+def _smooth(source: Timed, signal: "Signal", begin: int, end: int, width: float) -> FloatArray:
     """A signal at uniform times, NaN where it has no rows.
 
     A mean of the rows around, weighted by a Gaussian of this width: so noise has no frequencies
@@ -140,7 +138,7 @@ def _smooth(source: Timed, signal: Signal, begin: int, end: int, width: float) -
     return smooth
 
 
-def _numbers(source: Timed, signal: Signal) -> tuple[FloatArray, NDArray[np.int64]]:
+def _numbers(source: Timed, signal: "Signal") -> tuple[FloatArray, NDArray[np.int64]]:
     """The numbers of a signal that are finite, and their times [ns]."""
     history = source.history
     if callable(signal):

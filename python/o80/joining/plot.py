@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 MAX_PANELS = 24
 PANEL = (9.0, 1.9)  # width and height [inch]
 MAX_OF_MARK = 36  # characters that fit in a panel
+MARK_WIDTH = 0.012  # of the text of a mark, as a share of the axis
 PARTS = ("desired", "observed", "extended")
 END_STYLES = {"COMPLETED": ("|", "tab:green"), "OVERWRITTEN": ("|", "tab:purple")}
 STYLES = {"desired": "--", "observed": "-", "extended": "-"}
@@ -83,6 +84,7 @@ def plot(
     figure = _figure(count, window)
     axes = figure.subplots(count, sharex=True, squeeze=False)[:, 0]
     start = min(int(history.time[0]) for history in histories.values() if len(history))
+    marked = []
     for ax, panel in zip(axes[: len(panels)], panels, strict=True):
         drawn = [curve for curve in curves if (curve.robot, curve.panel) == panel]
         history = histories[panel[0]]
@@ -91,8 +93,10 @@ def plot(
         _draw(ax, drawn, history, times, several=len(histories) > 1)
         _draw_plans(ax, history, times, (planned or {}).get(panel[0], {}).get(panel[1], ()))
         _mark_ends(ax, panel[1], history, times, (ends or {}).get(panel[0], ()))
-        _draw_marks(ax, history, times, (marks or {}).get(panel[0], ()))
+        marked.append((ax, history, times, (marks or {}).get(panel[0], ())))
         ax.legend(fontsize=7, loc="center left", bbox_to_anchor=(1.0, 0.5))
+    for each in marked:
+        _draw_marks(*each)
     for ax, (name, taken) in zip(axes[len(panels) :], late.items(), strict=True):
         zero = start if origins is None else origins[name]
         _draw_latency(ax, histories[name], taken, zero)
@@ -219,16 +223,24 @@ def _draw_marks(
     times: NDArray[np.float64],
     marks: Sequence[tuple[str, int]],
 ) -> None:
-    """A line with its text where the program that recorded made a mark."""
+    """Lines with a text where the program that recorded made marks; near ones share the text."""
     iterations = history.iteration
-    for text, iteration in marks:
+    labels: list[tuple[float, list[str]]] = []
+    low, high = ax.get_xlim()
+    for text, iteration in sorted(marks, key=lambda mark: mark[1]):
         if len(history) and iterations[0] <= iteration <= iterations[-1]:
-            at = times[np.searchsorted(iterations, iteration)]
+            at = float(times[np.searchsorted(iterations, iteration)])
             ax.axvline(at, color="tab:olive", linewidth=1.0)
-            place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
-            # a mark holds any text: none of it is a formula
             short = text if len(text) <= MAX_OF_MARK else text[: MAX_OF_MARK - 1] + "\u2026"
-            ax.text(at, 0.98, short, transform=_shares(ax), parse_math=False, **place)
+            if labels and at - labels[-1][0] < MARK_WIDTH * (high - low):
+                labels[-1][1].append(short)
+            else:
+                labels.append((at, [short]))
+    for at, texts in labels:
+        place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
+        # a mark holds any text: none of it is a formula
+        joined = ", ".join(texts)
+        ax.text(at, 0.98, joined, transform=_shares(ax), parse_math=False, clip_on=True, **place)
 
 
 def _draw_latency(ax: "Axes", history: History, taken: Decisions, zero: int) -> None:

@@ -1,7 +1,5 @@
 """For each time of a list the rows of a history around it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

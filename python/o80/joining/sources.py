@@ -1,7 +1,5 @@
 """Sources to join by time: histories, each with the times of its rows on one common clock."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
@@ -11,6 +9,7 @@ from numpy.typing import NDArray
 
 from o80.base.argument_checks import whole
 from o80.base.errors import InvalidArgument
+from o80.base.machine import this_boot
 from o80.rows.history import History
 
 if TYPE_CHECKING:
@@ -42,7 +41,7 @@ class Timed:
 
 
 def timed(
-    sources: Sources,
+    sources: "Sources",
     *,
     seconds: float | None = None,
     offsets: Mapping[str, int] | None = None,
@@ -51,9 +50,15 @@ def timed(
 
     seconds: only the last seconds of each. offsets: see `align`. Raises InvalidArgument.
     """
-    found = {name: opened(name, source, seconds) for name, source in named(sources).items()}
+    given = named(sources)
+    found = {name: opened(name, source, seconds) for name, source in given.items()}
     if unknown := sorted(set(offsets or {}) - set(found)):
         raise InvalidArgument(f"offsets: there is no {unknown[0]!r}; there are: {', '.join(found)}")
+    offset_of: dict[str, int] = {}  # one for each boot: the wall clock may have been set in between
+    for name, (history, offset) in found.items():
+        boot = _boot_of(run_of(name, given[name]))
+        if boot and offset is not None and history.schema["clock"] == "monotonic":
+            found[name] = history, offset_of.setdefault(boot, offset)
     shifts = shifts_of(found)
     if offsets is not None:
         shifts = {name: whole(offsets.get(name, 0), f"offset of {name}") for name in found}
@@ -68,7 +73,7 @@ def timed(
     return {name: _on_clock(history, shifts[name]) for name, (history, _) in found.items()}
 
 
-def named(sources: Sources) -> Mapping[str, Source]:
+def named(sources: "Sources") -> "Mapping[str, Source]":
     if isinstance(sources, Mapping):
         return sources
     if hasattr(sources, "segments"):
@@ -101,6 +106,14 @@ def run_of(name: str, source: Any) -> Any:
             )
         (source,) = epochs
     return source
+
+
+def _boot_of(run: Any) -> str:
+    """Id of the boot on whose clock the rows of a run are; empty: not known."""
+    if hasattr(run, "provenance") and not hasattr(run, "wall_offset"):  # a frontend
+        return "" if run.played else this_boot()
+    boot: str = getattr(run, "boot", "")
+    return boot
 
 
 def opened(name: str, source: Any, seconds: float | None) -> tuple[History, int | None]:

@@ -1,7 +1,5 @@
 """Teleoperation: one robot, moved by hand, commands the joints of another."""
 
-from __future__ import annotations
-
 import contextlib
 import math
 import re
@@ -74,8 +72,8 @@ class Teleoperation:
 
     def __init__(
         self,
-        leader: Frontend,
-        follower: Frontend,
+        leader: "Frontend",
+        follower: "Frontend",
         *,
         joints: Iterable[Joint] | None = None,
         near: float = NEAR,
@@ -107,6 +105,7 @@ class Teleoperation:
                     raise InvalidArgument(
                         f"'{robot.segment}' has no joint '{name}', it has {', '.join(known)}"
                     )
+            _check_numbers(joint)
             _check_units(joint, given[joint.leader], taken[joint.follower])
         self._from = [_column(leader, given[joint.leader]) for joint in self.joints]
         self._to = [_column(follower, taken[joint.follower]) for joint in self.joints]
@@ -125,6 +124,8 @@ class Teleoperation:
         self.why = ""  #: it does not
         self.far: dict[str, tuple[float, float]] = {}
         """By joint of the follower that is not near: where it should be, and where it is."""
+        self.moves: list[str] = []
+        """How to move the leader, in its own numbers: "elbow from 0.50 to 0.00"."""
 
     def step(self) -> bool:
         """Waits for the next row of the leader and commands by it; whether the follower follows.
@@ -152,7 +153,8 @@ class Teleoperation:
             self._raise_if_the_follower_has_ended()
             self.follower.keep_alive()
         if why:
-            self.engaged, self._near_since, self.why, self.far = False, None, why, {}
+            self.engaged, self._near_since, self.why = False, None, why
+            self.far, self.moves = {}, []
             return False
         if not is_new:
             return self.engaged
@@ -178,7 +180,7 @@ class Teleoperation:
         )
         return targets
 
-    def delay(self, seconds: float = 30.0) -> Latency | None:
+    def delay(self, seconds: float = 30.0) -> "Latency | None":
         """How much later the follower shows what the leader did in the last seconds, measured at
         the joint that moved most; None if nothing moved enough.
         """
@@ -227,7 +229,7 @@ class Teleoperation:
         return ""
 
     def _let_go(self, why: str) -> None:
-        self.why, self._near_since, self.far = why, None, {}
+        self.why, self._near_since, self.far, self.moves = why, None, {}, []
         if self.engaged:
             self.engaged = False
             self.follower.halt(why)
@@ -239,6 +241,11 @@ class Teleoperation:
             self.joints[i].follower: (float(wanted[i]), float(here[i]))
             for i in np.flatnonzero(distant)
         }
+        there = _places(seen, self._from)
+        self.moves = [
+            self._move(self.joints[i], float(there[i]), float(here[i]))
+            for i in np.flatnonzero(distant)
+        ]
         if self.far:
             self._near_since = None
             self.why = "move the leader to where the follower is"
@@ -248,8 +255,27 @@ class Teleoperation:
         self.engaged = seen.time - self._near_since >= HELD * 1e9
         self.why = "" if self.engaged else "both are near since less than half a second"
 
+    def _move(self, joint: Joint, leader: float, follower: float) -> str:
+        """From where the leader is to where the follower would be near, in the leader's numbers."""
+        # so many that a rounded place is near, too
+        digits = max(2, math.ceil(math.log10(abs(joint.scale) / self.near)))
+        target = (follower - joint.offset) / joint.scale + 0.0  # never -0
+        places = [
+            f"{place:.{digits}f}" if math.isfinite(place) else "an unknown place"
+            for place in (leader, target)
+        ]
+        return f"{joint.leader} from {places[0]} to {places[1]}"
 
-def _check_units(joint: Joint, leader: Actuator, follower: Actuator) -> None:
+
+def _check_numbers(joint: Joint) -> None:
+    if joint.scale == 0 or not math.isfinite(joint.scale) or not math.isfinite(joint.offset):
+        raise InvalidArgument(
+            f"'{joint.follower}' follows '{joint.leader}' with scale {joint.scale:g} and offset "
+            f"{joint.offset:g}: the scale must not be 0, and both must be finite"
+        )
+
+
+def _check_units(joint: Joint, leader: "Actuator", follower: "Actuator") -> None:
     one, other = leader.numbers[0].unit, follower.numbers[0].unit
     if one != other and joint.scale == 1:
         raise InvalidArgument(
@@ -258,7 +284,7 @@ def _check_units(joint: Joint, leader: Actuator, follower: Actuator) -> None:
         )
 
 
-def _column(robot: Frontend, actuator: Actuator) -> Column:
+def _column(robot: "Frontend", actuator: "Actuator") -> Column:
     """The observed first number of an actuator."""
     path = ".".join(filter(None, ("observed", actuator.name, actuator.numbers[0].name)))
     return next(column for column in columns_of(robot.schema) if column.name == path)

@@ -1,7 +1,5 @@
 """Observations and actions of several copies: arrays, or dicts and tuples of them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

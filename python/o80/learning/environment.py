@@ -1,7 +1,5 @@
 """A Gymnasium environment of a task with one copy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium
@@ -9,7 +7,7 @@ import numpy as np
 from gymnasium.error import ResetNeeded
 
 from o80.base.errors import InvalidArgument
-from o80.learning import episodes, infos
+from o80.learning import episodes, halts, infos
 from o80.learning.batches import batch_of_one, rows
 from o80.learning.task import EVERY, Task
 
@@ -39,9 +37,11 @@ class Environment(gymnasium.Env[Any, Any]):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, infos.Info]:
-        """Begins an episode."""
+        """Begins an episode. Raises CopyFailed if the robot is halted and may not be resumed."""
         super().reset(seed=seed)
         self._ready = False
+        if failed := halts.resume(self.task.robots, _ONLY, 1, self.task.resumes):
+            raise failed
         begun = episodes.begin(self.task, _ONLY, [self.np_random], options)
         self._ready = True
         return rows(begun.observations, 0), infos.of_one(begun.info)
@@ -54,6 +54,8 @@ class Environment(gymnasium.Env[Any, Any]):
         self._ready = False
         stepped = episodes.step(self.task, actions, EVERY)
         info = infos.of_one(stepped.info) | infos.of_one(stepped.judged_info)
+        if stepped.halted.size:
+            info |= infos.of_one(stepped.halt_info)
         terminated, truncated = bool(stepped.terminated[0]), bool(stepped.truncated[0])
         self._ready = not (terminated or truncated)
         observation = rows(stepped.observations, 0)

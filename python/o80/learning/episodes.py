@@ -1,8 +1,7 @@
 """The order of a step and of a reset, which the environments of one copy and of many share."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,7 +10,10 @@ from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
 from o80.learning.batches import fresh
+from o80.learning.halts import halts_of
 from o80.learning.task import Index, Outcome, Task
+
+_NOBODY: NDArray[np.intp] = np.zeros(0, np.intp)
 
 
 @dataclass(slots=True)
@@ -35,6 +37,10 @@ class Stepped(Begun):
     """Numbers of the copies that were judged."""
     judged_info: Mapping[str, Any]
     """Info of the judged copies."""
+    halted: NDArray[np.intp]
+    """Numbers of the copies that are halted; they were judged too."""
+    halt_info: Mapping[str, Any]
+    """Info of the halted copies."""
 
 
 def begin(
@@ -45,46 +51,79 @@ def begin(
 ) -> Begun:
     """Begins an episode of some copies."""
     task.steps[copies] = 0
-    task.begin(copies, generators, options or {})
-    info = task.info(copies)
-    return Begun(fresh(task.observation_space, task.observe(copies)), info)
+    task.restart(copies, generators, options or {})
+    observed, info = task.shown(copies)
+    return Begun(fresh(task.observation_space, observed), info)
 
 
 def step(task: Task, actions: Any, copies: Index) -> Stepped:
     """A step of some copies."""
-    task.step(actions, copies)
+    halted = _carried_out(task, actions, copies)
     task.steps[copies] += 1
     rewards = np.zeros(task.copies)
     terminated, truncated = np.zeros(task.copies, np.bool_), np.zeros(task.copies, np.bool_)
     judged_info: Mapping[str, Any] = {}
-    judged, late = _to_be_judged(task, copies)
+    judged, late = _to_be_judged(task, copies, halted)
     if judged.size:
-        outcome: object = task.judge(judged)
+        outcome: object = task.outcome(judged)
         if not isinstance(outcome, Outcome):
             name = type(task).__name__
             raise InvalidArgument(f"{name}.judge must return an Outcome, got {outcome!r}")
         rewards[judged] = outcome.reward
+        if not np.isfinite(rewards).all():
+            copy = int(np.flatnonzero(~np.isfinite(rewards))[0])
+            raise InvalidArgument(
+                f"{type(task).__name__}.judge gave copy {copy} the reward {rewards[copy]}: it must "
+                "be finite, or a policy that learns from it is lost"
+            )
         terminated[judged] = outcome.terminated
+        terminated[halted] = True
         truncated[judged] = outcome.truncated
         if late is not None:
             truncated |= late
         judged_info = outcome.info
-    info = task.info(copies)
-    observations = fresh(task.observation_space, task.observe(copies))
-    return Stepped(observations, info, rewards, terminated, truncated, judged, judged_info)
+    observed, info = task.shown(copies)
+    return Stepped(
+        fresh(task.observation_space, observed),
+        info,
+        rewards,
+        terminated,
+        truncated,
+        judged,
+        judged_info,
+        halted,
+        {"halt": [task.halts[copy] for copy in halted.tolist()]},
+    )
 
 
 def no_step(task: Task) -> Stepped:
     """Result of a step of no copy."""
     nothing = np.zeros(task.copies, np.bool_)
     return Stepped(
-        None, {}, np.zeros(task.copies), nothing, nothing.copy(), np.zeros(0, np.intp), {}
+        None, {}, np.zeros(task.copies), nothing, nothing.copy(), _NOBODY, {}, _NOBODY, {}
     )
 
 
-def _to_be_judged(task: Task, copies: Index) -> tuple[NDArray[np.intp], NDArray[np.bool_] | None]:
+def _carried_out(task: Task, actions: Any, copies: Index) -> NDArray[np.intp]:
+    """Carries out a step; the numbers of its copies that are halted then."""
+    # of one copy: what the step has left out is missing in no other one
+    with task.until_halted() if task.copies == 1 else nullcontext():
+        task.step(actions, copies)
+    task.halts = halts = halts_of(task.robots, task.copies)
+    if not halts:
+        return _NOBODY
+    halted = np.array(sorted(halts), np.intp)
+    return halted if isinstance(copies, slice) else np.intersect1d(halted, copies)
+
+
+def _to_be_judged(
+    task: Task, copies: Index, halted: NDArray[np.intp]
+) -> tuple[NDArray[np.intp], NDArray[np.bool_] | None]:
     """Numbers of the copies to be judged, and which of all are out of steps (None: no limit)."""
     flagged, late = task.flagged(), None
+    if halted.size:
+        flagged = flagged.copy()
+        flagged[halted] = True
     if task.max_steps is not None:
         late = task.steps >= task.max_steps
         flagged = flagged | late

@@ -1,7 +1,5 @@
 """The random generators of the copies, seeded as Gymnasium seeds single environments."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,15 +1,12 @@
 """A task on one inline group."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
-from gymnasium import Space, spaces
+from gymnasium import Space
 from numpy.typing import NDArray
 
 from o80.base.arrays import Image
-from o80.base.errors import InvalidArgument
 from o80.groups.gather import Gather
 from o80.groups.group_burst import GroupBurst
 from o80.groups.inline_group import InlineGroup
@@ -49,6 +46,7 @@ class GroupTask(Task):
             max_steps=max_steps,
         )
         self.group, self.burst, self.seen = group, burst, seen
+        self.robots = (group,)
         self._has_flags = seen.flags.shape[1] > 0
         self._pictures: Pictures | None = None
         if "model" in group[0].schema and type(self).render is GroupTask.render:
@@ -63,18 +61,13 @@ class GroupTask(Task):
 
         By default the actions themselves, clipped into the action space.
         """
-        space = self.action_space
-        if not isinstance(space, spaces.Box):
-            raise InvalidArgument(
-                f"{type(self).__name__} has actions of {space}: define targets(actions)"
-            )
-        clipped = np.clip(actions, space.low, space.high)
-        return clipped.reshape(len(clipped), *self.burst.targets.shape[1:])
+        return self.clipped(actions).reshape(len(actions), *self.burst.targets.shape[1:])
 
     def step(self, actions: Any, copies: Index) -> None:
         """Sends the targets of these copies, and runs a burst of them."""
         self.burst.targets[copies] = self.targets(actions)
-        self.burst.run(copies)
+        with self.until_halted():
+            self.burst.run(copies)
 
     def observe(self, copies: Index) -> Any:
         """(n, numbers) as they are gathered."""

@@ -3,8 +3,6 @@
 The same as Gymnasium's `VectorEnv._add_info` makes of the infos of single environments.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

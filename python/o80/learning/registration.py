@@ -1,7 +1,5 @@
 """Ids under which Gymnasium makes the environments of a task."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

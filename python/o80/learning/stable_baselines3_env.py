@@ -1,7 +1,5 @@
 """A vector environment as Stable-Baselines3 wants it."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Sequence
 from typing import Any, Literal

@@ -1,18 +1,21 @@
 """A task: what copies of a robot do in episodes, and what it is worth."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 from gymnasium import Space
+from gymnasium.spaces import Box
 from numpy.typing import ArrayLike, NDArray
 
 from o80.base.argument_checks import whole
-from o80.base.errors import InvalidArgument
+from o80.base.errors import BackendHalted, CopyFailed, InvalidArgument, NotCompleted
+from o80.frontend.frontend import Frontend
+from o80.groups.inline_group import InlineGroup
+from o80.learning.halts import halts_of
 
 Index = slice | NDArray[np.intp]
 """Some copies, as an index of arrays over all copies: an array of numbers, or `EVERY`."""
@@ -46,6 +49,13 @@ class Task(ABC):
     An argument `copies` of a method is an index of arrays over all copies.
     """
 
+    robots: Sequence[InlineGroup | Frontend] = ()
+    """Robots that the task moves. A halt of one ends the episode, and the next reset resumes it:
+    see docs/learning.md. A frontend belongs to all copies. Without them a halt is an exception."""
+    resumes: bool = True
+    """Whether a reset resumes robots that run by their own clock."""
+    halts: Mapping[int, str] = {}
+    """The copies that are halted after the last step, each with the text of its halt."""
     metadata: Mapping[str, Any] = {"render_modes": []}
     """Metadata of the environments: modes of rendering, among others."""
 
@@ -74,6 +84,24 @@ class Task(ABC):
         self.steps: NDArray[np.int64] = np.zeros(self.copies, np.int64)
         """(copies,) steps of each episode so far; counted by the environment."""
 
+    def restart(
+        self,
+        copies: NDArray[np.intp],
+        generators: Sequence[np.random.Generator],
+        options: dict[str, Any],
+    ) -> None:
+        """Begins episodes for an environment: `begin`, and what a kind of task adds."""
+        self.begin(copies, generators, options)
+
+    def outcome(self, copies: NDArray[np.intp]) -> Outcome:
+        """Judges a step for an environment: `judge`, and what a kind of task adds."""
+        return self.judge(copies)
+
+    def shown(self, copies: Index) -> tuple[Any, Mapping[str, Any]]:
+        """Observations and infos for an environment: `observe`, `info`, and further ones."""
+        info = self.info(copies)
+        return self.observe(copies), info
+
     @abstractmethod
     def begin(
         self,
@@ -91,6 +119,26 @@ class Task(ABC):
     def step(self, actions: Any, copies: Index) -> None:
         """Carries out the actions (n, ...) of these n copies."""
 
+    @contextmanager
+    def until_halted(self) -> Iterator[None]:
+        """For a burst of a group in `step`: the step continues although it has halted copies."""
+        try:
+            yield
+        except (BackendHalted, CopyFailed, NotCompleted) as error:
+            halted = halts_of(self.robots, self.copies).keys()
+            failed = error.errors.keys() if isinstance(error, CopyFailed) else halted
+            if not halted or not failed <= halted:
+                raise
+
+    def clipped(self, actions: Any) -> Any:
+        """Actions (n, ...), clipped into the action space. Raises InvalidArgument."""
+        space = self.action_space
+        if not isinstance(space, Box):
+            raise InvalidArgument(
+                f"{type(self).__name__} has actions of {space}: define targets(actions)"
+            )
+        return np.clip(actions, space.low, space.high)
+
     @abstractmethod
     def observe(self, copies: Index) -> Any:
         """Observations (n, ...) of these n copies; the environment copies them."""
@@ -104,7 +152,9 @@ class Task(ABC):
 
     @abstractmethod
     def judge(self, copies: NDArray[np.intp]) -> Outcome:
-        """Judges the step of these copies, which are flagged or at the end of `max_steps`."""
+        """Judges the step of these copies, which are flagged, in `halts`, or at the end of
+        `max_steps`. The episode of a copy in `halts` terminates whatever this says.
+        """
 
     def info(self, copies: Index) -> Mapping[str, Any]:
         """Entries of Gymnasium's info in every step and reset: arrays (n, ...), or mappings."""

@@ -1,7 +1,5 @@
 """A Gymnasium vector environment of a task with any number of copies."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import gymnasium
@@ -13,7 +11,7 @@ from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
 from o80.base.lifecycle import Closeable
-from o80.learning import episodes, infos
+from o80.learning import episodes, halts, infos
 from o80.learning.batches import checked_actions, put, rows
 from o80.learning.environment import checked_render_mode
 from o80.learning.generators import Generators, Seed
@@ -32,6 +30,9 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
     It gives, bit for bit, what Gymnasium's SyncVectorEnv gives of as many single `Environment`s in
     the same autoreset mode: copy i is seeded with seed + i, and all arrays are fresh. An exception
     in `step` leaves some copies stepped and others not: call `reset` before the next step.
+
+    CopyFailed for halts that a reset may not end names the copies that then have no episode. The
+    others are done: they continue when these were reset.
 
     Closing it, or leaving its `with` block, closes the task.
     """
@@ -80,16 +81,29 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
         self._generators.seed(seed, copies)
         others = np.setdiff1d(self._unbegun, copies)
         self._unbegun, self._final = np.union1d(self._unbegun, copies), None
+        self._ended = np.setdiff1d(self._ended, copies)
         info: infos.Info = {}
-        self._begin(copies, options, info)
-        self._unbegun, self._ended = others, np.setdiff1d(self._ended, copies)
+        self._begin(copies, options, info, others)
         return rows(self._observations, EVERY), info
 
-    def _begin(self, copies: Numbers, options: dict[str, Any], info: infos.Info) -> None:
-        """Begins an episode of some copies; adds what they see and their info."""
-        begun = episodes.begin(self.task, copies, self._generators.of(copies), options)
-        put(self._observations, copies, begun.observations)
-        infos.add(info, begun.info, copies, self.num_envs)
+    def _begin(
+        self, copies: Numbers, options: dict[str, Any], info: infos.Info, unbegun: Numbers
+    ) -> None:
+        """Begins an episode of some copies; adds what they see and their info.
+
+        unbegun: other copies that have none. Raises CopyFailed for those that stay halted.
+        """
+        failed = halts.resume(self.task.robots, copies, self.num_envs, self.task.resumes)
+        if failed:
+            refused = np.array([*failed.errors], np.intp)
+            copies, unbegun = np.setdiff1d(copies, refused), np.union1d(unbegun, refused)
+        if copies.size:
+            begun = episodes.begin(self.task, copies, self._generators.of(copies), options)
+            put(self._observations, copies, begun.observations)
+            infos.add(info, begun.info, copies, self.num_envs)
+        self._unbegun = unbegun
+        if failed:
+            raise failed
 
     # ------------------------------------------------------------------ step
 
@@ -130,7 +144,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
             self._add_finals(stepped, over, info)
             self._final, self._ended = stepped.observations, _NOBODY
             self._observations = rows(stepped.observations, EVERY)
-            self._begin(ended, {}, info)
+            self._begin(ended, {}, info, _NOBODY)
         else:
             self._report(stepped, EVERY, info)
         return self._result(stepped, info)
@@ -149,6 +163,8 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
                 if among.any():
                     judged = infos.some(stepped.judged_info, among)
                     infos.add(where, judged, stepped.judged[among], count)
+        if stepped.halted.size:
+            infos.add(final_info, stepped.halt_info, stepped.halted, count)
         info.update(final_obs=final_obs, _final_obs=over.copy())
         info.update(final_info=final_info, _final_info=over.copy())
 
@@ -161,14 +177,16 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
             self._report(stepped, stepping, info)
         else:
             stepped = episodes.no_step(self.task)
-        self._begin(beginning, {}, info)
         self._ended = np.flatnonzero(stepped.terminated | stepped.truncated)
+        self._begin(beginning, {}, info, _NOBODY)
         return self._result(stepped, info)
 
     def _report(self, stepped: episodes.Stepped, copies: Index, info: infos.Info) -> None:
         infos.add(info, stepped.info, copies, self.num_envs)
         if stepped.judged.size:
             infos.add(info, stepped.judged_info, stepped.judged, self.num_envs)
+        if stepped.halted.size:
+            infos.add(info, stepped.halt_info, stepped.halted, self.num_envs)
 
     def _result(self, stepped: episodes.Stepped, info: infos.Info) -> StepResult:
         observations = rows(self._observations, EVERY)

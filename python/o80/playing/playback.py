@@ -5,7 +5,6 @@ import os
 import threading
 import time
 from collections.abc import Mapping, Sequence
-from types import TracebackType
 
 import numpy as np
 
@@ -147,13 +146,8 @@ class Playback(Closeable):
             self._thread.join()
         self._end_all()
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
-        super().__exit__(kind, error, trace)
+    def _leave(self, error: BaseException | None) -> None:
+        self.close()
         if error is None and self._failure is not None:
             raise self._failure
 

@@ -2,13 +2,12 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-if TYPE_CHECKING:
-    from o80.recording.recorded_epoch import RecordedEpoch
+from o80.recording.recorded_epoch import RecordedEpoch
 
 MAX_ROWS = 256  # of a part: what is published by one call
 SAME_CLOCK = 500_000_000  # clocks whose offsets differ by less are one clock [ns]

@@ -4,8 +4,6 @@ What was found is kept in a SQLite file in the folder. It is only a copy: whatev
 is made anew. A recording is read again if its size or its time of change differs.
 """
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os
@@ -14,11 +12,12 @@ import struct
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 from typing import Any
 
 from o80.base.errors import InvalidArgument, RecordingError
+from o80.base.finite import json_text
 from o80.recording.reader import RecordingFile
 
 INDEX = ".o80-recordings.sqlite"
@@ -118,24 +117,6 @@ def recordings(
     return sorted(chosen, key=lambda each: each.begin)
 
 
-def time_of(text: str, *, is_end: bool = False) -> datetime:
-    """A time of this computer's clock: "2026-11-24", "2026-11-24 10:02" or "10:02" (today).
-
-    is_end: a day means its end. Raises InvalidArgument.
-    """
-    today = ":" in text and "-" not in text
-    try:
-        found = datetime.fromisoformat(
-            f"{datetime.now():%Y-%m-%d} {text.zfill(5)}" if today else text
-        )
-    except ValueError:
-        raise InvalidArgument(
-            f"write 2026-11-24, '2026-11-24 10:02' or 10:02 (today), not '{text}'"
-        ) from None
-    is_day = len(text) <= len("2026-11-24") and not today
-    return found + timedelta(days=1, microseconds=-1) if is_end and is_day else found
-
-
 def _nanoseconds(time: datetime) -> int:
     """Since 1970; of a year that no clock has, such as that of `datetime.min`, 0 or very many."""
     try:
@@ -197,14 +178,14 @@ def _summary(path: Path) -> str:
         every = recording.marks
         skipped = max(len(every) - MARKS, 0)
         marks = [
-            (mark.name, mark.row_time, json.dumps(mark.values)[:1000])
+            (mark.name, mark.row_time, json_text(mark.values)[:1000])
             for mark in (every[: MARKS // 2] + every[MARKS // 2 + skipped :])
         ]
         found = {"finished": recording.finished, "runs": runs, "marks": marks}
-        return json.dumps(found | {"mark_count": len(every), "problem": ""})
+        return json_text(found | {"mark_count": len(every), "problem": ""})
     except _DAMAGED as error:
         nothing = {"finished": False, "runs": [], "marks": [], "mark_count": 0}
-        return json.dumps(nothing | {"problem": str(error) or repr(error)})
+        return json_text(nothing | {"problem": str(error) or repr(error)})
 
 
 def _run(segment: str, number: int, epoch: Any) -> FoundRun:

@@ -4,13 +4,12 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import datetime
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from o80.base.errors import RecordingError
-
-if TYPE_CHECKING:
-    from o80.frontend.reader import Reader
-    from o80.recording.scan import Scan
+from o80.base.machine import this_boot
+from o80.frontend.reader import Reader
+from o80.recording.scan import Scan
 
 DESCRIPTION = "application/x-o80-description"
 """Media type of the attachment with the description of a robot, as it is in a segment."""
@@ -21,7 +20,7 @@ EARLIER_FILE = "the file before is missing"
 OVERWRITTEN = "overwritten before the recorder read them"
 
 # as src/memory/segment/segment_name.cpp allows
-_NAME = re.compile(r"[A-Za-z0-9_-][A-Za-z0-9_.-]{0,63}")
+_NAME = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.-]{0,63}")
 
 
 class Gap(NamedTuple):
@@ -65,6 +64,7 @@ class EpochNote:
     wall_offset: int  #: log time less row time [ns]
     clock: str  #: monotonic or simulated
     before: str = LATE  #: why rows before `begin` are missing, if they are
+    boot: str = ""  #: of the machine whose monotonic clock the rows have; empty: not known
 
     def texts(self) -> dict[str, str]:
         return {name: str(value) for name, value in vars(self).items()}
@@ -90,6 +90,7 @@ class EpochNote:
                 wall_offset=int(texts["wall_offset"]),
                 clock=texts["clock"],
                 before=texts.get("before", LATE),
+                boot=texts.get("boot", ""),
             )
         except (KeyError, ValueError):
             return None
@@ -128,6 +129,27 @@ class EpochNote:
         return replace(self, wall_offset=offset)
 
 
+@dataclass
+class WallClock:
+    """Wall-clock times of robots on monotonic clocks: those of one boot keep their distances,
+    although the wall clock was read at the start of each, and may have been set in between.
+    """
+
+    offsets: dict[str, int]  #: log time less row time, by boot [ns]
+    after: int = 0  #: before rows of another boot [ns]
+
+    def placed(self, note: EpochNote, first_time: int, last_log_time: int) -> EpochNote:
+        """The note with the offset of its boot; a row at `first_time` is after `last_log_time`."""
+        if note.boot in self.offsets:
+            note = replace(note, wall_offset=self.offsets[note.boot])
+        elif note.boot:
+            last_log_time = max(last_log_time, self.after)
+        note = note.not_before(first_time, last_log_time)
+        if note.boot:
+            self.offsets.setdefault(note.boot, note.wall_offset)
+        return note
+
+
 def topic_of(segment: str, content: str = "") -> str:
     """Topic of a segment's rows, or of something else of it, as ROS 2 accepts it.
 
@@ -141,6 +163,7 @@ def topic_of(segment: str, content: str = "") -> str:
 
 def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:
     """Note about the rows from `begin` on."""
+    clock = frontend.schema["clock"]
     return EpochNote(
         segment=frontend.segment,
         robot=frontend.robot,
@@ -148,7 +171,8 @@ def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:
         number=number,
         begin=begin,
         wall_offset=frontend.provenance.wall_clock_offset,
-        clock=frontend.schema["clock"],
+        clock=clock,
+        boot=this_boot() if clock == "monotonic" and not frontend.played else "",
     )
 
 

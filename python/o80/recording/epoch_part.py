@@ -5,16 +5,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
+
+from mcap.records import ChunkIndex
 
 from o80.base.errors import RecordingError
 from o80.recording.blocks import messages_in
 from o80.recording.cdr import ENCAPSULATION
 from o80.recording.epoch import EpochNote
 from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of, unreadable
-
-if TYPE_CHECKING:
-    from mcap.records import ChunkIndex
 
 UNFINISHED = "the recorder still runs, or was killed"
 

@@ -6,6 +6,7 @@ behind it.
 
 import contextlib
 import os
+import shutil
 import struct
 import zlib
 from collections.abc import Callable, Mapping, Sequence
@@ -271,7 +272,32 @@ class FileWriter:
         """Closes the file as it is; may be called twice."""
         if self._file.descriptor >= 0:
             os.ftruncate(self._file.descriptor, self.size)  # gives reserved space back
-            self._file.close()
+            try:
+                if os.fstat(self._file.descriptor).st_nlink == 0:
+                    self._write_again()
+            finally:
+                self._file.close()
+
+    def moved_to(self) -> str | None:
+        """The name that the open file has now; "": none, it was removed; None: still `path`."""
+        is_open = os.fstat(self._file.descriptor)
+        with contextlib.suppress(OSError):
+            if os.path.samestat(is_open, os.stat(self.path)):
+                return None
+        return os.readlink(self._opened) if is_open.st_nlink else ""
+
+    @property
+    def _opened(self) -> str:
+        return f"/proc/self/fd/{self._file.descriptor}"
+
+    def _write_again(self) -> None:
+        """Copies a file that was removed to its name, unless that is another file's by now."""
+        with (
+            contextlib.suppress(FileExistsError),
+            open(self._opened, "rb") as removed,
+            self.path.open("xb") as again,
+        ):
+            shutil.copyfileobj(removed, again)
 
 
 def _beginning() -> bytes:

@@ -8,20 +8,19 @@ Velocities and efforts come from the same place: numbers `velocity` and `effort`
 the state, arrays of sensor values with one number for each joint.
 """
 
+import struct
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80.recording.blocks import Block
-from o80.recording.cdr import CdrWriter
+from o80.recording.cdr import ENCAPSULATION, CdrWriter
 from o80.recording.epoch import EpochNote, topic_of
+from o80.recording.file_writer import FileWriter
 from o80.rows.layout import Layout, is_plain
-
-if TYPE_CHECKING:
-    from o80.recording.file_writer import FileWriter
 
 TYPE = "sensor_msgs/msg/JointState"
 DEFINITION = f"""\
@@ -182,3 +181,9 @@ class JointWriter:
                 )
             messages[:, place : place + values.shape[1] * 8] = values.view(np.uint8)
         return block
+
+
+def stamped(message: bytes, log_time: int) -> bytes:
+    """A message with another time [ns] in its header, which begins with it."""
+    begin = len(ENCAPSULATION)
+    return message[:begin] + struct.pack("<II", *divmod(log_time, 10**9)) + message[begin + 8 :]

@@ -1,23 +1,20 @@
 """The journal of a backend in a recording: a channel whose messages hold its entries as bytes.
 
-The metadata of the channel say in which version of the format they are (ARCHITECTURE.md, The
-journal in files). `_core.RawJournal` encodes them, `_core.RecordedJournal` decodes them.
+The metadata of the channel name the version of the format (src/runtime/journal/journal_format.hpp).
+`_core.RawJournal` encodes the entries, `_core.RecordedJournal` decodes them.
 """
 
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import IO, TYPE_CHECKING
+from typing import IO
 
 import o80._core as _core
+from o80.frontend.frontend import Frontend
 from o80.recording.cdr import ENCAPSULATION
 from o80.recording.epoch import EpochNote, topic_of
+from o80.recording.file_writer import FileWriter
 from o80.recording.scan import Scan, messages_of
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
-
-    from o80.frontend.frontend import Frontend
-    from o80.recording.file_writer import FileWriter
 
 TYPE = "o80/msg/Journal"
 DEFINITION = """\

@@ -10,6 +10,8 @@ from pathlib import Path
 from typing import Any
 from weakref import WeakSet
 
+from o80.base.descriptors import above_standard
+
 _open_here: "WeakSet[LockedFile]" = WeakSet()
 
 
@@ -20,7 +22,8 @@ class LockedFile:
 
     def __init__(self, path: Path, flags: int) -> None:
         """flags: of os.open, beside O_RDWR. Raises OSError, BlockingIOError if it is locked."""
-        self.descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)
+        with above_standard():
+            self.descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)
         try:
             fcntl.flock(self.descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

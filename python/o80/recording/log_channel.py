@@ -4,25 +4,21 @@ Messages are `rcl_interfaces/Log` on `/rosout`, which Foxglove, rqt and other to
 themselves. The journal beside it holds the same exactly.
 """
 
-from __future__ import annotations
-
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import o80._core as _core
 from o80.base.errors import Error
 from o80.base.words import Status
+from o80.frontend.frontend import Frontend
 from o80.recording.blocks import Messages
 from o80.recording.cdr import CdrWriter
+from o80.recording.file_writer import FileWriter
 from o80.recording.journal_channel import Entries
 from o80.recording.message_types import SEPARATOR
 from o80.rows.journal import ENDS, EntryDecoder, JournalEntry
-from o80.rows.journal_text import JournalText
-
-if TYPE_CHECKING:
-    from o80.frontend.frontend import Frontend
-    from o80.recording.file_writer import FileWriter
+from o80.rows.journal_text import JournalText, command_text, status_text
 
 TOPIC = "/rosout"
 TYPE = "rcl_interfaces/msg/Log"
@@ -47,7 +43,8 @@ uint32 nanosec
 """
 MAX_BYTES = 1 << 16  # of a journal between two polls; of more, only notable entries are told
 MAX_ENDS = 20  # of commands that are told one by one in a poll
-_SILENT = {"taken", "scheduled", "burst", "burst_ended"}
+_BATCHES = {"taken", "scheduled"}
+_SILENT = {*_BATCHES, "burst", "burst_ended"}
 _LEVELS = {
     "halt": ERROR,
     "halt_reason": ERROR,
@@ -98,7 +95,7 @@ class JournalLog:
         self._description = frontend._description
         self._native = _core.RecordedJournal(self._description, 0)
         self._decoder = EntryDecoder(frontend.schema)
-        self._text = JournalText()
+        self._open: dict[tuple[int, int], _core.JournalRecord] = {}  # by lane and id, until the end
 
     def told(self, entries: Entries, notable: bool) -> list[tuple[int, int, str]]:
         """Iteration, level and text of what is worth a line.
@@ -108,7 +105,7 @@ class JournalLog:
         many = len(entries.content) > MAX_BYTES
         if many:  # what it knows of open commands would only grow
             self._native = _core.RecordedJournal(self._description, 0)
-            self._text = JournalText()
+            self._open = {}
         if many and not notable:
             return []
         try:
@@ -120,29 +117,35 @@ class JournalLog:
         natives = self._native.decode(entries.content, entries.codec)
         if many:
             natives = [each for each in natives if each.kind not in {*_SILENT, "status"}]
+        ends = [each for each in natives if each.kind == "status" and each.status in ENDS]
         told: list[tuple[int, int, str]] = []
-        ends: list[tuple[Status, tuple[int, int, str]]] = []
         for native in natives:
-            entry = self._decoder.entry(native)
-            text = self._text.text(entry)
-            level = _level(entry)
-            if entry.status in ENDS and entry.kind == "status":
-                ends.append((entry.status, (entry.iteration, level, text.strip())))
-            elif level > 0:
-                told.append((entry.iteration, level, text))
-        if len(ends) <= MAX_ENDS:
-            told += [line for _, line in ends]
-        else:
-            found = [status for status, _ in ends]
-            counts = ", ".join(f"{found.count(each)} {each}" for each in dict.fromkeys(found))
-            told.append((ends[-1][1][0], INFO, f"commands ended: {counts}"))
+            if native.kind in _BATCHES:
+                self._open.update({(native.lane, each.id): each for each in native.records})
+            elif native.kind == "status":
+                if native.status in ENDS:
+                    record = self._open.pop((native.lane, native.id), None)
+                    if len(ends) <= MAX_ENDS:
+                        told.append(self._end(native, record))
+            elif native.kind not in _SILENT:
+                entry = self._decoder.entry(native)
+                told.append((entry.iteration, _level(entry), JournalText().text(entry)))
+        if len(ends) > MAX_ENDS:
+            counts = Counter(each.status for each in ends)
+            text = ", ".join(f"{count} {status}" for status, count in counts.items())
+            told.append((ends[-1].iteration, INFO, f"commands ended: {text}"))
         return sorted(told, key=lambda line: line[0])
+
+    def _end(
+        self, native: _core.JournalEntry, record: _core.JournalRecord | None
+    ) -> tuple[int, int, str]:
+        entry = self._decoder.entry(native)
+        command = None if record is None else command_text(self._decoder.command(record))
+        level = _LEVELS_OF_ENDS.get(native.status, INFO)
+        return entry.iteration, level, status_text(entry, command)
 
 
 def _level(entry: JournalEntry) -> int:
-    """0: not worth a line."""
-    if entry.kind == "status":
-        return _LEVELS_OF_ENDS.get(entry.status, INFO) if entry.status in ENDS else 0
     if entry.kind == "ended":
         return ERROR if entry.text else INFO
-    return 0 if entry.kind in _SILENT else _LEVELS.get(entry.kind, INFO)
+    return _LEVELS.get(entry.kind, INFO)

@@ -12,6 +12,7 @@ from typing import IO, Any
 
 import numpy as np
 
+from o80.base.finite import json_text
 from o80.base.screen import html
 from o80.recording.blocks import Messages
 from o80.recording.cdr import CdrReader, CdrWriter
@@ -48,7 +49,7 @@ class Mark:
         cdr.numbers("I", len(self.rows))
         if self.rows:
             cdr.numbers("q", *self.rows.values())
-        cdr.text(json.dumps(self.values, default=_plain))
+        cdr.text(json_text(self.values, default=_plain))
         return bytes(cdr.data)
 
     @classmethod

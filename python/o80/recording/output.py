@@ -11,12 +11,12 @@ from o80.base.unwritable import reason
 from o80.recording import joint_states
 from o80.recording.blocks import messages_in
 from o80.recording.cdr import ENCAPSULATION
-from o80.recording.epoch import EpochNote, channels_of
+from o80.recording.epoch import EpochNote, WallClock, channels_of
 from o80.recording.file_writer import USUAL, FileWriter, Form
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import last_entries_in
-from o80.recording.reader import RecordingFile, files_of, in_order
-from o80.recording.scan import MAGIC, NotARecordingError, Scan, content_of, has_end, index_of, scan
+from o80.recording.reader import files_of, in_order
+from o80.recording.scan import NotARecordingError, Scan, content_of, has_end, index_of, scan
 
 
 @dataclass(frozen=True)
@@ -80,15 +80,10 @@ def opened_in(folder: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
     return last
 
 
-def unfinished_in(path: Path) -> list[Path]:
-    """The files of a recording that were cut. Raises RecordingError."""
-    begun = [file for file in in_order(path) if not _has_begun(file)]  # of a folder
-    cut = [file for file in files_of(path) if not RecordingFile(file).finished]
-    return sorted(begun + cut)
-
-
-def _has_begun(file: Path) -> bool:
-    return file.stat().st_size >= len(MAGIC)
+def all_files_of(path: Path) -> list[Path]:
+    """The files of a recording, also those that were being created. Raises RecordingError."""
+    there = files_of(path)
+    return in_order(path) if path.is_dir() else there
 
 
 def next_file(file: FileWriter) -> FileWriter:
@@ -109,6 +104,18 @@ class Predecessor:
         self._last = file.path
         self._found = [(file.path, file.found)]  # newest first
         self._unread = list(before)
+
+    def clock(self) -> WallClock:
+        """The clock that the last file goes on with. Raises RecordingError."""
+        path, found = self._found[0]
+        clock = WallClock({})
+        for channel in found.channels.values():
+            note = EpochNote.of(channel.metadata)
+            if note is not None and note.boot:
+                clock.offsets.setdefault(note.boot, note.wall_offset)
+                last = _last_row(path, found, channel.id)
+                clock.after = max(clock.after, last[1] if last else 0)
+        return clock
 
     def written(self, segment: str) -> dict[int, Written]:
         """Written part of each epoch of a segment; empty: no row. Raises RecordingError."""

@@ -1,14 +1,14 @@
 """Recordings made of others: a stretch of time, some segments, every nth row, several in one."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO
+
+from mcap.records import Channel, ChunkIndex
 
 from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
@@ -16,21 +16,16 @@ from o80.recording import joint_states
 from o80.recording.blocks import Block, Messages
 from o80.recording.cdr import ENCAPSULATION
 from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote
+from o80.recording.file_writer import FileWriter, MessageBlock
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries
 from o80.recording.output import opened
 from o80.recording.reader import RecordingFile
-from o80.recording.scan import attachment_of, index_of, messages_of
+from o80.recording.recorded_epoch import RecordedEpoch
+from o80.recording.scan import Scan, attachment_of, index_of, messages_of
 from o80.recording.transforms import TOPIC as TRANSFORMS
 from o80.recording.transforms import Poses, TransformWriter
-
-if TYPE_CHECKING:
-    from mcap.records import Channel, ChunkIndex
-
-    from o80.recording.file_writer import FileWriter, MessageBlock
-    from o80.recording.recorded_epoch import RecordedEpoch
-    from o80.recording.scan import Scan
 
 Run = tuple[str, int]  # segment and epoch
 
@@ -62,11 +57,14 @@ def write_part(
     """
     read = [RecordingFile(path) for path in recordings]
     sources = [[each for each in recording.scans if each[1].chunks] for recording in read]
+    offsets = _offsets_in(chain.from_iterable(sources))
     # those of one recording in their order, which may not be that of time: robots have own clocks
-    in_order = sorted((each for each in sources if each), key=_begin_of)
+    in_order = sorted(
+        (each for each in sources if each), key=lambda files: _begin_of(files, offsets)
+    )
     file = opened(output, proceed=False)
     try:
-        writer = _PartWriter(file, selection)
+        writer = _PartWriter(file, selection, offsets)
         for recording in read if selection.transforms else ():
             for name in recording:
                 for epoch in recording[name].epochs:
@@ -93,14 +91,44 @@ def write_part(
     return writer.rows
 
 
-def _begin_of(files: list[tuple[Path, Scan]]) -> int:
-    return min(found.chunks.start for _, found in files)
+def _begin_of(files: list[tuple[Path, Scan]], offsets: dict[str, int]) -> int:
+    return min(found.chunks.start + _largest(_shifts(found, offsets)) for _, found in files)
+
+
+def _notes_in(found: Scan) -> Iterator[EpochNote]:
+    for channel in found.channels.values():
+        note = EpochNote.of(channel.metadata)
+        if note is not None:
+            yield note
+
+
+def _offsets_in(files: Iterable[tuple[Path, Scan]]) -> dict[str, int]:
+    """Wall clock less row time of each boot [ns]: the largest, because clocks begin in the past."""
+    offsets: dict[str, int] = {}
+    for _, found in files:
+        for note in _notes_in(found):
+            if note.boot:
+                offsets[note.boot] = max(note.wall_offset, offsets.get(note.boot, 0))
+    return offsets
+
+
+def _shifts(found: Scan, offsets: dict[str, int]) -> dict[Run, int]:
+    """Shift of the log times of the runs of a file [ns], so that those of one boot agree."""
+    return {
+        (note.segment, note.epoch): offsets.get(note.boot, note.wall_offset) - note.wall_offset
+        for note in _notes_in(found)
+    }
+
+
+def _largest(shifts: dict[Run, int]) -> int:
+    return max(shifts.values(), default=0)
 
 
 class _PartWriter:
-    def __init__(self, file: FileWriter, selection: Selection) -> None:
+    def __init__(self, file: FileWriter, selection: Selection, offsets: dict[str, int]) -> None:
+        """offsets: of the boots of all recordings; see `_offsets_in`."""
         self.rows: dict[str, tuple[int, int, int]] = {}
-        self._file, self._selection = file, selection
+        self._file, self._selection, self._offsets = file, selection, offsets
         self._channels: dict[object, int] = {}
         self._numbers: dict[Run, int] = {}  # of runs in the new file
         self._next: dict[int, int] = {}  # by new channel: what comes next, so nothing comes twice
@@ -113,8 +141,9 @@ class _PartWriter:
     def add(self, content: IO[bytes], found: Scan) -> None:
         """Adds what is kept of a file. Raises ValueError if it is damaged."""
         self._found, self._content = found, content
+        self._shifts = _shifts(found, self._offsets)
         for chunk in found.chunks:
-            if chunk.message_end_time >= self._selection.begin:
+            if chunk.message_end_time + _largest(self._shifts) >= self._selection.begin:
                 blocks = [*self._blocks(chunk)]
                 if blocks:
                     self._file.add_chunk(blocks)
@@ -164,7 +193,9 @@ class _PartWriter:
                 continue
             if channel.topic == TRANSFORMS and self._selection.transforms:
                 continue
-            times = [int(time) for time in index_of(content, chunk, number)[:, 0]]
+            # marks and the log belong to no run: they are of the newest boot of the file
+            shift = _largest(self._shifts) if run is None else self._shifts.get(run, 0)
+            times = [int(time) + shift for time in index_of(content, chunk, number)[:, 0]]
             messages: Iterable[tuple[int, bytes]] = zip(
                 times, messages_of(content, chunk, number), strict=True
             )
@@ -176,7 +207,11 @@ class _PartWriter:
             elif channel.metadata.get("content") == JOURNAL and run is not None:
                 messages = self._entries(channel, messages)
             elif channel.metadata.get("content") == joint_states.CONTENT and run in kept:
-                messages = [each for each in messages if each[0] in kept[run]]
+                messages = [
+                    (time, joint_states.stamped(message, time) if shift else message)
+                    for time, message in messages
+                    if time in kept[run]
+                ]
             else:  # marks and the log; recordings of the same time have them twice
                 messages = [
                     each
@@ -251,7 +286,9 @@ class _PartWriter:
             if each.name == note.provenance:
                 self._file.add_metadata(new.provenance, each.metadata)
             elif each.name == note.interruption:
+                shift = self._shifts[note.segment, note.epoch]
                 texts = each.metadata | {"number": str(number)}
+                texts["since"] = str(int(texts["since"]) + shift)
                 self._file.add_metadata(new.interruption, texts)
             elif each.name == JOURNAL_GAP and run == (note.segment, str(note.number)):
                 self._file.add_metadata(each.name, each.metadata | {"number": str(number)})
@@ -263,6 +300,8 @@ class _PartWriter:
         if key not in self._channels:
             texts = channel.metadata if run is None else self._texts(channel)
             if begin is not None:
+                if offset := self._offsets.get(texts.get("boot", "")):
+                    texts = texts | {"wall_offset": str(offset)}
                 texts = texts | {"begin": str(begin), "every": str(self._every(channel))}
                 if begin - int(channel.metadata["begin"]) >= self._every(channel):
                     texts |= {"before": "cut away"}

@@ -4,6 +4,7 @@ import os
 import struct
 from bisect import bisect
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -162,9 +163,16 @@ def _scans_of(path: Path) -> Iterator[tuple[Path, Scan]]:
 
 
 def _scanned(path: Path) -> Scan:
-    try:
+    with told(path):
         found = scan(path)
         return copied(path) if found.foreign else found
+
+
+@contextmanager
+def told(path: Path) -> Iterator[None]:
+    """Makes errors of a scan of a file RecordingErrors, which say what to do."""
+    try:
+        yield
     except NotARecordingError as error:
         raise RecordingError(f"{error}: o80.open reads files of o80 record") from None
     except FileNotFoundError:

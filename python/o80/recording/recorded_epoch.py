@@ -2,9 +2,10 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
+from mcap.records import ChunkIndex
 
 import o80._core as _core
 from o80.base.argument_checks import whole
@@ -22,9 +23,6 @@ from o80.rows.history import History, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
 from o80.rows.layout import Layout, decoder_of
 from o80.rows.provenance import Provenance
-
-if TYPE_CHECKING:
-    from mcap.records import ChunkIndex
 
 T = TypeVar("T")
 
@@ -47,6 +45,11 @@ class RecordedEpoch:
     def wall_offset(self) -> int:
         """Wall-clock time [ns since 1970] less row time."""
         return self._note.wall_offset
+
+    @property
+    def boot(self) -> str:
+        """Names the boot of the machine whose monotonic clock the rows have; empty: not known."""
+        return self._note.boot
 
     @property
     def rows(self) -> int:

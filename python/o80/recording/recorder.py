@@ -15,7 +15,7 @@ from typing import Any
 from o80.base.errors import Error, InvalidArgument, RecordingError
 from o80.base.screen import bytes_text
 from o80.frontend.segments import segments
-from o80.recording.epoch import topic_of
+from o80.recording.epoch import WallClock, topic_of
 from o80.recording.file_writer import USUAL, Form
 from o80.recording.log_channel import INFO, Line, added_lines
 from o80.recording.marks import Mark, added_marks, has_marks
@@ -80,10 +80,12 @@ class Recorder:
         self._file_begun = time.monotonic()
         self.sources: dict[str, Source] = {}
         self._search_at = 0.0
+        self._lost: object = None  # the file whose name was lost
         self._begun = self._polled = time.monotonic()
         self._left_out: set[str] = set()  # found, but not recorded
         try:
             self._before = Predecessor(self.file, before) if proceed else None
+            self._clock = self._before.clock() if self._before else WallClock({})
             with self.writing():
                 for name in names:
                     if name not in self._patterns:
@@ -156,7 +158,20 @@ class Recorder:
                 blocks.append(added_lines(self.file, lines))
             if blocks:
                 self.file.add_chunk(blocks)
+            self._check_name()
         return count
+
+    def _check_name(self) -> None:
+        """Warns once when the file that is written has lost its name."""
+        name = self.file.moved_to()
+        if name is not None and self._lost is not self.file:
+            self._lost = self.file
+            where = (
+                f"moved to {name}, and goes on there" if name else "removed: it is written again"
+            )
+            end = "" if name else " to its name when it ends, and lost if its recorder is killed"
+            text = f"the recording {self.file.path} was {where}{end}"
+            warnings.warn(text, RuntimeWarning, stacklevel=3)
 
     @contextmanager
     def writing(self) -> Iterator[None]:
@@ -251,7 +266,7 @@ class Recorder:
                 )
         written = self._before.written(name) if self._before else {}
         self.sources[name] = Source(
-            name, self.file, written, from_now=from_now, snapshots=self._snapshots
+            name, self.file, written, self._clock, from_now=from_now, snapshots=self._snapshots
         )
 
     def _search(self, from_now: bool = False, *, new: bool = False) -> None:

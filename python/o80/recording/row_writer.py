@@ -1,22 +1,19 @@
 """Messages of the rows of one run of a backend."""
 
 import time
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80.base.machine import this_machine
+from o80.frontend.reader import Reader
 from o80.recording.blocks import Block
 from o80.recording.epoch import DESCRIPTION, EpochNote, topic_of
+from o80.recording.file_writer import FileWriter
 from o80.recording.joint_states import JointWriter
 from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import PACKAGE, row_type
-
-if TYPE_CHECKING:
-    from o80.frontend.reader import Reader
-    from o80.recording.file_writer import FileWriter
-    from o80.rows.layout import Layout
+from o80.rows.layout import Layout
 
 
 class RowWriter:

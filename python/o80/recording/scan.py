@@ -50,7 +50,7 @@ CHUNK_HEAD = struct.Struct("<QQQIL")
 FOOTER_LENGTH = HEAD.size + 20 + len(MAGIC)
 DATA_END_LENGTH = HEAD.size + 4
 BETWEEN_FIGURES = 5000  # records that are scanned
-_DAMAGED = (EndOfFile, ValueError, OverflowError, struct.error)
+_DAMAGED = (EndOfFile, ValueError, OverflowError, LookupError, MemoryError, struct.error)
 
 
 class NotARecordingError(ValueError):
@@ -112,7 +112,7 @@ def scan(path: str | os.PathLike[str]) -> Scan:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MAGIC)) != MAGIC:
             raise NotARecordingError(f"{path} is not an MCAP file")
-        found = _by_summary(file, size) or _Scanner(file, size, path).run()
+        found = _by_summary(file, size) or _scanned(file, size, path)
     known = found.channels.keys()
     for there in found.chunks.channels:
         found.foreign |= not known >= there
@@ -135,6 +135,12 @@ def has_end(path: str | os.PathLike[str]) -> bool:
         return _footer(file, os.fstat(file.fileno()).st_size) is not None
 
 
+def has_summary(path: str | os.PathLike[str]) -> bool:
+    """Whether the summary of a file is whole and tells everything. Raises OSError."""
+    with Path(path).open("rb") as file:
+        return _by_summary(file, os.fstat(file.fileno()).st_size) is not None
+
+
 def _footer(file: IO[bytes], size: int) -> Footer | None:
     """The footer, if there is a summary."""
     file.seek(max(0, size - FOOTER_LENGTH))
@@ -153,6 +159,45 @@ def _by_summary(file: IO[bytes], size: int) -> Scan | None:
         return None
 
 
+def _scanned(file: IO[bytes], size: int, path: str | os.PathLike[str]) -> Scan:
+    try:
+        return _Scanner(file, size, path).run()
+    except RecordingError:
+        raise
+    except _DAMAGED as error:
+        raise RecordingError(f"{path} is damaged, and its summary too") from error
+
+
+def damage_in(path: Path, found: Scan) -> Iterator[str]:
+    """Places that disagree with their checksum, and chunks whose indexes lead elsewhere."""
+    with found.opened(path) as file:
+        for chunk in found.chunks:
+            try:
+                at = file.seek(chunk.chunk_start_offset)
+                head = Opcode.CHUNK, chunk.chunk_length - HEAD.size
+                if HEAD.unpack(file.read(HEAD.size)) != head:
+                    raise ValueError(f"the head of the chunk at byte {at} is damaged")
+                _check_indexes(file, chunk, content_of(file, chunk))
+            except _DAMAGED as error:
+                yield str(error)
+        for place in found.attachments:
+            file.seek(place.offset + HEAD.size)
+            record = file.read(place.length - HEAD.size)
+            if zlib.crc32(record[:-4]) != int.from_bytes(record[-4:], "little"):
+                yield f"the attachment {place.name} at byte {place.offset} is damaged"
+
+
+def _check_indexes(file: IO[bytes], chunk: ChunkIndex, content: bytes) -> None:
+    """Raises ValueError if a message index does not lead to the messages of its channel."""
+    for channel in chunk.message_index_offsets:
+        for time, offset in index_of(file, chunk, channel).tolist():
+            head = content[offset : offset + MESSAGE_HEAD.itemsize].ljust(MESSAGE_HEAD.itemsize)
+            known = np.frombuffer(head, MESSAGE_HEAD)[0]
+            if (known["channel"], known["log_time"]) != (channel, time):
+                place = chunk.message_index_offsets[channel]
+                raise ValueError(f"the message index at byte {place} is damaged")
+
+
 def _summary(file: IO[bytes], size: int) -> Scan | None:
     footer = _footer(file, size)
     if footer is None or not footer.summary_crc:
@@ -161,7 +206,7 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
     file.seek(max(end, 0))
     data = file.read(size)
     behind = len(data) - len(MAGIC) - 4  # of what the checksum covers
-    if end < 0 or data[0] != Opcode.DATA_END:
+    if end < 0 or len(data) < DATA_END_LENGTH or data[0] != Opcode.DATA_END:
         return None
     if zlib.crc32(data[DATA_END_LENGTH:behind]) != footer.summary_crc:
         return None

@@ -8,7 +8,7 @@ import o80._core as _core
 from o80.base.errors import BackendGone, RecordingError, SegmentError, TimeoutError
 from o80.frontend.frontend import Frontend
 from o80.recording.blocks import Block, Messages
-from o80.recording.epoch import EARLIER_FILE, GAP, note_of
+from o80.recording.epoch import EARLIER_FILE, GAP, WallClock, note_of
 from o80.recording.file_writer import FileWriter, MessageBlock
 from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
@@ -30,12 +30,13 @@ class Source:
         name: str,
         file: FileWriter,
         written: Mapping[int, Written],
+        clock: WallClock,
         *,
         from_now: bool,
         snapshots: float | None = None,
     ) -> None:
-        """written: by epoch, at least the newest. from_now: begin with the newest row. snapshots:
-        ask for one in this time [s].
+        """written: by epoch, at least the newest. clock: of the recording. from_now: begin with
+        the newest row. snapshots: ask for one in this time [s].
         """
         self.name = name
         self.rows = 0  #: recorded so far
@@ -46,6 +47,7 @@ class Source:
         self.log: list[Line] = []  #: what was not written yet
         self._file = file
         self._written = dict(written)
+        self._clock = clock
         self._from_now = from_now
         self._frontend: Frontend | None = None
         self._writer: RowWriter | None = None
@@ -225,12 +227,10 @@ class Source:
         if not self._from_now or self._written:
             first = min(first, _oldest_safe(frontend))
         number = 1 + max((each.note.number for each in self._written.values()), default=-1)
+        times = frontend.history(since=first, until=first).time
+        first_time = int(times[0]) if len(times) else 2**62  # it was overwritten meanwhile
         note = note_of(frontend, number, first)
-        if self._written:
-            first_time = frontend.history(since=first, until=first).time
-            if len(first_time):
-                note = note.not_before(int(first_time[0]), self._last_log_time)
-        return Written(note)
+        return Written(self._clock.placed(note, first_time, self._last_log_time))
 
     # ------------------------------------------------------------------ what it reads
 

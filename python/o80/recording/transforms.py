@@ -1,21 +1,17 @@
 """Poses of a robot's bodies as tf2_msgs/TFMessage, which ROS tools and Foxglove show in 3D."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80.recording.blocks import Block
 from o80.recording.cdr import CdrWriter
+from o80.recording.file_writer import FileWriter
 from o80.recording.message_plan import plan_of_rows
 from o80.recording.message_types import SEPARATOR
-
-if TYPE_CHECKING:
-    from o80.recording.file_writer import FileWriter
-    from o80.rows.layout import Layout
+from o80.rows.layout import Layout
 
 TOPIC = "/tf"
 TYPE = "tf2_msgs/msg/TFMessage"

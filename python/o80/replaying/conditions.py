@@ -11,17 +11,14 @@ TOLERANCE = 1e-9
 
 def reads_the_world(schema: dict[str, Any]) -> str:
     """Why a robot must not be started for a replay, because it may be hardware; else empty."""
-    if schema.get("of_the_world"):
-        return "the robot reads the world (its driver says so), which no replay can repeat"
-    if schema.get("simulated"):
-        return ""
+    said_nothing = not schema.get("of_the_world")  # in old recordings
     served = {request["name"] for request in schema["requests"]}
-    if lacking := {"snapshot", "restore"} - served:
-        return (
-            f"the robot may be hardware: it does not say that it is a simulation (in Python "
-            f"of_the_world = False), nor serves the requests of one ({', '.join(sorted(lacking))})"
-        )
-    return ""
+    if schema.get("simulated") or (said_nothing and {"snapshot", "restore"} <= served):
+        return ""
+    return (
+        "the robot may be hardware: it does not say that it is simulated (in describe "
+        "schema.simulated(), in Python simulated = True)"
+    )
 
 
 def blended_columns(schema: dict[str, Any]) -> list[str]:

@@ -1,7 +1,5 @@
 """Gives the entries of a journal to a replay, just before the rows that they act in."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +16,7 @@ class EntryFeed:
         entries: Iterator[_core.JournalEntry],
         start: Start,
         slots: SlotsKept,
-        rules: MotionRules,
+        rules: "MotionRules",
     ) -> None:
         self._entries = (entry for entry in entries if entry.number >= start.entry)
         self._begins = start.entry
@@ -94,7 +92,7 @@ class MotionRules:
     limited: frozenset[int]  #: the actuators with such limits
 
     @classmethod
-    def of(cls, schema: dict[str, Any], recorded: int, now: int) -> MotionRules:
+    def of(cls, schema: dict[str, Any], recorded: int, now: int) -> "MotionRules":
         actuators = list(enumerate(schema["actuators"]))
         limited = (
             number

@@ -1,7 +1,5 @@
 """Run of a backend, as a replay needs it: its rows, its journal, how it was started."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
@@ -40,7 +38,7 @@ class RecordedRun(Protocol):
         """The same, as the compiled library reads it."""
 
     @property
-    def provenance(self) -> Provenance: ...
+    def provenance(self) -> "Provenance": ...
 
     @property
     def machine(self) -> Machine | None:
@@ -58,7 +56,7 @@ class RecordedRun(Protocol):
     def missing(self) -> list[str]:
         """Texts about an end of the run, or runs before it, that are missing."""
 
-    def blocks(self) -> Iterator[History]:
+    def blocks(self) -> "Iterator[History]":
         """Rows in their order, a few thousand at a time."""
 
     def entries(self) -> Iterator[_core.JournalEntry]:
@@ -69,7 +67,7 @@ class RecordedRun(Protocol):
 class LiveRun:
     """Run that a segment in shared memory holds."""
 
-    frontend: Frontend
+    frontend: "Frontend"
     number: int = 0
 
     @property
@@ -86,7 +84,7 @@ class LiveRun:
         return self.frontend._description
 
     @property
-    def provenance(self) -> Provenance:
+    def provenance(self) -> "Provenance":
         return self.frontend.provenance
 
     @property
@@ -105,7 +103,7 @@ class LiveRun:
     def missing(self) -> list[str]:
         return []
 
-    def blocks(self) -> Iterator[History]:
+    def blocks(self) -> "Iterator[History]":
         last = self.frontend.published
         for since in range(self.frontend.oldest, last + 1, ROWS_AT_ONCE):
             yield self.frontend.history(since=since, until=min(last, since + ROWS_AT_ONCE - 1))
@@ -128,7 +126,7 @@ class FileRun:
 
     segment: str
     number: int
-    epoch: RecordedEpoch
+    epoch: "RecordedEpoch"
 
     @property
     def schema(self) -> dict[str, Any]:
@@ -139,7 +137,7 @@ class FileRun:
         return self.epoch.description
 
     @property
-    def provenance(self) -> Provenance:
+    def provenance(self) -> "Provenance":
         return self.epoch.provenance
 
     @property
@@ -161,7 +159,7 @@ class FileRun:
             *(str(gap) for gap in self.epoch.gaps if gap.first >= self.epoch.next_row),
         ]
 
-    def blocks(self) -> Iterator[History]:
+    def blocks(self) -> "Iterator[History]":
         for block in self.epoch.blocks():
             for begin in range(0, len(block), ROWS_AT_ONCE):
                 yield block[begin : begin + ROWS_AT_ONCE]
@@ -175,7 +173,7 @@ class FileRun:
         return self.epoch.native_journal(rests=True)
 
 
-def runs_in(recording: RecordingFile, segment: str | None = None) -> list[FileRun]:
+def runs_in(recording: "RecordingFile", segment: str | None = None) -> list[FileRun]:
     """The runs of all segments of a recording, or of one. Raises InvalidArgument."""
     if segment is not None and segment not in recording.segments:
         there = ", ".join(recording) or "none"

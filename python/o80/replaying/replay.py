@@ -4,18 +4,16 @@ report = o80.replay("run.mcap")
 assert report.identical, report
 """
 
-from __future__ import annotations
-
 import os
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 import o80._core as _core
-from o80.base.errors import DriverError, InvalidArgument
+from o80.base.errors import DriverError, InvalidArgument, sentence
 from o80.frontend.frontend import Frontend
 from o80.joining.difference import Difference, RobotsDifferError, first_difference, same_bytes
 from o80.replaying.conditions import (
@@ -50,7 +48,7 @@ _HISTORY = 4 * ROWS_AT_ONCE  # rows that the replay keeps: those of a block, and
 
 
 def replay(
-    source: str | os.PathLike[str] | RecordingFile | Frontend,
+    source: "str | os.PathLike[str] | RecordingFile | Frontend",
     *,
     segment: str | None = None,
     robot: OtherRobot = None,
@@ -79,50 +77,23 @@ def replay(
     driver: False starts no robot, as for hardware.
     progress: called with the name of a run, its rows compared, and all its rows.
 
-    Only simulations are started: robots that say so (in Python of_the_world = False), and those
-    that serve the requests snapshot and restore and do not say that they read the world. Of all
-    others, and with driver=False, only the backend runs: it reads the recorded observed and
-    extended values, obeys the recorded halts, interrupts and fresh starts of the driver too, and
-    its desired states are compared. No hardware is touched. The report says so.
+    Only robots that say that they are simulated are started. Of all others, and with driver=False,
+    only the backend runs: it reads the recorded observed and extended values, obeys the recorded
+    halts, interrupts and fresh starts of the driver too, and its desired states are compared. No
+    hardware is touched. The report says so.
 
     Raises InvalidArgument, RecordingError, DriverError.
     """
-    return replay_runs(
-        _runs_of(source, segment),
-        robot=robot,
-        options=options,
-        tolerances=tolerances,
-        ignore=ignore,
-        since=since,
-        driver=driver,
-        progress=progress,
-    )
-
-
-def replay_runs(
-    runs: Iterable[RecordedRun],
-    *,
-    robot: OtherRobot = None,
-    options: Mapping[str, Any] | None = None,
-    tolerances: Mapping[str, float] | None = None,
-    ignore: tuple[str, ...] = (),
-    since: int | None = None,
-    driver: bool = True,
-    progress: Progress | None = None,
-) -> ReplayReport:
-    """As `replay`, for runs from anywhere."""
     return ReplayReport(
         tuple(
-            _RunReplay(
-                run, robot, options or {}, tolerances, ignore, since, driver, progress
-            ).report()
-            for run in runs
+            RunReplay(run, robot, options, tolerances, ignore, since, driver, progress).report()
+            for run in _runs_of(source, segment)
         )
     )
 
 
 def _runs_of(
-    source: str | os.PathLike[str] | RecordingFile | Frontend, segment: str | None
+    source: "str | os.PathLike[str] | RecordingFile | Frontend", segment: str | None
 ) -> list[RecordedRun]:
     if isinstance(source, Frontend):
         return [LiveRun(source)]
@@ -135,21 +106,21 @@ def _runs_of(
     return runs
 
 
-class _RunReplay:
-    """The replay of one run."""
+class RunReplay:
+    """The replay of one run; the arguments are those of `replay`."""
 
     def __init__(
         self,
         run: RecordedRun,
-        robot: OtherRobot,
-        options: Mapping[str, Any],
-        tolerances: Mapping[str, float] | None,
-        ignore: tuple[str, ...],
-        since: int | None,
-        driver: bool,
-        progress: Progress | None,
+        robot: OtherRobot = None,
+        options: Mapping[str, Any] | None = None,
+        tolerances: Mapping[str, float] | None = None,
+        ignore: tuple[str, ...] = (),
+        since: int | None = None,
+        driver: bool = True,
+        progress: Progress | None = None,
     ) -> None:
-        self._run, self._robot, self._options = run, robot, options
+        self._run, self._robot, self._options = run, robot, options or {}
         self._tolerances, self._ignore, self._progress = tolerances, ignore, progress
         self._since = since
         self._no_driver = reads_the_world(run.schema) if driver else "as requested"
@@ -270,11 +241,11 @@ class _RunReplay:
         return between.join(begins)
 
     @staticmethod
-    def _chain(first: History, others: Iterator[History]) -> Iterator[History]:
+    def _chain(first: "History", others: "Iterator[History]") -> "Iterator[History]":
         yield first
         yield from others
 
-    def _whole(self, blocks: Iterator[History]) -> Iterator[History]:
+    def _whole(self, blocks: "Iterator[History]") -> "Iterator[History]":
         """Rows from the start to the first gap.
 
         No block ends with the row of a fresh start: the decisions after it are of the same step.
@@ -321,7 +292,7 @@ class _RunReplay:
             )
         return without_driver(self._run, _HISTORY)
 
-    def _compare_block(self, runner: Runner, block: History) -> Difference | None:
+    def _compare_block(self, runner: Runner, block: "History") -> Difference | None:
         first, last = int(block.iteration[0]), int(block.iteration[-1])
         native = runner.native
         try:
@@ -337,8 +308,8 @@ class _RunReplay:
         except RobotsDifferError as error:
             raise InvalidArgument(
                 f"robot '{self._run.schema['robot']}' is described differently than when segment "
-                f"'{self._run.segment}' was recorded: {error}. Give the robot as it was then "
-                f"(--robot FILE.so, in Python robot=), or compare only desired states "
+                f"'{self._run.segment}' was recorded: {sentence(error)} Give the robot as it was "
+                f"then (--robot FILE.so, in Python robot=), or compare only desired states "
                 f"(--without-driver, in Python driver=False)"
             ) from None
         decided = native.mismatch
@@ -367,7 +338,7 @@ class _RunReplay:
         parts = ["desired", "observed"] if frontend.actuators else []
         return [*parts, "extended"] if "extended" in frontend._layout.schema else parts
 
-    def _first_difference(self, recorded: History, replayed: History) -> Difference | None:
+    def _first_difference(self, recorded: "History", replayed: "History") -> Difference | None:
         if same_bytes(recorded, replayed):
             return None
         world = [each.name for each in columns_of(recorded.schema) if each.origin == "world"]
@@ -375,7 +346,7 @@ class _RunReplay:
             recorded, replayed, ignore=[*self._ignore, *world], tolerances=self._tolerances
         )
 
-    def _count(self, compared: History) -> None:
+    def _count(self, compared: "History") -> None:
         if not len(compared):
             return
         if self._rows == 0:
@@ -386,13 +357,13 @@ class _RunReplay:
             self._progress(self._run.segment, self._rows, self._run.rows)
 
 
-def _settled(block: History) -> History:
+def _settled(block: "History") -> "History":
     """The block without fresh starts at its end: later decisions belong to the same step."""
     settled = np.flatnonzero(block.rows["fresh"] == 0)
     return block[: int(settled[-1]) + 1 if len(settled) else 0]
 
 
-def _joined(one: History, other: History) -> History:
+def _joined(one: "History", other: "History") -> "History":
     from o80.rows.history import History
 
     return History._joined(one._decoder, [one, other])

@@ -1,7 +1,5 @@
 """Runners of a replay: the recorded robot, or its backend alone."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -49,7 +47,7 @@ class Runner:
             return
         self.native.begin_at(start.row)
 
-    def run(self, block: History, start: Start) -> bool:
+    def run(self, block: "History", start: Start) -> bool:
         """Runs one iteration for each row; False if the robot or its backend has ended."""
         if isinstance(self.native, _core.Replay):
             first = int(block.iteration[0])
@@ -59,7 +57,7 @@ class Runner:
 
 @contextmanager
 def with_driver(
-    run: RecordedRun, robot: OtherRobot, options: Mapping[str, Any], history: int
+    run: "RecordedRun", robot: OtherRobot, options: Mapping[str, Any], history: int
 ) -> Iterator[Runner]:
     """The recorded robot, or another one, with the recorded options.
 
@@ -83,7 +81,7 @@ def with_driver(
 
 
 @contextmanager
-def without_driver(run: RecordedRun, history: int) -> Iterator[Runner]:
+def without_driver(run: "RecordedRun", history: int) -> Iterator[Runner]:
     """A backend of the recorded description, which reads what was recorded.
 
     history: rows that the replay keeps. Raises InvalidArgument.
@@ -100,7 +98,7 @@ def without_driver(run: RecordedRun, history: int) -> Iterator[Runner]:
         _core.clean(name)
 
 
-def _loop_options(run: RecordedRun, history: int) -> list[tuple[str, str]]:
+def _loop_options(run: "RecordedRun", history: int) -> list[tuple[str, str]]:
     recorded, schema = run.provenance.run_options, run.schema
     loop = {name: recorded[name] for name in _OF_BACKEND if name in recorded}
     loop |= {"bursting": text_of(schema["bursting"]), "stale": schema["stale"]}

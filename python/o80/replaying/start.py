@@ -4,8 +4,6 @@ snapshot that was taken while nothing acted.
 Without a driver: at row 0, at a fresh start, or at a row in which nothing acts.
 """
 
-from __future__ import annotations
-
 import bisect
 import itertools
 import struct
@@ -39,7 +37,7 @@ class Requests:
     def __init__(self, schema: dict[str, Any]) -> None:
         self._names = [request["name"] for request in schema["requests"]]
 
-    def of(self, entry: _core.JournalEntry) -> Iterator[tuple[str, int, int]]:
+    def of(self, entry: "_core.JournalEntry") -> Iterator[tuple[str, int, int]]:
         """Name, slot and id of each request of a batch; slot -1: the request has none."""
         for record in entry.records:
             if record.kind != "request":
@@ -56,7 +54,7 @@ class SlotsKept:
         self._requests, self._start = requests, start
         self._known = set(start.snapshots)
 
-    def unknown(self, entry: _core.JournalEntry) -> int | None:
+    def unknown(self, entry: "_core.JournalEntry") -> int | None:
         """The slot that this batch restores although its snapshot is not known, or None."""
         if entry.kind != "taken" or self._start.row == 0:
             return None
@@ -75,7 +73,7 @@ class Purges:
     they were sent for a later iteration. A replay that begins between the two does not know it.
     """
 
-    def __init__(self, entries: Iterator[_core.JournalEntry]) -> None:
+    def __init__(self, entries: "Iterator[_core.JournalEntry]") -> None:
         taken: list[tuple[int, int, bool]] = []  # number, ticket, whether it purges
         base = 0
         for entry in entries:
@@ -97,7 +95,7 @@ class Purges:
         return is_inside and self._newest_purge[at - 1] > self._oldest_behind[at]
 
 
-def find_start(run: RecordedRun, since: int) -> Start | None:
+def find_start(run: "RecordedRun", since: int) -> Start | None:
     """The first one at row `since` or later, or None.
 
     A reset determines the whole state of a simulation, and so does a restored snapshot that the
@@ -128,7 +126,7 @@ def find_start(run: RecordedRun, since: int) -> Start | None:
     return None
 
 
-def find_kept(run: RecordedRun, since: int) -> Start | None:
+def find_kept(run: "RecordedRun", since: int) -> Start | None:
     """The first snapshot, in row `since` or later, that was taken where nothing acted, or None.
 
     It is the state after the row before, which has the desired states that go on.
@@ -161,7 +159,7 @@ def find_kept(run: RecordedRun, since: int) -> Start | None:
     return None
 
 
-def _kept_at(run: RecordedRun, row: int, numbers: tuple[int, int], before: bytes) -> Start:
+def _kept_at(run: "RecordedRun", row: int, numbers: tuple[int, int], before: bytes) -> Start:
     kept: dict[int, bytes] = {}
     for entry in run.entries():
         if entry.kind == "snapshot":
@@ -171,7 +169,7 @@ def _kept_at(run: RecordedRun, row: int, numbers: tuple[int, int], before: bytes
     return Start(row, numbers[0], "", kept, is_at_rest=True, slot=entry.slot, before=before)
 
 
-def find_fresh_start(run: RecordedRun, since: int) -> Start | None:
+def find_fresh_start(run: "RecordedRun", since: int) -> Start | None:
     """For a replay without a driver: the first fresh start at row `since` or later, or None.
 
     It drops all queues, and its row has the state of the robot. The batch that caused it must hold
@@ -194,7 +192,7 @@ def find_fresh_start(run: RecordedRun, since: int) -> Start | None:
     return None
 
 
-def find_rest(run: RecordedRun, since: int) -> Start | None:
+def find_rest(run: "RecordedRun", since: int) -> Start | None:
     """For a replay without a driver: the first row at `since` or later in which nothing acts.
 
     The journal marks where such rows begin; they end before the next entry by which something acts.
@@ -225,7 +223,7 @@ def find_rest(run: RecordedRun, since: int) -> Start | None:
 _ACTS = {"halt", "resume", "died", "silent", "interrupted", "fresh_start", "stopping", "ended"}
 
 
-def _rests(entries: Iterator[_core.JournalEntry]) -> Iterator[tuple[int, int, int]]:
+def _rests(entries: "Iterator[_core.JournalEntry]") -> Iterator[tuple[int, int, int]]:
     """First row, last row, and number of the mark of each stretch in which nothing acts."""
     began: _core.JournalEntry | None = None
     newest = -1
@@ -250,7 +248,7 @@ def _restores(snapshots: dict[int, bytes]) -> list[tuple[str, int]]:
 
 
 def _note(
-    entry: _core.JournalEntry, sent: set[tuple[int, int]], running: set[tuple[int, int]]
+    entry: "_core.JournalEntry", sent: set[tuple[int, int]], running: set[tuple[int, int]]
 ) -> None:
     key = (entry.lane, entry.id)
     if entry.status == "active" and key in sent:

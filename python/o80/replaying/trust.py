@@ -5,8 +5,6 @@ found here by their names, and reads only files whose content is the recorded on
 names them or the run is one of the user's own robots in shared memory.
 """
 
-from __future__ import annotations
-
 import hashlib
 import stat
 from collections.abc import Mapping
@@ -23,7 +21,7 @@ if TYPE_CHECKING:
 _LARGEST_HASHED = 64 << 20  # [bytes], as when it was recorded
 
 
-def robot_of(run: RecordedRun) -> Path | str | type[Any]:
+def robot_of(run: "RecordedRun") -> Path | str | type[Any]:
     """The recorded robot: its library, or its class in Python.
 
     Raises DriverError if no robot of this name is known here.
@@ -48,7 +46,9 @@ def robot_of(run: RecordedRun) -> Path | str | type[Any]:
     )
 
 
-def options_of(run: RecordedRun, library: robots.Robot, given: Mapping[str, str]) -> dict[str, str]:
+def options_of(
+    run: "RecordedRun", library: robots.Robot, given: Mapping[str, str]
+) -> dict[str, str]:
     """The options of the robot: the recorded ones, then those that the user gives.
 
     Raises InvalidArgument for a recorded file that has another content here.
@@ -63,7 +63,7 @@ def options_of(run: RecordedRun, library: robots.Robot, given: Mapping[str, str]
     return recorded | dict(given)
 
 
-def _checked(option: str, text: str, provenance: Provenance) -> str:
+def _checked(option: str, text: str, provenance: "Provenance") -> str:
     """The text of an option, if it is no file, or a file with the recorded content."""
     files = [file for file in provenance.files if file.option == option]
     path = Path(text)

@@ -1,7 +1,5 @@
 """The face of a robot: groups, states, units, limits, sensor values and requests, as plain data."""
 
-from __future__ import annotations
-
 import contextlib
 import itertools
 import json

@@ -8,12 +8,12 @@ import time
 import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from types import TracebackType
-from typing import IO, Any, Self
+from typing import IO, Any
 
 import o80._core as _core
 from o80.base import lifecycle
 from o80.base.child_process import end_child, ends_within, start_child
+from o80.base.descriptors import above_standard
 from o80.base.errors import (
     DriverError,
     Error,
@@ -29,7 +29,7 @@ LOOK = 0.002  # [s] between checks of a robot that starts
 BAD_OPTIONS = 2  # exit code
 
 
-class Process:
+class Process(lifecycle.Managed):
     """A robot's process. Leaving a `with` block stops it; it also ends when this process does.
 
     The robot stops in order when this process ends in any way, also by a kill. Start it with
@@ -104,15 +104,7 @@ class Process:
     def _close_at_exit(self) -> None:
         self.stop()
 
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def _leave(self, error: BaseException | None) -> None:
         if self._owner == os.getpid():
             self.stop()
 
@@ -153,7 +145,8 @@ def start_process(
     import tempfile  # here, for it takes a tenth of the time to import o80
 
     _refuse_in_import()
-    output = tempfile.TemporaryFile()  # noqa: SIM115, it lives as long as the process
+    with above_standard():
+        output = tempfile.TemporaryFile()  # noqa: SIM115, it lives as long as the process
     try:
         popen = start_child(
             [*program, f"--segment={segment}", "--until-eof", *flags],

@@ -5,17 +5,18 @@ import inspect
 import numbers
 import os
 import sys
-import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
 import o80._core as _core
 from o80.base.argument_checks import whole
-from o80.base.errors import DriverError, InvalidArgument
+from o80.base.errors import DriverError, InvalidArgument, exception_text, sentence
 from o80.base.installation import announced, prefix
 from o80.base.loop_options import did_you_mean, loop_options, loop_texts, names_of, text_of
+from o80.base.refusals import explained
 from o80.base.words import StaleWord
 from o80.frontend.frontend import Frontend
 from o80.robots.face import compared, described, is_text_of_face, text_of_face
@@ -51,15 +52,13 @@ class Option:
 def list() -> builtins.list[RobotFile]:
     """All robots with a name: in O80_ROBOT_PATH, bundled with o80, and in Python packages.
 
-    A package whose robot cannot be found is left out, with a RuntimeWarning.
+    A robot whose package fails, or needs one that is not installed, is left out: `load` says why.
     """
     found = {name: Path(path) for name, path in _core.find_robots()}
     for name, point in announced(GROUP).items():
         if name not in found:
-            try:
+            with suppress(DriverError):
                 found[name] = _path_of(point)
-            except DriverError as error:
-                warnings.warn(str(error), RuntimeWarning, stacklevel=2)
     return [RobotFile(name, path) for name, path in found.items()]
 
 
@@ -167,8 +166,8 @@ def _value_of(point: "EntryPoint") -> Any:
         return value if isinstance(value, type) or not callable(value) else value()
     except Exception as error:
         raise DriverError(
-            f"robot '{point.name}' is left out: the package {package}, which announces it, failed "
-            f"with {type(error).__name__}: {error}. Repair the package or uninstall it"
+            f"robot '{point.name}' cannot be loaded: the package {package}, which announces it, "
+            f"failed with {sentence(exception_text(error))} Repair the package or uninstall it"
         ) from error
 
 
@@ -303,7 +302,9 @@ class Robot:
             for name, text in texts
         ]
         words += [f"--{name}={text}" for name, text in self._config(config, known)]
-        return start_process(self._program, segment or self.name, words, timeout, self._environment)
+        name = segment or self.name
+        with explained(f"start the robot of '{name}'"):
+            return start_process(self._program, name, words, timeout, self._environment)
 
     @overload
     def inline(

@@ -1,13 +1,14 @@
 """The numbers of a robot's rows, each with a name: "observed.elbow", "extended.force[2]"."""
 
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 import o80._core as _core
 from o80.base.errors import InvalidArgument
+from o80.base.loop_options import did_you_mean
 from o80.rows.layout import dtype_of_field, labels_of_field
 
 
@@ -22,7 +23,7 @@ class Column(NamedTuple):
     unit: str = ""
 
 
-def columns_of(schema: dict[str, Any]) -> Iterator[Column]:
+def columns_of(schema: Mapping[str, Any]) -> Iterator[Column]:
     """The columns of desired, observed and extended numbers."""
     row = schema["row"]
     for part in ("desired", "observed"):
@@ -54,6 +55,37 @@ def _numbers(
             else:
                 labels = labels_of_field(field)._labels_ if field["kind"] == "enum" else None
                 yield Column(name, dtype, offset, labels, origin, field["unit"])
+
+
+def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:
+    """The numbers at a path: "observed", "observed.elbow", "extended.force[2]", or of a group.
+
+    Raises InvalidArgument if there is none.
+    """
+    columns = list(columns_of(schema))
+    found = [c for c in columns if c.name == path or c.name.startswith((path + ".", path + "["))]
+    if not found:
+        found = [c for c in columns if _group_path(c, schema) == path]
+    if not found:
+        names = [column.name for column in columns]
+        part, _, rest = path.partition(".")
+        near = did_you_mean(path, names) or did_you_mean(rest, ["desired", "observed"])
+        there = [name for name in names if name.startswith(f"{part}.")] or names
+        raise InvalidArgument(
+            f"a row has no number '{path}'" + (near or f": it has {', '.join(there[:8])}")
+        )
+    return found
+
+
+def _group_path(column: Column, schema: Mapping[str, Any]) -> str:
+    """The path of the group of a state: "observed.joints"."""
+    part, _, rest = column.name.partition(".")
+    for actuator in schema["actuators"] if part != "extended" else ():
+        if rest == actuator["name"] or rest.startswith(
+            (actuator["name"] + ".", actuator["name"] + "[")
+        ):
+            return f"{part}.{schema['groups'][actuator['group']]['name']}"
+    return ""
 
 
 def value_of(row: Any, column: Column) -> Any:

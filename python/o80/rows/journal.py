@@ -196,7 +196,7 @@ class EntryDecoder:
             seen=native.seen,
             cut=native.cut,
             follows=native.follows,
-            commands=tuple(self._command(record) for record in native.records),
+            commands=tuple(self.command(record) for record in native.records),
             commands_lost=native.records_lost,
             status=native.status if has_status else None,
             reason=native.reason if has_status else None,
@@ -212,7 +212,7 @@ class EntryDecoder:
         name: str = self._names[index] if index < len(self._names) else str(index)
         return name or str(index)
 
-    def _command(self, native: _core.JournalRecord) -> JournalCommand:
+    def command(self, native: _core.JournalRecord) -> JournalCommand:
         kind = native.kind
         if kind == "command":
             is_chunk = native.pace == "chunk"

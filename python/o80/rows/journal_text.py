@@ -1,13 +1,11 @@
 """Decisions of a backend in words."""
 
-from __future__ import annotations
-
-import json
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
+from o80.base.finite import json_text
 from o80.rows.journal import JournalCommand, JournalEntry
 
 _MAX_NUMBERS = 8  # of a target
@@ -84,12 +82,18 @@ class JournalText:
 
     def _status(self, entry: JournalEntry) -> str:
         key = (entry.lane, entry.id or 0)
-        what = self._open.get(key, f"command {entry.id} of lane {entry.lane}")
+        command = self._open.get(key)
         if entry.status != "active":
             self._open.pop(key, None)
-        status = "begins" if entry.status == "active" else str(entry.status)
-        reason = f" ({entry.reason})" if entry.reason not in (None, "none") else ""
-        return f"  {what}: {status}{reason}"
+        return f"  {status_text(entry, command)}"
+
+
+def status_text(entry: JournalEntry, command: str | None) -> str:
+    """A status of a command in words; None: the command is not known."""
+    what = command or f"command {entry.id} of lane {entry.lane}"
+    status = "begins" if entry.status == "active" else str(entry.status)
+    reason = f" ({entry.reason})" if entry.reason not in (None, "none") else ""
+    return f"{what}: {status}{reason}"
 
 
 def _seen(entry: JournalEntry) -> str:
@@ -116,7 +120,7 @@ def command_text(command: JournalCommand) -> str:
     if command.kind == "resume":
         return f"resume halt {command.halt}"
     if command.kind == "mark":
-        return "mark " + json.dumps(command.text, ensure_ascii=False)
+        return "mark " + json_text(command.text, ensure_ascii=False)
     if command.kind == "unknown":
         return f"something of a newer o80 ({command.unknown})"
     if command.kind != "command":

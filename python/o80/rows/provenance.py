@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from typing import Any, Self
 
+from o80.base.finite import json_text
 from o80.base.screen import html, plain, style
 
 _TEXTS = ("robot", "version", "source_hash", "library", "library_sha256", "built_with")
@@ -48,9 +49,8 @@ class Provenance:
 
     def as_json(self) -> str:
         """As one line of JSON, which `from_json` reads. Pure ASCII."""
-        import json  # late: most processes that attach never ask
 
-        return json.dumps(asdict(self), sort_keys=True)
+        return json_text(asdict(self), sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Self:

@@ -4,17 +4,20 @@ import json
 import sys
 
 from o80.base.errors import Error
+from o80.base.finite import json_text
+from o80.base.screen import keep_printing
 from o80.view.serve import page_server, wait_for_end
 
 
 def main() -> int:
     """The options of `page_server` are the argument, as JSON."""
+    keep_printing()
     try:
         with page_server(**json.loads(sys.argv[1])) as server:
-            print(json.dumps({"url": server.url, "port": server.port}), flush=True)
+            print(json_text({"url": server.url, "port": server.port}), flush=True)
             wait_for_end(until_eof=True)
     except Error as error:
-        print(json.dumps({"error": str(error)}), flush=True)
+        print(json_text({"error": str(error)}), flush=True)
         return 1
     return 0
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+import o80._core as _core
 from o80._core import Observation
 from o80.base.errors import Error, InvalidArgument, ReadOnly
 from o80.frontend.frontend import Frontend
@@ -134,7 +135,7 @@ class Answers:
     def halt(self, query: dict[str, Any]) -> dict[str, Any]:
         """Halts a live segment."""
         source = self._live(query)
-        reason = str(query.get("reason", ""))[:LONGEST_REASON] or "from o80 view"
+        reason = _core.printable(query.get("reason") or "from o80 view")[:LONGEST_REASON]
         return {"halt": halt_backend(source.name, reason)}
 
     def resume(self, query: dict[str, Any]) -> dict[str, Any]:

@@ -216,7 +216,9 @@ class Gate:
         try:
             if "expect" in head.headers:
                 connection.send(CONTINUE)
-            reply = self._reply(head, connection.body(head.length))
+            body = connection.body(min(head.length, LARGEST_REQUEST))
+            reply = self._reply(head, body)
+            connection.skip(head.length - len(body))  # with unread bytes the answer would be lost
             connection.send(reply.as_bytes(last=connection.last))
         except Exception:  # its client went or was too slow, or the answer failed
             connection.last = True
@@ -311,17 +313,29 @@ class _Connection:
         """Waits for the rest of a request. Raises OSError."""
         end = time.monotonic() + BODY_WITHIN
         while len(self.received) < length:
-            left = end - time.monotonic()
-            if left <= 0.0:
-                raise TimeoutError
-            self.socket.settimeout(left)
-            data = self.socket.recv(length - len(self.received))
-            if not data:
-                raise ConnectionError
-            self.received += data
+            self.received += self._more(length - len(self.received), end)
         body = bytes(self.received[:length])
         del self.received[:length]
         return body
+
+    def skip(self, length: int) -> None:
+        """Waits for more of a request, and drops it. Raises OSError."""
+        end = time.monotonic() + BODY_WITHIN
+        here = min(length, len(self.received))
+        del self.received[:here]
+        length -= here
+        while length > 0:
+            length -= len(self._more(min(length, LARGEST_REQUEST), end))
+
+    def _more(self, most: int, end: float) -> bytes:
+        left = end - time.monotonic()
+        if left <= 0.0:
+            raise TimeoutError
+        self.socket.settimeout(left)
+        data = self.socket.recv(most)
+        if not data:
+            raise ConnectionError
+        return data
 
     def send(self, data: bytes) -> None:
         """Waits until all is sent. Raises OSError."""

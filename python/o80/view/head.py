@@ -10,13 +10,17 @@ from dataclasses import dataclass
 from o80.base.errors import Error
 
 LARGEST_HEAD = 1 << 14  # [bytes]
-LARGEST_REQUEST = 1 << 16  # the body [bytes]
+LARGEST_REQUEST = 1 << 16  # the body [bytes]; of a longer halt this much is read
+HALT = "/halt"
+
+TOO_LARGE = f"the request is larger than {LARGEST_REQUEST} bytes"
 
 _END = b"\r\n\r\n"
 _CONTROL = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _FIRST_LINE = re.compile(r"([A-Z]{1,20}) (/[!-~]*) HTTP/1\.([01])")
 _NAME = re.compile(r"[\w!#$%&'*+.^`|~-]+", re.ASCII)
 _LENGTH = re.compile(r"[0-9]+")
+_MOST_DIGITS = 15  # of the length of a halt
 
 
 class Refused(Error):  # noqa: N818
@@ -61,7 +65,7 @@ def take_head(received: bytearray, checked: int) -> Head | None:
     headers = _headers(lines)
     path, _, query = target.partition("?")
     last = minor == "0" or "close" in headers.get("connection", "").lower()
-    return Head(method, path, query, headers, _length(headers), last)
+    return Head(method, path, query, headers, _length(headers, path), last)
 
 
 def _lines_end_well(received: bytearray, checked: int, stop: int) -> bool:
@@ -90,12 +94,13 @@ def _headers(lines: list[str]) -> dict[str, str]:
     return headers
 
 
-def _length(headers: dict[str, str]) -> int:
+def _length(headers: dict[str, str], path: str) -> int:
     if "transfer-encoding" in headers:
         raise Refused(400, "Transfer-Encoding is not supported: send a Content-Length")
     digits = headers.get("content-length", "0")
     if not _LENGTH.fullmatch(digits):
         raise Refused(400, "Content-Length must be digits")
-    if len(digits) > len(str(LARGEST_REQUEST)) or int(digits) > LARGEST_REQUEST:
-        raise Refused(413, f"the request is larger than {LARGEST_REQUEST} bytes")
+    most_digits = _MOST_DIGITS if path == HALT else len(str(LARGEST_REQUEST))
+    if len(digits) > most_digits or (path != HALT and int(digits) > LARGEST_REQUEST):
+        raise Refused(413, TOO_LARGE)
     return int(digits)

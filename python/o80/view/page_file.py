@@ -4,11 +4,8 @@ It is the page of `o80 view` with what it would ask for: poses 60 times a second
 sixtieth of a second the first, lowest and highest row, as float32; and what chunks planned.
 """
 
-from __future__ import annotations
-
 import base64
 import gzip
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -17,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80.base.errors import Error, InvalidArgument, RecordingError
+from o80.base.finite import json_text
 from o80.rows.columns import columns_of
 from o80.rows.history import values_of
 from o80.rows.plans import Planned
@@ -115,7 +113,7 @@ def _packed_sources(sources: Sequence[Source]) -> str:
         drawn[source.label].described(numbers, drawn) | {"opened": source is opened}
         for source in sources
     ]
-    head = json.dumps(whole).encode()
+    head = json_text(whole).encode()
     content = len(head).to_bytes(4, "little") + head + numbers.content
     return base64.b64encode(gzip.compress(content, 9, mtime=0)).decode()
 
@@ -131,7 +129,7 @@ class _Recorded:
         self.ticks = np.flatnonzero(np.diff(stretch, prepend=-1))  # first row of each stretch
         self.times: NDArray[np.int64] = self.rows.time[self.ticks]
 
-    def described(self, numbers: _Numbers, everything: dict[str, _Recorded]) -> dict[str, Any]:
+    def described(self, numbers: _Numbers, everything: "dict[str, _Recorded]") -> dict[str, Any]:
         """All that a page may ask about it, and the numbers."""
         source, rows = self.source, self.rows
         first, last = source.extent()
@@ -241,7 +239,7 @@ class _Recorded:
             kept.append(first[first < len(values)])
         return np.unique(np.concatenate(kept))
 
-    def _others(self, numbers: _Numbers, everything: dict[str, _Recorded]) -> dict[str, Any]:
+    def _others(self, numbers: _Numbers, everything: "dict[str, _Recorded]") -> dict[str, Any]:
         """By other run: whether it shares the world, and its tick at each tick; -1: none."""
         found: dict[str, Any] = {}
         sources = [each.source for each in everything.values()]

@@ -1,7 +1,5 @@
 """Pictures and films of a robot's model, drawn without a screen."""
 
-from __future__ import annotations
-
 import ctypes.util
 import importlib
 import os
@@ -104,8 +102,19 @@ def renderer_of_mujoco() -> Any:
     return needed("mujoco", "rendering", "a picture")
 
 
+PALETTE = "split[a][b];[a]palettegen=max_colors=128[p];[b][p]paletteuse=dither=none"
+GIF: dict[str, Any] = {
+    "codec": "gif",
+    "pix_fmt_out": "pal8",
+    "macro_block_size": 1,
+    "ffmpeg_log_level": "error",
+    "output_params": ["-filter_complex", PALETTE, "-loop", "0"],
+}
+"""Options of ffmpeg for a film with the best 128 colours."""
+
+
 def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: float) -> int:
-    """Writes pictures (height, width, 3) as an MP4 film; returns how many frames it has.
+    """Writes pictures (height, width, 3) as NAME.mp4 or NAME.gif; returns the number of frames.
 
     Needs the extra `rendering`; raises o80.MissingExtra.
     """
@@ -116,8 +125,10 @@ def write_film(path: Path, pictures: Iterable[Image], *, frames_per_second: floa
         for picture in pictures:
             if writer is None:
                 height, width = picture.shape[:2]
+                size = (width, height)
+                options = GIF if path.suffix == ".gif" else {"macro_block_size": 2}
                 writer = imageio_ffmpeg.write_frames(
-                    str(path), (width, height), fps=frames_per_second, macro_block_size=2
+                    str(path.absolute()), size, fps=frames_per_second, **options
                 )
                 writer.send(None)
             writer.send(np.ascontiguousarray(picture))

@@ -1,9 +1,11 @@
 """An answer as the bytes of HTTP."""
 
-import json
 from dataclasses import dataclass
 from http import HTTPStatus
 from typing import Any
+
+from o80.base.finite import json_text
+from o80.base.screen import complain_once
 
 NOTHING = "default-src 'none'"  # a content security policy
 
@@ -20,7 +22,7 @@ class Reply:
     @classmethod
     def json(cls, code: int, body: dict[str, Any]) -> "Reply":
         """A JSON object."""
-        return cls(code, json.dumps(body).encode(), "application/json")
+        return cls(code, json_text(body, say=complain_once).encode(), "application/json")
 
     def as_bytes(self, *, last: bool) -> bytes:
         """Head and body. last: the connection is closed after it."""

@@ -9,6 +9,7 @@ import contextlib
 import errno
 import hashlib
 import json
+import re
 import secrets
 import socket
 from collections.abc import Callable, Mapping
@@ -20,7 +21,7 @@ from typing import Any
 from o80.base.errors import Error
 from o80.view.gate import Gate
 from o80.view.guard import ANY, Guard
-from o80.view.head import Head
+from o80.view.head import HALT, TOO_LARGE, Head
 from o80.view.reply import Reply
 
 BACKLOG = 4096  # connections that wait in the kernel until they are accepted
@@ -64,12 +65,19 @@ class PageServer:
         answer = self._answers.get(head.path)
         if answer is None:
             return Reply(404, b"unknown request")
-        query = None
+        query: Any = None
         with contextlib.suppress(ValueError, RecursionError):
             query = json.loads(body)
-        if not isinstance(query, dict):
+        wrong = not isinstance(query, dict)
+        if wrong and head.path != HALT:
             return Reply(400, b"the request must be a JSON object")
         try:
+            if wrong:
+                done = answer(_unreadable_halt(body))
+                code, why = 400, "the request must be a JSON object"
+                if head.length > len(body):
+                    code, why = 413, TOO_LARGE
+                return Reply.json(code, done | {"error": f"it is halted, but {why}"})
             return Reply.json(200, answer(query))
         except Error as error:
             return Reply.json(409, {"error": str(error)})
@@ -77,6 +85,17 @@ class PageServer:
             return Reply.json(400, {"error": f"invalid request: {error}"})
         except Exception as error:
             return Reply.json(500, {"error": f"the view failed: {error!r}"})
+
+
+def _unreadable_halt(body: bytes) -> dict[str, Any]:
+    """Fields of a request for a halt that is no JSON object, the segment at least."""
+    text = body.decode(errors="replace")
+    with contextlib.suppress(ValueError, RecursionError):
+        query = json.loads(text)
+        if isinstance(query, dict):
+            return query
+    found = re.search(r'"segment"\s*:\s*"([\w.-]+)"', text)
+    return {"segment": found[1]} if found else {}
 
 
 def _listen(host: str, port: int) -> socket.socket:

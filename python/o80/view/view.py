@@ -13,6 +13,7 @@ from typing import Any
 from o80.base import lifecycle
 from o80.base.child_process import end_child, start_child
 from o80.base.errors import Error, InvalidArgument, TimeoutError
+from o80.base.finite import json_text
 from o80.base.lifecycle import Closeable
 from o80.frontend.frontend import Frontend
 from o80.recording.reader import RecordingFile
@@ -57,7 +58,7 @@ class View(Closeable):
             "control": control,
             "model_files": model_files,
         }
-        command = [sys.executable, "-m", "o80.view", json.dumps(options)]
+        command = [sys.executable, "-m", "o80.view", json_text(options)]
         self._popen = start_child(command, stdout=subprocess.PIPE)
         lifecycle.close_later(self)
         try:

@@ -1,7 +1,5 @@
 """The models that draw segments, and which of them stand in one world."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any
@@ -23,7 +21,7 @@ class Drawn:
     mjcf: str
     described: dict[str, Any]  #: what moves it, as in a schema
     trusted: bool  #: the files that it names may be read
-    standing: Standing
+    standing: "Standing"
 
 
 def drawn(schema: dict[str, Any], mjcf: str, *, trusted: bool) -> Drawn | None:
@@ -59,7 +57,7 @@ class Standing:
     places: frozenset[tuple[str, int, int, int]] = frozenset()
     floats: bool = False  #: nothing of it stands: a tracked ball, subjects of motion capture
 
-    def shares(self, other: Standing) -> bool:
+    def shares(self, other: "Standing") -> bool:
         """Whether both stand in one world: a thing of one name stands at one place in both."""
         return self.floats or other.floats or not self.places.isdisjoint(other.places)
 

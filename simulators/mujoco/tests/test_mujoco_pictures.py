@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 from gymnasium import spaces
+from processes import run_o80
 
 import o80
 from o80.learning import Environment, GroupTask, Outcome, VectorEnvironment
@@ -139,6 +140,56 @@ def test_a_film_is_written(model: Path, tmp_path: Path) -> None:
         drawn = (pictures.draw(row) for row in robot.history()[::10])
         assert o80.write_film(path, drawn, frames_per_second=25) == 11
     assert path.stat().st_size > 1000
+
+
+@pytest.mark.parametrize("suffix", ["mp4", "gif"])
+def test_robots_of_a_recording_are_filmed_side_by_side(
+    suffix: str, model: Path, tmp_path: Path
+) -> None:
+    file, path = tmp_path / "run.mcap", tmp_path / f"at 12:30 %d.{suffix}"
+    library = o80.robots.load("mujoco")
+    with library.inline("one", model=model) as one, library.inline("other", model=model) as other:
+        with o80.Recording(file, [one, other]):
+            for target in (1.0, -1.0):
+                one.add_command("turn", {"position": target}, iterations=100)
+                one.burst(100)
+                other.burst(100)
+        period = one.period
+    done = run_o80("film", file, "-o", path.name, "--size", 160, 120, "--rate", 20, cwd=tmp_path)
+    assert f"{path.name}: {int(np.ceil(199 * period * 20))} frames" in done.stdout
+    reader: Any = pytest.importorskip("imageio_ffmpeg").read_frames(str(path))
+    assert next(reader)["size"] == (320, 120)
+    frames = [np.frombuffer(each, np.uint8).reshape(120, 320, 3) for each in reader]
+    moved = np.abs(np.diff(np.array(frames, np.int16), axis=0)) > 60
+    assert moved[..., :160, :].any()
+    assert not moved[..., 160:, :].any()
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (("x.avi",), "a film is NAME.mp4 or NAME.gif"),
+        (("nowhere/x.gif",), "there is no folder nowhere"),
+        (("x.gif", "--size", 0, 100), "16 to 4096 pixels"),
+        (("x.gif", "--speed", "nan"), "--speed must be"),
+        (("x.gif", "--rate", 60), "at most 50 frames a second of a gif"),
+        (("x.gif", "--from", 5), "give --from and --to within"),
+        (("x.gif", "--segment", "third"), "there are: one, other"),
+        (("x.gif",), "never ran at the same time"),
+    ],
+)
+def test_a_film_that_cannot_be_is_refused(
+    words: tuple[object, ...], message: str, model: Path, tmp_path: Path
+) -> None:
+    library, file = o80.robots.load("mujoco"), tmp_path / "run.mcap"
+    for name in ("one", "other"):
+        with (
+            library.inline(name, model=model) as robot,
+            o80.Recording(file, robot, proceed=name == "other"),
+        ):
+            robot.burst(9)
+    done = run_o80("film", file, "-o", *words, code=1, cwd=tmp_path)
+    assert message in done.stderr
 
 
 def test_without_a_renderer_the_error_names_the_extra(model: Path) -> None:

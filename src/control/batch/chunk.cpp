@@ -1,7 +1,5 @@
 #include "control/batch/chunk.hpp"
 
-#include <algorithm>
-
 namespace o80 {
 
 ChunkRows::ChunkRows(BlockPool& pool, BlockIndex member, const StateLayout& layout) noexcept

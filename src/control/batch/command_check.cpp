@@ -5,7 +5,6 @@
 #include <cmath>
 #include <limits>
 #include <string>
-#include <vector>
 
 #include "base/short_text.hpp"
 #include "describe/number_name.hpp"

@@ -17,7 +17,7 @@ inline constexpr CommandId kMemberMark = CommandId{1} << 63;
 inline bool is_member(const RecordHead& head) noexcept { return (head.id & kMemberMark) != 0; }
 
 /// State of a command of several actuators, stored behind the head of its group record
-/// (ARCHITECTURE.md, Commands of several actuators). Each member is in the queue of its actuator.
+/// (src/control/README.md#queue). Each member is in the queue of its actuator.
 struct CommandGroup {
   Iteration last_end = 0;     // last iteration in which a member has ended
   std::uint16_t open = 0;     // members that have not ended

@@ -1,7 +1,5 @@
 #include "control/batch/ledger.hpp"
 
-#include <algorithm>
-
 namespace o80 {
 
 void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare,

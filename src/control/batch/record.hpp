@@ -89,7 +89,7 @@ static_assert(sizeof(RecordHead) == 48 && std::is_trivially_copyable_v<RecordHea
 // flags of a batch
 inline constexpr std::uint16_t kBurstUntilEnded = 1;
 /// The batch has only purges and control orders, and does not wait for batches of other lanes
-/// (ARCHITECTURE.md, Express batches and purges).
+/// (src/control/README.md#order).
 inline constexpr std::uint16_t kExpress = 2;
 
 // limits of one batch: `pulse` refuses more, and the backend rejects the records beyond them

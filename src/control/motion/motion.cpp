@@ -175,9 +175,10 @@ Limited Motion::step(Iteration now, std::byte* state) noexcept {
     const bool first = limit != Limit::none && result.limit == Limit::none;
     if (first || limit >= Limit::below_integral) result = {limit, each.number};
     if (over && each.motion.arrived()) {
-      std::memcpy(state + each.offset, target() + each.offset, layout_.numbers()[each.number].size);
+      clear_sign_of_zero(target() + each.offset, each.kind);
+      copy_number(state + each.offset, target() + each.offset, layout_.numbers()[each.number].size);
     } else if (each.kind == Kind::float64) {
-      store(state + each.offset, each.motion.position());
+      store(state + each.offset, each.motion.position() + 0.0);
     } else {
       publish(each, state);
     }
@@ -196,7 +197,7 @@ void Motion::publish(const Number& number, std::byte* state) noexcept {
   visit_number(number.kind, [&]<class T>(T) {
     if constexpr (std::is_floating_point_v<T>) {
       const bool is_cut = sizeof(T) < 8 && number.is_limited;
-      store(at, static_cast<T>(is_cut ? nearest_float(value, low, high) : value));
+      store(at, static_cast<T>((is_cut ? nearest_float(value, low, high) : value) + 0.0));
     } else if (sizeof(T) < 8 || number.is_limited || !number.motion.is_on_line()) {
       store(at, to_integer<T>(number.is_limited ? nearest_whole(value, low, high) : value));
     } else {

@@ -1,7 +1,6 @@
 #include "control/motion/number_motion.hpp"
 
 #include <algorithm>
-#include <utility>
 
 namespace o80 {
 

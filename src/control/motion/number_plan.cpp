@@ -1,8 +1,5 @@
 #include "control/motion/number_plan.hpp"
 
-#include <algorithm>
-#include <cmath>
-
 namespace o80 {
 namespace {
 

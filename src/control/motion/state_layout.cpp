@@ -2,10 +2,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 #include <string>
-
-#include "describe/visit_number.hpp"
 
 namespace o80 {
 namespace {
@@ -74,13 +71,16 @@ bool StateLayout::same(const std::byte* one, const std::byte* other,
 void StateLayout::copy_finite(std::byte* to, const std::byte* from) const noexcept {
   if (plain_) {
     for (std::uint32_t at = 0; at < size_; at += sizeof(double)) {
-      if (std::isfinite(load<double>(from + at))) std::memcpy(to + at, from + at, sizeof(double));
+      if (!std::isfinite(load<double>(from + at))) continue;
+      std::memcpy(to + at, from + at, sizeof(double));
+      clear_sign_of_zero(to + at, Kind::float64);
     }
     return;
   }
   for (std::size_t i = 0; i < numbers_.size(); ++i) {
     if (!finite_number(i, from)) continue;
     copy_number(to + numbers_[i].offset, from + numbers_[i].offset, numbers_[i].size);
+    clear_sign_of_zero(to + numbers_[i].offset, numbers_[i].kind);
   }
 }
 

@@ -43,6 +43,16 @@ inline void copy_number(std::byte* to, const std::byte* from, std::uint32_t size
   }
 }
 
+/// Zero is published as +0, also where -0 was commanded or observed.
+inline void clear_sign_of_zero(std::byte* at, Kind kind) noexcept {
+  const auto clear = [at]<class T>(T zero) {
+    const T value = load<T>(at) + zero;
+    std::memcpy(at, &value, sizeof value);
+  };
+  if (kind == Kind::float64) clear(0.0);
+  if (kind == Kind::float32) clear(0.0F);
+}
+
 /// True if the bit of a number is set; a null mask means all.
 inline bool masked(const std::uint64_t* mask, std::size_t number) noexcept {
   return mask == nullptr || (mask[number / 64] >> (number % 64) & 1) != 0;

@@ -1,7 +1,5 @@
 #include "control/motion/velocity_change.hpp"
 
-#include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace o80 {

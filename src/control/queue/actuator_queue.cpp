@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <utility>
 
 #include "control/batch/command_check.hpp"
 #include "control/batch/record_check.hpp"

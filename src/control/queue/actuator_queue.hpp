@@ -49,8 +49,8 @@ class ActuatorQueue {
     ledger_->drop(queue_.take(lane), outcome, iteration);
     if (empty()) end_motion();
   }
-  /// For commands of several actuators (ARCHITECTURE.md, Commands of several actuators); called for
-  /// all queues before any step(). Reports that the next command is a member of a group.
+  /// For commands of several actuators (src/control/README.md#queue); called for all queues before
+  /// any step(). Reports that the next command is a member of a group.
   void arrive(Iteration iteration, std::uint32_t& late_budget) noexcept {
     if (runs_ == Runs::queued || !end_late(iteration, late_budget)) return;
     const RecordHead* head = next_member();

@@ -1,9 +1,7 @@
 #include "control/queue/controller.hpp"
 
-#include <algorithm>
 #include <bit>
 #include <limits>
-#include <utility>
 
 namespace o80 {
 namespace {

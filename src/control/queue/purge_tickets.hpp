@@ -9,7 +9,7 @@
 namespace o80 {
 
 /// The highest ticket of a purge, for each lane and actuator. Commands with lower tickets end as
-/// purged, even if they are taken later (ARCHITECTURE.md, Express batches and purges).
+/// purged, even if they are taken later (src/control/README.md#order).
 ///
 /// Realtime: everything but construction.
 class PurgeTickets {

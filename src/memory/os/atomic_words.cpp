@@ -1,16 +1,20 @@
 #include "memory/os/atomic_words.hpp"
 
 #include <algorithm>
+#include <array>
+
+#include "base/printable.hpp"
 
 namespace o80 {
 
 void store_text(std::atomic<std::uint64_t>* words, std::size_t count,
                 std::string_view text) noexcept {
-  text = text.substr(0, 8 * count - 1);
+  std::array<char, 8 * kMostTextWords> chars{};
+  count = std::min(count, kMostTextWords);
+  printable(text, chars.data(), 8 * count - 1);
   for (std::size_t i = 0; i < count; ++i) {
     std::uint64_t word = 0;
-    if (8 * i < text.size())
-      std::memcpy(&word, text.data() + 8 * i, std::min<std::size_t>(8, text.size() - 8 * i));
+    std::memcpy(&word, chars.data() + 8 * i, 8);
     words[i].store(word, std::memory_order_release);  // sync text
   }
 }
@@ -26,8 +30,7 @@ void load_text(const std::atomic<std::uint64_t>* words, std::size_t count, char*
 std::string load_text(const std::atomic<std::uint64_t>* words, std::size_t count) {
   std::string text(8 * count, '\0');
   load_text(words, count, text.data());
-  text.resize(std::min(text.find('\0'), text.size()));
-  return text;
+  return printable(text.substr(0, text.find('\0')));
 }
 
 }  // namespace o80

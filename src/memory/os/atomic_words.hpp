@@ -43,11 +43,15 @@ inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes
   }
 }
 
-/// Writes a text with a terminating zero; excess characters are dropped. Release: see `load_text`.
+inline constexpr std::size_t kMostTextWords = 128;
+
+/// Writes a text with a terminating zero, made printable; excess characters are dropped. Release:
+/// see `load_text`.
 void store_text(std::atomic<std::uint64_t>* words, std::size_t count,
                 std::string_view text) noexcept;
 
-/// Reads a text up to its zero, never out of bounds. During a write it may mix old and new words.
+/// Reads a text up to its zero, never out of bounds, and makes it printable. During a write it may
+/// mix old and new words.
 std::string load_text(const std::atomic<std::uint64_t>* words, std::size_t count);
 
 /// The same, into a buffer of 8 * count bytes with a terminating zero.

@@ -2,6 +2,8 @@
 
 #include <fcntl.h>
 
+#include <cerrno>
+#include <cstring>
 #include <utility>
 
 namespace o80 {
@@ -22,7 +24,16 @@ struct flock one_byte(short type, std::uint64_t byte) noexcept {
 bool is_byte_locked(int descriptor, std::uint64_t byte) noexcept {
   // a read lock conflicts with write locks only
   struct flock range = one_byte(F_RDLCK, byte);
-  return fcntl(descriptor, F_OFD_GETLK, &range) == 0 && range.l_type != F_UNLCK;
+  if (fcntl(descriptor, F_OFD_GETLK, &range) != 0) return errno != EBADF;
+  return range.l_type != F_UNLCK;
+}
+
+std::string why_locks_are_refused() {
+  if (errno == EAGAIN || errno == EACCES) return {};
+  return std::string(
+             "this system refuses the locks by which o80 knows who lives (fcntl "
+             "F_OFD_SETLK: ") +
+         std::strerror(errno) + "). If this is a container or sandbox, allow fcntl in its profile";
 }
 
 LockFile LockFile::open(const std::string& path, int flags, mode_t permission) {

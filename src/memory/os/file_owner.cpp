@@ -6,6 +6,8 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <string_view>
 #include <vector>
 
@@ -48,7 +50,8 @@ bool is_member(gid_t group) {
 
 std::string why_untrusted(int descriptor) {
   struct stat file;
-  if (fstat(descriptor, &file) != 0) return "its owner cannot be read";
+  if (fstat(descriptor, &file) != 0)
+    return std::string("its owner cannot be read: ") + std::strerror(errno);
   if (file.st_uid == geteuid() || file.st_uid == 0) return {};
   if ((file.st_mode & S_IRGRP) != 0 && is_member(file.st_gid)) return {};
   if (is_named_in_the_environment(file.st_uid)) return {};

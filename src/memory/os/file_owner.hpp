@@ -14,7 +14,7 @@ std::string user_name(uid_t user);
 /// Every user may create a file in the directory of segments under the name of a robot. Trusted
 /// are root, this user, the users in the environment variable O80_TRUST (names or numbers,
 /// separated by commas), and any owner of a file that a group of this user may read: only members
-/// can create files of a group. See ARCHITECTURE.md, Trust in files.
+/// can create files of a group. See docs/users.md.
 std::string why_untrusted(int descriptor);
 
 /// The name of the user that owns the file of that path (of a link, not of its target).

@@ -2,6 +2,7 @@
 
 #include <fcntl.h>
 #include <pthread.h>
+#include <sys/socket.h>
 #include <unistd.h>
 
 #include <algorithm>
@@ -11,6 +12,7 @@
 #include <vector>
 
 #include "base/short_text.hpp"
+#include "memory/os/descriptors.hpp"
 #include "memory/os/file_lock.hpp"
 #include "o80/base/error.hpp"
 
@@ -81,7 +83,15 @@ void end_forked_child(std::string_view robot, std::string_view function) noexcep
 int open_for_this_process(const char* path, int flags, mode_t permission) {
   const std::lock_guard lock(fork_mutex());
   lock_files().reserve(lock_files().size() + 1);
-  const int descriptor = ::open(path, flags, permission);
+  const int descriptor = above_standard(::open(path, flags, permission));
+  if (descriptor >= 0) lock_files().push_back(descriptor);
+  return descriptor;
+}
+
+int socket_for_this_process(int domain, int type) {
+  const std::lock_guard lock(fork_mutex());
+  lock_files().reserve(lock_files().size() + 1);
+  const int descriptor = above_standard(::socket(domain, type, 0));
   if (descriptor >= 0) lock_files().push_back(descriptor);
   return descriptor;
 }

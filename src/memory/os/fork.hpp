@@ -15,8 +15,11 @@ std::uint64_t process_generation() noexcept;
 /// Locked around every fork, so that process-wide lists are consistent in the child.
 InheritingMutex& fork_mutex() noexcept;
 
-/// open(2) of a file that every forked child closes at once. No fork can happen during the call.
+/// open(2) of a file that every forked child closes at once, with a descriptor from 3 on. No fork
+/// can happen during the call.
 int open_for_this_process(const char* path, int flags, mode_t permission);
+/// socket(2) with the same promise.
+int socket_for_this_process(int domain, int type);
 /// Closes such a file in this process.
 void close_in_this_process(int descriptor) noexcept;
 

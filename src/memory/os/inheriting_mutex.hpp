@@ -10,8 +10,7 @@ namespace o80 {
 class InheritingMutex {
  public:
   InheritingMutex() noexcept { initialise(); }
-  InheritingMutex(const InheritingMutex&) = delete;
-  InheritingMutex& operator=(const InheritingMutex&) = delete;
+  InheritingMutex& operator=(InheritingMutex&&) = delete;
   ~InheritingMutex() { pthread_mutex_destroy(&mutex_); }
 
   void lock() noexcept { pthread_mutex_lock(&mutex_); }

@@ -1,9 +1,7 @@
 #include "memory/ring/journal.hpp"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
-#include <bit>
 #include <cstring>
 
 #include "base/crash_point.hpp"

@@ -1,9 +1,6 @@
 #include "memory/ring/lane_receiver.hpp"
 
-#include <algorithm>
-
 #include "base/crash_point.hpp"
-#include "memory/os/atomic_words.hpp"
 
 namespace o80 {
 

@@ -15,7 +15,7 @@
 
 namespace o80 {
 
-/// The backend's end of one lane (ARCHITECTURE.md, Lanes and their owners).
+/// The backend's end of one lane (src/memory/README.md#lanes).
 ///
 /// Every value that a frontend can write is checked: the cursor is private, blocks are copied
 /// before they are read, impossible counters reset the lane.

@@ -1,17 +1,13 @@
 #include "memory/ring/lane_sender.hpp"
 
-#include <algorithm>
 #include <iterator>
-#include <string>
 #include <vector>
 
 #include "base/crash_point.hpp"
-#include "base/printable.hpp"
 #include "memory/os/atomic_words.hpp"
 #include "memory/os/futex.hpp"
 #include "memory/os/prefetch.hpp"
 #include "memory/segment/segment_file.hpp"
-#include "o80/base/error.hpp"
 #include "o80/base/nearest_name.hpp"
 
 namespace o80 {
@@ -26,7 +22,7 @@ std::string holders(const SegmentView& view) {
   names.reserve(view.shape.lanes);
   for (std::uint32_t i = 0; i < view.shape.lanes; ++i) {
     const LaneSenderPage& page = view.lane(i);
-    names.push_back(printable(load_text(page.owner, std::size(page.owner))));
+    names.push_back(load_text(page.owner, std::size(page.owner)));
   }
   return first_names(names);
 }
@@ -40,6 +36,8 @@ LaneSender::LaneSender(const AttachedSegment& segment) : segment_(&segment), vie
   lock_ = segment.open_commands_again();
   const std::uint32_t lanes = view_.shape.lanes;
   while (lane_ < lanes && !lock_.try_lock(kFirstLaneByte + lane_)) ++lane_;
+  if (const std::string why = lane_ == lanes ? why_locks_are_refused() : ""; !why.empty())
+    throw SegmentError(quoted + " cannot be commanded: " + why + ".");
   if (lane_ == lanes)
     throw NoLane(quoted + ": all of its " + std::to_string(lanes) + " lanes are taken, by " +
                  holders(view_) +

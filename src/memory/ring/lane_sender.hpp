@@ -7,7 +7,6 @@
 #include <span>
 #include <string>
 #include <string_view>
-#include <utility>
 
 #include "memory/ring/status_word.hpp"
 #include "memory/segment/attached_segment.hpp"
@@ -22,8 +21,8 @@ inline constexpr std::int64_t kShortestSlice = 100'000;  // between signs of lif
 LaneFull lane_full(std::string_view segment, std::uint64_t needed, std::uint32_t free,
                    std::uint32_t most);
 
-/// Move-only: a lane owned by a frontend (ARCHITECTURE.md, Lanes and their owners). The destructor
-/// releases it; the kernel does if the process dies.
+/// Move-only: a lane owned by a frontend (src/memory/README.md#lanes). The destructor releases it;
+/// the kernel does if the process dies.
 ///
 /// Ids and positions continue where the former owner stopped.
 ///

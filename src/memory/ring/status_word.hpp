@@ -26,8 +26,8 @@ struct StatusWord {
             .iteration = static_cast<std::int64_t>(word << 16) >> 16};
   }
   /// The word of a slot between its new id and the first status of that id. If the backend crashes
-  /// in between, the former id of the slot reads as forgotten (ARCHITECTURE.md, Statuses and ids).
-  /// It is the 48 bits that an id has.
+  /// in between, the former id of the slot reads as forgotten (src/memory/README.md#lanes). It is
+  /// the 48 bits that an id has.
   static constexpr std::uint64_t announcing(std::uint64_t id) noexcept {
     return id & 0xffff'ffff'ffffULL;
   }

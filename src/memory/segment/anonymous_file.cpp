@@ -4,7 +4,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <utility>
 
 #include "memory/os/random_bits.hpp"
 #include "memory/segment/segment_name.hpp"

@@ -35,6 +35,8 @@ std::string other_segments(std::string_view name) {
   std::vector<std::string> names;
   std::vector<std::string> known;
   for (const SegmentEntry& entry : list_segments()) {
+    if (entry.name == name && entry.life == Life::running && !entry.readable)
+      return "A backend of that name runs, but " + entry.problem;
     names.push_back(entry.name);
     known.push_back(entry.name + " (" + entry.state() + ")");
   }

@@ -67,7 +67,7 @@ class AttachedSegment {
   int commands_descriptor() const noexcept { return commands_.descriptor(); }
   /// Queries the lock of the backend (2 us). An end is final: during a take-over the successor
   /// holds the lock of the dead backend for a moment, which does not make it running again
-  /// (ARCHITECTURE.md, How a backend takes a name).
+  /// (src/memory/README.md#successor).
   Life life() const noexcept;
   /// True if the stored state is an end: one load. Does not detect a killed backend.
   bool has_ended() const noexcept;

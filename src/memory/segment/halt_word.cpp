@@ -44,8 +44,9 @@ bool read_halt(const HaltSlot& slot, std::uint64_t number, Halt& halt) noexcept 
 }  // namespace
 
 std::string_view to_text(HaltCause cause) noexcept {
-  constexpr std::string_view kTexts[] = {"none",          "frontend", "driver",   "silence",
-                                         "dead_frontend", "error",    "overruns", "predecessor"};
+  constexpr std::string_view kTexts[] = {"none",     "frontend",      "driver",
+                                         "silence",  "dead_frontend", "error",
+                                         "overruns", "predecessor",   "unreachable"};
   const auto index = static_cast<std::size_t>(cause);
   return index < std::size(kTexts) ? kTexts[index] : "unknown";
 }
@@ -113,12 +114,17 @@ std::optional<Halt> shown_halt(const SegmentView& view) noexcept {
 std::optional<Halt> requested_halt(const SegmentView& view) noexcept {
   const std::uint64_t requested = view.bell().halts.load(std::memory_order_seq_cst);  // sync halts
   const std::optional<Halt> shown = shown_halt(view);
-  if (shown && shown->number == requested) return shown;
-  if (requested == view.counters().cleared.load(std::memory_order_acquire))
+  const bool is_shown = shown && shown->number == requested;
+  if (is_shown && shown->cause != HaltCause::none) return shown;
+  if (!is_shown && requested == view.counters().cleared.load(std::memory_order_acquire))
     return shown;  // sync cleared
   Halt halt;
   halt.number = std::max<std::uint64_t>(requested, 1);
-  read_halt(view.bell().reasons[halt.number % kHaltsKept], halt.number, halt);
+  // its requester may just be writing the reason, or was killed before
+  for (int i = 0; i < kReasonReadings; ++i) {
+    if (read_halt(view.bell().reasons[halt.number % kHaltsKept], halt.number, halt)) break;
+  }
+  if (is_shown) halt.iteration = shown->iteration;
   return halt;
 }
 

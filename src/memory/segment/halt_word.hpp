@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string_view>
@@ -10,7 +9,7 @@
 #include "o80/memory/halt.hpp"
 
 // Halts: a counter that each requester increments, and slots for the reasons. A request is one
-// atomic addition and needs no lane. The protocol is in ARCHITECTURE.md, Halts.
+// atomic addition and needs no lane. The protocol is in src/runtime/README.md#halts.
 
 namespace o80 {
 

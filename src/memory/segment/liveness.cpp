@@ -7,12 +7,15 @@
 #include <atomic>
 #include <deque>
 #include <mutex>
+#include <string>
+#include <system_error>
 #include <thread>
 #include <utility>
 
 #include "memory/os/futex.hpp"
 #include "memory/os/helper_scheduling.hpp"
 #include "memory/segment/verb_word.hpp"
+#include "o80/base/error.hpp"
 #include "o80/base/time.hpp"
 
 namespace o80 {
@@ -20,6 +23,7 @@ namespace o80 {
 namespace {
 
 constexpr std::int64_t kPeriod = 20'000'000;  // [ns]
+constexpr std::uint32_t kRoundsPerNames = 5;  // rounds from one check of the names to the next
 
 constexpr std::uint64_t pack(LaneLife life) noexcept {
   return life.incarnation << 2 | static_cast<std::uint64_t>(life.state);
@@ -36,7 +40,10 @@ constexpr LaneLife unpack(std::uint64_t word) noexcept {
 /// Realtime: reading the atomic words.
 struct LaneLiveness::Watched {
   explicit Watched(const OwnedSegment& segment)
-      : descriptor(segment.commands_descriptor()), view(segment.view()) {
+      : descriptor(segment.commands_descriptor()),
+        names(segment.names()),
+        socket(segment.socket().descriptor()),
+        view(segment.view()) {
     for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes.emplace_back(0);
   }
 
@@ -51,7 +58,18 @@ struct LaneLiveness::Watched {
     }
     if (changed) changes.fetch_add(1, std::memory_order_release);  // sync changes
     note_slow_verb(view, monotonic_now());
+    if (rounds.load(std::memory_order_relaxed) % kRoundsPerNames == 0) check_names();
     rounds.fetch_add(1, std::memory_order_relaxed);
+  }
+
+  void check_names() noexcept {
+    if (socket) NameSocket::drain(*socket);
+    if (nameless.load(std::memory_order_relaxed) || !names.lead_elsewhere()) return;
+    // read after the names: a backend stores its end before it removes its files
+    const auto state = static_cast<BackendState>(
+        view.counters().state.load(std::memory_order_acquire));  // sync state
+    if (state == BackendState::starting || state == BackendState::running)
+      nameless.store(true, std::memory_order_relaxed);
   }
 
   std::uint64_t owner_of(std::uint32_t i) const noexcept {
@@ -78,11 +96,14 @@ struct LaneLiveness::Watched {
   }
 
   int descriptor;
+  FileNames names;
+  std::shared_ptr<const std::atomic<int>> socket;  // null: an anonymous segment
   SegmentView view;
   std::deque<std::atomic<std::uint64_t>> lanes;
   std::atomic<std::uint32_t> changes{0};
   std::atomic<std::uint32_t> rounds{0};
   std::atomic<std::uint64_t> queries{0};
+  std::atomic<bool> nameless{false};
 };
 
 /// The helper of a process; everything in it is guarded by fork_mutex().
@@ -149,8 +170,17 @@ class LivenessThread {
     sigset_t every, before;
     sigfillset(&every);
     pthread_sigmask(SIG_BLOCK, &every, &before);
-    thread_ = std::thread([this] { run(); });
+    std::string refused;
+    try {
+      thread_ = std::thread([this] { run(); });
+    } catch (const std::system_error& error) {
+      refused = error.what();
+    }
     pthread_sigmask(SIG_SETMASK, &before, nullptr);
+    if (!refused.empty())
+      throw Error("the helper thread that notices dead frontends cannot be started (" + refused +
+                  "): raise the limit of threads (`ulimit -u`), or allow clone in the profile of "
+                  "this container");
   }
 
   ~LivenessThread() {
@@ -201,6 +231,10 @@ std::uint64_t LaneLiveness::queries() const noexcept {
 
 LaneLife LaneLiveness::lane(std::uint32_t i) const noexcept {
   return unpack(watched_->lanes[i].load(std::memory_order_relaxed));
+}
+
+bool LaneLiveness::nameless() const noexcept {
+  return watched_->nameless.load(std::memory_order_relaxed);
 }
 
 void LaneLiveness::refresh() noexcept {

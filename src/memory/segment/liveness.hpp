@@ -41,6 +41,9 @@ class LaneLiveness {
   std::uint32_t rounds() const noexcept;
   /// Number of queries so far, one system call each; a lane without an owner is not queried.
   std::uint64_t queries() const noexcept;
+  /// True from when a name of the segment's files was seen to lead elsewhere: no other process can
+  /// find this backend any more. Checked every 100 ms.
+  bool nameless() const noexcept;
   /// Queries all lanes now, in the calling thread. Not real-time.
   void refresh() noexcept;
 

@@ -18,7 +18,8 @@ namespace o80 {
 
 namespace {
 
-constexpr std::int64_t kPassing = 20'000'000;   // longest lock of a starter or a cleaner [ns]
+constexpr std::int64_t kPassing =
+    100'000'000;  // of a starter, a cleaner, or one killed on a busy machine
 constexpr std::int64_t kDying = 1'000'000'000;  // longest end of a dying process [ns]
 
 std::int64_t patience(int descriptor) noexcept {
@@ -84,10 +85,10 @@ NamedSegment NamedSegment::open(std::string_view name) {
 void NamedSegment::check_owner() const {
   const std::string why = why_untrusted(descriptor());
   if (!why.empty())
-    throw SegmentError("the name '" + name_ + "' is in use: " + path_ + " is in the way, and " +
-                       why +
-                       ". Otherwise have that file removed, choose another name with --segment, or "
-                       "another directory with O80_DIRECTORY.");
+    throw SegmentError(
+        "the name '" + name_ + "' is in use: " + path_ + " is in the way, and " + why +
+        ". Otherwise have that file removed, choose another name with --segment (segment "
+        "in code), or another directory with O80_DIRECTORY.");
 }
 
 bool NamedSegment::try_lock() noexcept {

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -9,7 +8,7 @@
 namespace o80 {
 
 /// Move-only: the two files behind the name of a segment, to replace or remove them
-/// (ARCHITECTURE.md, How a backend takes a name).
+/// (src/memory/README.md#successor).
 ///
 /// The lock of byte 0 of the commanders' file decides: its holder is the living backend, or the
 /// only process that may replace or remove the segment. For a file without a commanders' file
@@ -33,12 +32,12 @@ class NamedSegment {
   /// True if the name still leads to this segment file.
   bool is_current() const noexcept;
   /// True if a living backend has the name. A cleaner, a starter or a dying process may hold the
-  /// lock for a moment, so this waits for it up to 20 ms (1 s if the process of the header is
+  /// lock for a moment, so this waits for it up to 100 ms (1 s if the process of the header is
   /// gone). Call it only if try_lock() has failed.
   bool is_alive() const;
   /// The text of the error for a second backend, and what to do instead of stopping the first.
-  std::string taken_text(
-      std::string_view otherwise = "give this one another name with --segment") const;
+  std::string taken_text(std::string_view otherwise =
+                             "give this one another name with --segment (segment in code)") const;
   /// What refuses to remove it while its backend lives.
   std::string in_use_text() const;
   /// Unlinks both files, the segment file first, so that a name never leads to a segment without

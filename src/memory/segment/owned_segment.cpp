@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <cerrno>
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -15,13 +16,15 @@
 #include "memory/segment/halt_word.hpp"
 #include "memory/segment/named_segment.hpp"
 #include "memory/segment/segment_draft.hpp"
-#include "memory/segment/segment_file.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "o80/base/error.hpp"
+#include "o80/base/time.hpp"
 
 namespace o80 {
 
 namespace {
+
+constexpr std::int64_t kEnding = 1'000'000'000;  // longest end of a former holder's process [ns]
 
 std::uint64_t journal_bytes_of(const SegmentSpec& spec) {
   if (spec.journal_bytes == 0) return 0;
@@ -80,6 +83,18 @@ void fill(const SegmentView& view, const SegmentSpec& spec, std::uint64_t epoch)
   view.bell().wanted.store(std::numeric_limits<std::int64_t>::max(), std::memory_order_relaxed);
 }
 
+/// Binds the socket of a name that no living backend has. Another starter may hold it for a moment;
+/// where no socket is granted, the locks of the files alone decide.
+NameSocket take_name(std::string_view name) {
+  const std::int64_t end = monotonic_now() + kEnding;
+  while (true) {
+    OwnedSegment::refuse_if_taken(name);
+    NameSocket socket = NameSocket::take(name);
+    if (socket.is_open() || errno != EADDRINUSE || monotonic_now() >= end) return socket;
+    usleep(1000);
+  }
+}
+
 }  // namespace
 
 OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
@@ -93,8 +108,9 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
         " lanes. A row must be a multiple of 8 bytes, a segment must be below 64 TiB, and there "
         "must be at most " +
         std::to_string(kMaxLanes) + " lanes.");
+  NameSocket socket;
   if (!spec.anonymous) {
-    refuse_if_taken(spec.name);
+    socket = take_name(spec.name);
     sweep_orphans();
   }
 
@@ -120,7 +136,10 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
                  former.was_halted ? "the former backend was halted and not resumed"
                                    : "the former backend was killed while commands were active");
   };
-  if (!spec.anonymous) draft.publish(inherit);
+  if (!spec.anonymous) {
+    draft.publish(inherit);
+    socket.show();
+  }
   segment.name_ = spec.name;
   segment.path_ = path;
   segment.commands_path_ = draft.commands_path();
@@ -130,14 +149,31 @@ OwnedSegment OwnedSegment::create(const SegmentSpec& spec) {
   segment.commands_mapping_ = std::move(commands_mapping);
   segment.lock_ = draft.take_segment_lock();
   segment.commands_lock_ = draft.take_commands_lock();
+  segment.socket_ = std::move(socket);
   return segment;
 }
 
 void OwnedSegment::refuse_if_taken(std::string_view name) {
-  const NamedSegment bearer = NamedSegment::open(name);
-  if (!bearer.is_open()) return;
-  bearer.check_owner();
-  if (bearer.is_alive()) throw SegmentTaken(bearer.taken_text());
+  // the socket of a process that is just ending may outlive its locks
+  const std::int64_t end = monotonic_now() + kEnding;
+  while (true) {
+    const NamedSegment bearer = NamedSegment::open(name);
+    if (bearer.is_open()) bearer.check_owner();
+    if (bearer.is_open() && bearer.is_alive()) throw SegmentTaken(bearer.taken_text());
+    const int holder = NameSocket::holder_of(name);
+    if (holder == 0) return;
+    if (monotonic_now() >= end)
+      throw SegmentTaken("segment '" + std::string(name) + "' already has a backend (pid " +
+                         std::to_string(holder) + "), whose files were removed from " +
+                         segment_directory() + ".\nStop it first with `o80 stop " +
+                         std::string(name) + "`, or give this one another name with --segment.");
+    usleep(10'000);
+  }
+}
+
+FileNames OwnedSegment::names() const {
+  if (path_.empty()) return {};
+  return {{{path_, lock_.descriptor()}, {commands_path_, commands_lock_.descriptor()}}};
 }
 
 void OwnedSegment::publish(const std::string& name) {
@@ -146,7 +182,7 @@ void OwnedSegment::publish(const std::string& name) {
   if (!path_.empty())
     throw Error("segment '" + name_ +
                 "' has a name already: " + path_.substr(path_.rfind('/') + 1));
-  refuse_if_taken(name);
+  NameSocket socket = take_name(name);
   sweep_orphans();
   SegmentDraft draft(name, epoch_, std::move(lock_), std::move(commands_lock_));
   const auto take_back = [&] {
@@ -157,12 +193,14 @@ void OwnedSegment::publish(const std::string& name) {
   try {
     draft.give_names();
     draft.publish([](const Predecessor&) {});
+    socket.show();
   } catch (...) {
     take_back();
     throw;
   }
   path_ = path;
   commands_path_ = draft.commands_path();
+  socket_ = std::move(socket);
   take_back();
 }
 
@@ -178,6 +216,7 @@ OwnedSegment& OwnedSegment::operator=(OwnedSegment&& other) noexcept {
   query_ = std::move(other.query_);
   lock_ = std::move(other.lock_);
   commands_lock_ = std::move(other.commands_lock_);
+  socket_ = std::move(other.socket_);
   view_ = other.view_;
   guard_ = other.guard_;
   return *this;
@@ -204,6 +243,7 @@ void OwnedSegment::release() noexcept {
   mapping_ = Mapping();
   commands_mapping_ = Mapping();
   query_.close();
+  socket_.close();
   lock_.close();
   commands_lock_.close();
 }
@@ -226,6 +266,7 @@ void OwnedSegment::end(BackendState stopped_or_failed, std::string_view text) no
 
 void OwnedSegment::remove() noexcept {
   if (path_.empty()) return;  // anonymous
+  socket_.close();
   // we hold byte 0, so no other segment can get the name between the check and the unlink
   O80_CRASH_POINT("segment.before_unlink");
   if (leads_to(path_, lock_.descriptor())) unlink(path_.c_str());

@@ -12,6 +12,8 @@
 #include "memory/os/fork.hpp"
 #include "memory/os/mapping.hpp"
 #include "memory/segment/anonymous_file.hpp"
+#include "memory/segment/name_socket.hpp"
+#include "memory/segment/segment_file.hpp"
 #include "memory/segment/segment_layout.hpp"
 #include "o80/memory/life.hpp"
 
@@ -66,6 +68,9 @@ class OwnedSegment {
   /// Opens a file once more, for a frontend in this process.
   LockFile open_segment_again(int flags) const { return open_again(lock_, flags); }
   LockFile open_commands_again(int flags) const { return open_again(query_, flags); }
+  const NameSocket& socket() const noexcept { return socket_; }
+  /// The names of both files; empty while it is anonymous.
+  FileNames names() const;
   BackendState state() const noexcept;
   /// Stores the state, from starting to running.
   void set_state(BackendState state) noexcept;
@@ -91,6 +96,7 @@ class OwnedSegment {
   LockFile lock_;           // the segment file: holds the lock of byte 0, not mapped
   LockFile commands_lock_;  // the commanders' file: holds the lock of byte 0, not mapped
   LockFile query_;          // the commanders' file: mapped, without a lock
+  NameSocket socket_;
   Mapping mapping_;
   Mapping commands_mapping_;
   SegmentView view_;

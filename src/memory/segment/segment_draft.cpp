@@ -5,9 +5,11 @@
 #include <sys/statvfs.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <cstring>
+#include <vector>
 
 #include "base/crash_point.hpp"
 #include "memory/os/file_owner.hpp"
@@ -36,6 +38,18 @@ constexpr int kAttempts = 100;
 
 Mapping map(const LockFile& file, std::uint64_t bytes) {
   return {file.descriptor(), bytes, Mapping::Protection::read_write, Mapping::Faults::later};
+}
+
+/// Reserves the blocks of a file by writing it. Returns an error number.
+int fill_with_zeros(int descriptor, std::uint64_t bytes) {
+  const std::vector<char> zeros(1U << 16);
+  for (std::uint64_t at = 0; at < bytes;) {
+    const std::uint64_t part = std::min<std::uint64_t>(zeros.size(), bytes - at);
+    const ssize_t written = pwrite(descriptor, zeros.data(), part, static_cast<off_t>(at));
+    if (written < 0 && errno != EINTR) return errno;
+    if (written > 0) at += static_cast<std::uint64_t>(written);
+  }
+  return 0;
 }
 
 BackendState state_of(const SegmentView& view) {
@@ -142,8 +156,13 @@ bool SegmentDraft::create_commands() {
   if (!commands_.is_open() && errno == EEXIST) return false;
   if (!commands_.is_open()) fail("no file can be made in " + segment_directory(), errno);
   O80_CRASH_POINT("create.before_lock");
-  if (!commands_.try_lock(kBackendByte) || !leads_to(commands_path_, commands_.descriptor()))
-    return false;
+  if (!commands_.try_lock(kBackendByte)) {
+    const std::string why = why_locks_are_refused();
+    if (why.empty()) return false;
+    unlink(commands_path_.c_str());
+    throw SegmentError("cannot create segment '" + name_ + "': " + why + ".");
+  }
+  if (!leads_to(commands_path_, commands_.descriptor())) return false;
   O80_CRASH_POINT("create.after_lock");
   return true;
 }
@@ -193,6 +212,7 @@ void SegmentDraft::reserve(const SegmentOffsets& offsets) {
     do {
       error = posix_fallocate(file->descriptor(), 0, static_cast<off_t>(bytes));
     } while (error == EINTR);
+    if (error == EPERM || error == ENOSYS) error = fill_with_zeros(file->descriptor(), bytes);
     if (error == ENOSPC || error == EFBIG || error == ENOMEM) fail_for_space(name_, all);
     if (error != 0) fail("its memory cannot be reserved", error);
   }

@@ -17,8 +17,24 @@ struct Predecessor {
   bool died_acting = false;  // it was killed while commands, control or a motion were active
 };
 
-/// The two files of a segment without a name (ARCHITECTURE.md, How a backend takes a name): the
-/// locked commanders' file of its epoch, and the locked segment file under a temporary name.
+/// The two files of a segment without a name: the locked commanders' file of its epoch, and the
+/// locked segment file under a temporary name, the draft. How a backend takes a name
+/// (src/memory/README.md#successor):
+///
+/// 1. A name with a living backend is refused; orphans are removed.
+/// 2. Both files are created, locked, reserved, given their permissions and filled.
+/// 3. The draft is linked to the name. If the name is free, all is done.
+/// 4. Else the files behind the name are opened, their owner is checked, and byte 0 of that
+///    commanders' file is locked. If it stays locked (NamedSegment::is_alive): SegmentTaken.
+/// 5. If the name leads to another file by now: step 3 again. Else the former backend is dead, and
+///    no other starter can replace it.
+/// 6. `superseded` is written into the former segment, and its waiters are woken.
+/// 7. Its halts are read, and a halt is requested in the new segment if one was pending or in
+///    force, or if the backend was killed while commands acted.
+/// 8. The draft is renamed over the name; the former commanders' file is unlinked.
+///
+/// 6 comes before 7, and a process that has requested a halt reads the state afterwards. So a halt
+/// is inherited, or its requester finds `superseded`.
 ///
 /// The destructor removes both files unless publish() has succeeded. If the process dies before,
 /// sweep_orphans() removes them later.
@@ -29,8 +45,7 @@ class SegmentDraft {
   explicit SegmentDraft(const std::string& name, Files files = Files::named);
   /// Takes the locked files of an anonymous segment, to name them (give_names) and publish them.
   SegmentDraft(const std::string& name, std::uint64_t epoch, LockFile segment, LockFile commands);
-  SegmentDraft(const SegmentDraft&) = delete;
-  SegmentDraft& operator=(const SegmentDraft&) = delete;
+  SegmentDraft& operator=(SegmentDraft&&) = delete;
   ~SegmentDraft();
 
   std::uint64_t epoch() const noexcept { return epoch_; }

@@ -5,6 +5,7 @@
 #include <time.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 
@@ -30,6 +31,16 @@ bool leads_to(const std::string& path, int descriptor) noexcept {
          named.st_dev == open.st_dev && named.st_ino == open.st_ino;
 }
 
+bool FileNames::lead_elsewhere() const noexcept {
+  return std::ranges::any_of(names, [](const Name& name) {
+    struct stat found, open;
+    // a refused call says nothing
+    if (lstat(name.path.c_str(), &found) != 0) return errno == ENOENT || errno == ENOTDIR;
+    return fstat(name.descriptor, &open) == 0 &&
+           (found.st_dev != open.st_dev || found.st_ino != open.st_ino);
+  });
+}
+
 bool bears_the_mark(int descriptor) noexcept {
   std::uint64_t magic = 0;
   return pread(descriptor, &magic, sizeof magic, 0) == sizeof magic && magic == kSegmentMagic;
@@ -50,6 +61,7 @@ std::string inspect_segment(int descriptor, SegmentHeader& header, SegmentOffset
   struct stat status;
   if (fstat(descriptor, &status) != 0) return std::strerror(errno);
   if (!S_ISREG(status.st_mode)) return "it is not a regular file";
+  if (pread(descriptor, &header, 1, 0) < 0) return std::strerror(errno);
   if (!bears_the_mark(descriptor)) return "it was not made by o80";
   if (!read_header(descriptor, header)) return "it is truncated";
   if (header.version != kSegmentVersion || header.header_bytes != sizeof header)

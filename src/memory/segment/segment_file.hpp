@@ -5,6 +5,7 @@
 #include <atomic>
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "memory/segment/segment_layout.hpp"
 #include "o80/memory/life.hpp"
@@ -13,6 +14,18 @@ namespace o80 {
 
 /// True if `path` leads to the file of the descriptor.
 bool leads_to(const std::string& path, int descriptor) noexcept;
+
+/// Names of open files. The files can be removed or replaced, or a file system can be mounted over
+/// their directory: then the names lead elsewhere.
+struct FileNames {
+  struct Name {
+    std::string path;
+    int descriptor = -1;
+  };
+  std::vector<Name> names{};
+
+  bool lead_elsewhere() const noexcept;
+};
 
 /// True if the file starts with the magic number of a segment, of any version.
 bool bears_the_mark(int descriptor) noexcept;
@@ -38,7 +51,7 @@ mode_t commanders_mode(mode_t permission) noexcept;
 
 /// Decides the Life of a backend from its state word and the lock of its byte. `descriptor` must
 /// not hold the lock itself. It is the segment file for observers, else the commanders' file
-/// (ARCHITECTURE.md, Ownership by locks).
+/// (src/memory/README.md#locks).
 Life judge_life(int descriptor, const std::atomic<std::uint32_t>& state) noexcept;
 
 /// Stores the end, and wakes all waiters if the view has the commanders' file.

@@ -12,10 +12,10 @@ namespace o80 {
 //
 //   SegmentHeader   written once, before the file gets its name
 //   schema          written once, before the file gets its name
-//   provenance      written once, before the file gets its name
-//   (runtime/journal/provenance_bytes.hpp) Counters        written by the backend history slots of
-//   row_bytes: written by the backend journal         a ring of entries (memory/ring/journal.hpp):
-//   written by the backend
+//   provenance      likewise (runtime/journal/provenance_bytes.hpp)
+//   Counters        written by the backend
+//   history         slots of row_bytes: written by the backend
+//   journal         a ring of entries (memory/ring/journal.hpp): written by the backend
 //
 // The commanders' file belongs to one epoch of a segment. Only users who may command can open it:
 //
@@ -25,7 +25,7 @@ namespace o80 {
 //   lanes           for each lane a LaneSenderPage and its transport blocks: written by its owner
 //   feedback        for each lane a LaneFeedback and its StatusSlots: written by the backend
 //
-// See ARCHITECTURE.md: Lanes and their owners, Halts, Waiting for a row.
+// The protocols are in src/memory/README.md; that of halts in src/runtime/README.md#halts.
 
 inline constexpr std::uint64_t kSegmentMagic = 0x0a67'6573'2030'386fULL;   // "o80 seg\n"
 inline constexpr std::uint64_t kCommandsMagic = 0x0a64'6d63'2030'386fULL;  // "o80 cmd\n"

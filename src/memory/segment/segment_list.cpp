@@ -1,8 +1,10 @@
 #include "o80/memory/segment_list.hpp"
 
 #include <fcntl.h>
+#include <sys/stat.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstddef>
@@ -11,6 +13,8 @@
 #include "base/printable.hpp"
 #include "memory/os/file_lock.hpp"
 #include "memory/os/file_owner.hpp"
+#include "memory/os/process_start.hpp"
+#include "memory/segment/name_socket.hpp"
 #include "memory/segment/named_segment.hpp"
 #include "memory/segment/segment_file.hpp"
 #include "memory/segment/segment_name.hpp"
@@ -36,15 +40,17 @@ SegmentEntry describe(const std::string& name) {
   if (entry.problem.empty()) entry.problem = inspect_segment(file.descriptor(), header, offsets);
   if (!entry.problem.empty()) return entry;
 
+  const auto reads = [&](auto& counter, std::size_t offset) {
+    const auto at = static_cast<off_t>(offsets.counters + offset);
+    return pread(file.descriptor(), &counter, sizeof counter, at) == sizeof counter;
+  };
   std::uint32_t word = 0;
-  const auto where = static_cast<off_t>(offsets.counters + offsetof(Counters, state));
-  if (pread(file.descriptor(), &word, sizeof word, where) != sizeof word) return entry;
+  if (!reads(word, offsetof(Counters, state))) return entry;
   const std::atomic<std::uint32_t> state(word);
   entry.life = judge_life(file.descriptor(), state);
   entry.readable = true;
   std::uint64_t halt = 0;
-  const auto shown = static_cast<off_t>(offsets.counters + offsetof(Counters, halted));
-  entry.halted = pread(file.descriptor(), &halt, sizeof halt, shown) == sizeof halt && halt != 0;
+  entry.halted = reads(halt, offsetof(Counters, halted)) && halt != 0;
   entry.pid = header.pid;
   entry.process_start = header.process_start;
   entry.started_at = header.started_at;
@@ -53,6 +59,36 @@ SegmentEntry describe(const std::string& name) {
   entry.epoch = header.epoch;
   entry.played = (header.flags & kPlayed) != 0;
   entry.bytes = offsets.file_bytes + offsets.commands_bytes;
+  return entry;
+}
+
+/// True if the name leads to a file that this user may read and that is no segment of any version.
+bool is_foreign(const std::string& name) {
+  const LockFile file = LockFile::open(segment_path(name), O_RDONLY | O_NOFOLLOW);
+  return file.is_open() && !bears_the_mark(file.descriptor());
+}
+
+/// True if the files of this backend have their names, whether it lives or is just ending.
+bool has_files(const NameHolder& holder, const SegmentEntry& entry) {
+  if (entry.name != holder.name) return false;
+  return entry.pid == holder.pid || (!is_over(entry.life) && !is_foreign(entry.name));
+}
+
+/// A living backend whose files are gone: its socket is all that is left of its name.
+SegmentEntry describe(const NameHolder& holder) {
+  SegmentEntry entry;
+  entry.name = holder.name;
+  entry.life = Life::running;
+  entry.pid = holder.pid;
+  entry.process_start = process_start(holder.pid);
+  struct stat process{};
+  if (stat(("/proc/" + std::to_string(holder.pid)).c_str(), &process) == 0)
+    entry.started_at = process.st_ctime;
+  entry.user = user_name(holder.user);
+  entry.problem =
+      "its files were removed or replaced: in real time it has halted itself. Nobody can attach to "
+      "it; stop it with `o80 stop " +
+      holder.name + "` or `kill " + std::to_string(holder.pid) + "`";
   return entry;
 }
 
@@ -70,9 +106,29 @@ const char* SegmentEntry::state() const noexcept {
 }
 
 std::vector<SegmentEntry> list_segments() {
+  std::vector<NameHolder> holders = NameSocket::holders();
   std::vector<SegmentEntry> entries;
-  for (const SegmentFileName& file : list_files())
+  int error = 0;
+  const std::vector<SegmentFileName> files = list_files(&error);
+  // an empty list would say that nothing runs
+  if (error != 0)
+    throw SegmentError("the segments in " + segment_directory() + " cannot be listed: " +
+                       std::strerror(error) + ". In a container its profile may have to allow it");
+  for (const SegmentFileName& file : files)
     if (file.kind == SegmentFileName::Kind::segment) entries.push_back(describe(file.name));
+  std::erase_if(holders, [&](const NameHolder& holder) {
+    return std::ranges::any_of(entries,
+                               [&](const SegmentEntry& entry) { return has_files(holder, entry); });
+  });
+  // a backend shows its socket while its files have their names: one that has just ended is not
+  // among those that show it still
+  const std::string directory = segment_directory();
+  const bool is_hidden = access(directory.c_str(), F_OK) == 0 &&
+                         access(directory.c_str(), R_OK | X_OK) != 0;  // the files may be there
+  if (holders.empty() || is_hidden) return entries;
+  for (const NameHolder& holder : NameSocket::holders())
+    if (std::ranges::count(holders, holder) > 0) entries.push_back(describe(holder));
+  std::ranges::sort(entries, {}, &SegmentEntry::name);
   return entries;
 }
 

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <charconv>
 #include <cinttypes>
 #include <cstdio>
@@ -54,7 +55,7 @@ bool is_segment_name(std::string_view name) noexcept {
     return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '_' ||
            c == '-' || c == '.';
   };
-  return !name.empty() && name.size() <= 64 && name.front() != '.' &&
+  return !name.empty() && name.size() <= 64 && name.front() != '.' && name.front() != '-' &&
          std::all_of(name.begin(), name.end(), allowed) &&
          name.find(kDraft) == std::string_view::npos &&
          name.find(kCommands) == std::string_view::npos;
@@ -64,7 +65,7 @@ void check_segment_name(std::string_view name) {
   if (!is_segment_name(name))
     throw InvalidArgument("'" + std::string(name) +
                           "' cannot name a segment: use 1 to 64 letters, digits, '_', '-' and "
-                          "'.', no '.' in front");
+                          "'.', with neither '.' nor '-' in front");
 }
 
 std::string segment_path(std::string_view name) {
@@ -101,11 +102,19 @@ std::optional<SegmentFileName> parse_file_name(std::string_view file) {
   return parsed;
 }
 
-std::vector<SegmentFileName> list_files() {
+std::vector<SegmentFileName> list_files(int* error) {
   std::vector<std::string> names;
   DIR* directory = opendir(segment_directory().c_str());
-  if (directory == nullptr) return {};
-  while (const dirent* entry = readdir(directory)) names.emplace_back(entry->d_name);
+  if (directory == nullptr) {
+    if (error != nullptr && errno != ENOENT && errno != ENOTDIR && errno != EACCES) *error = errno;
+    return {};
+  }
+  errno = 0;
+  while (const dirent* entry = readdir(directory)) {
+    names.emplace_back(entry->d_name);
+    errno = 0;
+  }
+  if (error != nullptr) *error = errno;
   closedir(directory);
   std::sort(names.begin(), names.end());
   std::vector<SegmentFileName> files;

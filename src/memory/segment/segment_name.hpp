@@ -40,7 +40,8 @@ struct SegmentFileName {
 /// Empty if this is not the name of a file of a segment.
 std::optional<SegmentFileName> parse_file_name(std::string_view file);
 
-/// All files of segments in that directory, sorted.
-std::vector<SegmentFileName> list_files();
+/// All files of segments in that directory, sorted. `error`: gets the number of a failure to read
+/// it; 0 also if it is missing or not for this user.
+std::vector<SegmentFileName> list_files(int* error = nullptr);
 
 }  // namespace o80

@@ -20,7 +20,7 @@ std::optional<std::uint32_t> register_for_row(const AttachedSegment& segment, It
 /// After a sleep on `seen`: the writer woke one, and the first awake tells the rest.
 void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept;
 
-/// Waits for rows (ARCHITECTURE.md, Waiting for a row).
+/// Waits for rows (src/memory/README.md#waiting).
 ///
 /// A waiter spins, lowers the word `wanted`, checks `published` again, and sleeps. The writer
 /// resets `wanted` when that row is published and wakes one waiter, which wakes the others. A

@@ -1,11 +1,9 @@
 #include "robot/driver/driver_instance.hpp"
 
-#include <sys/random.h>
-
 #include <algorithm>
-#include <cstdio>
 
 #include "memory/os/fork.hpp"
+#include "memory/os/random_bits.hpp"
 #include "o80/base/version.hpp"
 
 namespace o80 {
@@ -32,12 +30,7 @@ void check_table(const RobotTable& table, const std::string& where) {
 namespace {
 
 /// A random number as text. It fits in 53 bits, so that every language reads it exactly.
-std::string drawn_seed() {
-  std::uint64_t bits = 0;
-  while (getrandom(&bits, sizeof bits, 0) != sizeof bits) {
-  }
-  return std::to_string(bits >> 11);
-}
+std::string drawn_seed() { return std::to_string(random_bits() >> 11); }
 
 std::vector<OptionValue> plain(const OptionValues& options) {
   std::vector<OptionValue> values;

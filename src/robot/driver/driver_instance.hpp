@@ -1,6 +1,5 @@
 #pragma once
 
-#include <memory>
 #include <span>
 #include <string>
 #include <utility>
@@ -36,8 +35,7 @@ class DriverInstance {
  public:
   /// Constructs the driver, which touches no hardware. Throws InvalidArgument, DriverError.
   DriverInstance(const RobotTable& table, const OptionValues& options);
-  DriverInstance(const DriverInstance&) = delete;
-  DriverInstance& operator=(const DriverInstance&) = delete;
+  DriverInstance& operator=(DriverInstance&&) = delete;
   ~DriverInstance();
 
   const RobotTable& table() const { return table_; }

@@ -2,16 +2,19 @@
 
 #include <cxxabi.h>
 #include <dlfcn.h>
+#include <link.h>
 
 #include <algorithm>
 #include <array>
 #include <cstdlib>
+#include <cstring>
 #include <filesystem>
-#include <memory>
+#include <fstream>
 #include <sstream>
 #include <string_view>
 #include <utility>
 
+#include "base/sentence.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/nearest_name.hpp"
 #include "robot/driver/driver_instance.hpp"
@@ -30,6 +33,44 @@ fs::path bundled_folder() {
   std::error_code ignored;
   const fs::path library = fs::canonical(info.dli_fname, ignored);
   return library.parent_path() / "o80" / "robots";
+}
+
+/// True if the file is a library that exports the table of a robot. Only reads it: loading would
+/// run code of a library that may be no robot.
+bool is_robot_library(const fs::path& path) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored)) return false;
+  const std::uintmax_t size = fs::file_size(path, ignored);
+  std::ifstream file(path, std::ios::binary);
+  const auto read = [&]<class Row>(std::uintmax_t at, std::size_t count, std::vector<Row>& rows) {
+    if (at > size || count > (size - at) / sizeof(Row)) return false;
+    rows.resize(count);
+    const auto bytes = static_cast<std::streamsize>(count * sizeof(Row));
+    file.seekg(static_cast<std::streamoff>(at));
+    return file.read(reinterpret_cast<char*>(rows.data()), bytes).good();
+  };
+  std::vector<ElfW(Ehdr)> head;
+  std::vector<ElfW(Shdr)> sections;
+  if (!read(0, 1, head) || std::memcmp(head[0].e_ident, ELFMAG, SELFMAG) != 0 ||
+      !read(head[0].e_shoff, head[0].e_shnum, sections)) {
+    return false;
+  }
+  for (const ElfW(Shdr) & section : sections) {
+    if (section.sh_type != SHT_DYNSYM || section.sh_link >= sections.size()) continue;
+    const ElfW(Shdr) & texts = sections[section.sh_link];
+    std::vector<ElfW(Sym)> symbols;
+    std::vector<char> names;
+    if (!read(section.sh_offset, section.sh_size / sizeof(ElfW(Sym)), symbols) ||
+        !read(texts.sh_offset, texts.sh_size, names)) {
+      return false;
+    }
+    names.push_back(0);
+    for (const ElfW(Sym) & symbol : symbols) {
+      if (symbol.st_shndx == SHN_UNDEF || symbol.st_name >= names.size()) continue;
+      if (std::string_view(&names[symbol.st_name]) == kRobotSymbol) return true;
+    }
+  }
+  return false;
 }
 
 /// Robots of the other packages of o80's repository, and these packages.
@@ -72,7 +113,8 @@ std::string undefined_symbol(const std::string& message) {
 
 /// What the dynamic linker said, with the cure: it names one library only.
 std::string why_not_loaded(const std::string& robot, const std::string& message) {
-  std::string text = "the robot library '" + robot + "' cannot be loaded: " + message + ". ";
+  std::string text =
+      "the robot library '" + robot + "' cannot be loaded: " + sentence(message) + " ";
   if (const std::string symbol = undefined_symbol(message); !symbol.empty()) {
     const bool of_o80 = symbol.find("o80::") != std::string::npos;
     return text + (of_o80
@@ -141,7 +183,7 @@ std::vector<RobotFile> find_robots() {
     std::error_code ignored;
     std::vector<RobotFile> here;
     for (const auto& entry : fs::directory_iterator(folder, ignored)) {
-      if (entry.path().extension() == ".so") {
+      if (entry.path().extension() == ".so" && is_robot_library(entry.path())) {
         here.push_back({entry.path().stem().string(), fs::absolute(entry.path()).string()});
       }
     }

@@ -12,8 +12,7 @@ namespace o80 {
 class TrustedLibrary {
  public:
   explicit TrustedLibrary(const std::string& path);
-  TrustedLibrary(const TrustedLibrary&) = delete;
-  TrustedLibrary& operator=(const TrustedLibrary&) = delete;
+  TrustedLibrary& operator=(TrustedLibrary&&) = delete;
   ~TrustedLibrary();
 
   /// Path for dlopen: it leads to the same file that was checked.

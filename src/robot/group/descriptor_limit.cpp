@@ -3,8 +3,6 @@
 #include <dirent.h>
 #include <sys/resource.h>
 
-#include <algorithm>
-
 #include "o80/base/error.hpp"
 
 namespace o80 {

@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <cstring>
-#include <utility>
+#include <iterator>
+#include <optional>
 
+#include "base/sentence.hpp"
 #include "control/batch/batch_builder.hpp"
 #include "control/batch/command_check.hpp"
 #include "memory/os/futex.hpp"
@@ -48,7 +50,7 @@ std::string text_of(const std::string& group, const std::vector<CopyFailed::Fail
   std::string text = "copy " + std::to_string(failures.front().copy) + " of '" + group +
                      "' failed: " + text_of(failures.front().error);
   if (failures.size() == 1) return text;
-  text += ". So did ";
+  text = sentence(text) + " So did ";
   for (std::size_t i = 1; i < failures.size() && i < kMaxNamed; ++i) {
     text += (i == 1 ? "copy " : ", copy ") + std::to_string(failures[i].copy);
   }
@@ -100,8 +102,7 @@ class InlineGroup::Call {
     }
     innermost_ = this;
   }
-  Call(const Call&) = delete;
-  Call& operator=(const Call&) = delete;
+  Call& operator=(Call&&) = delete;
   ~Call() {
     innermost_ = outer_;
     group_.pool_->release();
@@ -134,8 +135,7 @@ class InlineGroup::FollowingCall {
     }
     group_->leader_.store(&leader, std::memory_order_relaxed);
   }
-  FollowingCall(const FollowingCall&) = delete;
-  FollowingCall& operator=(const FollowingCall&) = delete;
+  FollowingCall& operator=(FollowingCall&&) = delete;
   ~FollowingCall() {
     if (group_ == nullptr) return;
     group_->leader_.store(nullptr, std::memory_order_relaxed);
@@ -407,13 +407,29 @@ void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uin
   const std::size_t rows = plan.rows.size() / copies();
   const std::span<const std::byte> to = plan.targets.subspan(i * targets, targets);
   const std::span<std::byte> own = plan.rows.subspan(i * rows, rows);
-  if (!may_be_direct || !burst_directly(copy, plan, to, own)) {
-    if (!plan.actuators.empty()) plan.add_targets(copy.frontend, to);
-    PulseOptions pulse;
-    if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
-    copy.frontend.burst_rows(own, {}, go_on_, pulse);
+  try {
+    if (!may_be_direct || !burst_directly(copy, plan, to, own)) {
+      if (!plan.actuators.empty()) plan.add_targets(copy.frontend, to);
+      PulseOptions pulse;
+      if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
+      copy.frontend.burst_rows(own, {}, go_on_, pulse);
+    }
+  } catch (const BackendHalted&) {
+    show_last_row(i, own);
+    throw;
   }
   read_gathered(i, own.data() + rows - description().layout.size);
+}
+
+/// A halt has ended the burst of a copy: all that it shows is its last row.
+void InlineGroup::show_last_row(std::uint32_t i, std::span<std::byte> rows) {
+  Copy& copy = *copies_[i];
+  const std::size_t size = description().layout.size;
+  copy.frontend.latest(copy.bytes());
+  for (std::size_t at = 0; at < rows.size(); at += size) {
+    std::memcpy(rows.data() + at, copy.bytes(), size);
+  }
+  read_gathered(i, copy.bytes());
 }
 
 /// Rows of the copy => targets of the copy that follows => its burst.
@@ -500,6 +516,37 @@ void InlineGroup::throw_unless_completed(std::uint32_t request, const Batch& bat
                            "' was not completed: " + handle.text;
   if (handle.status == Status::halted) throw BackendHalted(text);
   throw Error(text);
+}
+
+std::vector<std::pair<std::size_t, Halt>> InlineGroup::halted() const {
+  check_usable();
+  std::vector<std::pair<std::size_t, Halt>> found;
+  for (std::size_t i = 0; i < copies_.size(); ++i) {
+    if (const std::optional<Halt> halt = copies_[i]->frontend.halted())
+      found.emplace_back(i, *halt);
+  }
+  return found;
+}
+
+void InlineGroup::resume(std::span<const std::uint32_t> chosen, Timeout timeout,
+                         const KeepWaiting& keep_waiting) {
+  check_usable();
+  // usually none is: no thread is woken then
+  std::vector<std::uint32_t> halted;
+  std::ranges::copy_if(chosen, std::back_inserter(halted),
+                       [&](std::uint32_t i) { return at(i).frontend.halted().has_value(); });
+  if (halted.empty()) return;
+  for_each(halted, timeout, keep_waiting, [&](std::uint32_t place, Copy& copy) {
+    // the braking has ended in the iteration after the first row that shows none
+    for (bool is_at_rest = false; !is_at_rest; copy.frontend.burst(1, {}, go_on_)) {
+      const UntypedObservation row = copy.frontend.latest();
+      is_at_rest = row.head().halted != 0 && !row.any_braking();
+    }
+    const std::optional<Halt> halt = copy.frontend.halted();
+    if (halt) copy.frontend.resume(halt->number, {}, go_on_);
+    copy.frontend.latest(copy.bytes());
+    read_gathered(halted[place], copy.bytes());
+  });
 }
 
 void InlineGroup::latest(std::span<const std::uint32_t> chosen, std::span<std::byte> rows) {

@@ -8,12 +8,14 @@
 #include <span>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "memory/os/fork.hpp"
 #include "o80/base/error.hpp"
 #include "o80/base/keep_waiting.hpp"
 #include "o80/control/command.hpp"
+#include "o80/memory/halt.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "robot/driver/driver_instance.hpp"
 #include "robot/group/inline_robot.hpp"
@@ -102,8 +104,7 @@ class InlineGroup {
   /// open so many files.
   InlineGroup(const RobotTable& table, const OptionValues& options, const Options& group,
               const KeepWaiting& keep_waiting = {});
-  InlineGroup(const InlineGroup&) = delete;
-  InlineGroup& operator=(const InlineGroup&) = delete;
+  InlineGroup& operator=(InlineGroup&&) = delete;
   ~InlineGroup();
 
   std::size_t copies() const noexcept { return copies_.size(); }
@@ -122,7 +123,8 @@ class InlineGroup {
   /// Sends the targets of the chosen copies and runs their iterations, then those of the same
   /// copies of the group that follows, if any. `chosen`: their numbers, each once. Copies between
   /// two iterations when it throws: CopyFailed; TimeoutError, Cancelled and what `keep_waiting`
-  /// throws, after which copies whose turn had not come have run nothing.
+  /// throws, after which copies whose turn had not come have run nothing. All rows of a copy that a
+  /// halt has ended are its last one.
   void burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen, Timeout timeout = {},
              const KeepWaiting& keep_waiting = {});
   /// Sends a request to the chosen copies, with a payload for each, and runs each until its request
@@ -132,6 +134,13 @@ class InlineGroup {
   void request(std::uint32_t request, std::span<const std::uint32_t> chosen,
                std::span<const std::byte> payloads, Timeout timeout = {},
                const KeepWaiting& keep_waiting = {}, std::span<std::byte> rows = {});
+  /// The halts that are in force or requested, by copy.
+  std::vector<std::pair<std::size_t, Halt>> halted() const;
+  /// Ends the halts of the chosen copies: each runs until it is at rest, then starts afresh where
+  /// it is. A copy that is not halted does nothing. Throws as burst(); a resume that is refused is
+  /// a failure of its copy.
+  void resume(std::span<const std::uint32_t> chosen, Timeout timeout = {},
+              const KeepWaiting& keep_waiting = {});
   /// Copies the newest rows of the chosen copies.
   void latest(std::span<const std::uint32_t> chosen, std::span<std::byte> rows);
 
@@ -164,6 +173,7 @@ class InlineGroup {
   void check_following(const BurstPlan& plan) const;
   void burst_copy(const BurstPlan& plan, bool may_be_direct, std::uint32_t i);
   void follow(const BurstPlan& plan, bool may_be_direct, std::uint32_t i);
+  void show_last_row(std::uint32_t i, std::span<std::byte> rows);
   bool may_be_direct(const BurstPlan& plan) const;
   bool burst_directly(Copy& copy, const BurstPlan& plan, std::span<const std::byte> targets,
                       std::span<std::byte> rows) const;

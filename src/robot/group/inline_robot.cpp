@@ -3,7 +3,6 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cstring>
 #include <utility>
 
@@ -40,8 +39,7 @@ class InlineRobot::Turn {
     }
     robot_.runner_.store(std::this_thread::get_id(), std::memory_order_relaxed);
   }
-  Turn(const Turn&) = delete;
-  Turn& operator=(const Turn&) = delete;
+  Turn& operator=(Turn&&) = delete;
   ~Turn() {
     robot_.runner_.store(std::thread::id(), std::memory_order_relaxed);
     if (robot_.turn_.exchange(0, std::memory_order_release) == 2) {  // sync turn

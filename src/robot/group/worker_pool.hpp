@@ -25,8 +25,7 @@ class WorkerPool {
  public:
   /// `workers`: threads besides the caller.
   explicit WorkerPool(std::size_t workers);
-  WorkerPool(const WorkerPool&) = delete;
-  WorkerPool& operator=(const WorkerPool&) = delete;
+  WorkerPool& operator=(WorkerPool&&) = delete;
   /// In a forked child it leaves the threads of the parent alone.
   ~WorkerPool();
 

@@ -24,7 +24,8 @@ std::string_view flag_name(std::string_view word) {
 
 std::string refused_flag(std::string_view word, const std::vector<std::string>& flags,
                          const std::vector<std::string>& switches) {
-  const std::string name(flag_name(word));
+  std::string name(flag_name(word));
+  std::ranges::replace(name, '_', '-');
   const std::string::size_type value = word.find('=');
   if (value != std::string_view::npos && std::ranges::find(switches, name) != switches.end()) {
     return takes_no_value(name, word.substr(value + 1));

@@ -7,7 +7,8 @@
 
 namespace o80 {
 
-// Error texts for wrong words of a robot's command line. `flags` and `switches` are without dashes.
+// Error texts for wrong words of a robot's command line. `flags` and `switches` are without the two
+// dashes before them.
 
 /// Text for an unknown or ambiguous flag, or for a switch with a value ("--bursting=0").
 std::string refused_flag(std::string_view word, const std::vector<std::string>& flags,

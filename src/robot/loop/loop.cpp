@@ -14,7 +14,6 @@
 #include <utility>
 
 #include "memory/segment/signal.hpp"
-#include "memory/segment/verb_word.hpp"
 #include "o80/base/time.hpp"
 
 namespace o80 {
@@ -75,7 +74,8 @@ bool Loop::pace() noexcept {
   if (robot_->table().paces_itself != 0) {
     if (!calls(Verb::wait, [&] { return robot_->wait(pacer_.due()); })) return failed("wait");
     backend_.set_timing(pacer_.tick(monotonic_now()));
-    return !pacer_.runs_ahead() || failed_to_wait();
+    if (pacer_.runs_ahead()) hold_back();
+    return true;
   }
   // A signal may arrive just before the sleep, so a long sleep is cut into slices. While the robot
   // moves, a stop does not shorten the period: the robot would have to move faster.
@@ -138,6 +138,11 @@ void Loop::brake() noexcept {
   while (monotonic_now() < end && backend_.brake() == Step::run) {
     if (!iterate()) return;
   }
+}
+
+void Loop::end_by_exit() noexcept {
+  if (fault_.empty()) fault_ = "the driver, or a library that it uses, called exit()";
+  stop();
 }
 
 Ended Loop::stop() noexcept {

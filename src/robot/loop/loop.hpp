@@ -22,7 +22,7 @@ struct Ended {
 
 /// The loop of a robot and its backend, in real time, bursting and inline: loop.cpp iterates,
 /// loop_start.cpp begins, loop_answers.cpp passes on requests and halts.
-/// See ARCHITECTURE.md, One iteration.
+/// See ARCHITECTURE.md#one-iteration.
 ///
 /// Writer:   one thread; `ask_to_stop` any thread or signal handler.
 /// Realtime: run, except for its end.
@@ -33,8 +33,7 @@ class Loop final : public RequestServer {
   /// With `recorded`, the loop replays a run: see `replay`.
   Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options,
        RecordedDecisions* recorded = nullptr);
-  Loop(const Loop&) = delete;
-  Loop& operator=(const Loop&) = delete;
+  Loop& operator=(Loop&&) = delete;
   ~Loop();
 
   /// Starts the hardware, calls `set_up`, and publishes row 0, from which on the robot runs for
@@ -72,6 +71,8 @@ class Loop final : public RequestServer {
   Ended stop() noexcept;
 
   void ask_to_stop() noexcept { backend_.ask_to_stop(); }
+  /// The driver called exit() in this thread, in one of its functions: ends the backend as failed.
+  void end_by_exit() noexcept;
   const UntypedBackend& backend() const noexcept { return backend_; }
   /// Names an anonymous segment. Call it between two iterations.
   void publish_as(const std::string& name) { backend_.publish_as(name); }
@@ -108,7 +109,7 @@ class Loop final : public RequestServer {
   }
   bool failed(const char* verb) noexcept;
   bool failed(const char* verb, std::string_view why) noexcept;
-  bool failed_to_wait() noexcept;
+  void hold_back() noexcept;
 
   static constexpr std::int64_t kLongestBraking = 1'000'000'000;  // [ns]
 

@@ -20,18 +20,23 @@ void Loop::note_requests(const ReadingView& view) noexcept {
   }
 }
 
-/// Reports ticks that came so fast that speed limits, which count iterations, no longer hold.
-bool Loop::failed_to_wait() noexcept {
-  const double period = static_cast<double>(backend_.schema().head.period) * 1e-6;
-  const Pacer::FastTicks& fast = pacer_.fast_ticks();
-  ShortText<400> text;
-  text.add("'").add(robot_->table().name).add("' failed in wait: ").add(fast.ticks);
-  text.add(" ticks came in ").add(static_cast<double>(fast.time) * 1e-6);
-  text.add(" ms, where the period of ").add(period).add(" ms says ");
-  text.add(static_cast<double>(fast.ticks) * period);
-  text.add(" ms: give the rate of the robot's ticks (--frequency), or make wait() wait for them");
-  fault_ = text.view();
-  return false;
+/// Ticks came so fast that speed limits, which count iterations, no longer hold: halts, and sleeps
+/// so that the robot brakes within its limits.
+void Loop::hold_back() noexcept {
+  if (backend_.halted().number == 0) {
+    const double period = static_cast<double>(backend_.schema().head.period) * 1e-6;
+    const Pacer::FastTicks& fast = pacer_.fast_ticks();
+    ShortText<248> text;
+    text.add(fast.ticks).add(" ticks of the robot came in ");
+    text.add(static_cast<double>(fast.time) * 1e-6).add(" ms, at a period of ").add(period);
+    text.add(
+        " ms: its clock or the link has jitter, --frequency is not its rate, or wait() returns "
+        "too early");
+    backend_.halt(HaltCause::overruns, text.view());
+  }
+  const std::int64_t before = monotonic_now();
+  sleep_until(before + std::min(pacer_.excess(), kLongestBraking));
+  pacer_.slept(monotonic_now() - before);
 }
 
 bool Loop::failed(const char* verb) noexcept { return failed(verb, robot_->fault()); }

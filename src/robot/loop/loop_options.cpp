@@ -5,7 +5,6 @@
 #include <charconv>
 #include <cmath>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -114,9 +113,11 @@ constexpr std::array kOptions = {
                "halt with silence, else hold",
                "policy for a commander that dies, or is silent for too long", kEverywhere,
                set_stale},
-    LoopOption{"silence", OptionKind::integer, "a whole number from 1 to 1000000000000000", 1, 1e15,
-               "no watchdog", "watchdog: iterations without a sign of life before stale applies",
-               kEverywhere, O80_SET(backend.silence)},
+    LoopOption{"silence", OptionKind::integer,
+               "a whole number from 1 to 1000000000000000 (iterations: seconds x frequency)", 1,
+               1e15, "no watchdog",
+               "watchdog: iterations without a sign of life before stale applies", kEverywhere,
+               O80_SET(backend.silence)},
     LoopOption{"max_overruns", OptionKind::integer, "a whole number from 1 to 100000", 1, 1e5,
                "no limit", "number of late iterations within a second that halts the robot",
                kProcess | kEmbedded, O80_SET(backend.max_overruns)},

@@ -41,8 +41,7 @@ class HangReport {
 class LoopReport {
  public:
   explicit LoopReport(std::string segment);
-  LoopReport(const LoopReport&) = delete;
-  LoopReport& operator=(const LoopReport&) = delete;
+  LoopReport& operator=(LoopReport&&) = delete;
   ~LoopReport();
 
  private:

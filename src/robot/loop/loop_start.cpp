@@ -21,10 +21,11 @@ std::uint32_t snapshot_of(const Schema& schema) {
   return static_cast<std::uint32_t>(found - schema.requests.begin());
 }
 
-BackendOptions with_provenance(BackendOptions options, const DriverInstance& robot) {
+BackendOptions of_loop(BackendOptions options, const DriverInstance& robot) {
   Provenance provenance = provenance_of(robot.table(), robot.options());
   provenance.run_options = std::move(options.provenance.run_options);
   options.provenance = std::move(provenance);
+  options.has_loop = true;
   return options;
 }
 }  // namespace
@@ -32,7 +33,7 @@ BackendOptions with_provenance(BackendOptions options, const DriverInstance& rob
 Loop::Loop(std::unique_ptr<DriverInstance> robot, const BackendOptions& options,
            RecordedDecisions* recorded)
     : robot_(std::move(robot)),
-      backend_(robot_->describe(options.period), with_provenance(options, *robot_), this, recorded),
+      backend_(robot_->describe(options.period), of_loop(options, *robot_), this, recorded),
       pacer_(backend_.schema().head.period),
       paced_(!options.bursting && recorded == nullptr),
       accepts_reading_(options.accept_reading),

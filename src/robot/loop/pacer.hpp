@@ -32,7 +32,15 @@ class Pacer {
   const Timing& missed() noexcept;
   /// True if ticks are more than kMaxPeriodsAhead periods ahead of the clock. Speed limits, which
   /// are applied per iteration, then no longer hold.
-  bool runs_ahead() const noexcept { return ahead_ > kMaxPeriodsAhead * period_; }
+  bool runs_ahead() const noexcept { return excess() > 0; }
+  /// Time by which ticks are farther ahead than that [ns].
+  std::int64_t excess() const noexcept { return ahead_ - kMaxPeriodsAhead * period_; }
+  /// The caller has slept after a tick that came too early.
+  void slept(std::int64_t time) noexcept {
+    ahead_ -= time;
+    due_ += time;
+    fast_.time += time;
+  }
   /// The ticks since the ticks were last in time with the clock.
   struct FastTicks {
     std::int64_t ticks = 0;

@@ -37,8 +37,7 @@ class RealtimeKit {
     if (library_ == nullptr) throw std::runtime_error("libsystemd is not installed");
     check(function<int(void**)>("sd_bus_open_system")(&bus_));
   }
-  RealtimeKit(const RealtimeKit&) = delete;
-  RealtimeKit& operator=(const RealtimeKit&) = delete;
+  RealtimeKit& operator=(RealtimeKit&&) = delete;
   ~RealtimeKit() {
     if (bus_ != nullptr) function<void*(void*)>("sd_bus_close_unref")(bus_);
   }

@@ -1,7 +1,5 @@
 #include "robot/loop/replay.hpp"
 
-#include <algorithm>
-#include <string_view>
 #include <utility>
 
 #include "o80/base/error.hpp"
@@ -11,25 +9,13 @@ namespace o80 {
 
 namespace {
 
-/// The options of the recorded run, for a backend that nobody halts or reads the journal of.
-BackendOptions replaying(BackendOptions options) {
-  options.resume = true;  // halts come from the recording
-  options.journal = 0;
-  return options;
-}
-
 /// Throws if this robot may be hardware. The recording may describe another robot than this one.
 void check_simulated(const Schema& schema) {
-  const auto serves = [&](std::string_view name) {
-    return std::ranges::any_of(schema.requests,
-                               [&](const RequestRow& row) { return row.name.view() == name; });
-  };
-  const std::uint8_t said = schema.head.of_the_world;
-  const bool seems_simulated = said == 0 && serves("snapshot") && serves("restore");
-  if (said == 2 || seems_simulated) return;
+  if (schema.head.is_simulated()) return;
   throw DriverError("robot '" + schema.head.robot.str() +
-                    "' is not started for a replay: it may be hardware, because it reads the world "
-                    "or neither says that it is a simulation nor serves snapshot and restore");
+                    "' is not started for a replay: it may be hardware, because it does not say "
+                    "that it is simulated (in describe schema.simulated(), in Python simulated = "
+                    "True)");
 }
 
 }  // namespace

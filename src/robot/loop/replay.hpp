@@ -16,7 +16,7 @@ namespace o80 {
 
 /// Repeats a recorded run: the same robot with the same options, whose backend obeys the recorded
 /// decisions at their iterations. Its rows are in a segment of its own, as those of any robot.
-/// See ARCHITECTURE.md, Replay.
+/// See src/runtime/README.md#replay.
 ///
 /// Writer: one thread.
 class Replay {

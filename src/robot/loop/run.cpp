@@ -4,22 +4,27 @@
 #include <signal.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cmath>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <iterator>
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <span>
 #include <string_view>
 #include <thread>
 
 #include "base/printable.hpp"
 #include "describe/number_name.hpp"
+#include "memory/os/descriptors.hpp"
 #include "memory/segment/owned_segment.hpp"
 #include "o80/base/error.hpp"
+#include "o80/base/time.hpp"
 #include "o80/robot/real_time.hpp"
 #include "robot/loop/loop.hpp"
 #include "robot/loop/loop_report.hpp"
@@ -33,7 +38,9 @@ namespace {
 
 std::atomic<bool> stop_asked{false};
 std::atomic<Loop*> running_loop{nullptr};
-std::mutex ending;  // held by the thread of watch_input() while it uses the loop
+pthread_t loop_thread;                                // of running_loop
+constexpr std::int64_t kLongestStop = 3'000'000'000;  // braking, and stop() of the driver [ns]
+std::mutex ending;  // held by other threads while they use the loop
 
 /// Runs in a signal handler: async-signal-safe operations only.
 void stop_on_signal(int) {
@@ -41,47 +48,93 @@ void stop_on_signal(int) {
   if (Loop* loop = running_loop.load()) loop->ask_to_stop();
 }
 
-/// While this object exists, SIGINT, SIGTERM and SIGHUP stop the loop in order, and SIGPIPE is
-/// ignored.
+/// Signals that do not end a process, or cannot be caught.
+constexpr int kHarmless[] = {SIGKILL, SIGSTOP, SIGTSTP, SIGTTIN, SIGTTOU,
+                             SIGCONT, SIGCHLD, SIGURG,  SIGWINCH};
+/// Requests to stop. A shell ignores the first two for programs that it starts with `&`.
+constexpr int kAsked[] = {SIGINT, SIGQUIT, SIGTERM};
+constexpr int kUnwritable[] = {SIGPIPE, SIGXFSZ};  // of a failed write
+constexpr int kFaults[] = {SIGSEGV, SIGBUS, SIGFPE, SIGILL, SIGABRT, SIGTRAP, SIGSYS};
+
+bool is_one_of(std::span<const int> numbers, int number) {
+  return std::ranges::find(numbers, number) != numbers.end();
+}
+
+/// The same for a signal that a process has sent (`kill -SEGV`). A fault of this process ends it:
+/// its next instruction would fault again.
+void stop_on_sent_fault(int number, siginfo_t* info, void*) {
+  if (info->si_code == SI_USER || info->si_code == SI_QUEUE) return stop_on_signal(number);
+  signal(number, SIG_DFL);
+  if (info->si_code <= 0) raise(number);  // abort(): delivered when this handler returns
+}
+
+/// While this object exists, every signal that would end the process stops the loop in order:
+/// SIGINT, SIGQUIT and SIGTERM always, others unless the program has a handler of its own or
+/// ignores them. Signals of failed writes (SIGPIPE, SIGXFSZ) are ignored.
 class StopSignals {
  public:
   StopSignals() {
     stop_asked = false;
-    struct sigaction action{};
-    for (std::size_t i = 0; i < std::size(kStops); ++i) {
-      action.sa_handler = stop_on_signal;
-      sigaction(kStops[i], nullptr, &before_[i]);
-      // started with nohup: a robot continues after its terminal has closed
-      if (kStops[i] == SIGHUP && before_[i].sa_handler == SIG_IGN) continue;
-      sigaction(kStops[i], &action, nullptr);
+    for (int number = 1; number < NSIG; ++number) {
+      struct sigaction& before = before_[static_cast<std::size_t>(number)];
+      const bool readable = sigaction(number, nullptr, &before) == 0;
+      const bool always = is_one_of(kAsked, number);
+      const bool unwritable = is_one_of(kUnwritable, number);
+      const bool is_free = (before.sa_flags & SA_SIGINFO) == 0 && before.sa_handler == SIG_DFL;
+      if (!readable || is_one_of(kHarmless, number) || !(always || unwritable || is_free)) {
+        before.sa_flags = kUntouched;
+        continue;
+      }
+      struct sigaction action{};
+      if (unwritable) {
+        action.sa_handler = SIG_IGN;
+      } else if (is_one_of(kFaults, number)) {
+        action.sa_flags = SA_SIGINFO;
+        action.sa_sigaction = stop_on_sent_fault;
+      } else {
+        action.sa_handler = stop_on_signal;
+      }
+      sigaction(number, &action, nullptr);
     }
-    action.sa_handler = SIG_IGN;
-    sigaction(SIGPIPE, &action, &pipe_before_);
   }
-  StopSignals(const StopSignals&) = delete;
-  StopSignals& operator=(const StopSignals&) = delete;
+  StopSignals& operator=(StopSignals&&) = delete;
   ~StopSignals() {
-    for (std::size_t i = 0; i < std::size(kStops); ++i) {
-      sigaction(kStops[i], &before_[i], nullptr);
+    for (int number = 1; number < NSIG; ++number) {
+      const struct sigaction& before = before_[static_cast<std::size_t>(number)];
+      if (before.sa_flags != kUntouched) sigaction(number, &before, nullptr);
     }
-    sigaction(SIGPIPE, &pipe_before_, nullptr);
   }
 
  private:
-  static constexpr int kStops[] = {SIGINT, SIGTERM, SIGHUP};
-  struct sigaction before_[std::size(kStops)]{};
-  struct sigaction pipe_before_{};
+  static constexpr int kUntouched = -1;
+  struct sigaction before_[NSIG]{};
 };
 
-/// While this object exists, signals stop this loop.
+/// Runs when a library calls exit() while the robot moves: the loop stops before the process ends.
+void stop_at_exit() {
+  {
+    const std::scoped_lock lock(ending);
+    Loop* const loop = running_loop.load();
+    if (loop == nullptr) return;
+    std::fputs("o80: exit() was called while the robot runs: it is stopped first\n", stderr);
+    if (pthread_equal(loop_thread, pthread_self()) != 0) return loop->end_by_exit();
+    loop->ask_to_stop();
+  }
+  const std::int64_t end = monotonic_now() + kLongestStop;
+  while (running_loop.load() != nullptr && monotonic_now() < end) usleep(1000);
+}
+
+/// While this object exists, signals and exit() stop this loop.
 class Running {
  public:
   explicit Running(Loop& loop) {
+    static const bool at_exit = std::atexit(stop_at_exit) == 0;
+    static_cast<void>(at_exit);
+    loop_thread = pthread_self();
     running_loop = &loop;
     if (stop_asked) loop.ask_to_stop();
   }
-  Running(const Running&) = delete;
-  Running& operator=(const Running&) = delete;
+  Running& operator=(Running&&) = delete;
   ~Running() {
     const std::scoped_lock lock(ending);
     running_loop = nullptr;
@@ -217,6 +270,7 @@ const char* program_name(const char* path) noexcept {
 }
 
 int run(const RobotTable& table, int argc, char** argv) {
+  open_standard_descriptors();
   try {
     const RunOptions options = parse_run_options(table, argc, argv);
     if (options.help) {

@@ -68,11 +68,15 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
     robot_options.push_back(own.name);
   }
   for (const std::string& own : robot_options) names.push_back(dashed(own));
-  for (const std::string& own : robot_options) names.push_back(own);
-  for (std::size_t i = 0; i < names.size(); ++i) {
+  const auto add = [&](const std::string& spelled, std::size_t i) {
     const bool is_switch = i < loop_options().size() && loop_options()[i].is_switch();
-    long_options.push_back({names[i].c_str(), is_switch ? no_argument : required_argument, nullptr,
+    long_options.push_back({spelled.c_str(), is_switch ? no_argument : required_argument, nullptr,
                             kFirstOption + static_cast<int>(i)});
+  };
+  for (std::size_t i = 0; i < names.size(); ++i) add(names[i], i);
+  // the same number again: an abbreviation of both spellings is not ambiguous
+  for (std::size_t i = 0; i < robot_options.size(); ++i) {
+    add(robot_options[i], loop_options().size() + i);
   }
   long_options.push_back({nullptr, 0, nullptr, 0});
 
@@ -102,8 +106,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
       set_loop_option(options, loop_options()[index], text, "--" + names[index]);
       has_priority = has_priority || names[index] == "priority";
     } else {
-      const std::size_t own = (index - loop_options().size()) % robot_options.size();
-      options.robot.emplace_back(robot_options[own], optarg);
+      options.robot.emplace_back(robot_options[index - loop_options().size()], optarg);
     }
   }
   if (optind < argc) {

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
-#include <memory>
-#include <string>
 
 #include "base/crash_point.hpp"
 #include "runtime/backend/backend_body.hpp"
@@ -66,6 +64,9 @@ UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, Reques
                                                                 : ReadingWatch::Of::followers),
       judges_first_(!options.bursting && recorded == nullptr && !options.accept_reading &&
                     !readings_.empty()),
+      judges_fresh_(options.has_loop && recorded == nullptr &&
+                    schema.head.of_the_world >= (options.bursting ? 3 : 1) &&
+                    !schema.head.is_simulated()),
       last_row_(layout.size / 8),
       overruns_(options.max_overruns),
       gaps_(recorded == nullptr ? longest_gap(schema, options) : 0) {

@@ -1,5 +1,5 @@
 // How batches reach the controller from the lanes, and statuses go back.
-// See ARCHITECTURE.md, The life of a command.
+// See ARCHITECTURE.md#a-commands-way and src/control/README.md#order.
 
 #include <algorithm>
 #include <cstring>

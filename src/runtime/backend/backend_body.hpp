@@ -1,6 +1,5 @@
 #pragma once
 
-#include <algorithm>
 #include <array>
 #include <atomic>
 #include <cassert>
@@ -46,9 +45,10 @@ inline constexpr std::uint32_t kWorkAheadOfAll = 512;
 inline constexpr std::uint32_t kExpressWork = 512;
 
 /// What a user may do about a reading that cannot be.
-inline constexpr std::string_view kToResume = "resume with --accept-reading";
+inline constexpr std::string_view kToResume =
+    "resume with --accept-reading (accept_reading in code)";
 
-/// The transitions that are drawn in ARCHITECTURE.md, The state of a backend.
+/// The phases that may follow each other (src/runtime/README.md#phases).
 constexpr bool may_follow(Phase next, Phase now) noexcept {
   switch (next) {
     case Phase::starting:
@@ -83,8 +83,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
  public:
   Body(Schema&& given, const BackendOptions& options, RequestServer* server,
        RecordedDecisions* recorded);
-  Body(const Body&) = delete;
-  Body& operator=(const Body&) = delete;
+  Body& operator=(Body&&) = delete;
   virtual ~Body() = default;
 
   // BatchHandler: requests and orders of a batch to the backend itself
@@ -247,6 +246,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void look_at_lives() noexcept;
   void on_owner_death(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   void watch_holder() noexcept;
+  void halt_nameless() noexcept;
   void watch_silence() noexcept;
   void break_silence(std::uint32_t lane) noexcept;
   void stale(std::uint32_t lane, Reason reason) noexcept;
@@ -297,6 +297,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   std::vector<Iteration> last_life_;  // of each lane: last sign of life of its owner
   std::uint32_t seen_changes_ = 0;
   std::uint32_t seen_rounds_ = 0;
+  bool is_nameless_ = false;  // its files were removed, which has halted it
   StatusOutbox outbox_;
 
   WorkShare share_;
@@ -319,6 +320,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   ReadingWatch followed_;  // of actuators that follow
   std::int64_t followed_at_ = 0;
   bool judges_first_;                    // an embedded backend, until the second reading
+  const bool judges_fresh_;              // the readings of fresh starts
   std::int64_t read_at_ = 0;             // time of the last row whose reading was not missed
   std::vector<std::uint64_t> last_row_;  // or observed states, while a fresh reading is judged
   OverrunLimit overruns_;

@@ -1,5 +1,5 @@
 // How a burst is granted, counted and ended; and direct bursts, which an inline group runs without
-// a batch. See ARCHITECTURE.md, Bursting.
+// a batch. See src/runtime/README.md#bursts.
 
 #include "runtime/backend/backend_body.hpp"
 #include "runtime/backend/direct_burst.hpp"

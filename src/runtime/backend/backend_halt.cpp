@@ -1,5 +1,5 @@
 // How a backend halts and resumes. The loop checks the words of memory/segment/halt_word.hpp in
-// each step. See ARCHITECTURE.md, Halts.
+// each step. See src/runtime/README.md#halts.
 
 #include <algorithm>
 
@@ -66,11 +66,12 @@ void UntypedBackend::Body::watch_errors() noexcept {
 void UntypedBackend::Body::watch_gaps(bool fresh) noexcept {
   const std::int64_t gap = gaps_.exceeded(fresh ? 0 : current, boot_now());
   if (gap == 0 || halts.acts()) return;
-  const std::int64_t milliseconds = gap / 1'000'000;
+  constexpr std::int64_t kMillisecond = 1'000'000;
   ShortText<160> text;
-  text.add("no iteration for ").add(static_cast<double>(milliseconds) * 1e-3);
-  text.add(" s, longer than --gap ").add(static_cast<double>(gaps_.most()) * 1e-9);
-  text.add(": the process was stopped, the machine slept, or the driver hung");
+  text.add("no iteration for ").add_seconds(gap - gap % kMillisecond);
+  text.add(", longer than --gap ")
+      .add_seconds(gaps_.most())
+      .add(": the process was stopped, the machine slept, or the driver hung");
   ask_to_halt(HaltCause::overruns, text.view());
 }
 

@@ -1,5 +1,7 @@
 // How a backend handles frontends that die or become silent.
-// See ARCHITECTURE.md, Lanes and their owners; Halts.
+// See src/runtime/README.md#watchdog and src/memory/README.md#lanes.
+
+#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -41,7 +43,11 @@ void UntypedBackend::Body::look_at_lives() noexcept {
   }
   // any frontend can corrupt the bell, so all lanes are scanned after each round of the helper
   const std::uint32_t rounds = liveness.rounds();
-  if (rounds != seen_rounds_) lanes.look_again();
+  if (rounds != seen_rounds_) {
+    lanes.look_again();
+    if (schema.head.bursting == 0 && liveness.nameless() && !std::exchange(is_nameless_, true))
+      halt_nameless();
+  }
   seen_rounds_ = rounds;
 
   const std::uint32_t changes = liveness.changes();
@@ -53,6 +59,15 @@ void UntypedBackend::Body::look_at_lives() noexcept {
     const bool died = lives_[i].state == LaneState::died;
     on_owner_death(i, died ? lives_[i].incarnation : lanes[i].dead_predecessor());
   }
+}
+
+/// A robot that nobody can find by its name cannot be stopped by it either.
+void UntypedBackend::Body::halt_nameless() noexcept {
+  ShortText<248> text;
+  text.add("the files of this segment were removed or replaced, so no frontend can attach. Stop ");
+  text.add("process ").add(std::int64_t{getpid()}).add(": `o80 stop ").add(segment.name());
+  text.add("` or `kill ").add(std::int64_t{getpid()}).add("`");
+  ask_to_halt(HaltCause::unreachable, text.view());
 }
 
 /// Handles the death of a lane's owner, once for each incarnation.

@@ -4,7 +4,6 @@
 #include <array>
 #include <bit>
 #include <charconv>
-#include <cstdlib>
 #include <limits>
 #include <sstream>
 #include <string>
@@ -30,17 +29,23 @@ constexpr std::uint64_t kMinBackendJournal = 8 * kWorkPerIteration * kBlockBytes
 
 std::string rate_text(std::int64_t period) {
   std::ostringstream text;
-  text << 1e9 / static_cast<double>(period) << " Hz (" << static_cast<double>(period) * 1e-6
+  text << 1e9 / static_cast<double>(period) << " Hz (" << static_cast<double>(period) / 1e6
        << " ms)";
   return text.str();
+}
+
+/// The shortest text that reads back as the same number.
+std::string shortest(double number) {
+  std::array<char, 32> text{};
+  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), number).ptr};
 }
 
 /// The requested period, the robot's own, or 1 ms.
 std::int64_t period_of(const Schema& schema, const BackendOptions& options) {
   const std::int64_t own = schema.head.period;
   if (options.period < 0) {
-    throw InvalidArgument("the period must be positive, got " + std::to_string(options.period) +
-                          " ns");
+    throw InvalidArgument("the period must be positive, got " +
+                          shortest(static_cast<double>(options.period) * 1e-9) + " s");
   }
   // printed frequencies are rounded: 166.667 Hz means 6 ms
   const bool same = std::abs(options.period - own) * kPeriodRounding <= own;
@@ -93,12 +98,6 @@ std::int64_t wall_clock_offset(const Schema& schema) {
     offset = wall - before - took / 2;
   }
   return offset;
-}
-
-/// The shortest text that reads back as the same number.
-std::string shortest(double number) {
-  std::array<char, 32> text{};
-  return {text.data(), std::to_chars(text.data(), text.data() + text.size(), number).ptr};
 }
 
 std::string octal(mode_t mode) {
@@ -172,8 +171,8 @@ std::int64_t longest_gap(const Schema& schema, const BackendOptions& options) {
   constexpr std::int64_t kMin = 100'000'000;
   if (options.bursting) return 0;
   if (options.gap >= 0) return options.gap;
-  const bool moves = schema.head.of_the_world == 1 && !schema.actuators.empty();
-  const std::int64_t least = moves ? std::max(kPeriods * schema.head.period, kMin) : 0;
+  const bool guards = options.has_loop && !schema.head.is_simulated() && !schema.actuators.empty();
+  const std::int64_t least = guards ? std::max(kPeriods * schema.head.period, kMin) : 0;
   const std::int64_t own = schema.head.gap * std::int64_t{1000};
   return own > 0 && (least == 0 || own < least) ? own : least;
 }
@@ -193,8 +192,7 @@ Provenance::Options texts_of(const BackendOptions& options) {
       {"accept_reading", text_of(options.accept_reading)},
   };
   if (options.silence > 0) texts.emplace_back("silence", std::to_string(options.silence));
-  if (options.gap >= 0)
-    texts.emplace_back("gap", shortest(static_cast<double>(options.gap) * 1e-9));
+  if (options.gap >= 0) texts.emplace_back("gap", shortest(static_cast<double>(options.gap) / 1e9));
   if (options.max_overruns > 0)
     texts.emplace_back("max_overruns", std::to_string(options.max_overruns));
   return texts;

@@ -1,5 +1,5 @@
 // How a backend obeys the decisions of a recorded run instead of its lanes, its watchdog and its
-// clock. See ARCHITECTURE.md, Replay.
+// clock. See src/runtime/README.md#replay.
 
 #include "runtime/backend/backend_body.hpp"
 #include "runtime/journal/recorded_decisions.hpp"

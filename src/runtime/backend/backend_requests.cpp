@@ -12,7 +12,8 @@ namespace o80 {
 namespace {
 // a robot that moves at its highest speed may be read to be faster, because of noise
 constexpr double kInMotion = 2.0;
-constexpr std::string_view kToFollow = "halt the robot and resume with --accept-reading";
+constexpr std::string_view kToFollow =
+    "halt the robot and resume with --accept-reading (accept_reading in code)";
 }  // namespace
 
 void UntypedBackend::Body::interrupt(std::uint32_t actuator) noexcept {
@@ -72,9 +73,8 @@ Outcome UntypedBackend::Body::reject_request(std::uint32_t lane, CommandId id,
 Outcome UntypedBackend::Body::start_afresh(std::uint32_t lane, CommandId id) noexcept {
   auto* desired = reinterpret_cast<std::byte*>(fresh_desired_.data());
   FreshReading reading{row() + layout.observed, row() + layout.extended, desired};
-  // a simulator may be put anywhere, a robot of the world cannot
-  const bool judges = schema.head.of_the_world == 1 && recorded_ == nullptr && has_begun();
-  if (judges) {
+  // a simulation may be put anywhere, a robot of the world cannot
+  if (judges_fresh_ && has_begun()) {
     if (!halts.acts()) {
       readings_.begin(reading.observed);
       read_at_ = unpack<RowHead>(row()).time;
@@ -232,7 +232,8 @@ bool UntypedBackend::Body::judge_first(bool again) noexcept {
   judges_first_ = false;
   const std::byte* observed = row() + layout.observed;
   ShortText<248> why;
-  const bool is_good = !again || !is_misread(observed, "start with --accept-reading", why);
+  const bool is_good =
+      !again || !is_misread(observed, "start with --accept-reading (accept_reading in code)", why);
   if (!is_good) note_failure(why.view());
   readings_.begin(observed);
   read_at_ = time();

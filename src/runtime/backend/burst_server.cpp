@@ -2,7 +2,8 @@
 
 #include <algorithm>
 #include <cstddef>
-#include <cstring>
+
+#include "o80/describe/describe.hpp"
 
 namespace o80 {
 
@@ -44,10 +45,9 @@ void BurstServer::take(std::uint32_t lane) noexcept {
   LaneReceiver& from = lanes_[lane];
   const bool had_left = from.owner_of_next() == 0 || from.next_is_of_dead();
   const std::uint64_t incarnation = from.incarnation();
-  BatchRecord batch;
   Block block{};
   const bool taken = from.available_of_one() > 0 && from.take(block.bytes.data());
-  std::memcpy(&batch, block.bytes.data(), sizeof batch);
+  const auto batch = unpack<BatchRecord>(block.bytes.data());
   const bool is_burst = taken && batch.kind == RecordKind::batch && batch.blocks == 1 &&
                         batch.records == 0 && batch.burst > 0 && from.expects(batch.id);
   if (taken) from.free(1);

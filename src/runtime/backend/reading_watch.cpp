@@ -1,7 +1,6 @@
 #include "runtime/backend/reading_watch.hpp"
 
 #include <array>
-#include <cmath>
 #include <cstdio>
 #include <utility>
 

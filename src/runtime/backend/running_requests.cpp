@@ -1,7 +1,6 @@
 #include "runtime/backend/running_requests.hpp"
 
 #include <algorithm>
-#include <cstring>
 #include <iterator>
 
 #include "memory/os/atomic_words.hpp"

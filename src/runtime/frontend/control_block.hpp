@@ -15,8 +15,7 @@ class ControlBlock {
  public:
   /// Sends the order to take control. Throws as UntypedFrontend::pulse.
   explicit ControlBlock(std::shared_ptr<UntypedFrontend> frontend);
-  ControlBlock(const ControlBlock&) = delete;
-  ControlBlock& operator=(const ControlBlock&) = delete;
+  ControlBlock& operator=(ControlBlock&&) = delete;
   ~ControlBlock();
 
   /// The order to take control, which is completed once this frontend has it.

@@ -1,5 +1,6 @@
 #include "runtime/frontend/ends_text.hpp"
 
+#include "base/sentence.hpp"
 #include "o80/base/nearest_name.hpp"
 
 namespace o80 {
@@ -82,7 +83,8 @@ std::string not_completed_text(const std::string& segment, const std::vector<std
   if (ends.size() > nearest::kListed) {
     text += "; and " + std::to_string(ends.size() - nearest::kListed) + " more";
   }
-  return text + ". See where the robot is (`observation` of this error) before you send more; if " +
+  return sentence(text) +
+         " See where the robot is (`observation` of this error) before you send more; if " +
          "such an end is expected, wait with check=False";
 }
 

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <thread>
-#include <utility>
 
 #include "o80/base/nearest_name.hpp"
 #include "o80/runtime/backend.hpp"

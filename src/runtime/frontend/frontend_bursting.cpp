@@ -1,4 +1,5 @@
-// How a frontend requests iterations, of one backend or of several. See ARCHITECTURE.md, Bursting.
+// How a frontend requests iterations, of one backend or of several.
+// See src/runtime/README.md#bursts.
 
 #include <algorithm>
 #include <limits>
@@ -16,8 +17,7 @@ namespace {
 class CancelUnlessDone {
  public:
   CancelUnlessDone(LaneSender* lane, CommandId id) : lane_(lane), id_(id) {}
-  CancelUnlessDone(const CancelUnlessDone&) = delete;
-  CancelUnlessDone& operator=(const CancelUnlessDone&) = delete;
+  CancelUnlessDone& operator=(CancelUnlessDone&&) = delete;
   ~CancelUnlessDone() {
     if (lane_ != nullptr) lane_->cancel_burst(id_);
   }

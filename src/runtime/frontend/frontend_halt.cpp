@@ -1,5 +1,5 @@
 // How a frontend halts, resumes, gives signs of life and reads running requests.
-// See ARCHITECTURE.md, Halts.
+// See src/runtime/README.md#halts.
 
 #include "base/printable.hpp"
 #include "memory/segment/running_slot.hpp"
@@ -26,7 +26,7 @@ std::uint64_t UntypedFrontend::halt(std::string_view reason) {
   const std::uint64_t number =
       request_halt(link_->segment.view(), HaltCause::frontend, own_process(), reason);
   // A successor inherits this halt, or it had marked the segment as superseded before: then throw.
-  // See ARCHITECTURE.md, How a backend takes a name.
+  // See src/memory/README.md#successor.
   link_->segment.throw_if_gone();
   // an inline robot begins the halt now, unless this thread is inside a burst, which does it
   std::shared_ptr<InlineRunner> runner;

@@ -1,9 +1,10 @@
 // How a frontend adds records to a batch and sends it.
-// See ARCHITECTURE.md, The life of a command.
+// See ARCHITECTURE.md#a-commands-way.
 
 #include <algorithm>
-#include <limits>
+#include <sstream>
 
+#include "base/short_text.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "runtime/backend/schedule.hpp"
 #include "runtime/frontend/link.hpp"
@@ -28,11 +29,22 @@ RecordHead head_of(std::uint32_t actuator, const CommandOptions& options, Profil
   return head;
 }
 
+std::string seconds_text(std::int64_t nanoseconds) {
+  std::ostringstream text;
+  text << static_cast<double>(nanoseconds) * 1e-9 << " s";
+  return text.str();
+}
+
 void check_pace(const PaceSpec& pace, std::uint32_t rows) {
   const auto check = [&pace](const std::string& name, std::int64_t low, std::int64_t high) {
     if (pace.amount >= low && pace.amount <= high) return;
     throw InvalidArgument(name + " must be from " + std::to_string(low) + " to " +
                           std::to_string(high) + ", got " + std::to_string(pace.amount));
+  };
+  const auto check_time = [&pace](const std::string& name) {
+    if (pace.amount >= 0 && pace.amount <= kLongestDuration) return;
+    throw InvalidArgument(name + " must be from 0 to " + seconds_text(kLongestDuration) + ", got " +
+                          seconds_text(pace.amount));
   };
   switch (pace.pace) {
     case Pace::speed:
@@ -40,9 +52,9 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
     case Pace::chunk:
       return;
     case Pace::direct:
-      return check("every [ns]", 0, kLongestDuration);
+      return check_time("every");
     case Pace::duration:
-      return check("duration [ns]", 0, kLongestDuration);
+      return check_time("duration");
     case Pace::iterations:
       return check("iterations", 1, kMaxIterations);
     case Pace::until:
@@ -66,19 +78,24 @@ void check_options(const CommandOptions& options) {
   }
 }
 
-void check_times(std::span<const std::int64_t> times, std::uint32_t rows) {
+/// Refuses rows that would be passed over, because another one is due in the same iteration.
+void check_times(std::span<const std::int64_t> times, std::uint32_t rows, std::int64_t period) {
   if (times.size() != rows) {
     throw InvalidArgument("a trajectory of " + std::to_string(rows) +
                           " rows needs as many times, " + std::to_string(times.size()) +
                           " were given");
   }
-  for (std::size_t i = 0; i < times.size(); ++i) {
-    const std::int64_t before = i == 0 ? 0 : times[i - 1];
-    if (times[i] < before || times[i] > kLongestDuration) {
-      throw InvalidArgument("the times of a trajectory must grow from 0: row " + std::to_string(i) +
-                            " ends at " + std::to_string(times[i]) + " ns, the one before at " +
-                            std::to_string(before) + " ns");
-    }
+  std::int64_t before = 0;
+  for (std::size_t i = 0; i < times.size(); before = times[i++]) {
+    const bool grows = times[i] > before && times[i] <= kLongestDuration;
+    const auto iteration = [period](std::int64_t time) { return (time + period / 2) / period; };
+    if (grows && iteration(times[i]) > iteration(before)) continue;
+    ShortText<160> where;
+    where.add("row ").add(i).add(" is due after ").add_seconds(times[i]);
+    where.add(i == 0 ? ", the start is at " : ", the row before after ").add_seconds(before);
+    if (grows) where.add(", in the same iteration of ").add_seconds(period);
+    throw InvalidArgument("the times of a trajectory must grow from 0, by an iteration at least: " +
+                          std::string(where.view()));
   }
 }
 
@@ -216,7 +233,7 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
   // a trajectory always has a pace
   if (paced.pace.pace == Pace::direct) paced.pace = iterations(1);
   if (!times.empty()) {
-    check_times(times, rows);
+    check_times(times, rows, link_->description->schema.head.period);
     paced.pace = duration(std::chrono::nanoseconds(times.back()));
   } else if (paced.pace.pace == Pace::duration && rows > 1) {
     throw InvalidArgument("a trajectory at a duration needs the times of its rows");

@@ -1,6 +1,5 @@
 #include "runtime/frontend/link.hpp"
 
-#include <algorithm>
 #include <chrono>
 #include <iterator>
 
@@ -115,7 +114,7 @@ std::string Link::owner_of(std::uint32_t lane) const {
   if (lane >= segment.view().shape.lanes) return "another frontend";
   const auto name = [lane](const AttachedSegment& of) {
     const LaneSenderPage& page = of.view().lane(lane);
-    return "the frontend of " + printable(load_text(page.owner, std::size(page.owner)));
+    return "the frontend of " + load_text(page.owner, std::size(page.owner));
   };
   if (segment.access() == Access::read_write) return name(segment);
   try {

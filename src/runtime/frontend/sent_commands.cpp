@@ -1,7 +1,8 @@
 #include "runtime/frontend/sent_commands.hpp"
 
 #include <algorithm>
-#include <cstring>
+
+#include "o80/describe/describe.hpp"
 
 namespace o80 {
 
@@ -15,12 +16,10 @@ GivesWay gives_way(const RecordHead& head) noexcept {
 }  // namespace
 
 void SentCommands::note(std::span<const Block> batch, std::vector<SentCommand>* noted) {
-  BatchRecord record;
-  std::memcpy(&record, batch.front().bytes.data(), sizeof record);
+  const auto record = unpack<BatchRecord>(batch.front().bytes.data());
   std::uint32_t places = 0;
   for (std::size_t block = 1; block < batch.size();) {
-    RecordHead head;
-    std::memcpy(&head, batch[block].bytes.data(), sizeof head);
+    const auto head = unpack<RecordHead>(batch[block].bytes.data());
     block += blocks_of(head.payload_bytes);
     const bool is_member = head.kind == RecordKind::member;
     const bool is_command = is_member || head.kind == RecordKind::command;

@@ -1,7 +1,6 @@
 #include "runtime/journal/journal_author.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cstring>
 #include <iterator>
 

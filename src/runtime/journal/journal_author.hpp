@@ -60,8 +60,13 @@ static_assert(sizeof(JournalSender) == 8);
 /// Payload of `ended`: the reason, as text.
 using JournalText = std::array<char, 248>;
 
-/// Writes the decisions of a backend into the journal of its segment. Each is one entry with its
-/// iteration; see ARCHITECTURE.md, The journal.
+/// Writes the decisions of a backend into the journal of its segment
+/// (src/runtime/README.md#journal). Each is one entry with its iteration.
+///
+/// The blocks of a batch are entries of the iteration in which they are staged, the decision on the
+/// batch one of the iteration in which it acts; readers join them by lane and id. A rejected batch
+/// is one entry, its commands get none. The owner of a lane is named before its first batch, and
+/// again before an entry that it causes if half a ring was written since.
 ///
 /// Writer:   the backend's thread.
 /// Realtime: everything but construction.

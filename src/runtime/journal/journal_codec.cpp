@@ -1,6 +1,5 @@
 #include "runtime/journal/journal_codec.hpp"
 
-#include <cstring>
 #include <string>
 
 #include "base/little_endian.hpp"

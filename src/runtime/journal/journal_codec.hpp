@@ -6,7 +6,6 @@
 #include <functional>
 #include <memory>
 #include <span>
-#include <vector>
 
 #include "control/batch/record.hpp"
 #include "memory/ring/journal.hpp"

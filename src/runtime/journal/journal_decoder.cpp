@@ -6,7 +6,7 @@
 
 #include "base/printable.hpp"
 #include "memory/ring/status_word.hpp"
-#include "runtime/journal/journal_author.hpp"
+#include "o80/describe/describe.hpp"
 #include "runtime/journal/journal_records.hpp"
 
 namespace o80 {
@@ -36,9 +36,8 @@ Enum enum_of(std::uint64_t value, std::size_t count) {
 
 /// The burst that a batch asks for; -1 until it has ended, 0: none.
 std::int64_t burst_of(const std::vector<std::byte>& blocks) {
-  BatchRecord batch;
-  if (blocks.size() < sizeof batch) return 0;
-  std::memcpy(&batch, blocks.data(), sizeof batch);
+  if (blocks.size() < sizeof(BatchRecord)) return 0;
+  const auto batch = unpack<BatchRecord>(blocks.data());
   return (batch.flags & kBurstUntilEnded) != 0 ? -1 : std::max<std::int64_t>(batch.burst, 0);
 }
 

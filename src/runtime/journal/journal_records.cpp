@@ -1,13 +1,13 @@
 #include "runtime/journal/journal_records.hpp"
 
 #include <cstring>
-#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "control/batch/chunk.hpp"
 #include "control/batch/record.hpp"
+#include "o80/describe/describe.hpp"
 
 namespace o80 {
 
@@ -224,8 +224,7 @@ std::optional<JournalRecord> take_record(const Schema& schema, std::span<const s
 std::vector<JournalRecord> records_of(const Schema& schema, std::span<const std::byte> blocks) {
   std::vector<JournalRecord> records;
   if (blocks.size() < kBlockBytes) return records;
-  BatchRecord batch;
-  std::memcpy(&batch, blocks.data(), sizeof batch);
+  const auto batch = unpack<BatchRecord>(blocks.data());
   blocks = blocks.subspan(kBlockBytes);
   for (std::uint32_t i = 0; i < batch.records && !blocks.empty(); ++i) {
     std::optional<JournalRecord> record = take_record(schema, blocks);
@@ -236,18 +235,16 @@ std::vector<JournalRecord> records_of(const Schema& schema, std::span<const std:
 }
 
 std::optional<Seen> seen_in(std::span<const std::byte> blocks) {
-  BatchRecord batch;
   if (blocks.size() < kBlockBytes) return std::nullopt;
-  std::memcpy(&batch, blocks.data(), sizeof batch);
+  const auto batch = unpack<BatchRecord>(blocks.data());
   blocks = blocks.subspan(kBlockBytes);
   // it lies behind the records, members of the last one included
   for (std::uint32_t records = 0; !blocks.empty();) {
-    SeenBlock last;
     const std::span<const std::byte> from = blocks;
     const std::optional<Piece> piece = take_piece(blocks);
     if (!piece) return std::nullopt;
     if (piece->head.kind == RecordKind::member || records++ < batch.records) continue;
-    std::memcpy(&last, from.data(), sizeof last);
+    const auto last = unpack<SeenBlock>(from.data());
     const bool is_row = last.head.kind == RecordKind::seen && blocks.empty() &&
                         last.head.payload_bytes == sizeof last - sizeof last.head &&
                         last.head.amount >= 0 && last.head.amount <= kMaxIterations &&

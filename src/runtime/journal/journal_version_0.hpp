@@ -12,8 +12,7 @@ namespace o80 {
 class JournalVersion0 {
  public:
   JournalVersion0();
-  JournalVersion0(const JournalVersion0&) = delete;
-  JournalVersion0& operator=(const JournalVersion0&) = delete;
+  JournalVersion0& operator=(JournalVersion0&&) = delete;
   ~JournalVersion0();
 
   /// Appends the first entry in `bytes` to `to`; returns its length in `bytes`, 0 if it is invalid.

@@ -1,9 +1,9 @@
 #include "runtime/journal/provenance_bytes.hpp"
 
 #include <cstdint>
-#include <cstring>
 #include <string>
 
+#include "base/little_endian.hpp"
 #include "o80/base/error.hpp"
 
 namespace o80 {
@@ -31,11 +31,11 @@ void each_part(ProvenanceLike& provenance, Visit&& visit) {
 
 class Writer {
  public:
-  void operator()(std::uint64_t number) { append(&number, sizeof number); }
-  void operator()(std::int64_t number) { append(&number, sizeof number); }
+  void operator()(std::uint64_t number) { to_.u64(number); }
+  void operator()(std::int64_t number) { to_.u64(number); }
   void operator()(const std::string& text) {
-    count(text.size());
-    append(text.data(), text.size());
+    to_.u32(text.size());
+    to_.bytes(std::as_bytes(std::span(text)));
   }
   void operator()(const std::pair<std::string, std::string>& option) {
     (*this)(option.first);
@@ -48,33 +48,25 @@ class Writer {
   }
   template <class Each>
   void operator()(const std::vector<Each>& all) {
-    count(all.size());
+    to_.u32(all.size());
     for (const Each& each : all) (*this)(each);
   }
   std::vector<std::byte> bytes;
 
  private:
-  void count(std::size_t number) {
-    const auto stored = static_cast<std::uint32_t>(number);
-    append(&stored, sizeof stored);
-  }
-  void append(const void* from, std::size_t size) {
-    const auto* first = static_cast<const std::byte*>(from);
-    bytes.insert(bytes.end(), first, first + size);
-  }
+  LittleEndianWriter to_{bytes};
 };
 
 class Reader {
  public:
-  explicit Reader(std::span<const std::byte> bytes) : bytes_(bytes) {}
-  void operator()(std::uint64_t& number) { take(&number, sizeof number); }
-  void operator()(std::int64_t& number) { take(&number, sizeof number); }
+  explicit Reader(std::span<const std::byte> bytes) : from_(bytes) {}
+  void operator()(std::uint64_t& number) { from_.u64(number); }
+  void operator()(std::int64_t& number) { from_.u64(number); }
   void operator()(std::string& text) {
     std::uint32_t size = 0;
-    take(&size, sizeof size);
-    if (size > bytes_.size()) fail();
-    text.assign(reinterpret_cast<const char*>(bytes_.data()), size);
-    bytes_ = bytes_.subspan(size);
+    from_.u32(size);
+    const std::span<const std::byte> found = from_.bytes(size);
+    if (!found.empty()) text.assign(reinterpret_cast<const char*>(found.data()), size);
   }
   void operator()(std::pair<std::string, std::string>& option) {
     (*this)(option.first);
@@ -88,23 +80,18 @@ class Reader {
   template <class Each>
   void operator()(std::vector<Each>& all) {
     std::uint32_t count = 0;
-    take(&count, sizeof count);
+    from_.u32(count);
     if (count > kMaxOfAKind) fail();
     for (std::uint32_t i = 0; i < count; ++i) (*this)(all.emplace_back());
   }
-  bool is_at_end() const { return bytes_.empty(); }
+  bool is_at_end() const { return !from_.failed() && from_.left() == 0; }
 
   [[noreturn]] static void fail() {
     throw SegmentError("the record of how the robot was started is damaged");
   }
 
  private:
-  void take(void* to, std::size_t size) {
-    if (size > bytes_.size()) fail();
-    std::memcpy(to, bytes_.data(), size);
-    bytes_ = bytes_.subspan(size);
-  }
-  std::span<const std::byte> bytes_;
+  LittleEndianReader from_;
 };
 
 }  // namespace

@@ -1,7 +1,8 @@
 #include "runtime/journal/recorded_decisions.hpp"
 
 #include <algorithm>
-#include <utility>
+
+#include "base/printable.hpp"
 
 namespace o80 {
 
@@ -136,7 +137,9 @@ void RecordedDecisions::interrupt(Iteration iteration, std::uint16_t actuator,
 }
 
 void RecordedDecisions::ask_to_halt(HaltCause cause, std::string_view text) {
-  requested_.push_back({cause, std::string(text)});
+  std::string kept(sizeof(Halt::text) - 1, '\0');  // as much as a segment keeps of it
+  kept.resize(printable(text, kept.data(), kept.size()));
+  requested_.push_back({cause, std::move(kept)});
 }
 
 void RecordedDecisions::compare_halt(const JournalEntry& halt) {

@@ -26,7 +26,7 @@ struct DecisionMismatch {
 
 /// The decisions and row times of a recorded run. A backend that replays it obeys them instead of
 /// its lanes, watchdog and clock. What the driver decides again (halts, interrupts, fresh starts)
-/// is compared with them; without a driver it is obeyed too. See ARCHITECTURE.md, Replay.
+/// is compared with them; without a driver it is obeyed too (src/runtime/README.md#replay).
 ///
 /// Writer: the thread of the replay.
 class RecordedDecisions {

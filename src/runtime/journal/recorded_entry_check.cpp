@@ -1,10 +1,10 @@
 #include "runtime/journal/recorded_entry_check.hpp"
 
-#include <cstring>
 #include <string>
 
 #include "control/batch/record.hpp"
 #include "o80/base/error.hpp"
+#include "o80/describe/describe.hpp"
 
 namespace o80 {
 
@@ -16,9 +16,8 @@ namespace {
 
 /// Throws if these are not the blocks of a whole batch.
 void check_blocks(const JournalEntry& entry) {
-  BatchRecord batch;
   if (entry.blocks.size() < kBlockBytes) refuse_entry(entry, "lacks the blocks of its batch");
-  std::memcpy(&batch, entry.blocks.data(), sizeof batch);
+  const auto batch = unpack<BatchRecord>(entry.blocks.data());
   const bool is_whole = batch.kind == RecordKind::batch &&
                         std::uint64_t{batch.blocks} * kBlockBytes == entry.blocks.size();
   if (!is_whole) refuse_entry(entry, "holds a damaged batch");
@@ -40,6 +39,12 @@ void check_recorded(const JournalEntry& entry, const Schema& schema, std::uint32
   if (entry.kind == JournalKind::interrupted && entry.actuator >= schema.actuators.size()) {
     refuse_entry(entry, "interrupts an actuator that the robot does not have");
   }
+}
+
+BackendOptions replaying(BackendOptions options) {
+  options.resume = true;  // halts come from the recording
+  options.journal = 0;
+  return options;
 }
 
 }  // namespace o80

@@ -6,30 +6,14 @@
 #include <vector>
 
 #include "o80/base/error.hpp"
+#include "o80/describe/describe.hpp"
 #include "runtime/journal/recorded_entry_check.hpp"
 
 namespace o80 {
 
-namespace {
-
-/// The options of the recorded run, for a backend that nobody halts or reads the journal of.
-BackendOptions without_journal(BackendOptions options) {
-  options.resume = true;  // halts come from the recording
-  options.journal = 0;
-  return options;
-}
-
-RowHead head_in(const std::byte* row) noexcept {
-  RowHead head;
-  std::memcpy(&head, row, sizeof head);
-  return head;
-}
-
-}  // namespace
-
 DriverlessReplay::DriverlessReplay(Schema schema, BackendOptions options)
     : lanes_(options.lanes),
-      backend_(std::move(schema), without_journal(std::move(options)), this, &recorded_) {}
+      backend_(std::move(schema), replaying(std::move(options)), this, &recorded_) {}
 
 void DriverlessReplay::begin_at(Iteration first) noexcept {
   start_ = first;
@@ -54,9 +38,9 @@ bool DriverlessReplay::run(std::span<const std::byte> rows) {
   rows_ = rows;
   first_ = started_ ? next() : start_;
   std::vector<std::int64_t> times;
-  if (next() < first_) times.push_back(head_in(rows.data()).time);
+  if (next() < first_) times.push_back(unpack<RowHead>(rows.data()).time);
   for (std::size_t i = 0; i < count; ++i) {
-    const RowHead head = head_in(rows.data() + i * size);
+    const auto head = unpack<RowHead>(rows.data() + i * size);
     if (head.iteration != first_ + static_cast<Iteration>(i)) {
       throw InvalidArgument("the recorded rows are not consecutive");
     }

@@ -14,7 +14,7 @@ namespace o80 {
 /// Repeats what the backend of a recorded run did, without its driver: it reads the observed and
 /// extended values of the recorded rows, obeys the recorded decisions, also those of the driver
 /// (halts, interrupts, fresh starts), and computes the desired states. So a run on hardware can be
-/// compared up to what o80 itself did. See ARCHITECTURE.md, Replay.
+/// compared up to what o80 itself did (src/runtime/README.md#replay).
 ///
 /// Types that interpolate in C++ (`blend`) need the driver's code: their desired states differ.
 ///

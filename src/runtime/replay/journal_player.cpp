@@ -4,6 +4,7 @@
 #include <cstring>
 #include <utility>
 
+#include "o80/describe/describe.hpp"
 #include "runtime/journal/journal_author.hpp"
 
 namespace o80 {
@@ -32,8 +33,7 @@ void JournalPlayer::note(const JournalItem& item) {
   const std::span<const std::byte> payload = item.payload;
   const bool is_halt = head.kind == JournalKind::halt || head.kind == JournalKind::halt_reason;
   if (is_halt && payload.size() >= sizeof(JournalHalt)) {
-    JournalHalt halt;
-    std::memcpy(&halt, payload.data(), sizeof halt);
+    const auto halt = unpack<JournalHalt>(payload.data());
     halt_ = {.number = head.id,
              .cause = static_cast<HaltCause>(std::min<std::uint64_t>(halt.cause, kHaltCauses - 1)),
              .iteration = head.iteration,

@@ -9,6 +9,7 @@
 #include "memory/segment/named_segment.hpp"
 #include "memory/segment/segment_file.hpp"
 #include "o80/base/error.hpp"
+#include "o80/describe/describe.hpp"
 #include "runtime/journal/provenance_bytes.hpp"
 
 namespace o80 {
@@ -58,12 +59,6 @@ OwnedSegment segment_of(const PlayedOptions& options, const RowLayout& layout) {
   spec.permission = options.permission;
   spec.played = true;
   return OwnedSegment::create(spec);
-}
-
-RowHead head_of(const std::byte* row) noexcept {
-  RowHead head;
-  std::memcpy(&head, row, sizeof head);
-  return head;
 }
 
 }  // namespace
@@ -152,7 +147,7 @@ bool PlayedSegment::wait_until(std::int64_t due, const KeepWaiting& keep_waiting
 }
 
 bool PlayedSegment::publish_one(const std::byte* row) {
-  const RowHead head = head_of(row);
+  const auto head = unpack<RowHead>(row);
   if (head.iteration <= last_)
     throw InvalidArgument("the rows of '" + segment_.name() + "' are not in order: row " +
                           std::to_string(head.iteration) + " follows row " + std::to_string(last_));

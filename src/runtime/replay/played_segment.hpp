@@ -8,7 +8,6 @@
 #include <memory>
 #include <span>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "memory/ring/history.hpp"
@@ -48,8 +47,7 @@ class PlayedSegment {
   /// Takes the name. Throws SegmentTaken if a living backend has it, or if it leads to what a robot
   /// that failed or was killed has left; SegmentError for an invalid description.
   explicit PlayedSegment(const PlayedOptions& options);
-  PlayedSegment(const PlayedSegment&) = delete;
-  PlayedSegment& operator=(const PlayedSegment&) = delete;
+  PlayedSegment& operator=(PlayedSegment&&) = delete;
   /// Ends as stopped unless it has ended.
   ~PlayedSegment();
 

@@ -112,6 +112,7 @@ Most play(Robot& robot, const std::vector<std::unique_ptr<Sender>>& senders, Ite
   return most;
 }
 
+// rule B7
 TEST_F(LoadsTest, TheHeaviestOfTheFirstVersionAreBounded) {
   for (const std::uint32_t actuators : {8U, 64U}) {
     for (const flood::Load& load : flood::heaviest_loads()) {

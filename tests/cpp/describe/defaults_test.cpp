@@ -96,7 +96,7 @@ TEST_F(DefaultsTest, AreReadFromASegment) {
 
 TEST_F(DefaultsTest, ThatAreNotThereAreRefused) {
   const auto why = [](const Schema& schema) {
-    return described::message_of<InvalidArgument>([&] { check(schema); });
+    return message_of<InvalidArgument>([&] { check(schema); });
   };
   Schema without_bytes = schema_;
   without_bytes.defaults.clear();

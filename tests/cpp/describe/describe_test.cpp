@@ -99,6 +99,31 @@ TEST(Describe, MakesEachFieldAnActuatorAndAnArrayFieldMany) {
   EXPECT_EQ(schema.groups[1].is_array, 0U);
 }
 
+/// Actuators that are plain numbers, two of them of one type.
+struct PlainActuators {
+  std::array<double, 2> joints{};
+  double grip = 0;
+  double spare = 0;
+};
+O80_DESCRIBE(PlainActuators, (joints, "[rad]"), (grip, "how hard [N]", o80::rests_at(2)), spare);
+struct PlainRobot {
+  using Actuators = PlainActuators;
+};
+
+TEST(Describe, GivesPlainNumbersTheNotesOfTheirGroup) {
+  const o80::Schema schema = schema_of<PlainRobot>();
+  const auto number = [&](std::size_t group) {
+    return field(schema, schema.groups[group].type, 0);
+  };
+  EXPECT_EQ(number(0).unit.view(), "rad");
+  EXPECT_EQ(number(1).unit.view(), "N");
+  EXPECT_EQ(number(1).help.view(), "how hard");
+  EXPECT_EQ(number(2).unit.view(), "");
+  EXPECT_EQ(schema.groups[0].count, 2U);
+  EXPECT_EQ(schema.limits[schema.actuators[2].first_limit].rest, 2.0);
+  EXPECT_EQ(schema.limits[schema.actuators[3].first_limit].resting, 0U);
+}
+
 TEST(Describe, KnowsEveryKindOfNumber) {
   using o80::Kind;
   using o80::describing::kind_of;

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <string>
 
+#include "message_of.hpp"
 #include "o80/describe/describe.hpp"
 #include "o80/describe/options.hpp"
 #include "o80/runtime/robot_types.hpp"
@@ -106,17 +107,6 @@ o80::Schema schema_of() {
   schema.head.period = 1'000'000;
   o80::describe_types<Robot>(schema);
   return schema;
-}
-
-/// What an error says, or "" if none is thrown.
-template <class Wanted, class Call>
-std::string message_of(Call&& call) {
-  try {
-    call();
-  } catch (const Wanted& error) {
-    return error.what();
-  }
-  return {};
 }
 
 }  // namespace described

@@ -10,7 +10,6 @@ namespace {
 using described::Config;
 using described::ConfigOfParts;
 using described::ControlMode;
-using described::message_of;
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;

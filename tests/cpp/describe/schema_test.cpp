@@ -8,7 +8,6 @@
 namespace o80 {
 namespace {
 
-using described::message_of;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 

@@ -11,7 +11,6 @@
 namespace o80 {
 namespace {
 
-using described::message_of;
 using described::MixedRobot;
 using described::schema_of;
 using ::testing::HasSubstr;

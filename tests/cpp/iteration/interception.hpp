@@ -52,8 +52,7 @@ const Calls& calls_so_far() noexcept;
 class Watched {
  public:
   Watched() noexcept;
-  Watched(const Watched&) = delete;
-  Watched& operator=(const Watched&) = delete;
+  Watched& operator=(Watched&&) = delete;
   ~Watched();
 };
 

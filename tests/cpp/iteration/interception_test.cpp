@@ -13,7 +13,6 @@
 #include <memory>
 #include <mutex>
 #include <shared_mutex>
-#include <sstream>
 #include <stdexcept>
 #include <thread>
 #include <vector>

@@ -6,10 +6,7 @@
 
 #include <array>
 #include <atomic>
-#include <memory>
 #include <numeric>
-#include <optional>
-#include <string>
 #include <thread>
 #include <vector>
 
@@ -88,7 +85,7 @@ TEST_P(IterationTest, CallsNothingWithTrajectoriesThatTakeManyIterationsToCome) 
   std::vector<double> targets(kRows);
   std::iota(targets.begin(), targets.end(), 0.0);
   std::vector<std::int64_t> times(kRows);
-  for (std::uint32_t i = 0; i < kRows; ++i) times[i] = std::int64_t{i} * 100'000;
+  for (std::uint32_t i = 0; i < kRows; ++i) times[i] = std::int64_t{i + 1} * 500'000;
   UntypedFrontend one("subject");
   UntypedFrontend two("subject");
   for (int round = 0; round < 5; ++round) {

@@ -89,6 +89,7 @@ class Subject {
 
   explicit Subject(const Config& config) : config_(config) {}
   void describe(Schema& schema) const {
+    schema.simulated();
     schema.actuator(1).limits({.minimum = -10.0, .maximum = 10.0, .speed = 1000.0});
     schema.actuator(2).when_idle(WhenIdle::follow);
   }
@@ -144,8 +145,7 @@ class WatchedLoop {
     });
     keeper.emplace("subject");
   }
-  WatchedLoop(const WatchedLoop&) = delete;
-  WatchedLoop& operator=(const WatchedLoop&) = delete;
+  WatchedLoop& operator=(WatchedLoop&&) = delete;
   ~WatchedLoop() {
     stop();
     Subject::account = nullptr;

@@ -5,7 +5,6 @@
 
 #include <filesystem>
 #include <functional>
-#include <optional>
 
 #include "base/crash_point.hpp"
 #include "memory/segment/segment_draft.hpp"

@@ -35,8 +35,7 @@ class ChildProcess {
     ::close(pipe_ends[1]);
     said_ = pipe_ends[0];
   }
-  ChildProcess(const ChildProcess&) = delete;
-  ChildProcess& operator=(const ChildProcess&) = delete;
+  ChildProcess& operator=(ChildProcess&&) = delete;
   ~ChildProcess() {
     if (pid_ > 0) kill_now();
     ::close(said_);

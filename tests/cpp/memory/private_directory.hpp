@@ -30,8 +30,7 @@ class FolderGuardian {
     close(ends[0]);
     waitpid(child, nullptr, 0);
   }
-  FolderGuardian(const FolderGuardian&) = delete;
-  FolderGuardian& operator=(const FolderGuardian&) = delete;
+  FolderGuardian& operator=(FolderGuardian&&) = delete;
   ~FolderGuardian() { close(life_); }
 
  private:
@@ -61,8 +60,7 @@ class PrivateDirectory {
     guardian_.emplace(path_);
     setenv("O80_DIRECTORY", path, 1);
   }
-  PrivateDirectory(const PrivateDirectory&) = delete;
-  PrivateDirectory& operator=(const PrivateDirectory&) = delete;
+  PrivateDirectory& operator=(PrivateDirectory&&) = delete;
   ~PrivateDirectory() {
     unsetenv("O80_DIRECTORY");
     std::filesystem::remove_all(path_);

@@ -3,13 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <chrono>
-#include <cstring>
 #include <string>
-#include <vector>
 
 #include "memory/private_directory.hpp"
 #include "memory/segment/attached_segment.hpp"
 #include "memory/segment/owned_segment.hpp"
+#include "message_of.hpp"
 
 namespace o80 {
 
@@ -36,16 +35,5 @@ class SegmentTest : public ::testing::Test {
  protected:
   PrivateDirectory directory_;
 };
-
-/// What an error says, or "" if none is thrown.
-template <class Wanted, class Call>
-std::string message_of(Call&& call) {
-  try {
-    call();
-  } catch (const Wanted& error) {
-    return error.what();
-  }
-  return {};
-}
 
 }  // namespace o80

@@ -1,12 +1,9 @@
 #pragma once
 
 #include <array>
-#include <atomic>
 #include <cstdint>
 #include <map>
-#include <memory>
 #include <stdexcept>
-#include <string>
 
 #include "o80/robot/make_table.hpp"
 #include "o80/robot/plant_requests.hpp"
@@ -40,6 +37,7 @@ class Drifter {
   explicit Drifter(const Config& config) : config_(config) { begin(0); }
 
   void describe(Schema& schema) const {
+    schema.simulated();
     schema.actuator(0).name("left");
     schema.actuator(1).name("right");
   }

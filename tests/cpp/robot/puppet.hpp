@@ -4,13 +4,10 @@
 #include <unistd.h>
 
 #include <array>
-#include <chrono>
-#include <cstdio>
 #include <functional>
 #include <iterator>
 #include <sstream>
 #include <string>
-#include <thread>
 #include <utility>
 #include <vector>
 
@@ -65,7 +62,7 @@ class Puppet {
   static inline std::function<void(Reading<Puppet>&)> on_read;
   static inline std::function<Served()> on_resume;
   static inline Limits limits;
-  static inline bool of_the_world = false;
+  static inline bool simulated = true;
   static inline std::int64_t own_gap = 0;  // [ns]; 0: by default
 
   explicit Puppet(const Config& config) : config_(config) {
@@ -79,7 +76,7 @@ class Puppet {
     schema.actuator(0).name("left");
     schema.actuator(1).name("right");
     schema.actuator(0).limits(limits);
-    if (of_the_world) schema.of_the_world();
+    schema.head.of_the_world = simulated ? 2 : 3;  // also in bursts
     if (own_gap > 0) schema.gap(own_gap);
   }
   void start() {
@@ -156,7 +153,7 @@ class PuppetTest : public StationTest {
     Puppet::on_read = {};
     Puppet::on_resume = {};
     Puppet::limits = {};
-    Puppet::of_the_world = false;
+    Puppet::simulated = true;
     Puppet::own_gap = 0;
   }
   static const RobotTable& table() { return *robot_table<Puppet>("puppet"); }
@@ -201,8 +198,7 @@ class Program {
     ::close(std::exchange(pipes_[1][1], -1));
     ::close(std::exchange(pipes_[2][1], -1));
   }
-  Program(const Program&) = delete;
-  Program& operator=(const Program&) = delete;
+  Program& operator=(Program&&) = delete;
   ~Program() {
     if (pid_ > 0) {
       ::kill(pid_, SIGKILL);

@@ -20,8 +20,7 @@ class SharedScene {
       : memory_(mmap(nullptr, sizeof(Scene), PROT_READ | PROT_WRITE, MAP_SHARED | MAP_ANONYMOUS, -1,
                      0)),
         scene_(new (memory_) Scene) {}
-  SharedScene(const SharedScene&) = delete;
-  SharedScene& operator=(const SharedScene&) = delete;
+  SharedScene& operator=(SharedScene&&) = delete;
   ~SharedScene() { munmap(memory_, sizeof(Scene)); }
   Scene* operator->() const { return scene_; }
 

@@ -7,11 +7,11 @@
 #include <functional>
 #include <string>
 #include <thread>
-#include <utility>
 #include <vector>
 
 #include "control/batch/batch_builder.hpp"
 #include "memory/private_directory.hpp"
+#include "message_of.hpp"
 #include "o80/robot/plant_requests.hpp"
 #include "o80/runtime/backend.hpp"
 #include "o80/runtime/frontend.hpp"
@@ -46,8 +46,7 @@ inline constexpr Timeout kPatience = std::chrono::seconds(60);
 class Station : private RequestServer {
  public:
   virtual ~Station() = default;
-  Station(const Station&) = delete;
-  Station& operator=(const Station&) = delete;
+  Station& operator=(Station&&) = delete;
 
   explicit Station(const BackendOptions& options = {.segment = "pair"},
                    const std::function<void(Schema&)>& describe = {})
@@ -177,8 +176,7 @@ class BurstingStation {
     station.start();
     thread_ = std::thread([this] { station.serve_bursts(); });
   }
-  BurstingStation(const BurstingStation&) = delete;
-  BurstingStation& operator=(const BurstingStation&) = delete;
+  BurstingStation& operator=(BurstingStation&&) = delete;
   ~BurstingStation() { stop(); }
   /// The thread has ended; the segment is still there.
   void stop() {
@@ -228,17 +226,6 @@ inline std::vector<double> desired(const UntypedFrontend& frontend, Iteration fi
     states.push_back(desired(frontend.wait_for(i, kAtOnce), actuator));
   }
   return states;
-}
-
-/// What an error says, or "" if none is thrown.
-template <class Wanted, class Call>
-std::string message_of(Call&& call) {
-  try {
-    call();
-  } catch (const Wanted& error) {
-    return error.what();
-  }
-  return {};
 }
 
 /// A test with its own folder of segments.

@@ -50,10 +50,12 @@ void expect_promises_kept(Script (*script_of)(std::uint64_t), std::uint64_t scri
   }
 }
 
+// rules C3, C18, L2
 TEST(Script, KeepsEveryPromise) {
   expect_promises_kept(random_script, from_environment("O80_SCRIPTS", kScriptsOfEachRun));
 }
 
+// rules C5, C13, C14, L3
 TEST(Script, OfPlannedMotionsKeepsEveryPromise) {
   expect_promises_kept(planned_script, from_environment("O80_SCRIPTS", kPlannedScripts));
 }

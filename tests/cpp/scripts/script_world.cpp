@@ -1,7 +1,6 @@
 #include "scripts/script_world.hpp"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 namespace o80::test {

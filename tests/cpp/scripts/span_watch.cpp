@@ -4,7 +4,6 @@
 #include <array>
 #include <cmath>
 #include <cstdio>
-#include <string>
 #include <utility>
 
 #include "control/motion/fastest_motion.hpp"

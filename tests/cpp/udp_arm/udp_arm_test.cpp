@@ -71,6 +71,14 @@ TEST(UdpArm, HaltsWhenMoreTicksInARowAreMissedThanAreTolerated) {
   EXPECT_EQ(arm.iterate().halt, "");
 }
 
+TEST(UdpArm, IsResumedAlthoughAsManyTicksAreMissedAsAreTolerated) {
+  LockStep arm({.tolerated = 2});
+  arm.fake.play(LinkFaults("drop 1-2"));
+  arm.iterate_in_vain();
+  arm.iterate_in_vain();
+  EXPECT_EQ(arm.driver.resume().kind, o80::Served::Kind::done);
+}
+
 TEST(UdpArm, ALatePacketNeitherEndsAnIterationNorIsLost) {
   LockStep arm;
   const Row before = arm.iterate();

@@ -144,13 +144,13 @@ def play_bench(recorder: Recorder) -> None:
         arm.pulse()
         bench.run(3)
         # trajectories: the last one is copied over several iterations
-        arm.add_trajectory([0.1, 0.2, 0.0], "finger", times=[0.01, 0.01, 0.03])
+        arm.add_trajectory([0.1, 0.2, 0.0], "finger", times=[0.01, 0.02, 0.03])
         arm.add_trajectory([True, False], "grip", iterations=2)
         arm.pulse()
         bench.run(20)
         ramp = np.linspace(0.0, 0.1, 3000)
         rows = {"position": np.stack([ramp, -ramp], 1), "velocity": np.zeros((3000, 2))}
-        arm.add_trajectory(rows, ["shoulder", "elbow"], times=np.arange(3000) * 1e-5)
+        arm.add_trajectory(rows, ["shoulder", "elbow"], times=np.arange(1, 3001) * 2e-3)
         arm.pulse()
         bench.run(40)
         # purges, requests, interrupts

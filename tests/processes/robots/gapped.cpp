@@ -38,6 +38,7 @@ class Gapped {
 
   explicit Gapped(const Config& /*config*/) {}
 
+  void describe(o80::Schema& schema) const { schema.simulated(); }
   void start() {}
   void write(const o80::Desired<Gapped>& /*desired*/) {}
   void read(o80::Reading<Gapped>& reading) {

@@ -101,8 +101,7 @@ class Actor {
   class Measured {
    public:
     Measured(Actor& actor, const char* what, o80::Timeout timeout);
-    Measured(const Measured&) = delete;
-    Measured& operator=(const Measured&) = delete;
+    Measured& operator=(Measured&&) = delete;
     ~Measured() noexcept(false);
 
    private:

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <functional>
 #include <map>
 #include <string>
 #include <vector>
@@ -42,8 +41,7 @@ class Arena {
   /// Without a nursery there are no actors in Python.
   Arena(std::string directory, Tally& tally, const Nursery* nursery)
       : directory_(std::move(directory)), tally_(tally), nursery_(nursery) {}
-  Arena(const Arena&) = delete;
-  Arena& operator=(const Arena&) = delete;
+  Arena& operator=(Arena&&) = delete;
   ~Arena();
 
   bool idle() const { return round_ == nullptr; }

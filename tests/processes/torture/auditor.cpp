@@ -3,7 +3,6 @@
 #include <map>
 #include <string_view>
 
-#include "describe/table.hpp"
 #include "runtime/frontend/link.hpp"
 #include "torture/actor.hpp"
 #include "torture/journal_audit.hpp"

@@ -1,7 +1,5 @@
 #include "o80/runtime/backend.hpp"
 
-#include <cstring>
-
 #include "o80/describe/describe.hpp"
 #include "torture/actor.hpp"
 

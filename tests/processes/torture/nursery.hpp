@@ -12,8 +12,7 @@ namespace torture {
 class Nursery {
  public:
   Nursery(const std::string& python, const std::string& script);
-  Nursery(const Nursery&) = delete;
-  Nursery& operator=(const Nursery&) = delete;
+  Nursery& operator=(Nursery&&) = delete;
   /// Lets it end.
   ~Nursery();
 

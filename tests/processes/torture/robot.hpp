@@ -5,7 +5,6 @@
 #include <array>
 #include <bit>
 #include <cstdint>
-#include <cstring>
 
 #include "o80/runtime/observation.hpp"
 #include "o80/runtime/robot_types.hpp"

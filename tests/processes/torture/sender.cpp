@@ -125,7 +125,7 @@ void Sender::add_trajectory() {
   }
   std::vector<std::int64_t> times(rows.size());
   std::int64_t time = 0;
-  for (std::int64_t& end : times) end = time += chance.between(1, 3 * kMillisecond);
+  for (std::int64_t& end : times) end = time += chance.between(kMillisecond, 3 * kMillisecond);
   frontend_.add_trajectory(actuator, count, states, {}, times);
 }
 

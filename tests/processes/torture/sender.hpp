@@ -16,8 +16,7 @@ class Sender {
  public:
   Sender(Actor& actor, o80::UntypedFrontend frontend);
   ~Sender();
-  Sender(const Sender&) = delete;
-  Sender& operator=(const Sender&) = delete;
+  Sender& operator=(Sender&&) = delete;
 
   o80::UntypedFrontend& frontend() { return frontend_; }
   Generation& life() const { return life_; }

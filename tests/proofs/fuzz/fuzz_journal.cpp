@@ -1,8 +1,6 @@
 // A journal with damaged counters, marks and entries: a reader ends, stays inside the ring, and
 // decodes what it gets; also from a damaged recording.
 
-#include <algorithm>
-#include <array>
 #include <cstdlib>
 #include <cstring>
 #include <memory>

@@ -47,8 +47,7 @@ class Directory {
     idle_.emplace(schema_of_robot(),
                   BackendOptions{.segment = "idle", .history = 1, .lanes = 1, .lane_blocks = 1});
   }
-  Directory(const Directory&) = delete;
-  Directory& operator=(const Directory&) = delete;
+  Directory& operator=(Directory&&) = delete;
   ~Directory() {
     idle_.reset();
     rmdir(path_.c_str());

@@ -1,9 +1,7 @@
 // The texts a robot is started with.
 
-#include <cmath>
 #include <cstdlib>
 #include <string>
-#include <string_view>
 
 #include "describe/table.hpp"
 #include "fuzz/bytes.hpp"

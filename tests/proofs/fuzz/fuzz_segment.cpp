@@ -12,10 +12,8 @@
 #include <filesystem>
 #include <fstream>
 #include <string>
-#include <utility>
 #include <vector>
 
-#include "describe/table.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
 #include "memory/segment/owned_segment.hpp"
@@ -67,8 +65,7 @@ class Original {
       files_[i].assign(std::istreambuf_iterator<char>(file), {});
     }
   }
-  Original(const Original&) = delete;
-  Original& operator=(const Original&) = delete;
+  Original& operator=(Original&&) = delete;
   ~Original() { std::filesystem::remove_all(directory_); }
 
   const std::string& path(std::size_t file) const { return paths_[file]; }

@@ -108,6 +108,7 @@ class Relacy:
     """Compiles models together with the sources of the product, or with a mutant of them."""
 
     SOURCES = (
+        "src/base/printable.cpp",
         "src/memory/segment/halt_word.cpp",
         "src/memory/ring/history.cpp",
         "src/memory/ring/journal.cpp",

@@ -21,6 +21,7 @@ class WatchedJoints {
   using Actuators = std::array<double, 2>;
 
   explicit WatchedJoints(const Config& config) : config_(config) {}
+  void describe(o80::Schema& schema) const { schema.simulated(); }
   void start() {}
   void write(const o80::Desired<WatchedJoints>& desired) { now_ = desired.states; }
   void read(o80::Reading<WatchedJoints>& reading) {

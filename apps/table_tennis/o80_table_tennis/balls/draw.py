@@ -22,9 +22,6 @@ class DrawnBalls:
     flights: list[SampledFlight]
 
 
-NO_BALLS = DrawnBalls([USERS_OWN], [])
-
-
 def draw_balls(
     source: Flights,
     rng: np.random.Generator,

@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 import o80
+from o80.base.descriptors import open_standard_streams
 from o80_devices.ball_launcher.launch_model import Launch
 from o80_devices.fakes.ball_launcher import Behaviour, FakeLauncher
 from o80_devices.fakes.qualisys import FakeQualisys, Pose
@@ -137,4 +138,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    open_standard_streams()
     main()

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 import o80
+from o80.base.screen import keep_printing
 
 from ..balls.launches import Launch
 from ..environment import TableTennisEnvironment
@@ -243,4 +244,5 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 if __name__ == "__main__":
+    keep_printing()
     main()

@@ -6,7 +6,6 @@ it is started again, and the lab goes on.
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping
 from pathlib import Path
@@ -17,6 +16,7 @@ from rich.live import Live
 from rich.table import Table
 
 import o80
+from o80.base.finite import json_text
 from o80.base.lifecycle import Closeable
 
 from ..ending import ends_in_order
@@ -46,7 +46,7 @@ class Events(Closeable):
     def add(self, part: str, what: str) -> None:
         """Now."""
         line = {"time": time.monotonic_ns(), "part": part, "what": what}
-        self._file.write(json.dumps(line) + "\n")
+        self._file.write(json_text(line) + "\n")
         self._file.flush()
 
 

@@ -1,12 +1,10 @@
-"""report.json: what the recording of a lab in real time says about rates, latencies and errors."""
+"""report.json: what the recording of a lab says about rates, latencies and errors."""
 
 from __future__ import annotations
 
-import json
 import os
 import time
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +12,7 @@ from numpy.typing import NDArray
 
 import o80
 from o80.base.arrays import IntArray
+from o80.base.finite import json_text
 
 from ..world.timing import ITERATIONS, PERIOD
 from .environment_row import Phase
@@ -32,8 +31,6 @@ from .parts import (
 )
 
 REPORT = "report.json"
-BURSTING = "bursting"
-"""Its entry about the lab in lock-step, see `comparison`."""
 
 MAX_MISSED = {ARM: 0.1} | dict.fromkeys((CAMERAS, TRACKER, MOTION_CAPTURE, ENVIRONMENT), 1.0)
 """Periods that may be missed on a quiet machine [%]."""
@@ -68,18 +65,8 @@ def write_report(
     }
     report["not_measured"] = [*not_played(balls, settings.balls), *not_measured(report)]
     path = settings.folder / REPORT
-    if (bursting := _told_before(path)) is not None:
-        report[BURSTING] = bursting
-    path.write_text(json.dumps(report, indent=2) + "\n")
+    path.write_text(json_text(report, indent=2) + "\n")
     return report
-
-
-def _told_before(path: Path) -> Any:
-    """Reads what the lab in lock-step has written there."""
-    try:
-        return json.loads(path.read_text()).get(BURSTING)
-    except (FileNotFoundError, ValueError, AttributeError):
-        return None
 
 
 class _Rows:

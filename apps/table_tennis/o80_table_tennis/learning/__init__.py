@@ -1,4 +1,20 @@
-"""Learning to return balls: training, evaluation, baselines, curves.
+"""Learning to return balls: the task that `python -m o80.learning train` trains; evaluations.
 
-Needs the extra `learn`; it is imported late, so that playing a policy needs NumPy only.
+`ours.json` and `published.json` are settings of trainings.
 """
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..copies import TableTennisCopies
+from ..players.conditions import Conditions
+
+
+def play(
+    copies: int, *, ball_seed: int = 0, threads: int | None = 1, **conditions: Any
+) -> TableTennisCopies:
+    """The task of these `Conditions`, given by their names, for the trainer of o80.learning."""
+    its = Conditions(**conditions)
+    task = its.task(ball_seed=ball_seed)
+    return TableTennisCopies(copies, rig=its.rig(), task=task, threads=threads)

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from o80.learning.training import wilson
+
 from ..balls.sources import balls_from
 from ..environment import TableTennisEnvironment
 from ..players.conditions import Conditions
@@ -19,7 +21,7 @@ from ..report.statistics import Statistics
 from ..settings import Pacing
 
 VERDICT_SEED = 7_000_001
-"""Seed of the shots and of the noise of a verdict, which no training and no search plays."""
+"""Seed of the shots and of the noise of a verdict."""
 VERDICT_BALLS = 400
 
 
@@ -61,12 +63,25 @@ class Evaluation:
         ]
         return float(np.median(apart)) if apart else float("nan")
 
+    @property
+    def speed(self) -> float:
+        """Median of the largest speeds of the returned balls after the touch [m/s]; NaN without."""
+        speeds = [episode.speed for episode in self.episodes if episode.returned]
+        return float(np.median(speeds)) if speeds else float("nan")
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's interval of the share of returned balls, 95 %."""
+        return wilson(sum(each.returned for each in self.episodes), len(self.episodes))
+
     def as_json(self) -> dict[str, Any]:
         """The figures."""
         return {
             "balls": len(self.episodes),
             "touched": round(self.touched, 4),
             "returned": round(self.returned, 4),
+            "returned_95_percent": [round(each, 4) for each in self.interval],
+            "speed": round(self.speed, 2) if self.returned else None,
             "reward": round(self.reward, 4),
             "ends": self.ends,
         }

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Any
 
 from ..settings import Pacing, RigSettings, TaskSettings
@@ -28,10 +28,10 @@ class Conditions:
     """Factor of the actions."""
     repeat: int = 2
     """Steps of 10 ms that an action lasts."""
-    chunk_size: int | None = None
-    """Rows of an action chunk, see `settings.TaskSettings` for this and the next two."""
-    action_steps: int = 1
     delay: int = 1
+    """Iterations from an observation to its action, less 1, see `settings.TaskSettings`."""
+    goal: str = "return"
+    """return or smash."""
     reward: str = "ordered"
     balls: str = "wide"
     """Simulated shots: wide, narrow or launcher; or a path of recordings."""
@@ -46,12 +46,11 @@ class Conditions:
         Without `fly_out` the rows of the ball's flight after the touch are there, for a film.
         """
         return TaskSettings(
+            task=self.goal,
             balls=self.balls,
             ball_seed=ball_seed,
             factor=self.factor,
             repeat=self.repeat,
-            chunk_size=self.chunk_size,
-            action_steps=self.action_steps,
             delay=self.delay,
             reward=self.reward,
             observation=self.observation,
@@ -63,21 +62,8 @@ class Conditions:
             fly_out=fly_out,
         )
 
-    def playing(self, balls: str | None) -> Conditions:
-        """The same with other balls, if any are named."""
-        return self if balls is None else replace(self, balls=balls)
-
-    def as_json(self) -> dict[str, Any]:
-        """By name."""
-        return asdict(self)
-
     @classmethod
-    def of_json(cls, values: Mapping[str, Any]) -> Conditions:
-        """Conditions from the values of a file. Raises ValueError for names that are unknown."""
+    def of_options(cls, options: Mapping[str, Any]) -> Conditions:
+        """Conditions of a training's options, without those that say how it was stepped."""
         known = [each.name for each in fields(cls)]
-        unknown = [name for name in values if name not in known]
-        if unknown:
-            raise ValueError(
-                f"unknown conditions: {', '.join(unknown)}; the file is of another version"
-            )
-        return cls(**values)
+        return cls(**{name: value for name, value in options.items() if name in known})

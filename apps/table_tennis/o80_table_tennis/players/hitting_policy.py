@@ -45,19 +45,19 @@ PREDICTED_EVERY = 4
 
 @dataclass(frozen=True)
 class ControlSettings:
-    """How the arm is driven along its swing."""
+    """How the arm is driven along its swing. A search on simulated shots found uneven numbers."""
 
-    stiffness: float = 400.0
+    stiffness: float = 412.5150855132902
     """Stiffness of the feedback [1/s^2]."""
-    damping: float = 30.0
+    damping: float = 28.33154073951581
     """Damping of the feedback [1/s]."""
-    mean_pressure: float = 0.45
+    mean_pressure: float = 0.45934124867561194
     """Mean normalised pressure of two antagonists."""
     begin: float = 0.003
     """Time from an observation to the effect of its action [s]."""
-    ahead: float = 0.012
+    ahead: float = 0.016792337953590822
     """Time after the observation at which the action aims [s]."""
-    settling: float = 0.014
+    settling: float = 0.015620133347269057
     """Time in which the pressures should reach the wanted ones [s]."""
     wrist_stiffness: float = 12.0
     """Additional feedback of joint 4, whose inertia is very small [Nm/rad]."""

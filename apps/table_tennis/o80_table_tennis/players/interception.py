@@ -21,7 +21,7 @@ from ..world.arm import BLADE_THICKNESS, racket_pose
 from ..world.ball import BALL_GUN_SPIN, BALL_RADIUS
 from ..world.materials import RACKET_RESTITUTION, Restitution
 from ..world.scene import Vector
-from ..world.table import TABLE, TARGET, Table
+from ..world.table import TABLE, Table
 from .aiming import velocity_to_land
 from .inverse_kinematics import posture_towards
 
@@ -55,11 +55,11 @@ class Strike:
 class InterceptionSettings:
     """Target, limits and preferences of strikes."""
 
-    target_x: float = TARGET[0]
+    target_x: float = -0.011334484200464848
     """Where on the table the ball should land [m]."""
-    target_y: float = TARGET[1]
+    target_y: float = 2.5272907045719197
     """[m]"""
-    flight: float = 0.55
+    flight: float = 0.5376000137690394
     """Duration of its flight there [s]."""
     nearest: float = -0.15
     """Least y at which a ball is met [m]."""
@@ -69,7 +69,7 @@ class InterceptionSettings:
     """Speed of joint 1 [rad/s]."""
     steepest: float = 1.2
     """Angle of the wrist, either way [rad]."""
-    comfortable_y: float = 0.05
+    comfortable_y: float = 0.1185812861960035
     """Where the ball is met if all places do equally well [m]."""
     comfortable_wrist: float = 0.3
     """The same for joint 4 [rad]."""

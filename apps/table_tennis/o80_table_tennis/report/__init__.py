@@ -1,1 +1,1 @@
-"""Records, statistics, plots and films of episodes, and the report of the demo."""
+"""Records, statistics and pictures of episodes, and the report of the demo."""

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import sys
 import time
 
 import o80
+from o80.base.screen import complain
 
 from ..rig.rig import Rig
 
@@ -27,7 +27,7 @@ class Page:
         self._step = 0.0 if rig.settings.pacing.real_time else rig.settings.step
         self._due = 0.0
         if not screen:
-            print(f"o80: no screen found; the view is at {self._view.url}", file=sys.stderr)
+            complain(f"no screen found; the view is at {self._view.url}")
 
     @property
     def url(self) -> str:

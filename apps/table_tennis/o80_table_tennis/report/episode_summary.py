@@ -28,6 +28,8 @@ class EpisodeSummary:
     """The ball then landed on the opponent's half, see `task.outcome`."""
     landing: list[float] | None
     """Where it first touched the table after the touch, on whichever half [m]; None: nowhere."""
+    speed: float
+    """Largest speed of the ball after the touch [m/s]; 0 without one."""
     terminated: bool
     """Ended by the rule of the task; else truncated: by the number of steps, or as stalled."""
     end: str
@@ -46,5 +48,6 @@ class EpisodeSummary:
             touched=bool(record.touched),
             returned=bool(returned(record)),
             landing=np.asarray(record.landing).tolist() if record.landed else None,
+            speed=float(record.largest_speed),
             **others,
         )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -14,10 +13,13 @@ from rich.console import Console
 from rich.markup import escape
 from rich.table import Table as Grid
 
+from o80.base.finite import json_text
+from o80.learning.training import wilson
+
 from ..settings import Pacing
 from ..world.timing import ITERATIONS
 from .recorded_episodes import RecordedEpisode
-from .statistics import Played, wilson
+from .statistics import Played
 
 Value = float | int | bool | str | None
 PERCENTILES = (50, 90, 99, 99.9, 100)
@@ -66,7 +68,7 @@ class Report:
     def write(self, path: Path) -> None:
         """As JSON."""
         path.write_text(
-            json.dumps({"modes": self.modes, "policies": self.policies, **self.whole}, indent=2)
+            json_text({"modes": self.modes, "policies": self.policies, **self.whole}, indent=2)
             + "\n"
         )
 
@@ -88,23 +90,17 @@ def write_report(
     modes: Mapping[Pacing, Played],
     policies: Mapping[str, Played],
     recorded: Mapping[Pacing, Sequence[RecordedEpisode]],
-    learned: Sequence[RecordedEpisode],
     *,
-    film: bool,
     begin: float,
 ) -> Report:
-    """Draws the plots and the films, and writes report.json; `begin` is monotonic time [s]."""
-    drawn = _draw(output, modes, recorded, film=film)
-    if film:
-        scripted = [episode for episodes in recorded.values() for episode in episodes]
-        drawn |= _film_side_by_side(output, scripted, learned)
+    """Writes report.json; `begin` is monotonic time [s]."""
     numbers = {
         pacing.value: mode_numbers(pacing, played, recorded[pacing])
         for pacing, played in modes.items()
     }
     others = {name: policy_numbers(played) for name, played in policies.items()}
     seconds = round(time.monotonic() - begin, 1)
-    report = Report(modes=numbers, policies=others, whole={**drawn, "seconds": seconds})
+    report = Report(modes=numbers, policies=others, whole={"seconds": seconds})
     report.write(output / "report.json")
     return report
 
@@ -158,116 +154,6 @@ def mode_numbers(
             **_percentiles("arm_jitter_us", np.abs(statistics.arm_periods_us - period)),
         }
     return numbers
-
-
-def _draw(
-    output: Path,
-    modes: Mapping[Pacing, Played],
-    recorded: Mapping[Pacing, Sequence[RecordedEpisode]],
-    *,
-    film: bool,
-) -> dict[str, Value]:
-    from .plots import plot_jitter, plot_motion, plot_overview, plot_paths
-
-    files: dict[str, Value] = {}
-    plot_overview(
-        output / "overview.png",
-        {pacing.value: played.episodes for pacing, played in modes.items()},
-        {pacing.value: played.statistics.steps_per_second for pacing, played in modes.items()},
-    )
-    if Pacing.REAL_TIME in modes:
-        statistics = modes[Pacing.REAL_TIME].statistics
-        plot_jitter(
-            output / "jitter.png",
-            statistics.arm_lateness_us,
-            statistics.arm_periods_us,
-            period=1e6 * statistics.step_seconds / ITERATIONS,
-        )
-    shown = best_of([episode for episodes in recorded.values() for episode in episodes])
-    if shown is not None:
-        plot_motion(output / "motion.png", shown)
-        plot_paths(output / "paths.png", shown)
-        files["shown_episode"] = shown.summary.number
-        files["shown_episode_returned"] = shown.summary.returned
-        files["shown_episode_reward"] = round(shown.summary.reward, 4)
-        if film:
-            files |= _film(output, shown)
-    return files
-
-
-def best_of(recorded: Sequence[RecordedEpisode]) -> RecordedEpisode | None:
-    """The best paid return, else the best paid of all that came to an end."""
-    return max(
-        recorded,
-        key=lambda episode: (
-            episode.summary.returned,
-            episode.summary.end != "stalled",
-            episode.summary.reward,
-        ),
-        default=None,
-    )
-
-
-def _film(output: Path, episode: RecordedEpisode) -> dict[str, Value]:
-    """A machine that cannot draw has no film, and says why; all else goes on."""
-    from .rendering import film_episode
-
-    try:
-        frames = film_episode(
-            output / "episode.mp4",
-            episode.twin.observed.joints["position"],
-            episode.balls,
-            period=episode.period,
-        )
-    except Exception as error:
-        return {"film_frames": 0, "no_film_because": f"{type(error).__name__}: {error}"}
-    return {"film_frames": frames}
-
-
-def shown_together(
-    scripted: Sequence[RecordedEpisode], learned: Sequence[RecordedEpisode]
-) -> tuple[RecordedEpisode, RecordedEpisode] | None:
-    """An episode of each with the same ball, which both returned if there is such a ball."""
-    pairs = [
-        (one, other)
-        for one in scripted
-        for other in learned
-        if one.summary.ball == other.summary.ball
-    ]
-    return max(
-        pairs,
-        key=lambda pair: (
-            sum(each.summary.returned for each in pair)
-            + 0.01 * sum(each.summary.reward for each in pair)
-        ),
-        default=None,
-    )
-
-
-def _film_side_by_side(
-    output: Path, scripted: Sequence[RecordedEpisode], learned: Sequence[RecordedEpisode]
-) -> dict[str, Value]:
-    """The scripted policy on the left, the learned one on the right, with the same ball."""
-    from .rendering import film_side_by_side
-
-    pair = shown_together(scripted, learned)
-    if pair is None:
-        return {}
-    try:
-        frames = film_side_by_side(
-            output / "side_by_side.mp4",
-            {
-                name: (each.twin.observed.joints["position"], each.balls[:, 0])
-                for name, each in zip(("scripted policy", "learned policy"), pair, strict=True)
-            },
-            period=pair[0].period,
-        )
-    except Exception as error:
-        return {
-            "side_by_side_frames": 0,
-            "not_side_by_side_because": f"{type(error).__name__}: {error}",
-        }
-    return {"side_by_side_frames": frames}
 
 
 def _percentiles(name: str, values: Any) -> dict[str, Value]:

@@ -1,8 +1,7 @@
-"""Rates and lateness of an environment, episodes that were played, how sure their shares are."""
+"""Rates and lateness of an environment, and episodes that were played."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
@@ -12,9 +11,6 @@ from o80.base.arrays import FloatArray
 
 from ..rig.rig import Rig
 from .episode_summary import EpisodeSummary
-
-NORMAL_95 = 1.959963984540054
-"""Standard deviations within which 95 % of a normal distribution lie."""
 
 
 @dataclass
@@ -117,21 +113,3 @@ class Played:
     def touches(self) -> int:
         """Episodes in which the racket met the ball."""
         return sum(episode.touched for episode in self.episodes)
-
-
-def wilson(successes: int, count: int) -> tuple[float, float]:
-    """Wilson's interval of a share, which holds the true one in 95 % of all cases.
-
-    (0, 1) of nothing counted. Unlike the plus or minus of a standard deviation it stays within
-    0 and 1, and has a width where all or none succeeded.
-    """
-    if not 0 <= successes <= count:
-        raise ValueError(f"successes must lie between 0 and {count}, got {successes}")
-    if count == 0:
-        return 0.0, 1.0
-    share, z2 = successes / count, NORMAL_95 * NORMAL_95
-    middle = (share + z2 / (2 * count)) / (1 + z2 / count)
-    spread = math.sqrt(share * (1 - share) / count + z2 / (4 * count * count))
-    half = NORMAL_95 * spread / (1 + z2 / count)
-    # rounding must not leave the share, or 0 and 1, outside
-    return max(0.0, min(middle - half, share)), min(1.0, max(middle + half, share))

@@ -51,6 +51,8 @@ class GroupRig:
             )
             stack.enter_context(twins)
             self.arm, self.twin = Arms(arms, delay=delay), Twins(twins)
+            self.robots = arms, twins
+            """Their halts end episodes."""
             self._step = self.arm.burst.then(self.twin.burst, MIRRORED)
             self._stack = stack.pop_all()
 
@@ -66,6 +68,9 @@ class GroupRig:
         self.arm.reset(copies, arm_seeds)
         self.twin.reset(copies, twin_seeds, self.arm.last_motion[copies], flights)
 
+    def see_newest(self) -> None:
+        """Nothing: a burst that a halt has ended shows the last row."""
+
     def step(self, pressures: FloatArray, copies: Index) -> None:
         """These arms are asked for normalised pressures (n, 8); five rows of each."""
         self.arm.ask(pressures, copies)
@@ -78,9 +83,9 @@ class GroupRig:
         arm, ball = slice(0, PRESSURES.stop), slice(BALL_POSITION.start, SIZE)
         return [self.arm.gather(low[arm], high[arm]), self.twin.gather(low[ball], high[ball])]
 
-    def positions(self, copy: int) -> FloatArray:
-        """(1, 3) of the ball of a copy [m]."""
-        return self.twin.ball[copy, None, :3]
+    def twin_of(self, copy: int) -> o80.Frontend:
+        """Frontend of the twin of a copy."""
+        return self.twin.group[copy]
 
     def close(self) -> None:
         """Ends arms and twins; may be called twice."""

@@ -87,6 +87,8 @@ class Rig(Closeable):
             ]
             self.twin = self.twins[0]
             """The one that holds the ball that is played."""
+            self.robots = (self.arm.frontend, *(twin.frontend for twin in self.twins))
+            """Arm and twins, whose halts end episodes."""
         except BaseException:
             self._stack.close()
             raise
@@ -154,6 +156,12 @@ class Rig(Closeable):
         counts.late_actions += self.arm.late
         counts.starved_iterations += self.arm.starved
 
+    def see_newest(self) -> None:
+        """Reads the newest rows: a step that a halt has ended did not."""
+        self.arm.read_newest()
+        for twin in self.twins:
+            twin.see(twin.frontend.latest())
+
     def ask(self, pressures: FloatArray) -> None:
         """Normalised pressures for the next steps."""
         self.arm.ask(pressures, at=self.row + 1 + self._delay)
@@ -189,10 +197,9 @@ class Rig(Closeable):
         """The row of the arm that the twins mirror. Without a clock rows of both are as many."""
         return self.arm.seen if self._real_time else None
 
-    def positions(self, _copy: int = 0) -> FloatArray:
-        """(balls, 3) of the played ball and the extra ones [m]."""
-        extra = [twin.all_balls[0, twin.extra] for twin in self.twins]
-        return np.concatenate([self.twin.ball, *extra])[:, :3]
+    def twin_of(self, _copy: int) -> o80.Frontend:
+        """Frontend of the first twin."""
+        return self.twin.frontend
 
     def _burst_twins(self, iterations: int) -> None:
         """All twins run at the same time."""

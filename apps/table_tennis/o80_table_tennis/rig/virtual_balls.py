@@ -31,7 +31,6 @@ class VirtualBalls:
         self,
         numbers: Sequence[int],
         played: State,
-        commanded: FloatArray,
         generator: np.random.Generator,
     ) -> None:
         """A new episode with these balls; `played` is the state of the played one."""
@@ -42,14 +41,13 @@ class VirtualBalls:
         self._returned = np.zeros(self._count, np.bool_)
         self._observations = self._observer.begin(
             self._state(played),
-            self._shared(commanded),
             [generator] * self._count,
             np.arange(self._count),
         )
 
-    def observe(self, played: State, commanded: FloatArray) -> None:
+    def observe(self, played: State) -> None:
         """Observes all extra balls, once after each step."""
-        self._observations = self._observer.observe(self._state(played), self._shared(commanded))
+        self._observations = self._observer.observe(self._state(played))
 
     def look(self, played: State, *, over: bool) -> dict[str, Any]:
         """`info["virtual"]` of the twins' newest rows; `played` is the state of the played ball.
@@ -78,6 +76,7 @@ class VirtualBalls:
             self._shared(np.asarray(played.steps)),
             self._shared(played.motion),
             self._shared(played.pressures),
+            self._shared(played.asked),
             self._shared(played.racket),
             np.concatenate([twin.all_balls[0, twin.extra] for twin in self._twins]),
             ball_records(records),

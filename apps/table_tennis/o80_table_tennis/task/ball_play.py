@@ -1,4 +1,4 @@
-"""The tasks with a ball: hit it, return it to the target, smash it.
+"""The named tasks: return the ball to the target, or smash it there.
 
 They share the observation of 22 numbers and the end of an episode, and differ in the reward, which
 is paid in the last step. An episode that is truncated is paid nothing: its value is for the learner
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from o80.base.arrays import Float32Array, FloatArray
 
-from .end import End, EndRule, terminated
+from .end import EndRule, terminated
 from .observations import ObservationBounds, observe_ball
 from .outcome import outcome
 from .rewards import OrderedReward, RewardRule
@@ -29,8 +29,6 @@ class ReturnTask:
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
     rule: EndRule = field(default_factory=EndRule)
     pay: RewardRule = field(default_factory=OrderedReward)
-
-    plays_ball = True
 
     @property
     def low(self) -> Float32Array:
@@ -67,12 +65,19 @@ class ReturnTask:
         return self.pay.returned(state)
 
     def info(self, state: State) -> dict[str, Any]:
-        """`touched`, `returned`, `landing` and `distance`: see `outcome`; `smallest_distance` of
-        the surfaces of ball and racket so far [m].
+        """`touched`, `returned`, `landing` and `distance`: see `outcome`; `speed`, the largest one
+        of the ball since the touch [m/s] (0 before); `smallest_distance` of the surfaces of ball
+        and racket so far [m].
         """
         info = outcome(state.record, state.goal)
+        info["speed"] = state.record.largest_speed
         info["smallest_distance"] = state.record.smallest_distance
         return info
+
+
+def observes_as_published(task: object) -> bool:
+    """Whether a task observes the 22 numbers, and nothing of its own."""
+    return getattr(type(task), "observe", None) is ReturnTask.observe
 
 
 @dataclass(frozen=True)
@@ -82,20 +87,3 @@ class SmashTask(ReturnTask):
     def worth(self, state: State) -> FloatArray:
         """(...) of an episode that an event ends in this state."""
         return self.pay.smashed(state)
-
-
-@dataclass(frozen=True)
-class HitTask(ReturnTask):
-    """The racket should touch the ball, wherever it flies then; a touch ends the episode."""
-
-    def eventful(self, state: State) -> Any:
-        """(...) whether the episode has ended."""
-        return state.record.touched | super().eventful(state)
-
-    def end(self, state: State) -> NDArray[np.int64]:
-        """(...) why it has."""
-        return np.where(state.record.touched, int(End.GOAL), super().end(state))
-
-    def worth(self, state: State) -> FloatArray:
-        """(...) 1 for a touch, else minus the smallest distance [m]."""
-        return self.pay.touched(state)

@@ -36,6 +36,8 @@ class End(IntEnum):
     """The ball met a side of the table after the touch, not its top."""
     STALLED = 9
     """Real time: the caller paused for so long that the episode was given up."""
+    HALTED = 10
+    """The arm or a twin was halted: why is in `info["halt"]`."""
 
     def __init__(self, number: int) -> None:
         self.text = self.name.lower().replace("_", " ")

@@ -48,7 +48,7 @@ class FullObserver:
         self._per_change = 1.0 / largest_change
         self._centres, self._per_scale = full.centres, 1.0 / full.scales
         places = full.places()
-        self._pressures, self._commanded_at = places["pressures"], places["asked"]
+        self._pressures, self._asked = places["pressures"], places["asked"]
         self._motion = slice(0, self._pressures.start)
         self._racket, self._time = places["racket"], places["time"].start
         begin, end = places["changes"].start, places["changes"].stop
@@ -60,41 +60,36 @@ class FullObserver:
         self._rows = np.zeros((count, len(self._centres)))
         self._last = np.zeros((count, MUSCLES))
 
-    def begin(
-        self, state: State, commanded: FloatArray, seen: Perceived, which: IntArray
-    ) -> FloatArray:
+    def begin(self, state: State, seen: Perceived, which: IntArray) -> FloatArray:
         """The first observations (n, M) of new episodes, scaled."""
         self._rows[which, self._changes] = 0.0
-        self._last[which] = commanded
+        self._last[which] = state.asked
         self._filter.begin(seen.ball, which)
-        return self._scaled(self._rows[which], state, commanded, seen, which)
+        return self._scaled(self._rows[which], state, seen, which)
 
-    def observe(
-        self, state: State, commanded: FloatArray, seen: Perceived, which: IntArray | slice = EVERY
-    ) -> FloatArray:
+    def observe(self, state: State, seen: Perceived, which: IntArray | slice = EVERY) -> FloatArray:
         """The observations (n, M) of some episodes after a step, scaled."""
         rows = self._rows[which]
         # the change of the asked pressures is the newest one
         rows[:, self._earlier] = rows[:, self._later].copy()
-        rows[:, self._newest] = (commanded - self._last[which]) * self._per_change
-        self._rows[which], self._last[which] = rows, commanded
+        rows[:, self._newest] = (state.asked - self._last[which]) * self._per_change
+        self._rows[which], self._last[which] = rows, state.asked
         if seen.first:
             self._filter.begin(seen.ball, self._every[which])
         else:
             self._filter.step(seen.ball, np.asarray(seen.missed), self._every[which])
-        return self._scaled(rows, state, commanded, seen, which)
+        return self._scaled(rows, state, seen, which)
 
     def _scaled(
         self,
         rows: FloatArray,
         state: State,
-        commanded: FloatArray,
         seen: Perceived,
         which: IntArray | slice,
     ) -> FloatArray:
         rows[:, self._motion] = state.motion
         rows[:, self._pressures] = seen.pressures
-        rows[:, self._commanded_at] = commanded
+        rows[:, self._asked] = state.asked
         rows[:, self._racket] = state.racket
         time = self._time
         rows[:, time] = state.steps * self._interval

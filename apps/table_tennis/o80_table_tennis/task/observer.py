@@ -14,7 +14,7 @@ from gymnasium import spaces
 
 from o80.base.arrays import Float32Array, FloatArray, IntArray
 
-from .ball_play import ReturnTask
+from .ball_play import observes_as_published
 from .full_observation import FullObservation
 from .full_observer import FullObserver
 from .noise import NO_NOISE, NoiseSettings
@@ -59,7 +59,7 @@ class Observer:
         self.is_ball_play = (
             full is None
             and self._perception is None
-            and getattr(type(task), "observe", None) is ReturnTask.observe
+            and observes_as_published(task)
             and bool(np.all(self.low < self.high))
         )
         """Whether observations are the numbers of `observations`, in their bounds, and no more:
@@ -76,14 +76,13 @@ class Observer:
     def begin(
         self,
         state: State,
-        commanded: FloatArray,
         generators: Sequence[np.random.Generator],
         which: IntArray,
     ) -> Float32Array:
         """The first observations (n, M) of new episodes `which` (n,).
 
-        `state` and the `asked` pressures (n, 8) are theirs alone, as are the `generators`, of
-        which each is drawn from once if there is any noise.
+        `state` is theirs alone, as are the `generators`, of which each is drawn from once if there
+        is any noise.
         """
         seen = (
             exactly(state)
@@ -92,15 +91,10 @@ class Observer:
         )
         if self._full is None:
             return self._of_task(state, seen)
-        return self.clip(self._full.begin(state, commanded, seen, which))
+        return self.clip(self._full.begin(state, seen, which))
 
-    def observe(
-        self, state: State, commanded: FloatArray, which: IntArray | slice = EVERY
-    ) -> Float32Array:
-        """The observations (n, M) after a step of the episodes `which` (n,).
-
-        `state` and `asked` are theirs alone.
-        """
+    def observe(self, state: State, which: IntArray | slice = EVERY) -> Float32Array:
+        """The observations (n, M) after a step of the episodes `which` (n,), in this state."""
         if self._perception is None and self._full is None:
             return self.clip(self._task.observe(state))
         seen = (
@@ -108,7 +102,7 @@ class Observer:
         )
         if self._full is None:
             return self._of_task(state, seen)
-        return self.clip(self._full.observe(state, commanded, seen, which))
+        return self.clip(self._full.observe(state, seen, which))
 
     def clip(self, observations: FloatArray) -> Float32Array:
         """Observations (..., M) within the bounds, a fresh array."""

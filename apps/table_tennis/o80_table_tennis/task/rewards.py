@@ -1,4 +1,4 @@
-"""Rewards of the tasks with a ball, paid when an episode has ended by an event.
+"""Rewards of the named tasks, paid when an episode has ended by an event.
 
 `ORDERED` pays any miss less than any touch, and any touch less than any return. `PUBLISHED` is the
 rule of the published configuration. It does not ask on which half the ball landed, so a policy may
@@ -43,10 +43,6 @@ class RewardRule(Protocol):
         """(...) of balls that should land there and be fast."""
         ...
 
-    def touched(self, state: State) -> FloatArray:
-        """(...) of balls that should be touched."""
-        ...
-
 
 def falling(distance: Numbers, reach: float, exponent: float) -> FloatArray:
     """1 - (distance / reach)^exponent, for distances (...)."""
@@ -84,10 +80,6 @@ class OrderedReward:
     def smashed(self, state: State) -> FloatArray:
         """(...) the same, accuracy times the largest speed of the ball after the touch [m/s]."""
         return self._ordered(state, smashed=True)
-
-    def touched(self, state: State) -> FloatArray:
-        """(...) 1 for a touch, else the miss."""
-        return np.where(state.record.touched, 1.0, self._missed(state))
 
     def _missed(self, state: State) -> FloatArray:
         missed: FloatArray = -np.minimum(state.record.smallest_distance, self.farthest_miss)
@@ -137,10 +129,6 @@ class PublishedReward:
         term = self._term(state) * state.record.largest_speed
         return self._paid(state, np.maximum(term, self.floor))
 
-    def touched(self, state: State) -> FloatArray:
-        """(...) 1 for a touched ball, else minus the smallest distance [m]."""
-        return np.where(state.record.touched, 1.0, -np.asarray(state.record.smallest_distance))
-
     def _term(self, state: State) -> FloatArray:
         return self.landing_term(distance(state.record.landing, state.goal))
 
@@ -161,9 +149,7 @@ def reward_rule(reward: str | RewardRule) -> RewardRule:
         if named not in REWARDS:
             raise ValueError(f"unknown reward '{named}'; there are: {', '.join(REWARDS)}")
         return REWARDS[named]
-    missing = [
-        name for name in ("target", "returned", "smashed", "touched") if not hasattr(named, name)
-    ]
+    missing = [name for name in ("target", "returned", "smashed") if not hasattr(named, name)]
     if missing or isinstance(named, type):
         raise TypeError(
             f"reward must be one of {', '.join(REWARDS)}, or an object like "

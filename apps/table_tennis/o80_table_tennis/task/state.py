@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,8 @@ class State:
     """(..., 8) angles [rad], then velocities [rad/s] of the joints."""
     pressures: FloatArray
     """(..., 8) in the muscles, normalised."""
+    asked: FloatArray
+    """(..., 8) asked for by the last action, normalised: with dead time they may not act yet."""
     racket: FloatArray
     """(..., 3) centre of the racket, world frame [m]."""
     ball: FloatArray
@@ -53,7 +55,7 @@ class State:
 
     def perceived(self, ball: FloatArray, pressures: FloatArray) -> State:
         """The same as it is observed: another ball (..., 6), other pressures (..., 8)."""
-        return State(self.steps, self.motion, pressures, self.racket, ball, self.record, self.goal)
+        return replace(self, ball=ball, pressures=pressures)
 
     def at(self, index: Any) -> State:
         """Some of N episodes, by an index or a mask (N,)."""
@@ -61,6 +63,7 @@ class State:
             np.asarray(self.steps)[index],
             self.motion[index],
             self.pressures[index],
+            self.asked[index],
             self.racket[index],
             self.ball[index],
             self.record.at(index),

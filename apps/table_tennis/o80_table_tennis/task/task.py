@@ -2,7 +2,7 @@
 
 The environment moves arm and ball; the task defines observation, reward and end of an episode.
 Every method takes the `State` of N episodes, and returns as many results: a single environment asks
-for one episode, a vector environment for many. `ball_play` and `reach` are examples.
+for one episode, a vector environment for many. `ball_play` has examples.
 """
 
 from __future__ import annotations
@@ -29,11 +29,6 @@ class Task(Protocol):
     @property
     def high(self) -> Float32Array:
         """(M,) largest observation."""
-        ...
-
-    @property
-    def plays_ball(self) -> bool:
-        """Whether a ball flies. Without one, ignore `State.ball` and `State.record`."""
         ...
 
     def begin(self, rng: np.random.Generator) -> FloatArray:

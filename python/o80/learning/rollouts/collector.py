@@ -1,7 +1,5 @@
 """Collects rollouts: plays policies in a vector environment."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
 

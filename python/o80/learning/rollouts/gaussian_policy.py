@@ -1,7 +1,5 @@
 """A policy with NumPy alone: a network gives the mean of the actions, and noise is added."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -56,7 +54,7 @@ class GaussianPolicy:
         hidden: tuple[int, ...] = (64, 64),
         log_std: float = 0.0,
         seed: int = 0,
-    ) -> GaussianPolicy:
+    ) -> "GaussianPolicy":
         """One that knows nothing: random weights, and means of 0."""
         generator = np.random.default_rng(seed)
         sizes = [inputs, *hidden, outputs]

@@ -7,8 +7,6 @@ with Collector(make, seed=1) as collector:
 Needs the extra `stable-baselines3`. See docs/learning.md.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any
 
@@ -134,10 +132,14 @@ class RolloutPPO(PPO):
         rollout_buffer.reset()
         callback.on_rollout_start()
         rollout = _Visible(self._collected(n_rollout_steps), self._visible)
+        steps = len(rollout.rewards)  # more than were asked for, if the collector ends episodes
+        if steps != rollout_buffer.buffer_size:
+            rollout_buffer.buffer_size = steps
+            rollout_buffer.reset()
         rewards, values, log_probabilities = self._valued(rollout)
         starts = self._last_episode_starts
         normalised = self._normalised(rollout.observations)
-        for step in range(n_rollout_steps):
+        for step in range(steps):
             self.num_timesteps += self.n_envs
             dones, infos = rollout.over[step], rollout.infos(step)
             told = {"rewards": rollout.rewards[step], "dones": dones, "infos": infos}
@@ -177,7 +179,7 @@ class RolloutPPO(PPO):
         normalised: Any = self._vec_normalize_env.normalize_obs(observations)
         return normalised  # type: ignore[no-any-return]
 
-    def _valued(self, rollout: _Visible) -> tuple[NDArray[Any], Any, Any]:
+    def _valued(self, rollout: "_Visible") -> tuple[NDArray[Any], Any, Any]:
         """Rewards (T, N) with the values that truncated episodes still had, values (T + 1, N), and
         log-probabilities (T, N): of torch, with which the update compares its own.
         """

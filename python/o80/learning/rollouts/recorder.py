@@ -1,7 +1,5 @@
 """Fills the arrays of a rollout step by step."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -78,7 +76,10 @@ class Recorder:
         self._ends.append(
             (np.full(over.size, step), over, sums.rewards[over], sums.lengths[over], last)
         )
-        self._infos.append({name: _entry(infos["final_info"], name)[over] for name in self._names})
+        copies = len(self._rewards[step])
+        self._infos.append(
+            {name: entry(infos["final_info"], name, copies)[over] for name in self._names}
+        )
         sums.restart(over)
 
     def rollout(self, observations: NDArray[Any]) -> Rollout:
@@ -107,7 +108,9 @@ class Recorder:
         return rollout
 
 
-def _entry(infos: Mapping[str, Any], name: str) -> NDArray[Any]:
+def entry(infos: Mapping[str, Any], name: str, copies: int) -> NDArray[Any]:
+    if name in ("halt", "is_success") and name not in infos:  # not every task or end has them
+        return np.full(copies, None, object)
     if name in infos and isinstance(infos[name], np.ndarray):
         entry: NDArray[Any] = infos[name]
         return entry

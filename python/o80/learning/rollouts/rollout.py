@@ -1,7 +1,5 @@
 """A rollout: what copies of an environment did under one policy, as arrays."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """The policy of Stable-Baselines3 as one of NumPy."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

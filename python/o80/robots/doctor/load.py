@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 from o80.base.child_process import end_child, start_child
+from o80.base.descriptors import open_standard_streams
 
 BYTES = 8 << 20  # more than most caches hold; a thread copies from one such array to another
 GRACE = 5.0  # [s] for the load to end
@@ -43,4 +44,5 @@ def _run() -> None:
 
 
 if __name__ == "__main__":
+    open_standard_streams()
     _run()

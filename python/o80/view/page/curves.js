@@ -3,6 +3,8 @@
 // a colour of the style sheet, which knows light and dark
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`);
 
+const TEXT_HEIGHT = 11; // of a mark [px]
+
 function element(tag, text = "", kind = "") {
   const made = document.createElement(tag);
   made.textContent = text; // never HTML: names come from other programs
@@ -76,7 +78,7 @@ class Chart {
     for (const part of ["planned", "extended", "observed", "desired"]) {
       if (this.parts[part]) this.curve(pen, this.parts[part], part, x, y);
     }
-    for (const [seconds, text] of this.marks) this.mark(pen, text, x(seconds), bottom);
+    for (const { at, texts, lines } of joinedMarks(this.marks, x)) this.mark(pen, texts.join(", "), at, lines, bottom);
     pen.restore();
     pen.strokeStyle = colour("cursor");
     pen.beginPath();
@@ -85,13 +87,15 @@ class Chart {
     pen.stroke();
   }
 
-  // a note of a program or of a person: a line with its text
-  mark(pen, text, at, bottom) {
+  // notes of programs or of persons: lines with a text
+  mark(pen, text, at, lines, bottom) {
     pen.strokeStyle = pen.fillStyle = colour("mark");
     pen.lineWidth = 1;
     pen.beginPath();
-    pen.moveTo(at, 0);
-    pen.lineTo(at, bottom);
+    for (const line of lines) {
+      pen.moveTo(line, 0);
+      pen.lineTo(line, bottom);
+    }
     pen.stroke();
     pen.save();
     pen.translate(at - 3, 4);
@@ -141,6 +145,19 @@ class Chart {
     pen.stroke();
     pen.setLineDash([]);
   }
+}
+
+// marks whose texts would overprint each other get one text, in the order of time
+function joinedMarks(marks, x) {
+  const joined = [];
+  for (const [seconds, text] of [...marks].sort(([one], [other]) => one - other)) {
+    const last = joined.at(-1);
+    if (last && x(seconds) - last.at < TEXT_HEIGHT) {
+      last.texts.push(text);
+      last.lines.push(x(seconds));
+    } else joined.push({ at: x(seconds), texts: [text], lines: [x(seconds)] });
+  }
+  return joined;
 }
 
 // 15 710 and 0.5, but 1e+12

@@ -8,6 +8,8 @@ const GIVE_UP = 8000; // [ms] for an answer
 const token = new URLSearchParams(location.search).get("token");
 const byId = (id) => document.getElementById(id);
 
+const sentence = (text) => (/[.?!]$/.test(text) ? text : `${text}.`);
+
 class Page {
   constructor() {
     this.scene = new Scene(byId("scene"));
@@ -104,6 +106,8 @@ class Page {
     }
     this.scene.choose(this.source);
     byId("no-scene").classList.toggle("above", this.scene.geoms.length > 0);
+    const isDrawn = this.scene.gl && (this.geometry || Object.keys(drawn).length);
+    document.body.classList.toggle("flat", this.key !== null && !isDrawn);
     byId("ghost-legend").hidden = !this.scene.ghosts().size;
   }
 
@@ -153,7 +157,7 @@ class Page {
     if (answer.not_finite?.length) return `not finite: ${answer.not_finite.slice(0, 5).join(", ")}`;
     if (answer.overwritten) return "this row was overwritten: the oldest one is shown";
     const line = this.line();
-    if (line.halt) return line.halt.text;
+    if (line.halt) return `${sentence(line.halt.text)} Go on with ${answer.control ? "Resume" : `o80 resume ${line.name} ${line.halt.number}`}`;
     if (answer.halted) return "halted";
     return this.said;
   }

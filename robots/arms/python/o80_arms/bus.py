@@ -14,10 +14,12 @@ from pathlib import Path
 from typing import ClassVar
 
 import o80
+from o80.base.descriptors import above_standard
 from o80_arms import dynamixel
 
 WAIT = 0.05  # for an answer [s]
 TRIES = 3
+PATIENCE = 60  # tries while somebody's work would be lost
 EVERYBODY = 254
 SERVOS = range(1, 7)  # of an arm
 
@@ -49,9 +51,11 @@ class Bus:
     GOAL, LOCK, POSITION = Register(42, 2, 15), Register(55, 1), Register(56, 2, 15)
     VOLTAGE, TEMPERATURE = Register(62, 1), Register(63, 1)
     modes = (0,) * 6  # of the servos of an arm
+    tries = TRIES  # of a reading
     PING = 0  # bytes in the answer to a ping
     OFFSET_SIGN = -1  # shown position = encoder - offset
 
+    @above_standard()
     def __init__(self, port: Path, wait: float | None = None) -> None:
         self.port, self.wait = port, WAIT if wait is None else wait
         owner = owner_of(port)
@@ -90,7 +94,7 @@ class Bus:
 
     def read(self, servo: int, register: Register) -> int:
         """A number of a servo. Raises BusError."""
-        for _ in range(TRIES):
+        for _ in range(self.tries):
             # a number of bytes of its own for each question: an answer to another is known by it
             self._question = (self._question + 1) % 8
             size = register.size + self._question

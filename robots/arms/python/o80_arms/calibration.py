@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Self
 
 import o80
+from o80.base.finite import json_text
 from o80_arms.bus import TURN, Bus, DynamixelBus
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
@@ -127,7 +128,7 @@ def write(file: Path, joints: dict[str, Calibration]) -> None:
         for number, joint in enumerate(JOINTS, 1)
     }
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(content, indent=4))
+    file.write_text(json_text(content, indent=4))
 
 
 def doubts(joints: dict[str, Calibration]) -> list[str]:

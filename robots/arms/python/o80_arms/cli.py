@@ -13,7 +13,7 @@ import typer
 
 import o80
 from o80_arms import calibration
-from o80_arms.bus import SERVOS, TURN, Bus, BusError, DynamixelBus, bus_at, ports
+from o80_arms.bus import PATIENCE, SERVOS, TURN, Bus, BusError, DynamixelBus, bus_at, ports
 from o80_arms.calibration import JOINTS, LARGEST_OFFSET, Calibration
 from o80_arms.dynamixel import KOCH, KOCH_LEADER
 
@@ -150,6 +150,7 @@ def doubts(bus: Bus, joints: dict[str, Calibration]) -> list[str]:
 
 
 def put(bus: Bus, joints: dict[str, Calibration]) -> None:
+    bus.tries = PATIENCE
     for joint, each in joints.items():
         if abs(each.offset) > LARGEST_OFFSET and not isinstance(bus, DynamixelBus):
             raise BusError(
@@ -162,6 +163,7 @@ def put(bus: Bus, joints: dict[str, Calibration]) -> None:
 
 def moved_by_hand(bus: Bus) -> dict[str, Calibration]:
     """Ranges through which somebody moves the joints, written into the servos."""
+    bus.tries = PATIENCE
     for servo in SERVOS:
         bus.write(servo, bus.TORQUE, 0)
     print("Move each joint to both of its ends, slowly. Then press Enter.")

@@ -5,6 +5,8 @@
 #include <poll.h>
 #include <sys/file.h>
 #include <sys/ioctl.h>
+#include <sys/stat.h>
+#include <sys/sysmacros.h>
 #include <termios.h>
 #include <unistd.h>
 
@@ -41,9 +43,23 @@ bool set_line(int descriptor) noexcept {
   return true;
 }
 
+/// It would stay exclusive, also after this process was killed, while its other side is open.
+bool is_pseudo_terminal(int descriptor) noexcept {
+  constexpr unsigned kFirst = 136, kLast = 143;  // major numbers
+  struct stat file{};
+  return fstat(descriptor, &file) == 0 && major(file.st_rdev) >= kFirst &&
+         major(file.st_rdev) <= kLast;
+}
+
 /// Opens, locks and sets a line; a negative errno if that fails.
 int opened(const char* path) noexcept {
-  const int descriptor = ::open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  int descriptor = ::open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  // a host with closed standard descriptors would write its messages to the servos
+  if (descriptor >= 0 && descriptor <= STDERR_FILENO) {
+    const int low =
+        std::exchange(descriptor, fcntl(descriptor, F_DUPFD_CLOEXEC, STDERR_FILENO + 1));
+    ::close(low);
+  }
   if (descriptor < 0) return -errno;
   // the lock is for o80, TIOCEXCL for those that do not lock
   int failed = 0;
@@ -56,7 +72,7 @@ int opened(const char* path) noexcept {
     ::close(descriptor);
     return -failed;
   }
-  static_cast<void>(ioctl(descriptor, TIOCEXCL));
+  if (!is_pseudo_terminal(descriptor)) static_cast<void>(ioctl(descriptor, TIOCEXCL));
   tcflush(descriptor, TCIOFLUSH);
   return descriptor;
 }

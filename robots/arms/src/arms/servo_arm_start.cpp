@@ -52,7 +52,6 @@ ServoArm::ServoArm(const Config& config, const ArmKind& kind)
 void ServoArm::describe(Schema& schema) const {
   if (schema.asked_period() != 0) period_ = schema.asked_period();
   schema.period(period_);
-  schema.of_the_world();
   for (std::uint32_t i = 0; i < kServos; ++i) {
     schema.actuator(i).name(kJointNames[i]);
     if (config_.leader) schema.actuator(i).when_idle(WhenIdle::follow);

@@ -3,10 +3,13 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <stdlib.h>
+#include <sys/ioctl.h>
 #include <termios.h>
 #include <unistd.h>
 
 #include <array>
+#include <cstdio>
+#include <fstream>
 #include <stdexcept>
 #include <string>
 
@@ -54,6 +57,18 @@ TEST(SerialPort, CarriesEveryByteUnchangedAtOneMegabaud) {
   EXPECT_EQ(cfgetospeed(&line), static_cast<speed_t>(B1000000));
 }
 
+TEST(SerialPort, GetsNoneOfTheStandardDescriptorsOfAHostThatLacksThem) {
+  const Terminal terminal;
+  const int input = fcntl(STDIN_FILENO, F_DUPFD_CLOEXEC, 3);
+  ::close(STDIN_FILENO);
+  {
+    const SerialPort port = SerialPort::open(terminal.path());
+    EXPECT_LT(fcntl(STDIN_FILENO, F_GETFD), 0);
+  }
+  dup2(input, STDIN_FILENO);
+  ::close(input);
+}
+
 TEST(SerialPort, IsOpenForOneOnly) {
   const Terminal terminal;
   const SerialPort port = SerialPort::open(terminal.path());
@@ -61,11 +76,25 @@ TEST(SerialPort, IsOpenForOneOnly) {
               ThrowsMessage<std::runtime_error>(HasSubstr("open")));
 }
 
+// the flag outlives a killed process there; root may open the line all the same, so it is asked
+TEST(SerialPort, MakesNoPseudoTerminalExclusive) {
+  const Terminal terminal;
+  const SerialPort port = SerialPort::open(terminal.path());
+  const int other = ::open(terminal.path().c_str(), O_RDWR | O_NOCTTY | O_CLOEXEC);
+  int exclusive = 1;
+  EXPECT_EQ(ioctl(other, TIOCGEXCL, &exclusive), 0);
+  EXPECT_EQ(exclusive, 0);
+  ::close(other);
+}
+
 TEST(SerialPort, SaysWhatToDoIfThereIsNone) {
   EXPECT_THAT([] { SerialPort::open("/dev/ttyNONE"); },
               ThrowsMessage<std::runtime_error>(HasSubstr("`o80 arms` lists")));
-  EXPECT_THAT([] { SerialPort::open("/dev/full"); },
+  const std::string file = testing::TempDir() + "o80_no_line_" + std::to_string(getpid());
+  std::ofstream(file) << "no line";  // one that no other process has open
+  EXPECT_THAT([&] { SerialPort::open(file); },
               ThrowsMessage<std::runtime_error>(HasSubstr("no serial line")));
+  std::remove(file.c_str());
 }
 
 TEST(SerialPort, IsClosedWhenTheAdapterIsUnpluggedAndOpensAgain) {

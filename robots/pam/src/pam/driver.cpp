@@ -61,6 +61,7 @@ PamDriver::PamDriver(const Config& config)
 }
 
 void PamDriver::describe(Schema& schema) const {
+  schema.simulated();
   const std::int64_t requested = schema.asked_period();
   if (requested != 0 && requested != period_) {
     const double frequency = 1e9 / static_cast<double>(period_);

@@ -5,7 +5,7 @@
 namespace o80::mujoco {
 
 Balls::Balls(const mjModel& model, const BallOptions& options)
-    : model_(model),
+    : model_(&model),
       teleport_distance_(options.teleport_distance),
       spin_(vector(options.spin)),
       places_(balls_in(model, options)),
@@ -38,7 +38,7 @@ void Balls::add_surfaces() {
       surfaces_.push_back(
           {place.shape, place.restitution, place.friction, place.watched, record, {}});
       followers_.push_back(
-          {place.geom, place.still, joints_under(model_, model_.geom_bodyid[place.geom])});
+          {place.geom, place.still, joints_under(*model_, model_->geom_bodyid[place.geom])});
     }
   };
   add_those([](const SurfacePlace& place) { return place.watched; });
@@ -99,7 +99,7 @@ void Balls::step(mjData& data, const StepOfIteration& step) noexcept {
 }
 
 void Balls::move_surfaces(const mjData& data, std::uint32_t steps) noexcept {
-  const double step = model_.opt.timestep;
+  const double step = model_->opt.timestep;
   for (std::size_t i = 0; i < surfaces_.size(); ++i) {
     if (followers_[i].still) continue;
     const Pose to = pose(data, followers_[i]);
@@ -157,7 +157,7 @@ bool Balls::fly(std::size_t i, const Ball& from, double begin, const StepOfItera
   const ContactRecords contacts = records(i);
   bool bounced = false;
   now_.balls[i].ball = flown_among(
-      among, from, air_[i], places_[i].sphere, model_.opt.timestep, begin,
+      among, from, air_[i], places_[i].sphere, model_->opt.timestep, begin,
       [&](const Contact& contact, const Ball& before, const Ball& after) {
         contacts.add(step, contact, before, after);
         bounced = true;
@@ -199,7 +199,7 @@ Pose Balls::pose(const mjData& data, const Follower& follower) const noexcept {
   pose.position = {position[0], position[1], position[2]};
   std::copy_n(matrix, 9, pose.rotation.m.begin());
   if (!follower.still) {
-    const Carried carried = carried_by(follower.joints, model_, data, pose.position);
+    const Carried carried = carried_by(follower.joints, *model_, data, pose.position);
     pose.velocity = carried.velocity;
     pose.spin = carried.spin;
   }

@@ -90,6 +90,9 @@ class Balls {
   /// Moves all balls by a step, after the engine has moved the surfaces.
   void step(mjData& data, const StepOfIteration& step) noexcept;
 
+  /// Goes on with the same model with another step of the engine, which must outlive this.
+  void take(const mjModel& model) noexcept { model_ = &model; }
+
   const State& state() const noexcept { return now_; }
   void restore(const State& state) noexcept { now_ = state; }
 
@@ -119,7 +122,7 @@ class Balls {
   void fly_out(std::size_t i, const StepOfIteration& step) noexcept;
   void store(mjData& data, std::size_t i) const noexcept;
 
-  const mjModel& model_;
+  const mjModel* model_;
   double teleport_distance_;
   Vector spin_;
   double period_ = 0;  // of an iteration [s]

@@ -20,6 +20,7 @@ O80_DESCRIBE_ENUM(JointMode, imposed, control, actuated);
 /// Options of a simulation. Names in a list are separated by commas.
 struct Config {
   std::string model;
+  std::string things;
   JointMode mode = JointMode::imposed;
   Face like;
   std::string joints;
@@ -31,6 +32,7 @@ struct Config {
   BallOptions ball_options;
 };
 O80_DESCRIBE(Config, (model, "MJCF file"),
+             (things, "MJCF file of what stands around the model; empty: nothing"),
              (mode,
               "imposed: commands set joints exactly; control: inputs of actuators; actuated: what "
               "the actuators of joints take"),

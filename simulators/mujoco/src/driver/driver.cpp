@@ -10,6 +10,26 @@
 namespace o80::mujoco {
 namespace {
 
+/// The type of the states of spread joints, in the numbers of their actuators.
+std::uint32_t type_of_spread(Schema& schema, const std::vector<JointPlace>& joints) {
+  const TypeRow own = schema.types[describing::type_of<JointState>(schema)];
+  const auto first = schema.fields.begin() + own.first_field;
+  std::vector<FieldRow> fields(first, first + own.fields);
+  std::string units;
+  std::string rates;
+  const auto add = [&](const char* unit, const char* rate, auto&& has) {
+    if (std::ranges::none_of(joints, has)) return;
+    units += (units.empty() ? "" : " or ") + std::string(unit);
+    rates += (rates.empty() ? "" : " or ") + std::string(rate);
+  };
+  add("rad", "rad/s", [](const JointPlace& each) { return !each.spread && !each.slides; });
+  add("m", "m/s", [](const JointPlace& each) { return !each.spread && each.slides; });
+  add("1", "1/s", [](const JointPlace& each) { return each.spread; });
+  fields[0].unit = UnitText(units);
+  fields[1].unit = UnitText(rates);
+  return schema.add_type("ActuatorState", fields);
+}
+
 /// The type of the states of joints. Its units say "rad or m" only where there are both.
 std::uint32_t type_of_states(Schema& schema, const std::vector<JointPlace>& joints) {
   const std::uint32_t type = describing::type_of<JointState>(schema);
@@ -88,6 +108,7 @@ MujocoDriver::Places MujocoDriver::add_to(Schema& schema) const {
     take_face(schema);
   } else {
     describe_types<BallRequests>(schema);
+    add_place(schema, simulation_.free_bodies());
     add_actuators(schema, places);
     add_sensors(schema, places);
   }
@@ -112,11 +133,13 @@ void MujocoDriver::show(Schema& schema, const Places& places) const {
   schema.shown.mjcf = model.mjcf;
   schema.shown.file = model.file;
   for (std::size_t i = 0; i < places.joints.size(); ++i) {
-    schema.shown.joint(model.joints[i].name, places.joints[i].offset);
+    const JointPlace& joint = model.joints[i];
+    if (!joint.spread) schema.shown.joint(joint.joint, places.joints[i].offset);
   }
   for (std::size_t i = 0; i < places.joint_sensors.size(); ++i) {
     if (face() && face()->moves(model.joints[i].position)) continue;
-    schema.shown.joint(model.joints[i].name, places.joint_sensors[i].offset, ShownFrom::extended);
+    if (model.imposed && !model.joints[i].spread) continue;
+    schema.shown.joint(model.joints[i].joint, places.joint_sensors[i].offset, ShownFrom::extended);
   }
   if (face()) face()->show(*model.model, schema.shown);
   if (const Balls* balls = simulation_.balls()) places.balls.show(schema.shown, *balls);
@@ -126,7 +149,8 @@ void MujocoDriver::add_actuators(Schema& schema, Places& places) const {
   const Model& model = simulation_.model();
   if (face()) add_face(*face(), schema);
   if (model.imposed && !model.joints.empty()) {
-    const std::uint32_t type = type_of_states(schema, model.joints);
+    const std::uint32_t type =
+        model.spreads ? type_of_spread(schema, model.joints) : type_of_states(schema, model.joints);
     places.joints = add_group<JointState>(schema, "joints", type, model.joints);
   }
   const auto first_control = static_cast<std::uint32_t>(schema.actuators.size());
@@ -148,7 +172,7 @@ void MujocoDriver::add_sensors(Schema& schema, Places& places) const {
   if (const Balls* balls = simulation_.balls()) places.balls.add_sensors(schema, *balls);
   places.clock.offset = schema.add_sensor(scalar_field(
       "clock", Kind::int64, "iterations since the start or a reset; a restore sets it back too"));
-  if (!model.imposed && !model.joints.empty()) {
+  if ((!model.imposed || model.spreads) && !model.joints.empty()) {
     places.joint_sensors = add_joint_sensors(schema, model.joints);
   }
   if (simulation_.integrates()) {
@@ -160,11 +184,13 @@ void MujocoDriver::add_sensors(Schema& schema, Places& places) const {
     places.sensors.push_back(
         {schema.add_sensor(scalar_field(sensor.name, Kind::float64, "sensor of the model", rows))});
   }
+  places.bodies = add_body_sensors(schema, simulation_.free_bodies());
 }
 
 void MujocoDriver::describe(Schema& schema) const {
   const std::int64_t requested = schema.asked_period();
   (void)add_to(schema);
+  schema.simulated();
   if (is_like_) {  // any rate, as the other robot
     constexpr std::int64_t kDefault = 1'000'000;
     if (schema.head.period == 0) schema.period(kDefault);
@@ -172,15 +198,20 @@ void MujocoDriver::describe(Schema& schema) const {
     return;
   }
   const double timestep = simulation_.timestep();
+  if (simulation_.model().imposed && requested != 0 &&
+      !is_whole_steps(requested, timestep, steps_)) {
+    period_ = requested;
+    return;
+  }
   const std::uint32_t steps =
       requested == 0 ? std::max(1U, steps_) : steps_in_period(requested, timestep, steps_);
   schema.period(std::llround(steps * (timestep * 1e9)));
 }
 
-/// With the face of another robot its period is a whole number of steps of the engine, which are at
-/// most as long as those of the model.
+/// What follows another robot has any period, as a whole number of steps of the engine, which are
+/// at most as long as those of the model.
 void MujocoDriver::start() {
-  if (!is_like_) return;
+  if (period_ == 0) return;
   const double period = static_cast<double>(period_) * 1e-9;
   const double most = std::ceil(period / simulation_.timestep() * (1 - kPeriodTolerance));
   simulation_.steps(steps_ > 0 ? steps_ : static_cast<std::uint32_t>(std::max(1.0, most)), period);
@@ -200,8 +231,10 @@ void MujocoDriver::write(const Desired<MujocoDriver>& desired) {
     if (desired.active(i)) commanded_.push_back(i);
   }
   Targets& targets = simulation_.targets();
+  targets.commanded = false;
   for (std::size_t i = 0; i < places_.joints.size(); ++i) {
     targets.joints[i] = desired.at(places_.joints[i]);
+    targets.commanded = targets.commanded || desired.active(i);
   }
   for (std::size_t i = 0; i < places_.controls.size(); ++i) {
     targets.controls[i] = desired.at(places_.controls[i]);
@@ -213,7 +246,7 @@ void MujocoDriver::write(const Desired<MujocoDriver>& desired) {
 
 void MujocoDriver::read(Reading<MujocoDriver>& reading) {
   for (std::size_t i = 0; i < places_.joints.size(); ++i) {
-    reading.observe(places_.joints[i], simulation_.joint(i));
+    reading.observe(places_.joints[i], simulation_.imposed(i));
   }
   for (std::size_t i = 0; i < places_.controls.size(); ++i) {
     reading.observe(places_.controls[i], simulation_.control(i));
@@ -254,6 +287,9 @@ void MujocoDriver::read_sensors(Reading<MujocoDriver>& reading) const {
       reading.extend(at, number);
       at.offset += sizeof(double);
     }
+  }
+  for (const BodyRow& row : places_.bodies) {
+    reading.extend(row.place, state_of(simulation_.free_bodies()[row.body], simulation_.data()));
   }
 }
 
@@ -317,9 +353,10 @@ Served MujocoDriver::resume() noexcept {
   return Served::done();
 }
 
-/// The requests about balls, or those of the other robot.
+/// The requests about balls and free bodies, or those of the other robot.
 Served MujocoDriver::on(std::uint32_t request, const std::byte* payload) noexcept {
   if (is_like_) return serve_as_arm(face()->words[request - 3], payload);
+  if (request == 5) return simulation_.place(unpack<PlaceBody>(payload));
   return request == 3 ? clear_contacts(simulation_.balls(), unpack<ClearContacts>(payload))
                       : fly_out(simulation_.balls(), unpack<FlyOut>(payload));
 }

@@ -52,6 +52,7 @@ class MujocoDriver {
     std::vector<Place<JointState>> joint_sensors;  // in mode control
     Place<std::uint32_t> engine_contacts;
     std::vector<Number> sensors;
+    std::vector<BodyRow> bodies;
   };
   Places add_to(Schema& schema) const;
   void take_face(Schema& schema) const;
@@ -69,7 +70,8 @@ class MujocoDriver {
   bool is_like_;         // it has the face of another robot
   bool restored_ = false;
   std::vector<std::uint32_t> commanded_;  // actuators of a relaxed robot, in the last iteration
-  mutable std::int64_t period_ = 0;       // as described, with the face of another robot [ns]
+  // as described, where the steps of the engine are shortened to fill it; else 0 [ns]
+  mutable std::int64_t period_ = 0;
   Places places_;
   bool steps_known_ = false;
 };

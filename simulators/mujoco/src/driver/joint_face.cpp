@@ -20,36 +20,6 @@ using Input = JointFace::Input;
 using Number = JointFace::Number;
 using Word = JointFace::Word;
 
-/// An entry of the option `joints`: `elbow`, `elbow=j2` or `jaw=j6 0 1`.
-struct Named {
-  std::string name;
-  std::string joint;
-  std::vector<double> over;  // the number at both ends of the joint's range, or empty
-};
-
-std::vector<Named> named_in(const std::string& list) {
-  std::vector<Named> all;
-  for (const std::string& entry : entries_of(list)) {
-    const auto equals = entry.find('=');
-    Named named;
-    named.name = trimmed(entry.substr(0, equals));
-    named.joint = equals == std::string::npos ? named.name : trimmed(entry.substr(equals + 1));
-    const auto space = named.joint.find(' ');
-    if (equals != std::string::npos && space != std::string::npos) {
-      const auto numbers = numbers_of(std::string_view(named.joint).substr(space));
-      if (!numbers || numbers->size() != 2 || (*numbers)[0] == (*numbers)[1]) {
-        throw DriverError("joints: '" + entry +
-                          "' must be like `jaw=j6`, or `jaw=j6 0 1` with the "
-                          "two numbers at the ends of the joint's range");
-      }
-      named.over = *numbers;
-      named.joint.resize(space);
-    }
-    all.push_back(named);
-  }
-  return all;
-}
-
 Quantity quantity_of_name(std::string_view name) {
   if (name == "position") return Quantity::position;
   if (name == "velocity") return Quantity::velocity;
@@ -356,12 +326,7 @@ class Builder {
     }
     if (over.empty()) return {};
     const Range range = servo.commanded == Quantity::position ? servo.allowed : servo.positions;
-    if (!std::isfinite(range.low) || !std::isfinite(range.high)) {
-      throw DriverError("joint '" + named.joint + "' has no range over which to spread " +
-                        shown(over[0]) + " to " + shown(over[1]) + ": give it one in the model");
-    }
-    const double factor = (range.high - range.low) / (over[1] - over[0]);
-    return {factor, range.low - over[0] * factor};
+    return spread_over(named, over, range);
   }
 
   /// Bounds that are not given are those of the model; others must lie inside them.
@@ -473,6 +438,38 @@ void put(const mjData& data, const std::vector<Number>& numbers, std::byte* bloc
 }
 
 }  // namespace
+
+std::vector<Named> named_in(const std::string& list) {
+  std::vector<Named> all;
+  for (const std::string& entry : entries_of(list)) {
+    const auto equals = entry.find('=');
+    Named named;
+    named.name = trimmed(entry.substr(0, equals));
+    named.joint = equals == std::string::npos ? named.name : trimmed(entry.substr(equals + 1));
+    const auto space = named.joint.find(' ');
+    if (equals != std::string::npos && space != std::string::npos) {
+      const auto numbers = numbers_of(std::string_view(named.joint).substr(space));
+      if (!numbers || numbers->size() != 2 || (*numbers)[0] == (*numbers)[1]) {
+        throw DriverError("joints: '" + entry +
+                          "' must be like `jaw=j6`, or `jaw=j6 0 1` with the "
+                          "two numbers at the ends of the joint's range");
+      }
+      named.over = *numbers;
+      named.joint.resize(space);
+    }
+    all.push_back(named);
+  }
+  return all;
+}
+
+Line spread_over(const Named& named, const std::vector<double>& over, const Range& range) {
+  if (!std::isfinite(range.low) || !std::isfinite(range.high)) {
+    throw DriverError("joint '" + named.joint + "' has no range over which to spread " +
+                      shown(over[0]) + " to " + shown(over[1]) + ": give it one in the model");
+  }
+  const double factor = (range.high - range.low) / (over[1] - over[0]);
+  return {factor, range.low - over[0] * factor};
+}
 
 bool JointFace::moves(int position) const noexcept {
   return std::ranges::any_of(states, [&](const Number& number) {

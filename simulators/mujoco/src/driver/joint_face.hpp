@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "driver/config.hpp"
@@ -11,6 +12,17 @@
 #include "o80/describe/schema.hpp"
 
 namespace o80::mujoco {
+
+/// An entry of the option `joints`: `elbow`, `elbow=j2` or `jaw=j6 0 1`.
+struct Named {
+  std::string name;
+  std::string joint;
+  std::vector<double> over;  // the number at both ends of the joint's range, or empty
+};
+/// Throws DriverError.
+std::vector<Named> named_in(const std::string& list);
+/// From a number in `over` to one in the range of this joint. Throws DriverError if it has none.
+Line spread_over(const Named& named, const std::vector<double>& over, const Range& range);
 
 /// The joints of a model as actuators of o80, each driven by its servo, with the face that the
 /// model gives (mode actuated) or that of another robot (like).

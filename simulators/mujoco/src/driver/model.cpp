@@ -1,31 +1,33 @@
 #include "driver/model.hpp"
 
-#include <array>
+#include <algorithm>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <type_traits>
 #include <utility>
 
+#include "balls/ball_model.hpp"
 #include "engine/drawings.hpp"
+#include "engine/model_files.hpp"
 #include "engine/names.hpp"
+#include "engine/things.hpp"
 #include "engine/version.hpp"
 #include "o80/base/error.hpp"
+#include "o80/describe/options.hpp"
 #include "o80/describe/shown_model.hpp"
 
 namespace o80::mujoco {
 namespace {
 
-SpecPointer parsed(const std::string& path) {
-  if (path.empty()) throw DriverError("no model was given: give the MJCF file with model=PATH");
-  std::array<char, 1024> error{};
-  SpecPointer spec(mj_parseXML(path.c_str(), nullptr, error.data(), error.size()));
-  if (!spec) throw DriverError("the model '" + path + "' cannot be read: " + error.data());
-  return spec;
-}
-
-ModelPointer compiled(const std::string& path, mjSpec& spec) {
+ModelPointer compiled(const Config& config, mjSpec& spec) {
   ModelPointer model(mj_compile(&spec, nullptr));
   if (!model) {
-    throw DriverError("the model '" + path + "' cannot be compiled: " + mjs_getError(&spec));
+    const std::string things =
+        config.things.empty() ? "" : " with the things '" + config.things + "'";
+    throw DriverError("the model '" + config.model + "'" + things +
+                      " cannot be compiled: " + mjs_getError(&spec));
   }
   return model;
 }
@@ -49,29 +51,61 @@ std::string absolute(const std::string& path) {
   return failed ? path : found.lexically_normal().string();
 }
 
+/// Equal for options and files of equal models.
+std::string key_of(const Config& config) {
+  std::string key = state_of_files(absolute(config.model)) + '\n';
+  if (!config.things.empty()) key += state_of_files(absolute(config.things));
+  key += '\n' + std::to_string(std::bit_cast<std::uint64_t>(config.timestep));
+  describing::each_option(config.ball_options, [&](auto, const auto& value, auto) {
+    if constexpr (std::is_same_v<decltype(value), const std::string&>) {
+      key += value + '\0';
+    } else {
+      key.append(reinterpret_cast<const char*>(&value), sizeof(value));
+    }
+  });
+  return key;
+}
+
 bool is_hinge_or_slide(const mjModel& model, int joint) {
   return model.jnt_type[joint] == mjJNT_HINGE || model.jnt_type[joint] == mjJNT_SLIDE;
 }
 
+JointPlace place_of(const mjModel& model, int id, const Named& named) {
+  Line line;
+  if (!named.over.empty()) {
+    Range range;
+    if (model.jnt_limited[id] != 0) range = {model.jnt_range[2 * id], model.jnt_range[2 * id + 1]};
+    line = spread_over(named, named.over, range);
+  }
+  return {named.name,
+          named.joint,
+          model.jnt_qposadr[id],
+          model.jnt_dofadr[id],
+          model.jnt_type[id] == mjJNT_SLIDE,
+          !named.over.empty(),
+          line};
+}
+
 /// The named hinges and slides; all of them if no name is given.
-std::vector<JointPlace> joints_in(const mjModel& model, const std::vector<std::string>& names) {
-  std::vector<int> ids;
-  for (const std::string& name : names) {
-    const int id = find(model, mjOBJ_JOINT, name, "joint");
-    if (!is_hinge_or_slide(model, id)) {
-      throw DriverError("joint '" + name + "' must be a hinge or a slide: it is a ball joint or " +
-                        "a free joint");
-    }
-    ids.push_back(id);
-  }
-  for (int id = 0; names.empty() && id < static_cast<int>(model.njnt); ++id) {
-    if (is_hinge_or_slide(model, id)) ids.push_back(id);
-  }
+std::vector<JointPlace> joints_in(const mjModel& model, const std::vector<Named>& all) {
   std::vector<JointPlace> joints;
-  joints.reserve(ids.size());
-  for (const int id : ids) {
-    joints.push_back({name_of(model, mjOBJ_JOINT, id, "joint"), model.jnt_qposadr[id],
-                      model.jnt_dofadr[id], model.jnt_type[id] == mjJNT_SLIDE});
+  for (const Named& named : all) {
+    const int id = find(model, mjOBJ_JOINT, named.joint, "joint");
+    if (!is_hinge_or_slide(model, id)) {
+      throw DriverError("joint '" + named.joint + "' must be a hinge or a slide: it is a ball " +
+                        "joint or a free joint");
+    }
+    for (const JointPlace& other : joints) {
+      if (other.joint != named.joint) continue;
+      throw DriverError("joints: '" + named.name + "' and '" + other.name +
+                        "' are the same joint of the model: name it once");
+    }
+    joints.push_back(place_of(model, id, named));
+  }
+  for (int id = 0; all.empty() && id < static_cast<int>(model.njnt); ++id) {
+    if (!is_hinge_or_slide(model, id)) continue;
+    const std::string name = name_of(model, mjOBJ_JOINT, id, "joint");
+    joints.push_back(place_of(model, id, {name, name, {}}));
   }
   return joints;
 }
@@ -137,12 +171,16 @@ Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
     each.opt.disableflags |= mjDSBL_AUTORESET;
     finish(each);
   };
-  const SpecPointer spec = parsed(config.model);
-  edit(*spec);
-  ModelPointer full = compiled(config.model, *spec);
-  prepare(*full);
+  if (config.model.empty()) {
+    throw DriverError("no model was given: give the MJCF file with model=PATH");
+  }
   file = absolute(config.model);
-  MadeModel made = shared(file, *full, [&] {
+  MadeModel made = shared(key_of(config), [&] {
+    const SpecPointer spec = parsed(config.model, "model");
+    if (!config.things.empty()) add_things(*spec, config.things);
+    edit(*spec);
+    ModelPointer full = compiled(config, *spec);
+    prepare(*full);
     std::string text = text_of(*spec);
     ModelPointer light = without_drawings(*spec, std::move(full));
     prepare(*light);
@@ -153,8 +191,9 @@ Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
   if (!config.keyframe.empty()) keyframe = find(*model, mjOBJ_KEY, config.keyframe, "keyframe");
   sensors = sensors_in(*model);
   const bool actuated = config.mode == JointMode::actuated || !config.like.empty();
-  joints = joints_in(*model, actuated ? std::vector<std::string>{} : entries_of(config.joints));
+  joints = joints_in(*model, actuated ? std::vector<Named>{} : named_in(config.joints));
   imposed = config.mode == JointMode::imposed && !actuated;
+  spreads = imposed && std::ranges::any_of(joints, &JointPlace::spread);
   if (config.mode == JointMode::control) controls = controls_in(*model);
   if (actuated) face = joint_face(*model, config);
 }

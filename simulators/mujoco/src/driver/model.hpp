@@ -13,10 +13,13 @@ namespace o80::mujoco {
 
 /// One hinge or slide.
 struct JointPlace {
-  std::string name;
-  int position;  // in qpos
-  int velocity;  // in qvel
-  bool slides;   // else it turns
+  std::string name;   // as an actuator
+  std::string joint;  // its own name
+  int position;       // in qpos
+  int velocity;       // in qvel
+  bool slides;        // else it turns
+  bool spread;        // the actuator's position is another number than the joint's
+  Line line;          // from that number to that of the joint
 };
 
 /// One sensor of the model: a number or a vector.
@@ -48,6 +51,7 @@ struct Model {
   int keyframe = -1;
   std::vector<JointPlace> joints;
   bool imposed;                        // joints are set; else the inputs of actuators are
+  bool spreads;                        // imposed, and one of them is spread
   std::vector<ControlPlace> controls;  // of mode control
   std::optional<JointFace> face;       // of mode actuated, or of another robot
   std::vector<SensorPlace> sensors;

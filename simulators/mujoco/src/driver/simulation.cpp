@@ -20,6 +20,8 @@ Simulation::Simulation(const Config& config)
           config, [&](mjSpec& spec) { add_extra_balls(spec, config.ball_options); },
           [&](mjModel& model) { switch_off_contacts(model, config.ball_options); }) {
   if (has_balls(config.ball_options)) balls_.emplace(*model_.model, config.ball_options);
+  free_bodies_ =
+      free_bodies_in(*model_.model, balls_ ? balls_->places() : std::vector<BallPlace>{});
   now_.targets.joints.resize(model_.imposed ? model_.joints.size() : 0);
   if (model_.face) now_.targets.states.resize(model_.face->schema.head.block);
   now_.targets.controls.resize(model_.controls.size());
@@ -50,6 +52,7 @@ void Simulation::add_slots(std::uint32_t count) {
 void Simulation::reset() noexcept {
   now_.clock = 0;
   now_.relaxed = false;
+  now_.teleports = true;
   now_.strength = 1;
   mj_resetDataKeyframe(model_.model.get(), data_.get(), model_.keyframe);
   if (model_.face) model_.face->hold(*data_);
@@ -59,7 +62,9 @@ void Simulation::reset() noexcept {
     mj_kinematics(model_.model.get(), data_.get());  // all that anybody looks at
   }
   for (std::size_t i = 0; i < now_.joints.size(); ++i) {
-    now_.joints[i] = now_.targets.joints[i] = joint(i);
+    const auto [position, velocity] = joint(i);
+    const Line& line = model_.joints[i].line;
+    now_.joints[i] = now_.targets.joints[i] = {line.back(position), velocity / line.factor};
   }
   for (std::size_t i = 0; i < now_.targets.controls.size(); ++i) {
     now_.targets.controls[i] = control(i);
@@ -93,6 +98,7 @@ void Simulation::advance() noexcept {
   }
   if (model_.face) model_.face->drive(now_.targets.states.data(), *data_);
   if (balls_) balls_->begin_iteration(period());
+  if (now_.teleports && now_.targets.commanded) teleport_joints();
   for (std::uint32_t number = 0; number < steps_; ++number) step(number);
   now_.joints = now_.targets.joints;
   update_sensors();
@@ -111,6 +117,21 @@ void Simulation::step(std::uint32_t number) noexcept {
   if (balls_) balls_->step(*data_, {now_.clock, number, steps_});
 }
 
+/// What mirrors a robot does not sweep from the model's start to where the robot is, through the
+/// bodies between. Where there are none, surfaces have a teleport distance.
+void Simulation::teleport_joints() noexcept {
+  now_.teleports = false;
+  if (!integrates_) return;
+  now_.joints = now_.targets.joints;
+  for (std::size_t i = 0; i < now_.joints.size(); ++i) impose(i, now_.joints[i]);
+}
+
+void Simulation::impose(std::size_t i, const JointState& state) noexcept {
+  const JointPlace& place = model_.joints[i];
+  data_->qpos[place.position] = place.spread ? place.line.of(state.position) : state.position;
+  data_->qvel[place.velocity] = place.spread ? place.line.factor * state.velocity : state.velocity;
+}
+
 void Simulation::impose_joints(std::uint32_t number) noexcept {
   if (now_.joints.empty() && !balls_) return;  // the next step begins with the kinematics
   const bool last = number + 1 == steps_;
@@ -118,11 +139,9 @@ void Simulation::impose_joints(std::uint32_t number) noexcept {
   for (std::size_t i = 0; i < now_.joints.size(); ++i) {
     const JointState& from = now_.joints[i];
     const JointState& to = now_.targets.joints[i];
-    const JointPlace& place = model_.joints[i];
-    data_->qpos[place.position] =
-        last ? to.position : interpolated(from.position, to.position, share);
-    data_->qvel[place.velocity] =
-        last ? to.velocity : interpolated(from.velocity, to.velocity, share);
+    impose(i, last ? to
+                   : JointState{interpolated(from.position, to.position, share),
+                                interpolated(from.velocity, to.velocity, share)});
   }
   mj_kinematics(model_.model.get(), data_.get());
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "balls/balls.hpp"
+#include "driver/free_bodies.hpp"
 #include "driver/model.hpp"
 
 namespace o80::mujoco {
@@ -20,7 +21,8 @@ O80_DESCRIBE(JointState, (position, "[rad or m]"), (velocity, "[rad/s or m/s]", 
 
 /// Targets of an iteration; those of balls are in `Balls`.
 struct Targets {
-  std::vector<JointState> joints;
+  std::vector<JointState> joints;  // imposed, in the numbers of their actuators
+  bool commanded = false;          // a command moves one of them
   std::vector<double> controls;
   std::vector<std::byte> states;  // of mode actuated, as desired
 };
@@ -45,6 +47,7 @@ class Simulation {
   void steps(std::uint32_t count, double period) {
     steps_ = count;
     model_.timestep(period / count);
+    if (balls_) balls_->take(*model_.model);
   }
   /// Targets of the next `advance`.
   Targets& targets() noexcept { return now_.targets; }
@@ -55,6 +58,11 @@ class Simulation {
   /// Null if the options name none.
   Balls* balls() noexcept { return balls_ ? &*balls_ : nullptr; }
   const Balls* balls() const noexcept { return balls_ ? &*balls_ : nullptr; }
+
+  const std::vector<FreeBody>& free_bodies() const noexcept { return free_bodies_; }
+  Served place(const PlaceBody& request) noexcept {
+    return mujoco::place(*model_.model, *data_, free_bodies_, request);
+  }
 
   /// Runs one iteration.
   void advance() noexcept;
@@ -73,6 +81,8 @@ class Simulation {
 
   const mjData& data() const noexcept { return *data_; }
   JointState joint(std::size_t i) const noexcept;
+  /// Of an imposed joint, in the numbers of its actuator.
+  JointState imposed(std::size_t i) const noexcept { return now_.joints[i]; }
   double control(std::size_t i) const noexcept;
   std::span<const double> sensor(std::size_t i) const noexcept;
   /// Iterations since the start; a restore sets it back too.
@@ -90,7 +100,8 @@ class Simulation {
     std::int64_t clock = 0;  // [iterations]
     std::uint32_t engine_contacts = 0;
     bool relaxed = false;
-    double strength = 1;  // share of the largest forces
+    bool teleports = true;  // imposed joints, at their first command
+    double strength = 1;    // share of the largest forces
     Targets targets;
     std::vector<JointState> joints;  // imposed ones, at the end of the last iteration
   };
@@ -107,12 +118,15 @@ class Simulation {
   template <class Bytes>
   void each_part(Slot& slot, Bytes& bytes) noexcept;
   void step(std::uint32_t number) noexcept;
+  void teleport_joints() noexcept;
   void impose_joints(std::uint32_t number) noexcept;
+  void impose(std::size_t i, const JointState& state) noexcept;
   void update_sensors() noexcept;
 
   std::uint32_t steps_;
   Model model_;
   std::optional<Balls> balls_;
+  std::vector<FreeBody> free_bodies_;
   bool integrates_;
   DataPointer data_;
   State now_;

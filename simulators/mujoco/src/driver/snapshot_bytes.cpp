@@ -24,6 +24,7 @@ void Simulation::each_part(Slot& slot, Bytes& bytes) noexcept {
   bytes(slot.state.clock);
   bytes(slot.state.engine_contacts);
   bytes(slot.state.relaxed);
+  bytes(slot.state.teleports);
   bytes(slot.state.strength);
   bytes(slot.state.targets.joints);
   bytes(slot.state.targets.controls);

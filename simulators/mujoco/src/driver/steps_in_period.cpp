@@ -35,14 +35,23 @@ namespace {
   throw DriverError(text);
 }
 
+double nearest_count(double period, double step, std::uint32_t steps) {
+  return steps > 0 ? steps : std::max(1.0, std::round(period / step));
+}
+
 }  // namespace
+
+bool is_whole_steps(std::int64_t period, double timestep, std::uint32_t steps) {
+  const auto requested = static_cast<double>(period);
+  const double error = nearest_count(requested, timestep * 1e9, steps) * timestep * 1e9 - requested;
+  return std::abs(error) <= kPeriodTolerance * requested;
+}
 
 std::uint32_t steps_in_period(std::int64_t period, double timestep, std::uint32_t steps) {
   const double step = timestep * 1e9;
   const auto requested = static_cast<double>(period);
-  const double count = steps > 0 ? steps : std::max(1.0, std::round(requested / step));
-  if (std::abs(count * step - requested) <= kPeriodTolerance * requested) {
-    return static_cast<std::uint32_t>(count);
+  if (is_whole_steps(period, timestep, steps)) {
+    return static_cast<std::uint32_t>(nearest_count(requested, step, steps));
   }
   if (steps > 0) refuse_steps(requested, step, steps);
   refuse_period(requested, step);

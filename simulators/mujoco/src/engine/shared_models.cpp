@@ -1,9 +1,7 @@
 #include "engine/shared_models.hpp"
 
-#include <cstddef>
 #include <functional>
 #include <mutex>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -11,8 +9,7 @@ namespace o80::mujoco {
 namespace {
 
 struct InUse {
-  std::string file;
-  std::size_t hash;  // of the model that it was made of
+  std::string key;
   std::weak_ptr<const mjModel> model;
   std::string mjcf;
 };
@@ -28,19 +25,6 @@ std::mutex mutex;
 std::vector<InUse> models;
 std::vector<InAnotherStep> in_another_step;
 
-std::size_t hash_of(const void* begin, std::size_t size) {
-  return std::hash<std::string_view>{}({static_cast<const char*>(begin), size});
-}
-
-/// Of sizes, options and all arrays.
-std::size_t hash_of(const mjModel& model) {
-  const std::size_t parts[] = {
-      hash_of(&model, offsetof(mjModel, buffer)),
-      hash_of(model.buffer, static_cast<std::size_t>(model.nbuffer)),
-  };
-  return hash_of(parts, sizeof(parts));
-}
-
 template <class Known>
 void forget_unused(std::vector<Known>& known) {
   std::erase_if(known, [](const Known& each) { return each.model.expired(); });
@@ -48,20 +32,15 @@ void forget_unused(std::vector<Known>& known) {
 
 }  // namespace
 
-MadeModel shared(const std::string& file, const mjModel& compiled,
-                 const std::function<MadeModel()>& make) {
-  const std::size_t hash = hash_of(compiled);
-  {
-    const std::scoped_lock lock(mutex);
-    forget_unused(models);
-    for (const InUse& each : models) {
-      if (each.hash != hash || each.file != file) continue;
-      if (SharedModel found = each.model.lock()) return {std::move(found), each.mjcf};
-    }
+MadeModel shared(std::string key, const std::function<MadeModel()>& make) {
+  const std::scoped_lock lock(mutex);
+  forget_unused(models);
+  for (const InUse& each : models) {
+    if (each.key != key) continue;
+    if (SharedModel found = each.model.lock()) return {std::move(found), each.mjcf};
   }
   MadeModel made = make();
-  const std::scoped_lock lock(mutex);
-  models.push_back({file, hash, made.model, made.mjcf});
+  models.push_back({std::move(key), made.model, made.mjcf});
   return made;
 }
 

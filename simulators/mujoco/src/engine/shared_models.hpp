@@ -17,12 +17,10 @@ struct MadeModel {
   std::string mjcf;  // as text
 };
 
-/// What `make` returns; or what it returned for an equal model of this file (equal in a hash of all
-/// its bytes), if that is still in use in this process. Copies of a simulation so need the memory
-/// of one model, most of which are its meshes and textures, and the time to make it once. May be
-/// called by several threads.
-MadeModel shared(const std::string& file, const mjModel& compiled,
-                 const std::function<MadeModel()>& make);
+/// What `make` returns; or what it returned for this key, if that is still in use in this process.
+/// Copies of a simulation so need the memory of one model, most of which are its meshes and
+/// textures, and the time to compile it once. May be called by several threads.
+MadeModel shared(std::string key, const std::function<MadeModel()>& make);
 
 /// The model with another step of the engine [s]: one for all that ask while it is in use.
 SharedModel with_timestep(SharedModel model, double step);

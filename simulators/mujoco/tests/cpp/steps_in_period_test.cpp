@@ -40,7 +40,7 @@ TEST_F(StepsInPeriodTest, TakesAsManyStepsAsThePeriodHolds) {
 
 TEST_F(StepsInPeriodTest, RefusesAPeriodOfNoWholeNumberOfStepsBeforeItStarts) {
   const auto start = [](std::int64_t period, const OptionValues& more) {
-    return [=] { Inline robot(court(more), period); };
+    return [=] { Inline robot(pendulum(more), period); };
   };
   EXPECT_THAT(start(1'000'000, {}),
               ThrowsMessage<Error>(AllOf(HasSubstr("1000 Hz (iterations of 1 ms)"),
@@ -58,17 +58,17 @@ TEST_F(StepsInPeriodTest, TheAdviceAboutThePeriodWorks) {
   for (const std::int64_t period : {1'000'000, 5'000'000, 3'333'333, 7'000'001, 400'000}) {
     std::string text;
     try {
-      Inline robot(court(), period);
+      Inline robot(pendulum(), period);
     } catch (const Error& error) {
       text = error.what();
     }
     const std::size_t at = text.find("timestep=");
     ASSERT_NE(at, std::string::npos) << period << ": " << text;
     const std::string advised = text.substr(at + 9, text.find(' ', at) - at - 9);
-    Inline robot(court({{"timestep", advised}}), period);
+    Inline robot(pendulum({{"timestep", advised}}), period);
     EXPECT_NO_THROW(robot.burst(2)) << text;
     const double rate = std::stod(text.substr(text.find("Ask for ") + 8));
-    Inline slower(court(), std::llround(1e9 / rate));
+    Inline slower(pendulum(), std::llround(1e9 / rate));
     EXPECT_NO_THROW(slower.burst(2)) << text;
   }
 }

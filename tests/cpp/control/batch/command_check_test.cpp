@@ -72,6 +72,7 @@ TEST_F(CommandCheckTest, WhatIsWithinTheLimitsPasses) {
   EXPECT_NO_THROW(check.speed(0, 1e9));
 }
 
+// rule L1
 TEST_F(CommandCheckTest, ATargetOutsideItsLimitsIsRefusedNamingAllThereIsToKnow) {
   EXPECT_THAT(refusal_of_target(1, {1.75, {}}),
               AllOf(HasSubstr("'elbow' (1)"), HasSubstr("'position'"), HasSubstr("1.75 [rad]"),
@@ -80,6 +81,7 @@ TEST_F(CommandCheckTest, ATargetOutsideItsLimitsIsRefusedNamingAllThereIsToKnow)
               AllOf(HasSubstr("'torque[1]'"), HasSubstr("-4 [Nm]"), HasSubstr("from -3 to 3")));
 }
 
+// rule L1
 TEST_F(CommandCheckTest, NanAndInfinityAreRefusedWhateverTheLimits) {
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   EXPECT_THAT(refusal_of_target(0, {std::nan(""), {}}), HasSubstr("not a finite number"));

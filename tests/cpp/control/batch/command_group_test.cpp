@@ -36,6 +36,7 @@ std::vector<std::vector<double>> run(Rig& rig, int iterations,
   return rows;
 }
 
+// rule C21
 TEST(CommandGroup, MovesAllAndTellsOneStatus) {
   Rig rig(plain_robot(3));
   add_group(rig, {0, 2}, over(2), {2.0, 4.0});
@@ -52,6 +53,7 @@ TEST(CommandGroup, MovesAllAndTellsOneStatus) {
   EXPECT_TRUE(rig.all_blocks_back());
 }
 
+// rule C21
 TEST(CommandGroup, TakesTheFastestWayThatAllCanKeep) {
   Schema schema = plain_robot(2);
   for (const std::uint32_t i : {0U, 1U}) {
@@ -100,6 +102,7 @@ TEST(CommandGroup, DurationsOfItsMembersOweTheSameRounding) {
               17.0, 1.0);
 }
 
+// rule C22
 TEST(CommandGroup, GoesOnWithoutAMemberThatIsDroppedAndEndsAsThatOneDid) {
   const auto play = [](auto&& drop, Status status) {
     Rig rig(plain_robot(3));

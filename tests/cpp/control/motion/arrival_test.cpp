@@ -75,6 +75,7 @@ struct Requested {
 
 /// Whatever is asked of an actuator with limits of acceleration goes to its target, and rests
 /// there.
+// rule C3
 TEST(Arrival, CommandsRestAtTheirTargets) {
   const Limits arm{.speed = 2.0, .acceleration = 15.0, .jerk = 500.0};
   const Limits franka{.speed = 2.6, .acceleration = 10.0, .jerk = 5000.0};
@@ -122,6 +123,7 @@ TEST(Arrival, CommandsRestAtTheirTargets) {
   }
 }
 
+// rule C9
 TEST(Arrival, LaterThanAskedSaysWhy) {
   Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   rig.add(0, smoothly(over(50)), {0.1});
@@ -139,6 +141,7 @@ TEST(Arrival, LaterThanAskedSaysWhy) {
   EXPECT_EQ(rig.witness.last(batch + 4).iteration, 99 + 99 + 100) << "the exact time starts anew";
 }
 
+// rule C10
 TEST(Arrival, AnUntilThatCannotBeKeptComesLaterAndTheNextCommandAfterIt) {
   Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   rig.add(0, until(50), {0.1});
@@ -150,6 +153,7 @@ TEST(Arrival, AnUntilThatCannotBeKeptComesLaterAndTheNextCommandAfterIt) {
   EXPECT_EQ(rig.witness.last(batch + 3).iteration, 249);
 }
 
+// rule C11
 TEST(Arrival, TargetsOutOfReachAreRejectedWhenTheyWouldBegin) {
   Rig rig(limited_robot(1000, {.speed = 1.0, .acceleration = 1.0, .jerk = 1.0}, 2));
   rig.add(0, smoothly(over(10)), {1e300, 0.0});
@@ -167,6 +171,7 @@ TEST(Arrival, TargetsOutOfReachAreRejectedWhenTheyWouldBegin) {
 
 // ------------------------------------------------------------------------- set-points
 
+// rule C15
 TEST(Arrival, ASetPointGivesWayToTheNextAndTheLastArrives) {
   Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   for (const double target : {0.1, 0.2, 0.3}) rig.add(0, direct(), {target});
@@ -181,6 +186,7 @@ TEST(Arrival, ASetPointGivesWayToTheNextAndTheLastArrives) {
   EXPECT_EQ(rig.desired(), 0.3);
 }
 
+// rule C15
 TEST(Arrival, ASetPointArrivesBeforeACommandThatHasAPace) {
   Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   rig.add(0, direct(), {0.1});
@@ -193,6 +199,7 @@ TEST(Arrival, ASetPointArrivesBeforeACommandThatHasAPace) {
 }
 
 /// A policy that repeats its target, alone or for several actuators, does not keep the arm away.
+// rule C15
 TEST(Arrival, ASetPointThatIsRepeatedForEverArrives) {
   for (const bool overwrites : {false, true}) {
     for (const std::int64_t every : {0, 20}) {
@@ -267,6 +274,7 @@ TEST(Arrival, ThousandsOfQueuedRowsOfSetPointsDoNotLagMoreAndMore) {
 
 /// A motion whose target lies on a bound is halted in any iteration: it stays inside, within its
 /// limits, and comes to rest no later than it would have.
+// rule H6
 TEST(Arrival, AHaltBesideABoundStaysInsideWithinTheLimits) {
   for (const double jerk : {500.0, 5000.0, kNone}) {
     for (const std::int64_t n : {60, 130, 250}) {
@@ -295,6 +303,7 @@ TEST(Arrival, AHaltBesideABoundStaysInsideWithinTheLimits) {
   }
 }
 
+// rule C17
 TEST(Arrival, TargetsAsSentAreShownAsTheyAre) {
   Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
   RecordHead head = paced(Pace::direct, 0);
@@ -413,6 +422,7 @@ double play(const Stream& stream, std::uint64_t seed) {
   return best / frequency * 1e3;
 }
 
+// rule C16
 TEST(Arrival, StreamsOfSetPointsNeverPassTheirTargets) {
   const Limits arm{.speed = 2.0, .acceleration = 15.0, .jerk = 500.0};
   const Limits franka{.speed = 2.6, .acceleration = 10.0, .jerk = 5000.0};

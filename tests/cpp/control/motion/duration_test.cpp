@@ -30,6 +30,7 @@ TEST(DurationCarry, PassesWhatIsOverBeforeTheNextIteration) {
   EXPECT_EQ(carry.iterations(16), 2) << "the exact end is 20";
 }
 
+// rule C6
 TEST(DurationCarry, ItsSumIsTheRoundedSumOfAllDurations) {
   std::mt19937_64 random(1);
   for (const std::int64_t period : {1LL, 2LL, 3LL, 1'000'000LL, 1'234'567LL, 2'000'000LL}) {

@@ -97,6 +97,7 @@ double farthest_outside(int streams, double reaction, int delay, double lag, dou
   return farthest;
 }
 
+// rule L7
 TEST(IntegralBounds, HoldInRandomStreams) {
   EXPECT_LE(farthest_outside(40, 0.0, 0, 0.0, 1e-4), 0.3e-3);
 }
@@ -107,6 +108,7 @@ TEST(IntegralBounds, HoldWhereTheRobotIsLate) {
   EXPECT_LE(farthest_outside(40, 0.05, 0, 0.05, 1e-4), 10.0e-3);
 }
 
+// rule L7
 TEST(IntegralBounds, ACommandAtABoundEndsAndItsFieldRests) {
   VelocityRig rig(kJoint, 0.0);
   rig.command(0.5, over(10));

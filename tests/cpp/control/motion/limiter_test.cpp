@@ -51,6 +51,7 @@ TEST(Limiter, ATrajectoryIsFollowedInsideItsSpanToItsLastRow) {
   EXPECT_EQ(rig.desired(), 0.0);
 }
 
+// rule L4
 TEST(Limiter, ATrajectoryGoesOnUntilItsLastRowIsReached) {
   Schema schema = plain_robot(1);
   schema.actuator(0).limits({.speed = 1000.0, .acceleration = 10'000.0, .jerk = 1e6});
@@ -85,6 +86,7 @@ TEST(Limiter, AStatusSaysWhichLimitItWas) {
   EXPECT_EQ(told.detail, (Limited{Limit::speed, 1}.packed()));
 }
 
+// rule C8
 TEST(Limiter, TheFastestWayIsRefusedForANumberWithoutLimitsOfSpeedAndAcceleration) {
   for (const Limits& limits : {Limits{}, Limits{.speed = 1.0}}) {
     Schema robot = plain_robot(1, 2);
@@ -119,6 +121,7 @@ TEST(Limiter, ARestingNumberThatStandsForAMomentGoesOnToItsRest) {
   EXPECT_FALSE(rig.braking());
 }
 
+// rule C19
 TEST(Limiter, ADirectValueOfARestingNumberStaysUntilSomethingTakesItsPlace) {
   Schema schema = plain_robot(1, 2);
   schema.actuator(0).rests_at("x1", 0.5);

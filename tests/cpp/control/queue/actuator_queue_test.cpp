@@ -3,8 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "control/rig.hpp"
 
 namespace o80::test {
@@ -12,6 +10,7 @@ namespace {
 
 using testing::ElementsAre;
 
+// rule C1
 TEST(ActuatorQueue, ThousandsOfCommandsFollowEachOtherWithoutAnIdleIteration) {
   Rig rig(plain_robot(1));
   for (int i = 0; i < 3000; ++i) rig.add(0, over(1 + i % 3), {static_cast<double>(i)});
@@ -31,6 +30,7 @@ TEST(ActuatorQueue, ThousandsOfCommandsFollowEachOtherWithoutAnIdleIteration) {
   EXPECT_FALSE(rig.active());
 }
 
+// rule C10
 TEST(ActuatorQueue, APastUntilIsRejectedAsLateAndTheNextStartsInItsPlace) {
   Rig rig(plain_robot(1));
   rig.add(0, over(3), {3.0});
@@ -104,6 +104,7 @@ TEST(ActuatorQueue, ASpeedIsThePeakOfTheProfileChosen) {
   for (std::size_t i = 1; i < desired.size(); ++i) EXPECT_LE(desired[i] - desired[i - 1], 0.1);
 }
 
+// rule C20
 TEST(ActuatorQueue, NumbersLeftOutKeepTheDesiredValueTheCommandStartedFrom) {
   Rig rig(plain_robot(1, 2));
   rig.add(0, direct(), {1.0, 7.0});

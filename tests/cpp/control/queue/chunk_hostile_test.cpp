@@ -140,6 +140,7 @@ TEST(ChunkHostile, RandomBytesAreSafe) {
 
 /// Chunks of three lanes for overlapping actuators of different types, among all else that there
 /// is.
+// rule S1
 TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
   for (unsigned seed = 0; seed < 60; ++seed) {
     std::mt19937 dice(seed);

@@ -70,6 +70,7 @@ TEST(ChunkLimits, RowsWithinBoundsWithATakeOverOutsideAreClampedAndReached) {
 }
 
 /// Random chunks under random limits: all differences within them, all ends at the last row.
+// rule K10
 TEST(ChunkLimits, RandomScriptsStayWithinLimitsAndEndAtTheirLastRow) {
   for (unsigned seed = 0; seed < 60; ++seed) {
     std::mt19937 dice(seed);

@@ -49,6 +49,7 @@ TEST(Chunk, ARowThatIsDueInTheFirstIterationIsInTime) {
   EXPECT_NEAR(rig.at(121), 0.138, 1e-12);  // from slope 0.04 to that at row 2, 0
 }
 
+// rule K7
 TEST(Chunk, TheTakeOverPassesRowsThatAreDueTooSoon) {
   ChunkRig rig;
   rig.reach(117, 0.05, 0.01);
@@ -70,6 +71,7 @@ TEST(Chunk, WhereNoRowIsDueAfterTheTakeOverItGoesToTheLast) {
   EXPECT_EQ(rig.witness.last(id).iteration, 156);
 }
 
+// rule K6
 TEST(Chunk, WhereAllRowsAreLateItIsRejectedAndThePlanGoesOn) {
   for (const bool rejected : {false, true}) {
     ChunkRig rig;
@@ -111,6 +113,7 @@ TEST(Chunk, TheFrozenPrefixIsNotPlayed) {
   }
 }
 
+// rule K5
 TEST(Chunk, StandingStillDoesNotCount) {
   for (const std::uint32_t first : {0U, 3U}) {
     ChunkRig rig;
@@ -164,6 +167,7 @@ TEST(Chunk, ATakeOverMayPassWhereItWasByAThirdOfItsSpeed) {
   EXPECT_EQ(rig.at(110), 0.4);
 }
 
+// rule K9
 TEST(Chunk, RowsMayBeHeldOrJoinedByLines) {
   ChunkRig held;
   held.reach(117, 0.05, 0.01);
@@ -182,6 +186,7 @@ TEST(Chunk, RowsMayBeHeldOrJoinedByLines) {
   EXPECT_EQ(lines.at(130), 0.3);
 }
 
+// rule K2
 TEST(Chunk, OneOverwritesAnotherFromItsPlan) {
   ChunkRig rig;
   rig.run_to(101);
@@ -207,6 +212,7 @@ TEST(Chunk, OneOverwritesAnotherFromItsPlan) {
   EXPECT_LT(std::abs(rig.at(117) - 2 * rig.at(116) + rig.at(115)), 0.002) << "no jump of velocity";
 }
 
+// rule K6
 TEST(Chunk, RejectionsNameTheirReasonAndLeaveThePlan) {
   ChunkRig rig;
   rig.run_to(101);
@@ -224,6 +230,7 @@ TEST(Chunk, RejectionsNameTheirReasonAndLeaveThePlan) {
   EXPECT_TRUE(rig.all_blocks_back());
 }
 
+// rule K16
 TEST(Chunk, APurgeAHaltAnOverwriteAndAFreshStartEndOneThatWaits) {
   const std::vector<std::function<void(ChunkRig&)>> ends{
       [](ChunkRig& rig) {
@@ -421,6 +428,7 @@ TEST(Chunk, AStatusTellsItsShiftOrItIsLate) {
   }
 }
 
+// rule K8
 TEST(Chunk, EveryRowThatIsDueIsShown) {
   std::size_t exact = 0;
   for (unsigned seed = 0; seed < 200; ++seed) {
@@ -455,6 +463,7 @@ TEST(Chunk, EveryRowThatIsDueIsShown) {
   EXPECT_GT(exact, 10'000U);
 }
 
+// rule K3
 TEST(Chunk, RowsThatAreLateChangeNoBit) {
   for (unsigned seed = 0; seed < 50; ++seed) {
     ChunkRig one;

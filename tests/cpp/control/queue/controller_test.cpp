@@ -21,6 +21,7 @@ Schema robot_with_requests() {
   return schema;
 }
 
+// rule C2
 TEST(Controller, OverwritingDropsEarlierCommandsOfItsOwnBatchToo) {
   Rig rig(plain_robot(1));
   rig.add(0, over(4), {4.0});
@@ -32,6 +33,7 @@ TEST(Controller, OverwritingDropsEarlierCommandsOfItsOwnBatchToo) {
   EXPECT_EQ(rig.witness.of(batch + 2).size(), 1U) << "it never was active";
 }
 
+// rule C2
 TEST(Controller, APurgeDropsWithoutASuccessor) {
   Rig rig(plain_robot(2));
   for (std::uint32_t actuator : {0, 1}) {
@@ -104,6 +106,7 @@ TEST(Controller, ADeadFrontendIsPurgedWhateverItShares) {
   EXPECT_EQ(rig.witness.freed_blocks[1], 2U);
 }
 
+// rule C23
 TEST(Controller, AnInterruptEndsEverythingInItsIteration) {
   Rig rig(plain_robot(2));
   rig.add(0, over(8), {8.0});
@@ -219,6 +222,7 @@ TEST(Controller, TheRowsOfOneLongTrajectoryAreCheckedBitByBitToo) {
   }
 }
 
+// rule B9
 TEST(Controller, RequestsAreServedInOrderWithTheBatch) {
   Rig rig(robot_with_requests());
   rig.add(0, over(2), {1.0});

@@ -1,4 +1,4 @@
-// Paces that were not kept: speeds of integers, a speed without the first field (rule 5).
+// Paces of integers, of types that blend, and of commands without their first field (rule C7).
 #include <gtest/gtest.h>
 
 #include "control/rig.hpp"
@@ -64,6 +64,7 @@ TEST(Pace, TheSpeedLimitOfAnIntegerIsKept) {
   expect_ten_in_a_second<std::int64_t>(Kind::int64);
 }
 
+// rule C7
 TEST(Pace, ASpeedIsThatOfTheFirstNumberTheCommandNames) {
   for (const bool smooth : {false, true}) {
     Rig rig(plain_robot(1, 2));

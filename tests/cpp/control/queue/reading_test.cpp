@@ -40,6 +40,7 @@ void expect_that_limits_hold(Rig& rig) {
   EXPECT_EQ(rig.witness.status(batch + 2), Status::completed);
 }
 
+// rule L6
 TEST(Reading, InRowZeroThatIsNoNumberIsNeverDesired) {
   for (const double odd : {kNan, kInfinity, -kInfinity}) {
     Rig rig(robot_with({.speed = 1.0}));
@@ -69,6 +70,7 @@ TEST(Reading, OutsideTheBoundsIsLeftAtThePaceOfTheCommand) {
   EXPECT_EQ(rig.desired(), 0.5);
 }
 
+// rule L5
 TEST(Reading, OutsideTheBoundsIsNeverLeftOutwards) {
   Rig rig(robot_with({.minimum = -1.0, .maximum = 1.0}));
   rig.observe(0, 1.2);

@@ -2,6 +2,8 @@
 // (docs/commands.md#with-no-command-left).
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "control/rig.hpp"
 
 namespace o80::test {
@@ -34,6 +36,7 @@ TEST(Resting, ASuccessorGoesOnFromWhatADirectCommandAsked) {
   EXPECT_EQ(rig.desired(kVelocity), 5.0);
 }
 
+// rule C19
 TEST(Resting, AFieldThatACommandDoesNotNameGoesToRestWhileItRuns) {
   const std::vector<std::uint64_t> position_only = {1};
   RecordHead partial = over(100);
@@ -74,6 +77,22 @@ TEST(Resting, ADirectValueOfAnotherThatLeavesItOutEndsIt) {
   EXPECT_EQ(rig.desired(kVelocity), 0.0);
   EXPECT_FALSE(rig.controller.acts(0));
   EXPECT_FALSE(rig.controller.acts(1));
+}
+
+TEST(Resting, ZeroIsPositiveWhateverWasCommandedOrObserved) {
+  for (const RecordHead& head : {direct(), over(3), paced(Pace::fastest, 0)}) {
+    Rig rig(joint(0.0, {.speed = 1000.0, .acceleration = 1e6}));
+    rig.observe(0, -0.0);
+    rig.observe(8 * kVelocity, -0.0);
+    rig.controller.restart(rig.observed.data(), nullptr, rig.next);
+    rig.add(0, head, {-0.0, -0.0});
+    rig.pulse();
+    for (int i = 0; i < 20; ++i) {
+      rig.step();
+      EXPECT_FALSE(std::signbit(rig.desired())) << i;
+      EXPECT_FALSE(std::signbit(rig.desired(kVelocity))) << i;
+    }
+  }
 }
 
 TEST(Resting, OfInterruptedCommandsWhileAllFollowTheFieldGoesOnAndTheOthersBeginAtTheReading) {

@@ -11,6 +11,7 @@
 namespace o80::test {
 namespace {
 
+// rule K11
 TEST(Chunk, APlanIsStarvedFromTheIterationAfterItsLastRowUntilItEndsOrGoesOn) {
   const auto none = [](ChunkRig&) {};
   const auto close = [](ChunkRig& rig, std::uint64_t plan, std::uint32_t lane) {

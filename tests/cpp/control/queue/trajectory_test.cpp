@@ -11,6 +11,7 @@ namespace o80::test {
 namespace {
 
 /// A trajectory is a chunk that is anchored where its queue reaches it.
+// rule K15
 TEST(Trajectory, ItsRowsArePlayedAsThoseOfAChunk) {
   for (unsigned seed = 0; seed < 200; ++seed) {
     std::mt19937 dice(seed);
@@ -69,6 +70,7 @@ TEST(Trajectory, ItsRowsArePlayedAsThoseOfAChunk) {
   }
 }
 
+// rule K9
 TEST(Trajectory, ACurveThroughAParabolaHasItsSlopes) {
   // Steffen's slope of three points is that of their parabola
   ChunkRig rig;

@@ -1,4 +1,3 @@
-#include "memory/os/fork.hpp"
 
 #include <fcntl.h>
 #include <gmock/gmock.h>

@@ -7,9 +7,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
-#include <memory>
 #include <mutex>
-#include <optional>
 #include <thread>
 
 #include "memory/child_process.hpp"
@@ -138,8 +136,7 @@ class BusyProcessors {
       if (CPU_ISSET(i, &allowed)) threads_.emplace_back([this, i] { spin_on(i); });
     while (busy_.load() < threads_.size()) std::this_thread::yield();
   }
-  BusyProcessors(const BusyProcessors&) = delete;
-  BusyProcessors& operator=(const BusyProcessors&) = delete;
+  BusyProcessors& operator=(BusyProcessors&&) = delete;
   ~BusyProcessors() {
     over_ = true;
     for (std::thread& thread : threads_) thread.join();

@@ -53,6 +53,7 @@ TEST_F(HistoryTest, IsEmptyBeforeItsFirstRow) {
   EXPECT_EQ(reader_.read_range(0, 10, bytes(row)).count, 0U);
 }
 
+// rule O3
 TEST_F(HistoryTest, KeepsExactlyTheRowsPromised) {
   for (Iteration k = 0; k < 35; ++k) {
     publish(k, k);
@@ -137,6 +138,7 @@ TEST_F(HistoryTest, RowsBeforeAGapAreNotRead) {
   EXPECT_EQ(reader_.oldest(), 31) << "the gap is behind";
 }
 
+// rule O3
 TEST_F(HistoryTest, IsNeverTornWhenReadersAreOvertaken) {
   constexpr Iteration kLast = 30'000;
   std::atomic<bool> torn{false};

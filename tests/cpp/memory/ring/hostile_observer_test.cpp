@@ -8,7 +8,6 @@
 
 #include <atomic>
 #include <memory>
-#include <optional>
 #include <thread>
 
 #include "memory/os/futex.hpp"
@@ -136,6 +135,7 @@ TEST_F(HostileObserverTest, DoesNotKeepTheFilesOfADeadStarter) {
   EXPECT_EQ(directory_.files(), 0U);
 }
 
+// rule O4
 TEST_F(HostileObserverTest, SleepsOnNoWordThatOthersAreWokenBy) {
   const OwnedSegment segment = running_segment(spec_);
   if (!harass()) GTEST_SKIP() << kNoStranger;

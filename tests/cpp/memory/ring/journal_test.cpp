@@ -78,6 +78,7 @@ TEST_F(JournalTest, GivesEveryEntryOnceInItsOrderOverManyLaps) {
   }
 }
 
+// rule O13
 TEST_F(JournalTest, NumbersTheGapOfAReaderThatWasOvertaken) {
   write(0, 1000);
   std::uint64_t read = 0;

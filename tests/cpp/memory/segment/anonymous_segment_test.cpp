@@ -4,8 +4,6 @@
 #include <gmock/gmock.h>
 #include <sys/stat.h>
 
-#include <filesystem>
-
 #include "memory/blocks.hpp"
 #include "memory/child_process.hpp"
 #include "memory/segments.hpp"

@@ -4,7 +4,6 @@
 
 #include <fcntl.h>
 #include <unistd.h>
-#include <fstream>
 
 #include <future>
 #include <thread>

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "memory/child_process.hpp"
-#include "memory/os/fork.hpp"
 #include "memory/segment/signal.hpp"
 #include "memory/segments.hpp"
 
@@ -39,6 +38,19 @@ TEST_F(HaltWordTest, AHaltIsLatchedAndShownWithWhoAndWhy) {
   EXPECT_EQ(halt->iteration, 12);
   EXPECT_EQ(halt->who_text(), "pid 7 (python)");
   EXPECT_EQ(halt->reason(), "it smokes");
+}
+
+TEST_F(HaltWordTest, AReasonThatComesAfterTheHaltIsReadBeforeTheBackendShowsIt) {
+  const AttachedSegment frontend = attach();
+  frontend.view().bell().halts.fetch_add(1);  // the first step of request_halt
+  ASSERT_TRUE(latch_.look());
+  EXPECT_FALSE(latch_.show(12));
+  EXPECT_EQ(requested_halt(frontend.view())->reason(), "");
+  put_halt(frontend.view(), 1, HaltCause::frontend, "pid 7 (python)", "it smokes");  // the second
+  const auto halt = requested_halt(frontend.view());
+  EXPECT_EQ(halt->cause, HaltCause::frontend);
+  EXPECT_EQ(halt->reason(), "it smokes");
+  EXPECT_EQ(halt->iteration, 12);
 }
 
 TEST_F(HaltWordTest, ANewerHaltThanTheOneThatWasSeenIsNotCleared) {

@@ -84,6 +84,7 @@ TEST_F(KillTest, EndsTheWaitsOfItsFrontendsAndLeavesTheHistory) {
       HasSubstr("was killed"));
 }
 
+// rule O10
 TEST_F(KillTest, LetsANewBackendTakeOverAtOnceWhileOldReadersReadOn) {
   StandingProcess backend(be_a_backend);
   const AttachedSegment old = attach();

@@ -61,6 +61,24 @@ TEST_F(LivenessTest, NoticesByItself) {
   while (liveness.lane(0).state != LaneState::alive) std::this_thread::yield();
 }
 
+TEST_F(LivenessTest, NoticesThatANameLeadsElsewhereAndNotThatABackendHasEnded) {
+  for (const bool commanders : {false, true}) {
+    const OwnedSegment segment = running_segment();
+    const LaneLiveness liveness(segment);
+    EXPECT_FALSE(liveness.nameless());
+    const std::string path = segment.names().names[commanders ? 1 : 0].path;
+    std::filesystem::rename(path, path + ".away");
+    while (!liveness.nameless()) std::this_thread::yield();
+    std::filesystem::remove(path + ".away");
+  }
+  OwnedSegment ended = running_segment();
+  const LaneLiveness liveness(ended);
+  ended.end_and_remove();
+  const std::uint32_t rounds = liveness.rounds();
+  while (liveness.rounds() < rounds + 10) std::this_thread::yield();
+  EXPECT_FALSE(liveness.nameless());
+}
+
 TEST_F(LivenessTest, SeesTheDeathOfAnOwnerAndTheLifeOfTheNext) {
   const OwnedSegment segment = running_segment();
   StandingProcess owner([](const StandingProcess::Stand& stand) {

@@ -1,19 +1,28 @@
 #include "memory/segment/owned_segment.hpp"
 
 #include <gmock/gmock.h>
+#include <signal.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <fstream>
+#include <optional>
 
+#include "memory/child_process.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "memory/segments.hpp"
 #include "o80/base/error.hpp"
+#include "o80/memory/segment_list.hpp"
 
 namespace o80 {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::ElementsAre;
+using ::testing::Field;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using OwnedSegmentTest = SegmentTest;
 
 struct stat status_of(const std::string& path) {
@@ -140,11 +149,54 @@ TEST_F(OwnedSegmentTest, CanBeMoved) {
 TEST_F(OwnedSegmentTest, DoesNotTakeAwayTheFileOfASuccessor) {
   OwnedSegment segment = running_segment();
   std::filesystem::remove(directory_.file_of("arm"));  // somebody cleaned by hand
-  const OwnedSegment next = OwnedSegment::create(small_spec());
+  std::ofstream(directory_.file_of("arm")) << "of somebody else";
 
   segment.remove();
 
   EXPECT_TRUE(std::filesystem::exists(directory_.file_of("arm")));
+}
+
+TEST_F(OwnedSegmentTest, IsFoundAndKeepsItsNameAfterItsFilesWereRemoved) {
+  std::optional<OwnedSegment> segment(running_segment());
+  EXPECT_THAT(list_segments(), ElementsAre(Field(&SegmentEntry::readable, true)));
+  std::filesystem::remove(directory_.file_of("arm"));
+  std::filesystem::remove(commands_path("arm", segment->epoch()));
+
+  EXPECT_THAT(
+      list_segments(),
+      ElementsAre(AllOf(
+          Field(&SegmentEntry::name, "arm"), Field(&SegmentEntry::life, Life::running),
+          Field(&SegmentEntry::pid, getpid()), Field(&SegmentEntry::problem, HasSubstr("kill")))));
+  EXPECT_THAT(message_of<SegmentTaken>([] { OwnedSegment::create(small_spec()); }),
+              AllOf(HasSubstr("(pid " + std::to_string(getpid())), HasSubstr("removed"),
+                    HasSubstr("o80 stop arm")));
+  ASSERT_EQ(mkfifo(directory_.file_of("arm").c_str(), 0600), 0);
+  EXPECT_THAT(list_segments(), Contains(Field(&SegmentEntry::pid, getpid())));
+  std::filesystem::remove(directory_.file_of("arm"));
+  segment.reset();
+  EXPECT_THAT(list_segments(), IsEmpty());
+  EXPECT_NO_THROW(OwnedSegment::create(small_spec()));
+}
+
+TEST_F(OwnedSegmentTest, ItsNameIsFreeAsSoonAsItsProcessIsKilledAlsoWhereAChildLives) {
+  ChildProcess owner([](const auto& ready) {
+    const OwnedSegment segment = running_segment();
+    if (fork() == 0) {
+      std::ofstream(segment_directory() + "/child") << getpid() << std::flush;
+      ready();
+    }
+    pause_for_ever();
+  });
+  ASSERT_TRUE(owner.wait_until_ready());
+  pid_t child = 0;
+  std::ifstream(segment_directory() + "/child") >> child;
+  ASSERT_GT(child, 0);
+  std::filesystem::remove(directory_.file_of("arm"));
+  EXPECT_THAT(list_segments(), ElementsAre(Field(&SegmentEntry::pid, owner.pid())));
+  owner.kill_now();
+  EXPECT_THAT(list_segments(), IsEmpty());
+  EXPECT_NO_THROW(OwnedSegment::create(small_spec()));
+  kill(child, SIGKILL);
 }
 
 }  // namespace

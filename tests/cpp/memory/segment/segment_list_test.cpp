@@ -18,7 +18,8 @@ using SegmentListTest = SegmentTest;
 TEST_F(SegmentListTest, ShowsEverySegmentByNameWithItsLife) {
   const OwnedSegment starting = OwnedSegment::create(small_spec("b"));
   const OwnedSegment running = running_segment(small_spec("a"));
-  running_segment(small_spec("c")).end(BackendState::failed);
+  OwnedSegment ending = running_segment(small_spec("c"));  // its process lives
+  ending.end(BackendState::failed);
   std::ofstream(directory_.file_of("d")) << "foreign";
   std::ofstream(directory_.path() + "/other") << "no segment at all";
 

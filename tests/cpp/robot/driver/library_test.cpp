@@ -1,8 +1,11 @@
 #include "robot/driver/library.hpp"
 
+#include <sys/stat.h>
+
 #include <cstdlib>
 #include <filesystem>
 #include <fstream>
+#include <iterator>
 
 #include "robot/puppet.hpp"
 
@@ -39,6 +42,32 @@ TEST_F(LibraryTest, FindsRobotsInThePathFirst) {
   int seen = 0;
   for (const RobotFile& robot : find_robots()) seen += robot.name == "two_joints" ? 1 : 0;
   EXPECT_EQ(seen, 1) << "the first of a name hides the others";
+}
+
+TEST_F(LibraryTest, ListsRobotsOnly) {
+  const std::string folder = directory_.path() + "/mixed";
+  fs::create_directories(folder);
+  fs::copy(kTwoJoints, folder + "/own.so");
+  fs::copy(kPrefix + "/lib/libo80.so", folder + "/foreign.so");  // has the name as a text
+  fs::create_directory(folder + "/folder.so");
+  ASSERT_EQ(mkfifo((folder + "/pipe.so").c_str(), 0600), 0);
+  std::ifstream file(kTwoJoints, std::ios::binary);
+  const std::string bytes{std::istreambuf_iterator<char>(file), {}};
+  for (std::size_t i = 0; i < 40; ++i) {
+    std::string broken = bytes.substr(0, bytes.size() * (i + 1) / 41);
+    if (i % 2 == 1) {  // whole, with a header that leads anywhere
+      broken = bytes;
+      broken[42 + i % 6] = static_cast<char>(0xFF);
+    }
+    std::ofstream(folder + "/broken" + std::to_string(i) + ".so", std::ios::binary) << broken;
+  }
+  setenv("O80_ROBOT_PATH", folder.c_str(), 1);
+  for (const RobotFile& robot : find_robots()) {
+    if (fs::path(robot.path).parent_path() == folder) {
+      EXPECT_EQ(robot.name, "own");
+    }
+  }
+  EXPECT_EQ(RobotLibrary::load("own").path, folder + "/own.so");
 }
 
 TEST_F(LibraryTest, SaysWhatThereIsAndWhereToLook) {

@@ -251,6 +251,7 @@ class Guarded {
 
   explicit Guarded(const Config& config) { now_.at.fill(config.start); }
   void describe(Schema& schema) const {
+    schema.simulated();
     schema.actuator(0).name("left").limits(
         {.minimum = -30, .maximum = 30, .speed = 20'000, .acceleration = 1e7, .jerk = 4e9});
     schema.actuator(1).name("right").limits({.minimum = -31, .maximum = 31});
@@ -318,6 +319,7 @@ class GroupEqualityTest : public StationTest {
   }
 };
 
+// rule G7
 TEST_F(GroupEqualityTest, HoldsForRandomRunsOfAPlantWithMemory) { expect_equality(drifter(), 40); }
 
 TEST_F(GroupEqualityTest, HoldsForLimitsInterruptsAndActuatorsThatFollow) {

@@ -112,6 +112,7 @@ TEST_F(InlineGroupTest, RunsOnlyTheChosenCopies) {
   EXPECT_EQ(burst.last_iteration(1), 8);
 }
 
+// rule G7
 TEST_F(InlineGroupTest, NamesTheCopyThatFailsAndRunsTheOthers) {
   InlineGroup group(drifter(), {}, group_of(5));
   GroupBurst burst(group, 2, 1, 4);

@@ -51,6 +51,7 @@ TEST_F(LoopHaltTest, ADriverHaltsWithItsReading) {
   EXPECT_EQ(Puppet::calls.halted, 1) << "the driver is told that a halt begins";
 }
 
+// rule H10
 TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
   const auto loop = bursting_loop();
   UntypedFrontend frontend("puppet");
@@ -83,6 +84,7 @@ TEST_F(LoopHaltTest, ADriverThatFailsToHaltEndsTheLoop) {
 
 // ------------------------------------------------------------------------------ readings
 
+// rule R7
 TEST_F(LoopHaltTest, AFirstReadingThatIsNoNumberIsAFaultThatNamesIt) {
   Puppet::on_read = [](Reading<Puppet>& reading) {
     reading.observed[1] = std::numeric_limits<double>::quiet_NaN();
@@ -92,6 +94,7 @@ TEST_F(LoopHaltTest, AFirstReadingThatIsNoNumberIsAFaultThatNamesIt) {
   EXPECT_EQ(Puppet::calls.stopped, 1);
 }
 
+// rule R7
 TEST_F(LoopHaltTest, SoIsOneOfAFreshStart) {
   const auto loop = bursting_loop();
   UntypedFrontend frontend("puppet");
@@ -118,6 +121,7 @@ void expect_braked(const std::vector<double>& written) {
   EXPECT_LE(std::abs(before), 0.01 + 1e-9) << "at rest when the driver is stopped";
 }
 
+// rule H12
 TEST_F(LoopHaltTest, AStopBrakesWithinTheLimitsAndThenStopsTheDriver) {
   Puppet::limits = {.speed = 1000.0, .acceleration = 1e6};  // of iterations: 0.1 and 0.01
   std::vector<double> written;
@@ -162,6 +166,7 @@ TEST_F(LoopHaltTest, ARobotThatDoesNothingIsStoppedAtOnce) {
   EXPECT_EQ(Puppet::calls.written, 0);
 }
 
+// rule H12
 TEST_F(LoopHaltTest, BrakingThatTakesTooLongIsCut) {
   Puppet::limits = {.speed = 1000.0, .acceleration = 1.0};  // a quarter of an hour to stop
   Loop loop = timed_loop();
@@ -181,6 +186,7 @@ TEST_F(LoopHaltTest, BrakingThatTakesTooLongIsCut) {
   EXPECT_EQ(Puppet::calls.stopped, 1);
 }
 
+// rule H13
 TEST_F(LoopHaltTest, AFailedVerbLeavesNoTimeForBraking) {
   Puppet::limits = {.speed = 1000.0, .acceleration = 1.0};
   Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{{"fails", "write"}}),
@@ -252,6 +258,7 @@ class ReadingTest : public LoopHaltTest {
   double fresh_offset_ = 0.0;  // of the reading of a fresh start
 };
 
+// rule R2
 TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
   Dice dice(3);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
@@ -304,6 +311,7 @@ TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
   }
 }
 
+// rule R4
 TEST_F(ReadingTest, OneTurnOffInEveryRowIsRefusedUntilItIsAccepted) {
   begin({.speed = 2.0, .error = 0.3});
   run(10);
@@ -323,6 +331,7 @@ TEST_F(ReadingTest, OneTurnOffInEveryRowIsRefusedUntilItIsAccepted) {
   EXPECT_EQ(written_, 6.283);
 }
 
+// rule R5
 TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
   Dice dice(5);
   for (int i = 0; i < readings_played(20); ++i) {
@@ -389,9 +398,10 @@ TEST_F(ReadingTest, OneWrongReadingThatHaltsItIsForgotten) {
   EXPECT_EQ(handle.status, Status::completed) << handle.text;
 }
 
+// rule R1
 TEST_F(ReadingTest, ARobotOfTheWorldCannotComeFarByARequest) {
   for (const bool of_the_world : {false, true}) {
-    Puppet::of_the_world = of_the_world;
+    Puppet::simulated = !of_the_world;
     begin({.speed = 2.0});
     run(10);
     add_request(*frontend_, Poke{.how = 2});  // it is at 7 and starts afresh
@@ -423,6 +433,7 @@ TEST_F(ReadingTest, AFreshStartBeforeAHaltIsNoStep) {
   EXPECT_EQ(handle.status, Status::completed) << handle.text;
 }
 
+// rule R6
 TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
   begin({});
   const std::uint64_t number = halt();
@@ -440,6 +451,7 @@ TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
   EXPECT_TRUE(is_alive());
 }
 
+// rule R2
 TEST_F(ReadingTest, RowZeroInRealTimeIsReadUntilTwoReadingsAgree) {
   Puppet::limits = {.speed = 2.0};
   int reads = 0;
@@ -498,12 +510,14 @@ TEST_F(GapTest, AVerbThatHangsAndReturnsHaltsWithItsLength) {
   EXPECT_EQ(cause_after(hang, 0), "");
 }
 
+// rule R1
 TEST_F(GapTest, ADriverDescribesAShorterOne) {
   const auto hang = [] { std::this_thread::sleep_for(std::chrono::milliseconds(300)); };
   Puppet::own_gap = 250'000'000;
   EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.25"));
-  Puppet::of_the_world = true;
-  EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.1:")) << "the default is less";
+  Puppet::simulated = false;
+  EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.1 s:"))
+      << "the default is less";
   Puppet::own_gap = 50'000'000;
   EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.05"));
   EXPECT_EQ(cause_after(hang, 3'600'000'000'000), "") << "an option has the last word";

@@ -238,6 +238,7 @@ TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
   EXPECT_EQ(Puppet::calls.stopped, 1);
 }
 
+// rule W9
 TEST_F(LoopTest, PublishesAnOverrunAndSkipsThePeriodsInsteadOfHurrying) {
   const auto loop = started({}, false);
   UntypedFrontend frontend("puppet");

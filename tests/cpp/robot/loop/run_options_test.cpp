@@ -89,6 +89,15 @@ TEST_F(RunOptionsTest, AreReadFromFlags) {
               ElementsAre(Pair("gain", "2.5"), Pair("finish_at", "7"), Pair("finish_at", "8")));
 }
 
+TEST_F(RunOptionsTest, TakeAbbreviationsOfOneOptionInBothSpellings) {
+  for (const char* word : {"--gai=30", "--finish-a=30", "--finish_a=30", "--finish=30"}) {
+    const OptionValues given = parse({word}).robot;
+    ASSERT_EQ(given.size(), 1U) << word;
+    EXPECT_EQ(given[0].second, "30");
+  }
+  EXPECT_EQ(refusal({"--f", "1"}), "--f may be --frequency, --fails, --finish-at: write it out");
+}
+
 TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
   EXPECT_THAT(refusal({"--frequency", "0"}), AllOf(HasSubstr("--frequency"), HasSubstr("from")));
   EXPECT_THAT(refusal({"--frequency", "fast"}), HasSubstr("'fast'"));

@@ -10,12 +10,15 @@
 #include <unistd.h>
 
 #include <array>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <map>
 
 #include "memory/child_process.hpp"
 #include "o80/base/time.hpp"
+#include "o80/memory/segment_list.hpp"
 #include "robot/puppet.hpp"
 
 namespace o80::test {
@@ -86,8 +89,22 @@ TEST_F(RunTest, SaysAtItsStartWhichNumbersAHaltStopsInOneIteration) {
                     Not(HasSubstr("powered"))));
 }
 
+/// All that end a process and can be caught; those of failed writes are ignored.
+std::vector<int> ending_signals() {
+  std::vector<int> numbers{SIGHUP,  SIGINT,    SIGQUIT, SIGILL,  SIGTRAP, SIGABRT, SIGBUS,
+                           SIGFPE,  SIGUSR1,   SIGSEGV, SIGUSR2, SIGALRM, SIGTERM, SIGSTKFLT,
+                           SIGXCPU, SIGVTALRM, SIGPROF, SIGIO,   SIGPWR,  SIGSYS};
+  for (int number = SIGRTMIN; number <= SIGRTMAX; number += 15) numbers.push_back(number);
+  return numbers;
+}
+
+// rule H12
 TEST_F(RunTest, RunsARobotLibraryUntilASignalStopsItInOrder) {
-  for (const int signal : {SIGINT, SIGTERM}) {
+#ifdef O80_TEST_SANITIZED
+  GTEST_SKIP() << "a sanitizer has handlers of its own";
+#endif
+  for (const int signal : ending_signals()) {
+    SCOPED_TRACE(strsignal(signal));
     Program program(two_joints({"--frequency", "500"}));
     ASSERT_TRUE(program.says("two_joints runs on segment 'two_joints', 500 Hz"));
     UntypedFrontend frontend("two_joints", {.timeout = kPatience});
@@ -99,6 +116,59 @@ TEST_F(RunTest, RunsARobotLibraryUntilASignalStopsItInOrder) {
     EXPECT_THROW(frontend.wait_for(1'000'000, kPatience), BackendStopped);
     EXPECT_EQ(directory_.files(), 0U) << "nothing is left behind";
   }
+}
+
+TEST_F(RunTest, ALibraryThatCallsExitStopsTheRobotFirst) {
+  for (const bool in_the_loop : {true, false}) {
+    ChildProcess child([&](const auto&) {
+      Puppet::on_write = [&](const Desired<Puppet>& desired) {
+        if (desired.iteration() != 3) return;
+        if (in_the_loop) std::exit(5);               // NOLINT(concurrency-mt-unsafe)
+        std::thread([] { std::exit(5); }).detach();  // NOLINT(concurrency-mt-unsafe)
+      };
+      run_here(table(), {"--frequency", "1000"});
+      pause_for_ever();
+    });
+    EXPECT_EQ(child.wait(), 5);
+    if (in_the_loop) {
+      EXPECT_THAT(
+          message_of<BackendFailed>([] { UntypedFrontend("puppet", {.timeout = kPatience}); }),
+          HasSubstr("called exit()"));
+    }
+    // in order: its files are removed, or say that it has stopped
+    for (const SegmentEntry& entry : list_segments())
+      EXPECT_EQ(entry.life, in_the_loop ? Life::failed : Life::stopped);
+    clean_dead();
+  }
+}
+
+// rule W10
+TEST_F(RunTest, HaltsItselfWhenItsFilesAreRemovedAndIsStillFoundAndStopped) {
+  Program program(two_joints({"--frequency", "500"}));
+  ASSERT_TRUE(program.says("runs on segment"));
+  UntypedFrontend frontend("two_joints", {.timeout = kPatience});
+  send(frontend, 0, 1.0, {.pace = iterations(1'000'000'000)});
+  for (const auto& file : std::filesystem::directory_iterator(directory_.path()))
+    std::filesystem::remove(file.path());
+  // a halt acts before its reason is written
+  while (frontend.halted().value_or(Halt{}).cause != HaltCause::unreachable)
+    std::this_thread::yield();
+  EXPECT_THAT(std::string(frontend.halted()->reason()),
+              HasSubstr("kill " + std::to_string(program.pid())));
+
+  Program second(two_joints());
+  const Outcome refused = second.end();
+  EXPECT_EQ(refused.code, 1);
+  EXPECT_THAT(refused.err, HasSubstr("(pid " + std::to_string(program.pid())));
+  EXPECT_THAT(message_of<TimeoutError>(
+                  [] { UntypedFrontend("two_joints", {.timeout = std::chrono::milliseconds(0)}); }),
+              AllOf(HasSubstr("files were removed"), Not(HasSubstr("Did you mean"))));
+  const std::vector<SegmentEntry> found = list_segments();
+  ASSERT_EQ(found.size(), 1U);
+  EXPECT_EQ(found[0].pid, program.pid());
+
+  program.signal(SIGTERM);
+  EXPECT_EQ(program.end().code, 0);
 }
 
 TEST_F(RunTest, ASignalEndsEvenALongPeriodAtOnce) {
@@ -135,6 +205,7 @@ TEST_F(RunTest, StopsWhenItsInputEndsIfToldSo) {
   EXPECT_EQ(directory_.files(), 0U);
 }
 
+// rule O11
 TEST_F(RunTest, ASecondOneOfTheNameDoesNotEvenConstructItsDriver) {
   Station owner({.segment = "puppet"});
   ::testing::internal::CaptureStderr();

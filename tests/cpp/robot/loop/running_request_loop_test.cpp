@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <functional>
 #include <memory>
 
 #include "robot/loop/loop.hpp"

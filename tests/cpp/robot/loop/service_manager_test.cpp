@@ -30,8 +30,7 @@ class Manager {
     const auto size = static_cast<socklen_t>(offsetof(sockaddr_un, sun_path) + path.size());
     EXPECT_EQ(bind(socket_, reinterpret_cast<const sockaddr*>(&address), size), 0);
   }
-  Manager(const Manager&) = delete;
-  Manager& operator=(const Manager&) = delete;
+  Manager& operator=(Manager&&) = delete;
   ~Manager() { ::close(socket_); }
 
   void invite() const { setenv("NOTIFY_SOCKET", path_.c_str(), 1); }

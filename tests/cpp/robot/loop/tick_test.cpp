@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
-#include <thread>
+#include <optional>
 
 #include "o80/robot/make_table.hpp"
 #include "robot/loop/loop.hpp"
@@ -30,6 +30,7 @@ class Ticking {
   static inline std::function<void()> on_wait;
 
   explicit Ticking(const Config&) {}
+  void describe(Schema& schema) const { schema.simulated(); }
   void start() {}
   void write(const Desired<Ticking>& desired) { now_ = desired.states; }
   void read(Reading<Ticking>& reading) {
@@ -66,16 +67,50 @@ class TickTest : public StationTest {
   }
 };
 
-TEST_F(TickTest, AWaitThatReturnsAtOnceIsAFaultBeforeItMovesTheRobotFar) {
+TEST_F(TickTest, AWaitThatReturnsAtOnceHaltsAndTheRobotDoesNotBrakeFasterThanItMay) {
   Ticking::in_time = 20;
   const auto loop = make({.segment = "ticking", .period = 1'000'000});
+  Ticking::on_read = [](Reading<Ticking>& reading) {
+    if (reading.iteration() == 100) reading.finish();
+  };
   loop->start();
-  const Ended ended = loop->run();
-  EXPECT_FALSE(ended.in_order);
-  EXPECT_THAT(ended.fault, AllOf(HasSubstr("failed in wait"), HasSubstr("ticks came in"),
-                                 HasSubstr("--frequency"), HasSubstr("wait")));
-  EXPECT_EQ(Ticking::stopped, 1);
-  EXPECT_GE(loop->backend().iteration(), 20 + 10);
+  const UntypedFrontend frontend("ticking");
+  EXPECT_TRUE(loop->run().in_order);
+  const auto halt = frontend.halted();
+  ASSERT_TRUE(halt);
+  EXPECT_EQ(halt->cause, HaltCause::overruns);
+  EXPECT_EQ(halt->number, 1U) << "one halt, however long it goes on";
+  EXPECT_THAT(halt->reason(), AllOf(HasSubstr("ticks of the robot came in"), HasSubstr("jitter"),
+                                    HasSubstr("--frequency"), HasSubstr("wait() returns")));
+  EXPECT_GE(halt->iteration, 20 + 10);
+  const auto time = [&](std::int64_t i) { return frontend.wait_for(i, kPatience).head().time; };
+  EXPECT_GE(time(100) - time(20), (80 - 12) * 980'000) << "the loop itself waits";
+}
+
+TEST_F(TickTest, JitterOfTheRobotsClockHaltsAndAResumeGoesOn) {
+  const auto loop = make({.segment = "ticking", .period = 1'000'000});
+  std::optional<UntypedFrontend> frontend;
+  Ticking::on_wait = [waits = 0]() mutable {
+    ++waits;
+    if (waits > 50 && waits < 250) return;  // many ticks that come together
+    const std::int64_t until = monotonic_now() + 1'000'000;
+    while (!sleep_until(until)) {
+    }
+  };
+  Ticking::in_time = 0;
+  std::uint64_t number = 0;
+  Ticking::on_read = [&](Reading<Ticking>& reading) {
+    if (reading.iteration() == 300 && !reading.fresh()) {
+      if (const auto halt = frontend->halted()) number = halt->number;
+      send_resume(*frontend, number);
+    }
+    if (reading.iteration() == 330) reading.finish();
+  };
+  loop->start();
+  frontend.emplace("ticking");
+  EXPECT_TRUE(loop->run().in_order);
+  EXPECT_EQ(number, 1U);
+  EXPECT_FALSE(frontend->halted());
 }
 
 TEST_F(TickTest, ATickWithoutAReadingCountsInItsRowLikeAnOverrun) {
@@ -108,6 +143,7 @@ TEST_F(TickTest, TooManyTicksWithoutAReadingHalt) {
   EXPECT_LE(frontend.halted()->iteration, 4);
 }
 
+// rule W9
 TEST_F(TickTest, TheStepAfterMissedTicksIsNotLarger) {
   const auto loop = make({.segment = "ticking", .period = 1'000'000});
   Ticking::on_wait = [waits = 0]() mutable {

@@ -12,6 +12,7 @@ using ::testing::HasSubstr;
 
 class BackendTest : public StationTest {};
 
+// rule O1
 TEST_F(BackendTest, RowZeroIsTheRobotBeforeAnythingWasAsked) {
   Station station;
   station.now = {0.25, -0.5};
@@ -25,6 +26,7 @@ TEST_F(BackendTest, RowZeroIsTheRobotBeforeAnythingWasAsked) {
   EXPECT_FALSE(row.active(0));
 }
 
+// rule O2
 TEST_F(BackendTest, ARowShowsWhatWasAskedAndWhatCameOfIt) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -62,6 +64,7 @@ TEST_F(BackendTest, TakesABatchWholeForAllActuators) {
   EXPECT_EQ(batch.last_iteration(), 5);
 }
 
+// rule B2
 TEST_F(BackendTest, TakesBatchesInTheOrderOfTheirPulsesAcrossFrontends) {
   StartedStation station;
   UntypedFrontend one("pair");
@@ -82,6 +85,7 @@ TEST_F(BackendTest, TakesBatchesInTheOrderOfTheirPulsesAcrossFrontends) {
   EXPECT_EQ(second.handle(0).status, Status::completed);
 }
 
+// rule B3
 TEST_F(BackendTest, TakesABatchAtItsIterationExactly) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -99,6 +103,7 @@ TEST_F(BackendTest, TakesABatchAtItsIterationExactly) {
   EXPECT_EQ(now.first_iteration(), 1);
 }
 
+// rule B3
 TEST_F(BackendTest, RejectsABatchWhoseIterationHasBegunUnlessItMayBeLate) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -118,6 +123,7 @@ TEST_F(BackendTest, RejectsABatchWhoseIterationHasBegunUnlessItMayBeLate) {
   EXPECT_THROW(frontend.pulse({.at = -7}), InvalidArgument);
 }
 
+// rule S2
 TEST_F(BackendTest, NothingIsCompletedBeforeItsRowIsOut) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -142,6 +148,7 @@ TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
   EXPECT_THROW(batch.wait(kPatience), BackendFailed);
 }
 
+// rule B1
 TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -198,6 +205,7 @@ TEST_F(BackendTest, InterruptsAnActuatorInTheIterationUnderWay) {
   EXPECT_THAT(desired(frontend, 3, 5, 1), ElementsAre(3, 4, 5));
 }
 
+// rule O8
 TEST_F(BackendTest, TellsTimeByTheIterationWhenItBursts) {
   StartedStation station({.segment = "pair", .period = 2'000'000, .bursting = true});
   UntypedFrontend frontend("pair");
@@ -219,8 +227,9 @@ TEST_F(BackendTest, PublishesTheTimingOfThePeriods) {
 }
 
 TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
-  EXPECT_THAT(message_of<InvalidArgument>([] { Station({.segment = "pair", .period = -1}); }),
-              HasSubstr("period must be positive, got -1 ns"));
+  EXPECT_THAT(
+      message_of<InvalidArgument>([] { Station({.segment = "pair", .period = -2'000'000'000}); }),
+      HasSubstr("period must be positive, got -2 s"));
   EXPECT_THAT(message_of<InvalidArgument>(
                   [] { Station({.segment = "pair", .stale = Stale::hold, .silence = 1000}); }),
               HasSubstr("purge, halt or stop"));
@@ -234,6 +243,7 @@ TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
 
 // ------------------------------------------------------------------------------ requests
 
+// rule O12
 TEST_F(BackendTest, StartsAfreshInARowOfItsOwn) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -312,6 +322,7 @@ TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {
 
 // ------------------------------------------------------------------------------ stopping
 
+// rule S6
 TEST_F(BackendTest, EndsEveryCommandWhenItStops) {
   StartedStation station;
   UntypedFrontend frontend("pair");

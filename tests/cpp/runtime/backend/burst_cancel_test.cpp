@@ -3,9 +3,7 @@
 
 #include <gtest/gtest.h>
 
-#include <array>
 #include <optional>
-#include <utility>
 #include <vector>
 
 #include "runtime/station.hpp"
@@ -21,6 +19,7 @@ class BurstCancelTest : public StationTest {
   StartedStation station{{.segment = "pair", .bursting = true}};
 };
 
+// rule G3
 TEST_F(BurstCancelTest, ACancelledBurstEndsAfterTheIterationUnderWay) {
   UntypedFrontend frontend("pair");
   const Burst burst = frontend.start_burst(1'000'000'000'000'000);
@@ -47,6 +46,7 @@ TEST_F(BurstCancelTest, OneThatHasNotBegunRunsNoIterationAndNoOtherIsTouched) {
   EXPECT_EQ(third.wait(kAtOnce).iteration(), 5);
 }
 
+// rule G3
 TEST_F(BurstCancelTest, WhatWasSentWithItStaysQueued) {
   UntypedFrontend frontend("pair");
   add(frontend, 0, 8.0, {.pace = iterations(8)});
@@ -69,6 +69,7 @@ TEST_F(BurstCancelTest, ItEndsWhenItsSenderCloses) {
   EXPECT_EQ(station.last(), 2);
 }
 
+// rule G3
 TEST_F(BurstCancelTest, AnotherFrontendEndsItByNeitherCloseNorPurge) {
   UntypedFrontend frontend("pair");
   std::optional<UntypedFrontend> other("pair");
@@ -116,6 +117,7 @@ TEST_F(BurstCancelTest, ABurstThatWasStartedCanBeWaitedForAgainAfterATimeout) {
 
 // ------------------------------------------------------------------------------ groups
 
+// rule G5
 TEST_F(BurstCancelTest, NoMemberOfAGroupMovesIfOneCannot) {
   UntypedFrontend frontend("pair");
   add(frontend, 0, 1.0);  // goes with no burst that is refused

@@ -1,5 +1,4 @@
 #include <atomic>
-#include <memory>
 
 #include "memory/child_process.hpp"
 #include "runtime/station.hpp"
@@ -18,6 +17,7 @@ void wait_until_it_runs(const UntypedFrontend& frontend) {
   while (frontend.published() < 10) std::this_thread::yield();
 }
 
+// rule G1
 TEST_F(BurstTest, RunsExactlyAsManyIterationsAndReturnsTheLastRow) {
   BurstingStation bursting;
   UntypedFrontend frontend("pair");
@@ -28,6 +28,7 @@ TEST_F(BurstTest, RunsExactlyAsManyIterationsAndReturnsTheLastRow) {
               HasSubstr("waits for a burst"));
 }
 
+// rule G2
 TEST_F(BurstTest, WhatIsSentWithItActsFromItsFirstIteration) {
   BurstingStation bursting;
   UntypedFrontend frontend("pair");
@@ -72,6 +73,7 @@ TEST_F(BurstTest, OfMoreRowsThanTheHistoryKeepsIsAnErrorAtOnce) {
   EXPECT_EQ(frontend.published(), 0);
 }
 
+// rule G2
 TEST_F(BurstTest, NothingSentLaterActsInIt) {
   StartedStation station({.segment = "pair", .bursting = true});
   UntypedFrontend one("pair");
@@ -115,6 +117,7 @@ TEST_F(BurstTest, StagesAllThatWasSentBeforeIt) {
   EXPECT_EQ(one.published(), 3);
 }
 
+// rule G4
 TEST_F(BurstTest, AMovementIsBurstToItsEnd) {
   BurstingStation bursting;
   UntypedFrontend frontend("pair");
@@ -161,6 +164,7 @@ TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
   EXPECT_EQ(frontend.published(), 4);
 }
 
+// rule G1
 TEST_F(BurstTest, OfABackendWithAClockOfItsOwnIsAnErrorAtOnce) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -279,6 +283,7 @@ TEST_F(BurstTest, AFrontendThatDiesInABurstLeavesTheBackendUsable) {
   ::close(gate[1]);
 }
 
+// rule G6
 TEST_F(BurstTest, TwoRunsOfTheSameScriptGiveHistoriesIdenticalBitForBit) {
   const auto play = [] {
     BurstingStation bursting;

@@ -8,6 +8,7 @@ namespace {
 using ::testing::HasSubstr;
 using ExclusiveControl = StationTest;
 
+// rule B5
 TEST_F(ExclusiveControl, WhoHasControlHasItAlone) {
   StartedStation station;
   UntypedFrontend holder("pair");

@@ -43,6 +43,7 @@ class ExpressTest : public StationTest {
   std::vector<Batch> floods;
 };
 
+// rule B8
 TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOtherLanes) {
   UntypedFrontend one("pair");
   const Batch moving = send(one, 0, 9.0, {.pace = iterations(1000)});
@@ -186,6 +187,7 @@ TEST_F(ExpressTest, APurgeEndsWhatWaitsForALaterIterationIfItWasSentBefore) {
   EXPECT_EQ(after.handle(0).status, Status::completed);
 }
 
+// rule B4
 TEST_F(ExpressTest, WhoMayCommandIsDecidedWhenABatchActs) {
   UntypedFrontend one("pair");
   UntypedFrontend two("pair");

@@ -3,8 +3,6 @@
 #include <gtest/gtest.h>
 
 #include <array>
-#include <cmath>
-#include <optional>
 #include <vector>
 
 #include "runtime/station.hpp"
@@ -79,6 +77,7 @@ TEST_F(GroupCommandTest, IsRefusedWholeWithTheReason) {
   EXPECT_EQ(refusal({1, 0}, {0.5, 2.0}), "");
 }
 
+// rule C13
 TEST_F(GroupCommandTest, MovesSmoothlyIfOneOfItsActuatorsDoesByDefault) {
   StartedStation station({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.speed = 1e6, .acceleration = 1e9});

@@ -12,6 +12,7 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using HaltBurstTest = StationTest;
 
+// rule H5
 TEST_F(HaltBurstTest, AHaltEndsABurstAfterTheIterationUnderWay) {
   for (const bool to_end : {false, true}) {
     BurstingStation bursting("pair", [](Station& station) {
@@ -32,6 +33,7 @@ TEST_F(HaltBurstTest, AHaltEndsABurstAfterTheIterationUnderWay) {
   }
 }
 
+// rule H7
 TEST_F(HaltBurstTest, BurstsAreServedWhileHalted) {
   BurstingStation bursting;
   UntypedFrontend frontend("pair");

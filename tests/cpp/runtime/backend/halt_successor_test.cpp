@@ -5,7 +5,6 @@
 #include <optional>
 
 #include "memory/child_process.hpp"
-#include "o80/base/error.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {
@@ -64,6 +63,7 @@ std::optional<Halt> halt_of_successor(Before before, BackendOptions options = {.
   return halt;
 }
 
+// rule H11
 TEST_F(HaltSuccessorTest, OfABackendThatWasKilledWhileItActedStartsHalted) {
   const auto halt = halt_of_successor(Before::acting);
   ASSERT_TRUE(halt);
@@ -71,6 +71,7 @@ TEST_F(HaltSuccessorTest, OfABackendThatWasKilledWhileItActedStartsHalted) {
   EXPECT_THAT(std::string(halt->reason()), HasSubstr("killed while commands were active"));
 }
 
+// rule H11
 TEST_F(HaltSuccessorTest, OfAHaltedBackendStartsHalted) {
   for (const Before before : {Before::halted, Before::requested}) {
     const auto halt = halt_of_successor(before);
@@ -95,6 +96,7 @@ TEST_F(HaltSuccessorTest, OfAHaltedBackendWithoutARowStartsHaltedToo) {
   EXPECT_TRUE(UntypedFrontend("pair").halted());
 }
 
+// rule H11
 TEST_F(HaltSuccessorTest, OfAnyOtherBackendDoesNot) {
   EXPECT_FALSE(halt_of_successor(Before::idle));
   EXPECT_FALSE(halt_of_successor(Before::resumed));

@@ -2,8 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cmath>
-
 #include "control/batch/batch_builder.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/station.hpp"
@@ -19,6 +17,7 @@ std::uint32_t halted_in_row(const UntypedFrontend& frontend, Iteration k) {
   return frontend.wait_for(k, kAtOnce).head().halted;
 }
 
+// rules H3, H6
 TEST_F(HaltTest, ActsInTheFirstStepBegunAfterIt) {
   StartedStation station;
   UntypedFrontend commander("pair");
@@ -59,6 +58,7 @@ TEST_F(HaltTest, AReadOnlyFrontendMayNotHalt) {
   EXPECT_FALSE(reader.halted());
 }
 
+// rule H7
 TEST_F(HaltTest, CommandsAreRejectedWithCauseIterationAndWho) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -90,6 +90,7 @@ TEST_F(HaltTest, NoRequestIsServedThatWasSentAfterAHaltInTheSameStep) {
   EXPECT_EQ(request.handle(0).status, Status::halted);
 }
 
+// rule H4
 TEST_F(HaltTest, EndsWhatWasSentBeforeItWhereverItIs) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -148,6 +149,7 @@ TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
   EXPECT_EQ(desired(frontend.latest()), 0.0);
 }
 
+// rule H1
 TEST_F(HaltTest, NobodysExclusiveControlStopsIt) {
   StartedStation station;
   UntypedFrontend holder("pair");
@@ -161,6 +163,7 @@ TEST_F(HaltTest, NobodysExclusiveControlStopsIt) {
   EXPECT_EQ(batch.handle(1).status, Status::halted);
 }
 
+// rule H1
 TEST_F(HaltTest, NeedsNoLane) {
   StartedStation station({.segment = "pair", .lanes = 1});
   UntypedFrontend holder("pair");
@@ -172,6 +175,7 @@ TEST_F(HaltTest, NeedsNoLane) {
   EXPECT_EQ(batch.handle(0).status, Status::halted);
 }
 
+// rule H3
 TEST_F(HaltTest, IsLatchedBeforeRowZero) {
   Station station;
   halt("pair", "not today", kPatience);
@@ -197,6 +201,7 @@ TEST_F(HaltTest, IsTheBackendsOwnTooAndOnceForEachCause) {
   EXPECT_EQ(halt->reason(), "motor 3 is hot");
 }
 
+// rule H8
 TEST_F(HaltTest, OfTheBackendForAnotherReasonIsAnotherOne) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -244,6 +249,7 @@ TEST_F(HaltTest, AStatusBearsNoReasonOfALaterHalt) {
   EXPECT_THAT(third.handle(0).text, HasSubstr("the third"));
 }
 
+// rule L8
 TEST_F(HaltTest, ARobotThatIsNotWhereItShouldBeHalts) {
   StartedStation station({.segment = "pair"},
                          [](Schema& schema) { schema.actuator(1).limits({.error = 0.25}); });

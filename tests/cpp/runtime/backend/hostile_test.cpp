@@ -265,6 +265,7 @@ TEST_F(HostileTest, ABackendThatStandsStillHearsOfABurstWhoseBellWasPutBack) {
   silence.join();
 }
 
+// rule B5
 TEST_F(HostileTest, ControlFallsWithADeadHolderWhateverItWroteAboutItself) {
   StartedStation station;
   const SharedScene scene;

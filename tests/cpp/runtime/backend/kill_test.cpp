@@ -26,8 +26,7 @@ class Commander {
       pause_for_ever();
     });
   }
-  Commander(const Commander&) = delete;
-  Commander& operator=(const Commander&) = delete;
+  Commander& operator=(Commander&&) = delete;
   ~Commander() {
     ::close(gate_[0]);
     ::close(gate_[1]);
@@ -43,6 +42,7 @@ class Commander {
   std::optional<ChildProcess> child_;
 };
 
+// rule W5
 TEST_F(KillTest, TheBackendGoesOnWhenACommandingFrontendIsKilledAndTheNextOneCommands) {
   Commander commander;
   StartedStation station({.segment = "pair", .lanes = 1});

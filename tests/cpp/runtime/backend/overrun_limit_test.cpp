@@ -40,6 +40,7 @@ TEST_F(OverrunLimitTest, HaltsTheBackend) {
   EXPECT_EQ(frontend.halted()->cause, HaltCause::overruns);
 }
 
+// rule W8
 TEST(GapLimit, IsExceededByOneLongGapOnly) {
   constexpr std::int64_t kMs = 1'000'000;
   GapLimit limit(100 * kMs);

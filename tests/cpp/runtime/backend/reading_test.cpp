@@ -6,7 +6,6 @@
 #include <limits>
 #include <random>
 
-#include "o80/base/error.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "readings_played.hpp"
 #include "runtime/station.hpp"
@@ -36,6 +35,7 @@ bool publish(UntypedBackend& backend, double shoulder) {
   return backend.publish();
 }
 
+// rule R3
 TEST_F(EmbeddedReadingTest, OfRowZeroMustLieWithinItsBounds) {
   UntypedBackend backend(pair_with(kLimits), {.segment = "pair"});
   for (const double wrong : {2.31, -2.31, 1e300, kInfinity, std::nan("")}) {
@@ -102,6 +102,7 @@ class Follower {
   double written = 0.0;
 };
 
+// rule R2
 TEST_F(FollowerTest, IsCommandedOnlyFromWhereItCanBe) {
   std::mt19937 random(9);
   const auto uniform = [&](double low, double high) {

@@ -16,6 +16,7 @@ namespace {
 using ::testing::HasSubstr;
 using ResumeTest = StationTest;
 
+// rule H10
 TEST_F(ResumeTest, StartsAfreshFromWhereTheRobotIs) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -61,6 +62,7 @@ TEST_F(ResumeTest, OfAHaltThatWasRequestedInTheSameStepClearsIt) {
       << "the halt acts after its resume was reported as completed";
 }
 
+// rule H10
 TEST_F(ResumeTest, IsRefusedUntilTheRobotHasBraked) {
   // a backend that stands still latches a halt without an iteration in which it could brake
   BurstingStation bursting("pair", {}, [](Schema& schema) {
@@ -82,6 +84,7 @@ TEST_F(ResumeTest, IsRefusedUntilTheRobotHasBraked) {
   EXPECT_EQ(desired(frontend.latest()), desired(frontend.wait_for(15, kAtOnce)));
 }
 
+// rule H9
 TEST_F(ResumeTest, ClearsNoHaltThatCameAfterTheOneItNames) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -100,6 +103,7 @@ TEST_F(ResumeTest, ClearsNoHaltThatCameAfterTheOneItNames) {
   EXPECT_EQ(frontend.halted()->reason(), "second");
 }
 
+// rule H9
 TEST_F(ResumeTest, LosesAgainstALaterHaltInTheSameIteration) {
   StartedStation station;
   UntypedFrontend frontend("pair");
@@ -137,22 +141,37 @@ TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
   EXPECT_TRUE(frontend.halted());
 }
 
+/// A shoulder that needs ten iterations to rest.
+struct Moving {
+  Moving() {
+    send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
+    station.run(20);
+  }
+  /// What it says, while another thread iterates.
+  std::string resume(std::uint64_t number, const KeepWaiting& keep_waiting = {}) {
+    std::atomic<bool> over{false};
+    std::thread loop([&] {
+      while (!over) {
+        station.iterate();
+        std::this_thread::yield();
+      }
+    });
+    std::string refused =
+        message_of<Error>([&] { frontend.resume(number, kPatience, keep_waiting); });
+    over = true;
+    loop.join();
+    return refused;
+  }
+
+  StartedStation station{{.segment = "pair"}, limit_shoulder};
+  UntypedFrontend frontend{"pair"};
+};
+
 TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
-  StartedStation station({.segment = "pair"}, limit_shoulder);
-  UntypedFrontend frontend("pair");
-  send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
-  station.run(20);
+  Moving moving;
+  UntypedFrontend& frontend = moving.frontend;
   const std::uint64_t number = frontend.halt("the ball is on the floor");
-  std::atomic<bool> over{false};
-  std::thread loop([&] {
-    while (!over) {
-      station.iterate();
-      std::this_thread::yield();
-    }
-  });
-  const std::string refused = message_of<Error>([&] { frontend.resume(number, kPatience); });
-  over = true;
-  loop.join();
+  const std::string refused = moving.resume(number);
   EXPECT_EQ(refused, "");
   EXPECT_FALSE(frontend.halted());
   double before = 0.1;
@@ -167,35 +186,21 @@ TEST_F(ResumeTest, OfAFrontendWaitsUntilTheRobotRests) {
 }
 
 TEST_F(ResumeTest, OfAFrontendCanBeCalledOffHoweverFastRowsCome) {
-  StartedStation station({.segment = "pair"}, limit_shoulder);
-  UntypedFrontend frontend("pair");
-  send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
-  station.run(20);
+  Moving moving;
+  UntypedFrontend& frontend = moving.frontend;
   const std::uint64_t number = frontend.halt("");
-  std::atomic<bool> over{false};
-  std::thread loop([&] {
-    while (!over) {
-      station.iterate();
-      std::this_thread::yield();
-    }
-  });
-  const std::string refused = message_of<Error>(
-      [&] { frontend.resume(number, kPatience, []() -> bool { throw Error("Ctrl-C"); }); });
-  over = true;
-  loop.join();
+  const std::string refused = moving.resume(number, []() -> bool { throw Error("Ctrl-C"); });
   EXPECT_EQ(refused, "Ctrl-C");
   EXPECT_TRUE(frontend.halted());
 }
 
 TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
-  StartedStation station({.segment = "pair"}, limit_shoulder);
-  UntypedFrontend frontend("pair");
-  send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
-  station.run(20);
+  Moving moving;
+  UntypedFrontend& frontend = moving.frontend;
   const std::uint64_t number = frontend.halt("");
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
               HasSubstr("is not in force yet"));
-  station.run(1);
+  moving.station.run(1);
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
               HasSubstr("still brakes"));
 }
@@ -232,6 +237,7 @@ TEST_F(ResumeTest, WithoutAHaltChangesNothing) {
   EXPECT_EQ(running.handle(0).status, Status::active);
 }
 
+// rule H7
 TEST_F(ResumeTest, IsNotNeededByRequestsThatAreServedWhileHalted) {
   StartedStation station;
   UntypedFrontend frontend("pair");

@@ -95,6 +95,7 @@ class RunningRequestTest : public StationTest {
   UntypedFrontend frontend{"pair"};
 };
 
+// rule B10
 TEST_F(RunningRequestTest, IsActiveUntilTheDriverEndsIt) {
   const Batch batch = ask<Home>(frontend);
   station.run(3);
@@ -255,6 +256,7 @@ TEST_F(RunningRequestTest, APurgeLeavesItRunning) {
   EXPECT_EQ(batch.handle(0).status, Status::active);
 }
 
+// rule B10
 TEST_F(RunningRequestTest, AHaltEndsItAndADriverThatEndsItLaterChangesNothing) {
   const Batch batch = home();
   bool ran = true;

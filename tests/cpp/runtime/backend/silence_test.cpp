@@ -18,6 +18,7 @@ BackendOptions watched(Stale stale, std::int64_t silence = 5) {
   return {.segment = "pair", .stale = stale, .silence = silence};
 }
 
+// rule W1
 TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
   StartedStation station(watched(Stale::purge));
   UntypedFrontend frontend("pair");
@@ -30,6 +31,7 @@ TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
   EXPECT_EQ(desired(frontend.latest()), 6.0) << "five iterations after the batch";
 }
 
+// rule K11
 TEST_F(SilenceTest, AStarvedPlanActsAndAClosedOneDoesNot) {
   enum class Closed { no, by_its_last_chunk, by_order };
   for (const Closed closed : {Closed::no, Closed::by_its_last_chunk, Closed::by_order}) {
@@ -57,6 +59,7 @@ TEST_F(SilenceTest, AStarvedPlanActsAndAClosedOneDoesNot) {
   }
 }
 
+// rule W7
 TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
   StartedStation station(watched(Stale::purge, 50));
   UntypedFrontend silent("pair");
@@ -97,6 +100,7 @@ TEST_F(SilenceTest, CountsNoPeriodsThatWereMissedWhileHalted) {
   EXPECT_EQ(refused.rejected_by(), Reason::exclusive) << "the holder has kept its control";
 }
 
+// rule W4
 TEST_F(SilenceTest, EndsWhatTheSilentCommanderHasScheduled) {
   StartedStation station(watched(Stale::purge));
   UntypedFrontend silent("pair");
@@ -203,6 +207,7 @@ TEST_F(SilenceTest, ControlIsSomethingThatActsAndEnds) {
   EXPECT_EQ(taken.handle(0).status, Status::completed);
 }
 
+// rule W2
 TEST_F(SilenceTest, KeepAliveAndPulsesAreLife) {
   StartedStation station(watched(Stale::purge));
   UntypedFrontend frontend("pair");
@@ -232,6 +237,7 @@ TEST_F(SilenceTest, LifeCountsFromWhenItWasShown) {
   EXPECT_EQ(batch.handle(0).iteration, 15);
 }
 
+// rule W2
 TEST_F(SilenceTest, ReadingIsNoLife) {
   StartedStation station(watched(Stale::purge));
   UntypedFrontend frontend("pair");
@@ -246,6 +252,7 @@ TEST_F(SilenceTest, ReadingIsNoLife) {
   EXPECT_EQ(batch.handle(0).status, Status::purged);
 }
 
+// rule W2
 TEST_F(SilenceTest, AWaitForOnesOwnBatchIsLife) {
   StartedStation station(watched(Stale::purge, 3));
   UntypedFrontend frontend("pair");
@@ -269,6 +276,7 @@ TEST_F(SilenceTest, NothingThatActsNoSilence) {
   EXPECT_EQ(batch.handle(0).status, Status::active) << "nor is the time before counted";
 }
 
+// rule W3
 TEST_F(SilenceTest, ABurstIsItsSendersLifeAndStandingStillCountsNone) {
   BackendOptions options = watched(Stale::purge);
   options.bursting = true;
@@ -322,6 +330,7 @@ void rest_at_zero(Schema& schema) {
   schema.limits.at(schema.actuators.at(0).first_limit).resting = 1;
 }
 
+// rule W1
 TEST_F(SilenceTest, ADirectValueThatStillActsCountsAlthoughNothingIsQueued) {
   StartedStation station(watched(Stale::purge), rest_at_zero);
   UntypedFrontend frontend("pair");
@@ -333,6 +342,7 @@ TEST_F(SilenceTest, ADirectValueThatStillActsCountsAlthoughNothingIsQueued) {
   EXPECT_EQ(desired(frontend.latest()), 0.0) << "but not when its sender hangs";
 }
 
+// rule W6
 TEST_F(SilenceTest, WithoutAWatchdogADirectValueThatDoesNotRestIsRefused) {
   StartedStation station({.segment = "pair"}, rest_at_zero);
   UntypedFrontend frontend("pair");
@@ -358,6 +368,7 @@ TEST_F(SilenceTest, TheSchemaTellsFrontends) {
   EXPECT_EQ(frontend.schema().head.stale, Stale::halt);
 }
 
+// rule W4
 TEST_F(SilenceTest, HaltsUnlessAnotherPolicyIsAskedFor) {
   const Station watched_station({.segment = "watched", .silence = 7});
   const Station other({.segment = "other"});
@@ -366,6 +377,7 @@ TEST_F(SilenceTest, HaltsUnlessAnotherPolicyIsAskedFor) {
   EXPECT_EQ(other.backend.schema().head.stale, Stale::hold);
 }
 
+// rule W5
 TEST_F(SilenceTest, ADeadCommanderHaltsIfToldSo) {
   StartedStation station({.segment = "pair", .stale = Stale::halt});
   StandingProcess child([](const StandingProcess::Stand& stand) {

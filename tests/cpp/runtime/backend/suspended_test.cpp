@@ -4,9 +4,6 @@
 #include <gmock/gmock.h>
 #include <signal.h>
 
-#include <memory>
-#include <optional>
-
 #include "memory/child_process.hpp"
 #include "memory/segment/liveness.hpp"
 #include "o80/base/time.hpp"

@@ -9,7 +9,6 @@
 #include <fstream>
 
 #include "memory/child_process.hpp"
-#include "o80/base/time.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {

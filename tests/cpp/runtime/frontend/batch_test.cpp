@@ -46,6 +46,7 @@ TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
   EXPECT_THROW(static_cast<void>(batch.handle(4)), InvalidArgument);
 }
 
+// rule B11
 TEST_F(BatchTest, TellsHowLateItsDecisionWas) {
   StartedStation station({.segment = "pair", .history = 8, .lane_blocks = 16});
   UntypedFrontend frontend("pair");
@@ -127,6 +128,7 @@ TEST_F(BatchTest, TheEndOfAnOldCommandDisturbsNoNewOne) {
   }
 }
 
+// rule S3
 TEST_F(BatchTest, NeverForgetsWhatStillRunsHoweverMuchIsSentMeanwhile) {
   StartedStation station({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");

@@ -71,12 +71,19 @@ TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
   StartedStation station;
   UntypedFrontend frontend("pair");
   const std::array<double, 3> rows{1, 2, 4};
+  constexpr std::int64_t kMs = 1'000'000;  // the period
   const auto add_with = [&](std::vector<std::int64_t> times, CommandOptions options = {}) {
     return message_of<InvalidArgument>(
         [&] { frontend.add_trajectory(0, 3, std::as_bytes(std::span(rows)), options, times); });
   };
   EXPECT_THAT(add_with({1000, 2000}), HasSubstr("3 rows needs as many times"));
-  EXPECT_THAT(add_with({1000, 3000, 2000}), HasSubstr("must grow"));
+  const std::string grow = "must grow from 0, by an iteration at least: ";
+  EXPECT_THAT(add_with({kMs, 3 * kMs, 2 * kMs}),
+              HasSubstr(grow + "row 2 is due after 0.002 s, the row before after 0.003 s"));
+  EXPECT_THAT(add_with({kMs, kMs, 2 * kMs}), HasSubstr(grow + "row 1 is"));
+  EXPECT_THAT(add_with({0, kMs, 2 * kMs}), HasSubstr(grow + "row 0 is due after 0 s"));
+  EXPECT_THAT(add_with({kMs, 2 * kMs, 2 * kMs + kMs / 4}), HasSubstr("in the same iteration of"));
+  EXPECT_EQ(add_with({kMs * 6 / 10, kMs * 16 / 10, 3 * kMs}), "") << "an iteration each";
   EXPECT_THAT(add_with({}, {.pace = duration(std::chrono::seconds(1))}), HasSubstr("times"));
   EXPECT_THAT(add_with({}, {.pace = until(9)}), HasSubstr("one target"));
   EXPECT_EQ(add_with({1'000'000, 2'000'000, 4'000'000}), "");
@@ -96,6 +103,7 @@ TEST_F(FrontendTest, AnEmptyBatchReturnsAtOnce) {
   EXPECT_EQ(frontend.pulse_and_wait(std::nullopt).iteration(), 0);
 }
 
+// rule B6
 TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
   StartedStation station({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
@@ -119,6 +127,7 @@ TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
   EXPECT_EQ(second.handle(39).status, Status::completed);
 }
 
+// rule B6
 TEST_F(FrontendTest, ALaneFullOfCommandsStillTakesAPurge) {
   StartedStation station({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
@@ -199,6 +208,7 @@ TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
 
 // ------------------------------------------------------------------------------ reading
 
+// rule O5
 TEST_F(FrontendTest, ReadsRowsByTheirIteration) {
   StartedStation station({.segment = "pair", .history = 10});
   UntypedFrontend frontend("pair");
@@ -241,6 +251,7 @@ TEST_F(FrontendTest, ReadsOneRowAfterTheOtherAndCountsWhatItMissed) {
   EXPECT_EQ(position, 21);
 }
 
+// rule O6
 TEST_F(FrontendTest, AReaderThatIsOvertakenAllTheTimeStillReadsTrueRowsInOrder) {
   StartedStation station({.segment = "pair", .history = 1});
   const UntypedFrontend frontend("pair");

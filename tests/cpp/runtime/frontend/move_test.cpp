@@ -34,6 +34,7 @@ void lag(Station& station) {
   };
 }
 
+// rule S5
 TEST_F(MoveTest, WaitsUntilTheRobotIsObservedAtItsTarget) {
   BurstingStation bursting("pair", lag);
   UntypedFrontend frontend("pair");
@@ -56,6 +57,7 @@ TEST_F(MoveTest, LeavesWhatWasAddedAndNotPulsed) {
   EXPECT_EQ(desired(row, 1), 0.0);
 }
 
+// rule S5
 TEST_F(MoveTest, SaysWhereTheRobotIsIfItIsNotThereInTime) {
   Station station({.segment = "pair", .period = 1'000'000, .bursting = true});
   station.before_publish = [&] { station.now[1] = 0.25; };  // it is stuck

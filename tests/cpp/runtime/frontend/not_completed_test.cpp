@@ -22,6 +22,7 @@ class NotCompletedTest : public StationTest {
   UntypedFrontend two_{"pair"};
 };
 
+// rule S4
 TEST_F(NotCompletedTest, ACommandThatAnotherFrontendOverwroteIsAnError) {
   const Batch mine = send(one_, 1, 9.0, {.pace = iterations(9)});
   station_.run(2);
@@ -44,6 +45,7 @@ TEST_F(NotCompletedTest, ACommandThatAnotherFrontendOverwroteIsAnError) {
   mine.wait(kAtOnce, {}, {.check = false});
 }
 
+// rule S4
 TEST_F(NotCompletedTest, OneThatTheSameFrontendOverwroteIsNone) {
   const Batch first = send(one_, 0, 9.0, {.pace = iterations(9)});
   station_.run(2);
@@ -164,6 +166,7 @@ TEST_F(NotCompletedTest, ListsFiveEndsAtMost) {
   EXPECT_THAT(told(mine), AllOf(HasSubstr("7 of 7 commands"), HasSubstr("and 2 more")));
 }
 
+// rule S4
 TEST_F(NotCompletedTest, AHaltIsAnErrorOfItsOwn) {
   const Batch mine = send(one_, 0, 9.0, {.pace = iterations(9)});
   station_.run(1);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <limits>
 #include <random>
 #include <string>
 #include <vector>
@@ -178,6 +177,7 @@ bool is_in(const UntypedObservation& row, const std::vector<std::uint32_t>& actu
 
 class PreviewTest : public StationTest {};
 
+// rule C24
 TEST_F(PreviewTest, IsWhatTheBackendThenDoesBitForBit) {
   int previewed = 0;
   int later = 0;
@@ -233,6 +233,7 @@ TEST_F(PreviewTest, IsWhatTheBackendThenDoesBitForBit) {
   EXPECT_GT(refused, 40);
 }
 
+// rule C4
 TEST_F(PreviewTest, IsExactForACommandThatOverwritesAPlannedMotion) {
   StartedStation station({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(0).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});

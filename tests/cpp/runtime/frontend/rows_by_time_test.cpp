@@ -30,6 +30,7 @@ TEST_F(RowsByTimeTest, FindsTheNewestRowAtOrBeforeATime) {
   EXPECT_EQ(frontend.at_time(7'500'000).iteration(), 7);
 }
 
+// rule O7
 TEST_F(RowsByTimeTest, AgreesWithASearchThroughAllRowsThatAreThere) {
   StartedStation station(millisecond(32));
   UntypedFrontend frontend("pair");

@@ -7,7 +7,6 @@
 #include <random>
 #include <tuple>
 
-#include "o80/base/error.hpp"
 #include "runtime/frontend/raw_journal.hpp"
 #include "runtime/journal/journal_author.hpp"
 #include "runtime/station.hpp"

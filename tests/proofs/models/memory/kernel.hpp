@@ -92,8 +92,7 @@ class Segment {
     }
     for (std::uint32_t i = 0; i < lanes; ++i) make_lane(i);
   }
-  Segment(const Segment&) = delete;
-  Segment& operator=(const Segment&) = delete;
+  Segment& operator=(Segment&&) = delete;
   ~Segment() {
     for (const auto& destroy : destroyers_) destroy();
   }

@@ -4,7 +4,9 @@ import argparse
 import sys
 from typing import Any
 
-from o80_arms.fakes import koch, so101
+from o80.base.screen import keep_printing
+from o80_arms import fakes
+from o80_arms.cli import ARMS
 from o80_arms.fakes.chain import FakeChain
 
 WORDS = """\
@@ -46,10 +48,10 @@ def obey(chain: FakeChain[Any], words: list[str]) -> None:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, epilog=WORDS)
-    parser.add_argument("arm", nargs="?", choices=["so101", "koch"], default="so101")
+    parser.add_argument("arm", nargs="?", choices=[*ARMS], default="so101")
     parser.add_argument("--latency", type=float, default=0.001, help="of the adapter [s]")
     given = parser.parse_args()
-    make = koch if given.arm == "koch" else so101
+    make = getattr(fakes, given.arm)
     with make(latency=given.latency) as fake:
         words = " ".join(f"--{name.replace('_', '-')} {it}" for name, it in fake.options.items())
         print(f"o80 run {given.arm} {words}\n{WORDS}", flush=True)
@@ -61,4 +63,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    keep_printing()
     main()

@@ -4,11 +4,13 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from o80_arms import calibration
 from o80_arms.calibration import JOINTS, Calibration
+from o80_arms.dynamixel import KOCH_LEADER
 from o80_arms.fakes import dynamixel, feetech
 from o80_arms.fakes.chain import FakeChain
 
@@ -44,6 +46,16 @@ def so101(*, latency: float = 0.001, tick: float | None = None) -> AbstractConte
 def koch(*, latency: float = 0.001, tick: float | None = None) -> AbstractContextManager[FakeArm]:
     """A calibrated Koch, as `so101`."""
     return _arm(dynamixel.FakeChain, latency, tick)
+
+
+def koch_leader(
+    *, latency: float = 0.001, tick: float | None = None
+) -> AbstractContextManager[FakeArm]:
+    """A calibrated leader of a Koch, as `so101`."""
+    return _arm(partial(dynamixel.FakeChain, models=KOCH_LEADER), latency, tick)
+
+
+so101_leader = so101  # the same servos
 
 
 @contextmanager

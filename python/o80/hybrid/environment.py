@@ -1,0 +1,150 @@
+"""Gymnasium environments of hybrid tasks, and their recordings."""
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from gymnasium.utils.seeding import np_random
+
+from o80.base.errors import InvalidArgument
+from o80.base.finite import json_text
+from o80.frontend.frontend import Frontend
+from o80.hybrid.single import Single
+from o80.learning.environment import Environment
+from o80.learning.infos import Info
+from o80.recording.recording import Recording
+
+
+class HybridEnvironment(Environment):
+    """The environment of one robot and its world.
+
+    With `record` all rows of both are recorded, and their episodes marked:
+
+    | mark | when | values |
+    |---|---|---|
+    | `environment` | when it is made | segments of robot and world, options |
+    | `episode` | in `reset` | number, task, seed, state of the generator, options |
+    | `episode_end` | after the last step | actions, rewards, rows, how it ended |
+    | `episode_dropped` | in a reset before it | |
+
+    Data sets follow from them, see docs/recording.md.
+    """
+
+    task: Any
+    """The HybridTask."""
+
+    def __init__(
+        self,
+        task: Any,
+        *,
+        render_mode: str | None = None,
+        record: str | Path | None = None,
+        options: Mapping[str, Any] | None = None,
+    ) -> None:
+        """record: a file; options: those of the task, for its mark. Raises RecordingError."""
+        super().__init__(task, render_mode=render_mode)
+        self._marks = None if record is None else _Marks(task, record, options or {})
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[Any, Info]:
+        """Begins an episode. Raises CopyFailed if the robot is halted and may not be resumed."""
+        if self._marks is not None:
+            self._marks.drop()
+        if seed is not None:
+            self._np_random, self._np_random_seed = np_random(seed)
+        state = json_text(self.np_random.bit_generator.state)
+        observed = super().reset(seed=seed, options=options)
+        if self._marks is not None:
+            self._marks.begin(self._np_random_seed, state, options or {})
+        return observed
+
+    def step(self, action: Any) -> tuple[Any, float, bool, bool, Info]:
+        """Carries out an action."""
+        stepped = super().step(action)
+        if self._marks is not None:
+            self._marks.step(action, *stepped[1:])
+        return stepped
+
+    def close(self) -> None:
+        """Finishes the recording and closes the task; may be called twice."""
+        marks = self.__dict__.get("_marks")
+        if marks is not None:
+            marks.recording.close()
+        super().close()
+
+
+class _Marks:
+    """A recording of a robot and its world, and the marks in it."""
+
+    def __init__(self, task: Any, path: str | Path, options: Mapping[str, Any]) -> None:
+        if not isinstance(task.engine, Single):
+            raise InvalidArgument("record is for one robot with frontends: leave out threads")
+        self._engine = task.engine
+        robot, world = task.engine.members
+        worlds = [world] if isinstance(world, Frontend) else [world[i] for i in range(len(world))]
+        self._members: list[Frontend] = [robot, *worlds]
+        self._task, self._number = type(task).__name__, 0
+        self._margin = 2 * task.engine.iterations
+        self._actions: list[Any] = []
+        self._rewards: list[float] = []
+        self._runs = False
+        self.recording = Recording(path, self._members, proceed=Path(path).exists())
+        names = [each.segment for each in self._members]
+        self.recording.mark("environment", robot=names[0], world=names[1], options=_plain(options))
+        self._flush()
+
+    def drop(self) -> None:
+        """Marks an episode that has not ended."""
+        if self._runs:
+            self.recording.mark("episode_dropped")
+        self._runs = False
+
+    def begin(self, seed: int | None, state: str, options: Mapping[str, Any]) -> None:
+        """An episode begins; state: of its generator before the reset."""
+        values = {"task": self._task, "seed": seed, "generator": state, "options": _plain(options)}
+        self.recording.mark("episode", number=self._number, **values)
+        self._number += 1
+        self._actions, self._rewards, self._runs = [], [], True
+
+    def step(
+        self, action: Any, reward: float, terminated: bool, truncated: bool, info: Info
+    ) -> None:
+        """A step was taken."""
+        self._actions.append(np.array(action).tolist())
+        self._rewards.append(reward)
+        rows = zip(self._members, self._flushed, strict=True)
+        if any(each.oldest > flushed - self._margin for each, flushed in rows):
+            self._flush()  # before rows are overwritten
+        if not (terminated or truncated):
+            return
+        self._flush()  # an episode that is marked has its rows
+        self.recording.mark(
+            "episode_end",
+            terminated=terminated,
+            truncated=truncated and not terminated,
+            actions=self._actions,
+            rewards=self._rewards,
+            rows=self._engine.span,
+            info=_plain(info),
+        )
+        self._runs = False
+
+    def _flush(self) -> None:
+        newest = [member.published for member in self._members]
+        self.recording.flush()
+        self._flushed = newest
+
+
+def _plain(value: Any) -> Any:
+    """Value as JSON can hold it; of anything else its text."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(each) for each in value]
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return str(value)

@@ -1,0 +1,172 @@
+"""A robot and the world that mirrors it."""
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from itertools import count
+from pathlib import Path
+from typing import Any, Literal
+
+from o80.base.argument_checks import whole
+from o80.base.errors import InvalidArgument
+from o80.hybrid.mirror import Mirror, Pair, pairs_of
+from o80.robots.robot import Robot, load
+
+AnyRobot = str | os.PathLike[str] | type | Robot
+"""A robot by its name or path, its driver class, or loaded."""
+
+_NUMBERS = count(1)
+
+
+@dataclass(frozen=True)
+class attach:  # noqa: N801, it reads as a function where a world is given
+    """A world that runs already and is only read: `make(Push, world=attach("tracker"), ...)`.
+
+    segment: its rows have the names that the task reads, at their own times.
+    """
+
+    segment: str
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rig:
+    """A robot and the world that mirrors it, stepped together.
+
+    The iterations of the robot are the only clock: the world makes one iteration for each of them,
+    with its joints where the robot's were. Nothing in the world pushes the robot back.
+    """
+
+    robot: AnyRobot
+    """Any robot of o80."""
+    world: AnyRobot | attach
+    """A robot that simulates, or `attach(segment)` of one that is only read. Of a robot that shows
+    a model file, such as "so101_twin", the model is simulated by o80-mujoco; "mujoco" takes it from
+    `world_options`."""
+    mirror: Mirror = field(default_factory=Mirror)
+    robot_options: Mapping[str, Any] = field(default_factory=dict)
+    world_options: Mapping[str, Any] = field(default_factory=dict)
+    """Options of the drivers. A relative path of `model` begins in the folder of the task's file.
+    """
+    things: str | os.PathLike[str] | None = None
+    """An MJCF file whose bodies are put into the world's model; a relative path as above."""
+    every: int
+    """Iterations of a step."""
+    delay: int = 1
+    """Iterations from the newest row to the first one in which an action acts, less 1. Below
+    `every`, with chunks below `every` x `action_steps`. In real time the time to decide in."""
+    worlds: int | None = None
+    """Worlds for each robot, all of which mirror its motion; what tasks return then has their
+    dimension, (copies, worlds, ...). None: one, without that dimension."""
+    end: Literal["first", "all"] = "first"
+    """The episode of a robot ends with that of its first world, or when those of all have ended.
+    A world whose episode has ended mirrors on."""
+    frequency: float | None = None
+    """Iterations a second [1/s] (None: the robot's own)."""
+
+    def __post_init__(self) -> None:
+        whole(self.every, "every (iterations)", 1)
+        whole(self.delay, "delay (iterations)", 0)
+        if self.worlds is not None:
+            whole(self.worlds, "worlds", 1)
+        if self.end not in ("first", "all"):
+            raise InvalidArgument(f"end must be 'first' or 'all', got {self.end!r}")
+        if not isinstance(self.mirror, Mirror):
+            raise InvalidArgument(f"mirror must be a Mirror, got {self.mirror!r}")
+
+    def beside(self, folder: Path) -> "Rig":
+        """This rig, with robots that are files of a folder (libraries, Python files) there."""
+        robot, world = (_beside(each, folder) for each in (self.robot, self.world))
+        return replace(self, robot=robot, world=world)
+
+
+def _beside(robot: Any, folder: Path) -> Any:
+    if not isinstance(robot, str | os.PathLike):
+        return robot
+    file = folder / os.fspath(robot).partition(":")[0]
+    return str(folder / robot) if file.suffix in (".so", ".py") and file.is_file() else robot
+
+
+def robot_of(robot: AnyRobot) -> Robot:
+    """The robot, loaded. Raises DriverError."""
+    return robot if isinstance(robot, Robot) else load(robot)
+
+
+def unused_name(robot: Robot) -> str:
+    """A name for its segment that no other rig has."""
+    return f"{robot.name}-{os.getpid()}-{next(_NUMBERS)}"
+
+
+class World:
+    """The simulation of a rig before it is started: its options, and what follows what."""
+
+    def __init__(self, rig: Rig, folder: Path, robot: Mapping[str, Any], name: str) -> None:
+        """folder: in which relative paths begin. robot, name: schema and name of the robot.
+
+        Raises InvalidArgument for what cannot be mirrored, DriverError.
+        """
+        self.robot, self.options = _simulation(rig, folder)
+        given = self.robot.describe(**self.options)
+        joints = {actuator["name"]: _unit(given, actuator) for actuator in given["actuators"]}
+        self.pairs = pairs_of(rig.mirror, {**robot, "robot": name}, joints, _name(rig.world))
+        self.joints = [pair.joint for pair in self.pairs]
+        self._has_velocity(rig, given)
+        if self.robot._library.name == "mujoco" and "joints" not in self.options:
+            self.options["joints"] = ", ".join(map(_entry, self.pairs))
+        elif spread := [pair.joint for pair in self.pairs if pair.over]:
+            raise InvalidArgument(
+                f"mirror: '{spread[0]}' is in 1, and only worlds of o80-mujoco spread it over the "
+                "range of a joint"
+            )
+
+    def _has_velocity(self, rig: Rig, schema: Mapping[str, Any]) -> None:
+        moves = {actuator["name"]: actuator["group"] for actuator in schema["actuators"]}
+        fields = {
+            part["name"]
+            for joint in self.joints
+            for part in schema["groups"][moves[joint]]["type"]["fields"]
+        }
+        self.states_have_names = fields != {""}
+        """Whether a state of a joint is a position and a velocity, and not one number."""
+        if "velocity" in fields and rig.mirror.velocity is None:
+            raise InvalidArgument(
+                f"mirror: the joints of world '{_name(rig.world)}' have a velocity, and none is "
+                "named: Mirror(velocity=...) takes the path of one in the robot's rows, or "
+                "difference(rows=3). With velocity 0 a moving arm hits as if it stood still"
+            )
+
+
+def _simulation(rig: Rig, folder: Path) -> tuple[Robot, dict[str, Any]]:
+    options = dict(rig.world_options)
+    assert not isinstance(rig.world, attach)
+    robot = robot_of(rig.world)
+    if robot._library.name != "mujoco" or "like" in robot._given:
+        shown = robot.describe(**options).get("model", {}).get("file", "")
+        if shown:
+            options = {"model": shown}
+            robot = load("mujoco")
+    if isinstance(options.get("model"), str | os.PathLike):
+        options["model"] = str(folder / options["model"])
+    if rig.things is not None:
+        if robot._library.name != "mujoco":
+            raise InvalidArgument(
+                f"things are put into models of o80-mujoco, and world '{robot.name}' has none"
+            )
+        options["things"] = str(folder / rig.things)
+    return robot, options
+
+
+def _entry(pair: Pair) -> str:
+    """As the option `joints` of o80-mujoco has it."""
+    if pair.over is None:
+        return pair.joint
+    return f"{pair.joint}={pair.joint} {pair.over[0]:g} {pair.over[1]:g}"
+
+
+def _unit(schema: Mapping[str, Any], actuator: Mapping[str, Any]) -> str:
+    """Unit of a joint's position."""
+    fields = schema["groups"][actuator["group"]]["type"]["fields"]
+    return str(next((each["unit"] for each in fields if each["name"] in ("", "position")), ""))
+
+
+def _name(robot: AnyRobot | attach) -> str:
+    return robot.__name__ if isinstance(robot, type) else getattr(robot, "name", None) or str(robot)

@@ -1,0 +1,124 @@
+"""The rows of robots and worlds as a task reads them."""
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from o80.base.arrays import FloatArray
+from o80.base.errors import InvalidArgument
+from o80.frontend.frontend import Frontend
+from o80.groups.inline_group import InlineGroup
+from o80.hybrid.mirror import read
+from o80.learning.task import Index
+from o80.rows.columns import columns_at
+
+
+class Side:
+    """The robots of a rig, or their worlds: the rows of the last step, and requests."""
+
+    def __init__(
+        self,
+        member: InlineGroup | Frontend | None,
+        rows: NDArray[Any],
+        worlds: int | None = None,
+        *,
+        schema: Mapping[str, Any] | None = None,
+        simulated: bool = True,
+    ) -> None:
+        """member: None where rows were recorded. worlds: of each, where numbers have that axis."""
+        self._member, self._schema = member, schema
+        self.worlds = worlds
+        self.simulated = simulated
+        """False of a world that is only read: what `begin` places, somebody has to."""
+        self.rows = rows
+        """Structured (copies, iterations), of worlds (copies, worlds, iterations): each step
+        overwrites them. After a reset all of a copy are its newest row."""
+        self.last = rows[..., -1]
+        """The newest rows, a view of `rows`."""
+
+    @property
+    def schema(self) -> Mapping[str, Any]:
+        """Description of the robot, as `Frontend.schema`."""
+        if self._schema is None:
+            member: Any = self._member
+            self._schema = (member[0] if isinstance(member, InlineGroup) else member).schema
+        return self._schema
+
+    def numbers(self, paths: Sequence[str]) -> "Numbers":
+        """Numbers at these paths of the newest rows. Raises InvalidArgument."""
+        return Numbers(self, paths)
+
+    def request(self, name: str, at: NDArray[np.intp], /, **fields: Any) -> None:
+        """Sends a request to some copies and runs each until it has ended.
+
+        at: numbers of the copies. fields: one value for all, or an array (n, ...) of one for each
+            copy, of worlds also (n, worlds, ...).
+        """
+        if self._member is None:
+            return  # what it did is in the rows
+        described = [each for each in self.schema["requests"] if each["name"] == name]
+        parts = described[0]["type"]["fields"] if described else []
+        dimensions = {part["name"]: len(part["shape"]) for part in parts}
+        member, each = self._member, self.rows[0, ..., 0].size
+        for field, value in fields.items():
+            more = 0 if isinstance(value, str) else np.ndim(value) - dimensions.get(field, 99)
+            if more > 0:
+                entries = _of_all(value, (len(at), each)[:more], each, f"{field} of '{name}'")
+                fields[field] = entries if isinstance(member, InlineGroup) else entries[0]
+        if isinstance(member, InlineGroup):
+            member.request(name, copies=numbers_of_worlds(at, each), **fields)
+        else:
+            member.request(name, **fields)
+
+
+def numbers_of_worlds(copies: NDArray[np.intp], each: int) -> NDArray[np.intp]:
+    """Numbers in their group of all worlds of these copies."""
+    return (np.asarray(copies)[:, np.newaxis] * each + np.arange(each)).ravel()
+
+
+def _of_all(value: Any, shape: tuple[int, ...], each: int, what: str) -> list[Any]:
+    """The entries for all worlds. Raises InvalidArgument."""
+    given = np.asarray(value)
+    if given.shape[: len(shape)] != shape:
+        raise InvalidArgument(f"{what} must begin with the shape {shape}, got {given.shape}")
+    if len(shape) == 1:
+        return list(np.repeat(given, each, axis=0))
+    return list(given.reshape(-1, *given.shape[2:]))
+
+
+class Numbers:
+    """Some numbers of the newest rows of a side."""
+
+    def __init__(self, side: Side, paths: Sequence[str]) -> None:
+        if isinstance(paths, str):
+            raise InvalidArgument(f"a list of paths is needed, such as ['{paths}']")
+        self._side = side
+        schema = side.schema
+        self._columns = [column for path in paths for column in columns_at(schema, _whole(path))]
+        self.names = [column.name for column in self._columns]
+
+    def __len__(self) -> int:
+        return len(self._columns)
+
+    def read(self, at: Index) -> FloatArray:
+        """(n, numbers) of these copies, or (n, worlds, numbers)."""
+        rows = self._side.last[at]
+        if self._side.worlds is None and rows.ndim > 1:
+            rows = rows[:, 0]
+        return read(rows, self._columns)
+
+
+def desired_of(robot: Frontend) -> FloatArray:
+    """(actuators,) the first number of each desired state, in the newest row."""
+    names = [actuator["name"] for actuator in robot.schema["actuators"]]
+    columns = [columns_at(robot.schema, f"desired.{name}")[0] for name in names]
+    numbers: FloatArray = read(robot.history(1).rows, columns)[0]
+    return numbers
+
+
+def _whole(path: str) -> str:
+    """A path without its part is one of sensor values."""
+    named = path.partition(".")[0] in ("desired", "observed", "extended")
+    return path if named else f"extended.{path}"

@@ -1,0 +1,100 @@
+"""Robots that are stepped return to where episodes begin."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from o80.base.errors import InvalidArgument
+from o80.frontend.frontend import Frontend
+from o80.groups.inline_group import InlineGroup
+from o80.hybrid.mirror import read
+from o80.hybrid.sides import Side
+from o80.rows.columns import columns_at
+
+Numbers = NDArray[np.intp]
+_BURST = 20
+"""Iterations of a burst on the way home: the same in each way of pacing, for the same bits."""
+
+
+@dataclass(frozen=True)
+class Home:
+    """Where episodes begin."""
+
+    place: Sequence[float] | None
+    """Targets of all actuators; None: where a reset leads."""
+    duration: float
+    """Time to come there [s]."""
+    tolerance: float
+    """Largest distance then, in the units of the robot."""
+
+
+class Starts:
+    """Starts of episodes of robots that are stepped.
+
+    Without a home by the request reset. With one a copy is moved there once; a snapshot brings it
+    back, if it serves that.
+    """
+
+    def __init__(self, member: InlineGroup | Frontend, side: Side, copies: int, home: Home) -> None:
+        self._member, self._side, self._home = member, side, home
+        schema = side.schema
+        served = [request["name"] for request in schema["requests"]]
+        self.resets, self._restores = "reset" in served, "restore" in served
+        self._settled = np.zeros(copies, np.bool_)
+        if home.place is None:
+            return
+        if np.shape(home.place) != (len(schema["actuators"]),):
+            raise InvalidArgument(
+                f"home must have a number for each of the {len(schema['actuators'])} actuators, "
+                f"got {home.place!r}"
+            )
+        self._burst: Any = member.prepared_burst(_BURST, mode="overwrite")
+        self._burst.targets[...] = home.place
+
+    def begin(self, copies: Numbers, seeds: Sequence[int], period: float) -> None:
+        """Episodes of these copies begin. Raises InvalidArgument if one does not come home."""
+        if self._home.place is None:
+            reset(self._side, copies, seeds)
+            return
+        away = copies[~self._settled[copies]]
+        if away.size:
+            reset(self._side, away, [0] * len(away))
+            for _ in range(math.ceil(self._home.duration / period / _BURST)):
+                self._run(away)
+            self._check(away)
+        if self._restores:
+            if away.size:
+                self._side.request("snapshot", away, slot=0)
+                self._settled[away] = True
+            self._side.request("restore", copies, slot=0)
+
+    def _run(self, copies: Numbers) -> None:
+        if isinstance(self._member, InlineGroup):
+            self._burst.run(copies)
+        else:
+            self._burst.run()
+
+    def _check(self, copies: Numbers) -> None:
+        rows = self._burst.rows[copies] if self._burst.rows.ndim > 1 else self._burst.rows[None]
+        there = read(rows[:, -1], columns_at(self._side.schema, "observed"))
+        wanted = np.asarray(self._home.place)
+        if there.shape[1:] != wanted.shape:
+            return  # states of several numbers
+        apart = np.abs(there - wanted).max(axis=1)
+        if (far := apart > self._home.tolerance).any():
+            raise InvalidArgument(
+                f"copy {copies[far][0]} is {apart[far][0]:.3g} away from home after "
+                f"{self._home.duration:g} s: give a longer home_duration, or a larger "
+                "home_tolerance"
+            )
+
+
+def reset(side: Side, copies: Numbers, seeds: ArrayLike) -> None:
+    """The request reset; nothing for a robot that does not serve it."""
+    schema: Mapping[str, Any] = side.schema
+    if any(request["name"] == "reset" for request in schema["requests"]):
+        side.request("reset", copies, seed=seeds)

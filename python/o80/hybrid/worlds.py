@@ -1,0 +1,130 @@
+"""The worlds of a rig: simulations that mirror the rows of its robots."""
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80._core as _core
+from o80.base.errors import CopyFailed
+from o80.frontend.frontend import Frontend
+from o80.frontend.prepared_burst import BurstArrays
+from o80.groups.inline_group import InlineGroup
+from o80.hybrid.mirror import Motion
+from o80.hybrid.rig import World
+from o80.hybrid.sides import Side, numbers_of_worlds
+from o80.hybrid.starts import reset
+
+Numbers = NDArray[np.intp]
+TIMEOUT = 20.0
+"""Longest wait for a row [s]."""
+
+
+@dataclass
+class Counts:
+    """Counts since the rig was made."""
+
+    steps: int = 0
+    late_actions: int = 0
+    """Actions that acted later than in their iteration; of chunks, rows that were skipped."""
+    late_steps: int = 0
+    """Steps that began when the robot had made further rows."""
+    missed: int = 0
+    """Rows that brought no reading."""
+    largest_lateness: int = 0
+    """[rows]"""
+    largest_drift: float = 0.0
+    """[s]"""
+    play: float = 0.0
+    """Time of the robots in episodes [s]."""
+    world_time: float = 0.0
+    """Mean time that all worlds together take of a step [s]."""
+
+
+class Worlds:
+    """The worlds of n robots, so many of each: an inline group of all, or the frontend of one."""
+
+    stalled = ""
+    """The text of what made a step impossible: nothing here."""
+
+    def __init__(
+        self,
+        member: InlineGroup | Frontend,
+        world: World,
+        motion: Motion,
+        iterations: int,
+        copies: int,
+        each: int | None,
+    ) -> None:
+        """each: worlds of a robot; None is one, without a dimension in what tasks return."""
+        self.member = member
+        self._each, self._named = each or 1, world.states_have_names
+        self._follow: Any = member.prepared_burst(iterations, world.joints, steps=iterations)
+        self._one: Any = member.prepared_burst(1, world.joints)
+        self._shape = copies, self._each
+        rows = self._by_copy(self._follow.rows)
+        if isinstance(member, Frontend):
+            rows = np.zeros_like(rows)  # those of a burst that failed are not valid
+        self.side = Side(member, rows, each)
+        self.motion, self.counts = motion, Counts()
+
+    def _by_copy(self, array: NDArray[Any]) -> NDArray[Any]:
+        """A view of targets or rows with the shape (copies, worlds, ...)."""
+        shape = array.shape[1:] if isinstance(self.member, InlineGroup) else array.shape
+        return array.reshape(*self._shape, *shape)
+
+    def reset(self, copies: Numbers, seeds: Sequence[int], rows: NDArray[Any]) -> None:
+        """The worlds of these copies to their starts, as these rows (n,) of the robots say.
+
+        The seed of world j is that of its copy + j.
+        """
+        own = (np.array(seeds)[:, np.newaxis] + np.arange(self._each)) % 2**31
+        reset(self.side, copies, own)
+        self.motion.begin(copies, rows)
+        self.mirror(copies, rows)
+
+    def mirror(self, copies: Numbers, rows: NDArray[Any], seen: _core.Seen | None = None) -> None:
+        """One iteration of these worlds, as rows (n,) of their robots say."""
+        self._put(self._one, copies, *self.motion.standing(rows))
+        self._run(self._one, copies, seen)
+        self.side.rows[copies] = self._by_copy(self._one.rows)[copies]
+
+    def follow(
+        self, copies: Numbers, rows: NDArray[Any], period: float, seen: _core.Seen | None = None
+    ) -> None:
+        """The iterations of these worlds for rows (n, iterations) of their robots."""
+        counts, begun = self.counts, time.monotonic()
+        counts.steps += 1
+        counts.play += rows.size * period
+        self._put(self._follow, copies, *self.motion.follow(copies, rows, period))
+        counts.missed = self.motion.all_missed
+        self._run(self._follow, copies, seen)
+        if isinstance(self.member, Frontend):
+            self.side.rows[...] = self._follow.rows
+        counts.world_time += (time.monotonic() - begun - counts.world_time) / counts.steps
+
+    def _put(self, burst: BurstArrays, copies: Numbers, positions: Any, velocities: Any) -> None:
+        targets = self._by_copy(burst.targets)
+        if not self._named:
+            targets[copies] = positions[:, np.newaxis]
+            return
+        targets["position"][copies] = positions[:, np.newaxis]
+        if velocities is not None:
+            targets["velocity"][copies] = velocities[:, np.newaxis]
+
+    def _run(self, burst: Any, copies: Numbers, seen: _core.Seen | None) -> None:
+        """Raises CopyFailed with the numbers of the copies."""
+        if isinstance(self.member, Frontend):
+            burst.run(TIMEOUT, seen=seen)
+            return
+        try:
+            burst.run(numbers_of_worlds(copies, self._each))
+        except CopyFailed as failed:
+            if self._each == 1:
+                raise
+            errors = {number // self._each: error for number, error in failed.errors.items()}
+            text = f"{failed} (they are worlds, {self._each} of each robot, in order)"
+            raise CopyFailed(text, errors) from failed

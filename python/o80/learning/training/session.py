@@ -1,0 +1,209 @@
+"""A training from its first decision to its last: updates, checkpoints, curve, policy."""
+
+import os
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import torch
+from gymnasium.vector import AutoresetMode, VectorEnv
+from stable_baselines3.common.callbacks import BaseCallback
+
+from o80.base.errors import Closed, InvalidArgument
+from o80.base.lifecycle import Closeable
+from o80.learning.training import curve, learner
+from o80.learning.training.collectors import EpisodeCollector, RepeatableCollector, Scaled
+from o80.learning.training.curve import CURVE, CurvePoint, EpisodeWindow
+from o80.learning.training.policy import POLICY, LearnedPolicy
+from o80.learning.training.settings import TrainingSettings
+
+RENEWED = 50
+"""Updates after which the environments begin anew: a resumed training repeats at most so many
+rollouts, to get to the state in which it was interrupted."""
+SAVED = 30.0
+"""Time between two checkpoints [s]."""
+
+
+class Training(Closeable):
+    """Learns in a folder, or resumes there. Close it.
+
+    An interrupted and resumed training learns, bit for bit, what an uninterrupted one does, if
+    the environments follow from their seeds. torch runs on one thread meanwhile.
+    """
+
+    def __init__(
+        self,
+        settings: TrainingSettings | None,
+        folder: str | os.PathLike[str],
+        *,
+        resume: bool = False,
+    ) -> None:
+        """settings: None for those with which the folder was trained.
+
+        Raises InvalidArgument, before anything is written, if the folder holds a training and
+        should not, or one with other settings, or none to resume.
+        """
+        self.folder = Path(folder)
+        saved: dict[str, Any] | None = None
+        if resume or settings is None:
+            theirs, saved = learner.load(self.folder)
+            settings = settings or theirs
+            settings.refuse_unless_same(theirs, self.folder)
+        elif (self.folder / learner.CHECKPOINT).exists():
+            raise InvalidArgument(
+                f"{self.folder} holds a training: `python -m o80.learning resume {self.folder}`, "
+                "or train in another folder"
+            )
+        self.settings = settings
+        self._ran = False
+        self._clock = time.monotonic()
+        kind = EpisodeCollector if settings.on_the_clock else RepeatableCollector
+        self.collector: RepeatableCollector = kind(
+            self._made,
+            seed=settings.seed,
+            iteration=saved["begun"] if saved else 0,
+            infos=[settings.task.success],
+        )
+        try:
+            self._begin(saved)
+        except BaseException:
+            self.collector.close()
+            raise
+
+    def _made(self) -> VectorEnv[Any, Any, Any]:
+        on_the_clock, copies = self.settings.on_the_clock, self.settings.copies
+        mode = AutoresetMode.DISABLED if on_the_clock else AutoresetMode.SAME_STEP
+        environments = self.settings.task.make_vec(copies, mode)
+        self._space: Any = environments.single_action_space
+        return Scaled(environments)
+
+    def _begin(self, saved: dict[str, Any] | None) -> None:
+        self.learner = learner.new_learner(self.settings, self.collector)
+        self.learner.on_rollout = self._count
+        self.window, self._spent = (
+            EpisodeWindow(),
+            dict.fromkeys(("play", "reset", "clock"), 0.0),
+        )
+        if saved:
+            self.collector.repeat([actions.numpy() for actions in saved["played"]])
+            self.learner.restore(saved["learner"])
+            self.window = EpisodeWindow(saved["episodes"], saved["window"].numpy())
+            self._spent = saved["spent"]
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise InvalidArgument(
+                f"{self.folder} cannot be written: {error.strerror}. Give another folder"
+            ) from None
+        curve.cut(self.folder / CURVE, CurvePoint, self.learner.num_timesteps)
+        self._keep()
+        self.save()
+
+    def _count(self, rollout: Any) -> None:
+        self.window.add(rollout.ends, self.settings.task.success)
+
+    def close(self) -> None:
+        """Ends the environments; may be called twice."""
+        self.collector.close()
+
+    def run(self, report: Callable[[CurvePoint], object] = lambda point: None) -> LearnedPolicy:
+        """Learns until the decisions of the settings are made; returns the policy.
+
+        report: called before each update. Checkpoint and policy are saved also when an exception
+        ends the training, such as KeyboardInterrupt: as they were before the rollout under way.
+        """
+        if self._ran:
+            raise Closed("this training has ended: resume its folder with a new one")
+        self._ran = True
+        threads = torch.get_num_threads()
+        torch.set_num_threads(1)  # small networks: more threads wait for each other
+        try:
+            left = self.settings.decisions - self.learner.num_timesteps
+            if left > 0:
+                updates = _Updates(self, report)
+                self.learner.learn(left, updates, reset_num_timesteps=False)
+            self._keep()
+        finally:
+            torch.set_num_threads(threads)
+            self.save()
+        return self.policy
+
+    def save(self) -> None:
+        """Writes checkpoint and policy, as they were between the last two updates."""
+        learner.save(self.folder, self.settings, self._state)
+        self.policy.save(self.folder / POLICY)
+        self._saved_at = time.monotonic()
+
+    def point(self) -> CurvePoint:
+        """The curve here."""
+        policy: Any = self.learner.policy
+        spent = self._spent_now()
+        return CurvePoint(
+            self.learner.num_timesteps,
+            self.window.episodes,
+            spent["play"] / 3600,
+            spent["reset"] / 3600,
+            spent["clock"] / 60,
+            *self.window.means(),
+            float(policy.log_std.exp().mean().item()),
+        )
+
+    def before_rollout(self) -> None:
+        """Begins the environments anew now and then, and saves."""
+        renewed = len(self.collector.played) >= RENEWED
+        if renewed:
+            self.collector.restart(self.collector.iteration)
+        self._keep()
+        if renewed or self.settings.on_the_clock or time.monotonic() > self._saved_at + SAVED:
+            self.save()
+
+    def _keep(self) -> None:
+        """Keeps state and policy: between two updates."""
+        window, collector = self.window, self.collector
+        self._state = {
+            "learner": self.learner.state(),
+            "begun": collector.begun,
+            "played": [torch.tensor(actions) for actions in collector.played],
+            "episodes": window.episodes,
+            "window": torch.tensor(window.rows),
+            "spent": self._spent_now(),
+        }
+        training = {
+            "seed": self.settings.seed,
+            "copies": self.settings.copies,
+            "decisions": self.learner.num_timesteps,
+            "episodes": window.episodes,
+        }
+        task = self.settings.task
+        self.policy = LearnedPolicy(self.learner.network(), self._space, task, training)
+        """The policy without exploration, as of the last update."""
+
+    def _spent_now(self) -> dict[str, float]:
+        """Times so far [s]."""
+        collector, reset = self.collector, self.collector.resetting
+        now = {
+            "play": collector.seconds - reset,
+            "reset": reset,
+            "clock": time.monotonic() - self._clock,
+        }
+        return {name: self._spent[name] + seconds for name, seconds in now.items()}
+
+
+class _Updates(BaseCallback):
+    """Callback for all that is not learning."""
+
+    def __init__(self, training: Training, report: Callable[[CurvePoint], object]) -> None:
+        super().__init__()
+        self._training, self._report = training, report
+
+    def _on_rollout_start(self) -> None:
+        self._training.before_rollout()
+
+    def _on_step(self) -> bool:
+        return True
+
+    def _on_rollout_end(self) -> None:
+        point = self._training.point()
+        curve.append(self._training.folder / CURVE, point)
+        self._report(point)

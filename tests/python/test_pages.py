@@ -1,0 +1,87 @@
+"""The programs of pages in docs/ run as they stand there."""
+
+import re
+from pathlib import Path
+
+import gymnasium
+import pytest
+from pages import programs, run_programs
+from processes import run_python
+
+
+def test_the_first_program_about_commands_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(programs("commands.md")[0], "commands.md", "exec"), {})
+
+    assert capsys.readouterr().out == "COMPLETED 0 [0.  0.5]\n"
+
+
+def test_programs_about_commands_print_what_they_say(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    for verb in ("arm.preview(", "seen=seen"):
+        (program,) = (text for text in programs("commands.md") if verb in text)
+        exec(compile(program, "commands.md", "exec"), {"__name__": "preview"})
+
+        assert capsys.readouterr().out.splitlines() == re.findall(r"print\(.*\)  # (.*)", program)
+
+
+def test_the_program_about_chunks_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_programs("chunks.md", __name__="chunks") == 1
+
+    begins, late, skipped, shift = map(int, capsys.readouterr().out.split())
+    assert (begins > 0, late >= 0, skipped >= 0, shift >= 0) == (True, True, True, True)
+
+
+def test_the_programs_about_streaming_run(capsys: pytest.CaptureFixture[str]) -> None:
+    run_programs("streaming.md", __name__="streaming")
+
+    assert capsys.readouterr().out.splitlines() == ["0.0", "True"]
+
+
+def test_the_programs_about_groups_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_programs("groups.md") == 5
+    printed = capsys.readouterr().out.splitlines()
+    assert printed[0] == "(16, 10, 2)"
+    # the last rows of a burst of 5: the second group follows what the first was observed at
+    followed = [float(number) for number in printed[1].strip("[]").split()]
+    assert all(0 < number < 0.5 for number in followed)
+    assert len(followed) == 2
+    assert printed[2].startswith("[0")  # after the reset
+    assert printed[3].startswith("(16, 4) ['observed.shoulder', 'observed.elbow', 'extended")
+    assert printed[4].startswith("{2: BackendHalted(")
+
+
+def test_the_programs_about_learning_run() -> None:
+    try:
+        assert run_programs("learning.md") >= 3
+    finally:
+        gymnasium.registry.pop("mine/Reach-v0", None)
+
+
+def test_the_programs_about_recording_run_one_after_the_other(tmp_path: Path) -> None:
+    outputs = [run_python("-c", each, cwd=tmp_path).stdout for each in programs("recording.md")]
+
+    assert len(outputs) >= 4
+    assert "151 (151, 2) []" in outputs[1]
+    assert "('episode', {'number': 2}" in outputs[1]
+
+
+def test_the_program_about_views_runs() -> None:
+    [program] = programs("view.md")
+    assert "/?token=" in run_python("-c", program).stdout
+
+
+def test_the_programs_about_joining_run(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run_programs("time.md") == 3
+    shape, other, age, *joined, capture = capsys.readouterr().out.splitlines()
+    assert joined == [
+        "[0 1 2 3 4 5 6]",
+        "[3 3 4 4 8 8]",
+        "[False  True  True  True  True  True  True]",
+    ]
+    assert (shape, other) == ("(501,)", "(501, 2)")
+    assert 0 < float(age) < 1 / 180
+    time, error, epoch = capture.split()
+    assert int(time) > 0
+    assert int(error) > 0
+    assert int(epoch) >= 0

@@ -1,0 +1,96 @@
+"""Prints of programs: a full device, a closed pipe and a poor encoding end no work."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import o80
+from o80.cli.app import COMMANDS
+
+PROGRAM = Path(sys.executable).parent / "o80"
+ASCII = {"LC_ALL": "C", "PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+WAIT = 120.0  # [s] only ends a hang
+OUTPUTS = ("stdout", "stderr", "both", "ascii")
+
+
+def run(*words: str | Path, on: str = "") -> subprocess.CompletedProcess[str]:
+    """on: what is full, or ascii: the encoding of both."""
+    with Path("/dev/full").open("w") as full:
+        return subprocess.run(
+            [PROGRAM, *words],
+            stdin=subprocess.DEVNULL,
+            stdout=full if on in ("stdout", "both") else subprocess.PIPE,
+            stderr=full if on in ("stderr", "both") else subprocess.PIPE,
+            env=os.environ | (ASCII if on == "ascii" else {}),
+            encoding="ascii" if on == "ascii" else "utf-8",
+            timeout=WAIT,
+            check=False,
+        )
+
+
+def check(done: subprocess.CompletedProcess[str], on: str) -> None:
+    said = (done.stdout or "") + (done.stderr or "")
+    assert "Traceback" not in said
+    assert "Exception ignored" not in said
+    assert done.returncode == (1 if on in ("stdout", "both") else 0), said
+    if on == "stdout":
+        assert "the standard output cannot be written: No space left" in done.stderr
+
+
+@pytest.mark.parametrize("on", OUTPUTS)
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_of_every_command_survives_its_output(command: str, on: str) -> None:
+    check(run(command, "--help", on=on), on)
+
+
+@pytest.fixture
+def robot(segment: str) -> Iterator[None]:
+    with o80.robots.load("two_joints").start(segment, frequency=200):
+        yield
+
+
+@pytest.mark.usefixtures("robot")
+@pytest.mark.parametrize("on", OUTPUTS)
+def test_what_lists_ends_with_words(segment: str, on: str) -> None:
+    run("mark", segment, "begin")
+    for words in (["list"], ["list", "--watch"], ["info", segment], ["echo", segment]):
+        endless = words[-1] == "--watch" or words[0] == "echo"
+        if not endless or on in ("stdout", "both"):  # what fails ends also what is endless
+            check(run(*words, on=on), on)
+    check(run("echo", segment, "--commands", "--count", "1", on=on), on)
+
+
+@pytest.mark.usefixtures("robot")
+@pytest.mark.parametrize("on", OUTPUTS)
+def test_a_recorder_records_on(segment: str, tmp_path: Path, on: str) -> None:
+    path = tmp_path / "run.mcap"
+    done = run("record", segment, "-o", path, "--seconds", "1", on=on)
+    assert done.returncode == 0  # it prints on stderr only
+    assert o80.open(path)[segment].epochs[0].rows > 100
+    play = run("play", path, "--prefix", "again-", "--speed", "4", on=on)
+    assert play.returncode == 0
+    npz: tuple[str | Path, ...] = ("export", path, "-o", tmp_path / "a.npz")
+    for words in (npz, ("info", path)):
+        check(run(*words, on=on), on)
+
+
+@pytest.mark.usefixtures("robot")
+def test_a_reader_that_has_enough_ends_it_quietly(segment: str) -> None:
+    with subprocess.Popen(
+        [PROGRAM, "echo", segment, "--every"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    ) as echo:
+        assert echo.stdout is not None
+        assert echo.stderr is not None
+        echo.stdout.readline()
+        echo.stdout.close()
+        said = echo.stderr.read()
+        assert echo.wait(WAIT) == 0
+    assert "Traceback" not in said
+    assert "cannot be written" not in said
