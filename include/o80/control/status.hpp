@@ -16,7 +16,6 @@ enum class Status : std::uint8_t {
   queued,
   active,
   completed,
-  limited,  // only in recordings of earlier versions: a limit kept it from its target
   overwritten,
   purged,
   interrupted,

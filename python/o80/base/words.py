@@ -38,7 +38,6 @@ class Status(StrEnum):
     QUEUED = "queued"
     ACTIVE = "active"
     COMPLETED = "completed"
-    LIMITED = "limited"  #: only in recordings of earlier versions: did not reach its target
     OVERWRITTEN = "overwritten"
     PURGED = "purged"
     INTERRUPTED = "interrupted"

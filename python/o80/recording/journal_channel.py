@@ -25,7 +25,7 @@ uint8[] entries  # o80.open decodes them
 CONTENT = "journal"
 """Name of this content in the metadata of the channel."""
 CODEC = "codec"
-"""Name of the format's version in the metadata; files without it are of version 0."""
+"""Name of the format's version in the metadata."""
 GAP = "o80.journal_gap"
 """Name of the metadata record of entries that were overwritten before they were read."""
 MOST = 4 << 20  # bytes that are read at once

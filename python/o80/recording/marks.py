@@ -53,27 +53,14 @@ class Mark:
         return bytes(cdr.data)
 
     @classmethod
-    def of(cls, message: bytes, encoding: str) -> "Mark":
-        """From a message in this encoding of its channel: cdr, or json, as an earlier o80 wrote.
-
-        Raises ValueError, TypeError, RecursionError, struct.error if it is damaged.
-        """
-        if encoding == "json":
-            mark = cls(**json.loads(message))
-        else:
-            cdr = CdrReader(message)
-            name, (time,), segments = cdr.text(), cdr.numbers("q", 1), cdr.texts()
-            (count,) = cdr.numbers("I", 1)
-            rows = cdr.numbers("q", count) if count else ()
-            mark = cls(name, time, dict(zip(segments, rows, strict=True)), json.loads(cdr.text()))
-        is_whole = (
-            isinstance(mark.name, str)
-            and isinstance(mark.time, int)
-            and isinstance(mark.values, dict)
-            and isinstance(mark.rows, dict)
-            and all(isinstance(row, int) for row in mark.rows.values())
-        )
-        if not is_whole:
+    def of(cls, message: bytes) -> "Mark":
+        """From CDR. Raises ValueError, TypeError, RecursionError, struct.error if it is damaged."""
+        cdr = CdrReader(message)
+        name, (time,), segments = cdr.text(), cdr.numbers("q", 1), cdr.texts()
+        (count,) = cdr.numbers("I", 1)
+        rows = cdr.numbers("q", count) if count else ()
+        mark = cls(name, time, dict(zip(segments, rows, strict=True)), json.loads(cdr.text()))
+        if not isinstance(mark.values, dict):
             raise ValueError("a mark is damaged")
         return mark
 
@@ -106,7 +93,7 @@ def _plain(value: Any) -> Any:
 def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Messages:
     """Messages of marks, at least one, each with its log time: that of its newest row [ns]."""
     channel = _channel_in(file.found)
-    if channel is None or file.found.channels[channel].message_encoding == "json":
+    if channel is None:
         schema = file.add_schema(TYPE, DEFINITION)
         channel = file.add_channel(TOPIC, schema, {})
     return Messages(channel, [(time, mark.message()) for time, mark in marks])
@@ -114,9 +101,9 @@ def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Messages
 
 def marks_in(file: IO[bytes], found: Scan) -> list[Mark]:
     """All marks of a file, in their order."""
-    channels = {each.id: each for each in found.channels.values() if each.topic == TOPIC}
+    channels = [each.id for each in found.channels.values() if each.topic == TOPIC]
     return [
-        replace(Mark.of(message, channels[number].message_encoding), row_time=int(row_time))
+        replace(Mark.of(message), row_time=int(row_time))
         for chunk in found.chunks.having(*channels)
         for number in channels
         if number in chunk.message_index_offsets

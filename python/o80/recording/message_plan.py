@@ -97,20 +97,12 @@ class MessagePlan:
         return len(ENCAPSULATION) + begin
 
 
-#: parts that rows did not have in earlier recordings
-_LATER = ("starvations", "starved")
-
-
 def plan_of_rows(layout: Layout, size: int) -> MessagePlan:
-    """The plan of a robot's recorded rows, of this version of o80 or an earlier one.
-
-    size: of their messages [bytes]. Raises ValueError if no version has such rows.
-    """
-    for leave_out in ((), _LATER):
-        plan = MessagePlan(row_type(layout, leave_out=leave_out), layout.size)
-        if plan.size == size:
-            return plan
-    raise ValueError(f"rows of '{layout.schema['robot']}' have another size")
+    """The plan of a robot's recorded rows, whose messages have `size` bytes. Raises ValueError."""
+    plan = MessagePlan(row_type(layout), layout.size)
+    if plan.size != size:
+        raise ValueError(f"rows of '{layout.schema['robot']}' have another size")
+    return plan
 
 
 def _merged(copies: Iterator[Copy]) -> list[Copy]:

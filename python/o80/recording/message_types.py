@@ -7,7 +7,6 @@ file.
 
 import hashlib
 import re
-from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -56,13 +55,11 @@ class MessageType:
         return list(found.values())
 
 
-def row_type(layout: Layout, *, leave_out: Collection[str] = ()) -> MessageType:
-    """The message type of a robot's rows, without some of their parts."""
+def row_type(layout: Layout) -> MessageType:
+    """The message type of a robot's rows."""
     row = layout.schema["row"]
     numbers = {"i8": ("int64", 8), "u4": ("uint32", 4)}
-    members = [
-        Member(name, *numbers[kind], row[name]) for name, kind in HEAD if name not in leave_out
-    ]
+    members = [Member(name, *numbers[kind], row[name]) for name, kind in HEAD]
     if layout.actuators:
         states = _states_members(layout)
         members += [_placed(states, part, row[part]) for part in ("desired", "observed")]
@@ -78,7 +75,6 @@ def row_type(layout: Layout, *, leave_out: Collection[str] = ()) -> MessageType:
                 True,
             )
             for mask in ("active", "clamped", "braking", "starved")
-            if mask not in leave_out
         ]
     if layout.extras.itemsize:
         extended = _struct(layout.schema["extended"], "Extended")

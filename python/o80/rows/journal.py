@@ -16,7 +16,6 @@ from o80.rows.record import Record
 ENDS = frozenset(
     {
         Status.COMPLETED,
-        Status.LIMITED,
         Status.OVERWRITTEN,
         Status.PURGED,
         Status.INTERRUPTED,

@@ -30,8 +30,8 @@ std::string_view to_text(Profile profile) noexcept {
 std::string_view to_text(Start start) noexcept { return text_of(start, {"desired", "observed"}); }
 
 std::string_view to_text(Status status) noexcept {
-  return text_of(status, {"none", "queued", "active", "completed", "limited", "overwritten",
-                          "purged", "interrupted", "rejected", "forgotten", "halted"});
+  return text_of(status, {"none", "queued", "active", "completed", "overwritten", "purged",
+                          "interrupted", "rejected", "forgotten", "halted"});
 }
 
 std::string_view to_text(Reason reason) noexcept {

@@ -7,7 +7,7 @@
 
 #include "memory/ring/journal.hpp"
 #include "runtime/frontend/link.hpp"
-#include "runtime/journal/journal_codec.hpp"
+#include "runtime/journal/journal_encoder.hpp"
 
 namespace o80 {
 
@@ -26,7 +26,7 @@ class RawJournal {
     std::uint64_t next = 0;   // number after the last one; = first: there are no entries
     bool more = false;        // the next read may return entries at once
     bool notable = false;     // there are others than batches, bursts and ends of commands
-    std::vector<JournalFileEncoder::Mark> marks;  // in these entries
+    std::vector<JournalEncoder::Mark> marks;  // in these entries
   };
 
   /// Starts at the oldest entry in the ring, or at the entry with number `first` if that is later.
@@ -46,7 +46,7 @@ class RawJournal {
   JournalReader reader_;
   std::uint64_t first_;
   JournalItem item_;
-  JournalFileEncoder encoder_;
+  JournalEncoder encoder_;
   bool holds_ = false;  // item_ is an entry that was not returned yet
 };
 

@@ -5,7 +5,6 @@
 #include "base/little_endian.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/journal/journal_format.hpp"
-#include "runtime/journal/journal_version_0.hpp"
 
 namespace o80 {
 
@@ -45,7 +44,7 @@ bool append_record(LittleEndianReader& get, std::vector<std::byte>& blocks) {
   const auto ends_here = [&](std::size_t head) {
     return here == payload || (head + here) % kBlockBytes == 0;
   };
-  if (kind == JournalLayout::kBatchKind) {
+  if (kind == static_cast<std::uint16_t>(RecordKind::batch)) {
     BatchRecord batch;
     if (fields != journal_format::kBatchFields || payload != 0) return false;
     journal_format::batch_fields(list, batch);
@@ -104,7 +103,7 @@ bool decode_payload(LittleEndianReader& get, JournalItem& item) {
     fields(get, payload);
     append(item.payload, payload);
   };
-  if (journal_format::visit_payload<JournalLayout>(kind, get_fields)) return !get.failed();
+  if (journal_format::visit_payload(kind, get_fields)) return !get.failed();
   if (kind == JournalKind::records) return decode_records(get, item);
   if (kind == JournalKind::statuses) return decode_runs(get, item);
   const std::span<const std::byte> bytes = get.rest();
@@ -129,33 +128,22 @@ std::size_t decode_entry(std::span<const std::byte> bytes, JournalItem& item) {
 }
 
 [[noreturn]] void refuse_version(std::int64_t version) {
-  if (version < 0) throw InvalidArgument("the journal is damaged: its version is negative");
+  if (version < kJournalCodec) throw InvalidArgument("the journal is damaged: it has no version");
   throw InvalidArgument("the journal was written in version " + std::to_string(version) +
-                        " of the format, and this o80 reads versions 0 to " +
+                        " of the format, and this o80 reads version " +
                         std::to_string(kJournalCodec) +
                         ": read it with a newer o80. Its rows can be read with this one");
 }
 
 }  // namespace
 
-JournalFileDecoder::JournalFileDecoder() = default;
-JournalFileDecoder::JournalFileDecoder(JournalFileDecoder&&) noexcept = default;
-JournalFileDecoder& JournalFileDecoder::operator=(JournalFileDecoder&&) noexcept = default;
-JournalFileDecoder::~JournalFileDecoder() = default;
-
-void JournalFileDecoder::decode(std::int64_t version, std::span<const std::byte> bytes,
-                                const std::function<void(JournalItem&)>& take) {
-  if (version < 0 || version > kJournalCodec) refuse_version(version);
-  if (version == 0 && version_0_ == nullptr) version_0_ = std::make_unique<JournalVersion0>();
+void decode_journal(std::int64_t version, std::span<const std::byte> bytes,
+                    const std::function<void(JournalItem&)>& take) {
+  if (version != kJournalCodec) refuse_version(version);
   JournalItem item;
-  std::vector<std::byte> converted;
   for (std::size_t at = 0; at < bytes.size();) {
-    const auto rest = bytes.subspan(at);
-    converted.clear();
-    std::size_t length = version == 0 ? version_0_->convert(rest, converted) : 0;
-    const std::size_t decoded = decode_entry(version == 0 ? converted : rest, item);
-    if (version != 0) length = decoded;
-    if (length == 0 || decoded == 0)
+    const std::size_t length = decode_entry(bytes.subspan(at), item);
+    if (length == 0)
       throw InvalidArgument("the journal is damaged: invalid entry at byte " + std::to_string(at));
     at += length;
     take(item);

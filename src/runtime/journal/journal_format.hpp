@@ -1,9 +1,11 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 
 #include "o80/memory/journal_kind.hpp"
+#include "runtime/journal/journal_author.hpp"
 
 // The format of journals in files, version 1. It does not depend on the layout in memory. All
 // numbers are little-endian.
@@ -29,8 +31,7 @@
 
 namespace o80 {
 
-/// Version of the format in which journals are written to files. Version 0 was the layout in
-/// memory (journal_version_0.hpp).
+/// Version of the format in which journals are written to files.
 inline constexpr std::int64_t kJournalCodec = 1;
 
 namespace journal_format {
@@ -53,7 +54,7 @@ inline constexpr std::uint16_t kSeen = 11;
 inline constexpr std::size_t kRecordFields = 27;
 inline constexpr std::size_t kBatchFields = 43;
 
-// Lists of fields: `io` writes or reads them, for all layouts in memory.
+// Lists of fields: `io` writes or reads them.
 
 template <class Io, class Head>
 void head_fields(Io& io, Head& head) {
@@ -86,22 +87,22 @@ void record_fields(Io& io, Record& record) {
 }
 
 /// Calls visit(payload, fields) if an entry of this kind has a struct as its payload: an empty
-/// struct of the layout, and its list of fields. Else false.
-template <class Layout, class Visit>
+/// struct, and its list of fields. Else false.
+template <class Visit>
 bool visit_payload(JournalKind kind, Visit&& visit) {
   switch (kind) {
     case JournalKind::owner:
-      visit(typename Layout::Owner{}, [](auto& io, auto& name) { io.text(name); });
+      visit(std::array<char, sizeof(JournalOwner)>{}, [](auto& io, auto& name) { io.text(name); });
       return true;
     case JournalKind::taken:
     case JournalKind::scheduled:
     case JournalKind::rejected:
-      visit(typename Layout::Decision{},
+      visit(JournalBatch{},
             [](auto& io, auto& batch) { io.u64(batch.ticket, batch.sender, batch.at); });
       return true;
     case JournalKind::halt:
     case JournalKind::halt_reason:
-      visit(typename Layout::Halt{}, [](auto& io, auto& halt) {
+      visit(JournalHalt{}, [](auto& io, auto& halt) {
         io.u32(halt.cause);
         io.text(halt.who);
         io.text(halt.text);
@@ -109,14 +110,13 @@ bool visit_payload(JournalKind kind, Visit&& visit) {
       return true;
     case JournalKind::resume:
     case JournalKind::burst_ended:
-      visit(typename Layout::Sender{}, [](auto& io, auto& by) { io.u64(by.sender); });
+      visit(JournalSender{}, [](auto& io, auto& by) { io.u64(by.sender); });
       return true;
     case JournalKind::burst:
-      visit(typename Layout::Burst{},
-            [](auto& io, auto& burst) { io.u64(burst.iterations, burst.sender); });
+      visit(JournalBurst{}, [](auto& io, auto& burst) { io.u64(burst.iterations, burst.sender); });
       return true;
     case JournalKind::ended:
-      visit(typename Layout::Text{}, [](auto& io, auto& text) { io.text(text); });
+      visit(JournalText{}, [](auto& io, auto& text) { io.text(text); });
       return true;
     default:
       return false;

@@ -4,12 +4,13 @@
 #include <utility>
 
 #include "o80/base/error.hpp"
+#include "runtime/journal/journal_codec.hpp"
 
 namespace o80 {
 
 void RecordedJournal::decode(std::span<const std::byte> bytes, std::vector<JournalEntry>& entries,
                              std::int64_t codec) {
-  file_.decode(codec, bytes, [&](JournalItem& item) { take(item, entries); });
+  decode_journal(codec, bytes, [&](JournalItem& item) { take(item, entries); });
 }
 
 void RecordedJournal::take(JournalItem& item, std::vector<JournalEntry>& entries) {

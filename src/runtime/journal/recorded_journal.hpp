@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
-#include "runtime/journal/journal_codec.hpp"
 #include "runtime/journal/journal_decoder.hpp"
+#include "runtime/journal/journal_format.hpp"
 
 namespace o80 {
 
@@ -30,7 +30,6 @@ class RecordedJournal {
  private:
   void take(JournalItem& item, std::vector<JournalEntry>& entries);
 
-  JournalFileDecoder file_;
   JournalDecoder decoder_;
   std::uint64_t expected_ = 0;  // number of the next entry
 };

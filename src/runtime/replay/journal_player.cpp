@@ -6,12 +6,13 @@
 
 #include "o80/describe/describe.hpp"
 #include "runtime/journal/journal_author.hpp"
+#include "runtime/journal/journal_codec.hpp"
 
 namespace o80 {
 
 Iteration JournalPlayer::add(std::span<const std::byte> entries, std::int64_t codec) {
   Iteration last = -1;
-  file_.decode(codec, entries, [&](JournalItem& item) {
+  decode_journal(codec, entries, [&](JournalItem& item) {
     last = item.head.iteration;
     added_.push_back(std::move(item));
   });

@@ -10,7 +10,6 @@
 #include "memory/ring/journal.hpp"
 #include "o80/memory/halt.hpp"
 #include "o80/memory/life.hpp"
-#include "runtime/journal/journal_codec.hpp"
 
 namespace o80 {
 
@@ -42,7 +41,6 @@ class JournalPlayer {
   void note(const JournalItem& item);
 
   JournalWriter writer_;
-  JournalFileDecoder file_;
   std::deque<JournalItem> added_;  // and not written
   Halt halt_;
   std::optional<End> end_;

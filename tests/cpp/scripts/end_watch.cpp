@@ -22,9 +22,6 @@ std::string positions(long double is, long double expected) {
 
 std::optional<Failure> EndWatch::step(const ScriptWorld& world) const {
   for (const SentCommand* command : world.ended) {
-    if (command->status == Status::limited) {
-      return Failure{"arrival", "a command ended as limited: it goes on until it has arrived"};
-    }
     if (command->status != Status::completed) continue;
     if (command->ended_at != world.iteration) {
       return Failure{"completion", "a command completed at another iteration than the present"};

@@ -3,8 +3,6 @@
 The files stay as they are when o80 changes, so that later versions must read what this one wrote. A
 change of the format gets a file of its own. The JSON beside a file says what must be found in it.
 
-format_1.mcap: journal in version 0, by one of the first recorders
-codec_0.mcap: journal in version 0, by the last one, commit 6fd9210
 codec_1.mcap: journal in version 1
 """
 
@@ -24,8 +22,6 @@ from o80.recording.recorder import Recorder
 
 HERE = Path(__file__).parent
 SEGMENT, BENCH = "joints", "bench"
-#: parts of rows that the files lack, so that they are empty
-LATER = ("starvations", "starved")
 MAX_NUMBERS = 16
 
 # ---------------------------------------------------------------------------- what is played
@@ -269,7 +265,6 @@ def facts(epoch: Any) -> dict[str, Any]:
         "sha256": {
             name: hashlib.sha256(_text_of(history.rows[name]).encode()).hexdigest()
             for name in history.rows.dtype.names
-            if name not in LATER or history.rows[name].any()
         },
         "gaps": [*epoch.gaps, *epoch.journal_gaps],
         "options": epoch.provenance.options,

@@ -82,7 +82,7 @@ class JournalAudit {
   void compare(const SentBatch& batch, std::uint32_t place, const SentCommand& command) {
     const auto status = static_cast<Status>(command.found);
     // an end of a whole batch has no entry of its own
-    if (status != Status::completed && status != Status::limited) return;
+    if (status != Status::completed) return;
     const Key key{batch.lane, o80::record_id(batch.id, place)};
     const auto found = ends_.find(key);
     if (found == ends_.end()) {

@@ -81,9 +81,9 @@ bool has_ended(std::uint32_t status) {
 }
 
 const char* name_of(Status status) {
-  static constexpr const char* kNames[] = {"none",     "queued",      "active", "completed",
-                                           "limited",  "overwritten", "purged", "interrupted",
-                                           "rejected", "forgotten",   "halted"};
+  static constexpr const char* kNames[] = {"none",        "queued", "active",      "completed",
+                                           "overwritten", "purged", "interrupted", "rejected",
+                                           "forgotten",   "halted"};
   return kNames[static_cast<std::size_t>(status)];
 }
 
@@ -224,8 +224,6 @@ class Judge {
           done[0].iteration > at + (status == Status::overwritten ? kLongestStop : 0))
         return add(Fault::falsely_told, slot, batch, group,
                    name + "done at " + std::to_string(done[0].iteration) + ", after the end");
-      if (status == Status::limited && round_.lives[batch.generation].limited == 0)
-        return add(Fault::falsely_told, slot, batch, group, name + "nothing limits it");
     }
     const Generation& life = round_.lives[batch.generation];
     const bool forgotten = static_cast<Status>(group.found) == Status::forgotten;
@@ -286,8 +284,6 @@ class Judge {
             "done at " + std::to_string(done[0].iteration));
       return;
     }
-    if (status == Status::limited && !is_limited(batch, command))
-      return add(Fault::falsely_told, slot, batch, command, "no target was outside of the limits");
     // within limits of acceleration a motion may rest on its target before its last iteration; a
     // smooth motion that overwrites a straight line may stop where that would have ended: in twice
     // as many iterations as it had left. So may one that begins where a line was purged, which is
@@ -297,7 +293,7 @@ class Judge {
                                                                : 0;
     const bool stops_there = !done.empty() && done[0].iteration < at + longest;
     const bool early = command.arrives_early != 0 || is_limited(batch, command) || stops_there;
-    if (!done.empty() && !early && status != Status::limited)
+    if (!done.empty() && !early)
       add(Fault::falsely_told, slot, batch, command,
           "done at " + std::to_string(done[0].iteration) + " all the same" +
               around(round_.lives[batch.generation], done[0]) + told_of(slot, batch));

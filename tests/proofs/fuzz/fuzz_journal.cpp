@@ -13,6 +13,7 @@
 #include "o80/base/error.hpp"
 #include "o80/runtime/journal.hpp"
 #include "runtime/journal/journal_author.hpp"
+#include "runtime/journal/journal_encoder.hpp"
 #include "runtime/journal/journal_records.hpp"
 #include "runtime/journal/recorded_journal.hpp"
 
@@ -71,7 +72,7 @@ void write_some(JournalWriter& writer, Bytes& bytes) {
 /// What a reader may get without an end: no more entries than the ring has heads. Adds them to
 /// `copy` as a recorder does.
 void read_all(JournalReader& reader, const Schema& schema, std::vector<std::byte>& copy) {
-  JournalFileEncoder encoder;
+  JournalEncoder encoder;
   JournalItem item;
   std::uint64_t entries = 0;
   while (reader.next(item)) {
@@ -87,15 +88,13 @@ void read_all(JournalReader& reader, const Schema& schema, std::vector<std::byte
 /// What a damaged recording may give: no more entries than statuses fit into its bytes.
 void decode(const std::shared_ptr<const Description>& description,
             std::span<const std::byte> recorded) {
-  for (std::int64_t codec = 0; codec <= kJournalCodec; ++codec) {
-    std::vector<JournalEntry> entries;
-    try {
-      RecordedJournal(description).decode(recorded, entries, codec);
-    } catch (const InvalidArgument&) {
-    }
-    // the shortest entry of statuses has one run; in version 0 it has 56 bytes, later more
-    if (entries.size() > recorded.size() * kMaxStatuses / 48) std::abort();
+  std::vector<JournalEntry> entries;
+  try {
+    RecordedJournal(description).decode(recorded, entries);
+  } catch (const InvalidArgument&) {
   }
+  // the shortest entry of statuses has one run
+  if (entries.size() > recorded.size() * kMaxStatuses / 48) std::abort();
 }
 
 std::shared_ptr<const Description> description_of_robot() {
