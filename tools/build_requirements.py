@@ -9,11 +9,21 @@ import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-PACKAGES = (".", "simulators/mujoco", "robots/pam", "robots/arms", "devices", "apps/table_tennis")
+PACKAGES = (
+    ".",
+    "simulators/mujoco",
+    "robots/pam",
+    "robots/arms",
+    "devices",
+    "apps/table_tennis",
+    "gateways/lerobot",
+)
+ELSEWHERE = ("o80=", "o80-", "o80[", "lerobot>")
+"""Begins of requirements that are not listed: each other, and LeRobot (tools/lerobot.txt)."""
 
 
 def requirements(kind: str, extras: list[str]) -> list[str]:
-    """Requirements of all packages, without those on each other."""
+    """Requirements of all packages, without ELSEWHERE."""
     found: set[str] = set()
     for package in PACKAGES:
         pyproject = tomllib.loads((ROOT / package / "pyproject.toml").read_text())
@@ -24,7 +34,7 @@ def requirements(kind: str, extras: list[str]) -> list[str]:
             found.update(project["dependencies"])
             for extra in extras:
                 found.update(project.get("optional-dependencies", {}).get(extra, []))
-    return sorted(each for each in found if not each.startswith(("o80=", "o80-", "o80[")))
+    return sorted(each for each in found if not each.startswith(ELSEWHERE))
 
 
 if __name__ == "__main__":

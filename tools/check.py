@@ -9,10 +9,18 @@ import sys
 
 from outcomes import Outcomes
 from sources import ROOT
-from steps import LOGS, PYTHON, Step, build, ctest, pytest, run_beside, times, use_tools
+from steps import LEROBOT, LOGS, PYTHON, Step, build, ctest, pytest, run_beside, times, use_tools
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
-PACKAGES = ("o80", "o80_mujoco", "o80_pam", "o80_arms", "o80_devices", "o80_table_tennis")
+PACKAGES = (
+    "o80",
+    "o80_mujoco",
+    "o80_pam",
+    "o80_arms",
+    "o80_devices",
+    "o80_table_tennis",
+    "lerobot_robot_o80",
+)
 TYPED = (  # beside the packages
     "tools",
     "benchmarks",
@@ -30,6 +38,7 @@ TYPED_TESTS = (
     "robots/pam/tests",
     "simulators/mujoco/tests",
     "devices/tests",
+    "gateways/lerobot/tests",
     "apps/table_tennis/tests",
 )
 WORKFLOW = ".github/workflows/tests.yml"
@@ -54,6 +63,7 @@ STEPS: dict[str, list[list[str]]] = {
     "mypy": typed(),
     "cpp": [ctest("cpp", "dev", "-L", "^check$")],
     "python": [pytest("python", "-m", "check")],
+    "lerobot": [pytest("lerobot", "gateways/lerobot/tests", processes=2, python=LEROBOT)],
     "torture": [
         *build("dev", "o80-torture"),
         ["build/dev/bin/o80-torture", *TORTURE, "--python", sys.executable],
@@ -74,6 +84,7 @@ CHAINS = (
     ("python",),
     ("asan", "fuzz"),
     ("rt",),
+    ("lerobot",),
     ("models",),
     ("tsan",),
     ("cpp", "torture", "tidy"),

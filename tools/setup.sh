@@ -132,11 +132,17 @@ install_tools() {
   say "installed what running ${1:+and testing }needs"
 }
 
-# the judge of the arms, alone: what it requires would bring torch of another version
-lerobot="lerobot==0.4.4 deepdiff==8.6.2 orderly-set==5.5.0"
+# LeRobot with what it requires: an environment of its own that also sees .venv
 install_lerobot() {
-  say "installing LeRobot's package"
-  pip install --no-deps --upgrade --target .venv/lerobot $lerobot
+  say "installing LeRobot and what it needs"
+  local packages
+  .venv/bin/python -m venv --without-pip --clear build/lerobot
+  packages=$(echo build/lerobot/lib/python3.*/site-packages)
+  echo "$PWD/.venv/${packages#build/lerobot/}" > "$packages/zz_o80.pth" # behind its own packages
+  pip --python build/lerobot/bin/python install --no-deps -r tools/lerobot.txt
+  mkdir "$packages/torchvision"
+  cp tools/torchvision.py "$packages/torchvision/__init__.py"
+  say "installed LeRobot"
 }
 
 # install_package NAME FOLDER [DEFINITION...]: one of the packages, whose requirements are there
@@ -170,6 +176,8 @@ install_others() {
       once devices "$(package_state devices)" install_package o80-devices ./devices
       once arms "$headers $(package_state robots/arms)" \
         install_package o80-arms ./robots/arms "$checkout"
+      once lerobot_robot "$(package_state gateways/lerobot)" \
+        install_package lerobot_robot_o80 ./gateways/lerobot
       ;;
   esac
 }
@@ -232,7 +240,8 @@ install_programs() {
         qemu-user-static relacy-dev spin strace rt-tests qemu-system-x86 busybox-static \
         cpio chromium
       need_renderer
-      once lerobot "$lerobot" install_lerobot
+      [ -e build/lerobot ] || rm -f .venv/stamps/lerobot # after make clean
+      once lerobot "$(state_of tools/lerobot.txt tools/torchvision.py)" install_lerobot
       ;;
   esac
 }

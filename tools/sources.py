@@ -12,6 +12,7 @@ FOLDERS = (
     "simulators",
     "devices",
     "apps",
+    "gateways",
     "examples",
     "benchmarks",
     "tests",

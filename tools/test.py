@@ -11,15 +11,29 @@ import sys
 from outcomes import Outcomes
 from selection import NAMED, NoSuchTestsError, Selection, select
 from sources import ROOT, all_left_to_check
-from steps import LOGS, Step, build, ctest, pytest, run, run_beside, times, use_tools
+from steps import (
+    LEROBOT,
+    LOGS,
+    PYTHON,
+    Step,
+    build,
+    ctest,
+    pytest,
+    run,
+    run_beside,
+    times,
+    use_tools,
+)
 
 NEED_PROGRAMS = ("tests/processes", "tests/consumer")  # of the preset dev
+GATEWAYS = "gateways"  # their tests run with LeRobot, and all of them are marked `check`
 
 
 def set_up(chosen: Selection, *, everything: bool) -> bool:
     """Installs what these tests need: packages for Python, all tools for those marked `check`."""
     purpose = "test" if everything or chosen.python else "tools"
-    if any(all_left_to_check(file) for file in chosen.files()):
+    gateway = any(path.startswith(GATEWAYS) for path in chosen.python)
+    if gateway or any(all_left_to_check(file) for file in chosen.files()):
         purpose = "check"
     return subprocess.run(["tools/setup.sh", purpose], cwd=ROOT).returncode == 0
 
@@ -40,13 +54,17 @@ def some_steps(chosen: Selection, keyword: str | None) -> tuple[list[list[str]],
     if chosen.cpp:
         pattern = chosen.cpp_pattern() + (f".*{keyword}" if keyword else "")
         tests.append(Step("some_cpp", [ctest("some_cpp", "dev", "-R", pattern, "-LE", "^check$")]))
-    if chosen.python:
-        only_files = len(chosen.files()) == len(chosen.python)
-        options = [] if only_files else ["-m", "not check"]
+    theirs = [path for path in chosen.python if path.startswith(GATEWAYS)]
+    ours = [path for path in chosen.python if path not in theirs]
+    for name, paths, python in (("some_python", ours, PYTHON), ("some_lerobot", theirs, LEROBOT)):
+        if not paths:
+            continue
+        only_files = all(".py" in path for path in paths)
+        options = [] if only_files or python is LEROBOT else ["-m", "not check"]
         options += ["-k", keyword] if keyword else []
-        processes = {"processes": 1} if only_files and len(chosen.python) == 1 else {}
-        command = pytest("some_python", *options, *chosen.python, **processes)
-        tests.append(Step("some_python", [command]))
+        processes = {"processes": 1} if only_files and len(paths) == 1 else {}
+        command = pytest(name, *options, *paths, python=python, **processes)
+        tests.append(Step(name, [command]))
     return build("dev", *targets) if targets or needs_programs else [], tests
 
 

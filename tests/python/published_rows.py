@@ -353,7 +353,8 @@ def data_sets(path: Path, folder: Path, expected: Columns) -> None:
     assert np.array_equal(episode.observations, np.hstack(seen))
     assert np.array_equal(episode.actions, parts["desired."][1:])
 
-    lerobot.write(folder / "lerobot", found)
+    sensors = ["extended"] if parts["extended."].size else []
+    lerobot.write(folder / "lerobot", found, sensors=sensors, units="native")
     frames = pyarrow.parquet.read_table(folder / "lerobot/data/chunk-000/file-000.parquet")
     features = json.loads((folder / "lerobot/meta/info.json").read_text())["features"]
     for name, part, rows in (
@@ -363,6 +364,8 @@ def data_sets(path: Path, folder: Path, expected: Columns) -> None:
     ):
         if parts[part].size:
             names = [each.removeprefix(part) for each in expected if each.startswith(part)]
-            assert features[name]["names"] == names
-            values = np.array(frames[name].to_pylist(), np.float32)
+            if part == "extended.":
+                assert features[name]["names"] == names
+            assert len(features[name]["names"]) == len(names)
+            values = np.array(frames[name].to_pylist(), np.float32).reshape(len(frames), -1)
             assert np.array_equal(values, parts[part][rows].astype(np.float32))

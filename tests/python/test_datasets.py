@@ -1,8 +1,9 @@
 """Episodes of recordings as data sets for learning, read by what reads them."""
 
 import json
+import time
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pandas
@@ -111,7 +112,7 @@ def test_statistics_leave_out_what_is_not_finite_and_say_so(segment: str, tmp_pa
         recording.mark("episode_end", reward=1.0)
     exported = run_o80("export", str(path), "-o", str(tmp_path / "set"), "--format", "lerobot")
     assert "1 number is not finite, left out of the statistics" in exported.stderr
-    assert "wrist (1)" in exported.stderr
+    assert "observation.state wrist.pos (1)" in exported.stderr
     text = (tmp_path / "set/meta/stats.json").read_text()
     stats = json.loads(text, parse_constant=lambda word: pytest.fail(word))
     assert stats["observation.state"]["mean"][1] == 1.0
@@ -247,7 +248,7 @@ def test_a_lerobot_data_set_has_the_documented_files(recorded: Path, tmp_path: P
     """Checked against the loader of LeRobot: datasets/io_utils.py and dataset_metadata.py."""
     root = tmp_path / "set"
     found = episodes(recorded, every=10)
-    lerobot.write(root, found)
+    lerobot.write(root, found, sensors=["effort", "homing"])
 
     info = json.loads((root / "meta/info.json").read_text())
     assert info["codebase_version"] == "v3.0"
@@ -269,7 +270,9 @@ def test_a_lerobot_data_set_has_the_documented_files(recorded: Path, tmp_path: P
         state = np.stack(own["observation.state"])
         assert np.array_equal(state, episode.observed[:-1].astype(np.float32))
         assert own["next.reward"].to_numpy() == pytest.approx(episode.rewards)
-    assert info["features"]["action"]["names"] == ["shoulder", "elbow"]
+    assert info["features"]["action"]["names"] == ["shoulder.pos", "elbow.pos"]
+    policies = [name for name in info["features"] if name.startswith(("observation", "action"))]
+    assert policies == ["action", "observation.state", "observation.environment_state"]
     sensors = info["features"]["observation.environment_state"]["names"]
     assert sensors == ["homing", "effort[0]", "effort[1]"]
 
@@ -288,6 +291,118 @@ def test_a_lerobot_data_set_has_the_documented_files(recorded: Path, tmp_path: P
     )
     parquet = pyarrow.parquet.ParquetFile(root / "data/chunk-000/file-000.parquet")
     assert parquet.num_row_groups == 3
+
+
+class Slow:
+    """A joint that needs 100 iterations for a radian, and is where it was asked to be."""
+
+    actuators = ("elbow",)
+    limits: ClassVar = {"elbow": o80.Limits(minimum=-2, maximum=2, speed=10.0)}
+    simulated = True
+
+    def __init__(self) -> None:
+        self.place = 0.0
+
+    def write(self, desired: Any) -> None:
+        self.place = desired.states[0]
+
+    def read(self, reading: Any) -> None:
+        reading.observed = [self.place]
+
+
+def test_a_data_set_has_what_was_asked_for_and_what_acted(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load(Slow).inline(segment, frequency=1000) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        recording.mark("episode")
+        arm.burst(10)  # nothing was asked for
+        arm.add_command("elbow", 1.0)
+        arm.burst(10)
+        arm.purge("elbow")
+        arm.burst(10)
+        arm.add_command("elbow", 0.5)
+        arm.burst(10)
+        arm.halt("a hand")
+        arm.burst(1)
+        arm.add_command("elbow", -1.0)
+        with pytest.raises(o80.BackendHalted):
+            arm.burst(1)
+        arm.burst(9)
+        recording.mark("episode_end")
+        arm.resume()
+        recording.mark("episode")
+        with arm.chunks("elbow", step=5) as plan:
+            plan.send([0.2, 0.3, 0.4, 0.5], seen=arm.latest(), fixed=True)
+            arm.burst(20)
+    found = episodes(path, every=5)
+    read = {}
+    for action_is in ("acted", "asked"):
+        lerobot.write(tmp_path / action_is, found, action_is=action_is)
+        file = tmp_path / action_is / "data/chunk-000/file-000.parquet"
+        read[action_is] = pyarrow.parquet.read_table(file).to_pydict()
+    acted, asked = (np.ravel(read[name]["action"]) for name in ("acted", "asked"))
+    assert np.array_equal(np.ravel(read["acted"]["complementary_info.action_asked"]), asked)
+    assert np.array_equal(np.ravel(read["asked"]["complementary_info.action_acted"]), acted)
+    rows = np.concatenate([each.actions for each in found.all])[:, 0]
+    assert np.array_equal(acted, rows.astype(np.float32))
+    assert asked[2:4].tolist() == [1.0, 1.0]
+    assert np.array_equal(asked[:2], acted[:2])
+    assert np.array_equal(asked[4:6], acted[4:6])  # after the purge
+    assert asked[6:].tolist() == pytest.approx([0.5, 0.5, -1, -1, 0.2, 0.3, 0.4, 0.5])
+
+
+def test_numbers_and_units_of_a_lerobot_data_set_are_chosen(recorded: Path, tmp_path: Path) -> None:
+    options = ("-o", tmp_path / "set", "--format", "lerobot", "--every", "10")
+    run_o80("export", recorded, *options, "--state", "elbow", "--units", "degrees")
+    features = json.loads((tmp_path / "set/meta/info.json").read_text())["features"]
+    assert features["observation.state"]["names"] == ["elbow.pos"]
+    assert features["action"]["names"] == ["shoulder.pos", "elbow.pos"]
+    assert not [name for name in features if "environment_state" in name]
+    table = pyarrow.parquet.read_table(tmp_path / "set/data/chunk-000/file-000.parquet")
+    rows = np.concatenate([each.observed[:-1, 1] for each in episodes(recorded, every=10).all])
+    state = np.ravel(table["observation.state"].to_pylist())
+    assert state == pytest.approx(np.degrees(rows), abs=1e-4)
+    for words, why in (
+        (("--units", "normalised"), "through which ranges"),
+        (("--units", "turns"), "must be one of degrees, normalised, native"),
+        (("--action", "elbo"), "Did you mean 'elbow'"),
+        (("--fields", "effort"), "--sensors"),
+    ):
+        said = run_o80("export", recorded, "-o", tmp_path / "no", *options[2:], *words, code=1)
+        assert why in said.stderr
+    said = run_o80("export", recorded, "-o", tmp_path / "no.npz", "--units", "degrees", code=1)
+    assert "--format lerobot" in said.stderr
+
+
+def test_times_are_k_over_fps_and_the_true_ones_beside_them(segment: str, tmp_path: Path) -> None:
+    path = tmp_path / "run.mcap"
+    sensors = {"capture_time": np.int64}
+    with o80.Backend(segment, ["lift"], extended=sensors, frequency=100) as backend:
+
+        def publish() -> None:
+            backend.publish([0.0], {"capture_time": time.monotonic_ns() - 3_000_000})
+
+        publish()
+        with o80.Recording(path, segment) as recording:
+            recording.mark("episode")
+            for _ in range(3):
+                backend.step()
+                publish()
+            recording.mark("episode_end")
+    found = episodes(path)
+    lerobot.write(tmp_path / "set", found)
+    table = pyarrow.parquet.read_table(tmp_path / "set/data/chunk-000/file-000.parquet")
+    rows = found.all[0].rows[:-1]
+    assert table["timestamp"].to_pylist() == pytest.approx([0, 0.01, 0.02])
+    true = (rows.time - rows.time[0]) * 1e-9
+    assert table["complementary_info.time"].to_pylist() == pytest.approx(true)
+    age = np.ravel(table["complementary_info.age"].to_pylist())
+    assert age == pytest.approx((rows.time - rows.extended.capture_time) * 1e-9)
+    assert (age >= 0.003).all()
+    captured = np.ravel(table["complementary_info.capture_time"].to_pylist())
+    assert captured == pytest.approx(true - age)
 
 
 def test_a_folder_that_exists_is_not_overwritten(recorded: Path, tmp_path: Path) -> None:
@@ -440,4 +555,6 @@ def test_actions_come_with_the_latency_of_their_decisions(
     assert episode.delays == pytest.approx(delays, nan_ok=True)
     lerobot.write(tmp_path / "set", found)
     table = pyarrow.parquet.read_table(tmp_path / "set/data/chunk-000/file-000.parquet")
-    assert table["action.delay"].to_pylist() == pytest.approx([-1, -1, 0.002, 0.002, 0.002, 0.004])
+    assert table["complementary_info.delay"].to_pylist() == pytest.approx(
+        [-1, -1, 0.002, 0.002, 0.002, 0.004]
+    )

@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = (
-    *("apps", "benchmarks", "devices", "docs", "examples"),
+    *("apps", "benchmarks", "devices", "docs", "examples", "gateways"),
     *("python", "robots", "simulators", "src", "tests"),
 )
 PAGES = sorted([*ROOT.glob("*.md"), *(page for f in FOLDERS for page in (ROOT / f).rglob("*.md"))])
@@ -31,7 +31,17 @@ INSIDE = [ROOT / "ARCHITECTURE.md", *NOTES]
 LARGEST = {page: 12 * 1024 if page.parent == ROOT else 6 * 1024 for page in INSIDE}  # [bytes]
 SOURCES = [
     path
-    for folder in ("apps", "devices", "include", "python", "robots", "simulators", "src", "tests")
+    for folder in (
+        "apps",
+        "devices",
+        "gateways",
+        "include",
+        "python",
+        "robots",
+        "simulators",
+        "src",
+        "tests",
+    )
     for path in (ROOT / folder).rglob("*")
     if path.suffix in {".hpp", ".cpp", ".py"} and path != Path(__file__)
 ]

@@ -20,6 +20,7 @@ FOLDERS = (
     "benchmarks",
     "devices",
     "examples",
+    "gateways",
     "python",
     "robots",
     "simulators",

@@ -207,18 +207,19 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 CEILINGS = {
     "include, src": (33_450, 0),
     "python/bindings": (5_608, 0),
-    "python/o80": (29_490, 0),
+    "python/o80": (29_970, 0),
     "python/o80/hybrid": (2_290, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
     "devices": (8_850, 4_500),
-    "robots/arms": (4_450, 3_095),
+    "gateways/lerobot": (900, 900),
+    "robots/arms": (4_450, 3_100),
     "robots/pam, robots/two_joints": (2_144, 1_208),
     "simulators/mujoco": (5_240, 4_580),
     "apps/table_tennis": (10_750, 6_045),
-    "benchmarks, tools": (5_380, 0),
+    "benchmarks, tools": (5_470, 0),
     "examples": (1_900, 0),
-    "tests, conftest.py": (0, 66_720),
+    "tests, conftest.py": (0, 66_870),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

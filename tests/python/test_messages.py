@@ -17,7 +17,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 GOLDEN = ROOT / "tests" / "messages"
-FOLDERS = ("apps", "devices", "include", "python", "robots", "simulators", "src")
+FOLDERS = ("apps", "devices", "gateways", "include", "python", "robots", "simulators", "src")
 LEFT_OUT = {"build", "build_backend", "studies", "tests"}
 VALUE = re.compile(r"\{[^{}]*\}")
 WORD = re.compile(r"(?<![^\s(;`'\[|-])[A-Za-z]+(?![^\s,.:;)?`'|\]-])")

@@ -1,9 +1,10 @@
 """``o80 export``: rows in formats that data tools and learners read."""
 
 import sys
+from collections.abc import Mapping
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
@@ -32,11 +33,7 @@ def export(
     ],
     segment: Annotated[str | None, typer.Option(help="Only this segment of a recording.")] = None,
     fields: Annotated[
-        str,
-        typer.Option(
-            help="Only these, for example observed.elbow,extended.effort; with --format: of the "
-            "sensor values"
-        ),
+        str, typer.Option(help="Only these, for example observed.elbow,extended.effort.")
     ] = "",
     form: Annotated[
         Format | None,
@@ -46,16 +43,51 @@ def export(
         str,
         typer.Option(help="With --format: a step of the data set, iterations or seconds (0.1)."),
     ] = "1",
+    sensors: Annotated[
+        str, typer.Option(help="With --format: these sensor values, for example measured.velocity.")
+    ] = "",
+    state: Annotated[
+        str, typer.Option(help="With --format lerobot: only these actuators in observation.state.")
+    ] = "",
+    action: Annotated[
+        str, typer.Option(help="With --format lerobot: only these actuators in action.")
+    ] = "",
+    units: Annotated[
+        str,
+        typer.Option(
+            help="With --format lerobot: degrees, normalised or native (by default those of "
+            "LeRobot's driver of the arm)."
+        ),
+    ] = "",
+    action_is: Annotated[
+        str,
+        typer.Option(
+            help="With --format lerobot: 'acted', the desired states, or 'asked', the targets."
+        ),
+    ] = "",
 ) -> None:
     """Export rows: one column for each number, named as in observed.elbow or extended.force[2].
 
     With --format, the episodes of a recording as a data set for learning: see docs/recording.md.
     """
+    of_lerobot = {
+        "state": _listed(state),
+        "action": _listed(action),
+        "units": units,
+        "action_is": action_is,
+    }
+    of_lerobot = {name: given for name, given in of_lerobot.items() if given}
+    if of_lerobot and form is not Format.LEROBOT:
+        name = next(iter(of_lerobot)).replace("_", "-")
+        raise InvalidArgument(f"--{name} is for data sets of LeRobot: give --format lerobot too")
     if form is not None:
-        _export_episodes(source, output, segment, form, _time(every), _listed(fields))
+        if fields:
+            raise InvalidArgument("--fields is for files: a data set has --sensors")
+        _export_episodes(source, output, segment, form, _time(every), _listed(sensors), of_lerobot)
         return
-    if every != "1":
-        raise InvalidArgument("--every is for data sets: give --format lerobot or minari too")
+    for name, given in (("every", every != "1"), ("sensors", sensors)):
+        if given:
+            raise InvalidArgument(f"--{name} is for data sets: give --format lerobot or minari too")
     from o80.datasets.export import write
 
     found = list(histories(source, segment))
@@ -87,16 +119,26 @@ def _listed(fields: str) -> list[str]:
 
 
 def _export_episodes(
-    source: str, output: Path, segment: str | None, form: Format, every: float, fields: list[str]
+    source: str,
+    output: Path,
+    segment: str | None,
+    form: Format,
+    every: float,
+    sensors: list[str],
+    of_lerobot: Mapping[str, Any],
 ) -> None:
     from o80.datasets import lerobot, minari
     from o80.datasets.episodes import episodes_of
     from o80.recording.reader import open as open_recording
 
+    is_lerobot = form is Format.LEROBOT
+    fields = [] if is_lerobot else sensors
     episodes = episodes_of(open_recording(source), segment, every=every, fields=fields)
-    write = {Format.LEROBOT: lerobot.write, Format.MINARI: minari.write}[form]
     with writing(output):
-        write(output, episodes, complain)
+        if is_lerobot:
+            lerobot.write(output, episodes, complain, sensors=sensors, **of_lerobot)
+        else:
+            minari.write(output, episodes, complain)
     for why in episodes.left_out:
         complain(f"left out: {why}")
     steps = sum(len(episode) for episode in episodes.all)

@@ -3,9 +3,10 @@
 The rules are in docs/recording.md, Export for learning.
 """
 
+import functools
 import sys
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from numpy.typing import NDArray
 from o80.base.argument_checks import iterations
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument
+from o80.datasets.asked import Asked
 from o80.rows.columns import Column, chosen, columns_of
 from o80.rows.history import History, values_of
 
@@ -44,6 +46,7 @@ class Episode:
     task: str
     values: Mapping[str, Any]  #: of the mark before it
     sensors: Sequence[Column]  #: the columns of `extended`
+    _commands: Callable[[], Asked] = field(repr=False)
 
     def __len__(self) -> int:
         return len(self.rewards)
@@ -67,6 +70,12 @@ class Episode:
     def actions(self) -> NDArray[np.float64]:
         """Actions of all steps, the desired states: (T, numbers)."""
         return self._numbers(_columns(self.rows.schema, "desired"))[1:]
+
+    def asked(self, columns: Sequence[Column]) -> NDArray[np.float64]:
+        """Targets (T, columns) that commands asked for at the ends of the steps, of columns of
+        desired numbers; NaN where none did.
+        """
+        return self._commands().at(self.rows.iteration[1:], columns)
 
     def _numbers(self, columns: Sequence[Column]) -> NDArray[np.float64]:
         numbers = np.empty((len(self.rows), len(columns)))
@@ -109,6 +118,7 @@ def episodes_of(
     epochs = [epoch for epoch in robot.epochs if epoch.rows]
     step = iterations(every, "every", float(robot.schema["period"]) * 1e-9, 1)
     taken = {epoch: _Orders.of(epoch.native_journal()) for epoch in epochs}
+    commands = {epoch: functools.cache(functools.partial(_asked, epoch)) for epoch in epochs}
     _sensors(robot.name, robot.schema, fields)  # refuses fields that it lacks
     usual = (begin, end) == (BEGIN, END)
     left_out = _misspelt(recording.marks, robot.name) if usual else []
@@ -117,7 +127,9 @@ def episodes_of(
         if not span.dropped:
             _refuse_wrong_rewards(span, robot.name)
         try:
-            found.append(_episode(span, epochs, robot.name, step, taken, fields, left_out))
+            found.append(
+                _episode(span, epochs, robot.name, step, taken, commands, fields, left_out)
+            )
         except InvalidArgument as error:
             left_out.append(str(error))
     if not found:
@@ -190,6 +202,7 @@ def _episode(
     segment: str,
     every: int,
     taken: Mapping["RecordedEpoch", "_Orders"],
+    commands: Mapping["RecordedEpoch", Callable[[], Asked]],
     fields: Sequence[str],
     left_out: list[str],
 ) -> Episode:
@@ -236,7 +249,12 @@ def _episode(
         task=task or epoch.schema["robot"],
         values=mark.values,
         sensors=_sensors(segment, epoch.schema, fields),
+        _commands=commands[epoch],
     )
+
+
+def _asked(epoch: "RecordedEpoch") -> Asked:
+    return Asked(epoch.native_journal(), epoch.schema)
 
 
 @dataclass(frozen=True)

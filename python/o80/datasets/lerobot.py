@@ -5,9 +5,10 @@ Written without LeRobot, which is large; it reads the result:
 """
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,32 +17,56 @@ from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
 from o80.base.finite import Say, json_text, say_not_finite, warn
 from o80.datasets.episodes import Episode, Episodes
+from o80.datasets.lerobot_numbers import Number, Units, numbers_of, values_in
+from o80.rows.columns import Column, chosen, columns_of
+from o80.rows.history import History, values_of
 
 VERSION = "v3.0"
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
 TASKS = "meta/tasks.parquet"
+EXTRA = "complementary_info."
+"""Begin of the names of what no policy gets: LeRobot gives it all `observation` and `action`."""
 Columns = dict[str, NDArray[Any]]
 
 
-def write(path: Path, episodes: Episodes, say: Say = warn) -> None:
-    """Writes a folder, which must not exist. Raises InvalidArgument, MissingExtra, OSError.
+def write(
+    path: Path,
+    episodes: Episodes,
+    say: Say = warn,
+    *,
+    state: Sequence[str] = (),
+    action: Sequence[str] = (),
+    sensors: Sequence[str] = (),
+    units: Units | None = None,
+    action_is: Literal["acted", "asked"] = "acted",
+) -> None:
+    """Writes a folder, which must not exist.
 
-    observation.state is observed, observation.environment_state the sensor values, action the
-    desired states that were reached with the step; next.reward and next.done are those of the step.
-    action.delay is the decision latency of each action [s], -1 where it is not known; only if
-    actions were sent with `pulse(seen=row)`.
+    state, action: actuators or fields of their states in observation.state, which is observed, and
+        in action (empty: all).
+    sensors: sensor values in observation.environment_state (empty: none).
+    units: of states and actions: "degrees", "normalised" or "native" (None: those of LeRobot's
+        driver of this arm, else "native").
+    action_is: "acted": the desired states that were reached with the step; "asked": the targets of
+        the commands. The other one is complementary_info.action_asked or .action_acted.
+
+    docs/lerobot.md lists the other columns. Raises InvalidArgument, MissingExtra, OSError.
     """
     needed("pyarrow", "export", "a LeRobot data set")
     if path.exists():
         raise InvalidArgument(f"{path} exists: a data set is written to a new folder")
+    chosen_numbers = _Chosen.of(episodes, state, action, sensors, units, action_is)
     tasks = list(dict.fromkeys(episode.task for episode in episodes.all))
-    features = _features(episodes)
+    features = _features(episodes, chosen_numbers)
     frames, rows, first = [], [], 0
     for number, episode in enumerate(episodes.all):
-        columns = _frames(episode, number, first, tasks.index(episode.task), features)
-        frames.append(columns)
-        rows.append(_row(episode, number, first, columns))
+        columns = {
+            **chosen_numbers.columns(episode),
+            **_indices(episode, number, first, tasks.index(episode.task), episodes.frequency),
+        }
+        frames.append(_typed(columns, features))
+        rows.append(_row(episode, number, first, frames[-1]))
         first += len(episode)
     (path / "meta/episodes/chunk-000").mkdir(parents=True)
     (path / "data/chunk-000").mkdir(parents=True)
@@ -52,6 +77,86 @@ def write(path: Path, episodes: Episodes, say: Say = warn) -> None:
     say_not_finite(_not_finite(features, frames), "left out of the statistics", say)
     whole = {name: np.concatenate([each[name] for each in frames]) for name in features}
     _write_json(path / "meta/stats.json", {name: _stats(v) for name, v in whole.items()})
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """Numbers of the rows that the data set holds."""
+
+    state: Sequence[Number]
+    action: Sequence[Number]
+    sensors: Sequence[Column]
+    captures: Mapping[str, Column | None]  #: stamps by what was captured; None: the row's own time
+    action_is: Literal["acted", "asked"]
+
+    @classmethod
+    def of(
+        cls,
+        episodes: Episodes,
+        state: Sequence[str],
+        action: Sequence[str],
+        sensors: Sequence[str],
+        units: Units | None,
+        action_is: Literal["acted", "asked"],
+    ) -> "_Chosen":
+        if action_is not in ("acted", "asked"):
+            raise InvalidArgument(f"action_is must be 'acted' or 'asked', got {action_is!r}")
+        schema = episodes.all[0].rows.schema
+        extended = [each for each in columns_of(schema) if each.name.startswith("extended.")]
+        names = [each.name for each in extended]
+        wanted = set(chosen(episodes.segment, names, sensors)) if sensors else set()
+        stamps: dict[str, Column | None] = {
+            each.name.removeprefix("extended.").rpartition(".")[0] or "sensors": each
+            for each in extended
+            if each.name.endswith(".capture_time") and each.origin != "absent"
+        }
+        return cls(
+            numbers_of(schema, "observed", units, state),
+            numbers_of(schema, "desired", units, action),
+            [each for each in extended if each.name in wanted],
+            stamps or {"state": None},
+            action_is,
+        )
+
+    @property
+    def other(self) -> str:
+        """Name of the column with the actions that `action` does not hold."""
+        return f"{EXTRA}action_{'asked' if self.action_is == 'acted' else 'acted'}"
+
+    def columns(self, episode: Episode) -> Columns:
+        """Values of an episode: (T,) or (T, numbers)."""
+        rows = episode.rows[:-1]
+        acted = episode.rows[1:]
+        wanted = [number.column for number in self.action]
+        desired = _values(acted, wanted)
+        asked = episode.asked(wanted)
+        both = {"acted": desired, "asked": np.where(np.isnan(asked), desired, asked)}
+        action = both.pop(self.action_is)
+        (other,) = both.values()
+        captured = [
+            rows.time if stamp is None else values_of(rows, stamp)
+            for stamp in self.captures.values()
+        ]
+        captures = np.stack(captured, axis=1)
+        begin = episode.rows.time[0]
+        return {
+            "action": values_in(self.action, action),
+            "observation.state": values_in(
+                self.state, _values(rows, [number.column for number in self.state])
+            ),
+            "observation.environment_state": _values(rows, self.sensors),
+            self.other: values_in(self.action, other),
+            f"{EXTRA}time": (rows.time - begin) * 1e-9,
+            f"{EXTRA}capture_time": (captures - begin) * 1e-9,
+            f"{EXTRA}age": (rows.time[:, None] - captures) * 1e-9,
+            f"{EXTRA}delay": np.nan_to_num(episode.delays, nan=-1.0),
+        }
+
+
+def _values(rows: History, columns: Sequence[Column]) -> NDArray[np.float64]:
+    """Numbers of rows (T, columns)."""
+    each = [values_of(rows, column).astype(np.float64) for column in columns]
+    return np.stack(each, axis=1) if each else np.empty((len(rows), 0))
 
 
 def _not_finite(
@@ -67,52 +172,51 @@ def _not_finite(
     return found
 
 
-def _features(episodes: Episodes) -> dict[str, dict[str, Any]]:
+def _features(episodes: Episodes, numbers: _Chosen) -> dict[str, dict[str, Any]]:
     """Every column of the frames: type, shape, and the names of its numbers."""
-    vectors = {
-        "action": episodes.names["desired"],
-        "observation.state": episodes.names["observed"],
-        "observation.environment_state": episodes.names["extended"],
-    }
-    features: dict[str, dict[str, Any]] = {
-        name: {"dtype": "float32", "shape": [len(numbers)], "names": list(numbers)}
-        for name, numbers in vectors.items()
-        if numbers
-    }
+    action = [number.name for number in numbers.action]
+    sensors = [each.name.removeprefix("extended.") for each in numbers.sensors]
+    captures = list(numbers.captures)
     says = any(np.isfinite(episode.delays).any() for episode in episodes.all)
-    for name, dtype in (
-        *([("action.delay", "float32")] if says else []),
-        ("next.reward", "float32"),
-        ("next.done", "bool"),
-        ("timestamp", "float32"),
-        ("frame_index", "int64"),
-        ("episode_index", "int64"),
-        ("index", "int64"),
-        ("task_index", "int64"),
-    ):
-        features[name] = {"dtype": dtype, "shape": [1], "names": None}
-    return features
+    described: tuple[tuple[str, str, list[str] | None], ...] = (
+        ("action", "float32", action),
+        ("observation.state", "float32", [number.name for number in numbers.state]),
+        ("observation.environment_state", "float32", sensors),
+        (numbers.other, "float32", action),
+        (f"{EXTRA}time", "float64", None),
+        (f"{EXTRA}capture_time", "float64", captures),
+        (f"{EXTRA}age", "float64", captures),
+        *([(f"{EXTRA}delay", "float32", None)] if says else []),
+        ("next.reward", "float32", None),
+        ("next.done", "bool", None),
+        ("timestamp", "float32", None),
+        ("frame_index", "int64", None),
+        ("episode_index", "int64", None),
+        ("index", "int64", None),
+        ("task_index", "int64", None),
+    )
+    return {
+        name: {"dtype": dtype, "shape": [1 if names is None else len(names)], "names": names}
+        for name, dtype, names in described
+        if names != []
+    }
 
 
-def _frames(
-    episode: Episode, number: int, first: int, task: int, features: Mapping[str, Any]
-) -> Columns:
-    """The columns of an episode: one frame for each step."""
+def _indices(episode: Episode, number: int, first: int, task: int, frequency: float) -> Columns:
+    """Columns (T,) that place the frames of an episode. Times are k / fps, as LeRobot checks."""
     steps = np.arange(len(episode))
-    times = (episode.rows.time[:-1] - episode.rows.time[0]) * 1e-9
-    columns = {
-        "action": episode.actions,
-        "observation.state": episode.observed[:-1],
-        "observation.environment_state": episode.extended[:-1],
-        "action.delay": np.nan_to_num(episode.delays, nan=-1.0),
+    return {
         "next.reward": episode.rewards,
         "next.done": steps == len(episode) - 1,
-        "timestamp": times,
+        "timestamp": steps / round(frequency, 5),
         "frame_index": steps,
         "episode_index": np.full(len(episode), number),
         "index": first + steps,
         "task_index": np.full(len(episode), task),
     }
+
+
+def _typed(columns: Columns, features: Mapping[str, Any]) -> Columns:
     with np.errstate(over="ignore"):  # what is too large for 32 bits is infinite, and is said
         return {name: columns[name].astype(each["dtype"]) for name, each in features.items()}
 
@@ -177,13 +281,18 @@ def _write_frames(path: Path, frames: list[Columns], features: Mapping[str, Any]
     import pyarrow as arrow
     import pyarrow.parquet as parquet
 
-    kinds = {"float32": arrow.float32(), "int64": arrow.int64(), "bool": arrow.bool_()}
+    kinds = {
+        "float32": arrow.float32(),
+        "float64": arrow.float64(),
+        "int64": arrow.int64(),
+        "bool": arrow.bool_(),
+    }
     schema = arrow.schema(
         [
             (
                 name,
                 kinds[each["dtype"]]
-                if each["shape"] == [1] and each["names"] is None
+                if each["shape"] == [1]  # LeRobot reads these as plain numbers
                 else arrow.list_(kinds[each["dtype"]], each["shape"][0]),
             )
             for name, each in features.items()

@@ -22,16 +22,18 @@ pytestmark = [
     pytest.mark.parametrize("arm", ["so101", "koch"], indirect=True),
 ]
 
-# the package alone: what it requires would bring torch of another version
-FOLDER = Path(sys.prefix) / "lerobot"
+ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture
 def motors(monkeypatch: pytest.MonkeyPatch) -> Any:
     """LeRobot's package of motors."""
-    if not FOLDER.exists():
-        pytest.skip(f"there is no {FOLDER}: tools/setup.sh check installs LeRobot's package there")
-    monkeypatch.syspath_prepend(str(FOLDER))
+    packages = [*ROOT.glob("build/lerobot/lib/python3.*/site-packages")]
+    if not packages:
+        pytest.skip(
+            f"there is no {ROOT}/build/lerobot: tools/setup.sh check installs LeRobot there"
+        )
+    monkeypatch.syspath_prepend(str(packages[0]))
     # the module imports torch, accelerate and datasets; the bus takes two functions for terminals
     terminal = ModuleType("lerobot.utils.utils")
     terminal.__dict__.update(enter_pressed=None, move_cursor_up=None)

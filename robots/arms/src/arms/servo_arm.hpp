@@ -173,6 +173,7 @@ class ServoArm {
   };
 
   // servo_arm_start.cpp
+  void tell_ranges(Schema& schema) const;
   void check_servos();
   void check_calibration();
   void tell_doubts() const;

@@ -74,6 +74,22 @@ void ServoArm::describe(Schema& schema) const {
                                               .acceleration = 20.0,
                                               .jerk = 1000.0,
                                               .noise = 0.05});
+  tell_ranges(schema);
+}
+
+/// The calibrated ranges as help of the joints, which recordings keep. LeRobot's normalised units
+/// are shares of them; the limits may be narrower.
+void ServoArm::tell_ranges(Schema& schema) const {
+  if (calibration_.empty()) return;
+  std::string text = "0: the middle of calibrated ranges";
+  for (std::size_t i = 0; i < kGripper; ++i) {
+    std::array<char, 16> width{};
+    std::snprintf(width.data(), width.size(), " %.6f",
+                  calibration_[i].width() * Calibration::kStep);
+    text += width.data();
+  }
+  const TypeRow& joints = schema.types.at(schema.groups.at(0).type);
+  schema.fields.at(joints.first_field).help = FieldHelpText(text + " rad");
 }
 
 // start() may wait, and throws

@@ -1,0 +1,91 @@
+"""A segment of o80 in LeRobot's names and units."""
+
+import contextlib
+from collections.abc import Mapping
+from typing import Any, Literal
+
+import o80
+from o80.datasets.lerobot_numbers import Number, numbers_of
+from o80.rows.columns import value_of
+
+
+class Segment:
+    """Observed and desired numbers of a segment, by LeRobot's names.
+
+    name: of the segment. units: "degrees", "normalised" or "native"; "": those of LeRobot's driver
+    of this arm, else "native". timeout: longest wait for the robot, and for its next row [s].
+    """
+
+    def __init__(self, name: str, units: str, timeout: float) -> None:
+        self.name = name
+        self.arm: o80.Frontend | None = None  #: while it is open
+        self._units: Any = units or None
+        self._timeout = timeout
+        self._numbers: dict[str, dict[str, Number]] | None = None
+
+    def numbers(self, part: Literal["observed", "desired"] = "observed") -> Mapping[str, Number]:
+        """The numbers by name. Attaches for a moment if it is not open.
+
+        Raises TimeoutError if no such robot runs, InvalidArgument for units that it cannot have.
+        """
+        if self._numbers is None:
+            with o80.Frontend(self.name, self._timeout, read_only=True) as reader:
+                self._describe(reader)
+        assert self._numbers is not None
+        return self._numbers[part]
+
+    def _describe(self, arm: o80.Frontend) -> None:
+        self._numbers = {
+            part: {each.name: each for each in numbers_of(arm.schema, part, self._units)}
+            for part in ("observed", "desired")
+        }
+
+    def open(self, *, read_only: bool = False) -> o80.Frontend:
+        """Attaches. Raises TimeoutError, and InvalidArgument for a robot that bursts."""
+        arm = o80.Frontend(self.name, self._timeout, read_only=read_only, on_error="continue")
+        try:
+            if arm.bursting:
+                raise o80.InvalidArgument(
+                    f"'{self.name}' bursts, and LeRobot's loops do not burst it: start it in real "
+                    "time"
+                )
+            self._describe(arm)
+        except BaseException:
+            arm.close()
+            raise
+        self.arm = arm
+        return arm
+
+    def close(self) -> None:
+        """Detaches. May be called twice."""
+        arm, self.arm = self.arm, None
+        if arm is not None:
+            arm.close()
+
+    def read(self) -> tuple[o80.Observation, dict[str, float]]:
+        """The newest row, and its observed numbers in LeRobot's units.
+
+        Raises BackendGone if the robot has ended, BackendHalted with the text of the halt, and
+        TimeoutError if the newest row is older than `timeout`.
+        """
+        arm = self.checked()
+        if (age := arm.row_age or 0.0) > self._timeout:
+            raise o80.TimeoutError(f"'{self.name}' has published nothing for {age:.1f} s")
+        row = arm.latest()
+        found = {
+            name: float(number.of_row(value_of(row, number.column)))
+            for name, number in self.numbers().items()
+        }
+        return row, found
+
+    def checked(self) -> o80.Frontend:
+        """The frontend of a robot that runs. Raises BackendGone, BackendHalted."""
+        assert self.arm is not None
+        with contextlib.suppress(o80.TimeoutError):  # raises if it has ended
+            self.arm.wait_for(self.arm.published + 1, 0.0)
+        if (halt := self.arm.halted) is not None:
+            raise o80.BackendHalted(
+                f"'{self.name}' is halted: {halt.text or halt.cause}. When the cause is gone: "
+                f"o80 resume {self.name} {halt.number}"
+            )
+        return self.arm

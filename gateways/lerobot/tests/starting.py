@@ -1,0 +1,33 @@
+"""Robots in processes of their own for the tests of this folder; arms with fake servos."""
+
+import itertools
+import os
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from typing import Any
+
+import o80
+from o80_arms import fakes
+
+#: Starts a robot in real time by its name and options; returns its segment. moved: steps by which
+#: its fake servos stand away from the middle of their ranges.
+Start = Callable[..., str]
+_count = itertools.count()
+
+
+@contextmanager
+def starting() -> Iterator[Start]:
+    """Ends the robots at the end of the block."""
+    with ExitStack() as stack:
+
+        def start(robot: str, moved: int = 0, **options: Any) -> str:
+            if hasattr(fakes, robot):
+                fake = stack.enter_context(getattr(fakes, robot)())
+                for servo in fake.chain.servos.values():
+                    servo.stand_at(servo.shown + moved)
+                options |= fake.options | {"answer_timeout": 9.0}  # a busy machine
+            segment = f"test-{os.getpid()}-{next(_count)}"
+            stack.enter_context(o80.robots.load(robot).start(segment, gap=60.0, **options))
+            return segment
+
+        yield start
