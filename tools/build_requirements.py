@@ -17,6 +17,7 @@ PACKAGES = (
     "devices",
     "apps/table_tennis",
     "gateways/lerobot",
+    "gateways/ros2",
 )
 ELSEWHERE = ("o80=", "o80-", "o80[", "lerobot>")
 """Begins of requirements that are not listed: each other, and LeRobot (tools/lerobot.txt)."""

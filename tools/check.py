@@ -20,6 +20,7 @@ PACKAGES = (
     "o80_devices",
     "o80_table_tennis",
     "lerobot_robot_o80",
+    "o80_ros2",
 )
 TYPED = (  # beside the packages
     "tools",
@@ -39,6 +40,7 @@ TYPED_TESTS = (
     "simulators/mujoco/tests",
     "devices/tests",
     "gateways/lerobot/tests",
+    "gateways/ros2/tests",
     "apps/table_tennis/tests",
 )
 WORKFLOW = ".github/workflows/tests.yml"

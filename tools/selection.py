@@ -8,7 +8,11 @@ from pathlib import Path
 
 from sources import ROOT
 
-PACKAGES = [each for group in ("robots", "simulators", "apps") for each in ROOT.glob(f"{group}/*/")]
+PACKAGES = [
+    each
+    for group in ("robots", "simulators", "gateways", "apps")
+    for each in ROOT.glob(f"{group}/*/")
+]
 PACKAGES = [each for each in (*PACKAGES, ROOT / "devices") if (each / "tests").is_dir()]
 #: Folders of tests in C++ by the name of their program, o80_test_<name>.
 CPP = {folder.name: folder for folder in ROOT.glob("tests/cpp/*/")} | {

@@ -145,6 +145,17 @@ install_lerobot() {
   say "installed LeRobot"
 }
 
+# rclpy of two versions of ROS 2, the judges of the gateway, each in an environment of its own
+install_ros() {
+  local name
+  for name in jazzy kilted; do
+    say "installing rclpy of ROS 2 $name"
+    "$python" -m venv --clear "build/ros/$name"
+    "build/ros/$name/bin/python" -m pip -qq --disable-pip-version-check install \
+      -r <(.venv/bin/python tools/build_requirements.py run "$name" | grep '^ros-')
+  done
+}
+
 # install_package NAME FOLDER [DEFINITION...]: one of the packages, whose requirements are there
 install_package() {
   local name=$1 folder=$2
@@ -174,6 +185,7 @@ install_others() {
     demo | learn) ;;
     *)
       once devices "$(package_state devices)" install_package o80-devices ./devices
+      once ros2 "$(package_state gateways/ros2)" install_package o80-ros2 ./gateways/ros2
       once arms "$headers $(package_state robots/arms)" \
         install_package o80-arms ./robots/arms "$checkout"
       once lerobot_robot "$(package_state gateways/lerobot)" \
@@ -242,6 +254,7 @@ install_programs() {
       need_renderer
       [ -e build/lerobot ] || rm -f .venv/stamps/lerobot # after make clean
       once lerobot "$(state_of tools/lerobot.txt tools/torchvision.py)" install_lerobot
+      once ros "$(state_of gateways/ros2/pyproject.toml)" install_ros
       ;;
   esac
 }

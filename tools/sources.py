@@ -11,6 +11,7 @@ FOLDERS = (
     "robots",
     "simulators",
     "devices",
+    "gateways",
     "apps",
     "gateways",
     "examples",

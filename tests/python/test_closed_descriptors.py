@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PACKAGES = (
     "python/o80",
     "devices/o80_devices",
+    "gateways/ros2/o80_ros2",
     "robots/arms/python",
     "apps/table_tennis/o80_table_tennis",
 )

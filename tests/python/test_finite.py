@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 ROOMS = (
     "python/o80",
     "devices/o80_devices",
+    "gateways/ros2/o80_ros2",
     "robots/arms/python",
     "robots/pam/python",
     "simulators/mujoco/python",

@@ -12,7 +12,14 @@ import o80
 
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED = Path(o80.__file__).parent
-OTHERS = ("simulators/mujoco", "robots/pam", "robots/arms", "devices", "apps/table_tennis")
+OTHERS = (
+    "simulators/mujoco",
+    "robots/pam",
+    "robots/arms",
+    "devices",
+    "gateways/ros2",
+    "apps/table_tennis",
+)
 
 
 def pyproject(folder: str = ".") -> dict[str, Any]:

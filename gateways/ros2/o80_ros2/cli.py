@@ -1,0 +1,58 @@
+"""``o80 ros2``: robots of o80 in ROS 2."""
+
+from contextlib import closing
+from typing import Annotated
+
+import typer
+
+from o80.cli.stop_request import StopRequest
+from o80.errors import InvalidArgument
+from o80_ros2 import ros
+
+app = typer.Typer(help="Publish robots in ROS 2, and take commands.", subcommand_metavar="")
+Names = Annotated[list[str] | None, typer.Argument(help="Segments (default: all that come).")]
+Rates = Annotated[
+    list[str] | None,
+    typer.Option(
+        help="Messages a second of each robot, or all for every row; NAME=RATE for one robot. "
+        "Default: 100, above ten robots 20."
+    ),
+]
+Command = Annotated[bool, typer.Option("--command", help="Take commands; otherwise only read.")]
+Step = Annotated[
+    int | None, typer.Option(min=1, help="A service `step`: so many iterations of a simulation.")
+]
+Prefix = Annotated[str, typer.Option(help="Before names of robots and joints: two arms apart.")]
+
+
+def rates_of(texts: list[str]) -> dict[str, float]:
+    """Rates by segment [Hz], "" for all others, 0 for every row. Raises InvalidArgument."""
+    found: dict[str, float] = {}
+    for text in texts:
+        name, _, word = text.rpartition("=")
+        try:
+            found[name] = 0.0 if word == "all" else float(word) or -1.0
+        except ValueError:
+            found[name] = -1.0
+        if not 0 <= found[name] <= 10_000:
+            raise InvalidArgument(
+                f"--rate must be a number up to 10000, or all; NAME=RATE for one. Got '{text}'"
+            )
+    return found
+
+
+@app.callback(invoke_without_command=True)
+def ros2(
+    names: Names = None,
+    rate: Rates = None,
+    command: Command = False,
+    step: Step = None,
+    prefix: Prefix = "",
+) -> None:
+    """Publish robots in ROS 2, and take commands for them (docs/ros2.md)."""
+    settings = ros.Settings(rates_of(rate or []), command, step, prefix)
+    stop = StopRequest()
+    from o80_ros2.gateway import Gateway
+
+    with closing(Gateway(names or [], settings)) as gateway:
+        gateway.run(stop)

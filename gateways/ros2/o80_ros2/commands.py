@@ -1,0 +1,198 @@
+"""Commands of ROS 2 for one robot: a frontend as any other, with the same refusals."""
+
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import o80
+from o80.errors import Error, InvalidArgument
+from o80_ros2 import ros
+
+if TYPE_CHECKING:
+    from o80.frontend.chunks import Chunks
+
+PATIENCE, RESUME = 30.0, 5.0
+"""Longest waits: for a request, which then continues, or a step; for the end of a halt [s]."""
+SLOW = 0.5
+"""Set-points further apart are no stream [s]."""
+SLACK = 1.01
+"""Factor by which speeds may exceed their limit: times are rounded to iterations."""
+
+
+class Commands:
+    """Takes the messages and calls of one robot, in threads of the executor."""
+
+    def __init__(self, shared: ros.Shared, arm: o80.Frontend, refuse: Any) -> None:
+        """refuse: gets what was refused, and why."""
+        self._node, self._clock, self._arm, self._refuse = shared.node, shared.clock, arm, refuse
+        self._name = shared.settings.robot(arm.segment)
+        self._actuators = shared.settings.joints(each.name for each in arm.actuators)
+        self._plans: dict[tuple[int, ...], Chunks] = {}
+        self._sent: deque[tuple[str, Any]] = deque(maxlen=64)  # batches that have not ended
+        self._moves: Any = None  # the batch of the newest trajectory
+        self._last = self._every = 0.0  # of set-points: time of the last one, interval [s]
+        self._made: list[tuple[Callable[[Any], object], Any]] = []
+        group = ros.of("rclpy.callback_groups.MutuallyExclusiveCallbackGroup")
+        if shared.settings.step and arm.bursting:
+            self._steps = shared.settings.step
+            self._trigger("step", self._step, group())
+        if not shared.settings.command:
+            return
+        topics, calls = group(), group()
+        for kind, name, take, depth in (
+            ("trajectory_msgs.msg.JointTrajectory", "joint_trajectory", self._trajectory, 10),
+            ("std_msgs.msg.Float64MultiArray", "commands", self._set_points, 1),
+        ):
+            taken = partial(self._taken, name, take)
+            self._make("subscription", kind, name, taken, depth, group=topics)
+        self._trigger("halt", self._halt, group())  # waits behind no other call
+        self._trigger("resume", self._resume, calls)
+        requests = [each["name"] for each in arm.schema["requests"]]
+        for request, path in zip(requests, ros.names_of(requests), strict=True):
+            self._serve_request(request, f"requests/{path}", calls)
+
+    def close(self) -> None:
+        """Takes topics and services away, and closes the frontend: what was sent goes on."""
+        for destroy, made in self._made:
+            destroy(made)
+        with suppress(Error):
+            self._arm.close()
+
+    def poll(self) -> None:
+        """Reports commands that the backend rejected; keeps a trajectory alive until its end."""
+        for _ in range(len(self._sent)):
+            what, batch = self._sent.popleft()
+            if not batch.ended:
+                self._sent.append((what, batch))
+            elif (end := batch[0]).status == o80.Status.REJECTED:
+                self._refuse(what, f"{end.reason} {end.text}")
+        if self._moves is not None and not self._moves.ended:
+            with suppress(Error):
+                self._arm.keep_alive()
+
+    def _tried(self, what: str, run: Callable[[], str | None]) -> tuple[bool, str]:
+        """Runs it; whether it was not refused, and its text or the reason."""
+        try:
+            return True, run() or ""
+        except (Error, ValueError, TypeError, OverflowError) as error:
+            with suppress(Error):
+                self._arm.forget_added()
+            self._refuse(what, error)
+            return False, str(error)
+
+    def _make(self, what: str, kind: str, name: str, *rest: Any, group: Any) -> None:
+        """Makes a subscription or a service."""
+        create, destroy = (getattr(self._node, f"{verb}_{what}") for verb in ("create", "destroy"))
+        made = create(ros.of(kind), f"/{self._name}/{name}", *rest, callback_group=group)
+        self._made.append((destroy, made))
+
+    def _taken(self, name: str, take: Callable[[Any], None], message: Any) -> None:
+        self._tried(name, lambda: take(message))
+
+    def _set_points(self, message: Any) -> None:
+        """A set-point for each actuator, in their order."""
+        if len(message.data) != len(self._actuators):
+            raise InvalidArgument(
+                f"a number for each actuator is needed ({', '.join(self._actuators)}), "
+                f"got {len(message.data)}"
+            )
+        interval = time.monotonic() - self._last
+        self._last += interval
+        mean = 0.8 * self._every + 0.2 * interval if self._every else interval
+        self._every = mean if interval < SLOW else 0.0
+        every = self._every if self._every > self._arm.period else None
+        self._arm.add_command(None, list(message.data), every=every)
+        self._sent.append(("commands", self._arm.pulse()))
+
+    def _trajectory(self, message: Any) -> None:
+        """A chunk: anchored at the stamp; without one it begins now."""
+        arm, names = self._arm, list(message.joint_names)
+        unknown = [name for name in names if name not in self._actuators]
+        if unknown or not names or len({*names}) < len(names):
+            raise InvalidArgument(
+                f"joint_names must name joints of {', '.join(self._actuators)}, each once; got "
+                f"{', '.join(names)}"
+            )
+        chosen = tuple(self._actuators.index(name) for name in names)
+        if not message.points or {len(p.positions) for p in message.points} != {len(names)}:
+            raise InvalidArgument(f"each point needs {len(names)} positions, one for each joint")
+        rows = np.array([each.positions for each in message.points], float)
+        times = np.array([nanoseconds(each.time_from_start) for each in message.points])
+        if times[0] < 0 or (np.diff(times) <= 0).any():
+            raise InvalidArgument("time_from_start must not be negative, and must rise")
+
+        newest, period = arm.latest(), arm.schema["period"]
+        stamp, begin = nanoseconds(message.header.stamp), newest.time
+        if stamp:
+            simulated = arm.schema["clock"] == "simulated"
+            begin = stamp if simulated else self._clock.row_time(stamp)
+        anchor = newest.iteration + round((begin - newest.time) / period)
+        due = anchor + np.rint(times / period).astype(np.int64)
+        kept = np.append(np.diff(due) > 0, True)  # the last one of points in one iteration
+        rows, due = rows[kept], due[kept]
+        if due[-1] <= newest.iteration:
+            late = (newest.iteration - int(due[-1])) * arm.period
+            raise InvalidArgument(f"it is past: its last point was due {late:.3f} s ago")
+        self._check_speeds(names, chosen, rows, due)
+        anchor = min(anchor, newest.iteration)
+        rows, due = rows[due > anchor], due[due > anchor]
+        plan = self._plans.get(chosen)
+        if plan is None:
+            plan = self._plans[chosen] = arm.chunks(list(chosen), step=1)
+        fields = plan._kind.names  # of a state with several numbers the first one is given
+        targets = {fields[0]: rows} if fields else rows
+        sent = plan.send(targets, seen=anchor, due=due, fixed=bool(stamp), final=True)
+        self._moves = sent.batch
+        self._sent.append(("joint_trajectory", sent.batch))
+
+    def _check_speeds(self, names: list[str], chosen: tuple[int, ...], rows: Any, due: Any) -> None:
+        """Raises InvalidArgument if a joint would have to be faster than its limit."""
+        limits = np.array([self._arm.actuators[each].limits.speed for each in chosen])
+        speeds = np.abs(np.diff(rows, axis=0)) / (np.diff(due)[:, None] * self._arm.period)
+        for i, j in np.argwhere(speeds > SLACK * limits):
+            raise InvalidArgument(
+                f"'{names[j]}' would need a speed of {speeds[i, j]:.4g} from point {i} to the next "
+                f"one, its limit is {limits[j]:.4g}"
+            )
+
+    def _trigger(self, name: str, run: Callable[[], str], group: Any) -> None:
+        def serve(_: Any, answer: Any) -> Any:
+            answer.success, answer.message = self._tried(name, run)
+            return answer
+
+        self._make("service", "std_srvs.srv.Trigger", name, serve, group=group)
+
+    def _serve_request(self, request: str, path: str, group: Any) -> None:
+        """A service for a request of the driver: its fields are parameters by name."""
+        value_of = ros.of("rclpy.parameter.parameter_value_to_python")
+
+        def serve(call: Any, answer: Any) -> Any:
+            def run() -> str:
+                fields = {each.name: value_of(each.value) for each in call.parameters}
+                self._arm.request(request, timeout=PATIENCE, **fields)
+                return f"{request} has ended"
+
+            answer.result.successful, answer.result.reason = self._tried(path, run)
+            return answer
+
+        kind = "rcl_interfaces.srv.SetParametersAtomically"
+        self._make("service", kind, path, serve, group=group)
+
+    def _step(self) -> str:
+        return f"iteration {self._arm.burst(self._steps, timeout=PATIENCE).iteration}"
+
+    def _halt(self) -> str:
+        return f"halt {o80.halt(self._arm.segment, 'requested over ROS 2')} is requested"
+
+    def _resume(self) -> str:
+        return "the halt has ended" if self._arm.resume(timeout=RESUME) else "there was no halt"
+
+
+def nanoseconds(time: Any) -> int:
+    """A Time or Duration of ROS [ns]."""
+    return int(time.sec) * 10**9 + int(time.nanosec)

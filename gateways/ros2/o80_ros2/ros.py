@@ -1,0 +1,63 @@
+"""Packages and names of ROS 2, and what all parts of the gateway share."""
+
+import importlib
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from o80.errors import MissingExtra
+from o80.recording.epoch import topic_of
+from o80_ros2.wall_clock import WallClock
+
+
+def of(path: str) -> Any:
+    """A name of ROS 2, such as std_msgs.msg.String. Raises MissingExtra, which says the cure."""
+    module, _, name = path.rpartition(".")
+    try:
+        return getattr(importlib.import_module(module), name)
+    except ImportError as error:
+        raise MissingExtra(
+            f"`o80 ros2` needs {module}, which this Python does not find: on a machine with ROS 2 "
+            "source its setup.bash and install o80-ros2 into a venv with --system-site-packages; "
+            'elsewhere, on Linux with x86-64, pip install "o80-ros2[kilted]" (or [jazzy])',
+            name=module,
+        ) from error
+
+
+@dataclass(frozen=True)
+class Settings:
+    """Options of the command."""
+
+    rates: Mapping[str, float]  #: by segment, "" for all others [Hz]; 0: every row
+    command: bool = False
+    step: int | None = None  #: iterations of the service `step`; None: there is none
+    prefix: str = ""
+
+    def robot(self, segment: str) -> str:
+        """Name of a robot below which its topics lie: with the prefix, that of a recording."""
+        return topic_of(self.prefix + segment).lstrip("/")
+
+    def joints(self, names: Iterable[str]) -> list[str]:
+        """Names of joints with the prefix."""
+        return names_of(self.prefix + (name or f"joint_{i}") for i, name in enumerate(names))
+
+
+@dataclass(frozen=True)
+class Shared:
+    """Parts that the robots of a gateway share. tf: publisher of /tf; None without tf2_msgs."""
+
+    node: Any
+    settings: Settings
+    clock: WallClock
+    tf: Any
+
+
+def names_of(given: Iterable[str]) -> list[str]:
+    """Names that ROS accepts, each once: letters, digits and underscores, no digit first."""
+    found: list[str] = []
+    for name in given:
+        plain = re.sub(r"[^A-Za-z0-9_]+", "_", name)
+        plain = f"x_{plain}" if plain[:1].isdigit() else plain
+        found.append(f"{plain}_{len(found)}" if plain in found else plain)
+    return found

@@ -1,0 +1,97 @@
+"""Sensor values that have a message type of their own in ROS 2: poses, points, wrenches, images.
+
+The names, shapes and units of the fields decide, as those of a recording's joints do:
+- `position`, or a name that ends so, three numbers [m], is a point; with a `quaternion` (x, y, z,
+  w) of the same begin it is a pose;
+- `force` and `torque`, or names that end so, three numbers each, are a wrench;
+- bytes whose name contains `image`, of a robot with options `height` and `width`, are images of
+  one or three bytes a pixel, each in a row of the array.
+"""
+
+import math
+import struct
+import zlib
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+PAIRS = (("position", "quaternion", 4), ("force", "torque", 3))
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """One measured thing."""
+
+    kind: str  #: point, pose, wrench or image
+    name: str  #: path below the robot's topics
+    structs: tuple[str, ...]  #: names of the structs of sensor values that hold its fields
+    fields: tuple[str, ...]
+    valid: str = ""  #: a bool beside them, False where a row holds nothing
+    place: int | None = None  #: among the images of the field
+    size: tuple[int, ...] = ()  #: of an image
+
+    def values(self, row: NDArray[Any]) -> list[NDArray[Any]] | None:
+        """The numbers of each field in one row; None if it holds none."""
+        within: Any = row["extended"]
+        for name in self.structs:
+            within = within[name]
+        found = [within[name] for name in self.fields]
+        valid: Any = within[self.valid] if self.valid else True
+        if self.kind == "image":
+            valid = valid if self.place is None or np.ndim(valid) == 0 else valid[self.place]
+            found = [(found[0] if self.place is None else found[0][self.place]).reshape(self.size)]
+        return found if valid and all(np.isfinite(each).all() for each in found) else None
+
+
+def sensors_of(schema: Mapping[str, Any], options: Mapping[str, str]) -> list[Sensor]:
+    """The sensors of a robot. options: of the robot, as `Provenance.options` has them."""
+    size = [int(text) for name in ("height", "width") if (text := options.get(name, ""))]
+    return [*_sensors(schema["extended"], (), size)] if "extended" in schema else []
+
+
+def _sensors(
+    described: Mapping[str, Any], structs: tuple[str, ...], size: list[int]
+) -> Iterator[Sensor]:
+    fields = {each["name"]: each for each in described["fields"]}
+    flags = [name for name in ("visible", "valid") if name in fields]
+    single = next((name for name in flags if not fields[name]["shape"]), "")
+    for name, field in fields.items():
+        if field["kind"] == "struct" and not field["shape"]:
+            yield from _sensors(field["type"], (*structs, name), size)
+        for ending, partner, count in PAIRS:
+            if not name.endswith(ending) or field["shape"] != [3]:
+                continue
+            begin = name.removesuffix(ending)
+            kind = "wrench" if ending == "force" else "pose"
+            both = fields.get(begin + partner, {}).get("shape") == [count]
+            if kind == "pose" and (not both or field["unit"] != "m"):
+                kind = "point" if field["unit"] == "m" else ""
+            if kind and (both or kind == "point"):
+                path = "/".join((*structs, *[begin.rstrip("_")][: len(begin)], kind))
+                chosen = (name, begin + partner) if kind != "point" else (name,)
+                yield Sensor(kind, path, structs, chosen, single)
+        if field["kind"] == "uint8" and "image" in name and len(size) == 2 and field["shape"]:
+            *several, pixels = field["shape"]
+            one = {math.prod(size): (*size,), 3 * math.prod(size): (*size, 3)}.get(pixels)
+            for i in range(several[0] if several else 1) if one else ():
+                path = "/".join((*structs, name + f"_{i}" * len(several), "compressed"))
+                valid = "valid" if "valid" in fields else ""
+                place = i if several else None
+                yield Sensor("image", path, structs, (name,), valid, place, one or ())
+
+
+def png(image: NDArray[np.uint8]) -> bytes:
+    """An image (height, width) or (height, width, 3) as a PNG file."""
+    height, width = image.shape[:2]
+    lines = np.zeros((height, 1 + image[0].size), np.uint8)  # each begins with its filter: none
+    lines[:, 1:] = image.reshape(height, -1)
+    colour = 2 if image.ndim == 3 else 0
+    head = struct.pack(">IIBBBBB", width, height, 8, colour, 0, 0, 0)
+    parts = ((b"IHDR", head), (b"IDAT", zlib.compress(lines.tobytes(), 1)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in parts
+    )

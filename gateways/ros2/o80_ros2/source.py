@@ -1,0 +1,138 @@
+"""One segment that the gateway carries, through restarts of its backend."""
+
+from contextlib import suppress
+
+import o80
+from o80.errors import Error
+from o80_ros2.commands import Commands
+from o80_ros2.ros import Shared
+from o80_ros2.topics import Topics
+
+BETWEEN_LOOKS = 0.5
+"""Time between attempts to attach to a backend that is not there [s]."""
+EVERY_ROW = 0.005
+"""Time between readings of a robot of which every row is published [s]."""
+MOST_ROWS = 500
+"""Rows that are published at once; the others wait, so that other robots have their turn."""
+OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
+
+
+class Source:
+    """Reads one segment and publishes its rows. Used by one thread, but for `refuse`."""
+
+    def __init__(self, shared: Shared, segment: str) -> None:
+        self.segment, self._shared = segment, shared
+        self.name = shared.settings.robot(segment)  #: in ROS
+        self._log = shared.node.get_logger()
+        self._frontend: o80.Frontend | None = None
+        self.topics: Topics | None = None
+        self._commands: Commands | None = None
+        self._next = 0  # iteration that was not read yet
+        self._look_at = 0.0
+        self._problem = ""  # why it is not read
+        self.due = 0.0  #: when it wants to be read again [s]
+        self.published = self.missed = self.late = self.refused = 0
+        self._why = ""  # of the last refusal
+
+    @property
+    def gone(self) -> bool:
+        """Whether its backend has ended, or was never there."""
+        return self._frontend is None or not self._frontend.alive
+
+    def refuse(self, what: str, why: object) -> None:
+        """Reports that a message or a call was refused."""
+        self.refused += 1
+        self._why = f"{what}: {why}"
+        self._log.warning(f"'{self.segment}' refused {self._why}", throttle_duration_sec=1.0)
+
+    def tick(self, now: float, usual: float) -> None:
+        """Publishes what is new. now: [s]; usual: rate of robots for which none was given [Hz]."""
+        rates = self._shared.settings.rates
+        rate = rates.get(self.segment, rates.get("", usual))
+        period = 1.0 / rate if rate else EVERY_ROW
+        left_out = int((now - self.due) / period) if self.due else 0
+        self.due = (self.due or now) + (left_out + 1) * period
+        if left_out:
+            self.late += left_out
+            text = f"behind: {self.late} periods of '{self.segment}' were left out so far"
+            self._log.warning(f"{text}; a lower --rate helps", throttle_duration_sec=5.0)
+        gone = self.gone  # before the last rows are read
+        self._publish(every=not rate)
+        if gone and now >= self._look_at:
+            self._look_at = now + BETWEEN_LOOKS
+            if self._attach():
+                self._publish(every=not rate)
+                self.due = 0.0  # that took long
+        if self._commands is not None:
+            self._commands.poll()
+
+    def _publish(self, *, every: bool) -> None:
+        robot = self._frontend
+        if robot is None or self.topics is None or robot.published < self._next:
+            return
+        since = max(self._next, robot.oldest) if every else robot.published
+        rows = robot.history(since=since, until=since + MOST_ROWS - 1).rows
+        if not len(rows):
+            return
+        self.missed += max(0, int(rows["iteration"][0]) - self._next) if every else 0
+        self.topics.publish(rows)
+        self.published += len(rows)
+        self._next = int(rows["iteration"][-1]) + 1
+
+    def _attach(self) -> bool:
+        """Whether there is a backend that was not read so far."""
+        known, settings = self._frontend, self._shared.settings
+        try:
+            found = o80.Frontend(self.segment, 0.0, read_only=True)
+        except Error as error:
+            self._problem = str(error)
+            return False
+        if found.published < 0 or (known is not None and known.epoch == found.epoch):
+            found.close()
+            return False
+        self._close_frontends()
+        self._frontend, self._next = found, found.published
+        if self.topics is None or self.topics.schema != found.schema:
+            if self.topics is not None:
+                self.topics.destroy()
+            self.topics = Topics(self._shared, found)
+        if not found.played and (settings.command or (settings.step and found.bursting)):
+            arm = o80.Frontend(self.segment, 0.0)
+            self._commands = Commands(self._shared, arm, self.refuse)
+        return True
+
+    def status(self) -> tuple[bytes, str, dict[str, object]]:
+        """Level, message and values for /diagnostics."""
+        values: dict[str, object] = {"refused": self.refused, "last refusal": self._why}
+        values |= {"rows published": self.published, "rows missed": self.missed}
+        values["periods left out"] = self.late
+        robot = self._frontend
+        if robot is None:
+            return STALE, self._problem, values
+        values |= {"robot": robot.robot, "iteration": robot.published}
+        values |= {"overruns": robot.overruns, "missed ticks": robot.missed_ticks}
+        values["rate reached"] = robot.rate_reached
+        if not robot.alive:
+            return ERROR, f"its backend has ended: {robot.life}", values
+        if (halt := robot.halted) is not None:
+            values |= {"halt": halt.number, "halt cause": halt.cause, "halt text": halt.text}
+            return WARN, f"halted (halt {halt.number}): {halt.text}", values
+        if self._shared.node.count_publishers(f"/{self.name}/desired") > 1:
+            return WARN, "another gateway publishes this name: give one of them --prefix", values
+        if trouble := robot.trouble:
+            return WARN, trouble, values
+        return OK, "bursting" if robot.bursting else f"running at {robot.frequency:g} Hz", values
+
+    def _close_frontends(self) -> None:
+        if self._commands is not None:
+            self._commands.close()
+            self._commands = None
+        if self._frontend is not None:
+            with suppress(Error):
+                self._frontend.close()
+
+    def close(self) -> None:
+        """Closes what is open."""
+        self._close_frontends()
+        if self.topics is not None:
+            self.topics.destroy()

@@ -1,0 +1,45 @@
+"""A robot, and a gateway's source that carries it and publishes into lists."""
+
+from collections.abc import Callable
+from typing import Any
+
+import stand_in_ros
+
+import o80
+from o80_ros2 import ros
+from o80_ros2.source import Source
+from o80_ros2.wall_clock import WallClock
+
+OFFSET = 10**18
+
+
+class Carried:
+    """A robot, and the source that carries it."""
+
+    def __init__(self, robot: o80.Frontend, settings: ros.Settings) -> None:
+        self.robot, self.node = robot, stand_in_ros.Node()
+        self.monotonic = 0
+        self.clock = WallClock(lambda: self.monotonic + OFFSET, lambda: self.monotonic)
+        kind = stand_in_ros.imported("tf2_msgs.msg").TFMessage
+        self.tf = self.node.create_publisher(kind, "/tf", 100)
+        self.source = Source(ros.Shared(self.node, settings, self.clock, self.tf), robot.segment)
+        self.now = 100.0
+
+    def tick(self) -> None:
+        """Lets time pass, and reads."""
+        self.now += 1.0
+        self.source.tick(self.now, 100.0)
+
+    def sent(self, topic: str) -> list[Any]:
+        """The messages of a topic below the robot's name, or of an absolute one."""
+        name = topic if topic.startswith("/") else f"/{self.source.name}/{topic}"
+        return self.node.published[name].sent
+
+    def send(self, topic: str, message: Any) -> None:
+        self.node.subscribed[f"/{self.source.name}/{topic}"](message)
+
+    def call(self, service: str, **parameters: Any) -> tuple[bool, str]:
+        return self.node.call(f"/{self.source.name}/{service}", **parameters)
+
+
+Carry = Callable[..., Carried]

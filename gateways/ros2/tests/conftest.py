@@ -1,0 +1,30 @@
+"""Gateways without rclpy."""
+
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from typing import Any
+
+import pytest
+import stand_in_ros
+from carried import Carried, Carry
+
+import o80
+from o80_ros2 import ros
+
+
+@pytest.fixture
+def carry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Carry]:
+    """Carries a robot: carry(robot, prefix=..., rates=..., command=..., step=...)."""
+    monkeypatch.setattr(ros, "of", stand_in_ros.of)
+    with ExitStack() as stack:
+
+        def carried(robot: o80.Frontend, **given: Any) -> Carried:
+            given = {"rates": {"": 0.0}, "command": True, **given}
+            made = Carried(robot, ros.Settings(**given))
+            stack.callback(made.source.close)
+            made.tick()
+            return made
+
+        yield carried
+    assert "rclpy" not in sys.modules

@@ -1,0 +1,233 @@
+"""Rows of robots as messages: values, names, stamps, and what was missed."""
+
+import zlib
+from dataclasses import dataclass
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+import pytest
+from carried import OFFSET, Carry
+
+import o80
+from o80_ros2.sensors import png
+
+
+def nanoseconds(message: Any) -> int:
+    stamp = message.header.stamp
+    return int(stamp.sec * 10**9 + stamp.nanosec)
+
+
+def test_every_row_is_a_message_of_joints_stamped_with_its_time(carry: Carry) -> None:
+    with o80.robots.load("two_joints").inline(frequency=500) as robot:
+        carried = carry(robot)
+        robot.add_command("elbow", 0.5, iterations=20)
+        robot.burst(30)
+        carried.tick()
+
+        history = robot.history()
+        states, desired = carried.sent("joint_states"), carried.sent("desired")
+        assert len(states) == len(desired) == 31
+        assert states[0].name == ["shoulder", "elbow"]
+        assert np.array_equal([each.position for each in states], history.observed)
+        assert np.array_equal([each.effort for each in states], history.extended.effort)
+        assert np.array_equal([each.position for each in desired], history.desired)
+        assert [nanoseconds(each) for each in states] == history.time.tolist()
+        assert not any(len(each.effort) for each in desired), "a measured effort is not desired"
+
+
+def test_a_robot_on_the_monotonic_clock_has_stamps_on_the_wall_clock(carry: Carry) -> None:
+    with o80.robots.load("two_joints").start(frequency=500) as process:
+        carried = carry(process.frontend(), rates={"": 50.0})
+        with process.frontend() as robot:
+            (state,) = carried.sent("joint_states")
+            assert nanoseconds(state) - OFFSET in robot.history().time.tolist()
+
+
+def test_rows_that_were_overwritten_are_counted(carry: Carry) -> None:
+    with o80.robots.load("two_joints").inline() as robot:
+        carried = carry(robot)
+        robot.burst(1)
+        capacity = robot.published - robot.oldest
+        while robot.oldest < 100:
+            capacity += 1000
+            robot.burst(1000)
+        oldest = robot.oldest
+        carried.tick()
+
+        assert carried.source.missed == oldest - 1
+        assert (
+            carried.sent("joint_states")[1].header.stamp.sec
+            == robot.at_time(robot.history(since=oldest, until=oldest)[0].time).time // 10**9
+        )
+
+
+def test_a_rate_gives_the_newest_row_once(carry: Carry) -> None:
+    with o80.robots.load("two_joints").inline() as robot:
+        carried = carry(robot, rates={robot.segment: 10.0})
+        robot.burst(7)
+        carried.tick()
+        carried.tick()
+        assert [nanoseconds(each) for each in carried.sent("joint_states")] == [
+            0,
+            robot.latest().time,
+        ]
+
+
+def test_a_gateway_that_is_behind_counts_the_periods_that_it_left_out(carry: Carry) -> None:
+    with o80.robots.load("two_joints").inline() as robot:
+        carried = carry(robot, rates={"": 10.0})
+        carried.tick()
+        assert carried.source.late == 0
+        carried.now += 2.0
+        carried.tick()
+        assert 20 <= carried.source.late <= 30
+
+
+def test_names_are_legal_and_a_prefix_keeps_arms_apart(carry: Carry) -> None:
+    with o80.robots.load("two_joints").inline("2-arms.of_me") as robot:
+        carried = carry(robot, prefix="left_")
+        assert carried.source.name == "left_2_arms_of_me"
+        assert carried.sent("joint_states")[0].name == ["left_shoulder", "left_elbow"]
+
+
+def test_pressures_are_desired_positions_and_the_racket_is_a_point(carry: Carry) -> None:
+    with o80.robots.load("pam").inline() as robot:
+        carried = carry(robot)
+        robot.burst(50)
+        carried.tick()
+        row = robot.latest()
+
+        assert carried.sent("desired")[-1].position.tolist() == row.desired.tolist()
+        assert carried.sent("desired")[-1].name[0] == "agonist_1"
+        assert carried.sent("joint_states")[-1].name == [f"joint_{i}" for i in range(4)]
+        point = carried.sent("racket/point")[-1].point
+        assert [point.x, point.y, point.z] == row.extended.racket_position.tolist()
+
+
+class Sensors:
+    """A force sensor, a subject of motion capture that comes and goes, and a camera."""
+
+    actuators = ()
+    units = {"capture_time": "ns", "position": "m"}  # noqa: RUF012
+    extended = {  # noqa: RUF012
+        "capture_time": np.int64,
+        "force": (float, 3),
+        "torque": (float, 3),
+        "puck": {"visible": bool, "position": (float, 3), "quaternion": (float, 4)},
+        "images": (np.uint8, (2, 18)),
+        "valid": (bool, (2,)),
+    }
+
+    @dataclass
+    class Config:
+        width: int = 3
+        height: int = 2
+
+    def __init__(self, config: Config) -> None:
+        self.count = -1
+
+    def write(self, desired: Any) -> None:
+        pass
+
+    def read(self, reading: Any) -> None:
+        self.count += 1
+        reading.extended = {
+            "capture_time": 0 if self.count == 2 else 7_000 + self.count,
+            "force": [1.0, 2.0, 3.0],
+            "torque": [4.0, 5.0, 6.0],
+            "puck": (self.count != 1, [0.1, 0.2, 0.3], [0.0, 0.0, 0.0, 1.0]),
+            "images": np.arange(36).reshape(2, 18),
+            "valid": [False, True],
+        }
+
+
+def test_sensors_have_types_of_their_own_and_the_stamp_of_their_capture(carry: Carry) -> None:
+    with o80.robots.load(Sensors).inline(frequency=100) as robot:
+        carried = carry(robot)
+        robot.burst(3)
+        carried.tick()
+
+        wrenches, poses = carried.sent("wrench"), carried.sent("puck/pose")
+        assert [each.header.stamp.nanosec for each in wrenches] == [7000, 7001, 7003]
+        assert [each.header.stamp.nanosec for each in poses] == [7000, 7003], "not the hidden one"
+        frames = [each.child_frame_id for each in carried.sent("/tf")[-1].transforms]
+        assert frames == [f"{carried.source.name}/puck"]
+        assert (wrenches[0].wrench.force.z, wrenches[0].wrench.torque.x) == (3.0, 4.0)
+        assert carried.node.qos[f"/{carried.source.name}/images_1/compressed"] == "best effort"
+        assert not carried.sent("images_0/compressed"), "its camera gave none"
+        image = carried.sent("images_1/compressed")[-1]
+        assert image.format == "png"
+        begin = image.data.tobytes().index(b"IDAT") + 4
+        lines = zlib.decompress(image.data.tobytes()[begin:])
+        assert lines == bytes([0, *range(18, 27), 0, *range(27, 36)]), "a filter, then pixels"
+
+
+def test_a_png_has_its_size_and_its_lines() -> None:
+    file = png(np.zeros((3, 5), np.uint8))
+    assert file[16:24] == bytes([0, 0, 0, 5, 0, 0, 0, 3])
+
+
+@pytest.mark.parametrize("robot", ["two_joints", "pam"])
+def test_urdf_and_transforms_agree(carry: Carry, robot: str) -> None:
+    """A chain of the URDF, computed here, ends where /tf says that the body is."""
+    pytest.importorskip("mujoco")
+    with o80.robots.load(robot).inline() as arm:
+        if robot == "two_joints":
+            arm.add_command(None, [0.7, -0.4], iterations=200)
+        else:
+            arm.add_command(None, [18_000, 8_000] * 4, iterations=10)
+        carried = carry(arm)
+        arm.burst(300)
+        carried.tick()
+        state = carried.sent("joint_states")[-1]
+        angles = dict(zip(state.name, state.position, strict=True))
+        urdf: Any = ElementTree.fromstring(carried.sent("robot_description")[-1].data)
+        joints = {each.find("child").get("link"): each for each in urdf.iter("joint")}
+        placed = {each.child_frame_id: each for each in carried.sent("/tf")[-1].transforms}
+        links = [each for each in placed if each in joints]
+        assert links
+        for link in links:
+            at, here = np.eye(4), link
+            while here != "world":
+                joint = joints[here]
+                at, here = moved(joint, angles) @ at, joint.find("parent").get("link")
+            translation = placed[link].transform.translation
+            there = [translation.x, translation.y, translation.z]
+            assert np.allclose(at[:3, 3], there, atol=1e-6), link
+
+
+def moved(joint: Any, angles: dict[str, float]) -> Any:
+    """The place of a joint's child in its parent (4, 4)."""
+    origin = joint.find("origin")
+    found = np.eye(4)
+    roll, pitch, yaw = map(float, origin.get("rpy").split())
+    found[:3, :3] = turned([0, 0, 1], yaw) @ turned([0, 1, 0], pitch) @ turned([1, 0, 0], roll)
+    found[:3, 3] = [float(word) for word in origin.get("xyz").split()]
+    if joint.get("type") in ("revolute", "continuous"):
+        axis = [float(word) for word in joint.find("axis").get("xyz").split()]
+        found[:3, :3] = found[:3, :3] @ turned(axis, angles[joint.get("name")])
+    return found
+
+
+def turned(axis: list[float], angle: float) -> Any:
+    """The rotation about an axis (Rodrigues)."""
+    x, y, z = np.array(axis) / np.linalg.norm(axis)
+    cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
+    return np.eye(3) + np.sin(angle) * cross + (1 - np.cos(angle)) * cross @ cross
+
+
+def test_a_backend_that_starts_again_is_carried_on(carry: Carry) -> None:
+    with o80.robots.load("two_joints").inline("again") as robot:
+        carried = carry(robot)
+        robot.burst(3)
+    carried.tick()
+    assert len(carried.sent("joint_states")) == 4, "also the last rows"
+    assert carried.source.status()[0] == b"\x02"
+    with o80.robots.load("two_joints").inline("again") as robot:
+        robot.burst(1)
+        carried.tick()
+        robot.burst(2)
+        carried.tick()
+        assert len(carried.sent("joint_states")) == 7
+        assert carried.source.status()[0] == b"\x00"
