@@ -220,7 +220,7 @@ CEILINGS = {
     "apps/table_tennis": (10_750, 6_045),
     "benchmarks, tools": (5_490, 0),
     "examples": (1_900, 0),
-    "tests, conftest.py": (0, 66_870),
+    "tests, conftest.py": (0, 66_890),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

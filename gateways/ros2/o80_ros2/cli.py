@@ -8,6 +8,7 @@ import typer
 from o80.cli.stop_request import StopRequest
 from o80.errors import InvalidArgument
 from o80_ros2 import ros
+from o80_ros2.gateway import Gateway
 
 app = typer.Typer(help="Publish robots in ROS 2, and take commands.", subcommand_metavar="")
 Names = Annotated[list[str] | None, typer.Argument(help="Segments (default: all that come).")]
@@ -52,7 +53,5 @@ def ros2(
     """Publish robots in ROS 2, and take commands for them (docs/ros2.md)."""
     settings = ros.Settings(rates_of(rate or []), command, step, prefix)
     stop = StopRequest()
-    from o80_ros2.gateway import Gateway
-
     with closing(Gateway(names or [], settings)) as gateway:
         gateway.run(stop)

@@ -29,7 +29,7 @@ class Commands:
 
     def __init__(self, shared: ros.Shared, arm: o80.Frontend, refuse: Any) -> None:
         """refuse: gets what was refused, and why."""
-        self._node, self._clock, self._arm, self._refuse = shared.node, shared.clock, arm, refuse
+        self._shared, self._arm, self._refuse = shared, arm, refuse
         self._name = shared.settings.robot(arm.segment)
         self._actuators = shared.settings.joints(each.name for each in arm.actuators)
         self._plans: dict[tuple[int, ...], Chunks] = {}
@@ -37,24 +37,21 @@ class Commands:
         self._moves: Any = None  # the batch of the newest trajectory
         self._last = self._every = 0.0  # of set-points: time of the last one, interval [s]
         self._made: list[tuple[Callable[[Any], object], Any]] = []
-        group = ros.of("rclpy.callback_groups.MutuallyExclusiveCallbackGroup")
         if shared.settings.step and arm.bursting:
-            self._steps = shared.settings.step
-            self._trigger("step", self._step, group())
+            self._trigger("step", partial(self._step, shared.settings.step), shared.calls)
         if not shared.settings.command:
             return
-        topics, calls = group(), group()
         for kind, name, take, depth in (
-            ("trajectory_msgs.msg.JointTrajectory", "joint_trajectory", self._trajectory, 10),
+            ("trajectory_msgs.msg.JointTrajectory", "joint_trajectory", self._trajectory, 1000),
             ("std_msgs.msg.Float64MultiArray", "commands", self._set_points, 1),
         ):
-            taken = partial(self._taken, name, take)
-            self._make("subscription", kind, name, taken, depth, group=topics)
-        self._trigger("halt", self._halt, group())  # waits behind no other call
-        self._trigger("resume", self._resume, calls)
+            taken = partial(self._tried, name, take)
+            self._make(shared.node, "subscription", kind, name, taken, depth)
+        self._trigger("halt", self._halt, shared.node)
+        self._trigger("resume", self._resume, shared.calls)
         requests = [each["name"] for each in arm.schema["requests"]]
         for request, path in zip(requests, ros.names_of(requests), strict=True):
-            self._serve_request(request, f"requests/{path}", calls)
+            self._serve_request(request, f"requests/{path}")
 
     def close(self) -> None:
         """Takes topics and services away, and closes the frontend: what was sent goes on."""
@@ -75,24 +72,20 @@ class Commands:
             with suppress(Error):
                 self._arm.keep_alive()
 
-    def _tried(self, what: str, run: Callable[[], str | None]) -> tuple[bool, str]:
+    def _tried(self, what: str, run: Callable[..., str | None], *given: Any) -> tuple[bool, str]:
         """Runs it; whether it was not refused, and its text or the reason."""
         try:
-            return True, run() or ""
+            return True, run(*given) or ""
         except (Error, ValueError, TypeError, OverflowError) as error:
             with suppress(Error):
                 self._arm.forget_added()
             self._refuse(what, error)
             return False, str(error)
 
-    def _make(self, what: str, kind: str, name: str, *rest: Any, group: Any) -> None:
+    def _make(self, node: Any, what: str, kind: str, name: str, *rest: Any) -> None:
         """Makes a subscription or a service."""
-        create, destroy = (getattr(self._node, f"{verb}_{what}") for verb in ("create", "destroy"))
-        made = create(ros.of(kind), f"/{self._name}/{name}", *rest, callback_group=group)
-        self._made.append((destroy, made))
-
-    def _taken(self, name: str, take: Callable[[Any], None], message: Any) -> None:
-        self._tried(name, lambda: take(message))
+        create, destroy = (getattr(node, f"{verb}_{what}") for verb in ("create", "destroy"))
+        self._made.append((destroy, create(ros.of(kind), f"/{self._name}/{name}", *rest)))
 
     def _set_points(self, message: Any) -> None:
         """A set-point for each actuator, in their order."""
@@ -130,7 +123,7 @@ class Commands:
         stamp, begin = nanoseconds(message.header.stamp), newest.time
         if stamp:
             simulated = arm.schema["clock"] == "simulated"
-            begin = stamp if simulated else self._clock.row_time(stamp)
+            begin = stamp if simulated else self._shared.clock.row_time(stamp)
         anchor = newest.iteration + round((begin - newest.time) / period)
         due = anchor + np.rint(times / period).astype(np.int64)
         kept = np.append(np.diff(due) > 0, True)  # the last one of points in one iteration
@@ -160,14 +153,14 @@ class Commands:
                 f"one, its limit is {limits[j]:.4g}"
             )
 
-    def _trigger(self, name: str, run: Callable[[], str], group: Any) -> None:
+    def _trigger(self, name: str, run: Callable[[], str], node: Any) -> None:
         def serve(_: Any, answer: Any) -> Any:
             answer.success, answer.message = self._tried(name, run)
             return answer
 
-        self._make("service", "std_srvs.srv.Trigger", name, serve, group=group)
+        self._make(node, "service", "std_srvs.srv.Trigger", name, serve)
 
-    def _serve_request(self, request: str, path: str, group: Any) -> None:
+    def _serve_request(self, request: str, path: str) -> None:
         """A service for a request of the driver: its fields are parameters by name."""
         value_of = ros.of("rclpy.parameter.parameter_value_to_python")
 
@@ -181,10 +174,10 @@ class Commands:
             return answer
 
         kind = "rcl_interfaces.srv.SetParametersAtomically"
-        self._make("service", kind, path, serve, group=group)
+        self._make(self._shared.calls, "service", kind, path, serve)
 
-    def _step(self) -> str:
-        return f"iteration {self._arm.burst(self._steps, timeout=PATIENCE).iteration}"
+    def _step(self, iterations: int) -> str:
+        return f"iteration {self._arm.burst(iterations, timeout=PATIENCE).iteration}"
 
     def _halt(self) -> str:
         return f"halt {o80.halt(self._arm.segment, 'requested over ROS 2')} is requested"

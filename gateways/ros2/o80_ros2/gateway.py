@@ -1,5 +1,6 @@
 """The gateway: a node, the robots that it carries, and the loop that reads them."""
 
+import sys
 import threading
 import time
 from collections.abc import Sequence
@@ -17,6 +18,9 @@ USUAL, USUAL_OF_MANY, MANY = 100.0, 20.0, 10
 BETWEEN_LISTS, BETWEEN_REPORTS, BETWEEN_LOOKS = 1.0, 1.0, 0.1
 """Times between looks for segments, between diagnostics, between looks for a change of them [s]."""
 
+SWITCH = 0.0005
+"""Longest time for which a thread that publishes keeps those waiting that serve [s]."""
+
 
 class Gateway:
     """Publishes segments until it is asked to stop."""
@@ -25,14 +29,21 @@ class Gateway:
         """names: of segments; empty for all, also those that start later."""
         handlers = ros.of("rclpy.signals.SignalHandlerOptions").NO
         ros.of("rclpy.init")(signal_handler_options=handlers)
-        name = settings.robot("o80_ros2")
-        node = self._node = ros.of("rclpy.create_node")(name, start_parameter_services=False)
-        self._names, self._log, tf = names, node.get_logger(), None
+        name, create = settings.robot("o80_ros2"), ros.of("rclpy.create_node")
+        self._served: list[tuple[Any, Any, threading.Thread]] = []
+        # calls that take long have a node and a thread of their own, so that a halt does not wait
+        for each in (name, f"{name}_calls"):
+            executor = ros.of("rclpy.executors.SingleThreadedExecutor")()
+            node = create(each, start_parameter_services=False)
+            executor.add_node(node)
+            self._served.append((node, executor, threading.Thread(target=executor.spin)))
+        calls, node, self._names, tf = node, self._served[0][0], names, None
+        self._node, self._log = node, node.get_logger()
         try:
             tf = node.create_publisher(ros.of("tf2_msgs.msg.TFMessage"), "/tf", 100)
         except MissingExtra:
             self._log.warning("there is no tf2_msgs, which its wheels lack: /tf is not published")
-        self._shared = ros.Shared(node, settings, WallClock(), tf)
+        self._shared = ros.Shared(node, calls, settings, WallClock(), tf)
         self._array = ros.of("diagnostic_msgs.msg.DiagnosticArray")
         self._diagnostics = node.create_publisher(self._array, "/diagnostics", 10)
         self._reported: Any = None
@@ -40,11 +51,9 @@ class Gateway:
         self._clock: Any = None  # publisher of /clock
         self._simulated = -1  # time published last [ns]
         self._sources: dict[str, Source] = {}
-        # several threads: a halt does not wait behind a request
-        self._executor = ros.of("rclpy.executors.MultiThreadedExecutor")(num_threads=4)
-        self._executor.add_node(node)
-        self._thread = threading.Thread(target=self._executor.spin, daemon=True)
-        self._thread.start()
+        sys.setswitchinterval(SWITCH)
+        for *_, thread in self._served:
+            thread.start()
 
     def run(self, stop: StopRequest) -> None:
         """Reads all robots, each at its rate."""
@@ -78,7 +87,7 @@ class Gateway:
                 self._log.info(f"'{segment}' is /{name}")
         for segment, source in list(self._sources.items()):
             if not self._names and segment not in alive and source.gone:
-                self._sources.pop(segment).close()
+                self._sources.pop(segment).close(topics=True)
         if step := self._shared.clock.update():
             self._log.warning(f"the wall clock was set by {step * 1e-9:+.3f} s: stamps follow it")
 
@@ -116,8 +125,9 @@ class Gateway:
     def close(self) -> None:
         """Ends the node. Robots go on, and so does what was sent to them."""
         for source in self._sources.values():
-            source.close()
-        self._executor.shutdown(timeout_sec=2.0)
-        self._thread.join(timeout=2.0)
-        self._node.destroy_node()
+            source.close(topics=True)
+        for node, executor, thread in self._served:
+            executor.shutdown()
+            thread.join()
+            node.destroy_node()
         ros.of("rclpy.try_shutdown")()

@@ -48,6 +48,7 @@ class Shared:
     """Parts that the robots of a gateway share. tf: publisher of /tf; None without tf2_msgs."""
 
     node: Any
+    calls: Any  #: node of services that take long
     settings: Settings
     clock: WallClock
     tf: Any

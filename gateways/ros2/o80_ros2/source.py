@@ -12,8 +12,8 @@ BETWEEN_LOOKS = 0.5
 """Time between attempts to attach to a backend that is not there [s]."""
 EVERY_ROW = 0.005
 """Time between readings of a robot of which every row is published [s]."""
-MOST_ROWS = 500
-"""Rows that are published at once; the others wait, so that other robots have their turn."""
+MOST_ROWS, MOST_BYTES = 200, 4 << 20
+"""Rows that are read at once; the others wait, so that other robots have their turn."""
 OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
 
 
@@ -52,13 +52,14 @@ class Source:
         period = 1.0 / rate if rate else EVERY_ROW
         left_out = int((now - self.due) / period) if self.due else 0
         self.due = (self.due or now) + (left_out + 1) * period
-        if left_out:
+        if left_out and rate:  # otherwise rows wait, until they are overwritten
             self.late += left_out
             text = f"behind: {self.late} periods of '{self.segment}' were left out so far"
             self._log.warning(f"{text}; a lower --rate helps", throttle_duration_sec=5.0)
-        gone = self.gone  # before the last rows are read
+        gone, robot = self.gone, self._frontend  # before the last rows are read
         self._publish(every=not rate)
-        if gone and now >= self._look_at:
+        is_read = robot is None or robot.published < self._next
+        if gone and is_read and now >= self._look_at:
             self._look_at = now + BETWEEN_LOOKS
             if self._attach():
                 self._publish(every=not rate)
@@ -71,7 +72,8 @@ class Source:
         if robot is None or self.topics is None or robot.published < self._next:
             return
         since = max(self._next, robot.oldest) if every else robot.published
-        rows = robot.history(since=since, until=since + MOST_ROWS - 1).rows
+        most = max(1, min(MOST_ROWS, MOST_BYTES // robot._layout.size))
+        rows = robot.history(since=since, until=since + most - 1).rows
         if not len(rows):
             return
         self.missed += max(0, int(rows["iteration"][0]) - self._next) if every else 0
@@ -90,22 +92,24 @@ class Source:
         if found.published < 0 or (known is not None and known.epoch == found.epoch):
             found.close()
             return False
-        self._close_frontends()
+        self.close()
         self._frontend, self._next = found, found.published
-        if self.topics is None or self.topics.schema != found.schema:
-            if self.topics is not None:
-                self.topics.destroy()
-            self.topics = Topics(self._shared, found)
+        if self.topics is not None and self.topics.schema != found.schema:
+            self.topics.destroy()
+            self.topics = None
+        self.topics = self.topics or Topics(self._shared, found)
         if not found.played and (settings.command or (settings.step and found.bursting)):
-            arm = o80.Frontend(self.segment, 0.0)
-            self._commands = Commands(self._shared, arm, self.refuse)
+            try:
+                arm = o80.Frontend(self.segment, 0.0)
+                self._commands = Commands(self._shared, arm, self.refuse)
+            except Error as error:
+                self.refuse("commands", error)
         return True
 
     def status(self) -> tuple[bytes, str, dict[str, object]]:
         """Level, message and values for /diagnostics."""
         values: dict[str, object] = {"refused": self.refused, "last refusal": self._why}
-        values |= {"rows published": self.published, "rows missed": self.missed}
-        values["periods left out"] = self.late
+        values |= {"published": self.published, "missed": self.missed, "left out": self.late}
         robot = self._frontend
         if robot is None:
             return STALE, self._problem, values
@@ -123,16 +127,13 @@ class Source:
             return WARN, trouble, values
         return OK, "bursting" if robot.bursting else f"running at {robot.frequency:g} Hz", values
 
-    def _close_frontends(self) -> None:
+    def close(self, *, topics: bool = False) -> None:
+        """Detaches. topics: takes the topics away too."""
         if self._commands is not None:
             self._commands.close()
             self._commands = None
         if self._frontend is not None:
             with suppress(Error):
                 self._frontend.close()
-
-    def close(self) -> None:
-        """Closes what is open."""
-        self._close_frontends()
-        if self.topics is not None:
+        if topics and self.topics is not None:
             self.topics.destroy()

@@ -18,8 +18,8 @@ if TYPE_CHECKING:
 
 BETWEEN_IMAGES = 100_000_000
 """Smallest distance of two images: packing one takes long [ns]."""
-DEPTH = 100
-"""Messages that a reliable topic keeps for subscribers that are late."""
+DEPTH = 1000
+"""Messages that a reliable topic keeps until its subscribers have acknowledged them."""
 STATE, TEXT = "sensor_msgs.msg.JointState", "std_msgs.msg.String"
 TYPES = {
     "pose": ("geometry_msgs.msg.PoseStamped", ("pose.position", "pose.orientation")),
@@ -64,8 +64,7 @@ class Topics:
         try:
             self._links = Links.of(robot, self._name)
         except Error as error:
-            text = f"'{self._name}' has no transforms of its bodies and no URDF: {error}"
-            shared.node.get_logger().warning(text)
+            shared.node.get_logger().warning(f"no URDF of '{self._name}': {error}")
         if self._links is not None:
             durable = ros.of("rclpy.qos.DurabilityPolicy").TRANSIENT_LOCAL
             latched = ros.of("rclpy.qos.QoSProfile")(depth=1, durability=durable)

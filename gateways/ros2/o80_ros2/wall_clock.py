@@ -37,14 +37,9 @@ class WallClock:
         return change if abs(change) >= STEP else 0
 
     def row_time(self, stamp: int) -> int:
-        """Time on the clock of rows that a stamp means [ns].
-
-        Raises InvalidArgument for a stamp across a step: nobody knows which moment it means.
-        """
+        """Time on the clock of rows [ns]. Raises InvalidArgument for a stamp across a step."""
         self.update()
         time, step = stamp - self.offset, self._stepped_at
         if step is not None and (time < step or self._monotonic() < step + UNCERTAIN):
-            raise InvalidArgument(
-                "the wall clock was set since the stamp: stamp it anew, a second later"
-            )
+            raise InvalidArgument("the wall clock was set since the stamp: stamp it a second later")
         return time

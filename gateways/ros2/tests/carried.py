@@ -20,9 +20,11 @@ class Carried:
         self.robot, self.node = robot, stand_in_ros.Node()
         self.monotonic = 0
         self.clock = WallClock(lambda: self.monotonic + OFFSET, lambda: self.monotonic)
-        kind = stand_in_ros.imported("tf2_msgs.msg").TFMessage
+        kind = stand_in_ros.of("tf2_msgs.msg.TFMessage")
         self.tf = self.node.create_publisher(kind, "/tf", 100)
-        self.source = Source(ros.Shared(self.node, settings, self.clock, self.tf), robot.segment)
+        self.source = Source(
+            ros.Shared(self.node, self.node, settings, self.clock, self.tf), robot.segment
+        )
         self.now = 100.0
 
     def tick(self) -> None:

@@ -20,8 +20,8 @@ def carry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Carry]:
     with ExitStack() as stack:
 
         def carried(robot: o80.Frontend, **given: Any) -> Carried:
-            given = {"rates": {"": 0.0}, "command": True, **given}
-            made = Carried(robot, ros.Settings(**given))
+            settings = ros.Settings(**{"rates": {"": 0.0}, "command": True, **given})
+            made = Carried(robot, settings)
             stack.callback(made.source.close)
             made.tick()
             return made

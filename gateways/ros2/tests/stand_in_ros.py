@@ -10,7 +10,6 @@ import numpy as np
 from rosbags.typesys import Stores, get_typestore
 
 STORE: Any = get_typestore(Stores.ROS2_JAZZY)
-SERVICES = {"std_srvs.srv": ("Trigger",), "rcl_interfaces.srv": ("SetParametersAtomically",)}
 BASE, NAME, ARRAY, SEQUENCE = 1, 2, 3, 4  # kinds of a field, as rosbags numbers them
 
 
@@ -23,15 +22,14 @@ def default(kind: int, of: Any) -> Any:
 @cache
 def message_class(name: str) -> type:
     """A class with the fields of a message, all with defaults, as those of rclpy."""
-    constants, fields = STORE.fielddefs[name]
+    _, fields = STORE.fielddefs[name]
 
     def fill(self: Any, **given: Any) -> None:
         for field, (kind, of) in fields:
             setattr(self, field, given.pop(field) if field in given else default(int(kind), of))
         assert not given, f"{name} has no fields {given}"
 
-    levels = {key: bytes([value]) for key, _, value in constants if key in ("OK", "WARN", "ERROR")}
-    return type(name, (), {"__init__": fill, "ros_name": name, **levels})
+    return type(name, (), {"__init__": fill, "ros_name": name})
 
 
 def encoded(message: Any) -> Any:
@@ -52,35 +50,21 @@ def _plain(message: Any) -> Any:
                 value = [_plain(each) for each in value]
             elif element[0] != "string":
                 value = np.array(value, element[0])
-        elif of[0] in ("byte", "octet", "uint8") and isinstance(value, bytes):
-            value = value[0]
         values[field] = value
     return STORE.types[message.ros_name](**values)
 
 
-def imported(module: str) -> Any:
-    """A module of ROS 2, as far as the gateway uses it."""
-    package, _, kind = module.partition(".")
-    if kind == "msg":
-        names = [each for each in STORE.fielddefs if each.startswith(f"{package}/msg/")]
-        return SimpleNamespace(**{each.rpartition("/")[2]: message_class(each) for each in names})
-    if module in SERVICES:
-        return SimpleNamespace(**dict.fromkeys(SERVICES[module], object))
-    return {
-        "rclpy.qos": SimpleNamespace(
-            QoSProfile=lambda **given: given,
-            qos_profile_sensor_data="best effort",
-            DurabilityPolicy=SimpleNamespace(TRANSIENT_LOCAL="transient local"),
-        ),
-        "rclpy.callback_groups": SimpleNamespace(MutuallyExclusiveCallbackGroup=object),
-        "rclpy.parameter": SimpleNamespace(parameter_value_to_python=lambda value: value),
-    }[module]
-
-
 def of(path: str) -> Any:
-    """A name of ROS 2."""
-    module, _, name = path.rpartition(".")
-    return getattr(imported(module), name)
+    """A name of ROS 2, as far as the gateway uses it."""
+    package, kind, name = path.split(".", 2)
+    if kind == "msg":
+        return message_class(f"{package}/msg/{name}")
+    return {
+        "QoSProfile": lambda **given: given,
+        "qos_profile_sensor_data": "best effort",
+        "DurabilityPolicy": SimpleNamespace(TRANSIENT_LOCAL="transient local"),
+        "parameter_value_to_python": lambda value: value,
+    }.get(name, object)
 
 
 class Publisher:
@@ -118,14 +102,12 @@ class Node:
         return self.published[name]
 
     def create_subscription(
-        self, kind: type, name: str, take: Callable[[Any], None], qos: Any, **_: Any
+        self, kind: type, name: str, take: Callable[[Any], None], qos: Any
     ) -> str:
         self.subscribed[name] = take
         return name
 
-    def create_service(
-        self, kind: type, name: str, serve: Callable[[Any, Any], Any], **_: Any
-    ) -> str:
+    def create_service(self, kind: type, name: str, serve: Callable[[Any, Any], Any]) -> str:
         self.served[name] = serve
         return name
 

@@ -1,7 +1,5 @@
 """The command, and what it says where there is no ROS."""
 
-import importlib.util
-
 import pytest
 from typer.testing import CliRunner
 
@@ -17,7 +15,6 @@ def test_rates_are_numbers_or_every_row_for_all_or_for_one_segment() -> None:
             cli.rates_of([wrong])
 
 
-@pytest.mark.skipif(importlib.util.find_spec("rclpy") is not None, reason="this Python has rclpy")
 def test_without_rclpy_one_sentence_says_what_to_install() -> None:
     found = CliRunner().invoke(cli.app, [])
     assert isinstance(found.exception, o80.MissingExtra)
