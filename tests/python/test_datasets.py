@@ -355,22 +355,26 @@ def test_a_data_set_has_what_was_asked_for_and_what_acted(segment: str, tmp_path
 
 def test_numbers_and_units_of_a_lerobot_data_set_are_chosen(recorded: Path, tmp_path: Path) -> None:
     options = ("-o", tmp_path / "set", "--format", "lerobot", "--every", "10")
-    run_o80("export", recorded, *options, "--state", "elbow", "--units", "degrees")
+    words = ("--state", "elbow", "--units", "degrees", "--sensors", "observed.shoulder,effort[1]")
+    run_o80("export", recorded, *options, *words)
     features = json.loads((tmp_path / "set/meta/info.json").read_text())["features"]
     assert features["observation.state"]["names"] == ["elbow.pos"]
     assert features["action"]["names"] == ["shoulder.pos", "elbow.pos"]
-    assert not [name for name in features if "environment_state" in name]
+    assert features["observation.environment_state"]["names"] == ["shoulder.pos", "effort[1]"]
     table = pyarrow.parquet.read_table(tmp_path / "set/data/chunk-000/file-000.parquet")
     rows = np.concatenate([each.observed[:-1, 1] for each in episodes(recorded, every=10).all])
     state = np.ravel(table["observation.state"].to_pylist())
     assert state == pytest.approx(np.degrees(rows), abs=1e-4)
-    for words, why in (
+    run_o80("export", recorded, "-o", tmp_path / "plain", *options[2:])
+    plain = json.loads((tmp_path / "plain/meta/info.json").read_text())["features"]
+    assert "observation.environment_state" not in plain
+    for refused, why in (
         (("--units", "normalised"), "through which ranges"),
         (("--units", "turns"), "must be one of degrees, normalised, native"),
         (("--action", "elbo"), "Did you mean 'elbow'"),
         (("--fields", "effort"), "--sensors"),
     ):
-        said = run_o80("export", recorded, "-o", tmp_path / "no", *options[2:], *words, code=1)
+        said = run_o80("export", recorded, "-o", tmp_path / "no", *options[2:], *refused, code=1)
         assert why in said.stderr
     said = run_o80("export", recorded, "-o", tmp_path / "no.npz", "--units", "degrees", code=1)
     assert "--format lerobot" in said.stderr

@@ -59,7 +59,8 @@ class O80(Robot):
         self.segment = Segment(config.segment, config.units, config.timeout)
         self.cameras = make_cameras_from_configs(config.cameras)
         self._held = contextlib.ExitStack()  # control, cameras
-        self._seen: o80.Observation | None = None
+        #: The row of the last observation.
+        self.seen: o80.Observation | None = None
         self._stood: dict[str, float] = {}
 
     @property
@@ -101,7 +102,7 @@ class O80(Robot):
             if self.config.at_stop != "hold" and "relax" not in arm.requests:
                 raise o80.InvalidArgument(f"'{arm.segment}' cannot be relaxed: take at_stop=hold")
             stack.enter_context(arm.control(self.config.timeout))
-            self._seen, self._stood = self.segment.read()
+            self.seen, self._stood = self.segment.read()
             for camera in self.cameras.values():
                 camera.connect()
                 stack.callback(camera.disconnect)
@@ -110,7 +111,7 @@ class O80(Robot):
     @check_if_not_connected
     def get_observation(self) -> dict[str, Any]:
         """The newest row in LeRobot's units, and an image of each camera."""
-        self._seen, found = self.segment.read()
+        self.seen, found = self.segment.read()
         images = {name: camera.async_read() for name, camera in self.cameras.items()}
         return {**found, **images}
 
@@ -126,7 +127,7 @@ class O80(Robot):
         numbers = self.segment.numbers("desired")
         sent = {name: _within(_known(numbers, name), value) for name, value in action.items()}
         self._add(arm, sent, every=1 / self.config.fps)
-        arm.pulse(seen=self._seen)
+        arm.pulse(seen=self.seen)
         action.update({name: value * numbers[name].scale for name, value in sent.items()})
         return action
 

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any, Literal
 
 import o80
+from o80.base.errors import sentence
 from o80.datasets.lerobot_numbers import Number, numbers_of
 from o80.rows.columns import value_of
 
@@ -85,7 +86,7 @@ class Segment:
             self.arm.wait_for(self.arm.published + 1, 0.0)
         if (halt := self.arm.halted) is not None:
             raise o80.BackendHalted(
-                f"'{self.name}' is halted: {halt.text or halt.cause}. When the cause is gone: "
-                f"o80 resume {self.name} {halt.number}"
+                f"'{self.name}' is halted: {sentence(halt.text or halt.cause)} When the cause is "
+                f"gone: o80 resume {self.name} {halt.number}"
             )
         return self.arm

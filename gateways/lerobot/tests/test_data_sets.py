@@ -1,4 +1,4 @@
-"""Data sets of o80 are LeRobot's: those of its own SO-101 driver have the same names and numbers."""
+"""Data sets of o80 as LeRobot reads them; its own SO-101 driver writes the same numbers."""
 
 import math
 from collections.abc import Iterator

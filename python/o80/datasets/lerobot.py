@@ -17,7 +17,7 @@ from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
 from o80.base.finite import Say, json_text, say_not_finite, warn
 from o80.datasets.episodes import Episode, Episodes
-from o80.datasets.lerobot_numbers import Number, Units, numbers_of, values_in
+from o80.datasets.lerobot_numbers import Number, Units, numbers_of, sensor, values_in
 from o80.rows.columns import Column, chosen, columns_of
 from o80.rows.history import History, values_of
 
@@ -45,7 +45,7 @@ def write(
 
     state, action: actuators or fields of their states in observation.state, which is observed, and
         in action (empty: all).
-    sensors: sensor values in observation.environment_state (empty: none).
+    sensors: sensor values in observation.environment_state, also "observed" (empty: none).
     units: of states and actions: "degrees", "normalised" or "native" (None: those of LeRobot's
         driver of this arm, else "native").
     action_is: "acted": the desired states that were reached with the step; "asked": the targets of
@@ -85,7 +85,7 @@ class _Chosen:
 
     state: Sequence[Number]
     action: Sequence[Number]
-    sensors: Sequence[Column]
+    sensors: Sequence[Number]
     captures: Mapping[str, Column | None]  #: stamps by what was captured; None: the row's own time
     action_is: Literal["acted", "asked"]
 
@@ -104,7 +104,9 @@ class _Chosen:
         schema = episodes.all[0].rows.schema
         extended = [each for each in columns_of(schema) if each.name.startswith("extended.")]
         names = [each.name for each in extended]
-        wanted = set(chosen(episodes.segment, names, sensors)) if sensors else set()
+        observed = [each for each in sensors if each.partition(".")[0] == "observed"]
+        others = [each for each in sensors if each not in observed]
+        wanted = set(chosen(episodes.segment, names, others)) if others else set()
         stamps: dict[str, Column | None] = {
             each.name.removeprefix("extended.").rpartition(".")[0] or "sensors": each
             for each in extended
@@ -113,7 +115,10 @@ class _Chosen:
         return cls(
             numbers_of(schema, "observed", units, state),
             numbers_of(schema, "desired", units, action),
-            [each for each in extended if each.name in wanted],
+            [
+                *(numbers_of(schema, "observed", units, observed) if observed else ()),
+                *(sensor(each) for each in extended if each.name in wanted),
+            ],
             stamps or {"state": None},
             action_is,
         )
@@ -141,16 +146,19 @@ class _Chosen:
         begin = episode.rows.time[0]
         return {
             "action": values_in(self.action, action),
-            "observation.state": values_in(
-                self.state, _values(rows, [number.column for number in self.state])
-            ),
-            "observation.environment_state": _values(rows, self.sensors),
+            "observation.state": _observed(rows, self.state),
+            "observation.environment_state": _observed(rows, self.sensors),
             self.other: values_in(self.action, other),
             f"{EXTRA}time": (rows.time - begin) * 1e-9,
             f"{EXTRA}capture_time": (captures - begin) * 1e-9,
             f"{EXTRA}age": (rows.time[:, None] - captures) * 1e-9,
             f"{EXTRA}delay": np.nan_to_num(episode.delays, nan=-1.0),
         }
+
+
+def _observed(rows: History, numbers: Sequence[Number]) -> NDArray[np.float64]:
+    """Numbers of rows (T, numbers) in LeRobot's units."""
+    return values_in(numbers, _values(rows, [number.column for number in numbers]))
 
 
 def _values(rows: History, columns: Sequence[Column]) -> NDArray[np.float64]:
@@ -175,7 +183,7 @@ def _not_finite(
 def _features(episodes: Episodes, numbers: _Chosen) -> dict[str, dict[str, Any]]:
     """Every column of the frames: type, shape, and the names of its numbers."""
     action = [number.name for number in numbers.action]
-    sensors = [each.name.removeprefix("extended.") for each in numbers.sensors]
+    sensors = [number.name for number in numbers.sensors]
     captures = list(numbers.captures)
     says = any(np.isfinite(episode.delays).any() for episode in episodes.all)
     described: tuple[tuple[str, str, list[str] | None], ...] = (

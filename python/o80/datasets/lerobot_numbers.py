@@ -91,6 +91,12 @@ def numbers_of(
     return found
 
 
+def sensor(column: Column) -> Number:
+    """A sensor value, as it is in rows."""
+    name = column.name.removeprefix("extended.")
+    return Number(name, column, "", "", 1.0, -math.inf, math.inf, -math.inf, math.inf)
+
+
 def _short(field: str) -> str:
     """LeRobot's ending of a number: positions are "pos", velocities "vel"."""
     return {"": "pos", "position": "pos", "velocity": "vel"}.get(field, field)

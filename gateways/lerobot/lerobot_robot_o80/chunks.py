@@ -1,0 +1,162 @@
+"""LeRobot's client of asynchronous inference, whose answers act in the iterations they are for.
+
+python -m lerobot_robot_o80.chunks --robot.type=o80 --robot.segment=so101 --fps=30 \\
+    --policy_type=act --pretrained_name_or_path=user/model --actions_per_chunk=50
+
+The flags are those of `python -m lerobot.async_inference.robot_client`; aggregate_fn_name is not
+used. The server is LeRobot's. Needs grpcio. See docs/lerobot.md.
+"""
+
+import math
+import threading
+from typing import Any
+
+import draccus
+import numpy as np
+from lerobot.async_inference.configs import RobotClientConfig
+from lerobot.async_inference.helpers import TimedAction, TimedObservation
+from lerobot.async_inference.robot_client import RobotClient
+from lerobot.utils.import_utils import register_third_party_plugins
+from numpy.typing import NDArray
+
+import o80
+from lerobot_robot_o80.robot import O80
+from o80.frontend.chunks import SentChunk
+from o80.rows.columns import value_of
+
+PATIENCE = 2.0
+"""After so long without an answer the server is asked again [s]."""
+
+
+class ChunkClient(RobotClient):
+    """A client that plays answers through a plan of chunks (docs/chunks.md).
+
+    An observation carries the iteration of its row as its timestep, which the server gives back:
+    action i of the answer is due i + 1 steps after that row, however late it comes. The server is
+    asked when at most the share chunk_size_threshold of an answer is planned.
+
+    Threads: control_loop in one, receive_actions in another, as LeRobot runs them.
+    """
+
+    def __init__(self, config: RobotClientConfig) -> None:
+        super().__init__(config)
+        if not isinstance(self.robot, O80):
+            self.robot.disconnect()
+            raise o80.InvalidArgument(
+                f"chunks are for robots of o80: take --robot.type=o80, not {config.robot.type}"
+            )
+        try:
+            arm = self.robot.segment.checked()
+            self._numbers = [*self.robot.segment.numbers("desired").values()]
+            self._wall = arm.provenance.wall_clock_offset
+            names = [number.actuator for number in self._numbers]
+            step = arm.frequency / config.fps
+            self.plan = arm.chunks(names, step=step)
+            self._step, self._usual = step, self.plan.ease
+            self.sent: list[SentChunk] = []  #: the answers
+        except BaseException:
+            self.robot.disconnect()
+            raise
+        self._lead = round(config.chunk_size_threshold * config.actions_per_chunk * step)
+        self._answered = threading.Event()
+        self._failure: BaseException | None = None
+
+    def control_loop(self, task: str, verbose: bool = False) -> tuple[Any, Any]:
+        """Asks for answers until `stop`. Returns the last observation and None.
+
+        Raises BackendHalted, BackendGone.
+        """
+        self.start_barrier.wait()
+        seen = None
+        while self.running:
+            try:
+                self.plan.wait(lead=self._lead, timeout=0.5)
+            except o80.TimeoutError:
+                continue
+            seen = self._ask(task)
+            self._answered.wait(PATIENCE)
+        if self._failure is not None:
+            raise self._failure
+        return seen, None
+
+    def _ask(self, task: str) -> dict[str, Any]:
+        self._answered.clear()
+        observation = self.robot.get_observation()
+        row = self.robot.seen
+        assert row is not None
+        self.send_observation(
+            TimedObservation(
+                timestamp=(row.time + self._wall) * 1e-9,
+                timestep=row.iteration,
+                observation={**observation, "task": task},
+                must_go=True,
+            )
+        )
+        return observation
+
+    def _aggregate_action_queues(
+        self, incoming_actions: list[TimedAction], aggregate_fn: Any = None
+    ) -> None:
+        """Sends an answer. LeRobot calls it for each, in the thread of receive_actions."""
+        try:
+            rows = np.array([each.get_action().numpy() for each in incoming_actions], np.float64)
+            rows /= [number.scale for number in self._numbers]
+            rows = np.clip(
+                rows,
+                [number.minimum for number in self._numbers],
+                [number.maximum for number in self._numbers],
+            )
+            seen = incoming_actions[0].get_timestep()
+            self.plan.ease = self._ease(rows, seen)
+            self.sent.append(self.plan.send(rows, seen=seen))
+        except o80.Error as error:
+            self._failure = error
+            self.shutdown_event.set()
+        finally:
+            self._answered.set()
+
+    def _ease(self, rows: NDArray[np.float64], seen: int) -> int:
+        """Iterations that the take-over needs within the limits of the joints (docs/chunks.md)."""
+        arm = self.robot.segment.checked()
+        now = min(int((arm.published - seen) / self._step), len(rows) - 1)
+        planned = self.plan.planned(seen, now + 1)
+        here = planned[now] if len(planned) > now else self._desired(arm.latest())
+        needed = 0.0
+        for number, distance in zip(self._numbers, np.abs(rows[now] - here), strict=True):
+            limits = next(each for each in arm.actuators if each.name == number.actuator).limits
+            needed = max(
+                needed,
+                (5.8 * distance / limits.acceleration) ** (1 / 2),
+                (60 * distance / limits.jerk) ** (1 / 3),
+                1.9 * distance / limits.speed,
+            )
+        return max(self._usual, math.ceil(needed * arm.frequency))
+
+    def _desired(self, row: o80.Observation) -> NDArray[np.float64]:
+        return np.array([value_of(row, number.column) for number in self._numbers])
+
+    def stop(self) -> None:
+        """Ends the plan: what was sent is played to its last action. Disconnects the robot."""
+        self.plan.close()
+        super().stop()
+
+
+@draccus.wrap()
+def main(config: RobotClientConfig) -> None:
+    """Runs the client until Ctrl-C, a halt, or the end of the robot."""
+    client = ChunkClient(config)
+    try:
+        if not client.start():
+            raise o80.Error(f"no policy server answers at {config.server_address}")
+        receiver = threading.Thread(target=client.receive_actions, daemon=True)
+        receiver.start()
+        client.control_loop(config.task)
+    except KeyboardInterrupt:
+        pass
+    finally:
+        client.stop()
+
+
+if __name__ == "__main__":
+    register_third_party_plugins()
+    main()
