@@ -208,7 +208,7 @@ CEILINGS = {
     "include, src": (33_450, 0),
     "python/bindings": (5_608, 0),
     "python/o80": (30_160, 0),
-    "python/o80/hybrid": (2_290, 0),
+    "python/o80/hybrid": (2_400, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
     "devices": (8_850, 4_500),
@@ -217,9 +217,9 @@ CEILINGS = {
     "robots/arms": (4_450, 3_100),
     "robots/pam, robots/two_joints": (2_144, 1_208),
     "simulators/mujoco": (5_240, 4_580),
-    "apps/table_tennis": (10_750, 6_045),
+    "apps/table_tennis": (10_140, 6_040),
     "benchmarks, tools": (5_700, 0),
-    "examples": (1_900, 0),
+    "examples": (1_965, 0),
     "tests, conftest.py": (0, 66_890),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""

@@ -31,17 +31,17 @@ def refuse_wrong_arguments(
 
 
 def refuse_wrong_balls(rig: RigSettings, task: TaskSettings) -> None:
-    """Raises ValueError for extra balls beside a ball that flies out."""
-    if task.fly_out and rig.extra_balls:
+    """Raises ValueError for other worlds beside a ball that flies out."""
+    if task.fly_out and (rig.worlds or 1) > 1:
         raise ValueError(
-            "fly_out ends an episode at the first touch of the played ball, while extra balls "
-            f"still come in: give fly_out=False, or extra_balls=0 instead of {rig.extra_balls}"
+            "fly_out ends an episode at the first touch of the played ball, while the balls of "
+            f"other worlds still come in: give fly_out=False, or worlds=1 instead of {rig.worlds}"
         )
 
 
 def refuse_unless_for_copies(rig: RigSettings, task: TaskSettings) -> None:
     """Raises ValueError for a rig or a task that a vector environment cannot have."""
-    wanted = {"pacing": Pacing.INLINE, "twins": 1, "extra_balls": 0, "attach": False}
+    wanted = {"pacing": Pacing.INLINE, "attach": False}
     given = {name: getattr(rig, name) for name in wanted} | {"chunk_size": task.chunk_size}
     for name, value in (wanted | {"chunk_size": None}).items():
         if given[name] != value:
@@ -52,7 +52,7 @@ def refuse_unless_for_copies(rig: RigSettings, task: TaskSettings) -> None:
 
 
 def refuse_wrong_options(options: Mapping[str, Any], *, period: float) -> None:
-    """Raises ValueError for options of `reset`; `period` is that of the twins [s]."""
+    """Raises ValueError for options of `reset`; `period` is that of the worlds [s]."""
     unknown = [name for name in options if name not in OPTIONS]
     if unknown:
         raise ValueError(f"unknown options: {', '.join(unknown)}; reset knows {', '.join(OPTIONS)}")

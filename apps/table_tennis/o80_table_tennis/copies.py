@@ -1,34 +1,39 @@
-"""Table tennis as a task of o80.learning: one copy on a `Rig`, or N copies on a `GroupRig`.
+"""Table tennis as a task of o80.hybrid: one arm as its settings say, or N copies inline.
 
 One step, with the arm's iterations as the only clock; k is its newest row used:
 1. actions => eight pressures of each arm, sent for iteration k + 1 + delay (by the clock, too late:
    taken at once, counted); with chunks row j for the five iterations from k + 1 + delay + 5 j on
    (too late: skipped, counted);
 2. by the clock: wait for row k + 5; else all arms burst by 5;
-3. the arm's rows k + 1 to k + 5 are replayed to its twins, which all burst by 5 at once;
-4. the arm's row k + 5 and the twin's row of the same instant => observation, contact, reward.
+3. the arm's rows k + 1 to k + 5 are replayed to its worlds, which all burst by 5 at once;
+4. the arm's row k + 5 and the world's row of the same instant => observation, contact, reward.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
-from o80.base.arrays import FloatArray
-from o80.learning import EVERY, Index, Outcome, Task
+import o80
+from o80.base.arrays import Float32Array, FloatArray
+from o80.hybrid import EVERY, HybridTask, Index, Outcome
+from o80.hybrid.single import Single
 from o80.learning.halts import halts_of
 from o80.view.pictures import Pictures
 
 from .arguments import refuse_unless_for_copies, refuse_wrong_balls, refuse_wrong_options
 from .balls.sources import balls_from
 from .episode_draw import EpisodeDraw, drawn_episode
-from .rig.group_rig import GroupRig
-from .rig.rig import Rig
-from .settings import RigSettings, TaskSettings
+from .rig.ball_records import fly_out_fields
+from .rig.home import Home
+from .rig.rig import rig_of
+from .rig.rows import RigRows
+from .settings import Pacing, RigSettings, TaskSettings
 from .task.actions import changed_pressures
 from .task.end import End, terminated, undecided
 from .task.observer import Observer
@@ -38,10 +43,14 @@ from .world.timing import ITERATIONS
 
 Numbers = NDArray[np.intp]
 
-SIZE = (640, 480)
+PACINGS: Mapping[Pacing, Any] = {each: each.name.lower() for each in Pacing}
+"""Words of o80.hybrid."""
+PICTURE = (640, 480)
 """Width and height of pictures [pixels]."""
 TEXTS = np.array([end.text for end in End], object)
 """Texts of the ends, by their numbers."""
+BALL_STATE = np.dtype([(name, np.float64, (3,)) for name in ("position", "velocity", "spin")])
+"""State of a ball that is sent to its world."""
 
 
 def _running(copies: int) -> dict[str, NDArray[Any]]:
@@ -50,10 +59,16 @@ def _running(copies: int) -> dict[str, NDArray[Any]]:
     return {"stalled": np.zeros(copies, np.bool_), "end": ends, "end_text": TEXTS[ends]}
 
 
-class TableTennisCopies(Task):
-    """Arms with simulated balls, stepped together."""
+class TableTennisCopies(HybridTask):
+    """Arms with simulated balls, stepped together.
+
+    With `RigSettings(worlds=n)` n balls fly beside each arm, each in a world of its own; arrays of
+    all balls have the worlds of copy 0 first.
+    """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012
+    profile = "hold"
+    max_drift = math.inf
 
     def __init__(
         self,
@@ -71,50 +86,124 @@ class TableTennisCopies(Task):
         settings, rig = task or TaskSettings(), rig or RigSettings()
         if copies is not None:
             refuse_unless_for_copies(rig, settings)
-        self.settings, self.task = settings, settings.made()
         refuse_wrong_balls(rig, settings)
         rig = settings.start_of(rig)
-        self.observer = Observer(self.task, settings.observing(rig.step), copies or 1)
+        self.settings, self.rig_settings, self.task = settings, rig, settings.made()
+        count, each = copies or 1, rig.worlds or 1
+        self.observer = Observer(self.task, settings.observing(rig.step), count * each)
         """Observer that makes observations of states."""
-        super().__init__(
-            copies or 1,
-            observation_space=self.observer.space,
-            action_space=spaces.Box(-1.0, 1.0, settings.action_shape, np.float32),
-        )
-        self._rig_settings, self._camera = rig, camera
+        self.observation_space = self.observer.space
+        self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
+        self.rig = rig_of(rig, delay=settings.delay, group=copies is not None or each > 1)
+        self.max_late = settings.max_late + settings.planned
+        if settings.chunk_size is not None:
+            self.chunk_size = settings.chunk_size * settings.repeat
+            self.action_steps = settings.steps
         self._balls = balls_from(
             settings.balls, settings.ball_seed, rig.period, settings.ball_count
         )
-        self._gathered: list[NDArray[np.float32]] = []
-        if copies is None:
-            self.rig: Rig | GroupRig = Rig(
-                rig, delay=settings.delay, chunks=settings.chunk_size is not None
-            )
-        else:
-            group = GroupRig(copies, rig, delay=settings.delay, threads=threads)
-            if self.observer.is_ball_play:
-                self._gathered = group.gather(self.observer.low, self.observer.high)
-            self.rig = group
-        self.robots = self.rig.robots
-        self._ends = np.zeros(self.copies, np.int64)
+        self._camera = camera
+        self._pictures: Pictures | None = None
+        super().__init__(
+            count,
+            pacing=PACINGS[rig.pacing],
+            attach=rig.arm_segment if rig.attach else None,
+            threads=1 if copies == 1 else threads,
+        )
+        try:
+            self._see()
+        except BaseException:
+            self.close()
+            raise
+        self.action_space = spaces.Box(-1.0, 1.0, settings.action_shape, np.float32)
+
+    def _see(self) -> None:
+        """Names the numbers in rows, and makes the arrays of the task."""
+        engine: Any = self.engine
+        arms, self._worlds = engine.members
+        self.arm: o80.Frontend = engine.frontend(0)
+        """Frontend of the first arm."""
+        self.rows = RigRows(self.robot.last, self.world.last, self.arm, self.world_of(0))
+        """Newest rows, with names."""
+        self.range, self.home_of_arm = self.rows.range, Home(self.arm)
+        self._gathered: list[Float32Array] = []
+        if isinstance(arms, o80.InlineGroup) and self.worlds == 1:
+            bounds = self.observer.low, self.observer.high
+            plays = self.observer.is_ball_play
+            self._gathered = self.rows.gather(arms, self._worlds, bounds if plays else None)
+        self._asked, self._pressures = np.zeros((2, self.copies, MUSCLES))
+        goal = np.shape(self.task.begin(np.random.default_rng(0)))
+        total = self.copies * self.worlds
         self.state = State(
             self.steps,
-            self.rig.arm.last_motion,
-            np.zeros((self.copies, MUSCLES)),
-            self.rig.arm.commanded(),
-            self.rig.arm.last_racket,
-            self.rig.twin.ball,
-            self.rig.twin.records,
-            np.zeros((self.copies, *np.shape(self.task.begin(np.random.default_rng(0))))),
+            self.rows.motion,
+            self._pressures,
+            self._asked,
+            self.rows.racket,
+            self.rows.balls,
+            self.rows.read_records(),
+            np.zeros((total, *goal)),
         )
-        """(copies, ...) after the last step."""
+        """State of all balls after the last step."""
         self.draws: list[EpisodeDraw] = []
         """Draws of the episodes that were begun last."""
-        self._pictures: Pictures | None = None
-        self._observations = np.zeros((self.copies, self.observer.size), np.float32)
-        self._unobserved = self._stalled = False
+        self.twin_row = 0
+        """Iteration of the first world that was used last."""
+        self.returns_at_reset = True
+        """By the clock a reset first brings the arm back; False: the caller has done so."""
+        self.after_step: Callable[[], None] | None = None
+        """Called after each step of 10 ms, with the newest rows of arm and world."""
+        self._observations = np.zeros((total, self.observer.size), np.float32)
+        self._ends = np.zeros(total, np.int64)
+        self._unobserved = self._some_ended = False
         self._running = _running(self.copies)
-        self._some_ended = False
+
+    @property
+    def single(self) -> Single:
+        """Engine of one arm, which runs in the way of its settings."""
+        assert isinstance(self.engine, Single)
+        return self.engine
+
+    def world_of(self, copy: int, world: int = 0) -> o80.Frontend:
+        """Frontend of a world of a copy."""
+        member: o80.InlineGroup | o80.Frontend = self._worlds
+        if isinstance(member, o80.Frontend):
+            return member
+        return member[copy * self.worlds + world]
+
+    # ------------------------------------------------------------------ episodes
+
+    def restart(
+        self,
+        copies: Numbers,
+        generators: Sequence[np.random.Generator],
+        options: Mapping[str, Any],
+    ) -> None:
+        """Arms and worlds to the start, with drawn balls, or that of `options`."""
+        refuse_wrong_options(options, period=self.rig_settings.period)
+        extra = self.worlds - 1
+        self.draws = draws = [
+            drawn_episode(self.task, self._balls, each, extra=extra, options=options)
+            for each in generators
+        ]
+        if self._clocked and self.returns_at_reset:
+            self.go_home(self.arm)
+        self.engine.reset(copies, [(draw.arm_seed, draw.twin_seed) for draw in draws])
+        if self._endings is not None:
+            self._endings.begin(copies)
+        self.begin(copies, generators, options)
+        self.engine.mirror(copies)
+        self.twin_row = self.rows.iteration
+        self._asked[copies] = self.commanded(copies)
+        balls = np.arange(len(self._ends))[self._balls_of(copies)]
+        self.state.goal[balls] = np.repeat([draw.goal for draw in draws], self.worlds, axis=0)
+        self._ends[balls] = End.RUNNING
+        self._look()
+        if not self._gathered:
+            seeds = [each for each in generators for _ in range(self.worlds)]
+            state = self.state.at(balls)
+            self._observations[balls] = self.observer.begin(state, seeds, balls)
+        self._unobserved = False
 
     def begin(
         self,
@@ -122,47 +211,52 @@ class TableTennisCopies(Task):
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
     ) -> None:
-        """Arms and twins to the start, with a drawn ball, or that of `options`."""
-        rig = self._rig_settings
-        refuse_wrong_options(options, period=rig.period)
-        self.draws = draws = [
-            drawn_episode(self.task, self._balls, each, extra=rig.extra_balls, options=options)
-            for each in generators
-        ]
-        self.rig.reset(
-            copies,
-            arm_seeds=[draw.arm_seed for draw in draws],
-            twin_seeds=[draw.twin_seed for draw in draws],
-            flights=[draw.balls.flights for draw in draws],
-        )
-        self.state.asked[copies] = self.rig.arm.commanded(copies)
-        self.state.goal[copies] = [draw.goal for draw in draws]
-        self._ends[copies] = End.RUNNING
-        self._look()
-        if not self._gathered:
-            state = self.state.at(copies)
-            self._observations[copies] = self.observer.begin(state, generators, copies)
-        self._unobserved = self._stalled = False
+        """The balls fly from the next iteration on."""
+        for copy, draw in zip(copies.tolist(), self.draws, strict=True):
+            for number, flight in enumerate(draw.balls.flights):
+                world, states = self.world_of(copy, number), flight.states.view(BALL_STATE)[:, 0]
+                if len(states) == 1:  # the usual case, ten times as fast
+                    world.add_command(self.rows.ball, states[0], iterations=1)
+                else:
+                    world.add_trajectory(states, self.rows.ball)
+                world.pulse()
+
+    def commanded(self, copies: Index = EVERY) -> FloatArray:
+        """Normalised pressures (n, 8) asked for in the last rows, a fresh array."""
+        return self.range.normalised(self.rows.desired[copies])
+
+    def go_home(self, robot: o80.Frontend) -> None:
+        """To the start by commands, as a real arm must."""
+        self.home_of_arm.go()
+
+    # ------------------------------------------------------------------ steps
 
     def step(self, actions: Any, copies: Index) -> None:
-        """`repeat` times five iterations of these arms and of their twins, with chunks for each of
+        """`repeat` times five iterations of these arms and of their worlds, with chunks for each of
         the `action_steps`.
 
-        Nothing if the arm has moved on too far for the twin to follow: the episode is given up.
+        Nothing if the arm has moved on too far for the world to follow: the episode is given up.
         """
-        settings, rig = self.settings, self.rig
-        self._stalled = rig.lateness > settings.max_late + settings.planned
-        if self._stalled:
-            return
-        asked = self.state.asked[copies]
+        settings, asked = self.settings, self._asked[copies]
+        if self._endings is not None:
+            self._endings.step(copies)
         if settings.chunk_size is None:
             for _ in range(settings.repeat):
                 asked = changed_pressures(asked, actions, factor=settings.factor)
-                self._move(asked, copies)
+                self._move(self.range.raw(asked), copies)
+                if self.engine.stalled:
+                    return
         else:
-            asked = self._step_chunk(asked, np.asarray(actions))
-        self.state.asked[copies] = asked
-        self._ends[copies], self._some_ended = End.RUNNING, False
+            rows = []
+            for action in np.repeat(np.asarray(actions)[0], settings.repeat, axis=0):
+                asked = changed_pressures(asked, action[None], factor=settings.factor)
+                rows.append(asked)
+            self._move(self.range.raw(np.stack(rows, 1)), copies)
+            if self.engine.stalled:
+                return
+            asked = rows[settings.steps - 1]  # the next chunk goes on from what is over by then
+        self._asked[copies] = asked
+        self._ends[self._balls_of(copies)], self._some_ended = End.RUNNING, False
         self._look()
         if settings.fly_out and np.count_nonzero(self.state.record.touched):
             touched = np.zeros(self.copies, np.bool_)
@@ -170,26 +264,18 @@ class TableTennisCopies(Task):
             self._fly(np.setdiff1d(np.flatnonzero(touched), [*halts_of(self.robots, self.copies)]))
         self._unobserved = True
 
-    def _move(self, pressures: FloatArray, copies: Index = EVERY, **steps: int) -> None:
-        """A step of the rig; arms and twins that a halt ends show their last rows."""
-        stepped = False
-        with self.until_halted():
-            self.rig.step(pressures, copies, **steps)
-            stepped = True
-        if not stepped:
-            self.rig.see_newest()
+    def _move(self, targets: FloatArray | None, copies: Index) -> None:
+        """A step of the rig; None: nothing is sent."""
+        self.engine.step(targets, copies, self.until_halted)
+        self.twin_row = self.rows.iteration
+        if self.after_step is not None and not self.engine.stalled:
+            self.after_step()
 
-    def _step_chunk(self, asked: FloatArray, actions: NDArray[Any]) -> FloatArray:
-        """Sends a chunk (1, chunk_size, 8); the pressures (1, 8) of its last row that is over when
-        the policy sees again: the next chunk changes these.
-        """
-        settings = self.settings
-        rows = []
-        for action in np.repeat(actions[0], settings.repeat, axis=0):
-            asked = changed_pressures(asked, action[None], factor=settings.factor)
-            rows.append(asked)
-        self._move(np.concatenate(rows), steps=settings.steps)
-        return rows[settings.steps - 1]
+    def idle(self) -> None:
+        """10 ms in which nothing is asked of the arm, by its clock."""
+        if self.single.lateness > self.max_late:
+            self.single.begin()
+        self._move(None, EVERY)
 
     def _fly(self, touched: Numbers) -> None:
         """The touched balls of these copies fly to their ends, unless they are there."""
@@ -197,67 +283,114 @@ class TableTennisCopies(Task):
         flying = touched[undecided(self.task.end(state), state.record.touched)]
         if flying.size:
             every = ITERATIONS * self.settings.steps
-            self.rig.twin.fly_out(flying, every, self.settings.end.passed_y)
+            fields = fly_out_fields(every=every, passed_y=self.settings.end.passed_y)
+            self.world.request("fly_out", flying, **fields)
+            self.engine.mirror(flying)
             self._look()
 
     def _look(self) -> None:
         """Updates the parts of the state that are no views of the newest rows."""
-        self.rig.arm.read_pressures(self.state.pressures)
-        self.state.record = self.rig.twin.records
+        self.range.normalised(self.rows.observed, out=self._pressures)
+        state, rows = self.state, self.rows
+        state.record = rows.read_records()
+        if self.worlds > 1:
+            of_arm = (self.steps, rows.motion, self._pressures, self._asked, rows.racket)
+            each: list[Any] = [np.repeat(part, self.worlds, axis=0) for part in of_arm]
+            state.steps, state.motion, state.pressures, state.asked, state.racket = each
+
+    def _balls_of(self, copies: Index) -> Index:
+        """Numbers of the balls of these copies."""
+        if self.worlds == 1:
+            return copies
+        numbers = np.arange(self.copies * self.worlds).reshape(self.copies, self.worlds)
+        return numbers[copies].ravel()
+
+    def _of(self, copies: Index) -> State:
+        return self.state if isinstance(copies, slice) else self.state.at(self._balls_of(copies))
+
+    def _by_world(self, values: Any) -> Any:
+        """Values of balls (n * worlds, ...), where there are several (n, worlds, ...)."""
+        values = np.asarray(values)
+        if self._endings is None:
+            return values
+        return values.reshape(-1, self.worlds, *values.shape[1:])
+
+    # ------------------------------------------------------------------ results
 
     def flagged(self) -> NDArray[np.bool_]:
         """(copies,) whose episode may have ended, or whose step is paid."""
-        if self._stalled:
+        if self.engine.stalled:
             return super().flagged()
         flags: NDArray[np.bool_] = self.task.eventful(self.state)
+        if self._endings is not None:
+            flags = (self._by_world(flags) & self._endings.running).any(axis=1)
         return flags
 
-    def judge(self, copies: Numbers) -> Outcome:
+    def outcome(self, copies: Numbers) -> Outcome:
         """Ends and rewards of these."""
         self._some_ended = True
-        if self._stalled:
-            self.steps[copies] -= 1  # nothing was done
-            self._ends[copies] = End.STALLED
-            return Outcome(truncated=True)
-        state = self.state.at(copies)
+        if not self.engine.stalled:
+            return super().outcome(copies)
+        self.steps[copies] -= 1  # nothing was done
+        self._ends[self._balls_of(copies)] = End.STALLED
+        outcome = super().outcome(copies)
+        return Outcome(outcome.reward, outcome.terminated, outcome.truncated)
+
+    def judge(self, copies: Numbers) -> Outcome:
+        """Ends and rewards of the balls of these."""
+        state, balls = self._of(copies), self._balls_of(copies)
         ends = self.task.end(state)
         by_event = terminated(ends)
-        self._ends[copies] = np.where(np.isin(copies, [*self.halts]), End.HALTED, ends)
-        return Outcome(self.task.reward(state), by_event, ~by_event & (ends != End.RUNNING))
+        halted = np.repeat(np.isin(copies, [*self.halts]), self.worlds)
+        self._ends[balls] = np.where(halted, End.HALTED, ends)
+        cut = ~by_event & (ends != End.RUNNING)
+        return Outcome(*map(self._by_world, (self.task.reward(state), by_event, cut)))
 
     def observe(self, copies: Index) -> Any:
         """(n, M); those that have been stepped are observed once, when first asked for."""
         if self._gathered:
-            if isinstance(copies, slice):
-                return np.concatenate(self._gathered, axis=1)
-            return np.concatenate([part[copies] for part in self._gathered], axis=1)
+            parts = self._gathered
+            if not isinstance(copies, slice):
+                parts = [part[copies] for part in parts]
+            return self._by_world(np.concatenate(parts, axis=1))
+        balls = self._balls_of(copies)
         if self._unobserved:
-            self._observations[copies] = self.observer.observe(self._of(copies), copies)
+            self._observations[balls] = self.observer.observe(self._of(copies), balls)
             self._unobserved = False
-        return self._observations[copies]
+        return self._by_world(self._observations[balls])
 
     def info(self, copies: Index) -> Mapping[str, Any]:
         """Entries of the task, and how the episode stands: see `environment`."""
         info = self.task.info(self._of(copies))
+        if self.worlds > 1:
+            info = {name: np.asarray(value)[:: self.worlds] for name, value in info.items()}
         if not self._some_ended and isinstance(copies, slice):
             return info | self._running
-        ends = self._ends[copies]
+        ends = self._ends[:: self.worlds][copies]
         info["stalled"] = ends == End.STALLED
         info["end"], info["end_text"] = ends, TEXTS[ends]
         return info
 
-    def _of(self, copies: Index) -> State:
-        return self.state if isinstance(copies, slice) else self.state.at(copies)
+    def shown(self, copies: Index) -> tuple[Any, Mapping[str, Any]]:
+        """Observations and infos; `worlds` also says which balls were touched and returned."""
+        if self._endings is None:
+            info = self.info(copies)
+            return self.observe(copies), info
+        observed, info = super().shown(copies)
+        told = self.task.info(self._of(copies))
+        names = told.keys() & {"touched", "returned"}
+        more = {name: self._by_world(told[name]) for name in names}
+        return observed, {**info, "worlds": info["worlds"] | more}
 
     def render(self, copy: int) -> Any:
         """A picture (480, 640, 3) of one copy."""
-        twin = self.rig.twin_of(copy)
+        world = self.world_of(copy)
         if self._pictures is None:
-            self._pictures = Pictures(twin, size=SIZE, camera=self._camera)
-        return self._pictures.draw(twin.latest())
+            self._pictures = Pictures(world, size=PICTURE, camera=self._camera)
+        return self._pictures.draw(world.latest())
 
     def close(self) -> None:
-        """Ends arms and twins; may be called twice."""
+        """Ends arms and worlds; may be called twice."""
         if self._pictures is not None:
             self._pictures.close()
-        self.rig.close()
+        super().close()

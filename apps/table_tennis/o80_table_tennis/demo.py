@@ -46,7 +46,6 @@ class DemoSettings:
     """Episodes of each accelerated mode."""
     real_time_episodes: int = 5
     seed: int = 1
-    extra_balls: int = 0
     muscle: str = "linear"
     output: Path = Path("build/demo")
 
@@ -57,7 +56,7 @@ class DemoSettings:
 
     def rig(self, pacing: Pacing) -> RigSettings:
         """The arm and its twin, running like this."""
-        return RigSettings(pacing=pacing, extra_balls=self.extra_balls, muscle=self.muscle)
+        return RigSettings(pacing=pacing, muscle=self.muscle)
 
     @property
     def recording(self) -> Path:
@@ -192,7 +191,6 @@ def main(
     episodes: Annotated[int, typer.Option(min=0, help="Of each accelerated mode.")] = 20,
     real_time_episodes: Annotated[int, typer.Option(min=0, help="In real time.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Of the environments.")] = 1,
-    extra_balls: Annotated[int, typer.Option(min=0, help="Balls beside the one played.")] = 0,
     muscle: Annotated[str, typer.Option(help="Model of the muscles: linear or hill.")] = "linear",
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/demo"),
 ) -> None:
@@ -204,7 +202,6 @@ def main(
         episodes=episodes,
         real_time_episodes=real_time_episodes,
         seed=seed,
-        extra_balls=extra_balls,
         muscle=muscle,
         output=output,
     )

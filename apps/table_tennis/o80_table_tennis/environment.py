@@ -1,4 +1,4 @@
-"""The Gymnasium environment of one arm and its twins, see `copies` for what a step does."""
+"""The Gymnasium environment of one arm and its worlds, see `copies` for what a step does."""
 
 from __future__ import annotations
 
@@ -19,11 +19,8 @@ from .report.display import RENDER_MODES, Page
 from .report.episode_recorder import EpisodeRecorder
 from .report.episode_summary import EpisodeSummary
 from .report.statistics import EpisodeCounts, Statistics, statistics_of
-from .rig.rig import Rig
-from .rig.virtual_balls import VirtualBalls
 from .settings import RigSettings, TaskSettings
 from .task.end import End
-from .task.observer import Observer
 
 Action = NDArray[np.float32]
 Info = dict[str, Any]
@@ -46,23 +43,20 @@ class TableTennisEnvironment(Environment):
     `info` holds the entries of the task (with a ball `touched`, `returned`, `landing`, `distance`,
     see `task.outcome`, and `smallest_distance` of the surfaces of ball and racket so far [m]),
     `stalled` (real time: the caller paused for so long that the episode was given up), `end` (why
-    the episode ended, a number of `End`) and its `end_text`, and with extra balls `virtual`, see
-    `rig.virtual_balls`.
+    the episode ended, a number of `End`) and its `end_text`, and with `RigSettings(worlds=n)` what
+    is shown of each ball: `worlds`.
 
     `options` of `reset`: `ball`, the number of the ball to be played (else drawn from the seed), or
     `flight`, a SampledFlight of the caller's own. `statistics()` tells rates and lateness.
 
-    `record="run.mcap"` records every row of arm and twins, and marks the episodes; a file that
+    `record="run.mcap"` records every row of arm and worlds, and marks the episodes; a file that
     exists is continued. `report.recorded_episodes` reads it, see also `o80.open`.
 
-    Closing it, or leaving its `with` block, ends the arm and the twins that it started.
+    Closing it, or leaving its `with` block, ends the arm and the worlds that it started.
     """
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 100}  # noqa: RUF012
-    rig: Rig
-    """Arm and twins, to be watched."""
-    observer: Observer
-    """Observer that makes observations of states."""
+    task: TableTennisCopies
 
     def __init__(
         self,
@@ -74,26 +68,26 @@ class TableTennisEnvironment(Environment):
         record: str | Path | None = None,
     ) -> None:
         refuse_wrong_arguments(rig, task, render_mode, self.metadata["render_modes"])
-        self._copies = copies = TableTennisCopies(None, rig=rig, task=task, camera=camera)
-        super().__init__(copies)
+        super().__init__(TableTennisCopies(None, rig=rig, task=task, camera=camera))
         self.metadata, self.render_mode = type(self).metadata, render_mode
-        assert isinstance(copies.rig, Rig)
-        self.rig, self.observer = copies.rig, copies.observer
+        self.arm, *self.twins = self.task.single.frontends
+        """Frontends of the arm, and of the worlds; the ball of the first one is played."""
         self._counts = EpisodeCounts()
         self._number = -1
         self._begun = False
         self._summary: EpisodeSummary | None = None
-        self._virtual: VirtualBalls | None = None
         self._page: Page | None = None
         self._recorder: EpisodeRecorder | None = None
+        its_rig = self.task.rig_settings
         try:
-            if self.rig.settings.extra_balls:
-                observing = copies.settings.observing(self.rig.settings.step)
-                self._virtual = VirtualBalls(self.rig, copies.task, observing)
             if render_mode == "human":
-                self._page = Page(self.rig)
+                shown, by_clock = [*self.twins, self.arm], its_rig.pacing.real_time
+                self._page = Page(shown, 0.0 if by_clock else its_rig.step)
             if record is not None:
-                self._recorder = EpisodeRecorder(Path(record), self.rig, copies.settings)
+                recorded = [self.arm, *self.twins]
+                self._recorder = EpisodeRecorder(
+                    Path(record), recorded, its_rig, self.task.settings
+                )
         except BaseException:
             self.close()
             raise
@@ -101,20 +95,16 @@ class TableTennisEnvironment(Environment):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], Info]:
-        """Arm and twins to the start; the ball flies from the first step on."""
+        """Arm and worlds to the start; the ball flies from the first step on."""
         observation, info = super().reset(seed=seed, options=options)
-        copies = self._copies
-        self._draw, self._twin_first = copies.draws[0], self.rig.twin_row
-        if self._virtual is not None:
-            numbers = self._draw.balls.numbers[1:]
-            self._virtual.begin(numbers, copies.state, self.np_random)
+        self._draw, self._twin_first = self.task.draws[0], self.task.twin_row
         self._paid, self._number = 0.0, self._number + 1
         self._begun, self._summary = False, None
         self._first_observation = observation.copy()
-        return observation, self._told(info, End.RUNNING)
+        return observation, _plain(info)
 
     def step(self, action: Action) -> Outcome:
-        """Five iterations of the arm and of every twin, times `repeat`, times `action_steps`."""
+        """Five iterations of the arm and of every world, times `repeat`, times `action_steps`."""
         if not self._ready:
             state = "the episode is over" if self._number >= 0 else "no episode has begun"
             raise gymnasium.error.ResetNeeded(f"{state}: call reset() before step()")
@@ -123,9 +113,7 @@ class TableTennisEnvironment(Environment):
         called = time.perf_counter()
         observation, reward, terminated, truncated, info = super().step(action)
         end = End(info["end"])
-        if self._virtual is not None and end is not End.STALLED:
-            self._virtual.observe(self._copies.state)
-        info = self._told(info, end)
+        info = _plain(info)
         self._paid += reward
         if self._recorder is not None and end is not End.STALLED:
             self._recorder.step(action, reward, observation)
@@ -151,37 +139,26 @@ class TableTennisEnvironment(Environment):
                 twin_seed=draw.twin_seed,
             )
         self._first_step_at = time.monotonic()
-        self.rig.begin()
-        self._arm_first = self.rig.row
-
-    def _told(self, info: Info, end: End) -> Info:
-        """Info with plain numbers, and with what became of the extra balls."""
-        told = {
-            name: value.item() if isinstance(value, np.generic) else value
-            for name, value in info.items()
-        }
-        if self._virtual is not None:
-            told["virtual"] = self._virtual.look(self._copies.state, over=end is not End.RUNNING)
-        return told
 
     def _finish(self, end: End) -> None:
         """The episode is over: its summary, its mark in the recording."""
         self._counts.episodes += 1
         self._counts.stalled_episodes += end is End.STALLED
         self._counts.seconds += time.monotonic() - self._first_step_at
-        state = self._copies.state
+        task = self.task
+        _, first, last = task.single.span
         self._summary = EpisodeSummary.of(
-            state.record.at(0),
+            task.state.record.at(0),
             number=self._number,
             ball=self._draw.balls.numbers[0],
-            steps=int(self._copies.steps[0]),
+            steps=int(task.steps[0]),
             reward=self._paid,
             terminated=end.terminated,
             end=end.text,
-            arm_first=self._arm_first,
-            arm_last=self.rig.row,
+            arm_first=first,
+            arm_last=last,
             twin_first=self._twin_first,
-            twin_last=self.rig.twin_row,
+            twin_last=task.twin_row,
         )
         if self._recorder is not None:
             self._recorder.end(self._summary)
@@ -197,7 +174,12 @@ class TableTennisEnvironment(Environment):
 
     def statistics(self) -> Statistics:
         """Rates and lateness since the environment was made."""
-        return statistics_of(self._counts, self.rig)
+        task = self.task
+        rows = 1 if task.chunk_size is None else task.action_steps
+        step = task.rig_settings.step
+        return statistics_of(
+            self._counts, task.statistics(), self.arm, step_seconds=step, rows=rows
+        )
 
     def render(self) -> Any:
         """`rgb_array`: a picture (480, 640, 3) of the newest rows; `human`: None, see `Page`."""
@@ -210,3 +192,11 @@ class TableTennisEnvironment(Environment):
             for part in (self._page, self._recorder):
                 if part is not None:
                     stack.callback(part.close)
+
+
+def _plain(info: Info) -> Info:
+    """Info with plain numbers."""
+    return {
+        name: value.item() if isinstance(value, np.generic) else value
+        for name, value in info.items()
+    }

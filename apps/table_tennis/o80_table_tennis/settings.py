@@ -41,20 +41,19 @@ class Pacing(Enum):
 
 @dataclass(frozen=True)
 class RigSettings:
-    """The arm and its twins. Raises ValueError or TypeError."""
+    """The arm and its worlds. Raises ValueError or TypeError."""
 
     pacing: Pacing = Pacing.INLINE
     arm_segment: str | None = None
     """Name of the arm's segment; None: an unused one."""
     attach: bool = False
-    """The arm runs already, in another process, as `arm_segment`: only the twins are started."""
+    """The arm runs already, in another process, as `arm_segment`: only the world is started."""
     twin_segment: str | None = None
-    """The first twin runs already, bursting, in another process under this name; None: it is
-    started too. `rig.robot_options.twin_options` has its options."""
-    twins: int = 1
-    """Simulations that mirror the arm; the first one holds the ball that is played."""
-    extra_balls: int = 0
-    """Balls beside it, spread over the twins."""
+    """The world runs already, bursting, in another process under this name; None: it is started
+    too. `rig.rig.world_options` has its options."""
+    worlds: int | None = None
+    """Worlds that mirror the arm, each with a ball of its own; the ball of the first one is played.
+    None: one."""
     preset: str = "standard"
     """Numbers of the simulated arm: standard, identified (as the real arm) or published_simulation.
     The default policy is made for the standard ones."""
@@ -65,16 +64,17 @@ class RigSettings:
     start_noise: float = 0.0
     """On each joint of the simulated arm at a reset, uniform in plus or minus this [rad]."""
     frequency: float = 1.0 / PERIOD
-    """Frequency of the arm and of the twins [1/s]."""
+    """Frequency of arm and worlds [1/s]."""
     history: int | None = None
-    """Rows that arm and twins keep; None: as many as fit into o80's usual history."""
+    """Rows that arm and worlds keep; None: as many as fit into o80's usual history, of copies a few
+    steps."""
 
     def __post_init__(self) -> None:
         if self.pacing not in tuple(Pacing):
             there_are = ", ".join(str(each) for each in Pacing)
             raise TypeError(f"pacing must be one of {there_are}, got {self.pacing!r}")
-        whole(self.twins, "twins", 1)
-        whole(self.extra_balls, "extra_balls", 0)
+        if self.worlds is not None:
+            whole(self.worlds, "worlds", 1)
         if not (math.isfinite(self.frequency) and self.frequency > 0):
             raise ValueError(f"frequency must be a positive number [1/s], got {self.frequency}")
         if self.attach and self.arm_segment is None:
@@ -97,15 +97,6 @@ class RigSettings:
     def paced(self, pacing: Pacing) -> RigSettings:
         """The same rig in another way of pacing."""
         return replace(self, pacing=pacing)
-
-    def extra_balls_of(self, twin: int) -> int:
-        """How many of the extra balls twin number `twin` holds."""
-        share, more = divmod(self.extra_balls, self.twins)
-        return share + (1 if twin < more else 0)
-
-    def balls_of(self, twin: int) -> int:
-        """How many balls twin number `twin` holds: every twin mirrors the arm for at least one."""
-        return max(1, self.extra_balls_of(twin) + (1 if twin == 0 else 0))
 
 
 @dataclass(frozen=True)

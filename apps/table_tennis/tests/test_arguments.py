@@ -47,7 +47,7 @@ def test_a_step_needs_an_episode(inline: TableTennisEnvironment) -> None:
 @pytest.mark.parametrize(
     ("arguments", "error", "text"),
     [
-        ({"rig": {"twins": 2}}, TypeError, r"write rig=.*settings\.RigSettings\(twins=2\)"),
+        ({"rig": {"worlds": 2}}, TypeError, r"write rig=.*settings\.RigSettings\(worlds=2\)"),
         ({"task": 3}, TypeError, r"task must be a TaskSettings, got 3: write task=.*\(\.\.\.\)"),
         (
             {"render_mode": "ansi"},
@@ -103,9 +103,8 @@ def test_an_arm_of_another_frequency_is_refused() -> None:
     ("wrong", "error", "text"),
     [
         ({"pacing": "inline"}, TypeError, r"one of Pacing\.REAL_TIME, .*got 'inline'"),
-        ({"twins": 0}, ValueError, "twins must be at least 1, got 0"),
-        ({"twins": 1.5}, ValueError, "twins must be a whole number, got 1.5"),
-        ({"extra_balls": 2.5}, ValueError, "extra_balls must be a whole number, got 2.5"),
+        ({"worlds": 0}, ValueError, "worlds must be at least 1, got 0"),
+        ({"worlds": 1.5}, ValueError, "worlds must be a whole number, got 1.5"),
         ({"frequency": 0}, ValueError, "frequency must be a positive number"),
         ({"frequency": math.nan}, ValueError, "frequency must be a positive number"),
         ({"factor": math.nan}, ValueError, "factor must be a positive number, got nan"),

@@ -39,7 +39,7 @@ def test_the_motion_of_the_dead_time_is_predicted_from_the_actions_in_flight() -
     """Nearer by far than the present state, or its speed continued."""
     rng, steps, dead_steps = np.random.default_rng(3), 60, [4, 4, 2, 1]
     with closing(opened(preset="identified")) as environment:
-        numbers = ArmNumbers.of(environment.rig.arm.frontend)
+        numbers = ArmNumbers.of(environment.arm)
         settings = HittingSettings().for_arm(numbers)
         predictor = ArmPredictor(
             settings.arm, settings.muscles, settings.lag, settings.dead_time, BEGIN
@@ -59,7 +59,7 @@ def test_the_motion_of_the_dead_time_is_predicted_from_the_actions_in_flight() -
             elif step % 4 == 0:
                 action = -action
             seen, *_ = environment.step(action)
-            predictor.ask(environment.rig.arm.commanded()[0])
+            predictor.ask(environment.task.commanded()[0])
 
     for joint, ahead in enumerate(dead_steps):
         errors, moved, continued = [], [], []

@@ -11,8 +11,8 @@ from opened_environment import WAITING, opened
 
 import o80
 import o80_table_tennis
+from o80.hybrid.single import Single
 from o80_table_tennis.report.recorded_episodes import recorded_episodes
-from o80_table_tennis.rig.rig import Rig
 from o80_table_tennis.settings import Pacing, TaskSettings
 from o80_table_tennis.task.actions import COARSE, changed_pressures
 from o80_table_tennis.world.arm import MUSCLES
@@ -42,20 +42,20 @@ def test_an_answer_in_no_time_moves_the_arm_as_single_actions_do(
         environment.reset(seed=1)
         for action in chunks()[:, :4].reshape(-1, MUSCLES):
             seen, *_ = environment.step(action)
-        alone = environment.rig.arm.frontend.history(20 * repeat * ANSWERS)
+        alone = environment.arm.history(20 * repeat * ANSWERS)
     task = TaskSettings(chunk_size=8, action_steps=4, **common)
     with closing(opened(pacing, task=task)) as environment:
         environment.reset(seed=1)
         for chunk in chunks():
             also_seen, *_ = environment.step(chunk)
-        together = environment.rig.arm.frontend.history(20 * repeat * ANSWERS)
+        together = environment.arm.history(20 * repeat * ANSWERS)
         statistics = environment.statistics()
     for name in ("iteration", "desired", "observed"):
         np.testing.assert_array_equal(together.rows[name], alone.rows[name])
     if observation == "published":
         np.testing.assert_array_equal(also_seen, seen)
     assert statistics.late_actions == statistics.starved_iterations == 0
-    assert statistics.steps == statistics.exact_steps == 4 * repeat * ANSWERS
+    assert statistics.steps == 4 * repeat * ANSWERS
 
 
 @pytest.mark.parametrize("pacing", [Pacing.INLINE, Pacing.PROCESSES])
@@ -75,31 +75,31 @@ def test_rows_act_in_their_iterations_only_and_late_ones_are_counted(
     """`thought`: iterations that the arm makes between each observation and its answer."""
     with closing(opened(pacing, task=CHUNKED)) as environment:
         environment.reset(seed=1)
-        arm, begun = environment.rig.arm, environment.rig.row
+        arm, task, begun = environment.arm, environment.task, environment.arm.published
         length = 20 * ANSWERS + 60
-        wanted = np.tile(np.array(arm.start_pressures), (length, 1))
-        pressures, now = arm.commanded()[0], 0
+        wanted = np.tile(task.home_of_arm.pressures, (length, 1))
+        pressures, now = task.commanded()[0], 0
         for number, (chunk, thinks) in enumerate(zip(chunks(), thought, strict=True)):
             seen = 20 * number
             now = max(now, seen + thinks)
-            if begun + now > arm.newest:
-                arm.frontend.burst(begun + now - arm.newest)
+            if begun + now > arm.published:
+                arm.burst(begun + now - arm.published)
             environment.step(chunk)
             for row, action in enumerate(chunk):
                 pressures = changed_pressures(pressures, action, factor=COARSE)
                 acts = max(seen + 16 + 5 * row, now)  # place of the first iteration
                 if acts < seen + 16 + 5 * row + 5:
-                    wanted[acts:] = arm.range.raw(pressures)
+                    wanted[acts:] = task.range.raw(pressures)
                 if row == 3:
                     base = pressures
             pressures = base
             now = max(now, seen + 20)
         statistics = environment.statistics()
-        made = arm.newest - begun
-        desired = arm.frontend.history(made).desired
+        made = arm.published - begun
+        desired = arm.history(made).desired
     np.testing.assert_array_equal(desired, wanted[:made])
     assert (statistics.late_actions, statistics.starved_iterations) == (late, starved)
-    assert statistics.exact_steps == 4 * ANSWERS
+    assert statistics.steps == 4 * ANSWERS
 
 
 def test_a_decision_that_is_told_after_the_last_row_is_waited_for(
@@ -126,23 +126,23 @@ def test_by_the_clock_late_rows_are_skipped_and_counted() -> None:
     with closing(opened(Pacing.REAL_TIME, task=CHUNKED)) as environment:
         environment.reset(seed=1)
         environment.step(chunks()[0])
-        before, k = environment.statistics(), environment.rig.row
-        environment.rig.arm.frontend.wait_for(k + 31, timeout=WAITING)
+        before, k = environment.statistics(), environment.task.single.span[2]
+        environment.arm.wait_for(k + 31, timeout=WAITING)
         environment.step(chunks()[1])
         after = environment.statistics()
         assert after.late_actions - before.late_actions >= 3  # due in k + 21, k + 26, k + 31
-        assert after.exact_steps == after.steps == 8
+        assert after.steps == 8
 
 
 def test_an_episode_is_given_up_when_nothing_was_planned_for_too_long(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     task = TaskSettings(chunk_size=8, action_steps=4, delay=16, max_late=20)
-    with closing(opened(task=task)) as environment:
+    with closing(opened(Pacing.REAL_TIME, task=task)) as environment:
         environment.reset(seed=1)
         # 36 iterations after an observation the last row of the chunk before it is over
         for lateness, stalled in ((36 + 20, False), (36 + 21, True)):
-            monkeypatch.setattr(Rig, "lateness", lateness)
+            monkeypatch.setattr(Single, "lateness", lateness)
             assert environment.step(chunks()[0])[-1]["stalled"] is stalled
 
 

@@ -8,9 +8,7 @@ import pytest
 from numpy.typing import NDArray
 
 from o80.learning import EVERY
-from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.environment import TableTennisEnvironment
-from o80_table_tennis.rig.rig import Rig
 from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.world.arm import MUSCLES
@@ -24,7 +22,7 @@ Rows = list[bytes]
 
 
 def rig_settings(pacing: Pacing) -> RigSettings:
-    return RigSettings(pacing=pacing, twins=2, extra_balls=3, start_noise=0.02)
+    return RigSettings(pacing=pacing, worlds=4, start_noise=0.02)
 
 
 def histories(pacing: Pacing, *, seed: int = SEED) -> tuple[Rows, list[Any]]:
@@ -42,9 +40,8 @@ def histories(pacing: Pacing, *, seed: int = SEED) -> tuple[Rows, list[Any]]:
                 observation, reward, terminated, truncated, info = environment.step(action)
                 returned.append((observation.tobytes(), reward, terminated, truncated, repr(info)))
                 over = terminated or truncated
-        rig = environment.rig
-        rows = [rig.arm.frontend.history().rows.tobytes()]
-        rows += [twin.frontend.history().rows.tobytes() for twin in rig.twins]
+        frontends = [environment.arm, *environment.twins]
+        rows = [each.history().rows.tobytes() for each in frontends]
     return rows, returned
 
 
@@ -71,38 +68,37 @@ def test_another_seed_gives_other_histories(reference: tuple[Rows, list[Any]]) -
 
 @pytest.mark.parametrize("pacing", [Pacing.INLINE, Pacing.PROCESSES])
 def test_a_restored_rig_runs_again_bit_for_bit(pacing: Pacing) -> None:
-    actions = np.random.default_rng(6).uniform(0.1, 0.9, (STEPS, MUSCLES))
-    with Rig(rig_settings(pacing)) as rig:
-        frontends = [rig.arm.frontend, *(twin.frontend for twin in rig.twins)]
-        begin(rig)
-        run(rig, actions[:20])
+    actions = np.random.default_rng(6).uniform(-1, 1, (STEPS, MUSCLES)).astype(np.float32)
+    rig = RigSettings(pacing=pacing, start_noise=0.02)
+    with closing(TableTennisEnvironment(rig=rig, task=TaskSettings(factor=0.2))) as environment:
+        frontends = [environment.arm, *environment.twins]
+        environment.reset(seed=1, options={"ball": 0})
+        run(environment, actions[:20])
+        asked = environment.task.state.asked.copy()
         for frontend in frontends:
             frontend.request("snapshot", slot=2)
-        first = run(rig, actions[20:])
+        environment.task.robot.rows[...] = environment.arm.history(1).rows
+        environment.task.single.begin()
+        first = run(environment, actions[20:])
         for frontend in frontends:
             frontend.request("restore", slot=2)
-        rig.row = rig.arm.newest
-        second = run(rig, actions[20:])
+        environment.task.robot.rows[...] = environment.arm.history(1).rows
+        environment.task.single.begin()
+        environment.task.state.asked[...] = asked
+        second = run(environment, actions[20:])
 
     for before, after in zip(first, second, strict=True):
         np.testing.assert_array_equal(before, after)
 
 
-def begin(rig: Rig) -> None:
-    """Arm at rest, the balls in free flight: what is imposed is no part of a snapshot."""
-    flight = balls_from(None).flight(0)
-    flights = [[flight] * (1 + rig.settings.extra_balls)]
-    rig.reset(EVERY, arm_seeds=[1], twin_seeds=[1], flights=flights)
-
-
-def run(rig: Rig, actions: NDArray[np.float64]) -> list[NDArray[Any]]:
+def run(environment: TableTennisEnvironment, actions: NDArray[np.float32]) -> list[NDArray[Any]]:
     """Observed and extended bytes of all rows of arm and twins; iterations go on, they do not."""
     for action in actions:
-        rig.step(action[np.newaxis])
+        environment.task.step(action[np.newaxis], EVERY)
     rows = len(actions) * ITERATIONS
-    seen: list[NDArray[Any]] = [rig.arm.frontend.history(rows).flat(np.float64)]
-    for twin in rig.twins:
-        history = twin.frontend.history(rows)
+    seen: list[NDArray[Any]] = [environment.arm.history(rows).flat(np.float64)]
+    for twin in environment.twins:
+        history = twin.history(rows)
         seen += [history.observed.joints["position"], history.observed.balls["position"]]
         seen += [
             history.observed.balls["velocity"],

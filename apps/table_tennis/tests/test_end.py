@@ -54,7 +54,7 @@ def test_a_net_ball_is_one_that_touched_the_net_before_it_landed(
     net_at: int, landed_at: int, touched_net: bool
 ) -> None:
     with opened() as environment:
-        records = environment.rig.twins[0].all_records.copy()
+        records = environment.task.rows.records.copy()
     records["racket"]["count"], records["net"]["count"] = 1, net_at >= 0
     records["net"]["iteration"], records["table"]["iteration"] = net_at, landed_at
     records["net"]["position"], records["floor"]["position"] = (1, 2, 3), (4, 5, 6)

@@ -26,7 +26,7 @@ def inline() -> Iterator[TableTennisEnvironment]:
 
 @pytest.mark.parametrize("pacing", ALL_MODES)
 def test_every_step_is_five_iterations_of_the_arm_and_five_of_each_twin(pacing: Pacing) -> None:
-    with closing(opened(pacing, twins=2, extra_balls=1)) as environment:
+    with closing(opened(pacing, worlds=2)) as environment:
         environment.reset(seed=1)
         steps = played_out(environment)
         summary, statistics = environment.summary, environment.statistics()
@@ -34,8 +34,8 @@ def test_every_step_is_five_iterations_of_the_arm_and_five_of_each_twin(pacing: 
         assert summary.steps == len(steps)
         assert summary.arm_last - summary.arm_first == ITERATIONS * len(steps)
         assert summary.twin_last - summary.twin_first == ITERATIONS * len(steps)
-        assert statistics.steps == statistics.exact_steps == len(steps)
-        twins = [twin.frontend.published for twin in environment.rig.twins]
+        assert statistics.steps == len(steps)
+        twins = [twin.published for twin in environment.twins]
         assert twins == [summary.twin_last] * 2
 
 
@@ -44,13 +44,13 @@ def test_an_action_acts_from_the_iteration_it_is_meant_for(delay: int) -> None:
     task = TaskSettings(factor=COARSE, delay=delay)
     with closing(opened(task=task)) as environment:
         environment.reset(seed=1)
-        arm = environment.rig.arm
-        k, before = arm.newest, arm.commanded()[0]
+        arm, of_task = environment.arm, environment.task
+        k, before = arm.published, of_task.commanded()[0]
         environment.step(PUSH)
-        commanded = arm.frontend.history(since=k + 1, until=k + ITERATIONS).desired
+        commanded = arm.history(since=k + 1, until=k + ITERATIONS).desired
 
-        start = np.array(arm.start_pressures)
-        wanted = arm.range.raw(changed_pressures(before, PUSH, factor=COARSE))
+        start = of_task.home_of_arm.pressures
+        wanted = of_task.range.raw(changed_pressures(before, PUSH, factor=COARSE))
         np.testing.assert_array_equal(commanded[:delay], np.tile(start, (delay, 1)))
         np.testing.assert_array_equal(commanded[delay:], np.tile(wanted, (ITERATIONS - delay, 1)))
 
@@ -64,28 +64,28 @@ def test_a_step_that_repeats_its_action_is_several_steps_with_this_action(pacing
             environment.reset(seed=1)
             for _ in range(steps):
                 observation, *_ = environment.step(0.1 * PUSH)
-            arm, twin = environment.rig.arm.frontend, environment.rig.twins[0].frontend
+            arm, twin = environment.arm, environment.twins[0]
             histories = [each.history() for each in (arm, twin)]
             moved = [
                 each.rows[["iteration", "desired", "observed"]].tobytes() for each in histories
             ]
             seen.append((moved, observation.tobytes()))
-            assert environment.statistics().exact_steps == repeat * steps
+            assert environment.statistics().steps == repeat * steps
     assert seen[0] == seen[1]
 
 
 @pytest.mark.parametrize("pacing", ALL_MODES)
 def test_every_twin_mirrors_every_row_of_the_arm_bit_for_bit(pacing: Pacing) -> None:
-    with closing(opened(pacing, twins=2, extra_balls=1)) as environment:
+    with closing(opened(pacing, worlds=2)) as environment:
         environment.reset(seed=1)
         for _ in range(20):
             environment.step(PUSH)
-        rig, rows = environment.rig, 20 * ITERATIONS
+        rows = 20 * ITERATIONS
         # the arm may have moved on by its own clock
-        last = environment.rig.row
-        arm = rig.arm.frontend.history(since=last + 1 - rows, until=last).extended
-        for twin in rig.twins:
-            seen = twin.frontend.history(rows).observed.joints
+        last = environment.task.single.span[2]
+        arm = environment.arm.history(since=last + 1 - rows, until=last).extended
+        for twin in environment.twins:
+            seen = twin.history(rows).observed.joints
             np.testing.assert_array_equal(seen["position"], arm.joint_positions)
             np.testing.assert_array_equal(seen["velocity"], arm.joint_velocities)
         assert np.abs(arm.joint_velocities[:, 0]).max() > 0.5
@@ -104,10 +104,10 @@ def test_the_ball_starts_with_the_first_step(inline: TableTennisEnvironment) -> 
 def test_the_observation_is_the_state_after_the_action(inline: TableTennisEnvironment) -> None:
     inline.reset(seed=1)
     observation, *_ = inline.step(PUSH)
-    row = inline.rig.arm.frontend.latest()
+    row = inline.arm.latest()
 
     np.testing.assert_array_equal(observation[:4], row.extended.joint_positions.astype(np.float32))
-    normalised = inline.rig.arm.range.normalised(np.array(row.observed))
+    normalised = inline.task.range.normalised(np.array(row.observed))
     np.testing.assert_allclose(observation[8:16], normalised, rtol=1e-6)
 
 
@@ -151,20 +151,21 @@ def test_the_seed_chooses_the_ball_and_so_do_the_options(inline: TableTennisEnvi
 
 def test_extra_balls_are_judged_as_if_each_were_played_alone() -> None:
     actions = np.random.default_rng(4).uniform(-1, 1, (300, MUSCLES)).astype(np.float32)
-    with closing(opened(extra_balls=5, twins=2)) as environment:
-        _, info = environment.reset(seed=5)
-        balls, played = info["virtual"]["balls"], 0
-        paid, ended_after = np.zeros(5), np.zeros(5, dtype=int)
+    with closing(opened(worlds=6)) as environment:
+        environment.reset(seed=5)
+        balls, played = environment.task.draws[0].balls.numbers, 0
+        paid, ended_after = np.zeros(6), np.zeros(6, dtype=int)
         over = False
         while not over:
             _, _, terminated, truncated, info = environment.step(actions[played])
             played += 1
-            virtual = info["virtual"]
-            assert virtual["observations"].shape == (5, 22)
-            paid += virtual["rewards"]
-            ended_after[virtual["ended"] & (ended_after == 0)] = played
+            each = info["worlds"]
+            assert each["observation"].shape == (6, 22)
+            paid += each["reward"]
+            ended = each["terminated"] | each["truncated"]
+            ended_after[ended & (ended_after == 0)] = played
             over = terminated or truncated
-        assert virtual["ended"].all()
+        assert (ended_after > 0).all()
 
     # those whose own end came before that of the ball that was played
     whole = np.flatnonzero(ended_after < played)
@@ -175,15 +176,13 @@ def test_extra_balls_are_judged_as_if_each_were_played_alone() -> None:
                 _, reward, terminated, _, info = alone.step(actions[step])
             assert terminated
             assert reward == pytest.approx(paid[ball], abs=1e-6)
-            assert info["touched"] == virtual["touched"][ball]
-            assert info["returned"] == virtual["returned"][ball]
+            assert info["touched"] == each["touched"][ball]
 
 
 @pytest.mark.parametrize("pacing", ALL_MODES)
 def test_closing_leaves_nothing_behind(pacing: Pacing) -> None:
-    environment = opened(pacing, twins=2, extra_balls=1)
-    rig = environment.rig
-    names = {rig.arm.frontend.segment, *(twin.frontend.segment for twin in rig.twins)}
+    environment = opened(pacing, worlds=2)
+    names = {each.segment for each in (environment.arm, *environment.twins)}
     assert names <= {segment.name for segment in o80.segments()}
     environment.close()
     environment.close()

@@ -36,7 +36,7 @@ def played(
         action = policy.act(observation) + noise * rng.normal(size=MUSCLES)
         steps.append(environment.step(np.clip(action, -1, 1).astype(np.float32)))
         observation = steps[-1][0]
-    return steps, int(environment.rig.twins[0].all_records[0]["racket"]["count"])
+    return steps, int(environment.task.rows.records[0]["racket"]["count"])
 
 
 def compared(balls: range, noise: float) -> list[str]:
@@ -94,7 +94,7 @@ def test_it_works_in_every_way_of_pacing_and_replays(pacing: Pacing, tmp_path: P
         # the flight took one more iteration of the twin, and no step
         assert summary.twin_last - summary.twin_first == 5 * len(steps)
         flown = int(info["touched"])
-        assert environment.rig.twins[0].frontend.published == summary.twin_last + flown
+        assert environment.twins[0].published == summary.twin_last + flown
 
     (episode,) = recorded_episodes(path)
     assert (episode.summary, episode.rewards[-1]) == (summary, reward)
@@ -125,5 +125,5 @@ def test_it_saves_the_steps_after_the_touch() -> None:
 
 
 def test_it_is_refused_where_it_cannot_be() -> None:
-    with pytest.raises(ValueError, match="give fly_out=False, or extra_balls=0 instead of 3"):
-        TableTennisEnvironment(rig=RigSettings(extra_balls=3), task=TaskSettings(fly_out=True))
+    with pytest.raises(ValueError, match="give fly_out=False, or worlds=1 instead of 4"):
+        TableTennisEnvironment(rig=RigSettings(worlds=4), task=TaskSettings(fly_out=True))

@@ -45,13 +45,13 @@ def test_it_holds_the_arm_the_pressures_and_what_was_asked() -> None:
         for action in actions:
             observation, *_ = environment.step(action)
             commanded.append(part(observation, "asked"))
-        row = environment.rig.arm.frontend.latest()
-        arm = environment.rig.arm
+        row = environment.arm.latest()
+        task = environment.task
     positions = row.extended.joint_positions
     np.testing.assert_allclose(part(observation, "joint_positions"), positions, atol=1e-6)
-    normalised = arm.range.normalised(np.array(row.observed))
+    normalised = task.range.normalised(np.array(row.observed))
     np.testing.assert_allclose(part(observation, "pressures"), normalised, atol=1e-6)
-    np.testing.assert_allclose(part(observation, "racket"), arm.last_racket[0], atol=1e-6)
+    np.testing.assert_allclose(part(observation, "racket"), task.state.racket[0], atol=1e-6)
     assert part(observation, "time") == pytest.approx(0.12)
     # the newest change first; tanh is nearly straight, but for pressures at their limits
     changes = part(observation, "changes").reshape(4, 8)
@@ -68,7 +68,7 @@ def test_the_ball_and_its_crossing_are_those_of_the_flight() -> None:
         observation, _ = environment.reset(seed=7)
         for _ in range(60):
             observation, *_ = environment.step(np.zeros(8, np.float32))
-            true = environment.rig.twin.ball[0]
+            true = environment.task.state.ball[0]
             np.testing.assert_allclose(part(observation, "ball_position"), true[:3], atol=0.002)
             np.testing.assert_allclose(part(observation, "ball_velocity"), true[3:], atol=0.05)
             time = float(part(observation, "time")[0] + part(observation, "crossing_time")[0])
@@ -76,7 +76,7 @@ def test_the_ball_and_its_crossing_are_those_of_the_flight() -> None:
             rows.append([*true])
         while true[1] > FULL.plane:
             environment.step(np.zeros(8, np.float32))
-            before, true = rows[-1], environment.rig.twin.ball[0]
+            before, true = rows[-1], environment.task.state.ball[0]
             rows.append([*true])
     share = (before[1] - FULL.plane) / (before[1] - true[1])
     there = np.array(before[:3]) + share * (true[:3] - before[:3])
@@ -102,17 +102,16 @@ def test_everything_is_scaled_to_about_one() -> None:
     assert np.mean(spread) < 1.0
 
 
-def test_extra_balls_have_estimates_of_their_own() -> None:
+def test_each_ball_has_estimates_of_their_own() -> None:
     task = full_task(noise=NoiseSettings.tracker())
-    with closing(opened(task=task, extra_balls=3, twins=2)) as environment:
+    with closing(opened(task=task, worlds=4)) as environment:
         _, info = environment.reset(seed=2)
-        assert info["virtual"]["observations"].shape == (3, 73)
+        assert info["worlds"]["observation"].shape == (4, 73)
         for _ in range(40):
             _, _, _, _, info = environment.step(np.zeros(8, np.float32))
-        true = np.concatenate([twin.all_balls[0] for twin in environment.rig.twins])
-    seen = part(info["virtual"]["observations"], "ball_position")
-    # the played ball first, then the extra ones; the second twin has no played ball
-    np.testing.assert_allclose(np.sort(seen[:, 0]), np.sort(true[1:, 0]), atol=0.01)
+        true = environment.task.state.ball.copy()
+    seen = part(info["worlds"]["observation"], "ball_position")
+    np.testing.assert_allclose(seen[:, 0], true[:, 0], atol=0.01)
 
 
 @pytest.mark.parametrize("task", ["return", "smash"])

@@ -28,7 +28,7 @@ def inline() -> Iterator[TableTennisEnvironment]:
     [
         (o80_table_tennis.ACCELERATED, {}),
         (o80_table_tennis.ACCELERATED, {"processes": True}),
-        (o80_table_tennis.ACCELERATED, {"rig": RigSettings(extra_balls=3, twins=2)}),
+        (o80_table_tennis.ACCELERATED, {"rig": RigSettings(worlds=4)}),
         (o80_table_tennis.REAL_TIME, {"task": PATIENT}),
     ],
 )

@@ -15,10 +15,10 @@ from o80_table_tennis.task.end import End
 STEPS = 4
 
 
-@pytest.mark.parametrize("part", ["arm", "twin"])
+@pytest.mark.parametrize("part", [0, 1], ids=["arm", "twin"])
 @pytest.mark.parametrize("repeat", [1, 3])
 def test_a_halt_ends_the_episode_of_its_copy_as_that_of_a_single_one(
-    part: str, repeat: int
+    part: int, repeat: int
 ) -> None:
     task = TaskSettings(factor=PATIENT.factor, repeat=repeat)
     pushes = np.tile(PUSH, (3, 1))
@@ -26,14 +26,15 @@ def test_a_halt_ends_the_episode_of_its_copy_as_that_of_a_single_one(
     for halts in (False, True):
         with made(3, "SameStep", task=task) as vector, closing(opened(task=task)) as single:
             copies: Any = vector.task
+            alone: Any = single.task
             vector.reset(seed=[4, 5, 6])
             single.reset(seed=5)
             for _ in range(STEPS):
                 vector.step(pushes)
                 single.step(PUSH)
             if halts:
-                getattr(copies.rig, part).group[1].halt("look")
-                getattr(single.rig, part).frontend.halt("look")
+                copies.robots[part][1].halt("look")
+                alone.robots[part].halt("look")
             result, other = vector.step(pushes), single.step(PUSH)
             if not halts:
                 calm = result
@@ -57,7 +58,7 @@ def test_an_operator_who_halts_the_arm_resumes_it(pacing: Pacing, chunk_size: in
     with closing(opened(pacing, task=task)) as environment:
         environment.reset(seed=1)
         still = np.zeros(environment.action_space.shape or (), np.float32)
-        arm = environment.rig.arm.frontend
+        arm = environment.arm
         environment.step(still)
         o80.halt(arm.segment, "a hand is near")
         terminated = False

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from o80.learning import EVERY
 from o80_mujoco.balls import path
 from o80_table_tennis.balls.sampled_flight import SampledFlight
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
@@ -19,8 +18,7 @@ from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
 from o80_table_tennis.physics.impact import bounced, leaving
 from o80_table_tennis.players.policies import default_policy
-from o80_table_tennis.rig.rig import Rig
-from o80_table_tennis.settings import RigSettings, TaskSettings
+from o80_table_tennis.settings import TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.world.materials import RACKET_RESTITUTION
 from o80_table_tennis.world.table import TABLE
@@ -47,9 +45,9 @@ def flown() -> Iterator[Numbers]:
         np.zeros(1),
         spins=np.array([SPIN]),
     )
-    with Rig(RigSettings()) as rig:
-        rig.reset(EVERY, arm_seeds=[1], twin_seeds=[1], flights=[[start]])
-        twin = rig.twins[0].frontend
+    with TableTennisEnvironment() as environment:
+        environment.reset(seed=1, options={"flight": start})
+        (twin,) = environment.twins
         twin.burst(ROWS - 1)
         rows = twin.history(ROWS).observed.balls
         yield np.hstack([rows[name][:, 0] for name in ("position", "velocity", "spin")])
@@ -98,9 +96,9 @@ def test_a_ball_leaves_the_racket_alike() -> None:
         observation, info = environment.reset(seed=1, options={"flight": flight})
         while not info["touched"]:
             observation, *_, info = environment.step(policy.act(observation))
-        record: Any = environment.rig.twins[0].all_records[0]["racket"]
+        record: Any = environment.task.rows.records[0]["racket"]
         # the spin before the touch is the one that was imposed in that iteration
-        history = environment.rig.twins[0].frontend.history(5)
+        history = environment.twins[0].history(5)
         clock = np.array(history.extended.clock)
         row = int(np.flatnonzero(clock == record["iteration"])[0])
         before = np.array(history.desired.balls["spin"][row, 0])

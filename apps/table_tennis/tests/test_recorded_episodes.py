@@ -47,11 +47,10 @@ def rows_in(path: Path) -> Rows:
 @pytest.mark.parametrize("pacing", list(Pacing))
 def test_a_recording_holds_every_row_bit_for_bit(pacing: Pacing, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    with opened(pacing, record=path, twins=2, extra_balls=1) as environment:
+    with opened(pacing, record=path, worlds=2, history=4096) as environment:
         environment.reset(seed=1)
         played_out(environment)
-        rig = environment.rig
-        frontends = [rig.arm.frontend, *(twin.frontend for twin in rig.twins)]
+        frontends = [environment.arm, *environment.twins]
         live = {each.segment: each.history().rows for each in frontends}
     recorded = rows_in(path)
 
@@ -68,7 +67,7 @@ def test_no_row_is_lost_where_the_history_is_short(pacing: Pacing, tmp_path: Pat
         for _ in range(3):
             environment.reset(seed=1)
             played_out(environment)
-        published = environment.rig.arm.newest
+        published = environment.arm.published
 
     arm, twin = rows_in(path).values()
     assert published > 5 * SHORT
@@ -175,8 +174,8 @@ def test_a_stalled_episode_is_recorded_as_such(tmp_path: Path) -> None:
     with opened(Pacing.REAL_TIME, task=task, record=path) as environment:
         environment.reset(seed=1)
         environment.step(STILL)
-        arm = environment.rig.arm
-        arm.frontend.wait_for(arm.newest + 250, timeout=WAITING)
+        arm = environment.arm
+        arm.wait_for(arm.published + 250, timeout=WAITING)
         environment.step(STILL)
 
     (episode,) = recorded_episodes(path)

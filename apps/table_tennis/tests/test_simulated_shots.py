@@ -5,7 +5,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from o80.learning import EVERY
 from o80_table_tennis.balls import playable
 from o80_table_tennis.balls.launches import (
     NARROW,
@@ -16,9 +15,8 @@ from o80_table_tennis.balls.launches import (
 )
 from o80_table_tennis.balls.playable import REACH, Verdict, verdict
 from o80_table_tennis.balls.simulated_shots import SimulatedShots, drawn_launch, simulated_shot
+from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.physics.prediction import predict
-from o80_table_tennis.rig.rig import Rig
-from o80_table_tennis.settings import RigSettings
 from o80_table_tennis.world.arm import SHOULDER
 from o80_table_tennis.world.ball import BALL_RADIUS
 from o80_table_tennis.world.table import NET_HEIGHT, TABLE
@@ -147,9 +145,10 @@ def test_a_number_brings_a_shot_back_and_each_seed_has_its_own() -> None:
 def test_the_twin_flies_a_shot_as_predicted() -> None:
     launch = SimulatedShots(WIDE).launch(11)
     seen = launch.seen(duration=0.8, period=PERIOD)
-    with Rig(RigSettings()) as rig:
-        rig.reset(EVERY, arm_seeds=[1], twin_seeds=[1], flights=[[launch.flight(PERIOD)]])
-        rig.twins[0].frontend.burst(len(seen.positions) - 1)
-        flown = rig.twins[0].frontend.history(len(seen.positions)).observed.balls
+    with TableTennisEnvironment() as environment:
+        environment.reset(seed=1, options={"flight": launch.flight(PERIOD)})
+        (twin,) = environment.twins
+        twin.burst(len(seen.positions) - 1)
+        flown = twin.history(len(seen.positions)).observed.balls
     np.testing.assert_allclose(flown["position"][:, 0], seen.positions, atol=1e-4)
     np.testing.assert_allclose(flown["spin"][-1, 0], seen.spins[-1], atol=0.05)  # type: ignore[index]

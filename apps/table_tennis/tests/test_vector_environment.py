@@ -153,8 +153,10 @@ def test_plays_long_recorded_flights() -> None:
     ("rig", "text"),
     [
         (RigSettings(pacing=Pacing.PROCESSES), "needs pacing=Pacing.INLINE"),
-        (RigSettings(twins=2), "needs twins=1, got 2"),
-        (RigSettings(extra_balls=3), "needs extra_balls=0, got 3: make it of single"),
+        (
+            RigSettings(pacing=Pacing.PROCESSES, arm_segment="arm", attach=True),
+            "make it of single environments",
+        ),
     ],
 )
 def test_a_rig_that_copies_cannot_have_is_refused(rig: RigSettings, text: str) -> None:

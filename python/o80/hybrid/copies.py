@@ -18,6 +18,7 @@ from o80.hybrid.starts import Home, Starts
 from o80.hybrid.worlds import Worlds
 from o80.learning.task import Index
 from o80.robots.robot import Robot
+from o80.rows.layout import with_padding
 
 Numbers = NDArray[np.intp]
 
@@ -62,6 +63,7 @@ class Copies:
         self._burst = self._robots.prepared_burst(
             plan.iterations, targets, mode="overwrite", delay=0 if plan.chunk_size else rig.delay
         )
+        self._both, self._all = self._worlds.after(self._burst), np.arange(copies)
         self.robot, self.world = Side(self._robots, self._burst.rows), self._worlds.side
         self._starts = Starts(self._robots, self.robot, copies, home)
         self.resets = self._starts.resets
@@ -85,12 +87,10 @@ class Copies:
         slots: int = 0,
     ) -> InlineGroup:
         # a snapshot takes most of the memory of a copy: the only one is that of its home
-        own: dict[str, Any] = dict(options)
+        own: dict[str, Any] = {"history": history} | dict(options)
         if any(each.name == "slots" for each in robot.options):
             own.setdefault("slots", slots)
-        group = robot.inline(
-            copies=copies, threads=threads, frequency=frequency, history=history, **own
-        )
+        group = robot.inline(copies=copies, threads=threads, frequency=frequency, **own)
         return stack.enter_context(group)
 
     def frontend(self, copy: int) -> Frontend:
@@ -100,7 +100,8 @@ class Copies:
     def reset(self, copies: Numbers, seeds: Sequence[tuple[int, int]]) -> None:
         """Robots and worlds to their starts, each world as its robot stands."""
         self._starts.begin(copies, [pair[0] for pair in seeds], self.period)
-        self.robot.rows[copies] = self._robots.latest(copies)[:, np.newaxis]
+        newest = with_padding(self._robots.latest(copies))
+        with_padding(self.robot.rows)[copies] = newest[:, np.newaxis]
         self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot.last[copies])
 
     def mirror(self, copies: Numbers) -> None:
@@ -111,13 +112,19 @@ class Copies:
         self, targets: Any, copies: Index, until_halted: Callable[[], AbstractContextManager[None]]
     ) -> None:
         """One step of these copies; the worlds of those that halt in it stay."""
-        chosen = np.arange(len(self.robot.last))[copies]
+        chosen = self._all[copies]
         if self._plans:
             for copy, rows in zip(chosen.tolist(), targets, strict=True):
                 seen = int(self.robot.last["iteration"][copy]) + self._delay
                 self._plans[copy].send(rows, seen=seen, fixed=True)
         else:
             self._burst.targets[copies, 0] = targets
+        if self._both is not None:
+            self._worlds.counts.steps += 1
+            self._worlds.counts.play += chosen.size * self._burst.rows.shape[1] * self.period
+            with until_halted():
+                self._both.run(copies)
+            return
         with until_halted():
             self._burst.run(chosen)
         halted = self._robots.halted

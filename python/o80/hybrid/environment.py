@@ -82,9 +82,7 @@ class _Marks:
         if not isinstance(task.engine, Single):
             raise InvalidArgument("record is for one robot with frontends: leave out threads")
         self._engine = task.engine
-        robot, world = task.engine.members
-        worlds = [world] if isinstance(world, Frontend) else [world[i] for i in range(len(world))]
-        self._members: list[Frontend] = [robot, *worlds]
+        self._members: list[Frontend] = task.engine.frontends
         self._task, self._number = type(task).__name__, 0
         self._margin = 2 * task.engine.iterations
         self._actions: list[Any] = []

@@ -164,6 +164,13 @@ class Motion:
         self._over = 0  # rows of a difference; 0: all velocities are read
         if self._has_velocity and len(self._named) < len(pairs):
             self._over = mirror.velocity.rows if isinstance(mirror.velocity, difference) else 3
+        self.paths: dict[str, str] | None = None
+        """Paths in a row of the numbers that are mirrored as they are; None: some are computed."""
+        dropped = isinstance(mirror.names, Mapping) and None in mirror.names.values()
+        if not (self._over or self._fresh or dropped):
+            self.paths = {"position": mirror.position}
+            if isinstance(mirror.velocity, str):
+                self.paths["velocity"] = mirror.velocity
         self._past: FloatArray = np.zeros((copies, self._over + 1, len(pairs)))
         self._good: NDArray[np.int64] = np.ones(copies, np.int64)  # rows in sequence with a reading
         self.missed: NDArray[np.int64] = np.zeros(copies, np.int64)

@@ -187,7 +187,7 @@ class Recorded:
         self._begins = True
 
     def reset(self, copies: NDArray[np.intp], seeds: Sequence[tuple[int, int]]) -> None:
-        """The worlds to their starts, as the robot was in the reset."""
+        """The worlds to their starts."""
         self.robot.rows[...] = self._rows(self._reset, 1)
         self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot.last)
 

@@ -20,9 +20,11 @@ _NUMBERS = count(1)
 
 @dataclass(frozen=True)
 class attach:  # noqa: N801, it reads as a function where a world is given
-    """A world that runs already and is only read: `make(Push, world=attach("tracker"), ...)`.
+    """A world that runs in another process: `make(Push, world=attach("tracker"), ...)`.
 
-    segment: its rows have the names that the task reads, at their own times.
+    segment: one that bursts mirrors the robot, as a world that a rig has started. One with a clock,
+        such as a tracker, is only read: its rows have the names that the task reads, at their own
+        times.
     """
 
     segment: str
@@ -39,14 +41,14 @@ class Rig:
     robot: AnyRobot
     """Any robot of o80."""
     world: AnyRobot | attach
-    """A robot that simulates, or `attach(segment)` of one that is only read. Of a robot that shows
+    """A robot that simulates, or `attach(segment)` of one that runs already. Of a robot that shows
     a model file, such as "so101_twin", the model is simulated by o80-mujoco; "mujoco" takes it from
     `world_options`."""
     mirror: Mirror = field(default_factory=Mirror)
     robot_options: Mapping[str, Any] = field(default_factory=dict)
     world_options: Mapping[str, Any] = field(default_factory=dict)
-    """Options of the drivers. A relative path of `model` begins in the folder of the task's file.
-    """
+    """Options of the drivers, and `history` and `lane_blocks` of `Robot.start`. A relative path of
+    `model` begins in the folder of the task's file."""
     things: str | os.PathLike[str] | None = None
     """An MJCF file whose bodies are put into the world's model; a relative path as above."""
     every: int
@@ -99,18 +101,30 @@ def unused_name(robot: Robot) -> str:
 class World:
     """The simulation of a rig before it is started: its options, and what follows what."""
 
-    def __init__(self, rig: Rig, folder: Path, robot: Mapping[str, Any], name: str) -> None:
+    def __init__(
+        self,
+        rig: Rig,
+        folder: Path,
+        robot: Mapping[str, Any],
+        name: str,
+        schema: Mapping[str, Any] | None = None,
+    ) -> None:
         """folder: in which relative paths begin. robot, name: schema and name of the robot.
 
-        Raises InvalidArgument for what cannot be mirrored, DriverError.
+        schema: that of a world that runs already. Raises InvalidArgument for what cannot be
+        mirrored, DriverError.
         """
-        self.robot, self.options = _simulation(rig, folder)
-        given = self.robot.describe(**self.options)
+        if schema is not None:
+            given, own = schema, False
+        else:
+            self.robot, self.options = _simulation(rig, folder)
+            given = self.robot.describe(**_of_driver(self.options))
+            own = self.robot._library.name == "mujoco"
         joints = {actuator["name"]: _unit(given, actuator) for actuator in given["actuators"]}
         self.pairs = pairs_of(rig.mirror, {**robot, "robot": name}, joints, _name(rig.world))
         self.joints = [pair.joint for pair in self.pairs]
         self._has_velocity(rig, given)
-        if self.robot._library.name == "mujoco" and "joints" not in self.options:
+        if own and "joints" not in self.options:
             self.options["joints"] = ", ".join(map(_entry, self.pairs))
         elif spread := [pair.joint for pair in self.pairs if pair.over]:
             raise InvalidArgument(
@@ -140,7 +154,7 @@ def _simulation(rig: Rig, folder: Path) -> tuple[Robot, dict[str, Any]]:
     assert not isinstance(rig.world, attach)
     robot = robot_of(rig.world)
     if robot._library.name != "mujoco" or "like" in robot._given:
-        shown = robot.describe(**options).get("model", {}).get("file", "")
+        shown = robot.describe(**_of_driver(options)).get("model", {}).get("file", "")
         if shown:
             options = {"model": shown}
             robot = load("mujoco")
@@ -153,6 +167,12 @@ def _simulation(rig: Rig, folder: Path) -> tuple[Robot, dict[str, Any]]:
             )
         options["things"] = str(folder / rig.things)
     return robot, options
+
+
+def _of_driver(options: Mapping[str, Any]) -> dict[str, Any]:
+    """Options without those of the backend."""
+    aside = ("segment", "history", "lanes", "lane_blocks")
+    return {name: value for name, value in options.items() if name not in aside}
 
 
 def _entry(pair: Pair) -> str:

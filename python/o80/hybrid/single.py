@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base.errors import Error, InvalidArgument
+from o80.base.errors import Error, InvalidArgument, TimeoutError
+from o80.frontend.chunks import SentChunk
 from o80.frontend.frontend import Frontend
 from o80.groups.inline_group import InlineGroup
 from o80.hybrid.mirror import Motion
@@ -59,19 +60,26 @@ class Single:
             if attach is not None:
                 name = attach
                 robot = stack.enter_context(Frontend(attach))
-                if robot.bursting:
-                    raise InvalidArgument(f"attach is for robots in real time, '{attach}' bursts")
+                if robot.bursting is self._clocked:
+                    way = "bursts" if robot.bursting else "runs by its clock"
+                    raise InvalidArgument(
+                        f"robot '{attach}' {way}: pacing='{pacing}' cannot use it"
+                    )
             else:
                 library = robot_of(rig.robot)
                 name = library.name
                 robot = self._open(library, pacing, rig.frequency, dict(rig.robot_options))
             self.period = robot.period
             self._robot = robot
+            self.frontends = [robot]
+            """Frontends of the robot and of its worlds, by names that other programs find."""
             self._worlds = self._open_worlds(plan, pacing, name)
             self.motion, self.counts = self._worlds.motion, self._worlds.counts
             self._prepare(plan, home)
             self._stack = stack.pop_all()
         self.members = robot, self._worlds.member
+        if isinstance(self._worlds.member, Frontend):
+            self.frontends.append(self._worlds.member)
 
     def _prepare(self, plan: Plan, home: Home) -> None:
         robot, count = self._robot, self.iterations
@@ -83,6 +91,9 @@ class Single:
         elif robot.bursting:
             self._burst = robot.prepared_burst(count, mode="overwrite")
         rows = np.zeros((1, count), robot.history(1).rows.dtype)
+        if self._burst is not None:
+            rows = self._burst.rows[np.newaxis]
+        self._worlds.feed(rows)
         self.robot, self.world = Side(robot, rows), self._worlds.side
         self.first, self._epoch = desired_of(robot), robot.latest().epoch
         self._starts = None if self._clocked else Starts(robot, self.robot, 1, home)
@@ -92,7 +103,9 @@ class Single:
         self._row = self._reset_row = 0
         self._begins = True
         self._began = 0, 0
+        self._planned_until: int | None = None
         self._batch: _core.Batch | None = None
+        self._chunk: SentChunk | None = None
 
     def _open(
         self,
@@ -103,7 +116,7 @@ class Single:
         world: bool = False,
     ) -> Frontend:
         """Starts a robot in the way of this rig, and opens a frontend to it."""
-        segment = unused_name(library)
+        segment = options.pop("segment", None) or unused_name(library)
         if pacing == "inline":
             frontend: Frontend = library.inline(segment, frequency=frequency, **options)
             return self._stack.enter_context(frontend)
@@ -116,12 +129,20 @@ class Single:
 
     def _open_worlds(self, plan: Plan, pacing: Pacing, name: str) -> Worlds | Tracked:
         rig, robot = plan.rig, self._robot
+        running = None
         if isinstance(rig.world, attach):
-            tracker = self._stack.enter_context(Frontend(rig.world.segment))
-            return Tracked(tracker, robot, plan, self._tolerances.max_late)
-        world = World(rig, plan.folder, robot.schema, name)
+            running = self._stack.enter_context(Frontend(rig.world.segment))
+            if self._clocked and not running.bursting:
+                return Tracked(running, robot, plan, self._tolerances.max_late)
+            if not running.bursting:
+                raise InvalidArgument(
+                    f"world '{running.segment}' runs by its clock: it is only read, in "
+                    "pacing='real_time'"
+                )
+        schema = None if running is None else running.schema
+        world = World(rig, plan.folder, robot.schema, name, schema)
         motion = Motion(rig.mirror, world.pairs, 1, robot.schema)
-        member = self._open_world(plan, pacing, world)
+        member = running or self._open_world(plan, pacing, world)
         return Worlds(member, world, motion, plan.iterations, 1, rig.worlds)
 
     def _open_world(self, plan: Plan, pacing: Pacing, world: World) -> InlineGroup | Frontend:
@@ -129,15 +150,14 @@ class Single:
         count = plan.rig.worlds or 1
         if count == 1:
             return self._open(world.robot, pacing, 1 / self.period, world.options, world=True)
-        history = max(256, 4 * plan.iterations)
+        options = {"history": max(256, 4 * plan.iterations)} | world.options
         group = self._stack.enter_context(
-            world.robot.inline(
-                copies=count, frequency=1 / self.period, history=history, **world.options
-            )
+            world.robot.inline(copies=count, frequency=1 / self.period, **options)
         )
         name = unused_name(world.robot)
         for number in range(count):  # recordings find them by their names
             group.publish(number, f"{name}-{number}")
+            self.frontends.append(self._stack.enter_context(Frontend(f"{name}-{number}")))
         return group
 
     def frontend(self, _copy: int) -> Frontend:
@@ -157,6 +177,11 @@ class Single:
         self.stalled, self.moved, self._begins = "", False, True
 
     @property
+    def lateness(self) -> int:
+        """Rows that the robot has made since the newest one that was used."""
+        return self._robot.published - self._row
+
+    @property
     def span(self) -> tuple[int, int, int]:
         """Iterations of the robot: of the reset, before the first step, after the last one."""
         return self._reset_row, self._began[0], self._row
@@ -174,9 +199,9 @@ class Single:
         iteration, taken = int(row["iteration"][0]), int(row["time"][0])
         return _core.Seen(self._epoch, iteration, taken, self._robot.schema["clock"])
 
-    def _begin(self) -> None:
-        """The first step begins: with a clock the robot has made rows since the reset."""
-        self._begins = False
+    def begin(self) -> None:
+        """The next step follows the newest row: by a clock the robot has made some since."""
+        self._begins, self._planned_until = False, None
         if self._clocked:
             before = self.motion.standing(self.robot.last)[0]
             self.robot.rows[...] = self._robot.history(1).rows
@@ -194,34 +219,42 @@ class Single:
         _copies: Index,
         until_halted: Callable[[], AbstractContextManager[None]],
     ) -> None:
-        """One step, or nothing but a text in `stalled` if the robot has moved on too far."""
+        """One step, or nothing but a text in `stalled` if the robot has moved on too far.
+
+        targets: (1, actuators), of chunks (1, rows, actuators); None: nothing is sent.
+        """
         if self._begins:
-            self._begin()
+            self.begin()
         first = self._row + 1
         if self._clocked and self._is_late():
             return
-        stepped = False
+        done = 0
         with until_halted():
-            self._send(targets[0], first + self._delay)
+            self._batch = self._chunk = None
+            if targets is not None:
+                self._send(targets[0], first + self._delay)
             self._rows(first)
-            stepped = True
-        if not stepped:  # a halt has ended it
+            done = 1
+            self._count_late(first + self._delay)
+            self._worlds.follow(_ONLY, self.robot.rows, self.period, self._seen)
+            done = 2
+        if done == 0:  # a halt has ended it
             self.robot.rows[...] = self._robot.history(1).rows
             return
-        self._count_late(first + self._delay)
-        with until_halted():
-            self._worlds.follow(_ONLY, self.robot.rows, self.period, self._seen)
+        if done == 1:
+            self._worlds.see_newest()
         self.stalled = self._worlds.stalled
         if self.motion.missed[0] > self._tolerances.max_missed:
             self.stalled = f"{self.motion.missed[0]} rows in sequence brought no reading"
 
     def _is_late(self) -> bool:
-        late = self._robot.published - self._row
+        late = self.lateness
         row, since = self._began
         passed = int(self.robot.last["time"][0]) - since
         drift = passed * 1e-9 - (self._row - row) * self.period
         counts, most = self.counts, self._tolerances
         counts.late_steps += late > 0
+        counts.summed_lateness += late
         counts.largest_lateness = max(counts.largest_lateness, late)
         counts.largest_drift = max(counts.largest_drift, drift)
         if late > most.max_late:
@@ -253,24 +286,28 @@ class Single:
         last, robot = first + self.iterations - 1, self._robot
         if self._burst is not None:
             self._burst.run(TIMEOUT, at=first + self._delay, late="now")
-            self.robot.rows[0] = self._burst.rows
         else:
-            if robot.bursting:
-                robot.burst(self.iterations, timeout=TIMEOUT)
-            else:
+            if not robot.bursting:
                 robot.wait_for(last, timeout=TIMEOUT + self.iterations * self.period)
+            elif robot.published < last:
+                robot.burst(last - robot.published, timeout=TIMEOUT)
             self.robot.rows[0] = robot.history(since=first, until=last).rows
         self._row = last
 
     def _count_late(self, at: int) -> None:
         if self._batch is not None:
             self.counts.late_actions += not self._batch.taken or self._batch.first_iteration > at
-        elif self._plan is not None and self._clocked:
+        elif (chunk := self._chunk) is not None:
             end = time.monotonic() + TIMEOUT
-            while not self._chunk.decided and time.monotonic() < end:
-                self._robot.wait_for(self._robot.published + 1, timeout=TIMEOUT)
-            late = self._chunk.late
-            self.counts.late_actions += self._rows_sent if late is None else late
+            while not chunk.decided and time.monotonic() < end:
+                with suppress(TimeoutError):  # a rejection is reported after its row
+                    self._robot.wait_for(self._robot.published + 1, timeout=0.01)
+            rows = self._rows_sent
+            self.counts.late_actions += rows if chunk.late is None else chunk.late
+            if chunk.begins is not None:
+                planned = at - 1 if self._planned_until is None else self._planned_until
+                self.counts.starved += max(0, chunk.begins - 1 - planned)
+                self._planned_until = at - 1 + self._every * rows
 
     def close(self) -> None:
         """Ends what was started; may be called twice."""

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from types import FunctionType
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from gymnasium import Space, spaces
@@ -43,11 +43,12 @@ class HybridTask(Task):
     iteration k + 1 + `delay` on; the robot makes the rows k + 1 to k + `every`; the world mirrors
     exactly these; the task sees the last row of both.
 
-    A class sets `rig` and `action_space`, and defines `begin`, `targets` and `judge`. Its other
-    attributes without an underscore are parameters: `make(Push, reach=0.1)` sets `reach`.
+    A class sets `rig` and `action_space`, or its objects do before `super().__init__`, and defines
+    `begin`, `targets` and `judge`. Its other attributes without an underscore are parameters:
+    `make(Push, reach=0.1)` sets `reach`.
     """
 
-    rig: ClassVar[Rig]
+    rig: Rig
     """Robot and world that are stepped together."""
     action_space: Space[Any]
     robot_numbers: Sequence[str] = ()
@@ -100,9 +101,9 @@ class HybridTask(Task):
         pacing: "inline" in this process, "processes" in bursting ones, "real_time" by the robot's
             clock.
         robot, robot_options: instead of those of the rig.
-        attach: the segment of a robot that runs in real time already.
-        world, worlds: instead of those of the rig: `o80.hybrid.attach(segment)` is one that is only
-            read, such as a tracker, in real time.
+        attach: the segment of a robot that runs already, as `pacing` says.
+        world, worlds: instead of those of the rig: `o80.hybrid.attach(segment)` is one that runs
+            already, such as a tracker.
         recorded: a robot in a recording, of which only the worlds are made; see `relive`.
         resume: in real time a reset ends halts that the robot caused itself; else it raises them.
         threads: that step copies, the calling one included (None: one for each processor).
@@ -124,16 +125,16 @@ class HybridTask(Task):
                 f"environment each, o80.hybrid.make(..., pacing='{pacing}')"
             )
         if isinstance(rig.world, attached) and (
-            pacing != "real_time" or recorded is not None or (rig.worlds or 1) > 1
+            pacing == "inline" or recorded is not None or (rig.worlds or 1) > 1
         ):
             raise InvalidArgument(
-                f"world '{rig.world.segment}' is only read, in pacing='real_time' and as the only "
-                "world of one robot"
+                f"world '{rig.world.segment}' runs already: it is the only world of one robot that "
+                "is not inline, pacing='real_time' or pacing='processes'"
             )
         if threads is not None and pacing != "inline":
             raise InvalidArgument("threads step copies inline: leave them out of other pacings")
-        if attach is not None and pacing != "real_time":
-            raise InvalidArgument("attach is for pacing='real_time'")
+        if attach is not None and pacing == "inline":
+            raise InvalidArgument("attach is for pacing='real_time' or 'processes'")
         for name in ("home_duration", "home_tolerance", "home_rest"):
             if not 0 <= number(getattr(self, name), name) < math.inf:
                 raise InvalidArgument(f"{name} must be a finite number from 0 on")
@@ -171,7 +172,7 @@ class HybridTask(Task):
             setattr(self, name, value)
 
     def _rig_with(self, robot: AnyRobot | None, options: Mapping[str, Any] | None) -> Rig:
-        rig = getattr(type(self), "rig", None)
+        rig = getattr(self, "rig", None)
         if not isinstance(rig, Rig):
             raise InvalidArgument(f"{type(self).__name__}.rig must be an o80.hybrid.Rig")
         rig = rig.beside(folder_of(type(self)))
@@ -202,10 +203,10 @@ class HybridTask(Task):
             self.world.numbers(self.world_numbers),
         )
         self._flags = Flags(self.flags, self.robot, self.world)
-        if not isinstance(getattr(type(self), "action_space", None), Space):
+        if not isinstance(getattr(self, "action_space", None), Space):
             raise InvalidArgument(f"{type(self).__name__}.action_space must be a Gymnasium space")
         self.prepare()
-        space = getattr(type(self), "observation_space", None)
+        space = getattr(self, "observation_space", None)
         if space is None:
             shape, first = np.shape(self.observe(EVERY)), self._first_axes
             if len(shape) <= len(first) or shape[: len(first)] != first:
@@ -218,7 +219,7 @@ class HybridTask(Task):
         super().__init__(
             copies,
             observation_space=space,
-            action_space=self._actions(type(self).action_space),
+            action_space=self._actions(self.action_space),
             max_steps=self.max_steps,
         )
 
@@ -315,6 +316,7 @@ class HybridTask(Task):
             self.generators[copy] = generator
         if self._endings is not None:
             self._endings.begin(copies)
+        self.engine.mirror(copies)
         self.begin(copies, generators, options)
         self.engine.mirror(copies)
 

@@ -39,7 +39,12 @@ class Tracked:
         """An episode begins at this row of the robot. Raises BackendGone for a dead tracker."""
         self.member.wait_for(self.member.published + 1, timeout=TIMEOUT)
         self.motion.begin(copies, rows)
-        self.mirror(copies, rows)
+
+    def feed(self, _rows: NDArray[Any]) -> None:
+        """Nothing: `follow` gets all that it needs."""
+
+    def see_newest(self) -> None:
+        """Nothing: the newest row is that of the last step."""
 
     def mirror(self, _copies: NDArray[np.intp], rows: NDArray[Any], _seen: object = None) -> None:
         """The row for this one of the robot."""

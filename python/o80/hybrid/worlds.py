@@ -2,6 +2,7 @@
 
 import time
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,16 +10,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base.errors import CopyFailed
+from o80.base.errors import CopyFailed, InvalidArgument
 from o80.frontend.frontend import Frontend
 from o80.frontend.prepared_burst import BurstArrays
+from o80.groups.group_burst import GroupBurst
 from o80.groups.inline_group import InlineGroup
 from o80.hybrid.mirror import Motion
 from o80.hybrid.rig import World
 from o80.hybrid.sides import Side, numbers_of_worlds
 from o80.hybrid.starts import reset
+from o80.rows.layout import field_view, with_padding
 
 Numbers = NDArray[np.intp]
+Feeds = list[tuple[NDArray[Any], NDArray[Any]]]
 TIMEOUT = 20.0
 """Longest wait for a row [s]."""
 
@@ -41,7 +45,11 @@ class Counts:
     play: float = 0.0
     """Time of the robots in episodes [s]."""
     world_time: float = 0.0
-    """Mean time that all worlds together take of a step [s]."""
+    """Mean time that all worlds together take of a step [s]; 0 where C++ passes the rows on."""
+    summed_lateness: int = 0
+    """[rows]"""
+    starved: int = 0
+    """Iterations in episodes for which no chunk had a row."""
 
 
 class Worlds:
@@ -65,10 +73,9 @@ class Worlds:
         self._follow: Any = member.prepared_burst(iterations, world.joints, steps=iterations)
         self._one: Any = member.prepared_burst(1, world.joints)
         self._shape = copies, self._each
-        rows = self._by_copy(self._follow.rows)
-        if isinstance(member, Frontend):
-            rows = np.zeros_like(rows)  # those of a burst that failed are not valid
-        self.side = Side(member, rows, each)
+        self._first = with_padding(self._by_copy(self._one.rows))
+        self._feeds: Feeds = []
+        self.side = Side(member, self._by_copy(self._follow.rows), each)
         self.motion, self.counts = motion, Counts()
 
     def _by_copy(self, array: NDArray[Any]) -> NDArray[Any]:
@@ -77,20 +84,19 @@ class Worlds:
         return array.reshape(*self._shape, *shape)
 
     def reset(self, copies: Numbers, seeds: Sequence[int], rows: NDArray[Any]) -> None:
-        """The worlds of these copies to their starts, as these rows (n,) of the robots say.
+        """The worlds of these copies to their starts; episodes begin at these rows (n,) of robots.
 
         The seed of world j is that of its copy + j.
         """
-        own = (np.array(seeds)[:, np.newaxis] + np.arange(self._each)) % 2**31
+        own = (np.array(seeds)[:, np.newaxis] + np.arange(self._each)) % 2**32
         reset(self.side, copies, own)
         self.motion.begin(copies, rows)
-        self.mirror(copies, rows)
 
     def mirror(self, copies: Numbers, rows: NDArray[Any], seen: _core.Seen | None = None) -> None:
         """One iteration of these worlds, as rows (n,) of their robots say."""
         self._put(self._one, copies, *self.motion.standing(rows))
         self._run(self._one, copies, seen)
-        self.side.rows[copies] = self._by_copy(self._one.rows)[copies]
+        with_padding(self.side.rows)[copies] = self._first[copies]
 
     def follow(
         self, copies: Numbers, rows: NDArray[Any], period: float, seen: _core.Seen | None = None
@@ -99,12 +105,42 @@ class Worlds:
         counts, begun = self.counts, time.monotonic()
         counts.steps += 1
         counts.play += rows.size * period
-        self._put(self._follow, copies, *self.motion.follow(copies, rows, period))
-        counts.missed = self.motion.all_missed
+        for targets, numbers in self._feeds:
+            targets[...] = numbers
+        if not self._feeds:
+            self._put(self._follow, copies, *self.motion.follow(copies, rows, period))
+            counts.missed = self.motion.all_missed
         self._run(self._follow, copies, seen)
-        if isinstance(self.member, Frontend):
-            self.side.rows[...] = self._follow.rows
         counts.world_time += (time.monotonic() - begun - counts.world_time) / counts.steps
+
+    def feed(self, rows: NDArray[Any]) -> None:
+        """From now on `follow` gets these rows (copies, iterations) of robots, the same memory."""
+        targets = self._by_copy(self._follow.targets)
+        feeds: Feeds = []
+        with suppress(InvalidArgument):
+            for name, path in (self.motion.paths or {}).items():
+                numbers = field_view(rows, path)[:, np.newaxis]
+                if numbers.shape[-1] != targets.shape[-1]:
+                    return  # states of several numbers
+                feeds.append((targets[name] if self._named else targets, numbers))
+            self._feeds = feeds
+
+    def see_newest(self) -> None:
+        """Shows the newest row of the only world: a burst that a halt has ended has none."""
+        if isinstance(self.member, Frontend):
+            self.side.rows[...] = self.member.history(1).rows
+
+    def after(self, robots: GroupBurst) -> GroupBurst | None:
+        """The burst of the robots, with that of their worlds behind it, in one call; None: what the
+        worlds mirror is computed from rows.
+        """
+        paths = self.motion.paths
+        if self._each > 1 or paths is None:
+            return None
+        try:
+            return robots.then(self._follow, paths if self._named else paths["position"])
+        except InvalidArgument:
+            return None
 
     def _put(self, burst: BurstArrays, copies: Numbers, positions: Any, velocities: Any) -> None:
         targets = self._by_copy(burst.targets)

@@ -19,12 +19,14 @@ from typing import Any, ClassVar
 import gymnasium
 import numpy as np
 import pytest
+from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode
 from hybrid_tasks import RATE, START, Followed, Many, Push, Still, played
 
 import o80
 from o80.drivers import Reading
 from o80.hybrid import (
+    EVERY,
     HybridTask,
     Mirror,
     Outcome,
@@ -332,7 +334,7 @@ def test_a_rig_that_cannot_be_is_refused(changes: dict[str, Any], message: str) 
         ({"ens": 1}, "no parameter 'ens'. Did you mean 'ends'"),
         ({"pacing": "fast"}, "pacing must be one of"),
         ({"attach": "arm"}, "attach is for pacing='real_time'"),
-        ({"world": attach("camera")}, "world 'camera' is only read"),
+        ({"world": attach("camera")}, "world 'camera' runs already.*not inline"),
         ({"copies": 2, "pacing": "processes"}, "2 copies are inline"),
         ({"threads": 2, "pacing": "processes"}, "threads step copies inline"),
         ({"action_steps": 2}, "action_steps must be at most chunk_size"),
@@ -503,6 +505,82 @@ def test_a_robot_that_runs_is_attached_to_and_goes_on() -> None:
             made.reset(seed=1)
             made.step(np.zeros(2, np.float32))
         assert process.alive
+
+
+def test_a_robot_and_a_world_that_burst_already_give_the_same_bits(tmp_path: Path) -> None:
+    options: dict[str, Any] = {
+        "model": Path(__file__).with_name("models") / "push.xml",
+        "joints": "shoulder, elbow",
+    }
+    with (
+        o80.robots.load("two_joints").start("own_arm", frequency=RATE, bursting=True),
+        o80.robots.load("mujoco").start("own_world", frequency=RATE, bursting=True, **options),
+    ):
+        with make(Push, pacing="processes", attach="own_arm", world=attach("own_world")) as made:
+            found = list(played(made, 50, 3))
+        with pytest.raises(o80.InvalidArgument, match="robot 'own_arm' bursts"):
+            make(Push, pacing="real_time", attach="own_arm")
+    with make(Push) as made:
+        for mine, other in zip(played(made, 50, 3), found, strict=True):
+            assert mine.tobytes() == other.tobytes()
+
+
+def test_by_the_clock_a_step_may_send_nothing() -> None:
+    with make(Push, pacing="real_time", max_late=10**6, max_drift=1e6) as made:
+        made.reset(seed=1)
+        made.step(np.full(2, 0.3, np.float32))
+        engine: Any = made.task.engine
+        before = engine.span[2], engine.counts.steps, engine.counts.late_actions
+        engine.step(None, EVERY, made.task.until_halted)
+        assert (engine.span[2], engine.counts.steps) == (before[0] + 5, before[1] + 1)
+        assert engine.counts.late_actions == before[2]
+        row = made.task.robot.rows[0]
+        np.testing.assert_array_equal(row["desired"][-1], np.full(2, 0.3, np.float32))
+
+
+def test_a_recording_holds_every_world(tmp_path: Path) -> None:
+    with make(Many, worlds=3, record=tmp_path / "run.mcap", ends=False, max_steps=2) as made:
+        made.reset(seed=1)
+        for _ in range(2):
+            made.step(np.full(2, 0.3, np.float32))
+        world = made.task.world.last[0].copy()
+    recording = o80.open(tmp_path / "run.mcap")
+    values = recording.marks[0].values
+    names = [each for each in recording if each != values["robot"]]
+    assert (len(names), names[0]) == (3, values["world"])
+    for name, last in zip(names, world, strict=True):
+        assert recording[name].history().rows[-1] == last
+
+
+class Own(HybridTask):
+    """A rig and spaces of the object, and numbers that C++ passes on."""
+
+    def __init__(self, copies: int = 1, **options: Any) -> None:
+        self.rig = Followed.rig
+        self.action_space = Box(-1, 1, (2,), np.float32)
+        self.observation_space = Box(-np.inf, np.inf, (2,), np.float32)
+        super().__init__(copies, **options)
+
+    def begin(self, copies: Any, generators: Any, options: Any) -> None:
+        pass
+
+    def observe(self, copies: Any) -> Any:
+        return self.world.last["observed"][copies, 0]
+
+    def judge(self, copies: Any) -> Outcome:
+        return Outcome(1.0)
+
+
+@pytest.mark.parametrize("copies", [2, 1])
+def test_numbers_that_are_passed_on_are_those_of_the_robot(copies: int) -> None:
+    with make_vec(Own, copies) as made:
+        task: Any = made.task
+        made.reset(seed=1)
+        for target in (0.3, -0.2, 0.6):
+            made.step(np.full((copies, 2), target, np.float32))
+            robot, world = task.robot.rows["observed"], task.world.rows["desired"]
+            np.testing.assert_array_equal(world[:, 0], robot)
+        assert task.statistics().steps == 3
 
 
 def test_a_recording_holds_the_episodes_and_replays(tmp_path: Path) -> None:

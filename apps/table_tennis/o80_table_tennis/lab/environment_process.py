@@ -22,7 +22,7 @@ from o80.base.screen import keep_printing
 
 from ..balls.launches import Launch
 from ..environment import TableTennisEnvironment
-from ..rig.arm import LONGEST_RETURN
+from ..rig.home import LONGEST_RETURN
 from .environment_row import EXTENDED, UNITS, WATCHED, Phase
 from .launching import Launching
 from .parts import ARM, ENVIRONMENT, RATES, TRACKER, WORLD, LabSettings
@@ -71,11 +71,11 @@ class EnvironmentProcess:
     def _after_step(self) -> None:
         """A step of 10 ms of arm and world."""
         assert self._environment is not None
-        rig, row = self._environment.rig, self.row
-        row["arm_row"], row["world_row"] = rig.row, rig.twin_row
-        row["arm_time"] = rig.arm.last_time
-        row["late"] = rig.lateness
-        row["true_ball"] = rig.twin.ball[0, :3]
+        task, row = self._environment.task, self.row
+        row["arm_row"], row["world_row"] = task.single.span[2], task.twin_row
+        row["arm_time"] = self._arm_time()
+        row["late"] = task.single.lateness
+        row["true_ball"] = task.rows.balls[0, :3]
         self._tell_observed()
         self.publish()
 
@@ -142,12 +142,15 @@ class EnvironmentProcess:
             self._environment = opened(self._settings, self._policy, self._home)
         except OPENING:
             return
-        arm = self._environment.rig.arm
-        self._perception = TrackedPerception(self._tracker.frontend, lambda: arm.last_time)
-        self._environment.observer.look_through(self._perception)
-        rig = self._environment.rig
-        rig.after_step, rig.returns_at_reset = self._after_step, False
-        rig.begin()
+        task = self._environment.task
+        self._perception = TrackedPerception(self._tracker.frontend, self._arm_time)
+        task.observer.look_through(self._perception)
+        task.after_step, task.returns_at_reset = self._after_step, False
+
+    def _arm_time(self) -> int:
+        """Time of the row of the arm that was read last [ns]."""
+        assert self._environment is not None
+        return int(self._environment.task.robot.last["time"][0])
 
     def _close_environment(self) -> None:
         if self._environment is not None:
@@ -157,13 +160,13 @@ class EnvironmentProcess:
     def _return(self, environment: TableTennisEnvironment) -> None:
         """The arm goes back while the world goes on."""
         self._set(Phase.returning)
-        rig = environment.rig
-        rig.begin()
-        rig.arm.begin_return()
+        task = environment.task
+        task.single.begin()
+        task.home_of_arm.begin()
         end = time.monotonic() + LONGEST_RETURN
         while True:
-            self._idle(environment)
-            if rig.arm.is_back or time.monotonic() > end:
+            task.idle()
+            if task.home_of_arm.reached or time.monotonic() > end:
                 return
 
     def _launch(self, environment: TableTennisEnvironment) -> Launch | None:
@@ -171,21 +174,13 @@ class EnvironmentProcess:
         self._set(Phase.launching)
         self._launching.ask()
         while True:
-            self._idle(environment)
+            environment.task.idle()
             launch = self._launching.came()
             if launch is not None:
                 return launch
             if self._launching.failed:
                 self.row["launches_failed"] += 1
                 return None
-
-    def _idle(self, environment: TableTennisEnvironment) -> None:
-        """A step in which nothing is asked."""
-        rig = environment.rig
-        if rig.lateness > self._settings.max_late:
-            rig.begin()
-        rig.step_arm()
-        rig.step_twins()
 
     def _play(self, environment: TableTennisEnvironment, launch: Launch) -> None:
         """One ball, from the launch on."""
@@ -195,8 +190,8 @@ class EnvironmentProcess:
         self._policy.reset()
         self._set(Phase.playing)
         self.row["launch"] = self._launching.number
-        for robot in (environment.rig.arm, environment.rig.twin):  # one moment of both clocks
-            robot.frontend.mark(f"launch {self._launching.number}")
+        for robot in (environment.arm, *environment.twins):  # one moment of both clocks
+            robot.mark(f"launch {self._launching.number}")
         over = False
         while not over:
             observation, _, terminated, truncated, info = environment.step(

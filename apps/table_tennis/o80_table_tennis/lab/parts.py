@@ -16,7 +16,7 @@ from typing import Any
 
 from o80.base.loop_options import text_of
 
-from ..rig.robot_options import arm_options, twin_options
+from ..rig.rig import arm_options, world_options
 from ..settings import RigSettings
 from ..world.timing import PERIOD
 from .processes import Part
@@ -100,7 +100,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
             settings,
             WORLD,
             "mujoco",
-            {"frequency": 1.0 / PERIOD, "bursting": True} | twin_options(settings.rig),
+            {"frequency": 1.0 / PERIOD, "bursting": True} | world_options(settings.rig),
         ),
         _robot(
             settings,

@@ -14,7 +14,7 @@ from ..players.conditions import Conditions
 from ..players.learned_policy import LearnedPolicy, shipped_policy
 from ..players.policies import DEFAULT_FACTOR, Policy, default_policy
 from ..rig.arm_numbers import ArmNumbers
-from ..rig.robot_options import arm_options
+from ..rig.rig import arm_options
 from ..settings import Pacing, TaskSettings
 from .parts import ARM, WORLD, LabSettings
 
@@ -39,8 +39,8 @@ def opened(settings: LabSettings, policy: Policy, home: Home) -> TableTennisEnvi
         twin_segment=settings.segment(WORLD),
     )
     environment = TableTennisEnvironment(rig=rig, task=task_of(settings, policy))
-    arm = environment.rig.arm  # which may stand anywhere now
-    arm.start_pressures, arm.start_angles = home
+    start = environment.task.home_of_arm  # the arm may stand anywhere now
+    start.pressures, start.angles = home
     return environment
 
 

@@ -7,24 +7,22 @@ import time
 import o80
 from o80.base.screen import complain
 
-from ..rig.rig import Rig
-
 RENDER_MODES = ["human", "rgb_array"]
 
 
 class Page:
-    """`o80 view` of arm and twins, in a process of its own; opened where there is a screen.
+    """`o80 view` of arm and worlds, in a process of its own; opened where there is a screen.
 
     An accelerated environment is slowed down to real time, so that its motion can be followed.
     """
 
-    def __init__(self, rig: Rig) -> None:
+    def __init__(self, shown: list[o80.Frontend], step: float) -> None:
+        """step: duration of a step of an accelerated environment [s]; 0 by the clock."""
         from o80.view.browser import has_screen
 
-        shown = [twin.frontend for twin in rig.twins] + [rig.arm.frontend]
         screen = has_screen()
         self._view = o80.View(shown, open_browser=screen)
-        self._step = 0.0 if rig.settings.pacing.real_time else rig.settings.step
+        self._step = step
         self._due = 0.0
         if not screen:
             complain(f"no screen found; the view is at {self._view.url}")

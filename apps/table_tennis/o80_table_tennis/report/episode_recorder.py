@@ -1,11 +1,11 @@
-"""Records arm and twins of an environment, and marks its episodes in the recording.
+"""Records arm and worlds of an environment, and marks its episodes in the recording.
 
 The rows come from the segments. Only the environment knows where an episode begins, which ball it
 plays and what its steps were worth: this is what the marks hold.
 
 | mark | when | values |
 |---|---|---|
-| `environment` | when it is made | segments and epochs of arm and twins, settings |
+| `environment` | when it is made | segments and epochs of arm and worlds, settings |
 | `episode` | with its first step | number, task, seeds, balls, goal |
 | `episode_end` | after its last step | `EpisodeSummary`; all actions, rewards and observations |
 
@@ -29,8 +29,7 @@ import numpy as np
 import o80
 from o80.base.arrays import Float32Array
 
-from ..rig.rig import Rig
-from ..settings import TaskSettings
+from ..settings import RigSettings, TaskSettings
 from ..world.timing import ITERATIONS
 from .episode_summary import EpisodeSummary
 
@@ -49,8 +48,11 @@ class EpisodeRecorder:
     Raises o80.RecordingError, now or when the disk is full.
     """
 
-    def __init__(self, path: Path, rig: Rig, task: TaskSettings) -> None:
-        self._frontends = [rig.arm.frontend, *(twin.frontend for twin in rig.twins)]
+    def __init__(
+        self, path: Path, frontends: Sequence[o80.Frontend], rig: RigSettings, task: TaskSettings
+    ) -> None:
+        """frontends: of the arm, then of its worlds."""
+        self._frontends = frontends
         self._recording = o80.Recording(path, self._frontends, proceed=path.exists())
         self._task = task.task if isinstance(task.task, str) else type(task.task).__name__
         self._flushed = [-1] * len(self._frontends)
@@ -63,8 +65,8 @@ class EpisodeRecorder:
                 ENVIRONMENT,
                 arm=arm,
                 twins=twins,
-                period=rig.settings.period,
-                rig=_plain(rig.settings),
+                period=rig.period,
+                rig=_plain(rig),
                 task=_plain(task),
             )
             self.flush()

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+import o80
 from o80.base.arrays import FloatArray
+from o80.hybrid.worlds import Counts
 
-from ..rig.rig import Rig
 from .episode_summary import EpisodeSummary
 
 
@@ -31,8 +32,6 @@ class Statistics:
 
     episodes: int
     steps: int
-    exact_steps: int
-    """Steps of exactly five iterations of the arm and five of every twin, by their numbers."""
     steps_per_second: float
     """While an episode was played, the caller's own time (its policy) included [1/s]."""
     bare_steps_per_second: float
@@ -46,7 +45,7 @@ class Statistics:
     """Iterations of the arm, within episodes, for which no chunk had a row."""
     stalled_episodes: int
     mean_lateness: float
-    """Lateness of a step's end: newest row of the arm less the one used [rows]; real time only."""
+    """Rows of the arm that were newer than the one observed when a step began; real time only."""
     largest_lateness: int
     """[rows]"""
     arm_iterations: int
@@ -62,34 +61,38 @@ class Statistics:
     """(T - 1,) between the times of neighbouring rows [us]; real time only."""
 
 
-def statistics_of(counts: EpisodeCounts, rig: Rig) -> Statistics:
-    """From the counts of an environment and of its rig, and the history of the arm."""
-    arm, steps = rig.arm.frontend, rig.counts
-    rows = arm.history()
-    seconds = float(rows.time[-1] - rows.time[0]) * 1e-9
+def statistics_of(
+    counts: EpisodeCounts, of_rig: Counts, arm: o80.Frontend, *, step_seconds: float, rows: int = 1
+) -> Statistics:
+    """From the counts of an environment and of its rig, and the history of the arm.
+
+    rows: of a chunk in a step of the rig.
+    """
+    steps = of_rig.steps * rows
+    history = arm.history()
+    seconds = float(history.time[-1] - history.time[0]) * 1e-9
     lateness: FloatArray = np.empty(0)
     periods: FloatArray = np.empty(0)
     if not arm.bursting:
-        lateness = np.asarray(rows.lateness, np.float64) * 1e-3
-        periods = np.asarray(np.diff(rows.time), np.float64) * 1e-3
+        lateness = np.asarray(history.lateness, np.float64) * 1e-3
+        periods = np.asarray(np.diff(history.time), np.float64) * 1e-3
     return Statistics(
         episodes=counts.episodes,
-        steps=steps.steps,
-        exact_steps=steps.exact_steps,
-        steps_per_second=steps.steps / counts.seconds if counts.seconds > 0 else 0.0,
+        steps=steps,
+        steps_per_second=steps / counts.seconds if counts.seconds > 0 else 0.0,
         bare_steps_per_second=(
-            steps.steps / counts.seconds_stepping if counts.seconds_stepping > 0 else 0.0
+            steps / counts.seconds_stepping if counts.seconds_stepping > 0 else 0.0
         ),
-        step_seconds=rig.settings.step,
-        late_actions=steps.late_actions,
-        starved_iterations=steps.starved_iterations,
+        step_seconds=step_seconds,
+        late_actions=of_rig.late_actions,
+        starved_iterations=of_rig.starved,
         stalled_episodes=counts.stalled_episodes,
-        mean_lateness=steps.summed_lateness / max(1, steps.steps),
-        largest_lateness=steps.largest_lateness,
-        arm_iterations=int(rows.iteration[-1]),
-        arm_rate=(len(rows) - 1) / seconds if seconds > 0 else 0.0,
-        arm_overruns=int(rows.overruns[-1]),
-        arm_skipped=int(rows.skipped[-1]),
+        mean_lateness=of_rig.summed_lateness / max(1, of_rig.steps),
+        largest_lateness=of_rig.largest_lateness,
+        arm_iterations=int(history.iteration[-1]),
+        arm_rate=(len(history) - 1) / seconds if seconds > 0 else 0.0,
+        arm_overruns=int(history.overruns[-1]),
+        arm_skipped=int(history.skipped[-1]),
         arm_lateness_us=lateness,
         arm_periods_us=periods,
     )

@@ -14,7 +14,7 @@ from o80.base.arrays import FloatArray
 from ..settings import RigSettings
 from ..world.arm import JOINTS, MUSCLES
 from .pressure_range import PressureRange
-from .robot_options import arm_options
+from .rig import arm_options
 
 Numbers = tuple[float, ...]
 Pairs = tuple[tuple[float, float], ...]

@@ -32,11 +32,10 @@ SURFACES = {
 """Surfaces that balls bounce on, by the names of geoms; to the simulator they are all alike."""
 
 
-def ball_options(balls: int) -> dict[str, Any]:
-    """Options of the simulator for so many balls, for the air, and for what they bounce on."""
+def ball_options() -> dict[str, Any]:
+    """Options of the simulator for the ball, for the air, and for what it bounces on."""
     return {
         "balls": "ball",
-        "extra_balls": balls - 1,
         "surfaces": [f"{geom}={restitution.text}" for geom, restitution in SURFACES.items()],
         "watched": "racket",
         "air_density": AERODYNAMICS.air_density,

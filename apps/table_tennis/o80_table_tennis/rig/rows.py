@@ -1,0 +1,90 @@
+"""The newest rows of arms and of their worlds, as the task reads them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import o80
+from o80.base.arrays import Float32Array, FloatArray
+from o80.rows.layout import field_view
+
+from ..task.ball_record import BallRecord
+from ..task.observations import BALL_POSITION, PRESSURES, SIZE
+from ..world.arm import JOINTS
+from .ball_records import BallRecords, ball_records, event_flags, records_of
+from .pressure_range import PressureRange
+from .rig import MOTION
+
+SEEN_NUMBERS = 6
+"""Position and velocity: what is observed of a ball."""
+
+
+class RigRows:
+    """Views of the newest rows (N,) of arms and (N, worlds) of worlds, that each step fills.
+
+    Arrays of all balls have the worlds of the first arm first.
+    """
+
+    def __init__(
+        self, arms: NDArray[Any], worlds: NDArray[Any], arm: o80.Frontend, world: o80.Frontend
+    ) -> None:
+        """arm, world: frontends of the first ones."""
+        self.ball = world.actuators[JOINTS].name
+        """Name of the actuator that is the ball."""
+        self.range = PressureRange.of(arm)
+        """Range of the raw pressures."""
+        self.motion: FloatArray = field_view(arms, *MOTION)
+        """(N, 8) angles [rad] then velocities [rad/s] of the joints"""
+        self.racket: FloatArray = field_view(arms, "extended.racket_position")
+        """(N, 3) [m]"""
+        self.desired, self.observed = arms["desired"], arms["observed"]
+        """(N, 8) raw pressures that were asked for, and those in the muscles."""
+        flat = worlds.reshape(-1)
+        self._iteration = flat["iteration"][:1]
+        self.balls: FloatArray = field_view(flat, "observed.balls")[:, :SEEN_NUMBERS]
+        """(N * worlds, 6) position [m] and velocity [m/s]"""
+        assert np.shares_memory(self.balls, worlds)
+        self.records = records_of(flat)[:, 0]
+        """(N * worlds,) what has happened to each ball, as the simulator has it."""
+        self.read_records: Callable[[], BallRecord] = lambda: ball_records(self.records)
+        """Record of what has happened to each ball."""
+        self._muscles = [actuator.name for actuator in arm.actuators]
+
+    @property
+    def iteration(self) -> int:
+        """Iteration of the first world."""
+        return int(self._iteration.item())
+
+    def gather(
+        self,
+        arms: o80.InlineGroup,
+        worlds: o80.InlineGroup,
+        bounds: tuple[Float32Array, Float32Array] | None,
+    ) -> list[Float32Array]:
+        """C++ reads what happens to the balls from now on, in each step and reset.
+
+        bounds: least and largest observation (22,) of ball play; then it fills in the parts
+        (N, ...) that this returns, too.
+        """
+        numbers: list[o80.Gathered] = []
+        gathered: list[Float32Array] = []
+        if bounds is not None:
+            clips = [*zip(*(each.tolist() for each in bounds), strict=True)]
+            paths = [f"{field}[{joint}]" for field in MOTION for joint in range(JOINTS)]
+            paths += [f"observed.{name}" for name in self._muscles]
+            offsets = [0.0] * (2 * JOINTS) + self.range.least.tolist()
+            scales = [1.0] * (2 * JOINTS) + self.range.scale.tolist()
+            its = zip(paths, offsets, scales, clips[: PRESSURES.stop], strict=True)
+            gathered.append(arms.gather([o80.Gathered(*each) for each in its]).observations)
+            parts = ("position", "velocity")
+            paths = [f"observed.{self.ball}.{part}[{axis}]" for part in parts for axis in range(3)]
+            ball = zip(paths, clips[BALL_POSITION.start : SIZE], strict=True)
+            numbers = [o80.Gathered(path, clip=clip) for path, clip in ball]
+        seen = worlds.gather(numbers, event_flags())
+        flags = {name: seen[name] for name in seen.flag_names}
+        self.read_records = BallRecords(self.records, flags).read
+        return [*gathered, seen.observations] if numbers else []
