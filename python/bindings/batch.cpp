@@ -190,6 +190,12 @@ void bind_batch(nb::module_& m) {
                      return shift ? std::optional(std::pair(shift->iterations, shift->stood))
                                   : std::nullopt;
                    })
+      .def_prop_ro("_take_over",
+                   [](const Batch& self) {
+                     const auto begun = self.take_over();
+                     return begun ? std::optional(std::pair(begun->row, begun->needed))
+                                  : std::nullopt;
+                   })
       .def_prop_ro("ended", &Batch::ended, "True if all of them have ended.")
       .def_prop_ro(
           "taken", [](const Batch& self) { return self.first_iteration() >= 0; },

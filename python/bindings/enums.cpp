@@ -67,12 +67,13 @@ o80::Profile profile_of(nb::handle word) {
 
 o80::Profile profile_of_rows(nb::handle word) {
   using enum o80::Profile;
-  return parse(word, std::array{cubic, linear, hold}, "the profile of a chunk");
+  return parse(word, std::array{smooth, monotone, linear, hold}, "the profile of a chunk");
 }
 
 o80::Profile profile_of_trajectory(nb::handle word) {
   using enum o80::Profile;
-  return parse(word, std::array{cubic, linear, hold, minimum_jerk}, "the profile of a trajectory");
+  return parse(word, std::array{smooth, monotone, linear, hold, minimum_jerk},
+               "the profile of a trajectory");
 }
 
 o80::Start start_of(nb::handle word) {

@@ -1,11 +1,14 @@
 // How a frontend adds records to a batch and sends it.
 
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/string_view.h>
 #include <nanobind/stl/vector.h>
 
+#include <algorithm>
+#include <array>
 #include <cstring>
 #include <optional>
 #include <utility>
@@ -279,35 +282,75 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
   return send_alone(self, fill, seen_of(seen));
 }
 
-/// Places and slopes (doubles) of the plan of a chunk, in the first `most` iterations from its
-/// begin: of one number, from this place and slope. `ends`: the last iteration of the way to each
-/// row, counted from its begin.
-std::pair<nb::bytes, nb::bytes> plan_of_rows(double place, double slope,
-                                             const std::vector<double>& rows,
-                                             const std::vector<std::int64_t>& ends,
-                                             nb::handle profile, std::size_t most) {
+using Moments = std::vector<std::array<double, 3>>;  // place, slope and curvature
+
+/// Places, slopes and curvatures (doubles) of the plan of a chunk, in the first `most` iterations
+/// from its begin: of one number, from this moment. `ends`: the last iteration of the way to each
+/// row, counted from its begin. `low`, `high`: the bounds of the number.
+std::array<nb::bytes, 3> plan_of_rows(const std::array<double, 3>& start,
+                                      const std::vector<double>& rows,
+                                      const std::vector<std::int64_t>& ends, nb::handle profile,
+                                      std::size_t most, double low, double high) {
   const o80::Profile shape = profile_of_rows(profile);
-  std::pair<std::vector<double>, std::vector<double>> plan;
+  std::array<std::vector<double>, 3> plan;
   o80::NumberPlan way;
-  way.stand(place, slope);
-  for (std::size_t i = 0; i < rows.size() && plan.first.size() < most; ++i) {
-    const std::int64_t count = ends[i] - (i == 0 ? 0 : ends[i - 1]);
-    const bool is_last = i + 1 == rows.size();
-    if (shape == o80::Profile::hold) way.line(rows[i], rows[i]);
-    if (shape == o80::Profile::linear) way.line_on(rows[i], count);
-    if (shape == o80::Profile::cubic) {
-      way.curve_on(rows[i], count, is_last ? rows[i] : rows[i + 1],
-                   is_last ? 0 : ends[i + 1] - ends[i]);
+  way.stand({start[0], start[1], start[2]});
+  const auto iterations = [&](std::size_t row) {
+    return ends[row] - (row == 0 ? 0 : ends[row - 1]);
+  };
+  for (std::size_t i = 0; i < rows.size() && plan[0].size() < most; ++i) {
+    if (shape == o80::Profile::hold) way.hold_on(rows[i]);
+    if (shape == o80::Profile::linear) way.line_on(rows[i], iterations(i));
+    if (o80::is_curved(shape)) {
+      o80::RowsAhead ahead;
+      if (i + 1 < rows.size()) ahead = {rows[i + 1], iterations(i + 1), i == 0, rows[i + 1]};
+      if (i + 2 < rows.size()) ahead.after = rows[i + 2];
+      way.curve_on(shape, rows[i], iterations(i), ahead, {low, high});
     }
-    for (std::int64_t k = 0; k < count && plan.first.size() < most; ++k) {
-      plan.first.push_back(way.next());
-      plan.second.push_back(way.slope());
+    for (std::int64_t k = iterations(i); k > 0 && plan[0].size() < most; --k) {
+      plan[0].push_back(way.next());
+      const o80::Moment now = way.moment();
+      plan[1].push_back(now.speed);
+      plan[2].push_back(now.acceleration);
     }
   }
   const auto bytes = [](const std::vector<double>& values) {
     return nb::bytes(values.data(), values.size() * sizeof(double));
   };
-  return {bytes(plan.first), bytes(plan.second)};
+  return {bytes(plan[0]), bytes(plan[1]), bytes(plan[2])};
+}
+
+/// Due iterations, as first_row() takes them.
+struct DueRows {
+  const std::vector<std::uint32_t>& dues;
+
+  std::uint32_t count() const noexcept { return static_cast<std::uint32_t>(dues.size()); }
+  std::uint32_t due(std::uint32_t row) const noexcept { return dues[row]; }
+  std::uint32_t first_due_from(std::int64_t iterations) const noexcept {
+    return static_cast<std::uint32_t>(std::ranges::lower_bound(dues, iterations) - dues.begin());
+  }
+};
+
+/// The first row that a chunk reaches which begins so many iterations after its anchor. `starts`:
+/// where each number is before; `rows`: its rows; `rates`: its limits of speed, acceleration and
+/// jerk per iteration.
+std::uint32_t first_row(const std::vector<std::uint32_t>& due, std::int64_t begins,
+                        std::int64_t ease, const Moments& starts,
+                        const std::vector<std::vector<double>>& rows, const Moments& rates) {
+  return o80::first_row(DueRows{due}, begins, ease,
+                        [&](std::uint32_t row, std::int64_t iterations) {
+                          double most = 0.0;
+                          for (std::size_t i = 0; i < starts.size(); ++i) {
+                            const auto [place, slope, curvature] = starts[i];
+                            const auto [speed, acceleration, jerk] = rates[i];
+                            most = std::max(most, o80::iterations_to_take_over(
+                                                      {place, slope, curvature}, rows[i][row],
+                                                      static_cast<double>(iterations),
+                                                      {speed, acceleration, jerk}));
+                          }
+                          return most;
+                        })
+      .row;
 }
 
 std::uint16_t purged(const Frontend& self, nb::handle actuator) {
@@ -346,8 +389,9 @@ std::uint32_t add_request(const Frontend& self, nb::handle name, const nb::kwarg
 }  // namespace
 
 void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
-  m.def("plan_of_rows", &plan_of_rows, "place"_a, "slope"_a, "rows"_a, "ends"_a, "profile"_a,
-        "most"_a);
+  m.def("plan_of_rows", &plan_of_rows, "start"_a, "rows"_a, "ends"_a, "profile"_a, "most"_a,
+        "low"_a, "high"_a);
+  m.def("first_row", &first_row, "due"_a, "begins"_a, "ease"_a, "starts"_a, "rows"_a, "rates"_a);
   const auto all = "actuator"_a = nb::none();
   def_verb(frontend, "add_command", verbs::add_command, &add_command, "actuator"_a.none(),
            "target"_a.none(), nb::kw_only(), "duration"_a = nb::none(), "speed"_a = nb::none(),

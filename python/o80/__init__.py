@@ -60,8 +60,8 @@ if TYPE_CHECKING:
     from o80.drivers.backend import Backend as Backend
     from o80.drivers.backend import Running as Running
     from o80.drivers.backend import StartAfresh as StartAfresh
+    from o80.frontend.chunk_parts import SentChunk as SentChunk
     from o80.frontend.chunks import Chunks as Chunks
-    from o80.frontend.chunks import SentChunk as SentChunk
     from o80.frontend.frontend import Frontend as Frontend
     from o80.frontend.frontend import register_frontend as register_frontend
     from o80.frontend.frontend import wait_for_first as wait_for_first
@@ -136,7 +136,8 @@ else:  # a type checker that read this would accept every name
         "rows.journal": "JournalCommand JournalEntry",
         "playing.playback": "Playback play",
         "frontend.prepared_burst": "PreparedBurst",
-        "frontend.chunks": "Chunks SentChunk",
+        "frontend.chunk_parts": "SentChunk",
+        "frontend.chunks": "Chunks",
         "groups.group_burst": "GroupBurst GroupRequest",
         "rows.provenance": "Provenance ProvenanceFile",
         "rows.record": "Record States",

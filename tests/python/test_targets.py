@@ -234,8 +234,9 @@ def test_states_of_several_types_may_be_given_in_part(robot: Robot) -> None:
 @pytest.mark.parametrize(
     ("profile", "first"),
     [
-        (None, [0.15625, 0.5, 0.84375, 1.0]),  # at rest at a row where it turns round
-        ("cubic", [0.15625, 0.5, 0.84375, 1.0]),
+        (None, [0.0947265625, 0.46875, 0.8701171875, 1.0]),  # with the curvature of the turn
+        ("smooth", [0.0947265625, 0.46875, 0.8701171875, 1.0]),
+        ("monotone", [0.15625, 0.5, 0.84375, 1.0]),  # at rest where it turns round
         ("linear", [0.25, 0.5, 0.75, 1.0]),
         ("hold", [1.0, 1.0, 1.0, 1.0]),
     ],
@@ -248,7 +249,8 @@ def test_a_trajectory_takes_its_iterations_for_each_row(
     assert arm.pulse_and_wait(timeout=WAIT).iteration == 8
     desired = arm.history().desired[1:, 0]
     assert desired[:4].tolist() == first
-    assert desired[4:].tolist() == [1.0 - each for each in first]
+    back = first[2::-1] if profile in (None, "smooth") else [1.0 - each for each in first[:3]]
+    assert desired[4:].tolist() == [*back, 0.0]
 
 
 def test_at_a_speed_a_trajectory_goes_in_straight_lines(arm: o80.Frontend) -> None:
@@ -259,12 +261,12 @@ def test_at_a_speed_a_trajectory_goes_in_straight_lines(arm: o80.Frontend) -> No
 
 
 def test_profiles_of_rows_are_refused_where_they_cannot_be(arm: o80.Frontend) -> None:
-    with pytest.raises(o80.InvalidArgument, match="cubic needs rows that are due in fixed iter"):
-        arm.add_trajectory([1.0, 2.0], "elbow", speed=250.0, profile="cubic")
+    with pytest.raises(o80.InvalidArgument, match="smooth needs rows that are due in fixed iter"):
+        arm.add_trajectory([1.0, 2.0], "elbow", speed=250.0, profile="smooth")
     with pytest.raises(o80.InvalidArgument, match="'minimum_jerk', got 'as_sent'"):
         arm.add_trajectory([1.0, 2.0], "elbow", profile="as_sent")
     with pytest.raises(o80.InvalidArgument, match="profile"):
-        arm.add_command("elbow", 1.0, profile=cast(ProfileWord, "cubic"))
+        arm.add_command("elbow", 1.0, profile=cast(ProfileWord, "smooth"))
     assert arm.added == 0
 
 

@@ -63,7 +63,7 @@ async def wait(arm: o80.Frontend) -> None:
 
 BAD = [
     ("arm.add_command(0, 0.5, mode='overwritten')", "overwritten"),
-    ("arm.add_command(0, 0.5, profile='cubic')", "cubic"),
+    ("arm.add_command(0, 0.5, profile='smooth')", "smooth"),
     ("arm.add_command(0, 0.5, start='now')", "start"),
     ("arm.add_command(0, 0.5, every='often')", "every"),
     ("arm.add_command(0, 0.5, 2.0)", "Too many positional arguments"),

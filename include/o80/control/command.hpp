@@ -15,8 +15,16 @@ inline constexpr Iteration kNow = -1;
 
 enum class Mode : std::uint8_t { queue, overwrite };
 enum class Pace : std::uint8_t { direct, duration, speed, until, iterations, fastest, chunk };
-/// `cubic` and `hold` are for the rows of a chunk.
-enum class Profile : std::uint8_t { linear, minimum_jerk, as_sent, cubic, hold };
+/// From `monotone` on they are for rows of a chunk or a trajectory (docs/chunks.md).
+enum class Profile : std::uint8_t { linear, minimum_jerk, as_sent, monotone, hold, smooth };
+/// True for a curve through rows.
+constexpr bool is_curved(Profile profile) noexcept {
+  return profile == Profile::smooth || profile == Profile::monotone;
+}
+/// True for profiles that only rows have.
+constexpr bool is_of_rows(Profile profile) noexcept {
+  return is_curved(profile) || profile == Profile::hold;
+}
 /// Which state a command starts from.
 enum class Start : std::uint8_t { desired, observed };
 
@@ -93,15 +101,17 @@ struct PulseOptions {
 
 /// How rows of targets are played, each in a fixed iteration (docs/chunks.md).
 struct ChunkOptions {
-  Iteration anchor = 0;      ///< Iteration of the observation that the rows answer.
-  std::uint64_t epoch = 0;   ///< Of the run that takes it; set when it is sent.
-  std::uint64_t plan = 0;    ///< Number of a plan: within one, an older anchor is rejected.
-  std::uint32_t ease = 1;    ///< Iterations of the take-over.
+  Iteration anchor = 0;     ///< Iteration of the observation that the rows answer.
+  std::uint64_t epoch = 0;  ///< Of the run that takes it; set when it is sent.
+  std::uint64_t plan = 0;   ///< Number of a plan: within one, an older anchor is rejected.
+  /// Iterations of the take-over; 0: those that limits need, at least a step, and at most half of
+  /// those that are ahead.
+  std::uint32_t ease = 0;
   std::uint32_t first = 0;   ///< Rows before this one are what was planned before, not played.
   bool fixed = false;        ///< Rows keep their iterations also where the actuators stand still.
   bool reject_late = false;  ///< Rejects it if row `first` is late, instead of skipping rows.
   bool final = false;        ///< No chunk of its plan follows: as UntypedFrontend::add_close_plan.
-  Profile profile = Profile::cubic;  ///< Or linear, or hold.
+  Profile profile = Profile::smooth;  ///< Or monotone, linear or hold.
 };
 
 }  // namespace o80

@@ -76,6 +76,13 @@ class Batch {
     bool stood = false;
   };
   std::optional<Shift> shift() const;
+  /// The first row that its chunk reaches; nothing before that begins. `needed`: the iterations
+  /// that limits need for the take-over, at most 4095, if it has fewer; else 0.
+  struct TakeOver {
+    std::uint32_t row = 0;
+    std::int64_t needed = 0;
+  };
+  std::optional<TakeOver> take_over() const;
   /// The iteration in which the last of its records ended; -1 if some have not ended.
   Iteration last_iteration() const;
   /// The reason, in words, why the whole batch was rejected; empty if it was not.

@@ -118,7 +118,7 @@ class UntypedFrontend {
                        std::span<const std::uint64_t> masks = {}) const;
   /// Adds one command through `rows` states: at `times` (when each row is reached, since the start
   /// [ns], each in an iteration of its own; options.pace is then ignored), or with options.pace for
-  /// each row. Its profile is cubic (a curve through the rows), or linear at a speed, unless
+  /// each row. Its profile is smooth (a curve through the rows), or linear at a speed, unless
   /// options.profile is given.
   std::uint32_t add_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                std::span<const std::byte> states,

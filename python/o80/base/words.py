@@ -20,8 +20,9 @@ class Profile(StrEnum):
     LINEAR = "linear"
     MINIMUM_JERK = "minimum_jerk"
     AS_SENT = "as_sent"  #: no interpolation: each target in its iteration, where limits allow
-    CUBIC = "cubic"  #: of rows: a curve through them, without overshoot
+    MONOTONE = "monotone"  #: of rows: a curve through them that stays between them
     HOLD = "hold"  #: of rows: each from the iteration after the one before it
+    SMOOTH = "smooth"  #: of rows: a curve through them, as of samples of a smooth motion
 
 
 class Start(StrEnum):
@@ -77,7 +78,7 @@ class CommandEnd(NamedTuple):
 
 ModeWord: TypeAlias = Mode | Literal["queue", "overwrite"]
 ProfileWord: TypeAlias = Profile | Literal["linear", "minimum_jerk", "as_sent"]
-RowsWord: TypeAlias = Literal["cubic", "linear", "hold"]
+RowsWord: TypeAlias = Literal["smooth", "monotone", "linear", "hold"]
 StartWord: TypeAlias = Start | Literal["desired", "observed"]
 LateWord: TypeAlias = Literal["reject", "now"]
 OnErrorWord: TypeAlias = Literal["purge", "continue"]

@@ -17,17 +17,15 @@ from o80.base.argument_checks import iterations, number, text, whole, whole_or_n
 from o80.base.awaiting import in_thread
 from o80.base.errors import BackendGone, BackendHalted, Closed, InvalidArgument, RowOverwritten
 from o80.base.lifecycle import Managed
-from o80.base.words import RowsWord, Status
-from o80.rows.plans import ChunkRows, ChunkWay, Decision, Moment, decide
+from o80.base.words import RowsWord
+from o80.frontend.chunk_parts import ChunkPart, SentChunk
+from o80.rows.plans import ChunkRows, ChunkWay, Moment, limits_of
 from o80.rows.targets import common_labels, common_type, states_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
     from o80.frontend.commander import Commander
-
-#: Time of a take-over, if a step is not longer [s].
-EASE = 0.1
 
 _LATEST = 2**31  # a row is due at most so many iterations after its anchor
 _MOST_ITERATIONS = 2**47
@@ -73,125 +71,6 @@ def _finite(values: "ArrayLike", name: str) -> "NDArray[np.float64]":
     raise InvalidArgument(f"{name} must be finite numbers, got {values!r}")
 
 
-class SentChunk:
-    """A chunk that was sent. `late`, `skipped`, `first`, `begins` and `shift` are None until it
-    was decided in the loop, and if it was rejected.
-    """
-
-    def __init__(self, batch: _core.Batch, sent: ChunkRows) -> None:
-        self.batch = batch  #: with this chunk as its only command
-        self._sent = sent
-        self._decision: Decision | None = None
-
-    @property
-    def decided(self) -> bool:
-        """Whether the backend has taken or rejected it."""
-        return self.batch._shift is not None or self.batch.ended
-
-    @property
-    def rejected(self) -> bool:
-        """Whether it was rejected: `batch[0]` says why."""
-        return self.batch[0].status == Status.REJECTED
-
-    @property
-    def late(self) -> int | None:
-        """Number of rows that were due before it was taken: they are skipped."""
-        return None if self._decided is None else self._decided.late
-
-    @property
-    def skipped(self) -> int | None:
-        """Number of rows that are not reached: late ones, and those that the take-over passes."""
-        return None if self._decided is None else self._decided.row
-
-    first = property(lambda self: self.skipped, doc="Place of the first row that is reached.")
-
-    @property
-    def begins(self) -> int | None:
-        """The first iteration that it moves."""
-        return None if self._decided is None else self._decided.begins
-
-    @property
-    def shift(self) -> int | None:
-        """By how many iterations its rows are later, because the actuators stood still."""
-        return None if self._decided is None else self._decided.shift
-
-    def wait(self, timeout: float | None = None) -> None:
-        """Waits until the chunk has ended, as `Batch.wait` with check=False."""
-        self.batch.wait(timeout, check=False)
-
-    @property
-    def _decided(self) -> Decision | None:
-        if self._decision is None:
-            shift = self.batch._shift
-            if shift is not None:
-                self._decision = decide(self._sent, self.batch.first_iteration, *shift)
-        return self._decision
-
-
-class _Part:
-    """The plan of one chunk, from its begin on.
-
-    `known`: place and slope of the iteration before it, from which its places are computed when
-    somebody asks for them. Until that row is there, `start` may be what is expected.
-    """
-
-    def __init__(self, sent: SentChunk, way: ChunkWay) -> None:
-        self.sent = sent
-        self.begins = way.begins
-        self.last = way.last
-        self.known = False
-        self.start: Moment | None = None
-        self._way = way
-        self._computed: Moment | None = None
-
-    def begin(self, start: Moment, known: bool = True) -> None:
-        """From place and slope in the iteration before it."""
-        self.start, self.known, self._computed = start, known, None
-
-    def at(self, iteration: int, *, alone: bool = False) -> Moment:
-        """Places and slopes (actuators,) from its begin on; after its end it rests.
-
-        alone: nobody will ask for later ones.
-        """
-        place = iteration - self.begins
-        most = self.last - self.begins + 1
-        if place >= most:
-            return self._way.rows[-1], np.zeros_like(self._way.rows[-1])
-        if self._computed is None or len(self._computed[0]) <= place:
-            assert self.start is not None
-            # a chunk may be planned for hours: not further than about what is asked for
-            wanted = place + 1 if alone else min(most, max(1024, 2 * place))
-            self._computed = self._way.places(self.start, wanted)
-        places, slopes = self._computed  # (iterations, actuators)
-        return places[place], slopes[place]
-
-    def acts(self, iteration: int) -> bool:
-        """Whether what comes in the iteration after this one goes on from this plan."""
-        batch = self.sent.batch
-        # dropped commands act no more in the iteration in which they end, and braking is no plan
-        behind = {Status.COMPLETED: 0, Status.OVERWRITTEN: 1}.get(batch[0].status, 2)
-        return not batch.ended or batch.last_iteration >= iteration + behind
-
-    def note_end(self) -> None:
-        """If it was dropped: nothing of it is planned from there on."""
-        batch = self.sent.batch
-        kept = (Status.COMPLETED, Status.FORGOTTEN)
-        if batch.ended and batch[0].status not in kept and batch.last_iteration <= self.last:
-            self.end_in(batch.last_iteration)
-
-    def is_over(self, iteration: int) -> bool:
-        """Whether it has ended before this iteration, and nothing changes any more."""
-        return self.known and self.last < iteration and self.sent.batch.ended
-
-    def end_in(self, iteration: int) -> None:
-        """Nothing of it is planned in this iteration and later."""
-        self.last = min(self.last, iteration - 1)
-        kept = max(0, iteration - self.begins)
-        if self._computed is not None and len(self._computed[0]) > kept:
-            places, slopes = self._computed
-            self._computed = places[:kept].copy(), slopes[:kept].copy()
-
-
 class ChunkWaits:
     """The wait of a plan as a coroutine, as those of `Frontend.aio`."""
 
@@ -218,7 +97,7 @@ class Chunks(Managed):
         *,
         step: float | Fraction,
         ease: float | None = None,
-        profile: RowsWord = "cubic",
+        profile: RowsWord = "smooth",
         ensemble: float | None = None,
     ) -> None:
         arm.latest()  # raises what a frontend that cannot be used raises
@@ -229,14 +108,15 @@ class Chunks(Managed):
         begin, described = schema["row"]["desired"], schema["actuators"]
         self._places = [begin + described[each]["offset"] for each in self._actuators]  # in a row
         self._switches = self._kind.kind == "b" or bool(common_labels(self._actuators, arm._layout))
+        plain = self._actuators if self._is_plain else []
+        self._limits = [limits_of(schema, each, 0, self._kind) for each in plain]
         self.step = _fraction(step)  #: iterations from row to row
         self._dues = np.empty(0, np.int64)
-        usual = max(math.ceil(self.step), round(EASE / arm.period))
-        self.ease = usual  #: iterations of a take-over
+        self.ease = 0  #: iterations of a take-over; 0: those that the limits need
         if ease is not None:
             self.ease = _from_to(iterations(ease, "ease", arm.period, 0), "ease", 1, _LATEST)
         # it says what a profile may be
-        _core.plan_of_rows(0.0, 0.0, [0.0], [1], text(profile, "profile"), 1)
+        _core.plan_of_rows((0.0, 0.0, 0.0), [0.0], [1], text(profile, "profile"), 1, 0.0, 0.0)
         self.profile = profile
         self.ensemble = ensemble if ensemble is None else number(ensemble, "ensemble")
         if self.ensemble is not None and not math.isfinite(self.ensemble):
@@ -249,7 +129,7 @@ class Chunks(Managed):
         self._seen = -1  # the row that `wait` returned last
         self._open: list[SentChunk] = []  # those that _parts does not know yet
         self._settled = 0  # the anchor at which these were looked at by send()
-        self._parts: list[_Part] = []
+        self._parts: list[ChunkPart] = []
         self._over = 0  # of these, so many from the first one on are over
         self._answers: dict[int, int] = {}  # for a due iteration, how many chunks had a row for it
 
@@ -525,8 +405,8 @@ class Chunks(Managed):
                 # those that wait for the same or a later iteration are overwritten
                 while parts and parts[-1].begins >= decision.begins:
                     parts.pop()
-                way = ChunkWay(sent._sent, decision, self.profile, self._switches)
-                parts.append(_Part(sent, way))
+                way = ChunkWay(sent._sent, decision, self.profile, self._limits, self._switches)
+                parts.append(ChunkPart(sent, way))
             # nothing becomes of the others any more
             self._over = min(self._over, len(parts))
             changing = parts[self._over :]
@@ -547,7 +427,7 @@ class Chunks(Managed):
                 del parts[0]
                 self._over = max(0, self._over - 1)
 
-    def _begin(self, parts: list[_Part], former: _Part | None) -> None:
+    def _begin(self, parts: list[ChunkPart], former: ChunkPart | None) -> None:
         """Notes from where each part begins, as far as that is there."""
         for part in parts:
             before = part.begins - 1
@@ -558,13 +438,15 @@ class Chunks(Managed):
                     part.begin(former.at(before, alone=True))
             elif before <= self._arm.published:
                 with contextlib.suppress(RowOverwritten):
-                    part.begin(self._motion(before))
+                    decided = before < self._arm.published or part.sent._begun is not None
+                    part.begin(self._motion(before), known=decided)
             else:
                 # it waits: if nobody else commands, what rests goes on to rest
                 latest = self._arm.latest()
                 if part.start is None and not latest.active[self._actuators].any():
                     place = self._desired(latest)
-                    part.begin((place, np.zeros_like(place)), known=False)
+                    rests = np.zeros_like(place)
+                    part.begin((place, rests, rests), known=False)
             former = part
 
     def _desired(self, row: Any) -> "NDArray[np.float64]":
@@ -572,14 +454,20 @@ class Chunks(Managed):
         numbers = [np.ndarray((), self._kind, row, at) for at in self._places]
         return np.array(numbers, np.float64)
 
-    def _motion(self, iteration: int) -> "tuple[NDArray[np.float64], NDArray[np.float64]]":
+    def _motion(self, iteration: int) -> Moment:
         """Desired places and differences of a row, from the history; 0 for what does not act."""
-        row = self._arm.wait_for(iteration)
-        here = self._desired(row)
-        active = row.active[self._actuators]
-        if not active.any():
-            return here, np.zeros_like(here)
-        return here, np.where(active, here - self._desired(self._arm.wait_for(iteration - 1)), 0.0)
+        rows = [self._arm.wait_for(iteration)]
+        active = [row.active[self._actuators] for row in rows]
+        places = [self._desired(row) for row in rows]
+        rests = np.zeros_like(places[0])
+        if not active[0].any():
+            return places[0], rests, rests
+        for before in (iteration - 1, iteration - 2):
+            row = self._arm.wait_for(max(0, before))
+            active.append(row.active[self._actuators])
+            places.append(self._desired(row))
+        speed, former = (np.where(active[i], places[i] - places[i + 1], 0.0) for i in (0, 1))
+        return places[0], speed, np.where(active[0], speed - former, 0.0)
 
     # ------------------------------------------------------------------ its end
 

@@ -195,8 +195,9 @@ class Commander(Reader):
         iterations: number of iterations for each row (default: 1).
         times: when each row is reached, since the start [s]: (T,), each in an iteration of its own.
         speed: peak speed to each row, as in add_command.
-        profile: "cubic" (default, not with speed): a curve through the rows that stays between
-            them, at rest at the last one; "linear" (default with speed): straight lines;
+        profile: "smooth" (default, not with speed): a curve through the rows, as through samples
+            of a smooth motion, at rest at the last one; "monotone": one that stays between its
+            rows; "linear" (default with speed): straight lines;
             "hold": each row from the iteration after the one before it; "minimum_jerk": at rest
             at each row.
         mode, start: as in add_command.

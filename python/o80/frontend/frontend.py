@@ -106,16 +106,17 @@ class Frontend(Commander, lifecycle.Managed):
         *,
         step: "float | Fraction",
         ease: float | None = None,
-        profile: RowsWord = "cubic",
+        profile: RowsWord = "smooth",
         ensemble: float | None = None,
     ) -> "Chunks":
         """Opens a plan for a policy that answers with rows of targets, late (docs/chunks.md).
 
         actuators: indices or names (None: all).
         step: iterations from row to row, whole or a fraction (50 / 3: 30 rows a second at 500 Hz).
-        ease: iterations of a take-over, or as a float its time [s] (None: the longer of a step and
-            0.1 s).
-        profile: "cubic", "linear" or "hold" between rows.
+        ease: iterations of a take-over, or as a float its time [s] (None: those that the limits
+            need, at least a step and at most half of what is ahead).
+        profile: between rows: "smooth", a curve through them; "monotone", one that stays between
+            them; "linear"; or "hold".
         ensemble: mix each new row with the plan, as ACT does: share exp(-ensemble * i) of the i-th
             answer for an iteration (None: new rows replace the plan).
 

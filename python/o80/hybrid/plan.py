@@ -19,7 +19,7 @@ class Plan:
     """Rows of an action, each for `every` iterations; None: an action is one target."""
     action_steps: int = 1
     """Rows of a chunk in a step; the others act only while the next chunk is late."""
-    profile: RowsWord = "cubic"
+    profile: RowsWord = "smooth"
     """Profile of the motion between the rows of a chunk."""
 
     def __post_init__(self) -> None:

@@ -64,8 +64,8 @@ class HybridTask(Task):
     """An action is a chunk of so many rows, `every` iterations each; None: one target."""
     action_steps: int = 1
     """Rows of a chunk in a step."""
-    profile: RowsWord = "cubic"
-    """Profile of the motion between rows of a chunk: "cubic", "linear" or "hold"."""
+    profile: RowsWord = "smooth"
+    """Profile of the motion between rows of a chunk: "smooth", "monotone", "linear" or "hold"."""
     max_late: int = 25
     """In real time: rows that the robot may be ahead when a step begins [rows]."""
     max_drift: float = 0.2

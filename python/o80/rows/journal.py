@@ -43,7 +43,8 @@ class JournalCommand:
     start: str = ""
     times: tuple[float, ...] = ()  #: of a trajectory with its own times [s]
     #: Of a chunk: the iteration of the observation that it answers, when each row is due if the
-    #: actuators do not stand still, the iterations of its take-over, the first row that is played.
+    #: actuators do not stand still, the iterations of its take-over (None: those that its limits
+    #: need), the first row that is played.
     anchor: int | None = None
     due: tuple[int, ...] = ()
     ease: int | None = None
@@ -228,7 +229,7 @@ class EntryDecoder:
                 times=tuple(time * 1e-9 for time in native.row_times),
                 anchor=native.anchor if is_chunk else None,
                 due=tuple(native.anchor + due for due in native.due),
-                ease=native.ease if is_chunk else None,
+                ease=native.ease or None if is_chunk else None,
                 first=native.first if is_chunk else None,
                 fixed=native.fixed,
                 final=native.final,

@@ -1,23 +1,24 @@
 """Plans of chunks: the rows that are reached, and the places between them (docs/chunks.md)."""
 
 from collections import deque
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.words import Status
+from o80.rows.actuators import actuators_of
 from o80.rows.columns import Column, columns_of
 from o80.rows.history import History, values_of
 from o80.rows.journal import ENDS, JournalCommand, JournalEntry
 
 MOST_AHEAD = 20_000  # of the newest row [iterations]
 
-#: places and slopes [1/iteration], of (actuators,) or (iterations, actuators)
-Moment = tuple[NDArray[np.float64], NDArray[np.float64]]
+#: places, slopes [1/iteration] and curvatures, of (actuators,) or (iterations, actuators)
+Moment = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class ChunkRows:
 
     anchor: int
     due: NDArray[np.int64]  #: iterations after the anchor
-    ease: int
+    ease: int  #: iterations of the take-over; 0: those that the loop chooses
     first: int
     rows: NDArray[np.float64]  #: (rows, actuators)
 
@@ -38,7 +39,6 @@ class Decision:
     shift: int
     begins: int
     late: int
-    row: int  #: the first that is reached
     stood: bool
 
 
@@ -47,48 +47,99 @@ def decide(sent: ChunkRows, taken: int, shift: int, stood: bool) -> Decision:
     anchor = sent.anchor + shift
     first = 0 if stood else sent.first
     begins = max(taken, anchor + (int(sent.due[first - 1]) if first else 0) + 1)
-    late = int(np.searchsorted(sent.due, taken - anchor))
-    row = int(np.searchsorted(sent.due, begins + sent.ease - 1 - anchor))
-    return Decision(shift, begins, late, min(row, len(sent.due) - 1), stood)
+    return Decision(shift, begins, int(np.searchsorted(sent.due, taken - anchor)), stood)
+
+
+class NumberLimits(NamedTuple):
+    """Limits of one number, as the loop has them."""
+
+    low: float
+    high: float
+    rates: tuple[float, float, float]  #: of speed, acceleration and jerk, per iteration
+
+
+def limits_of(schema: dict[str, Any], actuator: int, number: int, kind: Any) -> NumberLimits:
+    """The limits of a number of an actuator's state, which is of this type."""
+    limits = actuators_of(schema)[actuator].numbers[number].limits
+    period = schema["period"] / 1e9
+    low, high = _range_of(np.dtype(kind))
+    rates = (
+        limits.speed * period,
+        limits.acceleration * period * period,
+        limits.jerk * period * period * period,
+    )
+    return NumberLimits(max(limits.minimum, low), min(limits.maximum, high), rates)
+
+
+def _range_of(kind: np.dtype[Any]) -> tuple[float, float]:
+    if kind.kind not in "fiu":
+        return 0.0, 1.0
+    numbers = np.finfo(kind) if kind.kind == "f" else np.iinfo(kind)
+    return float(numbers.min), float(numbers.max)
 
 
 class ChunkWay:
     """The way of a chunk from its begin to its last row.
 
-    switches: its numbers are not interpolated: rows are held.
+    limits: of each number. switches: its numbers are not interpolated: rows are held.
     """
 
     def __init__(
-        self, sent: ChunkRows, decision: Decision, profile: str, switches: bool = False
+        self,
+        sent: ChunkRows,
+        decision: Decision,
+        profile: str,
+        limits: Sequence[NumberLimits],
+        switches: bool = False,
     ) -> None:
         self.begins = decision.begins
-        ends = sent.due + (sent.anchor + decision.shift - self.begins + 1)
-        last = max(int(ends[-1]), sent.ease if decision.row == len(ends) - 1 else 1)
-        row = int(np.searchsorted(ends, 1)) if switches else decision.row
+        self.rows = sent.rows
+        self._limits = limits
+        self._sent = sent
+        self._switches = switches
         self._profile = "hold" if switches else profile
-        self.rows = sent.rows[min(row, len(ends) - 1) :]
+        self._begins = self.begins - sent.anchor - decision.shift  # iterations after the anchor
         # the last iteration of the way to each row, counted from the begin
-        self._ends = ends[-len(self.rows) :]
-        self._ends[0] = max(int(self._ends[0]), 1)
+        self._ends = sent.due - self._begins + 1
+        last = int(self._ends[-1])
+        if sent.ease and self._first_row(None) == len(sent.rows) - 1:
+            last = max(last, sent.ease)
         self._ends[-1] = last
         self.last = self.begins + last - 1
 
-    def places(self, start: Moment, most: int | None = None) -> Moment:
-        """Places and slopes (iterations, actuators) from its begin to its last row, at most so
-        many.
+    def _first_row(self, start: Moment | None) -> int:
+        """The first row that is reached: by a given `ease`, or from `start`."""
+        starts = [] if start is None else np.array(start, np.float64).T.tolist()
+        rows, rates = self.rows.T.tolist(), [each.rates for each in self._limits]
+        due = self._sent.due.tolist()
+        row: int = _core.first_row(due, self._begins, self._sent.ease, starts, rows, rates)
+        return row
+
+    def places(self, start: Moment, most: int | None = None, row: int | None = None) -> Moment:
+        """Places and derivatives (iterations, actuators) from its begin to its last row, at most
+        so many.
+
+        start: of the iteration before. row: the first that is reached, if that is known.
         """
-        ends = self._ends.tolist()
+        if self._switches:
+            row = min(int(np.searchsorted(self._ends, 1)), len(self.rows) - 1)
+        elif row is None:
+            row = self._first_row(start)
+        ends = np.maximum(self._ends[row:], 1).tolist()
         shape = len(self.rows.T), ends[-1] if most is None else min(most, ends[-1])
         plans = [
-            _core.plan_of_rows(place, slope, rows, ends, self._profile, shape[1])
-            for place, slope, rows in zip(
-                *(each.tolist() for each in start), self.rows.T.tolist(), strict=True
+            _core.plan_of_rows(moment, rows, ends, self._profile, shape[1], limit.low, limit.high)
+            for moment, rows, limit in zip(
+                np.array(start, np.float64).T.tolist(),
+                self.rows[row:].T.tolist(),
+                self._limits,
+                strict=True,
             )
         ]
-        places, slopes = (
-            np.frombuffer(b"".join(each[i] for each in plans)).reshape(shape).T for i in (0, 1)
+        places, slopes, curvatures = (
+            np.frombuffer(b"".join(each[i] for each in plans)).reshape(shape).T for i in range(3)
         )
-        return places, slopes
+        return places, slopes, curvatures
 
 
 class Planned(NamedTuple):
@@ -96,7 +147,7 @@ class Planned(NamedTuple):
 
     begins: int  #: the first iteration
     places: NDArray[np.float64]  #: (iterations,)
-    slopes: NDArray[np.float64]  #: (iterations,) [1/iteration]
+    derivatives: NDArray[np.float64]  #: (2, iterations): slopes [1/iteration] and curvatures
 
 
 class ChunkEntries:
@@ -124,8 +175,8 @@ def planned_by_chunks(
     """The plans of the chunks that began in these rows, by number: "elbow", "elbow.position".
 
     They begin where the plan of the chunk before them was if that was in force, else at the desired
-    state, with its speed. Chunks whose begin or the row before it is not there are left out, and
-    iterations far ahead of the newest row.
+    state, with its differences. Chunks whose begin or the row before it is not there are left out,
+    and iterations far ahead of the newest row.
     """
     found: dict[str, list[Planned]] = {}
     iterations = history.iteration
@@ -133,6 +184,7 @@ def planned_by_chunks(
         return found
     columns = {each.name: each for each in columns_of(history.schema)}
     latest = int(iterations[-1]) + MOST_AHEAD
+    place_of = _places_of(history.schema)
     waiting: dict[tuple[int | None, int | None], tuple[JournalEntry, JournalCommand]] = {}
     numbers: dict[tuple[int | None, int | None], list[str]] = {}
     ends: dict[str, tuple[int, Status | None]] = {}  # of the last chunk of each number
@@ -151,33 +203,64 @@ def planned_by_chunks(
             if place >= len(iterations) or iterations[place] != begins - 1:
                 continue
             shift = _shift(taken, command, history)
-            numbers[key] = []
-            for number, rows in _numbers(command):
-                column = columns.get(f"desired.{number}")
-                if column is None:
+            given = [each for each in _numbers(command) if f"desired.{each[0]}" in columns]
+            numbers[key] = [number for number, _ in given]
+            for switches in (False, True):
+                alike = [each for each in given if (each[1].dtype.kind == "b") == switches]
+                starts: list[Moment] = []
+                for number, _ in alike:
+                    before = found.setdefault(number, [])[-1:]
+                    start = _start(before, ends.pop(number, None), begins)
+                    if start is None:
+                        start = _desired(history, columns[f"desired.{number}"], place, command)
+                    starts.append(start)
+                if not starts:
                     continue
-                way = _way(taken, command, rows, shift, begins)
-                before = found.setdefault(number, [])
-                start = _start(before[-1:], ends.pop(number, None), begins)
-                if start is None:
-                    start = _desired(history, column, place, command)
-                places, slopes = way.places(start, latest - begins)
-                before.append(Planned(begins, places[:, 0], slopes[:, 0]))
-                numbers[key].append(number)
+                limits = [
+                    limits_of(history.schema, *place_of[number], rows.dtype)
+                    for number, rows in alike
+                ]
+                values = np.stack([rows for _, rows in alike], axis=1).astype(np.float64)
+                way = _way(taken, command, values, shift, begins, limits, switches)
+                at = tuple(np.concatenate(each) for each in zip(*starts, strict=True))
+                plan = way.places(cast("Moment", at), latest - begins)
+                for i, (number, _) in enumerate(alike):
+                    places, *derivatives = (each[:, i] for each in plan)
+                    found[number].append(Planned(begins, places, np.array(derivatives)))
     return found
 
 
 def _way(
-    taken: JournalEntry, command: JournalCommand, rows: NDArray[Any], shift: int, begins: int
+    taken: JournalEntry,
+    command: JournalCommand,
+    rows: NDArray[np.float64],
+    shift: int,
+    begins: int,
+    limits: list[NumberLimits],
+    switches: bool,
 ) -> ChunkWay:
     anchor = command.anchor or 0
     due = np.array(command.due, np.int64) - anchor
-    values = rows[:, None].astype(np.float64)
-    sent = ChunkRows(anchor, due, command.ease or 1, command.first or 0, values)
+    ease = 1 if command.profile == "hold" else command.ease or 0
+    sent = ChunkRows(anchor, due, ease, command.first or 0, rows)
     decision = decide(sent, taken.iteration, shift, stood=shift > 0)
     if decision.begins != begins:  # it had a prefix that did not count: the actuators stood
         decision = decide(sent, taken.iteration, shift, stood=True)
-    return ChunkWay(sent, decision, command.profile, rows.dtype.kind != "f")
+    return ChunkWay(sent, decision, command.profile, limits, switches)
+
+
+def _places_of(schema: dict[str, Any]) -> dict[str, tuple[int, int]]:
+    """Index of the actuator and of the number in its state, by name of the number."""
+    return {
+        f"{each.name or each.index}.{number.name}"
+        if number.name
+        else each.name or str(each.index): (
+            each.index,
+            place,
+        )
+        for each in actuators_of(schema)
+        for place, number in enumerate(each.numbers)
+    }
 
 
 def _indices(history: History, command: JournalCommand) -> list[int]:
@@ -215,12 +298,17 @@ def _start(
     at = begins - before[0].begins - 1
     if not 0 <= at < len(before[0].places):
         return None
-    return before[0].places[at : at + 1], before[0].slopes[at : at + 1]
+    slope, curvature = before[0].derivatives[:, at : at + 1]
+    return before[0].places[at : at + 1], slope, curvature
 
 
 def _desired(history: History, column: Column, place: int, command: JournalCommand) -> Moment:
-    """Where the number was in a row, and its speed; 0 if its actuator did not act there."""
+    """Where the number was in a row, and its differences; 0 if its actuator did not act there."""
     desired = np.asarray(values_of(history, column), np.float64)
-    acts = place > 0 and history.active[place, _indices(history, command)].any()
-    speed = desired[place] - desired[place - 1] if acts else 0.0
-    return desired[place : place + 1], np.array([speed])
+    acts = history.active[:, _indices(history, command)].any(axis=1)
+    speeds = [
+        desired[at] - desired[at - 1] if at > 0 and acts[at] else 0.0
+        for at in (place, max(0, place - 1))
+    ]
+    curvature = speeds[0] - speeds[1] if acts[place] else 0.0
+    return desired[place : place + 1], np.array([speeds[0]]), np.array([curvature])

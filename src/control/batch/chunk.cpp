@@ -93,7 +93,7 @@ void ChunkRows::join(Notes& notes) noexcept {
 
 bool is_sane(const ChunkHead& chunk) noexcept {
   return chunk.rows > 0 && chunk.rows <= kMaxChunkRows && chunk.first < chunk.rows &&
-         chunk.ease > 0 && chunk.ease <= kLatestDue && chunk.fixed <= 1 && chunk.reject_late <= 1 &&
+         chunk.ease <= kLatestDue && chunk.fixed <= 1 && chunk.reject_late <= 1 &&
          chunk.final <= 1 && chunk.anchor >= -static_cast<Iteration>(kLatestDue) &&
          chunk.anchor <= kMaxIterations;
 }
@@ -113,8 +113,6 @@ Reason judge(ChunkHead& chunk, const ChunkRows& rows, const ChunkSurroundings& a
   chunk.late = rows.first_due_from(at.now - anchor);
   if (chunk.late == chunk.rows) return Reason::late;
   if (chunk.reject_late != 0 && !stood && chunk.late > first) return Reason::late;
-  const std::int64_t ease = at.eases ? chunk.ease : 1;
-  chunk.row = std::min(rows.first_due_from(chunk.begins + ease - 1 - anchor), chunk.rows - 1);
   const std::int64_t ahead = anchor + rows.due(chunk.rows - 1) - at.now;
   return ahead > kLatestDue ? Reason::invalid : Reason::none;
 }

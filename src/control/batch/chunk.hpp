@@ -1,6 +1,8 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 
@@ -23,13 +25,13 @@ struct ChunkHead {
   Iteration anchor = 0;
   std::uint64_t plan = 0;  // of one plan of a lane, an older anchor is rejected
   std::uint32_t rows = 0;
-  std::uint32_t ease = 1;   // iterations of the take-over
+  std::uint32_t ease = 1;   // iterations of the take-over; 0: those that first_row() chooses
   std::uint32_t first = 0;  // rows before it are not played
   std::uint8_t fixed = 0;
   std::uint8_t reject_late = 0;
   std::uint8_t stood = 0;  // by judge(): whether its actuators stood still
   std::uint8_t final = 0;  // the last chunk of its plan; by a record close_plan too
-  // for the backend, by judge(); values from a frontend are ignored
+  // for the backend, by judge() and first_row(); values from a frontend are ignored
   std::int64_t shift = 0;  // rows are due so much later, because the actuators stood still
   Iteration begins = 0;
   std::uint32_t late = 0;  // rows that were due before it was taken
@@ -196,7 +198,6 @@ struct ChunkSurroundings {
   Iteration now = 0;          // the iteration that takes it
   Iteration acted_last = -1;  // the last one in which any of them had a command or braked
   bool stand = false;         // none of them has a command, and no chunk waits
-  bool eases = true;          // false: rows are held
 };
 /// What the active status of its batch tells of a chunk that was taken: the shift in its delay and
 /// in 6 bits of its detail. A bit tells this status from the one before, of the batch alone.
@@ -218,7 +219,60 @@ struct TakenChunk {
  private:
   static constexpr std::uint8_t kIsTaken = 0x40;
 };
-/// Decides when a chunk begins and with which row; Reason::late if all its rows are, or if its
+/// What the status of the end of its batch tells of a chunk that has begun, in 16 bits of the delay
+/// and 7 of the detail.
+struct BegunChunk {
+  static constexpr std::int64_t kMostNeeded = 4095;
+
+  std::uint32_t row = 0;    // the first row that is reached
+  std::int64_t needed = 0;  // iterations that limits need for the take-over, if it has fewer
+
+  std::uint8_t detail() const noexcept { return static_cast<std::uint8_t>(packed() >> 16 | 0x80); }
+  std::uint16_t late() const noexcept { return static_cast<std::uint16_t>(packed()); }
+  /// Nothing if it has not begun yet.
+  static std::optional<BegunChunk> of(std::uint8_t detail, std::int64_t late) noexcept {
+    if ((detail & 0x80) == 0) return std::nullopt;
+    const std::uint32_t packed = (detail & 0x7FU) << 16 | static_cast<std::uint32_t>(late);
+    return BegunChunk{packed % kMaxChunkRows, packed / kMaxChunkRows};
+  }
+
+ private:
+  std::uint32_t packed() const noexcept {
+    return static_cast<std::uint32_t>(std::min(needed, kMostNeeded)) * kMaxChunkRows + row;
+  }
+};
+static_assert(kMaxChunkRows * (BegunChunk::kMostNeeded + 1) == 1 << 23);
+
+/// The row to which a chunk takes over when it begins, so many iterations after its anchor. `ease`:
+/// iterations of the take-over; 0: those that limits need, at least a step and at most half of
+/// those that are ahead. `needed(row, n)`: how many limits need to a row that is n iterations away.
+template <class Rows, class Needed>
+BegunChunk first_row(const Rows& rows, std::int64_t begins, std::int64_t ease,
+                     Needed&& needed) noexcept {
+  const std::uint32_t last = rows.count() - 1;
+  const auto row_from = [&](std::int64_t iterations) {
+    return std::min(rows.first_due_from(begins + iterations - 1), last);
+  };
+  const auto way = [&](std::uint32_t row) {
+    return std::max<std::int64_t>(1, std::int64_t{rows.due(row)} - begins + 1);
+  };
+  const auto whole = [](double iterations) {
+    return static_cast<std::int64_t>(std::ceil(std::min(iterations, double{kLatestDue})));
+  };
+  std::int64_t fewest = 0;
+  if (ease == 0) {
+    const std::int64_t step = last == 0 ? 1 : (rows.due(last) - rows.due(0) + last - 1) / last;
+    const std::uint32_t row = row_from(step);
+    fewest = std::max(step, whole(needed(row, way(row))));
+    ease = std::clamp<std::int64_t>(fewest, 1, std::max<std::int64_t>(1, way(last) / 2));
+  }
+  const std::uint32_t row = row_from(ease);
+  const std::int64_t has = std::max(way(row), ease);
+  if (fewest == 0) fewest = whole(needed(row, has));
+  return {row, fewest > has ? fewest : 0};
+}
+
+/// Decides when a chunk begins; Reason::late if all its rows are, or if its
 /// actuators stood still for too long after its anchor to tell the shift.
 Reason judge(ChunkHead& chunk, const ChunkRows& rows, const ChunkSurroundings& at) noexcept;
 

@@ -24,7 +24,7 @@ std::string_view to_text(Pace pace) noexcept {
 }
 
 std::string_view to_text(Profile profile) noexcept {
-  return text_of(profile, {"linear", "minimum_jerk", "as_sent", "cubic", "hold"});
+  return text_of(profile, {"linear", "minimum_jerk", "as_sent", "monotone", "hold", "smooth"});
 }
 
 std::string_view to_text(Start start) noexcept { return text_of(start, {"desired", "observed"}); }

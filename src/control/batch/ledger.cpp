@@ -91,7 +91,7 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
   taken.last_end = std::max(taken.last_end, iteration);
   if (--taken.open > 0) return;
 
-  Outcome outcome{taken.end};
+  Outcome outcome{taken.end, Reason::none, taken.of_chunk, taken.late_of_chunk};
   if (taken.end == Status::rejected) outcome = {taken.end, taken.reason, taken.detail};
   tell(taken.lane, taken.id + 1, outcome, taken.last_end, StatusChange::Of::batch_end);
   sink_.freed(taken.lane, 1 + taken.spare.blocks);

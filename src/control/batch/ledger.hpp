@@ -56,6 +56,14 @@ class Ledger {
     tell(of.lane, of.id, {Status::active, Reason::none, chunk.detail(), chunk.shift & 0xFFFF},
          iteration, StatusChange::Of::chunk);
   }
+  /// Tells what was decided when it begins, by the status of the end of its batch (BegunChunk).
+  void note_begun(BlockIndex record, const BegunChunk& chunk, Iteration iteration) noexcept {
+    TakenBatch& of = batch(pool_.head(record).own[Own::kBatch]);
+    of.of_chunk = chunk.detail();
+    of.late_of_chunk = chunk.late();
+    tell(of.lane, of.id + 1, {Status::active, Reason::none, of.of_chunk, of.late_of_chunk},
+         iteration, StatusChange::Of::chunk);
+  }
   /// A record has ended; reported at once. A group is reported when its last member has ended, with
   /// the first end status that is not completed.
   void end(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept;
@@ -95,6 +103,8 @@ class Ledger {
     std::uint32_t lane = 0;
     BlockChain spare;
     Status reported_as = Status::rejected;  // end status of the records without blocks
+    std::uint8_t of_chunk = 0;              // BegunChunk
+    std::uint16_t late_of_chunk = 0;
   };
   static_assert(sizeof(TakenBatch) <= kBlockBytes);
   /// A list of records with a common end.

@@ -24,13 +24,13 @@ bool sane_pace(const RecordHead& head) noexcept {
 
 /// True if the profile suits the pace, and the other options too if that is `chunk`.
 bool sane_profile(const RecordHead& head) noexcept {
-  const bool is_of_rows = head.profile == Profile::cubic || head.profile == Profile::hold;
   if (is_chunk(head)) {
-    return head.kind == RecordKind::member && (is_of_rows || head.profile == Profile::linear) &&
+    return head.kind == RecordKind::member &&
+           (is_of_rows(head.profile) || head.profile == Profile::linear) &&
            head.mode == Mode::overwrite && head.start == Start::desired &&
            head.rows <= kMaxChunkRows;
   }
-  if (is_of_rows) return head.pace == Pace::iterations || head.pace == Pace::duration;
+  if (is_of_rows(head.profile)) return head.pace == Pace::iterations || head.pace == Pace::duration;
   return head.profile != Profile::as_sent || (head.pace == Pace::direct && head.rows == 1);
 }
 
@@ -87,7 +87,7 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
                                                 Progress& progress) noexcept {
   const bool of_chunk = is_chunk(head);
   const bool is_known = head.mode <= Mode::overwrite && head.pace <= Pace::chunk &&
-                        head.profile <= Profile::hold && head.start <= Start::observed &&
+                        head.profile <= Profile::smooth && head.start <= Start::observed &&
                         head.masked <= 1;
   if (head.actuator >= targets_.actuators() || head.rows == 0 || !is_known || !sane_pace(head) ||
       !sane_profile(head)) {

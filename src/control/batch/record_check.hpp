@@ -21,7 +21,7 @@ inline bool is_timed(const RecordHead& head) noexcept {
 inline bool plays_rows(const RecordHead& head) noexcept {
   const bool in_lines = head.profile == Profile::linear && head.rows > 1 &&
                         head.pace != Pace::direct && head.pace != Pace::fastest;
-  return in_lines || head.profile == Profile::cubic || head.profile == Profile::hold;
+  return in_lines || is_of_rows(head.profile);
 }
 /// For a timed one: stores the position of its first row in `amount`, which it does not use.
 inline void note_rows(RecordHead& head, const Cursor& rows) noexcept {

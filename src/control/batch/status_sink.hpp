@@ -17,7 +17,8 @@ struct Outcome {
 /// A change of the status of a record or a batch.
 struct StatusChange {
   /// batch: it was taken or rejected; batch_end: its last record has ended; of_rejected: a record
-  /// that ends because its whole batch was rejected; chunk: of its batch, again (TakenChunk).
+  /// that ends because its whole batch was rejected; chunk: of its batch, or of the
+  /// end of that, again (TakenChunk, BegunChunk).
   enum class Of : std::uint8_t { record, batch, batch_end, of_rejected, chunk };
 
   std::uint32_t lane = 0;

@@ -85,6 +85,8 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   is_row_ = course.is_row;
   next_row_ = course.next;
   next_iterations_ = course.next_iterations;
+  is_first_row_ = course.is_first;
+  row_after_ = course.after;
   const bool first_row = std::exchange(begun_, false);
   // a row begins at the row before it
   if (first_row || !is_row_) layout_.copy(from(), desired);
@@ -111,7 +113,7 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
     const double start =
         at_published ? layout_.number(each.number, from()) : each.motion.position();
     if (is_row_) {
-      if (observed != nullptr || !each.motion.is_planned()) each.motion.stand(start, 0.0, false);
+      if (observed != nullptr || !each.motion.is_planned()) each.motion.stand({start}, false);
       continue;
     }
     Requested requested = course;
@@ -134,9 +136,12 @@ void Motion::to_row(Number& number, std::int64_t iterations) noexcept {
   const double row = layout_.number(number.number, target());
   if (profile_ == Profile::hold) return number.motion.jump_on(row);
   if (profile_ == Profile::linear) return number.motion.line_on(row, iterations);
-  const bool is_last = next_iterations_ == 0;
-  number.motion.curve_on(row, iterations, is_last ? row : layout_.number(number.number, next_row_),
-                         next_iterations_);
+  RowsAhead ahead;
+  if (next_iterations_ > 0) {
+    ahead = {layout_.number(number.number, next_row_), next_iterations_, is_first_row_};
+    ahead.after = row_after_ == nullptr ? ahead.next : layout_.number(number.number, row_after_);
+  }
+  number.motion.curve_on(profile_, row, iterations, ahead);
 }
 
 /// Types that blend by themselves: by the share of the time, from rest to rest.

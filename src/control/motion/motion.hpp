@@ -38,6 +38,8 @@ class Motion {
     bool is_row = false;      // it is followed; the row after it, so many iterations later
     const std::byte* next = nullptr;
     std::int64_t next_iterations = 0;  // 0: it is the last row
+    bool is_first = false;             // the first row that is reached; the row after the next one
+    const std::byte* after = nullptr;  // null: there is none
   };
 
   /// The target of the next propose(); fill it before. Numbers of `mask` (null: all) move to it.
@@ -103,6 +105,18 @@ class Motion {
     for (Number& each : numbers_) {
       if (each.is_commanded) each.motion.widen(layout_.number(each.number, row));
     }
+  }
+  /// Iterations that a take-over to this row needs for its limits, if it is due in `iterations`.
+  double iterations_to_take_over(const std::byte* row, double iterations,
+                                 const std::uint64_t* mask) const noexcept {
+    double most = 0.0;
+    for (const Number& each : numbers_) {
+      if (!masked(mask, each.number)) continue;
+      most = std::max(
+          most, o80::iterations_to_take_over(each.motion.moment(), layout_.number(each.number, row),
+                                             iterations, each.motion.guard().rates()));
+    }
+    return most;
   }
   /// True if what settle() planned last is the way to a row, and a limit can keep it from there.
   bool follows_rows() const noexcept {
@@ -255,8 +269,11 @@ class Motion {
   const std::byte* observed_ = nullptr;
   bool has_integrals_ = false;
   bool is_row_ = false;
-  const std::byte* next_row_ = nullptr;  // as in Course
+  // as in Course
+  const std::byte* next_row_ = nullptr;
   std::int64_t next_iterations_ = 0;
+  bool is_first_row_ = false;
+  const std::byte* row_after_ = nullptr;
   bool begun_ = false;  // the next row begins a command
   std::int64_t requested_by_speed_ = 1;
   Limited slowest_;

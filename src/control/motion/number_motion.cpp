@@ -66,6 +66,9 @@ Limit NumberMotion::step(double low, double high) noexcept {
     if (!follows_ && guard_.pass(wanted)) return;
     follows_ = true;
     limit = leave() ? Limit::acceleration : guard_.follow(wanted);
+    // the range of a kind is no limit
+    if (limit == Limit::none && plan_.is_held() && wanted > low && wanted < high)
+      limit = wanted >= guard_.maximum() ? Limit::maximum : Limit::minimum;
   });
   return bound != Limit::none ? bound : limit;
 }

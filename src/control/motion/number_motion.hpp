@@ -76,16 +76,20 @@ class NumberMotion {
   /// motion of this number.
   void take_over() noexcept {
     const bool goes_on = planned_ && of_rows_;
-    const double place = goes_on ? plan_.place() : guard_.position();
-    const double slope = goes_on ? plan_.slope() : rests_ ? 0.0 : guard_.moment().speed;
+    const Moment from = moment();
     begin();
-    stand(place, slope, goes_on);
+    stand(from, goes_on);
   }
-  /// Or they begin at this place.
-  void stand(double place, double slope, bool goes_on) noexcept {
-    plan_.stand(place, slope);
+  /// Where they would begin.
+  Moment moment() const noexcept {
+    if (planned_ && of_rows_) return plan_.moment();
+    return rests_ ? Moment{guard_.position()} : guard_.moment();
+  }
+  /// Or they begin here.
+  void stand(const Moment& from, bool goes_on) noexcept {
+    plan_.stand(from);
     Span span = guard_.stop();
-    span.include(place);
+    span.include(from.position);
     goes_on ? guard_.reach(span) : guard_.begin(span);
     planned_ = follows_ = of_rows_ = true;
   }
@@ -95,15 +99,21 @@ class NumberMotion {
     plan_.line_on(target, iterations);
     guard_.widen(target);
   }
-  void curve_on(double target, std::int64_t iterations, double next,
-                std::int64_t next_iterations) noexcept {
-    plan_.curve_on(target, iterations, next, next_iterations);
-    widen(plan_.hull().low);
-    widen(plan_.hull().high);
+  void curve_on(Profile profile, double target, std::int64_t iterations,
+                const RowsAhead& ahead) noexcept {
+    const Span reach =
+        plan_.curve_on(profile, target, iterations, ahead, {guard_.minimum(), guard_.maximum()});
+    // the shortest stop from a place before a turning point ends behind it
+    const double turn =
+        std::min(ahead.iterations > 0 ? plan_.turn() : 0.0, guard_.rates().acceleration);
+    const double ramp = turn / guard_.rates().jerk;
+    const double room = turn > 0.0 ? turn * (1.0 + ramp * ramp / 24.0) : 0.0;
+    widen(reach.low - room);
+    widen(reach.high + room);
   }
   /// To the row in the first of its iterations.
   void jump_on(double target) noexcept {
-    plan_.line(target, target);
+    plan_.hold_on(target);
     guard_.widen(target);
   }
   /// Goes to the target within the limits, whatever they keep it from (Profile::as_sent).

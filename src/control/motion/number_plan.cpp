@@ -24,6 +24,30 @@ double slope_at(double before, double iterations, double place, double next_iter
   return std::isfinite(slope) ? std::copysign(slope, a) : 0.0;
 }
 
+double limited(double value, double most) noexcept {
+  return std::isfinite(value) ? std::clamp(value, -most, most) : 0.0;
+}
+
+/// Slope and curvature of a smooth curve at a row: those of the parabola through the place before
+/// it, so many iterations ago, the row, and the next one. They are bounded, because the places may
+/// be far apart in time on one side only.
+void bend_at(Moment& row, double way, double iterations, const RowsAhead& ahead) noexcept {
+  if (ahead.iterations == 0) return;  // it rests at the last row
+  const auto behind = static_cast<double>(ahead.iterations);
+  const double both = iterations + behind;
+  const double next_way = ahead.next - row.position;
+  const double before = way / iterations;
+  const double after = next_way / behind;
+  const double slope = before * (behind / both) + after * (iterations / both);
+  const double curvature = 2.0 * (after - before) / both;
+  // the way to the first row is as long as the take-over
+  const double other = ahead.is_first ? ahead.after - ahead.next : way;
+  const double step = std::max(std::abs(next_way), std::abs(other));
+  const double time = ahead.is_first ? behind : std::max(iterations, behind);
+  row.speed = limited(slope, 2.0 * step / time);
+  row.acceleration = limited(curvature, 4.0 * step / (time * time));
+}
+
 /// The fraction `share` between `from` and `to`, never outside, despite rounding and overflow.
 double between(double from, double to, double share) noexcept {
   const double distance = to - from;
@@ -181,17 +205,19 @@ double NumberPlan::at(std::int64_t done) const noexcept {
     case Shape::stop_first:
       return done <= stop_ ? to_stop_.position(i)
                            : smooth_.position(static_cast<double>(done - stop_));
-    case Shape::curve: {
+    case Shape::monotone: {
       // in the basis of Hermite; where a sum overflows, a straight line
       const double rest = 1.0 - share;
       const double n = static_cast<double>(iterations_);
-      const double place = from_.place * ((1.0 + 2.0 * share) * rest * rest) +
-                           to_.place * (share * share * (3.0 - 2.0 * share)) +
-                           from_.slope * (n * share * rest * rest) -
-                           to_.slope * (n * share * share * rest);
-      return std::clamp(std::isfinite(place) ? place : between(from_.place, to_.place, share),
+      const double place = from_.position * ((1.0 + 2.0 * share) * rest * rest) +
+                           to_.position * (share * share * (3.0 - 2.0 * share)) +
+                           from_.speed * (n * share * rest * rest) -
+                           to_.speed * (n * share * share * rest);
+      return std::clamp(std::isfinite(place) ? place : between(from_.position, to_.position, share),
                         hull_.low, hull_.high);
     }
+    case Shape::curve:
+      return std::clamp(curve_at(share), hull_.low, hull_.high);
     case Shape::line:
     case Shape::fastest:
       break;
@@ -199,31 +225,118 @@ double NumberPlan::at(std::int64_t done) const noexcept {
   return between(task_.line_start, task_.target, share);
 }
 
-void NumberPlan::curve_on(double target, std::int64_t iterations, double next,
-                          std::int64_t next_iterations) noexcept {
-  from_ = {place(), slope()};
-  line(from_.place, target);
+Span NumberPlan::curve_on(Profile profile, double target, std::int64_t iterations,
+                          const RowsAhead& ahead, const Span& bounds) noexcept {
+  from_ = moment();
+  line(from_.position, target);
   line_for(iterations);
-  shape_ = Shape::curve;
-  const auto n = static_cast<double>(iterations);
-  to_ = {target, 0.0};
-  if (next_iterations > 0)
-    to_.slope = slope_at(from_.place, n, target, static_cast<double>(next_iterations), next);
-  const double bend = from_.place + n * from_.slope / 3.0;
-  hull_ = {target, target};
-  hull_.include(from_.place);
-  if (std::isfinite(bend)) hull_.include(bend);
+  to_ = {target};
+  cut_ = false;
+  const bool is_monotone = profile == Profile::monotone;
+  shape_ = is_monotone ? Shape::monotone : Shape::curve;
+  return is_monotone ? monotone_on(ahead) : smooth_on(ahead, bounds);
 }
 
-double NumberPlan::slope() const noexcept {
-  if (shape_ != Shape::curve || done_ >= iterations_) return done_ > iterations_ ? 0.0 : to_.slope;
-  const double share = static_cast<double>(done_) / static_cast<double>(iterations_);
+Span NumberPlan::monotone_on(const RowsAhead& ahead) noexcept {
+  const auto n = static_cast<double>(iterations_);
+  if (ahead.iterations > 0) {
+    to_.speed = slope_at(from_.position, n, to_.position, static_cast<double>(ahead.iterations),
+                         ahead.next);
+  }
+  const double bend = from_.position + n * from_.speed / 3.0;
+  hull_ = {to_.position, to_.position};
+  hull_.include(from_.position);
+  if (std::isfinite(bend)) hull_.include(bend);
+  return hull_;
+}
+
+/// The polynomial of degree 5 with place, slope and curvature of the plan before and of the row.
+Span NumberPlan::smooth_on(const RowsAhead& ahead, const Span& bounds) noexcept {
+  const auto n = static_cast<double>(iterations_);
+  const double way = to_.position - from_.position;
+  const double most = 4.0 * (std::abs(way) + std::abs(from_.speed) * n) / (n * n);
+  from_.acceleration = limited(from_.acceleration, most);
+  bend_at(to_, way, n, ahead);
+
+  // its coefficients in the basis of Bernstein: it stays between them
+  hull_ = {to_.position, to_.position};
+  hull_.include(from_.position);
+  const auto include = [](Span& span, const Moment& knot, double time) {
+    const double first = knot.position + time / 5.0 * knot.speed;
+    const double second = first + time / 5.0 * knot.speed + time * time / 20.0 * knot.acceleration;
+    if (std::isfinite(first)) span.include(first);
+    if (std::isfinite(second)) span.include(second);
+  };
+  include(hull_, from_, n);
+  include(hull_, to_, -n);
+  Span reach = hull_;
+  if (ahead.iterations > 0) include(reach, to_, static_cast<double>(ahead.iterations));
+  Span allowed = bounds;
+  allowed.include(from_.position);
+  allowed.include(to_.position);
+  cut_ = hull_.low < allowed.low || hull_.high > allowed.high;
+  if (cut_) hull_ = {std::max(hull_.low, allowed.low), std::min(hull_.high, allowed.high)};
+
+  const double v0 = n * from_.speed;
+  const double v1 = n * to_.speed;
+  const double c0 = n * n / 2.0 * from_.acceleration;
+  const double c1 = n * n / 2.0 * to_.acceleration;
+  order_ = {v0, c0, 10.0 * way - 6.0 * v0 - 4.0 * v1 - 3.0 * c0 + c1,
+            -15.0 * way + 8.0 * v0 + 7.0 * v1 + 3.0 * c0 - 2.0 * c1,
+            6.0 * way - 3.0 * v0 - 3.0 * v1 - c0 + c1};
+  return reach;
+}
+
+/// The place at this share of a curve, where bounds do not hold it.
+double NumberPlan::curve_at(double share) const noexcept {
+  const auto& [a, b, c, d, e] = order_;
+  const double place =
+      from_.position + share * (a + share * (b + share * (c + share * (d + share * e))));
+  // where a sum overflows, a straight line
+  return std::isfinite(place) ? place : between(from_.position, to_.position, share);
+}
+
+bool NumberPlan::is_held() const noexcept {
+  if (!cut_ || shape_ != Shape::curve || done_ >= iterations_) return false;
+  const double place = curve_at(static_cast<double>(done_) / static_cast<double>(iterations_));
+  return place < hull_.low || place > hull_.high;
+}
+
+Moment NumberPlan::moment() const noexcept {
+  if (done_ > iterations_) return {task_.target};
+  if (done_ == iterations_) return {task_.target, to_.speed, to_.acceleration};
+  Moment now{at(done_), to_.speed};
   const double n = static_cast<double>(iterations_);
-  const double rest = 1.0 - share;
-  const double slope = (to_.place - from_.place) * (6.0 * share * rest / n) +
-                       from_.slope * (rest * (1.0 - 3.0 * share)) +
-                       to_.slope * (share * (3.0 * share - 2.0));
-  return std::isfinite(slope) ? slope : 0.0;
+  const double share = static_cast<double>(done_) / n;
+  if (shape_ == Shape::monotone) {
+    const double rest = 1.0 - share;
+    const double way = to_.position - from_.position;
+    now.speed = way * (6.0 * share * rest / n) + from_.speed * (rest * (1.0 - 3.0 * share)) +
+                to_.speed * (share * (3.0 * share - 2.0));
+    now.acceleration = (way / n * (6.0 - 12.0 * share) + from_.speed * (6.0 * share - 4.0) +
+                        to_.speed * (6.0 * share - 2.0)) /
+                       n;
+  }
+  if (shape_ == Shape::curve) {
+    const auto& [a, b, c, d, e] = order_;
+    now.speed =
+        (a + share * (2.0 * b + share * (3.0 * c + share * (4.0 * d + share * 5.0 * e)))) / n;
+    now.acceleration =
+        (2.0 * b + share * (6.0 * c + share * (12.0 * d + share * 20.0 * e))) / (n * n);
+  }
+  if (!std::isfinite(now.speed)) now.speed = 0.0;
+  if (!std::isfinite(now.acceleration)) now.acceleration = 0.0;
+  return now;
+}
+
+double iterations_to_take_over(const Moment& from, double row, double iterations,
+                               const Rates& rates) noexcept {
+  const double way = row - from.position - iterations * from.speed -
+                     iterations * iterations / 2.0 * from.acceleration;
+  constexpr double kFarthest = 1e300;  // finite below, too
+  const double d = std::isfinite(way) ? std::min(std::abs(way), kFarthest) : kFarthest;
+  return std::max({1.9 * d / rates.speed, std::sqrt(5.8 * d / rates.acceleration),
+                   std::cbrt(60.0 * d / rates.jerk)});
 }
 
 }  // namespace o80

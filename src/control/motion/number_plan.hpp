@@ -1,6 +1,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -38,6 +39,11 @@ inline constexpr std::int64_t kLongestPlan = std::int64_t{1} << 31;
 /// The iterations of a distance at a speed [1/iteration], at least 1. Rounding adds none.
 std::int64_t iterations_of(double distance, double speed) noexcept;
 
+/// Iterations in which a motion from here leads to a row, which is due in `iterations`, within
+/// these limits: about the fewest.
+double iterations_to_take_over(const Moment& from, double row, double iterations,
+                               const Rates& rates) noexcept;
+
 /// How a command asks for the target of one number.
 struct Requested {
   double target = 0.0;
@@ -46,6 +52,15 @@ struct Requested {
   std::int64_t iterations = 0;  // 0: as few as the limits allow
   double cruise = std::numeric_limits<double>::infinity();  // speed asked for [1/iteration]
   Profile profile = Profile::linear;
+};
+
+/// What comes after the row that a curve leads to.
+struct RowsAhead {
+  double next = 0.0;            // the next row,
+  std::int64_t iterations = 0;  // so many iterations after it; 0: there is none
+  // the row is the first one of a take-over. `after`: the row after the next one, if there is one
+  bool is_first = false;
+  double after = 0.0;
 };
 
 /// What a plan is for: one number, from its present motion to rest at a target.
@@ -81,28 +96,38 @@ class NumberPlan {
     done_ = 0;
   }
 
-  /// Rows of a chunk: the plan is at this place, with this slope [1/iteration].
-  void stand(double place, double slope) noexcept {
-    line(place, place);
+  /// Rows of a chunk: the plan is here, with these derivatives.
+  void stand(const Moment& from) noexcept {
+    line(from.position, from.position);
     done_ = iterations_;
-    to_.slope = slope;
+    to_ = from;
   }
-  /// Then to the next row on a straight line,
+  /// Then to the next row at once,
+  void hold_on(double target) noexcept {
+    line(target, target);
+    to_ = {target};
+  }
+  /// on a straight line,
   void line_on(double target, std::int64_t iterations) noexcept {
-    line(place(), target);
+    line(moment().position, target);
     line_for(iterations);
-    to_.slope = target / static_cast<double>(iterations) -
-                task_.line_start / static_cast<double>(iterations);
+    to_ = {target, target / static_cast<double>(iterations) -
+                       task_.line_start / static_cast<double>(iterations)};
   }
-  /// or on a cubic, from its slope to that at the row, which is 0 at the last row, and otherwise
-  /// that of Steffen: it does not overshoot. `next`: the row after that, so many iterations later.
-  void curve_on(double target, std::int64_t iterations, double next,
-                std::int64_t next_iterations) noexcept;
-  /// The place of the last iteration, and the slope there [1/iteration].
-  double place() const noexcept { return done_ >= iterations_ ? task_.target : at(done_); }
-  double slope() const noexcept;
-  /// Places between which the way to the row stays.
-  const Span& hull() const noexcept { return hull_; }
+  /// or on a curve (Profile::smooth or monotone, docs/chunks.md); at the last row it rests. Places
+  /// of a smooth one outside the bounds are set to them. Returns the places between which the way
+  /// to the row stays, and the begin of the way to the next one.
+  Span curve_on(Profile profile, double target, std::int64_t iterations, const RowsAhead& ahead,
+                const Span& bounds) noexcept;
+  /// The curvature where the way to a row turns around, if it does: the larger one at its ends.
+  double turn() const noexcept {
+    if (shape_ != Shape::curve || from_.speed * to_.speed > 0.0) return 0.0;
+    return std::max(std::abs(from_.acceleration), std::abs(to_.acceleration));
+  }
+  /// Place and derivatives of the curve in the last iteration.
+  Moment moment() const noexcept;
+  /// True if a bound holds the curve in the last iteration.
+  bool is_held() const noexcept;
 
   /// The position in the next iteration; from the last one on the exact target.
   double next() noexcept;
@@ -124,12 +149,11 @@ class NumberPlan {
   }
 
  private:
-  enum class Shape : std::uint8_t { line, smooth, stop_first, fastest, curve };
-  struct Knot {
-    double place = 0.0;
-    double slope = 0.0;  // [1/iteration]
-  };
+  enum class Shape : std::uint8_t { line, smooth, stop_first, fastest, monotone, curve };
 
+  Span monotone_on(const RowsAhead& ahead) noexcept;
+  Span smooth_on(const RowsAhead& ahead, const Span& bounds) noexcept;
+  double curve_at(double share) const noexcept;
   double at(std::int64_t done) const noexcept;
   std::int64_t fewest() noexcept;
   std::int64_t fewest_smooth(std::int64_t least) noexcept;
@@ -147,9 +171,13 @@ class NumberPlan {
   SmoothMotion to_stop_;
   SmoothMotion smooth_;
   FastestMotion fastest_;
-  Knot from_;  // of a row of a chunk
-  Knot to_;
-  Span hull_;
+  // of a row of a chunk: place and derivatives before and at it
+  Moment from_;
+  Moment to_;
+  Span hull_;         // the way to the row stays inside
+  bool cut_ = false;  // because of bounds
+  // of a curve: its derivatives at the begin and those of higher order, by the share of the way
+  std::array<double, 5> order_{};
 };
 
 }  // namespace o80

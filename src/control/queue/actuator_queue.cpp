@@ -29,7 +29,7 @@ ActuatorQueue::ActuatorQueue(const Schema& schema, const ActuatorRow& row,
       queue_(pool, lanes),
       mask_(layout.mask_words()),
       next_mask_(mask_.size()),
-      scratch_(2 * ((layout.size() + 7) / 8)) {}
+      scratch_(3 * ((layout.size() + 7) / 8)) {}
 
 void ActuatorQueue::drop(const Outcome& outcome, Iteration iteration) noexcept {
   const bool is_overwritten = outcome.status == Status::overwritten;
@@ -201,6 +201,19 @@ void ActuatorQueue::begin_chunk() noexcept {
   switch_row_ = motion_.has_switches() ? chunk().late : row_;
 }
 
+double ActuatorQueue::to_take_over(BlockIndex member, std::uint32_t row,
+                                   std::int64_t iterations) noexcept {
+  const RecordHead& head = pool_->head(member);
+  const std::uint64_t* mask = nullptr;
+  if (head.masked != 0) {
+    mask = next_mask_.data();
+    Cursor(*pool_, member, sizeof(RecordHead), head.payload_bytes)
+        .read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());
+  }
+  ChunkRows(*pool_, member, *layout_).cursor(row).read(scratch(), layout_->size());
+  return motion_.iterations_to_take_over(scratch(), static_cast<double>(iterations), mask);
+}
+
 /// Numbers that switch do not wait for the end of a take-over.
 void ActuatorQueue::switch_passed_rows(Iteration iteration) noexcept {
   const ChunkRows rows(*pool_, record_, *layout_);
@@ -327,7 +340,8 @@ Motion::Course ActuatorQueue::course(const RecordHead& head, Iteration iteration
                                        : carry_.iterations(head.amount);
       break;
   }
-  const bool is_curve = next.is_row && head.profile == Profile::cubic;
+  next.is_first = !begun_;
+  const bool is_curve = next.is_row && is_curved(head.profile);
   if (is_curve && rows_left_ > 0) look_ahead(next, head);
   return next;
 }
@@ -346,22 +360,24 @@ void ActuatorQueue::to_next_row(Motion::Course& course, Iteration iteration) noe
   if (rows_left_ > 0) course.next_iterations = rows.due(row + 1) - rows.due(row);
 }
 
-/// Reads the row after the next one, for the slope of a curve between them.
+/// Reads the rows after the next one, for the curve to it.
 void ActuatorQueue::look_ahead(Motion::Course& course, const RecordHead& head) noexcept {
-  std::byte* const next = scratch() + scratch_.size() / 2 * sizeof scratch_.front();
+  const std::size_t size = scratch_.size() / 3 * sizeof scratch_.front();
   Cursor rows = rows_;
   std::uint32_t left = rows_left_;
-  const auto read = [&] {
-    rows.read(next, layout_->size());
+  const auto read = [&](std::byte* row) {
+    rows.read(row, layout_->size());
     --left;
+    return row;
   };
-  read();
-  course.next = next;
+  course.next = read(scratch() + size);
   if (head.pace == Pace::iterations) course.next_iterations = course.iterations;
-  if (!is_timed(head)) return;
-  RowTimes times = times_;
-  DurationCarry carry = carry_;
-  course.next_iterations = times.next(carry, left, read);
+  if (is_timed(head)) {
+    RowTimes times = times_;
+    DurationCarry carry = carry_;
+    course.next_iterations = times.next(carry, left, [&] { read(scratch() + size); });
+  }
+  if (course.is_first && left > 0) course.after = read(scratch() + 2 * size);
 }
 
 /// Skips rows that end before the next iteration; the iterations of the first that does not.

@@ -98,6 +98,8 @@ class ActuatorQueue {
   void open_plan(std::uint32_t lane, const ChunkHead& chunk) noexcept {
     open_plan_ = {lane, chunk.final == 0, chunk.plan};
   }
+  /// Iterations that limits need for the take-over to a row of this chunk, due in `iterations`.
+  double to_take_over(BlockIndex member, std::uint32_t row, std::int64_t iterations) noexcept;
   static constexpr std::uint64_t kEveryPlan = 0;
   /// No chunk of this plan of a lane follows.
   void close_plan(std::uint32_t lane, std::uint64_t plan) noexcept {
@@ -334,7 +336,7 @@ class ActuatorQueue {
   std::uint32_t ahead_left_ = 0;
   std::vector<std::uint64_t> mask_;
   std::vector<std::uint64_t> next_mask_;
-  std::vector<std::uint64_t> scratch_;  // space for two states
+  std::vector<std::uint64_t> scratch_;  // space for three states
   Iteration acted_last_ = -1;
 };
 

@@ -277,7 +277,6 @@ Reason Controller::decide(const Taking& from, BlockIndex group, Iteration now) n
                (last.lane == from.lane && last.plan == chunk.plan && chunk.anchor < last.anchor);
     at.stand = at.stand && queue.empty();
     at.acted_last = std::max(at.acted_last, queue.acted_last());
-    at.eases = pool_.head(member).profile != Profile::hold;
   });
   for (const Waiting& each : waiting_) {
     each_member(each.group, [&](BlockIndex member) {
@@ -293,7 +292,29 @@ Reason Controller::decide(const Taking& from, BlockIndex group, Iteration now) n
   return reason == Reason::none && is_full ? Reason::full : reason;
 }
 
+/// The row to which a chunk that begins takes over.
+BegunChunk Controller::take_over(BlockIndex group, Iteration iteration) noexcept {
+  const ChunkHead& chunk = chunk_of(pool_, group);
+  const BlockIndex first = pool_.head(group).own[Own::kNext];
+  const RecordHead& head = pool_.head(first);
+  const ChunkRows rows(pool_, first, actuators_[head.actuator].layout());
+  const bool holds = head.profile == Profile::hold;
+  return first_row(rows, iteration - chunk.anchor - chunk.shift, holds ? 1 : chunk.ease,
+                   [&](std::uint32_t row, std::int64_t iterations) {
+                     double most = 0.0;
+                     each_member(group, [&](BlockIndex member) {
+                       ActuatorQueue& queue = actuators_[pool_.head(member).actuator];
+                       if (holds) return;
+                       most = std::max(most, queue.to_take_over(member, row, iterations));
+                     });
+                     return most;
+                   });
+}
+
 void Controller::begin_chunk(BlockIndex group, std::uint32_t lane, Iteration iteration) noexcept {
+  const BegunChunk begun = take_over(group, iteration);
+  chunk_of(pool_, group).row = begun.row;
+  ledger_.note_begun(group, begun, iteration);
   each_member(group, [&](BlockIndex member) {
     pool_.head(member).own[Own::kNext] = kNoBlock;
     const std::uint32_t actuator = pool_.head(member).actuator;

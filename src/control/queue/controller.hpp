@@ -259,6 +259,7 @@ class Controller {
   static constexpr std::uint32_t kEveryLane = 0xFFFFFFFF;
   void take_chunk(const Taking& from, BlockIndex group, BatchHandler& handler) noexcept;
   Reason decide(const Taking& from, BlockIndex group, Iteration now) noexcept;
+  BegunChunk take_over(BlockIndex group, Iteration iteration) noexcept;
   void begin_chunk(BlockIndex group, std::uint32_t lane, Iteration iteration) noexcept;
   /// Ends members of a chunk that has not begun, those with ends(actuator); false if none is left.
   template <class Ends>

@@ -183,6 +183,16 @@ std::optional<Batch::Shift> Batch::shift() const {
   return taken ? std::optional<Shift>({taken->shift, taken->stood}) : std::nullopt;
 }
 
+std::optional<Batch::TakeOver> Batch::take_over() const {
+  if (id_ == 0) return std::nullopt;
+  link_->segment.check_process();
+  const LaneSender::StatusAnswer answer = lane_->status(id_ + 1);
+  const auto status = static_cast<Status>(answer.word.status);
+  if (answer.known != LaneSender::Known::yes || status == Status::rejected) return std::nullopt;
+  const auto begun = BegunChunk::of(answer.word.detail, answer.late);
+  return begun ? std::optional<TakeOver>({begun->row, begun->needed}) : std::nullopt;
+}
+
 Iteration Batch::last_iteration() const {
   if (id_ == 0) return -1;
   const Handle handle = ask(id_ + 1);

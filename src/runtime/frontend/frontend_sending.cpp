@@ -108,7 +108,7 @@ void check_chunk(std::span<const std::uint32_t> due, const ChunkOptions& options
   const auto rows = static_cast<std::int64_t>(due.size());
   check("the number of rows of a chunk", rows, 1, kMaxChunkRows);
   check("first, whose row is the first that is played,", options.first, 0, rows - 1);
-  check("ease [iterations]", options.ease, 1, kLatestDue);
+  check("ease [iterations]", options.ease, 0, kLatestDue);
   check("the anchor", options.anchor, -std::int64_t{kLatestDue}, kMaxIterations);
   std::int64_t before = 0;
   for (std::size_t i = 0; i < due.size(); before = due[i++]) {
@@ -117,11 +117,8 @@ void check_chunk(std::span<const std::uint32_t> due, const ChunkOptions& options
                           std::to_string(i) + " is due " + std::to_string(due[i]) +
                           " iterations after it, the one before " + std::to_string(before));
   }
-  if (options.profile == Profile::cubic || options.profile == Profile::linear ||
-      options.profile == Profile::hold) {
-    return;
-  }
-  throw InvalidArgument("the profile of a chunk is cubic, linear or hold, got " +
+  if (is_of_rows(options.profile) || options.profile == Profile::linear) return;
+  throw InvalidArgument("the profile of a chunk is smooth, monotone, linear or hold, got " +
                         std::string(to_text(options.profile)));
 }
 
@@ -136,7 +133,7 @@ RecordHead UntypedFrontend::checked_command(std::uint32_t actuator,
   const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
   link_->command_check.targets(index, state, mask);
   check_options(options);
-  if (options.profile == Profile::cubic || options.profile == Profile::hold) {
+  if (options.profile && is_of_rows(*options.profile)) {
     throw InvalidArgument("the profile " + std::string(to_text(*options.profile)) +
                           " is for rows of targets, of a trajectory or a chunk");
   }
@@ -239,8 +236,8 @@ CommandOptions UntypedFrontend::checked_trajectory(std::uint32_t actuator, std::
     throw InvalidArgument("a trajectory at a duration needs the times of its rows");
   }
   const bool is_timed = paced.pace.pace == Pace::iterations || paced.pace.pace == Pace::duration;
-  if (!paced.profile) paced.profile = is_timed ? Profile::cubic : Profile::linear;
-  if (!is_timed && (paced.profile == Profile::cubic || paced.profile == Profile::hold)) {
+  if (!paced.profile) paced.profile = is_timed ? Profile::smooth : Profile::linear;
+  if (!is_timed && is_of_rows(*paced.profile)) {
     throw InvalidArgument("the profile " + std::string(to_text(*paced.profile)) +
                           " needs rows that are due in fixed iterations: give iterations or times");
   }

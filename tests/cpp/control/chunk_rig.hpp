@@ -52,7 +52,7 @@ class ChunkRig : public Rig {
   }
   /// Sends a chunk for the actuators, each with the same rows; returns the id of its record.
   CommandId chunk(const std::vector<double>& values, const std::vector<std::uint32_t>& due,
-                  const ChunkHead& head, Profile profile = Profile::cubic,
+                  const ChunkHead& head, Profile profile = Profile::smooth,
                   const std::vector<std::uint32_t>& actuators = {0}, std::uint32_t lane = 0) {
     const std::uint32_t place = add_chunk(values, due, head, profile, actuators);
     return record_id(pulse(lane), place);
@@ -74,7 +74,7 @@ class ChunkRig : public Rig {
     return batch.chunk(members, head, due, layouts);
   }
   /// One of the worked examples.
-  CommandId example(ChunkHead head, Profile profile = Profile::cubic) {
+  CommandId example(ChunkHead head, Profile profile = Profile::smooth) {
     if (head.anchor == 0) head.anchor = 100;
     return chunk(kRows, every(10, kRows.size()), head, profile);
   }

@@ -488,7 +488,9 @@ void Generator::add_trajectory(std::uint16_t actuator, std::uint32_t lane) {
   if (head.pace == Pace::iterations) head.amount = dice_.whole(0, 9);
   const bool is_due = head.pace == Pace::iterations || head.pace == Pace::duration;
   if (is_due && !linear_ && dice_.one_in(2))
-    head.profile = dice_.one_in(4) ? Profile::hold : Profile::cubic;
+    head.profile = dice_.one_in(4)   ? Profile::hold
+                   : dice_.one_in(3) ? Profile::monotone
+                                     : Profile::smooth;
   ScriptStep& step = add(Action::command);
   step.actuator = actuator;
   step.lane = lane;

@@ -94,6 +94,24 @@ long double SpanWatch::first_row(const ScriptStep& step) {
   return static_cast<long double>(end) * 1e-9L / kPeriod + 2.0L;
 }
 
+/// The most by which a smooth curve leaves its rows, and the way to the first one (docs/chunks.md).
+long double SpanWatch::excess_of(const ScriptWorld& world, const SentCommand& command,
+                                 std::size_t n, long double place, long double speed) {
+  const ScriptStep& step = world.step_of(command);
+  const long double first = world.target(command, 0, n);
+  long double largest = 0.0L;
+  for (std::size_t row = 1; row < world.rows_of(command); ++row) {
+    largest = std::max<long double>(
+        largest, std::fabs(world.target(command, row, n) - world.target(command, row - 1, n)));
+  }
+  const long double time = first_row(step);
+  // the slope at the first row is at most twice that of the larger step after it
+  const long double turn = 2.0L * largest * (step.head.pace == Pace::iterations ? 1.0L : time);
+  return std::max(
+      (largest + std::fabs(first - place)) / 2.0L,
+      0.3L * (std::max(std::fabs(first - place), largest) + std::fabs(speed) * time + turn));
+}
+
 void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken_over) {
   const SentCommand& command = *world.actuators[actuator].driver;
   const ScriptStep& step = world.step_of(command);
@@ -119,7 +137,7 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
       span.include(
           stops(number, place, rounding_of(world.script.actuators[actuator].numbers[n], place)));
       span.include(number.targets);
-      if (step.head.profile == Profile::cubic && world.names(command, n)) {
+      if (step.head.profile == Profile::monotone && world.names(command, n)) {
         const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
         const long double bend = seam_speed(world, actuator, number, spec) * first_row(step) / 3.0L;
         span.include(place - bend);
@@ -138,6 +156,13 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
       targets.include(load_as(spec.kind, bytes.data()));
     }
     span.include(targets);
+    if (step.head.profile == Profile::smooth && world.names(command, n)) {
+      const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
+      const long double seam = taken_over ? seam_speed(world, actuator, number, spec) : 0.0L;
+      const long double excess = excess_of(world, command, n, place, seam);
+      span.include(span.low - excess);
+      span.include(span.high + excess);
+    }
     number.span = span;
     number.targets = targets;
 

@@ -54,6 +54,8 @@ class SpanWatch {
   void plan(const ScriptWorld& world, std::size_t actuator);
   std::optional<Failure> takes_its_time(const ScriptWorld& world, std::size_t actuator) const;
   static long double first_row(const ScriptStep& step);
+  static long double excess_of(const ScriptWorld& world, const SentCommand& command, std::size_t n,
+                               long double place, long double speed);
   static long double seam_speed(const ScriptWorld& world, std::size_t actuator,
                                 const Number& number, const NumberSpec& spec);
   void begin(const ScriptWorld& world, std::size_t actuator, bool taken_over);

@@ -268,7 +268,7 @@ class Liar {
     for (std::vector<std::byte>& of_member : states) {
       RecordHead head;
       head.actuator = static_cast<std::uint16_t>(bytes.below(3));
-      head.profile = bytes.below(2) == 0 ? Profile::cubic : Profile::hold;
+      head.profile = bytes.below(2) == 0 ? Profile::smooth : Profile::hold;
       layouts.push_back(head.actuator < 2 ? &joint : &hand);
       // zeros are admitted, most other bytes are not
       of_member.resize(rows * layouts.back()->size());

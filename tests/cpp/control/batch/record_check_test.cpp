@@ -74,11 +74,11 @@ TEST(RecordCheck, EveryFieldOutOfItsRangeIsRefused) {
   EXPECT_TRUE(
       refused(direct(), [](RecordHead& h, double*) { h.profile = static_cast<Profile>(3); }));
   EXPECT_TRUE(refused(over(3), [](RecordHead& h, double*) { h.profile = Profile::as_sent; }));
-  EXPECT_FALSE(refused(over(3), [](RecordHead& h, double*) { h.profile = Profile::cubic; }));
-  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.profile = Profile::cubic; }));
+  EXPECT_FALSE(refused(over(3), [](RecordHead& h, double*) { h.profile = Profile::monotone; }));
+  EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.profile = Profile::monotone; }));
   EXPECT_TRUE(refused(at_speed(1.0), [](RecordHead& h, double*) { h.profile = Profile::hold; }));
   EXPECT_TRUE(
-      refused(over(3), [](RecordHead& h, double*) { h.profile = static_cast<Profile>(5); }));
+      refused(over(3), [](RecordHead& h, double*) { h.profile = static_cast<Profile>(6); }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.amount = -1; }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.start = static_cast<Start>(2); }));
   EXPECT_TRUE(refused(direct(), [](RecordHead& h, double*) { h.masked = 1; }));

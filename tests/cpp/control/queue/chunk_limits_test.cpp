@@ -69,6 +69,68 @@ TEST(ChunkLimits, RowsWithinBoundsWithATakeOverOutsideAreClampedAndReached) {
   EXPECT_EQ(rig.at(122), 0.3);
 }
 
+/// How far a motion goes past the rows of a chunk that it takes over to, a distance away.
+struct TakenOver {
+  double past = 0.0;
+  BegunChunk begun;
+};
+TakenOver take_over(double distance, std::uint32_t ease) {
+  ChunkRig rig(limited_robot(limits_of(5.0, 20.0, 2000.0)));
+  rig.run_to(100);
+  const CommandId id =
+      rig.chunk(std::vector<double>(60, distance), every(10, 60), {.anchor = 99, .ease = ease});
+  TakenOver found;
+  while (rig.next < 2000) {
+    rig.run_to(rig.next + 1);
+    found.past = std::max(found.past, rig.desired() - distance);
+  }
+  EXPECT_EQ(rig.desired(), distance);
+  const StatusChange told = rig.witness.last(id - 1);
+  found.begun = BegunChunk::of(told.detail, told.late).value();
+  return found;
+}
+
+// rule K7
+TEST(ChunkLimits, ATakeOverTakesTheTimeThatLimitsNeed) {
+  for (const double distance : {0.001, 0.02, 0.1, 0.25}) {
+    const auto [past, begun] = take_over(distance, 0);
+    EXPECT_LE(past, 1e-12) << distance;
+    EXPECT_EQ(begun.needed, 0) << distance;
+    const double fewest =
+        std::max(std::sqrt(5.8 * distance / 20e-6), std::cbrt(60.0 * distance / 2e-6));
+    const double first = std::ceil(std::max(10.0, fewest) / 10.0) - 1.0;  // rows are due every 10
+    EXPECT_EQ(begun.row, first) << distance;
+  }
+  // one that is too short is told, with the time that it would need; as much as there is, at most
+  const auto [past, begun] = take_over(0.1, 1);
+  EXPECT_GE(begun.needed, 170);
+  EXPECT_LE(begun.needed, 171);
+  EXPECT_LE(past, 1e-12);
+  EXPECT_GT(take_over(1.5, 0).begun.needed, 400);
+  EXPECT_EQ(take_over(1.5, 0).begun.row, 29U);
+}
+
+TEST(ChunkLimits, PlansAreHeldAtTheBoundsAndThatIsSaid) {
+  for (const double acceleration : {kNoLimit, 4000.0}) {
+    Schema schema = plain_robot(1);
+    schema.actuator(0).limits(
+        {.minimum = -1.0, .maximum = 1.0, .speed = 1e3, .acceleration = acceleration});
+    ChunkRig rig(std::move(schema));
+    rig.run_to(101);
+    std::vector<double> rows;
+    for (int i = 0; i < 200; ++i) rows.push_back(i / 7 % 2 == 0 ? 1.0 : -1.0);
+    rig.chunk(rows, every(10, rows.size()), {.anchor = 100, .ease = 10});
+    int clamped = 0;
+    while (rig.next < 2200) {
+      rig.run_to(rig.next + 1);
+      ASSERT_LE(std::abs(rig.desired()), 1.0);
+      clamped += rig.clamped() ? 1 : 0;
+    }
+    EXPECT_GT(clamped, 100);
+    EXPECT_EQ(rig.desired(), rows.back());
+  }
+}
+
 /// Random chunks under random limits: all differences within them, all ends at the last row.
 // rule K10
 TEST(ChunkLimits, RandomScriptsStayWithinLimitsAndEndAtTheirLastRow) {

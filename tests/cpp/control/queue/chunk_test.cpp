@@ -11,64 +11,99 @@
 namespace o80::test {
 namespace {
 
-TEST(Chunk, FromRestItReachesEachRowInItsIteration) {
-  ChunkRig rig;
-  rig.run_to(101);
-  const CommandId id = rig.example({.ease = 10});
-  rig.run_to(160);
-  const std::vector<std::pair<Iteration, double>> wanted{
-      {110, 0.0}, {115, 0.03125}, {120, 0.1},  {125, 0.21875}, {130, 0.3},
-      {135, 0.3}, {140, 0.3},     {145, 0.25}, {150, 0.2},     {155, 0.2}};
-  for (const auto& [iteration, value] : wanted) EXPECT_NEAR(rig.at(iteration), value, 1e-12);
-  for (std::size_t i = 0; i < kRows.size(); ++i) {
-    EXPECT_EQ(rig.at(110 + 10 * static_cast<Iteration>(i)), kRows[i]) << "bit for bit";
+/// Places of a curve in some iterations.
+struct OfProfile {
+  Profile profile;
+  std::vector<std::pair<Iteration, double>> wanted;
+
+  void expect(const ChunkRig& rig, double digits = kDigits) const {
+    for (const auto& [iteration, value] : wanted)
+      EXPECT_NEAR(rig.at(iteration), value, digits) << iteration << ' ' << to_text(profile);
   }
-  EXPECT_EQ(rig.witness.last(id).status, Status::completed);
-  EXPECT_EQ(rig.witness.last(id).iteration, 150);
-  EXPECT_EQ(rig.witness.of(id).front().iteration, 101);
-  EXPECT_TRUE(rig.all_blocks_back());
+};
+
+TEST(Chunk, FromRestItReachesEachRowInItsIteration) {
+  for (const OfProfile& of :
+       {OfProfile{Profile::smooth,
+                  {{105, -0.00625},
+                   {115, 0.0375},
+                   {125, 0.20625},
+                   {135, 0.31875},
+                   {145, 0.240625},
+                   {155, 0.2}}},
+        OfProfile{Profile::monotone,
+                  {{115, 0.03125}, {125, 0.21875}, {135, 0.3}, {145, 0.25}, {155, 0.2}}}}) {
+    ChunkRig rig;
+    rig.run_to(101);
+    const CommandId id = rig.example({.ease = 10}, of.profile);
+    rig.run_to(160);
+    of.expect(rig, 1e-12);
+    for (std::size_t i = 0; i < kRows.size(); ++i) {
+      EXPECT_EQ(rig.at(110 + 10 * static_cast<Iteration>(i)), kRows[i]) << "bit for bit";
+    }
+    EXPECT_EQ(rig.witness.last(id).status, Status::completed);
+    EXPECT_EQ(rig.witness.last(id).iteration, 150);
+    EXPECT_EQ(rig.witness.of(id).front().iteration, 101);
+    EXPECT_TRUE(rig.all_blocks_back());
+  }
 }
 
 TEST(Chunk, LateRowsAreSkippedAndTheMotionGoesOn) {
-  ChunkRig rig;
-  rig.reach(117, 0.05, 0.01);
-  rig.example({.ease = 1});
-  rig.run_to(130);
-  EXPECT_NEAR(rig.at(116), 0.05, 1e-12);
-  const std::vector<std::pair<Iteration, double>> wanted{
-      {117, 0.060692}, {118, 0.072679}, {119, 0.085826}, {120, 0.1}, {125, 0.218304}};
-  for (const auto& [iteration, value] : wanted) EXPECT_NEAR(rig.at(iteration), value, kDigits);
+  for (const OfProfile& of :
+       {OfProfile{Profile::smooth,
+                  {{117, 0.060403}, {118, 0.072366}, {119, 0.085763}, {120, 0.1}, {125, 0.205804}}},
+        OfProfile{
+            Profile::monotone,
+            {{117, 0.060692}, {118, 0.072679}, {119, 0.085826}, {120, 0.1}, {125, 0.218304}}}}) {
+    ChunkRig rig;
+    rig.reach(117, 0.05, 0.01);
+    rig.example({.ease = 1}, of.profile);
+    rig.run_to(130);
+    EXPECT_NEAR(rig.at(116), 0.05, 1e-12);
+    of.expect(rig);
+  }
 }
 
 TEST(Chunk, ARowThatIsDueInTheFirstIterationIsInTime) {
-  ChunkRig rig;
-  rig.reach(120, 0.05, 0.01);
-  rig.example({.ease = 1});
-  rig.run_to(123);
-  EXPECT_EQ(rig.at(120), 0.1);
-  EXPECT_NEAR(rig.at(121), 0.138, 1e-12);  // from slope 0.04 to that at row 2, 0
+  // from slope 0.04, which is the highest there
+  for (const OfProfile& of : {OfProfile{Profile::smooth, {{121, 0.137218}}},
+                              OfProfile{Profile::monotone, {{121, 0.138}}}}) {
+    ChunkRig rig;
+    rig.reach(120, 0.05, 0.01);
+    rig.example({.ease = 1}, of.profile);
+    rig.run_to(123);
+    EXPECT_EQ(rig.at(120), 0.1);
+    of.expect(rig);
+  }
 }
 
 // rule K7
 TEST(Chunk, TheTakeOverPassesRowsThatAreDueTooSoon) {
-  ChunkRig rig;
-  rig.reach(117, 0.05, 0.01);
-  rig.example({.ease = 10});
-  rig.run_to(131);
-  const std::vector<std::pair<Iteration, double>> wanted{
-      {117, 0.062267}, {120, 0.119971}, {125, 0.238593}, {130, 0.3}};
-  for (const auto& [iteration, value] : wanted) EXPECT_NEAR(rig.at(iteration), value, kDigits);
+  for (const OfProfile& of :
+       {OfProfile{Profile::smooth, {{117, 0.060359}, {120, 0.106058}, {125, 0.225001}, {130, 0.3}}},
+        OfProfile{Profile::monotone,
+                  {{117, 0.062267}, {120, 0.119971}, {125, 0.238593}, {130, 0.3}}}}) {
+    ChunkRig rig;
+    rig.reach(117, 0.05, 0.01);
+    const CommandId id = rig.example({.ease = 10}, of.profile);
+    rig.run_to(131);
+    of.expect(rig);
+    const StatusChange told = rig.witness.last(id - 1);
+    EXPECT_EQ(BegunChunk::of(told.detail, told.late).value().row, 2U);
+  }
 }
 
 TEST(Chunk, WhereNoRowIsDueAfterTheTakeOverItGoesToTheLast) {
-  ChunkRig rig;
-  rig.reach(147, 0.25, -0.01);
-  const CommandId id = rig.example({.ease = 10});
-  rig.run_to(160);
-  EXPECT_NEAR(rig.at(147), 0.2405, 1e-9);
-  EXPECT_NEAR(rig.at(150), 0.218, 1e-9);
-  EXPECT_EQ(rig.at(156), 0.2);
-  EXPECT_EQ(rig.witness.last(id).iteration, 156);
+  for (const OfProfile& of :
+       {OfProfile{Profile::smooth, {{147, 0.240095}, {150, 0.21512}, {156, 0.2}}},
+        OfProfile{Profile::monotone, {{147, 0.2405}, {150, 0.218}, {156, 0.2}}}}) {
+    ChunkRig rig;
+    rig.reach(147, 0.25, -0.01);
+    const CommandId id = rig.example({.ease = 10}, of.profile);
+    rig.run_to(160);
+    of.expect(rig, 1e-9);
+    EXPECT_EQ(rig.witness.last(id).iteration, 156);
+  }
 }
 
 // rule K6
@@ -156,15 +191,19 @@ TEST(Chunk, AnAnchorAheadWaits) {
 }
 
 TEST(Chunk, ATakeOverMayPassWhereItWasByAThirdOfItsSpeed) {
-  ChunkRig rig;
-  rig.reach(101, 0.5, 0.01);
-  rig.chunk({0.4, 0.3}, every(10, 2), {.anchor = 100, .ease = 10});
-  rig.run_to(121);
-  const std::vector<double> wanted{0.5062, 0.5056, 0.4994, 0.4888, 0.475};
-  for (std::size_t i = 0; i < wanted.size(); ++i) {
-    EXPECT_NEAR(rig.at(101 + static_cast<Iteration>(i)), wanted[i], 1e-9);
+  for (const OfProfile& of :
+       {OfProfile{
+            Profile::smooth,
+            {{101, 0.508954}, {102, 0.512768}, {103, 0.509102}, {104, 0.498016}, {105, 0.48125}}},
+        OfProfile{Profile::monotone,
+                  {{101, 0.5062}, {102, 0.5056}, {103, 0.4994}, {104, 0.4888}, {105, 0.475}}}}) {
+    ChunkRig rig;
+    rig.reach(101, 0.5, 0.01);
+    rig.chunk({0.4, 0.3}, every(10, 2), {.anchor = 100, .ease = 10}, of.profile);
+    rig.run_to(121);
+    of.expect(rig, 1e-9);
+    EXPECT_EQ(rig.at(110), 0.4);
   }
-  EXPECT_EQ(rig.at(110), 0.4);
 }
 
 // rule K9
@@ -190,10 +229,11 @@ TEST(Chunk, RowsMayBeHeldOrJoinedByLines) {
 TEST(Chunk, OneOverwritesAnotherFromItsPlan) {
   ChunkRig rig;
   rig.run_to(101);
-  const CommandId first = rig.example({.ease = 10});
+  const CommandId first = rig.example({.ease = 10}, Profile::monotone);
   rig.run_to(117);  // the plan of the first: 116
   const double place = rig.at(116);
-  const CommandId second = rig.chunk({0.1, 0.5}, {20, 30}, {.anchor = 110, .ease = 10});
+  const CommandId second =
+      rig.chunk({0.1, 0.5}, {20, 30}, {.anchor = 110, .ease = 10}, Profile::monotone);
   rig.run_to(145);
   EXPECT_EQ(rig.witness.last(first).status, Status::overwritten);
   EXPECT_EQ(rig.witness.last(first).iteration, 117);
@@ -272,7 +312,7 @@ TEST(Chunk, OfSeveralActuatorsOneThatIsOverwrittenLeavesTheOthers) {
   ChunkRig rig(plain_robot(3));
   rig.run_to(101);
   const CommandId id =
-      rig.chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::cubic, {0, 1, 2});
+      rig.chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::monotone, {0, 1, 2});
   rig.run_to(125);
   rig.add(1, overwriting(over(2)), {7.0});
   rig.pulse();
@@ -320,7 +360,7 @@ TEST(Chunk, NumbersThatCannotBeInterpolatedAreHeldFromTheFirstIteration) {
 TEST(Chunk, APurgeThatOvertakesItEndsTheActuatorsThatItIsFor) {
   ChunkRig rig(plain_robot(3));
   rig.run_to(101);
-  rig.add_chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::cubic, {0, 1, 2});
+  rig.add_chunk(kRows, every(10, 5), {.anchor = 100, .ease = 10}, Profile::monotone, {0, 1, 2});
   const BlockIndex chunk = rig.send();
   const CommandId id = record_id(rig.sent, 0);
   rig.pool.batch(chunk).ticket = 10;
@@ -343,9 +383,9 @@ TEST(Chunk, ThatBeginsAtOnceNeedsNoPlaceAmongThoseThatWait) {
   rig.run_to(10);
   std::vector<CommandId> waiting;
   for (Iteration i = 0; i < 65; ++i) {
-    waiting.push_back(rig.chunk({1.0}, {5}, {.anchor = 1000 + i}, Profile::cubic, {0}));
+    waiting.push_back(rig.chunk({1.0}, {5}, {.anchor = 1000 + i}, Profile::monotone, {0}));
   }
-  const CommandId at_once = rig.chunk({1.0}, {5}, {.anchor = 9}, Profile::cubic, {1});
+  const CommandId at_once = rig.chunk({1.0}, {5}, {.anchor = 9}, Profile::monotone, {1});
   rig.run_to(20);
   EXPECT_EQ(rig.witness.last(waiting.back()).reason, Reason::full);
   EXPECT_EQ(rig.witness.status(at_once), Status::completed);
@@ -392,7 +432,7 @@ TEST(Chunk, HeldRowsOf64BitsAreHeld) {
 }
 
 TEST(Chunk, HeldRowsOfATypeThatBlendsAreHeld) {
-  for (const Profile profile : {Profile::hold, Profile::cubic}) {
+  for (const Profile profile : {Profile::hold, Profile::smooth}) {
     Schema schema = plain_robot(1);
     schema.hooks[0].blend = [](void* out, const void* from, const void* to, double share) {
       const double begin = *static_cast<const double*>(from);

@@ -182,7 +182,7 @@ TEST(Chunk, TheMarkOfAStarvedPlanIsWhatTheScriptSays) {
                              .ease = static_cast<std::uint32_t>(pick(1, 4)),
                              .final = static_cast<std::uint8_t>(final)};
         const auto due = every(static_cast<std::uint32_t>(pick(1, 3)), rows.size());
-        const CommandId id = rig.chunk(rows, due, head, Profile::cubic, {actuator}, lane);
+        const CommandId id = rig.chunk(rows, due, head, Profile::monotone, {actuator}, lane);
         const bool is_rejected = rig.witness.status(id, lane) == Status::rejected;
         if (head.anchor < rig.next && !is_rejected) close(is_here);  // it begins
         all.push_back({id, lane, actuator, !final, plan});

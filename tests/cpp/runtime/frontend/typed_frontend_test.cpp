@@ -207,9 +207,10 @@ TEST_F(TypedTest, PlaysAChunkAndSaysWhatBecameOfIt) {
   Frontend<MixedRobot> frontend("mixed");
   const std::array<Joint, 3> rows{Joint{1, 0}, Joint{2, 0}, Joint{3, 0}};
   const std::array<std::uint32_t, 3> due{2, 5, 9};
-  frontend.add_chunk("joints_0", due, std::span<const Joint>(rows), {.anchor = 0});
+  frontend.add_chunk("joints_0", due, std::span<const Joint>(rows), {.anchor = 0, .ease = 1});
   const Batch batch = frontend.pulse();
   EXPECT_FALSE(batch.shift());
+  EXPECT_FALSE(batch.take_over());
   for (Iteration now = 1; now <= 9; ++now) {
     const auto desired = backend.step();
     ASSERT_TRUE(desired);
@@ -222,6 +223,8 @@ TEST_F(TypedTest, PlaysAChunkAndSaysWhatBecameOfIt) {
   }
   ASSERT_TRUE(batch.shift());
   EXPECT_EQ(batch.shift()->iterations, 0);
+  ASSERT_TRUE(batch.take_over());
+  EXPECT_EQ(batch.take_over()->row, 0U);
   EXPECT_EQ(batch.handle(0).status, Status::completed);
 
   const auto refuses = [&](std::vector<std::uint32_t> wrong, const ChunkOptions& options) {
@@ -231,7 +234,7 @@ TEST_F(TypedTest, PlaysAChunkAndSaysWhatBecameOfIt) {
   refuses({2, 5}, {});
   refuses({2, 2, 9}, {});
   refuses({0, 5, 9}, {});
-  refuses({2, 5, 9}, {.ease = 0});
+  refuses({2, 5, 9}, {.ease = (std::uint32_t{1} << 31) + 1});
   refuses({2, 5, 9}, {.first = 3});
   refuses({2, 5, 9}, {.profile = Profile::minimum_jerk});
   EXPECT_EQ(frontend.added(), 0U);
