@@ -14,7 +14,15 @@ import pytest
 pytestmark = [pytest.mark.check, pytest.mark.timeout(1500)]
 
 ROOT = Path(__file__).resolve().parents[2]
-OTHERS = ("o80_mujoco", "o80_pam", "o80_arms", "o80_devices", "o80_ros2", "o80_table_tennis")
+OTHERS = (
+    "o80_mujoco",
+    "o80_pam",
+    "o80_arms",
+    "o80_devices",
+    "lerobot_robot_o80",
+    "o80_ros2",
+    "o80_table_tennis",
+)
 NOT_FOR_THE_CORE = {"gymnasium", "h5py", "imageio-ffmpeg", "matplotlib", "mujoco-core"}
 
 
