@@ -172,7 +172,7 @@ def replay_of(run: FileRun, name: str) -> Callable[[], Any]:
     return lambda: _core.DriverlessReplay(run.description, name, loop, run.schema["period"])
 
 
-@pytest.mark.parametrize(("name", "segment"), product(FORMATS, ["joints", "bench"]))
+@pytest.mark.parametrize(("name", "segment"), list(product(FORMATS, ["joints", "bench"])))
 def test_a_replay_of_a_damaged_journal_ends_in_order(name: str, segment: str) -> None:
     form = FORMATS[name]
     (run, *_) = runs_in(o80.open(RECORDINGS / f"{name}.mcap"), segment)
