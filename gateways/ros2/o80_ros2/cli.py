@@ -1,5 +1,6 @@
 """``o80 ros2``: robots of o80 in ROS 2."""
 
+import re
 from contextlib import closing
 from typing import Annotated
 
@@ -31,11 +32,9 @@ def rates_of(texts: list[str]) -> dict[str, float]:
     found: dict[str, float] = {}
     for text in texts:
         name, _, word = text.rpartition("=")
-        try:
-            found[name] = 0.0 if word == "all" else float(word) or -1.0
-        except ValueError:
-            found[name] = -1.0
-        if not 0 <= found[name] <= 10_000:
+        is_rate = re.fullmatch(r"\d*\.?\d+", word) and 0 < float(word) <= 10_000
+        found[name] = float(word) if is_rate else 0.0
+        if not is_rate and word != "all":
             raise InvalidArgument(
                 f"--rate must be a number up to 10000, or all; NAME=RATE for one. Got '{text}'"
             )

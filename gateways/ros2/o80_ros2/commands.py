@@ -2,22 +2,20 @@
 
 import time
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import Any, cast
 
 import numpy as np
 
 import o80
 from o80.errors import Error, InvalidArgument
 from o80_ros2 import ros
-
-if TYPE_CHECKING:
-    from o80.frontend.chunks import Chunks
+from o80_ros2.topics import desired_numbers
 
 PATIENCE, RESUME = 30.0, 5.0
-"""Longest waits: for a request, which then continues, or a step; for the end of a halt [s]."""
+"""Longest waits: for a request, which goes on, or a step; for the end of a halt [s]."""
 SLOW = 0.5
 """Set-points further apart are no stream [s]."""
 SLACK = 1.01
@@ -32,7 +30,8 @@ class Commands:
         self._shared, self._arm, self._refuse = shared, arm, refuse
         self._name = shared.settings.robot(arm.segment)
         self._actuators = shared.settings.joints(each.name for each in arm.actuators)
-        self._plans: dict[tuple[int, ...], Chunks] = {}
+        self._desired = [*desired_numbers(arm.schema)]
+        self._plans: dict[tuple[int, ...], Any] = {}
         self._sent: deque[tuple[str, Any]] = deque(maxlen=64)  # batches that have not ended
         self._moves: Any = None  # the batch of the newest trajectory
         self._last = self._every = 0.0  # of set-points: time of the last one, interval [s]
@@ -54,11 +53,10 @@ class Commands:
             self._serve_request(request, f"requests/{path}")
 
     def close(self) -> None:
-        """Takes topics and services away, and closes the frontend: what was sent goes on."""
+        """Closes the frontend, which ends its waits; takes topics and services away."""
+        self._arm.close()
         for destroy, made in self._made:
             destroy(made)
-        with suppress(Error):
-            self._arm.close()
 
     def poll(self) -> None:
         """Reports commands that the backend rejected; keeps a trajectory alive until its end."""
@@ -91,8 +89,7 @@ class Commands:
         """A set-point for each actuator, in their order."""
         if len(message.data) != len(self._actuators):
             raise InvalidArgument(
-                f"a number for each actuator is needed ({', '.join(self._actuators)}), "
-                f"got {len(message.data)}"
+                f"{len(self._actuators)} actuators need as many numbers, got {len(message.data)}"
             )
         interval = time.monotonic() - self._last
         self._last += interval
@@ -105,12 +102,9 @@ class Commands:
     def _trajectory(self, message: Any) -> None:
         """A chunk: anchored at the stamp; without one it begins now."""
         arm, names = self._arm, list(message.joint_names)
-        unknown = [name for name in names if name not in self._actuators]
-        if unknown or not names or len({*names}) < len(names):
-            raise InvalidArgument(
-                f"joint_names must name joints of {', '.join(self._actuators)}, each once; got "
-                f"{', '.join(names)}"
-            )
+        if not {*names} <= {*self._actuators} or len({*names}) < max(1, len(names)):
+            there = ", ".join(self._actuators)
+            raise InvalidArgument(f"joint_names must be of {there}, each once; got {names}")
         chosen = tuple(self._actuators.index(name) for name in names)
         if not message.points or {len(p.positions) for p in message.points} != {len(names)}:
             raise InvalidArgument(f"each point needs {len(names)} positions, one for each joint")
@@ -119,38 +113,42 @@ class Commands:
         if times[0] < 0 or (np.diff(times) <= 0).any():
             raise InvalidArgument("time_from_start must not be negative, and must rise")
 
-        newest, period = arm.latest(), arm.schema["period"]
+        newest, period = cast(Any, arm.latest()), arm.schema["period"]
         stamp, begin = nanoseconds(message.header.stamp), newest.time
         if stamp:
-            simulated = arm.schema["clock"] == "simulated"
-            begin = stamp if simulated else self._shared.clock.row_time(stamp)
+            is_simulated = arm.schema["clock"] == "simulated"
+            begin = stamp if is_simulated else self._shared.clock.row_time(stamp)
         anchor = newest.iteration + round((begin - newest.time) / period)
         due = anchor + np.rint(times / period).astype(np.int64)
         kept = np.append(np.diff(due) > 0, True)  # the last one of points in one iteration
         rows, due = rows[kept], due[kept]
         if due[-1] <= newest.iteration:
-            late = (newest.iteration - int(due[-1])) * arm.period
-            raise InvalidArgument(f"it is past: its last point was due {late:.3f} s ago")
-        self._check_speeds(names, chosen, rows, due)
+            ago = (newest.iteration - int(due[-1])) * arm.period
+            raise InvalidArgument(f"it is past: its last point was due {ago:.3f} s ago")
         anchor = min(anchor, newest.iteration)
         rows, due = rows[due > anchor], due[due > anchor]
-        plan = self._plans.get(chosen)
-        if plan is None:
-            plan = self._plans[chosen] = arm.chunks(list(chosen), step=1)
+        numbers = [self._desired[each] for each in chosen]
+        now = np.array([np.ndarray((), each.kind, newest, each.offset) for each in numbers])
+        start = [] if stamp else [(anchor, now)]  # where it is by then nobody knows
+        self._check_speeds(names, chosen, [*start, *zip(due, rows, strict=True)])
+        if chosen not in self._plans:
+            self._plans[chosen] = arm.chunks(list(chosen), step=1)
+        plan = self._plans[chosen]
         fields = plan._kind.names  # of a state with several numbers the first one is given
         targets = {fields[0]: rows} if fields else rows
         sent = plan.send(targets, seen=anchor, due=due, fixed=bool(stamp), final=True)
         self._moves = sent.batch
         self._sent.append(("joint_trajectory", sent.batch))
 
-    def _check_speeds(self, names: list[str], chosen: tuple[int, ...], rows: Any, due: Any) -> None:
+    def _check_speeds(self, names: list[str], chosen: tuple[int, ...], way: Sequence[Any]) -> None:
         """Raises InvalidArgument if a joint would have to be faster than its limit."""
         limits = np.array([self._arm.actuators[each].limits.speed for each in chosen])
+        due, rows = map(np.array, zip(*way, strict=True))
         speeds = np.abs(np.diff(rows, axis=0)) / (np.diff(due)[:, None] * self._arm.period)
         for i, j in np.argwhere(speeds > SLACK * limits):
             raise InvalidArgument(
-                f"'{names[j]}' would need a speed of {speeds[i, j]:.4g} from point {i} to the next "
-                f"one, its limit is {limits[j]:.4g}"
+                f"'{names[j]}' would need a speed of {speeds[i, j]:.4g} to be at "
+                f"{rows[i + 1, j]:.4g} in time, its limit is {limits[j]:.4g}"
             )
 
     def _trigger(self, name: str, run: Callable[[], str], node: Any) -> None:

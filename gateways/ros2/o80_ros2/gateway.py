@@ -30,13 +30,15 @@ class Gateway:
         handlers = ros.of("rclpy.signals.SignalHandlerOptions").NO
         ros.of("rclpy.init")(signal_handler_options=handlers)
         name, create = settings.robot("o80_ros2"), ros.of("rclpy.create_node")
+        self._ends = False
         self._served: list[tuple[Any, Any, threading.Thread]] = []
         # calls that take long have a node and a thread of their own, so that a halt does not wait
         for each in (name, f"{name}_calls"):
             executor = ros.of("rclpy.executors.SingleThreadedExecutor")()
             node = create(each, start_parameter_services=False)
             executor.add_node(node)
-            self._served.append((node, executor, threading.Thread(target=executor.spin)))
+            thread = threading.Thread(target=self._serve, args=(executor,))
+            self._served.append((node, executor, thread))
         calls, node, self._names, tf = node, self._served[0][0], names, None
         self._node, self._log = node, node.get_logger()
         try:
@@ -48,12 +50,20 @@ class Gateway:
         self._diagnostics = node.create_publisher(self._array, "/diagnostics", 10)
         self._reported: Any = None
         self._report_at = self._list_at = self._look_at = 0.0
-        self._clock: Any = None  # publisher of /clock
-        self._simulated = -1  # time published last [ns]
+        self._clock: Any = None  # publisher of /clock, and the time published last [ns]
+        self._simulated = -1
         self._sources: dict[str, Source] = {}
         sys.setswitchinterval(SWITCH)
         for *_, thread in self._served:
             thread.start()
+
+    def _serve(self, executor: Any) -> None:
+        """Serves messages and calls until the end."""
+        while not self._ends:
+            try:
+                executor.spin()
+            except Exception as error:  # of rclpy, if what it waits for is destroyed meanwhile
+                self._log.warning(f"goes on after {error!r}", throttle_duration_sec=1.0)
 
     def run(self, stop: StopRequest) -> None:
         """Reads all robots, each at its rate."""
@@ -84,7 +94,8 @@ class Gateway:
                 self._log.warning(f"{text}, which is left out", once=True)
             elif segment not in self._sources:
                 self._sources[segment] = Source(self._shared, segment)
-                self._log.info(f"'{segment}' is /{name}")
+                waits = "" if segment in alive else ", and is waited for"
+                self._log.info(f"'{segment}' is /{name}{waits}")
         for segment, source in list(self._sources.items()):
             if not self._names and segment not in alive and source.gone:
                 self._sources.pop(segment).close(topics=True)
@@ -98,8 +109,7 @@ class Gateway:
         if first is None or first.time == self._simulated:
             return
         self._simulated, kind = first.time, ros.of("rosgraph_msgs.msg.Clock")
-        if self._clock is None:
-            self._clock = self._node.create_publisher(kind, "/clock", 10)
+        self._clock = self._clock or self._node.create_publisher(kind, "/clock", 10)
         message = kind()
         message.clock.sec, message.clock.nanosec = divmod(first.time, 10**9)
         self._clock.publish(message)
@@ -124,6 +134,7 @@ class Gateway:
 
     def close(self) -> None:
         """Ends the node. Robots go on, and so does what was sent to them."""
+        self._ends = True
         for source in self._sources.values():
             source.close(topics=True)
         for node, executor, thread in self._served:

@@ -39,7 +39,6 @@ class Settings:
         return topic_of(self.prefix + segment).lstrip("/")
 
     def joints(self, names: Iterable[str]) -> list[str]:
-        """Names of joints with the prefix."""
         return names_of(self.prefix + (name or f"joint_{i}") for i, name in enumerate(names))
 
 

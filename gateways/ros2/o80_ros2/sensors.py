@@ -1,8 +1,8 @@
 """Sensor values that have a message type of their own in ROS 2: poses, points, wrenches, images.
 
 The names, shapes and units of the fields decide, as those of a recording's joints do:
-- `position`, or a name that ends so, three numbers [m], is a point; with a `quaternion` (x, y, z,
-  w) of the same begin it is a pose;
+- `position`, or a name that ends so, three numbers [m], is a point; with a `quaternion` of the
+  same begin it is a pose: x, y, z, w, or as its help says `w, x, y, z`;
 - `force` and `torque`, or names that end so, three numbers each, are a wrench;
 - bytes whose name contains `image`, of a robot with options `height` and `width`, are images of
   one or three bytes a pixel, each in a row of the array.
@@ -32,6 +32,7 @@ class Sensor:
     valid: str = ""  #: a bool beside them, False where a row holds nothing
     place: int | None = None  #: among the images of the field
     size: tuple[int, ...] = ()  #: of an image
+    begins_with_w: bool = False  #: a quaternion
 
     def values(self, row: NDArray[Any]) -> list[NDArray[Any]] | None:
         """The numbers of each field in one row; None if it holds none."""
@@ -39,6 +40,8 @@ class Sensor:
         for name in self.structs:
             within = within[name]
         found = [within[name] for name in self.fields]
+        if self.begins_with_w:
+            found[1] = found[1][[1, 2, 3, 0]]
         valid: Any = within[self.valid] if self.valid else True
         if self.kind == "image":
             valid = valid if self.place is None or np.ndim(valid) == 0 else valid[self.place]
@@ -56,23 +59,23 @@ def _sensors(
     described: Mapping[str, Any], structs: tuple[str, ...], size: list[int]
 ) -> Iterator[Sensor]:
     fields = {each["name"]: each for each in described["fields"]}
-    flags = [name for name in ("visible", "valid") if name in fields]
-    single = next((name for name in flags if not fields[name]["shape"]), "")
+    flags = [n for n in ("visible", "valid") if n in fields and not fields[n]["shape"]]
+    single = flags[0] if flags else ""
     for name, field in fields.items():
         if field["kind"] == "struct" and not field["shape"]:
             yield from _sensors(field["type"], (*structs, name), size)
         for ending, partner, count in PAIRS:
             if not name.endswith(ending) or field["shape"] != [3]:
                 continue
-            begin = name.removesuffix(ending)
-            kind = "wrench" if ending == "force" else "pose"
+            begin, is_place = name.removesuffix(ending), ending == "position"
             both = fields.get(begin + partner, {}).get("shape") == [count]
-            if kind == "pose" and (not both or field["unit"] != "m"):
-                kind = "point" if field["unit"] == "m" else ""
-            if kind and (both or kind == "point"):
-                path = "/".join((*structs, *[begin.rstrip("_")][: len(begin)], kind))
-                chosen = (name, begin + partner) if kind != "point" else (name,)
-                yield Sensor(kind, path, structs, chosen, single)
+            if field["unit"] != "m" if is_place else not both:
+                continue
+            kind = ("pose" if both else "point") if is_place else "wrench"
+            path = "/".join(part for part in (*structs, begin.rstrip("_"), kind) if part)
+            chosen = (name, begin + partner) if both else (name,)
+            turned = both and fields[begin + partner]["help"].startswith("w")
+            yield Sensor(kind, path, structs, chosen, single, begins_with_w=turned)
         if field["kind"] == "uint8" and "image" in name and len(size) == 2 and field["shape"]:
             *several, pixels = field["shape"]
             one = {math.prod(size): (*size,), 3 * math.prod(size): (*size, 3)}.get(pixels)

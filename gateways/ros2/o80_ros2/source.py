@@ -1,17 +1,13 @@
 """One segment that the gateway carries, through restarts of its backend."""
 
-from contextlib import suppress
-
 import o80
 from o80.errors import Error
 from o80_ros2.commands import Commands
 from o80_ros2.ros import Shared
 from o80_ros2.topics import Topics
 
-BETWEEN_LOOKS = 0.5
-"""Time between attempts to attach to a backend that is not there [s]."""
-EVERY_ROW = 0.005
-"""Time between readings of a robot of which every row is published [s]."""
+BETWEEN_LOOKS, EVERY_ROW = 0.5, 0.005
+"""Times between attempts to attach, and between readings if every row is published [s]."""
 MOST_ROWS, MOST_BYTES = 200, 4 << 20
 """Rows that are read at once; the others wait, so that other robots have their turn."""
 OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
@@ -133,7 +129,6 @@ class Source:
             self._commands.close()
             self._commands = None
         if self._frontend is not None:
-            with suppress(Error):
-                self._frontend.close()
+            self._frontend.close()
         if topics and self.topics is not None:
             self.topics.destroy()

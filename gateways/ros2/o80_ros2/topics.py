@@ -2,19 +2,17 @@
 
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+import o80
 from o80.errors import Error
 from o80.recording.joint_states import Number, joints_of
 from o80.view.urdf import WORLD, Links, Place
 from o80_ros2 import ros
 from o80_ros2.sensors import Sensor, png, sensors_of
-
-if TYPE_CHECKING:
-    import o80
 
 BETWEEN_IMAGES = 100_000_000
 """Smallest distance of two images: packing one takes long [ns]."""
@@ -37,7 +35,7 @@ TYPES = {
 class Topics:
     """Publishes rows of robots that are described alike. Used by one thread."""
 
-    def __init__(self, shared: ros.Shared, robot: "o80.Frontend") -> None:
+    def __init__(self, shared: ros.Shared, robot: o80.Frontend) -> None:
         schema = self.schema = robot.schema
         self._shared, settings = shared, shared.settings
         self._name = settings.robot(robot.segment)
@@ -54,7 +52,7 @@ class Topics:
             names = dict(zip(places, texts, strict=True))
         if schema["actuators"]:
             texts = settings.joints(each["name"] for each in schema["actuators"])
-            numbers = {"position": tuple(_desired(schema))}
+            numbers = {"position": tuple(desired_numbers(schema))}
             self._states.append((self._publisher(STATE, "desired"), texts, numbers))
         self._sensors = [
             (each, self._publisher(TYPES[each.kind][0], each.name, newest=each.kind == "image"))
@@ -162,7 +160,7 @@ def _gathered(raw: NDArray[np.uint8], numbers: Iterable[Number]) -> NDArray[np.f
     return np.stack(columns, axis=1).astype(float)
 
 
-def _desired(schema: dict[str, Any]) -> Iterator[Number]:
+def desired_numbers(schema: dict[str, Any]) -> Iterator[Number]:
     """The first number of each actuator's desired state."""
     for actuator in schema["actuators"]:
         first = schema["groups"][actuator["group"]]["type"]["fields"][0]

@@ -29,8 +29,7 @@ class WallClock:
 
     def update(self) -> int:
         """Reads the offset anew; returns the step since the last reading [ns], 0 for none."""
-        offset = self._measured()
-        change = offset - self.offset
+        change = (offset := self._measured()) - self.offset
         if abs(change) >= STEP:
             self._stepped_at = self._monotonic()
         self.offset = offset

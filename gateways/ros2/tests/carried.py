@@ -17,15 +17,12 @@ class Carried:
     """A robot, and the source that carries it."""
 
     def __init__(self, robot: o80.Frontend, settings: ros.Settings) -> None:
-        self.robot, self.node = robot, stand_in_ros.Node()
-        self.monotonic = 0
+        self.node, self.monotonic, self.now = stand_in_ros.Node(), 0, 100.0
         self.clock = WallClock(lambda: self.monotonic + OFFSET, lambda: self.monotonic)
         kind = stand_in_ros.of("tf2_msgs.msg.TFMessage")
         self.tf = self.node.create_publisher(kind, "/tf", 100)
-        self.source = Source(
-            ros.Shared(self.node, self.node, settings, self.clock, self.tf), robot.segment
-        )
-        self.now = 100.0
+        shared = ros.Shared(self.node, self.node, settings, self.clock, self.tf)
+        self.source = Source(shared, robot.segment)
 
     def tick(self) -> None:
         """Lets time pass, and reads."""

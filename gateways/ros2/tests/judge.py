@@ -28,7 +28,7 @@ def spin_until(condition: Callable[[], object]) -> None:
 
 
 def listen(robot: str, count: int) -> dict[str, Any]:
-    """Every sample after the first, as bytes of the wire; what the graph says about the topic."""
+    """Samples as bytes of the wire; what the graph says about the topic."""
     raw: list[bytes] = []
     texts: list[String] = []
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

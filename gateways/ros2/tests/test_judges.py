@@ -21,8 +21,8 @@ import o80
 
 pytestmark = pytest.mark.check
 
-ROS = Path(__file__).resolve().parents[3] / "build" / "ros"
-HERE = Path(__file__).parent
+HERE = Path(__file__).resolve().parent
+ROS = HERE.parents[2] / "build" / "ros"
 VERSIONS = ("jazzy", "kilted")
 COUNT = 900  # samples, fewer than the gateway keeps until they are acknowledged
 HASH = "RIHS01_a13ee3a330e346c9d87b5aa18d24e11690752bd33a0350f11c5882bc9179260e"
