@@ -73,7 +73,11 @@ class ChunkClient(RobotClient):
                 self.plan.wait(lead=self._lead, timeout=0.5)
             except o80.TimeoutError:
                 continue
-            seen = self._ask(task)
+            try:
+                seen = self._ask(task)
+            except RuntimeError:  # LeRobot's, if it was stopped meanwhile
+                if self.running:
+                    raise
             self._answered.wait(PATIENCE)
         if self._failure is not None:
             raise self._failure
