@@ -48,6 +48,19 @@ Frontend::Frontend(const Attachment& attachment, std::shared_ptr<Decoder> decode
     indices_[nb::str(name.data(), name.size())] = i;
     plain_.push_back(plain_number(schema, schema.actuators[i].type));
   }
+  for (const o80::GroupRow& group : schema.groups) {
+    const nb::str name(group.name.view().data(), group.name.view().size());
+    if (group.name.view().empty() || indices_.contains(name)) continue;
+    nb::list actuators;
+    for (std::uint32_t i = 0; i < group.count; ++i) actuators.append(group.first_actuator + i);
+    groups_[name] = actuators;
+  }
+}
+
+nb::object Frontend::expanded(nb::handle named) const {
+  if (!PyUnicode_Check(named.ptr())) return nb::borrow(named);
+  PyObject* found = PyDict_GetItemWithError(groups_.ptr(), named.ptr());
+  return nb::borrow(found != nullptr ? nb::handle(found) : named);
 }
 
 std::uint32_t Frontend::actuator(nb::handle named) const {
@@ -93,16 +106,30 @@ std::vector<std::uint32_t> Frontend::actuators(nb::handle named) const {
   if (named.is_none()) {
     for (std::uint32_t i = 0; i < plain_.size(); ++i) indices.push_back(i);
   } else {
-    for (const nb::handle one : named) indices.push_back(actuator(one));
+    for (const nb::handle one : named) {
+      const nb::object several = expanded(one);
+      if (!names_several(several)) {
+        indices.push_back(actuator(one));
+        continue;
+      }
+      for (const nb::handle each : several) indices.push_back(actuator(each));
+    }
   }
   return indices;
 }
 
-std::uint32_t Frontend::add_commands(nb::handle named, nb::handle targets,
-                                     const o80::CommandOptions& options) const {
-  const std::shared_ptr<UntypedFrontend> frontend = untyped_;
-  const auto [chosen, states, masks] = targets_of(named, targets);
-  return frontend->add_commands(chosen, states, options, masks);
+void Frontend::clip(nb::handle clip, Targets& targets) const {
+  if (!truth_of(clip, "clip")) return;
+  const o80::CommandCheck& check = untyped_->command_check();
+  std::span<std::byte> states = targets.states;
+  std::span<const std::uint64_t> masks = targets.masks;
+  for (const std::uint32_t index : targets.actuators) {
+    const std::size_t size = check.layout(index).size();
+    const auto mask = masks.first(masks.empty() ? 0 : check.words_of_mask(index));
+    clipped += static_cast<std::int64_t>(check.clip(index, states.first(size), mask));
+    states = states.subspan(size);
+    masks = masks.subspan(mask.size());
+  }
 }
 
 Targets Frontend::targets_of(nb::handle named, nb::handle targets) const {

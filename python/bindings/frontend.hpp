@@ -45,11 +45,12 @@ class Frontend {
   /// Each returns the index of its record in the batch.
   std::uint32_t add_command(nanobind::handle named, nanobind::handle target,
                             const o80::CommandOptions& options) const;
-  /// Adds one command for several actuators (None: all), with a target for each.
-  std::uint32_t add_commands(nanobind::handle named, nanobind::handle targets,
-                             const o80::CommandOptions& options) const;
   /// The targets of one command for several actuators (None: all).
   Targets targets_of(nanobind::handle named, nanobind::handle targets) const;
+  /// The actuators of a group, by its name; what is no name of a group stays what it is.
+  nanobind::object expanded(nanobind::handle named) const;
+  /// Puts targets inside their bounds if `clip`; counts those that were outside.
+  void clip(nanobind::handle clip, Targets& targets) const;
   std::vector<std::byte> request_bytes(std::uint32_t index, nanobind::handle fields) const;
   Observation blank() const { return Observation(decoder_); }
 
@@ -58,7 +59,8 @@ class Frontend {
   /// Throws Closed after close().
   void reattach(const Attachment& attachment, std::shared_ptr<Decoder> decoder);
 
-  o80::Iteration next = -1;  // next row of wait_for_next; -1: not called yet
+  mutable std::int64_t clipped = 0;  // numbers of targets that were put inside their bounds
+  o80::Iteration next = -1;          // next row of wait_for_next; -1: not called yet
 
  private:
   std::string name_of(std::uint32_t index) const;
@@ -68,6 +70,7 @@ class Frontend {
   std::shared_ptr<o80::InlineRobot> robot_;
   std::shared_ptr<const Decoder> decoder_;
   nanobind::dict indices_;
+  nanobind::dict groups_;  // lists of indices, of groups whose name is none of an actuator
   std::vector<const o80::FieldRow*> plain_;  // of each actuator; null: a struct
 };
 

@@ -82,9 +82,10 @@ Move start_move(const Frontend& self, nb::handle actuators, nb::handle targets,
   MoveOptions options{.command = command_options(
                           pace_of(duration, speed, until, iterations, truth_of(fastest, "fastest")),
                           mode, profile, start)};
-  const bool several = names_several(actuators);
+  const nb::object named = self.expanded(actuators);
+  const bool several = names_several(named);
   const Targets chosen = several
-                             ? self.targets_of(actuators, targets)
+                             ? self.targets_of(named, targets)
                              : self.targets_of(nb::make_tuple(actuators), nb::make_tuple(targets));
   set_tolerances(self.decoder()->description->schema, tolerance, chosen, options);
   const Waiting waiting;

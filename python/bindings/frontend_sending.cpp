@@ -70,11 +70,17 @@ o80::CommandOptions options_of(const Frontend& self, nb::handle duration, nb::ha
 std::uint32_t add_command(const Frontend& self, nb::handle actuator, nb::handle target,
                           nb::handle duration, nb::handle speed, nb::handle until,
                           nb::handle iterations, nb::handle fastest, nb::handle mode,
-                          nb::handle profile, nb::handle start, nb::handle every) {
+                          nb::handle profile, nb::handle start, nb::handle every, nb::handle clip) {
   const o80::CommandOptions options =
       options_of(self, duration, speed, until, iterations, fastest, mode, profile, start, every);
-  return names_several(actuator) ? self.add_commands(actuator, target, options)
-                                 : self.add_command(actuator, target, options);
+  const nb::object named = self.expanded(actuator);
+  const bool several = names_several(named);
+  if (!several && clip.is(nb::bool_(false))) return self.add_command(actuator, target, options);
+  const auto frontend = self.shared();
+  Targets targets = several ? self.targets_of(named, target)
+                            : self.targets_of(nb::make_tuple(named), nb::make_tuple(target));
+  self.clip(clip, targets);
+  return frontend->add_commands(targets.actuators, targets.states, options, targets.masks);
 }
 
 /// The newest row, with these actuators at `initial`.
@@ -100,12 +106,13 @@ o80::UntypedObservation row_with(const Frontend& self, nb::handle actuators, nb:
 }
 
 /// How much later, why, and the desired blocks.
-nb::tuple preview(const Frontend& self, nb::handle named, nb::handle target, nb::handle initial,
+nb::tuple preview(const Frontend& self, nb::handle given, nb::handle target, nb::handle initial,
                   nb::handle duration, nb::handle speed, nb::handle until, nb::handle iterations,
                   nb::handle fastest, nb::handle profile, nb::handle start, nb::handle every) {
   const auto frontend = self.shared();
   const o80::CommandOptions options = options_of(self, duration, speed, until, iterations, fastest,
                                                  nb::str("queue"), profile, start, every);
+  const nb::object named = self.expanded(given);
   const bool several = names_several(named);
   const auto each = [&](nb::handle one) {
     return several ? nb::borrow(one) : nb::object(nb::make_tuple(one));
@@ -122,14 +129,34 @@ nb::tuple preview(const Frontend& self, nb::handle named, nb::handle target, nb:
   return nb::make_tuple(preview.late, preview.text, nb::bytes(rows.data(), rows.size()));
 }
 
-/// Adds one trajectory for several actuators. `states` holds all rows of the first, then all rows
-/// of the second, and so on; `mask` has a bit for each number of a state that is given, or is
-/// empty; `times` are the ends of rows [ns].
+/// Rows of targets for several actuators: all rows of the first, then all rows of the second, and
+/// so on; `masks` has for each actuator a bit for each number that is given, or is empty.
+Targets rows_of(const Frontend& self, const std::vector<std::uint32_t>& actuators,
+                std::uint32_t rows, nb::handle states, const std::vector<std::uint64_t>& masks,
+                nb::handle clip) {
+  const Bytes all(states);
+  Targets targets{actuators, {all.span().begin(), all.span().end()}, masks};
+  if (!truth_of(clip, "clip")) return targets;
+  const o80::CommandCheck& check = self.shared()->command_check();
+  std::span<std::byte> left = targets.states;
+  std::span<const std::uint64_t> given = masks;
+  for (const std::uint32_t index : actuators) {
+    const std::size_t size = std::min<std::size_t>(left.size(), rows * check.layout(index).size());
+    const auto mask = given.first(given.empty() ? 0 : check.words_of_mask(index));
+    self.clipped += static_cast<std::int64_t>(check.clip(index, left.first(size), mask));
+    left = left.subspan(size);
+    given = given.subspan(mask.size());
+  }
+  return targets;
+}
+
+/// Adds one trajectory for several actuators, with these rows_of(); `times` are the ends of rows
+/// [ns].
 std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
                                std::uint32_t rows, nb::handle states,
-                               const std::vector<std::uint64_t>& mask, nb::handle times,
+                               const std::vector<std::uint64_t>& masks, nb::handle times,
                                nb::handle speed, nb::handle iterations, nb::handle mode,
-                               nb::handle profile, nb::handle start) {
+                               nb::handle profile, nb::handle start, nb::handle clip) {
   const auto frontend = self.shared();
   o80::CommandOptions options{.pace = pace_of(nb::none(), speed, nb::none(), iterations),
                               .mode = mode_of(mode),
@@ -141,8 +168,8 @@ std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint
     ends.resize(bytes.span().size() / sizeof(std::int64_t));
     std::memcpy(ends.data(), bytes.span().data(), ends.size() * sizeof(std::int64_t));
   }
-  const Bytes all(states);
-  return frontend->add_trajectories(actuators, rows, all.span(), options, ends, mask);
+  Targets targets = rows_of(self, actuators, rows, states, masks, clip);
+  return frontend->add_trajectories(actuators, rows, targets.states, options, ends, masks);
 }
 
 Batch pulse(const Frontend& self, nb::handle at, nb::handle late, nb::handle seen) {
@@ -261,7 +288,7 @@ Batch send_alone(const Frontend& self, Fill&& fill, const std::optional<o80::See
 
 /// Sends a chunk. `due`: for each row an uint32, iterations after the anchor.
 Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators, nb::handle due,
-                 nb::handle states, const std::vector<std::uint64_t>& mask, o80::Iteration anchor,
+                 nb::handle states, const std::vector<std::uint64_t>& masks, o80::Iteration anchor,
                  std::uint64_t plan, std::uint32_t ease, std::uint32_t first, bool fixed,
                  bool reject_late, bool final, nb::handle profile, nb::handle seen) {
   const Bytes iterations(due);
@@ -277,7 +304,7 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
                                   .profile = profile_of_rows(profile)};
   const Bytes all(states);
   const auto fill = [&](o80::BatchBuilder& batch) {
-    self.untyped().add_chunk(batch, actuators, ends, all.span(), options, mask);
+    self.untyped().add_chunk(batch, actuators, ends, all.span(), options, masks);
   };
   return send_alone(self, fill, seen_of(seen));
 }
@@ -397,7 +424,8 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            "target"_a.none(), nb::kw_only(), "duration"_a = nb::none(), "speed"_a = nb::none(),
            "until"_a = nb::none(), "iterations"_a = nb::none(), "fastest"_a.none() = false,
            "mode"_a.none() = "queue", "profile"_a = nb::none(), "start"_a.none() = "desired",
-           "every"_a = nb::none());
+           "every"_a = nb::none(), "clip"_a.none() = false);
+  def_noun(frontend, "clipped", verbs::clipped, [](const Frontend& self) { return self.clipped; });
   def_verb(frontend, "add_request", verbs::add_request, &add_request, "name"_a.none(), "fields"_a);
   def_verb(
       frontend, "add_purge", verbs::add_purge,
@@ -434,10 +462,20 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            "seen"_a = nb::none(), "check"_a.none() = true);
 
   frontend
-      .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a, "mask"_a,
+      .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a, "masks"_a,
            "times"_a.none(), "speed"_a.none(), "iterations"_a.none(), "mode"_a.none(),
-           "profile"_a.none(), "start"_a.none())
-      .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "mask"_a, "anchor"_a,
+           "profile"_a.none(), "start"_a.none(), "clip"_a.none())
+      .def(
+          "_clip",
+          [](const Frontend& self, const std::vector<std::uint32_t>& actuators, std::uint32_t rows,
+             nb::handle states, const std::vector<std::uint64_t>& masks) {
+            const std::int64_t before = self.clipped;
+            const Targets inside = rows_of(self, actuators, rows, states, masks, nb::bool_(true));
+            return std::pair(nb::bytes(inside.states.data(), inside.states.size()),
+                             self.clipped - before);
+          },
+          "actuators"_a, "rows"_a, "states"_a, "masks"_a)
+      .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "masks"_a, "anchor"_a,
            "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "final"_a, "profile"_a,
            "seen"_a.none())
       .def(

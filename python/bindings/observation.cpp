@@ -113,13 +113,22 @@ void bind_observation(nb::module_& m) {
           },
           nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"));
 
-  nb::class_<Observation>(
+  nb::class_<Observation> observation(
       m, "Observation", nb::type_slots(buffer_slots),
       R"(One row of the history: desired, observed and extended values of one iteration.
 
-The arrays are views of this observation's own copy of the row, which does not change.)")
-      .def(nb::new_(&from_bytes), "decoder"_a, "row"_a, "missed"_a = 0)
+The arrays are views of this observation's own copy of the row, which does not change.)");
+  observation.attr("__iter__") = nb::none();
+  observation.def(nb::new_(&from_bytes), "decoder"_a, "row"_a, "missed"_a = 0)
       .def("__reduce__", &reduce, nb::sig("def __reduce__(self) -> tuple[typing.Any, ...]"))
+      .def(
+          "__getitem__",
+          [](nb::handle self, nb::handle path) {
+            const auto& layout = nb::cast<const Observation&>(self).decoder->layout;
+            return nb::module_::import_("o80.rows.columns").attr("numbers_in")(self, layout, path);
+          },
+          nb::sig("def __getitem__(self, path: str) -> typing.Any"), "path"_a,
+          "The numbers at a path: `row[\"observed.joint1.position\"]`, or of a group, (n,).")
       .def_prop_ro(
           "iteration", [](const Observation& self) { return self.row.iteration(); },
           "The iteration of this row.")

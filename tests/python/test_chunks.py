@@ -570,6 +570,104 @@ def test_a_chunk_moves_actuators_of_several_groups(segment: str) -> None:
             assert planned[-1].tolist() == [0.4, 0.7]
 
 
+@contextmanager
+def arm_and_gripper(segment: str) -> Iterator[Stepped]:
+    joint = [("position", float), ("torque", np.float32)]
+    groups = {"joints": (joint, ["left", "right"]), "gripper": float, "valve": bool}
+    limits: Any = {"gripper": o80.Limits(minimum=0.0, maximum=1.0), "left": {"torque": (-1, 1)}}
+    with o80.Backend(segment, groups, limits=limits, bursting=True) as backend:
+        backend.publish(np.zeros_like(backend._observed))
+        with o80.Frontend(segment) as frontend:
+            yield Stepped(backend, frontend)
+
+
+def test_an_arm_and_its_gripper_are_one_action(segment: str) -> None:
+    with arm_and_gripper(segment) as robot, robot.frontend.chunks(step=5, ease=1) as plan:
+        arm = robot.frontend
+        plan.send([[0.1 * i, -0.1 * i, 0.05 * i, i > 4] for i in range(1, 9)])
+        robot.run(1)
+        planned = plan.planned(0, step=1)
+        assert planned[4::5, 3].tolist() == [0, 0, 0, 0, 1, 1, 1, 1]
+        robot.run(len(planned) - 1)
+        rows = arm.history(since=1).desired
+        shown = (*rows.joints["position"].T, rows.gripper, rows.valve)
+        assert np.column_stack(shown).tolist() == planned.tolist()
+        assert not rows.joints["torque"].any(), "only the first field of each was given"
+
+        both = {"position": [[0.1, 0.2]] * 3, "torque": [[0.5, -0.5]] * 3}
+        sent = plan.send({"joints": both, "gripper": [0.2] * 3, "valve": [True] * 3})
+        robot.run(1)
+        planned = plan.planned(arm.published, step=1)
+        assert planned[-1].tolist() == [0.1, 0.5, 0.2, -0.5, 0.2, 1.0]
+        robot.run(20)
+        assert sent.batch.statuses == ["completed"]
+        assert arm.latest().desired.joints["torque"].tolist() == [0.5, -0.5]
+        # weights are those of all numbers that are given
+        paths = {"left.torque": [-1.0], "right.position": [1.0], "gripper": [0.4], "valve": [False]}
+        plan.send(paths)
+        robot.run(8)
+        joints = arm.latest().desired.joints
+        assert joints.tolist() == [(pytest.approx(0.1), -1.0), (1.0, -0.5)]
+
+
+def test_rows_outside_the_limits_are_put_on_them_where_that_is_wanted(segment: str) -> None:
+    with arm_and_gripper(segment) as robot:
+        arm = robot.frontend
+        rows = [[0.5, 1.5], [0.5, -0.25], [0.5, 0.75]]
+        with arm.chunks(["left", "gripper"], step=2, clip=True) as plan:
+            sent = plan.send(rows)
+            assert sent.clipped == 2
+            robot.run(8)
+            assert arm.history(since=2).desired.gripper[[0, 2, 4]].tolist() == [1.0, 0.0, 0.75]
+        with pytest.raises(o80.InvalidArgument, match="outside its limits: from 0 to 1"):
+            arm.chunks(["left", "gripper"], step=2).send(rows)
+        arm.add_trajectory(rows, ["left", "gripper"], clip=True)
+        arm.add_command("gripper", 7.0, clip=True)
+        arm.add_command("joints", [{"torque": 1e30}, {"torque": 0.5}], clip=True)
+        assert arm.clipped == 6
+        arm.pulse()
+        robot.run(6)
+        assert arm.latest().desired.gripper == 1.0
+        assert arm.latest().desired.joints["torque"].tolist() == [1.0, 0.5]
+
+
+@pytest.mark.parametrize(
+    ("targets", "message"),
+    [
+        ({"griper": [0.1]}, "named 'griper'. Did you mean 'gripper'"),
+        ({"gripper": [0.1]}, "leave out 'left', 'right', 'valve'"),
+        (
+            {"joints": {"positoin": [[0, 0]]}},
+            "of 'left' has no field 'positoin'; there are: position",
+        ),
+        ([[0.1, 0.2]], r"4 actuators are \(T, 4\), not \(1, 2\)"),
+        ([[0.1, 0.2, "open", True]], "cannot be read as float64"),
+    ],
+)
+def test_what_one_action_lacks_is_named(segment: str, targets: Any, message: str) -> None:
+    with (
+        arm_and_gripper(segment) as robot,
+        pytest.raises(o80.InvalidArgument, match=message),
+    ):
+        robot.frontend.chunks(step=5).send(targets)
+
+
+def test_a_prepared_burst_moves_an_arm_and_its_gripper(segment: str) -> None:
+    with arm_and_gripper(segment) as robot:
+        arm = robot.frontend
+        burst = arm.prepared_burst(3, ["left", "gripper"], steps=3)
+        burst.targets["left"]["torque"] = 0.0
+        burst.targets["left"]["position"] = burst.targets["gripper"] = [0.1, 0.2, 0.3]
+        waits = threading.Thread(target=burst.run)
+        waits.start()
+        while arm.published < 3:
+            robot.backend.publish(robot.backend.step())
+        waits.join()
+        desired = burst.rows["desired"]
+        assert desired["gripper"].tolist() == [0.1, 0.2, 0.3]
+        assert desired["joints"]["position"][:, 0].tolist() == [0.1, 0.2, 0.3]
+
+
 def test_a_chunk_that_waits_is_planned(arm: o80.Frontend) -> None:
     arm.burst(10)
     with arm.chunks(step=10, ease=10) as plan:

@@ -205,9 +205,9 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (33_760, 0),
-    "python/bindings": (5_640, 0),
-    "python/o80": (30_310, 0),
+    "include, src": (33_840, 0),
+    "python/bindings": (5_720, 0),
+    "python/o80": (30_600, 0),
     "python/o80/hybrid": (2_400, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
@@ -220,7 +220,7 @@ CEILINGS = {
     "apps/table_tennis": (10_140, 6_040),
     "benchmarks, tools": (5_700, 0),
     "examples": (1_965, 0),
-    "tests, conftest.py": (0, 67_210),
+    "tests, conftest.py": (0, 67_340),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

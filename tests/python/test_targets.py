@@ -310,7 +310,8 @@ def test_a_trajectory_may_overwrite(arm: o80.Frontend) -> None:
         (np.zeros((2, 2)), {"iterations": 0}, "iterations must be from 1"),
         ([[0.0, 0.0], [0.0, 9.0]], {}, "elbow"),
         (np.full((2, 2), np.nan), {}, "shoulder"),
-        ({"position": [0.0]}, {}, "plain number"),
+        ({"position": [0.0]}, {}, "no actuator, group or field is named 'position'"),
+        ({}, {}, "plain number"),
     ],
 )
 def test_a_trajectory_is_added_whole_or_not_at_all(
@@ -375,17 +376,42 @@ def test_a_trajectory_takes_the_forms_of_a_command(robot: Robot, single: bool) -
 
 
 def test_a_trajectory_names_fields_that_there_are(robot: Robot) -> None:
-    for targets in ({"positoin": np.zeros((3, 2))}, {}):
-        with pytest.raises(o80.InvalidArgument, match=r"fields of the state \(position, gains"):
-            robot.frontend.add_trajectory(targets, ["a", "b"])
+    with pytest.raises(o80.InvalidArgument, match=r"'positoin'\. Did you mean 'position'"):
+        robot.frontend.add_trajectory({"positoin": np.zeros((3, 2))}, ["a", "b"])
+    with pytest.raises(o80.InvalidArgument, match=r"fields of the state \(position, gains"):
+        robot.frontend.add_trajectory({}, ["a", "b"])
     with pytest.raises(o80.InvalidArgument, match=r"\(T, 2\), not \(\)"):
         robot.frontend.add_trajectory(0.5, ["a", "b"])
     assert robot.frontend.added == 0
 
 
-def test_a_trajectory_across_types_is_refused(robot: Robot) -> None:
-    with pytest.raises(o80.InvalidArgument, match="different types"):
-        robot.frontend.add_trajectory(np.zeros((3, 5)))
+def test_a_trajectory_across_types_gives_each_its_first_field(robot: Robot) -> None:
+    rows: Any = [[0.1, 0.2, "TORQUE", True, 3, 0.5], [0.3, 0.4, 0, False, 4, 0.6]]
+    robot.frontend.add_trajectory(rows)
+    robot.frontend.add_command("joints", [0.7, 0.8])
+    robot.frontend.pulse()
+    first, second, third = (cast(Any, robot.step()) for _ in range(3))
+
+    assert first.joints["position"].tolist() == [0.1, 0.2]
+    assert (first.mode, first.valve, first.gear, first.drive.speed) == ("TORQUE", True, 3, 0.5)
+    assert (int(second.mode), second.valve, second.gear, second.drive.speed) == (0, False, 4, 0.6)
+    assert third.joints["position"].tolist() == [0.7, 0.8]
+
+
+def test_a_path_is_the_name_of_a_number_in_rows_too(robot: Robot) -> None:
+    robot.frontend.add_trajectory({"a.position": [0.5], "b.count": [7]}, ["a", "b"])
+    robot.frontend.pulse()
+    robot.step()
+    row, history = robot.frontend.latest(), robot.frontend.history()
+
+    assert (row["desired.a.position"], row["desired.b.count"]) == (0.5, 7)
+    assert row["desired.valve"] == row.desired.valve
+    assert history["desired.a.position"].tolist() == [0.0, 0.5]
+    assert history["desired.drive"].shape == (2,)
+    with pytest.raises(o80.InvalidArgument, match=r"a row has no number 'desired.c'"):
+        row["desired.c"]
+    with pytest.raises(TypeError):
+        iter(row)  # type: ignore[call-overload]
 
 
 def test_the_only_number_of_a_struct_needs_no_name(robot: Robot) -> None:

@@ -125,28 +125,28 @@ class UntypedFrontend {
                                const CommandOptions& options = {.pace = iterations(1)},
                                std::span<const std::int64_t> times = {});
   /// The same for several actuators; `states` holds all rows of the first actuator, then all rows
-  /// of the second, and so on. `mask` as in add_command(), for all rows of all of them.
+  /// of the second, and so on. `masks` as in add_commands(), each for all rows of its actuator.
   std::uint32_t add_trajectories(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                                  std::span<const std::byte> states,
                                  const CommandOptions& options = {.pace = iterations(1)},
                                  std::span<const std::int64_t> times = {},
-                                 std::span<const std::uint64_t> mask = {});
+                                 std::span<const std::uint64_t> masks = {});
   /// Adds a row of set-points for each of several actuators, one an iteration; the last one stays
   /// in force. `states` as in add_trajectories().
   void add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                       std::span<const std::byte> states, Mode mode = Mode::queue);
   /// Adds a chunk (docs/chunks.md): rows that are due in fixed iterations, which overwrite what the
   /// actuators do. `due`: iterations after the anchor, rising from 1, one for each row. `states`
-  /// and `mask` as in add_trajectories(). Throws InvalidArgument.
+  /// and `masks` as in add_trajectories(). Throws InvalidArgument.
   std::uint32_t add_chunk(std::span<const std::uint32_t> actuators,
                           std::span<const std::uint32_t> due, std::span<const std::byte> states,
-                          const ChunkOptions& options, std::span<const std::uint64_t> mask = {}) {
-    return add_chunk(own_builder(), actuators, due, states, options, mask);
+                          const ChunkOptions& options, std::span<const std::uint64_t> masks = {}) {
+    return add_chunk(own_builder(), actuators, due, states, options, masks);
   }
   /// The same, for a batch of its own.
   std::uint32_t add_chunk(BatchBuilder& batch, std::span<const std::uint32_t> actuators,
                           std::span<const std::uint32_t> due, std::span<const std::byte> states,
-                          const ChunkOptions& options, std::span<const std::uint64_t> mask);
+                          const ChunkOptions& options, std::span<const std::uint64_t> masks);
   /// No chunk of this plan follows (ChunkOptions::plan; 0: of no plan of this frontend): when its
   /// rows end, it is not starved. Changes no motion.
   std::uint32_t add_close_plan(std::uint64_t plan = 0);
@@ -276,6 +276,8 @@ class UntypedFrontend {
                              std::span<const std::uint64_t> mask) const;
   std::size_t size_of_state(std::uint32_t actuator) const;
   void refuse_twice(std::span<const std::uint32_t> actuators) const;
+  void check_masks(std::span<const std::uint32_t> actuators,
+                   std::span<const std::uint64_t> masks) const;
   std::size_t size_of_rows(std::uint32_t actuator, std::uint32_t rows, std::size_t left,
                            std::span<const std::uint32_t> actuators) const;
   CommandOptions checked_trajectory(std::uint32_t actuator, std::uint32_t rows,

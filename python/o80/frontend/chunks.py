@@ -6,7 +6,7 @@ import math
 import os
 import threading
 import time
-from collections.abc import Mapping, Sequence, Sized
+from collections.abc import Sequence, Sized
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -19,8 +19,9 @@ from o80.base.errors import BackendGone, BackendHalted, Closed, InvalidArgument,
 from o80.base.lifecycle import Managed
 from o80.base.words import RowsWord
 from o80.frontend.chunk_parts import ChunkPart, SentChunk
-from o80.rows.plans import ChunkRows, ChunkWay, Moment, limits_of
-from o80.rows.targets import common_labels, common_type, states_of
+from o80.rows.given_numbers import GivenNumbers
+from o80.rows.plans import ChunkRows, ChunkWay, Moment
+from o80.rows.targets import Rows, first_fields, states_of
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
@@ -32,7 +33,6 @@ _MOST_ITERATIONS = 2**47
 # chunks that are sent, and iterations that pass, before send() looks at what became of the former
 # ones, if nobody asks for the plan
 _UNSETTLED, _UNSEEN = 16, 1000
-_ONE_NUMBER = "planned, weights and ensemble are for actuators whose state is one number"
 
 
 def _from_to(value: Any, name: str, low: int, high: int) -> int:
@@ -52,6 +52,11 @@ def _fraction(step: Any) -> Fraction:
     if fraction > _LATEST:
         raise InvalidArgument(f"step must be at most 2^31 iterations, got {step}")
     return fraction
+
+
+def _due_after(step: Fraction, rows: Any) -> Any:
+    """Iterations of so many steps, halves up."""
+    return (rows * (2 * step.numerator) + step.denominator) // (2 * step.denominator)
 
 
 def _iterations(values: "ArrayLike", name: str) -> "NDArray[np.int64]":
@@ -99,17 +104,14 @@ class Chunks(Managed):
         ease: float | None = None,
         profile: RowsWord = "smooth",
         ensemble: float | None = None,
+        clip: bool = False,
     ) -> None:
         arm.latest()  # raises what a frontend that cannot be used raises
         self._arm = arm
         self._actuators, self._single = arm._chosen(actuators)
-        self._kind = common_type(self._actuators, arm._layout)
-        schema = arm._layout.schema
-        begin, described = schema["row"]["desired"], schema["actuators"]
-        self._places = [begin + described[each]["offset"] for each in self._actuators]  # in a row
-        self._switches = self._kind.kind == "b" or bool(common_labels(self._actuators, arm._layout))
-        plain = self._actuators if self._is_plain else []
-        self._limits = [limits_of(schema, each, 0, self._kind) for each in plain]
+        self._masks = first_fields(self._actuators, arm._layout)
+        self._given = GivenNumbers(self._actuators, self._masks, arm._layout)
+        self.clip = clip  #: whether numbers outside minimum and maximum are put on them
         self.step = _fraction(step)  #: iterations from row to row
         self._dues = np.empty(0, np.int64)
         self.ease = 0  #: iterations of a take-over; 0: those that the limits need
@@ -137,7 +139,7 @@ class Chunks(Managed):
 
     def send(
         self,
-        rows: "ArrayLike | Mapping[str, ArrayLike]",
+        rows: Rows,
         *,
         seen: _core.Observation | int | None = None,
         first: int = 0,
@@ -149,8 +151,8 @@ class Chunks(Managed):
     ) -> SentChunk:
         """Sends rows of targets; row j is due in iteration seen + (j + 1) x step, rounded.
 
-        rows: (n, actuators), or (n,) for a single actuator, or a mapping from some fields of the
-            state to such arrays, as in add_trajectory.
+        rows: (n, actuators), or (n,) for a single actuator: the first field of each; or a mapping
+            from fields, groups, actuators or paths to such arrays, as in add_trajectory.
         seen: the observation that the policy saw, or its iteration (None: the newest). Of another
             segment on the same clock: the newest row from before its capture counts.
         first: number of rows at the begin that are what was planned before; they are not played,
@@ -175,21 +177,28 @@ class Chunks(Managed):
         anchor = self._anchor(seen)
         if isinstance(rows, Sized) and len(rows) == 0:
             raise InvalidArgument("a chunk needs a row")
-        states, count, mask = states_of(rows, self._actuators, self._single, self._arm._layout)
+        states, count, masks = states_of(rows, self._actuators, self._single, self._arm._layout)
         first = _from_to(first, "first", 0, count - 1)
         after = self._due(count) if due is None else _iterations(due, "due") - anchor
         if due is not None or after[-1] > _LATEST:
             self._check_due(after, count, anchor)
         with self._lock:  # those of several threads are known in the order in which they are sent
+            clipped = 0
+            if self.clip:
+                inside, clipped = self._arm._clip(self._actuators, count, states, masks)
+                states = np.frombuffer(inside, np.uint8)
+            self._note_given(masks)
+            numbers = self._given.values(states, count)
             if weights is not None or self.ensemble is not None:
-                mixed = self._mixed(self._numbers(states), anchor + after, weights)
-                states, count, mask = states_of(mixed, self._actuators, False, self._arm._layout)
+                states = states.copy()
+                self._given.put(self._mixed(numbers, anchor + after, weights), states)
+                numbers = self._given.values(states, count)
             ease = 1 if self.profile == "hold" else self.ease
             batch = self._arm._send_chunk(
                 self._actuators,
                 after.astype(np.uint32).view(np.uint8),
                 states,
-                mask,
+                masks,
                 anchor,
                 self._number,
                 ease,
@@ -202,8 +211,7 @@ class Chunks(Managed):
             )
             if self.ensemble is not None:
                 self._count_answers(anchor + after)
-            numbers = self._numbers(states) if self._is_plain else np.empty((count, 0))
-            sent = SentChunk(batch, ChunkRows(anchor, after, ease, first, numbers))
+            sent = SentChunk(batch, ChunkRows(anchor, after, ease, first, numbers), clipped)
             self._arm._open_plans.add(self._number)
             self._open.append(sent)
             self._newest = sent
@@ -225,13 +233,19 @@ class Chunks(Managed):
             )
         return since
 
+    def _note_given(self, masks: list[int]) -> None:
+        """The plan is known of the numbers that its chunks give."""
+        if masks == self._masks:
+            return
+        self._masks = masks
+        self._given = GivenNumbers(self._actuators, masks, self._arm._layout)
+        self._parts, self._open, self._over = [], [], 0
+
     def _due(self, count: int) -> "NDArray[np.int64]":
         """Iterations after the anchor: (j + 1) x step, halves up."""
         dues = self._dues  # another thread may send a chunk of another length
         if len(dues) != count:
-            up, down = self.step.numerator, self.step.denominator
-            rows = np.arange(1, count + 1, dtype=np.int64)
-            dues = self._dues = (rows * (2 * up) + down) // (2 * down)
+            dues = self._dues = _due_after(self.step, np.arange(1, count + 1, dtype=np.int64))
         return dues
 
     def _check_due(self, after: "NDArray[np.int64]", count: int, anchor: int) -> None:
@@ -261,7 +275,8 @@ class Chunks(Managed):
                 answers = self._answers.get(iteration, 0)
                 all_of_them = np.exp(-self.ensemble * np.arange(answers + 1))
                 share = all_of_them[-1] / all_of_them.sum()
-            new[row] = plan + (new[row] - plan) * share
+            moves = ~np.array(self._given.switches)
+            new[row, moves] = (plan + (new[row] - plan) * share)[moves]
         return new
 
     def _count_answers(self, due: "NDArray[np.int64]") -> None:
@@ -299,24 +314,22 @@ class Chunks(Managed):
         since: an iteration or an observation, such as the one that a policy sees.
         step: iterations from row to row (None: that of the plan; 1: every iteration).
 
-        Returns (rows, actuators), or (rows,) for a single actuator: in a policy's prefix the
-        targets that are played whatever it answers. It counts the chunks that were decided, and
-        holds if nobody else commands.
+        Returns (rows, numbers), of each actuator those that the chunks give, or (rows,) for a
+        single number: in a policy's prefix the targets that are played whatever it answers. It
+        counts the chunks that were decided, and holds if nobody else commands.
         """
-        if not self._is_plain:
-            raise InvalidArgument(_ONE_NUMBER)
         anchor = self._anchor(since)
         n = whole_or_none(n, "n", 0)
         self._settle()
-        own = self if step is None else Chunks(self._arm, self._actuators, step=step)
+        every = self.step if step is None else _fraction(step)
         places: list[NDArray[np.float64]] = []
         for count in itertools.count(1):
-            place = self._plan_at(anchor + int(own._due(count)[-1]))
+            place = self._plan_at(anchor + _due_after(every, count))
             if place is None or (n is not None and len(places) == n):
                 break
             places.append(place)
-        planned = np.array(places).reshape(len(places), len(self._actuators))
-        return planned[:, 0] if self._single else planned
+        planned = np.array(places).reshape(len(places), len(self._given.places))
+        return planned[:, 0] if self._single and planned.shape[1] == 1 else planned
 
     @property
     def aio(self) -> ChunkWaits:
@@ -360,19 +373,7 @@ class Chunks(Managed):
             return row
         anchor = newest._sent.anchor
         steps = int((arm.published - anchor) / self.step)
-        behind = int(self._due(steps)[-1]) if steps > 0 else 0
-        return arm.wait_for(anchor + behind)
-
-    @property
-    def _is_plain(self) -> bool:
-        return self._kind.names is None and self._kind.shape == ()
-
-    def _numbers(self, states: "NDArray[np.uint8]") -> "NDArray[np.float64]":
-        """The values (rows, actuators) that are sent: as the loop reads them."""
-        if not self._is_plain:
-            raise InvalidArgument(_ONE_NUMBER)
-        values = states.view(self._kind).reshape(len(self._actuators), -1)
-        return values.T.astype(np.float64)
+        return arm.wait_for(anchor + _due_after(self.step, max(0, steps)))
 
     def _plan_at(self, iteration: int) -> "NDArray[np.float64] | None":
         """Places in an iteration; None if nothing is planned for it, or not known yet."""
@@ -405,7 +406,8 @@ class Chunks(Managed):
                 # those that wait for the same or a later iteration are overwritten
                 while parts and parts[-1].begins >= decision.begins:
                     parts.pop()
-                way = ChunkWay(sent._sent, decision, self.profile, self._limits, self._switches)
+                given = self._given
+                way = ChunkWay(sent._sent, decision, self.profile, given.limits, given.switches)
                 parts.append(ChunkPart(sent, way))
             # nothing becomes of the others any more
             self._over = min(self._over, len(parts))
@@ -431,7 +433,7 @@ class Chunks(Managed):
         """Notes from where each part begins, as far as that is there."""
         for part in parts:
             before = part.begins - 1
-            if part.known or not self._is_plain:
+            if part.known:
                 pass
             elif former is not None and former.acts(before):
                 if former.known:
@@ -444,28 +446,24 @@ class Chunks(Managed):
                 # it waits: if nobody else commands, what rests goes on to rest
                 latest = self._arm.latest()
                 if part.start is None and not latest.active[self._actuators].any():
-                    place = self._desired(latest)
+                    place = self._given.desired(latest)
                     rests = np.zeros_like(place)
                     part.begin((place, rests, rests), known=False)
             former = part
 
-    def _desired(self, row: Any) -> "NDArray[np.float64]":
-        """Desired places in an observation, read from its memory."""
-        numbers = [np.ndarray((), self._kind, row, at) for at in self._places]
-        return np.array(numbers, np.float64)
-
     def _motion(self, iteration: int) -> Moment:
         """Desired places and differences of a row, from the history; 0 for what does not act."""
         rows = [self._arm.wait_for(iteration)]
-        active = [row.active[self._actuators] for row in rows]
-        places = [self._desired(row) for row in rows]
+        chosen = np.array(self._actuators)[self._given.places]
+        active = [row.active[chosen] for row in rows]
+        places = [self._given.desired(row) for row in rows]
         rests = np.zeros_like(places[0])
         if not active[0].any():
             return places[0], rests, rests
         for before in (iteration - 1, iteration - 2):
             row = self._arm.wait_for(max(0, before))
-            active.append(row.active[self._actuators])
-            places.append(self._desired(row))
+            active.append(row.active[chosen])
+            places.append(self._given.desired(row))
         speed, former = (np.where(active[i], places[i] - places[i + 1], 0.0) for i in (0, 1))
         return places[0], speed, np.where(active[0], speed - former, 0.0)
 

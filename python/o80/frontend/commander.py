@@ -65,12 +65,13 @@ class Commander(Reader):
             profile: ProfileWord | None = None,
             start: StartWord = "desired",
             every: float | int | None = None,
+            clip: bool = False,
         ) -> int:
             """Adds a command to the next pulse.
 
-            actuator: its index or its name. Several, or None for all, make one command for all of
-                them: it begins when it is the next command of all of them, takes as many iterations
-                as the slowest, and has one status. It needs a target for each.
+            actuator: its index or its name. Several, the name of a group, or None for all make one
+                command for all of them: it begins when it is the next command of all of them, takes
+                as many iterations as the slowest, and has one status. It needs a target for each.
             target: the state to reach, in the unit of its field. A number is its first field (or
                 the state, if that is one number); otherwise a mapping, a record, or all fields in
                 order. Fields that are left out keep their desired value.
@@ -89,6 +90,8 @@ class Commander(Reader):
             every: for a set-point of a stream, the time to the next one [s], or as an integer the
                 number of iterations. On actuators with acceleration limits the motion then takes
                 twice that, or longer, so that a stream moves smoothly.
+            clip: True puts numbers outside minimum and maximum on them, and counts these in
+                `clipped`, instead of refusing the command.
 
             Every command ends at its target. If the limits make it longer than requested, it is
             completed later, with the reason "limits".
@@ -110,6 +113,10 @@ class Commander(Reader):
         @property
         def added(self) -> int:
             """Number of commands, requests and purges that were added and not pulsed."""
+
+        @property
+        def clipped(self) -> int:
+            """Numbers of targets that `clip` has put inside their bounds so far."""
 
         def forget_added(self) -> None:
             """Drops all that was added and not pulsed."""
@@ -176,7 +183,7 @@ class Commander(Reader):
 
     def add_trajectory(
         self,
-        targets: "ArrayLike | Mapping[str, ArrayLike]",
+        targets: "ArrayLike | Mapping[str, Any]",
         actuators: int | str | Sequence[int | str] | None = None,
         *,
         iterations: int | None = None,
@@ -185,13 +192,15 @@ class Commander(Reader):
         mode: ModeWord = "queue",
         profile: ProfileWord | RowsWord | None = None,
         start: StartWord = "desired",
+        clip: bool = False,
     ) -> int:
-        """Adds one command through many states, for one or several actuators.
+        """Adds one command through many states, for one or several actuators of any groups.
 
         targets: (T, actuators), or (T,) for a single actuator. As in add_command, a number is the
-            first field of a state; otherwise a structured array, or a mapping from fields to
-            arrays. Fields that are left out keep their desired value.
-        actuators: indices or names (None: all).
+            first field of a state; otherwise a structured array, or a mapping from fields, groups,
+            actuators, or paths such as "joint1.position" to arrays. Fields that are left out keep
+            their desired value.
+        actuators: indices or names, also of groups (None: all).
         iterations: number of iterations for each row (default: 1).
         times: when each row is reached, since the start [s]: (T,), each in an iteration of its own.
         speed: peak speed to each row, as in add_command.
@@ -200,7 +209,7 @@ class Commander(Reader):
             rows; "linear" (default with speed): straight lines;
             "hold": each row from the iteration after the one before it; "minimum_jerk": at rest
             at each row.
-        mode, start: as in add_command.
+        mode, start, clip: as in add_command.
 
         Several actuators reach each row together, as in add_command. If InvalidArgument is raised,
         nothing is added. Returns its place, as add_command.
@@ -212,18 +221,19 @@ class Commander(Reader):
         if times is None and speed is None and iterations is None:
             iterations = 1
         chosen, single = self._chosen(actuators)
-        states, rows, mask = states_of(targets, chosen, single, self._layout)
+        states, rows, masks = states_of(targets, chosen, single, self._layout)
         return self._add_trajectories(
             chosen,
             rows,
             states,
-            mask,
+            masks,
             None if times is None else times_of(times),
             speed,
             iterations,
             mode,
             profile,
             start,
+            clip,
         )
 
     def _chosen(self, actuators: int | str | Sequence[int | str] | None) -> tuple[list[int], bool]:
@@ -231,8 +241,16 @@ class Commander(Reader):
         if actuators is None:
             return list(range(len(self.actuators))), False
         if isinstance(actuators, (int, str, np.integer)):
-            return [self._index(actuators)], True
-        return [self._index(actuator) for actuator in actuators], False
+            of_group = self._group(actuators)
+            return (of_group, False) if of_group else ([self._index(actuators)], True)
+        chosen = (self._group(each) or [self._index(each)] for each in actuators)
+        return [index for each in chosen for index in each], False
+
+    def _group(self, named: int | str) -> list[int]:
+        """The actuators of a group; none if this names no group, or an actuator too."""
+        if not isinstance(named, str) or any(each.name == named for each in self.actuators):
+            return []
+        return [each.index for each in self.actuators if each.group == named]
 
     def request(
         self,

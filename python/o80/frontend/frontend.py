@@ -108,10 +108,11 @@ class Frontend(Commander, lifecycle.Managed):
         ease: float | None = None,
         profile: RowsWord = "smooth",
         ensemble: float | None = None,
+        clip: bool = False,
     ) -> "Chunks":
         """Opens a plan for a policy that answers with rows of targets, late (docs/chunks.md).
 
-        actuators: indices or names (None: all).
+        actuators: indices or names, also of groups, of any types (None: all).
         step: iterations from row to row, whole or a fraction (50 / 3: 30 rows a second at 500 Hz).
         ease: iterations of a take-over, or as a float its time [s] (None: those that the limits
             need, at least a step and at most half of what is ahead).
@@ -119,6 +120,8 @@ class Frontend(Commander, lifecycle.Managed):
             them; "linear"; or "hold".
         ensemble: mix each new row with the plan, as ACT does: share exp(-ensemble * i) of the i-th
             answer for an iteration (None: new rows replace the plan).
+        clip: True puts numbers of rows outside minimum and maximum on them, counted in the
+            `clipped` of what `send` returns, instead of refusing the chunk.
 
         with arm.chunks(["shoulder", "elbow"], step=10) as plan:
             seen = plan.wait(lead=120)
@@ -126,7 +129,9 @@ class Frontend(Commander, lifecycle.Managed):
         """
         from o80.frontend.chunks import Chunks
 
-        return Chunks(self, actuators, step=step, ease=ease, profile=profile, ensemble=ensemble)
+        return Chunks(
+            self, actuators, step=step, ease=ease, profile=profile, ensemble=ensemble, clip=clip
+        )
 
     @cached
     def aio(self) -> "Waits":

@@ -11,7 +11,7 @@ from o80.base.errors import InvalidArgument
 from o80.base.words import LateWord, ModeWord, ProfileWord, StartWord
 from o80.rows.enumerations import labelled, numbers_of
 from o80.rows.layout import Layout
-from o80.rows.targets import common_labels, common_type, state_types, states_from
+from o80.rows.targets import labels_of, state_types, states_from
 
 #: Axes of targets, by their number.
 _AXES = {1: "(copies,)", 2: "(steps, actuators)", 3: "(copies, steps, actuators)"}
@@ -37,7 +37,10 @@ class BurstArrays:
         count, steps = _checked(iterations, "iterations"), _checked(steps, "steps")
         states = _states(layout, copies, actuators, steps)
         states.view(np.uint8).fill(255)
-        self._targets = states if states.ndim == 1 else states.swapaxes(-1, -2)
+        if states.ndim == 1:  # of several types: a field for each actuator
+            self._targets = states if copies else states.reshape(())
+        else:
+            self._targets = states.swapaxes(-1, -2)
         self._rows: NDArray[Any] = np.zeros((*copies, count), layout.row)
         each = _checked(each, "each")
         memory = states.view(np.uint8), self._rows.view(np.uint8)
@@ -76,7 +79,8 @@ class PreparedBurst(BurstArrays):
     """A burst that sends targets and returns all rows; made by `Frontend.prepared_burst`.
 
     targets: (steps, actuators), to be filled before a run: numbers for states of one number,
-        otherwise structured. Floats that are not filled are NaN and refused. Targets keep their
+        otherwise structured; where actuators have several types, with a field for each, as in
+        `targets["gripper"]`. Floats that are not filled are NaN and refused. Targets keep their
         values from run to run. An array that is assigned is copied into them.
     rows: (iterations,), structured like `history().rows`: the rows of the last run. Every run
         overwrites them: copy rows that you keep.
@@ -119,10 +123,10 @@ def _states(
     if copies and not actuators:
         return np.empty((*copies, 0, steps))  # it only runs them
     kinds = state_types(actuators, layout)
-    if copies and len(set(kinds)) > 1:
+    if len(set(kinds)) > 1:
         names = [layout.schema["actuators"][actuator]["name"] for actuator in actuators]
         columns = [(name, kind, (steps,)) for name, kind in zip(names, kinds, strict=True)]
-        return np.empty(copies, np.dtype(columns))
-    states = np.empty((*copies, len(actuators), steps), common_type(actuators, layout))
-    known: NDArray[Any] = labelled(states, common_labels(actuators, layout))
+        return np.empty(copies or (1,), np.dtype(columns))
+    states = np.empty((*copies, len(actuators), steps), kinds[0])
+    known: NDArray[Any] = labelled(states, labels_of(actuators[0], layout))
     return known

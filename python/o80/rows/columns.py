@@ -9,7 +9,7 @@ import numpy as np
 import o80._core as _core
 from o80.base.errors import InvalidArgument
 from o80.base.loop_options import did_you_mean
-from o80.rows.layout import dtype_of_field, labels_of_field
+from o80.rows.layout import Layout, dtype_of_field, labels_of_field
 
 
 class Column(NamedTuple):
@@ -91,6 +91,12 @@ def _group_path(column: Column, schema: Mapping[str, Any]) -> str:
 def value_of(row: Any, column: Column) -> Any:
     """The number of a column in an observation."""
     return np.ndarray((), column.dtype, row, column.offset)[()]
+
+
+def numbers_in(row: Any, layout: Layout, path: str) -> Any:
+    """The numbers of an observation at a path: one, or (n,). Raises InvalidArgument."""
+    values = [value_of(row, column) for column in layout.columns_at(path, columns_at)]
+    return values[0] if len(values) == 1 else np.array(values)
 
 
 def is_part(column: str, field: str) -> bool:

@@ -128,11 +128,21 @@ class History:
     def __getitem__(self, index: int) -> _core.Observation: ...
     @overload
     def __getitem__(self, index: slice) -> "History": ...
-    def __getitem__(self, index: int | slice) -> "_core.Observation | History":
+    @overload
+    def __getitem__(self, index: str) -> NDArray[Any]: ...
+    def __getitem__(self, index: int | slice | str) -> "_core.Observation | History | NDArray[Any]":
         """The observation at a position: 0 is the oldest, -1 the newest; a slice is a History.
+
+        A path gives the numbers there: `history["observed.joint1.position"]`, (T,), as a column of
+        `to_frame()`; that of several numbers, such as "observed.joints", (T, n).
 
         To find observations by iteration or time use `at_iteration`, `at_time`, `select`.
         """
+        if isinstance(index, str):
+            from o80.rows.columns import columns_at  # late: most processes that attach never ask
+
+            values = [values_of(self, each) for each in self._layout.columns_at(index, columns_at)]
+            return values[0] if len(values) == 1 else np.stack(values, axis=1)
         if isinstance(index, slice):
             if index.step is not None and index.step < 0:
                 raise InvalidArgument(

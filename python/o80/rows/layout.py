@@ -1,6 +1,6 @@
 """Conversion of a robot's rows to NumPy arrays."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache
 from typing import Any
 
@@ -213,6 +213,16 @@ class Layout:
         #: enumerations of sensor values, by field
         self.extended_labels = labels_of_type(schema["extended"]) if "extended" in schema else {}
         self._is_plain_array = self._is_array and not self.labels
+        self._columns: dict[str, list[Any]] = {}
+
+    def columns_at(self, path: str, find: Callable[[dict[str, Any], str], list[Any]]) -> list[Any]:
+        """Columns at a path, found by `o80.rows.columns.columns_at` once."""
+        if not isinstance(path, str):
+            raise InvalidArgument(f"a path of numbers must be a text, got {path!r}")
+        found = self._columns.get(path)
+        if found is None:
+            found = self._columns[path] = find(self.schema, path)
+        return found
 
     @cached
     def row(self) -> np.dtype[Any]:

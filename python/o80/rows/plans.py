@@ -3,6 +3,7 @@
 from collections import deque
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import compress
 from typing import Any, NamedTuple, cast
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.words import Status
-from o80.rows.actuators import actuators_of
+from o80.rows.actuators import Number, actuators_of
 from o80.rows.columns import Column, columns_of
 from o80.rows.history import History, values_of
 from o80.rows.journal import ENDS, JournalCommand, JournalEntry
@@ -58,9 +59,9 @@ class NumberLimits(NamedTuple):
     rates: tuple[float, float, float]  #: of speed, acceleration and jerk, per iteration
 
 
-def limits_of(schema: dict[str, Any], actuator: int, number: int, kind: Any) -> NumberLimits:
+def limits_of(number: Number, kind: Any, schema: dict[str, Any]) -> NumberLimits:
     """The limits of a number of an actuator's state, which is of this type."""
-    limits = actuators_of(schema)[actuator].numbers[number].limits
+    limits = number.limits
     period = schema["period"] / 1e9
     low, high = _range_of(np.dtype(kind))
     rates = (
@@ -81,7 +82,7 @@ def _range_of(kind: np.dtype[Any]) -> tuple[float, float]:
 class ChunkWay:
     """The way of a chunk from its begin to its last row.
 
-    limits: of each number. switches: its numbers are not interpolated: rows are held.
+    limits: of each number. switches: which of them are not interpolated: rows are held.
     """
 
     def __init__(
@@ -90,14 +91,14 @@ class ChunkWay:
         decision: Decision,
         profile: str,
         limits: Sequence[NumberLimits],
-        switches: bool = False,
+        switches: Sequence[bool] = (),
     ) -> None:
         self.begins = decision.begins
         self.rows = sent.rows
         self._limits = limits
         self._sent = sent
-        self._switches = switches
-        self._profile = "hold" if switches else profile
+        self._switches = switches or [False] * len(limits)
+        self._profile = profile
         self._begins = self.begins - sent.anchor - decision.shift  # iterations after the anchor
         # the last iteration of the way to each row, counted from the begin
         self._ends = sent.due - self._begins + 1
@@ -109,8 +110,12 @@ class ChunkWay:
 
     def _first_row(self, start: Moment | None) -> int:
         """The first row that is reached: by a given `ease`, or from `start`."""
+        # by those that are interpolated
         starts = [] if start is None else np.array(start, np.float64).T.tolist()
-        rows, rates = self.rows.T.tolist(), [each.rates for each in self._limits]
+        moves = [not each for each in self._switches]
+        starts = [*compress(starts, moves)]
+        rows = [*compress(self.rows.T.tolist(), moves)]
+        rates = [each.rates for each in compress(self._limits, moves)]
         due = self._sent.due.tolist()
         row: int = _core.first_row(due, self._begins, self._sent.ease, starts, rows, rates)
         return row
@@ -121,21 +126,25 @@ class ChunkWay:
 
         start: of the iteration before. row: the first that is reached, if that is known.
         """
-        if self._switches:
-            row = min(int(np.searchsorted(self._ends, 1)), len(self.rows) - 1)
-        elif row is None:
-            row = self._first_row(start)
-        ends = np.maximum(self._ends[row:], 1).tolist()
-        shape = len(self.rows.T), ends[-1] if most is None else min(most, ends[-1])
-        plans = [
-            _core.plan_of_rows(moment, rows, ends, self._profile, shape[1], limit.low, limit.high)
-            for moment, rows, limit in zip(
-                np.array(start, np.float64).T.tolist(),
-                self.rows[row:].T.tolist(),
-                self._limits,
-                strict=True,
+        row = self._first_row(start) if row is None else row
+        held = min(int(np.searchsorted(self._ends, 1)), len(self.rows) - 1)
+        last = int(self._ends[-1])
+        shape = len(self.rows.T), last if most is None else min(most, last)
+        plans = []
+        for moment, rows, limit, switches in zip(
+            np.array(start, np.float64).T.tolist(),
+            self.rows.T.tolist(),
+            self._limits,
+            self._switches,
+            strict=True,
+        ):
+            first, profile = (held, "hold") if switches else (row, self._profile)
+            ends = np.maximum(self._ends[first:], 1).tolist()
+            plans.append(
+                _core.plan_of_rows(
+                    moment, rows[first:], ends, profile, shape[1], limit.low, limit.high
+                )
             )
-        ]
         places, slopes, curvatures = (
             np.frombuffer(b"".join(each[i] for each in plans)).reshape(shape).T for i in range(3)
         )
@@ -184,7 +193,7 @@ def planned_by_chunks(
         return found
     columns = {each.name: each for each in columns_of(history.schema)}
     latest = int(iterations[-1]) + MOST_AHEAD
-    place_of = _places_of(history.schema)
+    number_of = _numbers_by_name(history.schema)
     waiting: dict[tuple[int | None, int | None], tuple[JournalEntry, JournalCommand]] = {}
     numbers: dict[tuple[int | None, int | None], list[str]] = {}
     ends: dict[str, tuple[int, Status | None]] = {}  # of the last chunk of each number
@@ -205,28 +214,24 @@ def planned_by_chunks(
             shift = _shift(taken, command, history)
             given = [each for each in _numbers(command) if f"desired.{each[0]}" in columns]
             numbers[key] = [number for number, _ in given]
-            for switches in (False, True):
-                alike = [each for each in given if (each[1].dtype.kind == "b") == switches]
-                starts: list[Moment] = []
-                for number, _ in alike:
-                    before = found.setdefault(number, [])[-1:]
-                    start = _start(before, ends.pop(number, None), begins)
-                    if start is None:
-                        start = _desired(history, columns[f"desired.{number}"], place, command)
-                    starts.append(start)
-                if not starts:
-                    continue
-                limits = [
-                    limits_of(history.schema, *place_of[number], rows.dtype)
-                    for number, rows in alike
-                ]
-                values = np.stack([rows for _, rows in alike], axis=1).astype(np.float64)
-                way = _way(taken, command, values, shift, begins, limits, switches)
-                at = tuple(np.concatenate(each) for each in zip(*starts, strict=True))
-                plan = way.places(cast("Moment", at), latest - begins)
-                for i, (number, _) in enumerate(alike):
-                    places, *derivatives = (each[:, i] for each in plan)
-                    found[number].append(Planned(begins, places, np.array(derivatives)))
+            if not given:
+                continue
+            starts: list[Moment] = []
+            for number, _ in given:
+                before = found.setdefault(number, [])[-1:]
+                start = _start(before, ends.pop(number, None), begins)
+                if start is None:
+                    start = _desired(history, columns[f"desired.{number}"], place, command)
+                starts.append(start)
+            limits = [limits_of(number_of[n], rows.dtype, history.schema) for n, rows in given]
+            switches = [rows.dtype.kind == "b" for _, rows in given]
+            values = np.stack([rows.astype(np.float64) for _, rows in given], axis=1)
+            way = _way(taken, command, values, shift, begins, limits, switches)
+            at = tuple(np.concatenate(each) for each in zip(*starts, strict=True))
+            plan = way.places(cast("Moment", at), latest - begins)
+            for i, (number, _) in enumerate(given):
+                places, *derivatives = (each[:, i] for each in plan)
+                found[number].append(Planned(begins, places, np.array(derivatives)))
     return found
 
 
@@ -237,7 +242,7 @@ def _way(
     shift: int,
     begins: int,
     limits: list[NumberLimits],
-    switches: bool,
+    switches: list[bool],
 ) -> ChunkWay:
     anchor = command.anchor or 0
     due = np.array(command.due, np.int64) - anchor
@@ -249,17 +254,12 @@ def _way(
     return ChunkWay(sent, decision, command.profile, limits, switches)
 
 
-def _places_of(schema: dict[str, Any]) -> dict[str, tuple[int, int]]:
-    """Index of the actuator and of the number in its state, by name of the number."""
+def _numbers_by_name(schema: dict[str, Any]) -> dict[str, Number]:
+    """The numbers of all actuators: "elbow", "elbow.position"."""
     return {
-        f"{each.name or each.index}.{number.name}"
-        if number.name
-        else each.name or str(each.index): (
-            each.index,
-            place,
-        )
+        ".".join(filter(None, (each.name or str(each.index), number.name))): number
         for each in actuators_of(schema)
-        for place, number in enumerate(each.numbers)
+        for number in each.numbers
     }
 
 
@@ -305,7 +305,7 @@ def _start(
 def _desired(history: History, column: Column, place: int, command: JournalCommand) -> Moment:
     """Where the number was in a row, and its differences; 0 if its actuator did not act there."""
     desired = np.asarray(values_of(history, column), np.float64)
-    acts = history.active[:, _indices(history, command)].any(axis=1)
+    acts = np.any(history.active[:, _indices(history, command)], axis=1)
     speeds = [
         desired[at] - desired[at - 1] if at > 0 and acts[at] else 0.0
         for at in (place, max(0, place - 1))

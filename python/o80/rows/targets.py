@@ -1,31 +1,39 @@
 """Converts targets of trajectories from Python values to bytes of each actuator."""
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import o80._core as _core
 from o80.base.errors import InvalidArgument
 from o80.rows.enumerations import numbers_of
 from o80.rows.layout import Layout, dtype_of_type, labels_of_type, runs_of
 
+#: Rows of targets: an array, or a mapping from fields, groups, actuators or paths to arrays.
+Rows: TypeAlias = "ArrayLike | Mapping[str, Any]"
+
 
 def states_of(
-    targets: ArrayLike | Mapping[str, ArrayLike],
+    targets: Rows,
     actuators: Sequence[int],
     single: bool,
     layout: Layout,
 ) -> tuple[NDArray[np.uint8], int, list[int]]:
     """Bytes of all rows of the first actuator, then of the second, and so on; number of rows;
-    words with a bit for each number of a state that is given, empty if all are.
+    words with a bit for each number of a state that is given, one actuator after the other, empty
+    if all are.
     """
-    kind = common_type(actuators, layout)
-    labels = common_labels(actuators, layout)
+    kinds = state_types(actuators, layout)
+    fields = kinds[0].names or ()
+    by_field = not isinstance(targets, Mapping) or set(targets) <= set(fields) or not targets
+    if len(set(kinds)) > 1 or not by_field:
+        return _states_of_parts(targets, actuators, kinds, layout)
+    kind, labels = kinds[0], labels_of(actuators[0], layout)
     if not isinstance(targets, Mapping) and _are_first_fields(targets, kind):
-        assert kind.names is not None
-        targets = {kind.names[0]: targets}
-    given: Sequence[str] = kind.names or ()
+        targets = {fields[0]: targets}
+    given: Sequence[str] = fields
     if isinstance(targets, Mapping):
         array = _from_fields(targets, kind, labels)
         given = list(targets)
@@ -40,7 +48,134 @@ def states_of(
         )
     states = np.zeros(array.T.shape, kind)  # a copy would hold anything in its padding
     states[...] = array.T
-    return states.reshape(-1).view(np.uint8), len(array), _mask_of(given, kind)
+    masks = _mask_of(given, kind) * len(actuators)
+    return states.reshape(-1).view(np.uint8), len(array), masks
+
+
+def _states_of_parts(
+    targets: Rows, actuators: Sequence[int], kinds: list[np.dtype[Any]], layout: Layout
+) -> tuple[NDArray[np.uint8], int, list[int]]:
+    """The same for actuators whose types differ, or from a mapping of their names."""
+    parts = _Parts(actuators, kinds, layout)
+    if isinstance(targets, Mapping):
+        for key, values in targets.items():
+            parts.add(key, values)
+    else:
+        parts.fill(list(range(len(actuators))), None, targets)
+    return parts.states()
+
+
+class _Parts:
+    """Columns of rows for each of several actuators, by their fields."""
+
+    def __init__(
+        self, actuators: Sequence[int], kinds: list[np.dtype[Any]], layout: Layout
+    ) -> None:
+        self._kinds = kinds
+        self._types = [_type_of(each, layout) for each in actuators]
+        schema = layout.schema
+        rows = [schema["actuators"][each] for each in actuators]
+        self._names = [each["name"] for each in rows]
+        self._groups = [schema["groups"][each["group"]]["name"] for each in rows]
+        # of each actuator: values (T, ...) by field; of a whole state by ""
+        self._columns: list[dict[str, NDArray[Any]]] = [{} for _ in actuators]
+
+    def add(self, key: str, values: Any) -> None:
+        """Targets by the name of an actuator, a group or a field, or by a path."""
+        name, _, field = key.partition(".")
+        places = self._named(key) or (self._named(name) if field else [])
+        inner: str | None = None if self._named(key) else field or None
+        if not places:
+            inner = key
+            places = [i for i, kind in enumerate(self._kinds) if key in (kind.names or ())]
+        if not places:
+            known = {*self._names, *self._groups, *(n for k in self._kinds for n in k.names or ())}
+            instead = _core.names_instead(key, sorted(known - {""}))
+            raise InvalidArgument(f"no actuator, group or field is named {key!r}{instead}")
+        if isinstance(values, Mapping):
+            for each, column in values.items():
+                self.fill(places, each, column)
+        else:
+            self.fill(places, inner, values)
+
+    def _named(self, name: str) -> list[int]:
+        names = self._names if name in self._names else self._groups
+        return [i for i, each in enumerate(names) if each == name and name]
+
+    def fill(self, places: list[int], field: str | None, values: Any) -> None:
+        """The same field of these actuators (None: the first) from (T, actuators), or (T,)."""
+        array = np.asarray(values)
+        if array.dtype.kind in "OUT":  # not as texts: numbers may stand beside labels
+            array = np.asarray(values, object)
+        whole = array.dtype.names is not None and field is None
+        for i, place in enumerate(places):
+            kind = self._kinds[place]
+            names = kind.names or ()
+            if field not in (None, *names):
+                raise InvalidArgument(
+                    f"the state of '{self._names[place]}' has no field {field!r}"
+                    f"{_core.names_instead(str(field), list(names))}"
+                )
+            named = "" if whole or not names else field or names[0]
+            target = kind if not named else _field_of(kind, named)
+            axes = 1 + len(target.shape)
+            column = array
+            if array.ndim == axes + 1 and array.shape[1] == len(places):
+                column = array[:, i]
+            elif array.ndim != axes or len(places) > 1:
+                raise InvalidArgument(
+                    f"the targets of {len(places)} actuators are (T, {len(places)}), "
+                    f"not {array.shape}"
+                )
+            labels = labels_of_type(self._types[place])
+            known = labels.get(named) if isinstance(labels, Mapping) else labels
+            self._columns[place][named] = _cast(numbers_of(known, column), target)
+
+    def states(self) -> tuple[NDArray[np.uint8], int, list[int]]:
+        """As states_of()."""
+        left_out = [n for n, each in zip(self._names, self._columns, strict=True) if not each]
+        if left_out:
+            raise InvalidArgument(
+                f"the targets leave out {', '.join(map(repr, left_out))}: give theirs, or choose "
+                "the other actuators only"
+            )
+        counts = {len(column) for each in self._columns for column in each.values()}
+        if len(counts) != 1:
+            raise InvalidArgument(f"the targets have different numbers of rows: {sorted(counts)}")
+        (count,) = counts
+        parts: list[bytes] = []
+        masks: list[list[int]] = []
+        for kind, columns in zip(self._kinds, self._columns, strict=True):
+            states = np.zeros(count, kind)
+            for name, column in columns.items():
+                (states[name] if name else states)[...] = column
+            parts.append(states.tobytes())
+            masks.append(_mask_of([*columns] if "" not in columns else kind.names or (), kind))
+        numbers = [_numbers_in(kind) for kind in self._kinds]
+        words = [mask or _words((1 << n) - 1, n) for mask, n in zip(masks, numbers, strict=True)]
+        given = [word for each in words for word in each] if any(masks) else []
+        return np.frombuffer(b"".join(parts), np.uint8), count, given
+
+
+def _field_of(kind: np.dtype[Any], name: str) -> np.dtype[Any]:
+    assert kind.fields is not None
+    return kind.fields[name][0]
+
+
+def _cast(column: Any, kind: np.dtype[Any]) -> NDArray[Any]:
+    """Numbers as those of a field; rounded where that is an integer or a truth value."""
+    base = kind.base
+    try:
+        array = np.asarray(column)
+        if base.kind in "iu" and array.dtype.kind == "f":
+            array, numbers = np.rint(array), np.iinfo(base)
+            if not np.all((array >= numbers.min) & (array <= numbers.max)):
+                raise OverflowError(f"they must be from {numbers.min} to {numbers.max}")
+        if base.kind == "b" and array.dtype.kind == "f":
+            array = array >= 0.5
+        return array.astype(base, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidArgument(f"the targets cannot be read as {base}: {error}") from error
 
 
 def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
@@ -94,32 +229,34 @@ def _mask_of(given: Sequence[str], kind: np.dtype[Any]) -> list[int]:
         if name in given:
             bits |= (1 << count) - 1 << place
         place += count
-    return [bits >> word & 2**64 - 1 for word in range(0, place, 64)]
+    return _words(bits, place)
+
+
+def _words(bits: int, count: int) -> list[int]:
+    return [bits >> word & 2**64 - 1 for word in range(0, count, 64)]
 
 
 def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]:
-    """The state type of each of these actuators."""
+    """The state type of each of these actuators. Raises InvalidArgument if there are none."""
+    if not actuators:
+        raise InvalidArgument("targets need an actuator")
     return [dtype_of_type(_type_of(actuator, layout)) for actuator in actuators]
 
 
-def common_type(actuators: Sequence[int], layout: Layout) -> np.dtype[Any]:
-    """The state type of all these actuators. Raises InvalidArgument if they differ."""
-    schema = layout.schema
-    groups = {schema["actuators"][actuator]["group"] for actuator in actuators}
-    kinds = {dtype_of_type(schema["groups"][group]["type"]) for group in groups}
-    if len(kinds) == 1:
-        return kinds.pop()
-    names = ", ".join(schema["groups"][group]["name"] for group in sorted(groups))
-    raise InvalidArgument(
-        f"the groups {names} have states of different types: give each a trajectory of its own"
-        if groups
-        else "a trajectory needs an actuator"
-    )
+def first_fields(actuators: Sequence[int], layout: Layout) -> list[int]:
+    """Words with a bit for each number that an array of targets gives, as those of states_of()."""
+    kinds = state_types(actuators, layout)
+    masks = [_mask_of(kind.names[:1], kind) if kind.names else [] for kind in kinds]
+    if not any(masks):
+        return []
+    counts = [_numbers_in(kind) for kind in kinds]
+    words = [mask or _words((1 << n) - 1, n) for mask, n in zip(masks, counts, strict=True)]
+    return [word for each in words for word in each]
 
 
-def common_labels(actuators: Sequence[int], layout: Layout) -> Any:
-    """The enumerations in the state of actuators that have a common type."""
-    return labels_of_type(_type_of(actuators[0], layout))
+def labels_of(actuator: int, layout: Layout) -> Any:
+    """The enumerations in the state of an actuator."""
+    return labels_of_type(_type_of(actuator, layout))
 
 
 def _type_of(actuator: int, layout: Layout) -> dict[str, Any]:

@@ -3,11 +3,14 @@
 #include <algorithm>
 #include <charconv>
 #include <cmath>
+#include <cstring>
 #include <limits>
 #include <string>
+#include <type_traits>
 
 #include "base/short_text.hpp"
 #include "describe/number_name.hpp"
+#include "describe/visit_number.hpp"
 #include "o80/base/nearest_name.hpp"
 
 namespace o80 {
@@ -99,6 +102,33 @@ bool TargetLimits::admit(std::uint32_t actuator, const std::byte* state,
     if (!(value >= ranges[i].lowest && value <= ranges[i].highest)) return false;
   }
   return true;
+}
+
+std::size_t TargetLimits::clip(std::uint32_t actuator, std::byte* state,
+                               const std::uint64_t* mask) const noexcept {
+  const auto& [layout, ranges] = actuators_[actuator];
+  std::size_t clipped = 0;
+  for (std::uint32_t i = 0; i < ranges.size(); ++i) {
+    const NumberPlace& place = layout->numbers()[i];
+    if (!masked(mask, i) || !place.moves()) continue;
+    const auto [lowest, highest, accelerates] = ranges[i];
+    const double value = layout->number(i, state);
+    if (!std::isfinite(value) || (value >= lowest && value <= highest)) continue;
+    ++clipped;
+    visit_number(place.kind, [&]<class T>(T) {
+      // rounded inward
+      T inside{};
+      if constexpr (std::is_floating_point_v<T>) {
+        inside = static_cast<T>(std::clamp(value, lowest, highest));
+        if (inside > highest) inside = std::nextafter(inside, std::numeric_limits<T>::lowest());
+        if (inside < lowest) inside = std::nextafter(inside, std::numeric_limits<T>::max());
+      } else {
+        inside = static_cast<T>(value < lowest ? std::ceil(lowest) : std::floor(highest));
+      }
+      std::memcpy(state + place.offset, &inside, sizeof inside);
+    });
+  }
+  return clipped;
 }
 
 std::uint32_t CommandCheck::actuator(std::string_view name) const {

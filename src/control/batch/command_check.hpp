@@ -30,6 +30,9 @@ class TargetLimits {
   /// True if the numbers whose bits are set are finite and inside their bounds, or proper.
   bool admit(std::uint32_t actuator, const std::byte* state,
              const std::uint64_t* mask) const noexcept;
+  /// Puts the finite numbers whose bits are set inside their bounds; returns how many were outside.
+  std::size_t clip(std::uint32_t actuator, std::byte* state,
+                   const std::uint64_t* mask) const noexcept;
   /// The first number whose bit is set, and that moves without a limit of acceleration.
   std::uint32_t first_without_acceleration(std::uint32_t actuator,
                                            const std::uint64_t* mask) const noexcept {
@@ -75,6 +78,16 @@ class CommandCheck {
   /// Checks one or several targets, one state after the other.
   void targets(std::uint32_t actuator, std::span<const std::byte> states,
                std::span<const std::uint64_t> mask = {}) const;
+  /// Puts the numbers of one or several targets inside their bounds; returns how many were outside.
+  std::size_t clip(std::uint32_t actuator, std::span<std::byte> states,
+                   std::span<const std::uint64_t> mask = {}) const noexcept {
+    const std::size_t size = targets_.layout(actuator).size();
+    std::size_t clipped = 0;
+    for (; states.size() >= size; states = states.subspan(size)) {
+      clipped += targets_.clip(actuator, states.data(), mask.empty() ? nullptr : mask.data());
+    }
+    return clipped;
+  }
   /// True if targets() admits `steps` states for each of these actuators, one after the other.
   bool admits(std::span<const std::uint32_t> actuators, std::uint32_t steps,
               const std::byte* states) const noexcept {

@@ -76,7 +76,8 @@ Motion::Motion(const Schema& schema, const ActuatorRow& actuator, const StateLay
     }
     const auto rest = row.resting != 0 ? std::optional(row.rest) : std::nullopt;
     numbers_.push_back({i, place.offset, lowest, highest, place.kind, limited || rest,
-                        NumberMotion(guard, rest, std::move(integral))});
+                        NumberMotion(guard, rest, std::move(integral),
+                                     row.minimum > -kUnlimited || row.maximum < kUnlimited)});
   }
 }
 

@@ -65,12 +65,18 @@ Limit NumberMotion::step(double low, double high) noexcept {
     const double wanted = std::clamp(plan_.next(), low, high);
     if (!follows_ && guard_.pass(wanted)) return;
     follows_ = true;
-    limit = leave() ? Limit::acceleration : guard_.follow(wanted);
-    // the range of a kind is no limit
-    if (limit == Limit::none && plan_.is_held() && wanted > low && wanted < high)
-      limit = wanted >= guard_.maximum() ? Limit::maximum : Limit::minimum;
+    limit = follow(wanted);
   });
   return bound != Limit::none ? bound : limit;
+}
+
+/// One iteration of what is not planned. Apart, so that what is planned pays nothing for it.
+[[gnu::noinline]] Limit NumberMotion::follow(double wanted) noexcept {
+  if (leave()) return Limit::acceleration;
+  const Limit limit = guard_.follow(wanted);
+  // a bound may hold the curve of rows
+  if (limit != Limit::none || !has_bounds_ || !plan_.is_held()) return limit;
+  return wanted >= guard_.maximum() ? Limit::maximum : Limit::minimum;
 }
 
 bool NumberMotion::brake() noexcept {

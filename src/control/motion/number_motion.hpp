@@ -18,9 +18,10 @@ namespace o80 {
 class NumberMotion {
  public:
   /// `rest`: its value without a command, if any. `integral`: bounds of what it moves, if any.
+  /// `has_bounds`: false if its minimum and maximum are but the range of its kind.
   NumberMotion(const NumberLimiter& guard, std::optional<double> rest,
-               std::unique_ptr<IntegralBound> integral = nullptr) noexcept
-      : guard_(guard), rest_(rest), integral_(std::move(integral)) {}
+               std::unique_ptr<IntegralBound> integral = nullptr, bool has_bounds = true) noexcept
+      : guard_(guard), rest_(rest), has_bounds_(has_bounds), integral_(std::move(integral)) {}
 
   /// Where what it moves is: before each step() or brake().
   void observe(const StateLayout& layout, const std::byte* observed) noexcept {
@@ -174,10 +175,12 @@ class NumberMotion {
   template <class Move>
   Limit move(Move&& move) noexcept;
   Limit hold_back() noexcept;
+  Limit follow(double wanted) noexcept;
   std::int64_t plan_for(const Requested& requested) noexcept;
 
   NumberLimiter guard_;
   std::optional<double> rest_;
+  bool has_bounds_;
   NumberPlan plan_;
   bool planned_ = false;  // a command moves it by `plan_`
   bool follows_ = false;  // `plan_` may break limits

@@ -205,19 +205,9 @@ double NumberPlan::at(std::int64_t done) const noexcept {
     case Shape::stop_first:
       return done <= stop_ ? to_stop_.position(i)
                            : smooth_.position(static_cast<double>(done - stop_));
-    case Shape::monotone: {
-      // in the basis of Hermite; where a sum overflows, a straight line
-      const double rest = 1.0 - share;
-      const double n = static_cast<double>(iterations_);
-      const double place = from_.position * ((1.0 + 2.0 * share) * rest * rest) +
-                           to_.position * (share * share * (3.0 - 2.0 * share)) +
-                           from_.speed * (n * share * rest * rest) -
-                           to_.speed * (n * share * share * rest);
-      return std::clamp(std::isfinite(place) ? place : between(from_.position, to_.position, share),
-                        hull_.low, hull_.high);
-    }
+    case Shape::monotone:
     case Shape::curve:
-      return std::clamp(curve_at(share), hull_.low, hull_.high);
+      return on_rows(share);
     case Shape::line:
     case Shape::fastest:
       break;
@@ -285,6 +275,20 @@ Span NumberPlan::smooth_on(const RowsAhead& ahead, const Span& bounds) noexcept 
             -15.0 * way + 8.0 * v0 + 7.0 * v1 + 3.0 * c0 - 2.0 * c1,
             6.0 * way - 3.0 * v0 - 3.0 * v1 - c0 + c1};
   return reach;
+}
+
+/// The place at this share of the way to a row. Apart, so that other motions pay nothing for it.
+[[gnu::noinline]] double NumberPlan::on_rows(double share) const noexcept {
+  if (shape_ == Shape::curve) return std::clamp(curve_at(share), hull_.low, hull_.high);
+  // in the basis of Hermite; where a sum overflows, a straight line
+  const double rest = 1.0 - share;
+  const double n = static_cast<double>(iterations_);
+  const double place = from_.position * ((1.0 + 2.0 * share) * rest * rest) +
+                       to_.position * (share * share * (3.0 - 2.0 * share)) +
+                       from_.speed * (n * share * rest * rest) -
+                       to_.speed * (n * share * share * rest);
+  return std::clamp(std::isfinite(place) ? place : between(from_.position, to_.position, share),
+                    hull_.low, hull_.high);
 }
 
 /// The place at this share of a curve, where bounds do not hold it.

@@ -154,6 +154,7 @@ class NumberPlan {
   Span monotone_on(const RowsAhead& ahead) noexcept;
   Span smooth_on(const RowsAhead& ahead, const Span& bounds) noexcept;
   double curve_at(double share) const noexcept;
+  double on_rows(double share) const noexcept;
   double at(std::int64_t done) const noexcept;
   std::int64_t fewest() noexcept;
   std::int64_t fewest_smooth(std::int64_t least) noexcept;

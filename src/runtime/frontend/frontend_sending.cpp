@@ -271,33 +271,49 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
                                                 std::span<const std::byte> states,
                                                 const CommandOptions& options,
                                                 std::span<const std::int64_t> times,
-                                                std::span<const std::uint64_t> mask) {
-  for (const std::uint32_t actuator : actuators) {
-    link_->command_check.actuator(std::int64_t{actuator});
-  }
-  refuse_twice(actuators);
+                                                std::span<const std::uint64_t> masks) {
+  check_masks(actuators, masks);
   CommandOptions paced = options;
-  std::size_t at = 0;
-  for (const std::uint32_t actuator : actuators) {
-    const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
-    paced = checked_trajectory(actuator, rows, states.subspan(at, size), options, times, mask);
-    at += size;
-  }
+  const auto each = [&](auto&& visit) {
+    std::size_t at = 0;
+    std::span<const std::uint64_t> left = masks;
+    for (const std::uint32_t actuator : actuators) {
+      const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
+      const auto mask = left.first(left.empty() ? 0 : link_->command_check.words_of_mask(actuator));
+      visit(actuator, states.subspan(at, size), mask);
+      at += size;
+      left = left.subspan(mask.size());
+    }
+  };
+  each([&](std::uint32_t actuator, auto of_one, auto mask) {
+    paced = checked_trajectory(actuator, rows, of_one, options, times, mask);
+  });
   const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
   const auto lock = link_->lock_to_add();
   if (actuators.size() == 1) {
-    return link_->builder.command(head_of(actuators[0], paced, Profile::linear), mask, ends, rows,
+    return link_->builder.command(head_of(actuators[0], paced, Profile::linear), masks, ends, rows,
                                   states);
   }
   link_->members.clear();
-  at = 0;
-  for (const std::uint32_t actuator : actuators) {
-    const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
-    link_->members.push_back(
-        {head_of(actuator, paced, Profile::linear), mask, states.subspan(at, size)});
-    at += size;
-  }
+  each([&](std::uint32_t actuator, auto of_one, auto mask) {
+    link_->members.push_back({head_of(actuator, paced, Profile::linear), mask, of_one});
+  });
   return link_->builder.group(link_->members, ends, rows);
+}
+
+/// Throws InvalidArgument unless there is a mask for each of these actuators, or none.
+void UntypedFrontend::check_masks(std::span<const std::uint32_t> actuators,
+                                  std::span<const std::uint64_t> masks) const {
+  std::size_t words = 0;
+  for (const std::uint32_t actuator : actuators) {
+    words +=
+        link_->command_check.words_of_mask(link_->command_check.actuator(std::int64_t{actuator}));
+  }
+  refuse_twice(actuators);
+  if (masks.empty() || masks.size() == words) return;
+  throw InvalidArgument("the masks of " + std::to_string(actuators.size()) + " actuators take " +
+                        std::to_string(words) + " words, " + std::to_string(masks.size()) +
+                        " were given");
 }
 
 BatchBuilder& UntypedFrontend::own_builder() { return link_->builder; }
@@ -307,11 +323,8 @@ std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
                                          std::span<const std::uint32_t> due,
                                          std::span<const std::byte> states,
                                          const ChunkOptions& options,
-                                         std::span<const std::uint64_t> mask) {
-  for (const std::uint32_t actuator : actuators) {
-    link_->command_check.actuator(std::int64_t{actuator});
-  }
-  refuse_twice(actuators);
+                                         std::span<const std::uint64_t> masks) {
+  check_masks(actuators, masks);
   check_chunk(due, options);
   const auto rows = static_cast<std::uint32_t>(due.size());
   const ChunkHead chunk{.epoch = epoch(),
@@ -330,6 +343,8 @@ std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
   for (const std::uint32_t actuator : actuators) {
     const auto of_one =
         states.subspan(at, size_of_rows(actuator, rows, states.size() - at, actuators));
+    const auto mask = masks.first(masks.empty() ? 0 : link_->command_check.words_of_mask(actuator));
+    masks = masks.subspan(mask.size());
     link_->command_check.targets(actuator, of_one, mask);
     at += of_one.size();
     RecordHead head;
