@@ -15,6 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PYTHON_EXAMPLES = sorted((ROOT / "examples" / "python").glob("*.py"))
 
 SAYS = {
+    "circle_of_the_tool": ["mujoco: desired at most 0.00 mm, observed at most "],
     "bursting": ["the same to the last bit: True", "left is at iteration 5, right at 3"],
     "embedded_backend": ["closed to [ 0.02 -0.02]"],
     "embedded_simulation": ["iteration 300"],

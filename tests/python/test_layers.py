@@ -219,7 +219,7 @@ CEILINGS = {
     "simulators/mujoco": (5_240, 4_580),
     "apps/table_tennis": (10_140, 6_040),
     "benchmarks, tools": (5_700, 0),
-    "examples": (1_965, 0),
+    "examples": (2_080, 0),
     "tests, conftest.py": (0, 67_340),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
