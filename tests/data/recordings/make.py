@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 import o80
+from o80 import _core
 from o80.recording.recorder import Recorder
 
 HERE = Path(__file__).parent
@@ -38,6 +39,13 @@ def play(arm: o80.Frontend, recorder: Recorder, seed: int) -> None:
     arm.burst(30)
     arm.add_trajectory([[0.0, 0.0], [0.1, 0.2], [0.3, -0.1]], iterations=5)
     arm.pulse_and_wait()
+    recorder.catch_up()
+    # chunks: the second answer takes over from the first
+    for profile in ("smooth", "monotone"):
+        with arm.chunks("elbow", step=5, profile=profile) as plan:
+            for rows in ([0.1, 0.2, 0.1, 0.0], [0.15, 0.1, 0.05]):
+                plan.send(rows, seen=arm.latest())
+                arm.burst(7)
     recorder.catch_up()
     arm.add_command("shoulder", 1.0, iterations=50)
     arm.burst(5)
@@ -237,6 +245,8 @@ def journal_facts(value: Any) -> Any:
         return [journal_facts(each) for each in value]
     if isinstance(value, np.ndarray) and value.size > MAX_NUMBERS:
         return [str(value.dtype), list(value.shape), hashlib.sha256(value.tobytes()).hexdigest()]
+    if isinstance(value, _core.Seen):
+        return repr(value)
     return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
 
 
