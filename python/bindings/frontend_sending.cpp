@@ -425,7 +425,10 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            "until"_a = nb::none(), "iterations"_a = nb::none(), "fastest"_a.none() = false,
            "mode"_a.none() = "queue", "profile"_a = nb::none(), "start"_a.none() = "desired",
            "every"_a = nb::none(), "clip"_a.none() = false);
-  def_noun(frontend, "clipped", verbs::clipped, [](const Frontend& self) { return self.clipped; });
+  def_noun(frontend, "clipped", verbs::clipped, [](const Frontend& self) {
+    self.untyped().added();  // in a forked child it raises
+    return self.clipped;
+  });
   def_verb(frontend, "add_request", verbs::add_request, &add_request, "name"_a.none(), "fields"_a);
   def_verb(
       frontend, "add_purge", verbs::add_purge,

@@ -614,7 +614,7 @@ def test_rows_outside_the_limits_are_put_on_them_where_that_is_wanted(segment: s
     with arm_and_gripper(segment) as robot:
         arm = robot.frontend
         rows = [[0.5, 1.5], [0.5, -0.25], [0.5, 0.75]]
-        with arm.chunks(["left", "gripper"], step=2, clip=True) as plan:
+        with arm.chunks(["left", "gripper"], step=2, ease=1, clip=True) as plan:
             sent = plan.send(rows)
             assert sent.clipped == 2
             robot.run(8)

@@ -68,7 +68,7 @@ DATA = {
 }
 # of a closed one; a frontend's life is that of its backend
 OPEN_WHEN_CLOSED = {
-    "Frontend": {"life", "alive", "added", "forget_added"},
+    "Frontend": {"life", "alive", "added", "clipped", "forget_added"},
     "Backend": set(),
     "Process": set(),
     "Burst": set(),

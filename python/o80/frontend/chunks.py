@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
     from o80.frontend.commander import Commander
 
+#: Time of a take-over where no number has a limit of acceleration, if a step is not longer [s].
+EASE = 0.1
+
 _LATEST = 2**31  # a row is due at most so many iterations after its anchor
 _MOST_ITERATIONS = 2**47
 # chunks that are sent, and iterations that pass, before send() looks at what became of the former
@@ -115,6 +118,8 @@ class Chunks(Managed):
         self.step = _fraction(step)  #: iterations from row to row
         self._dues = np.empty(0, np.int64)
         self.ease = 0  #: iterations of a take-over; 0: those that the limits need
+        if not any(math.isfinite(each.rates[1]) for each in self._given.limits):
+            self.ease = max(math.ceil(self.step), round(EASE / arm.period))
         if ease is not None:
             self.ease = _from_to(iterations(ease, "ease", arm.period, 0), "ease", 1, _LATEST)
         # it says what a profile may be

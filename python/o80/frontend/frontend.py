@@ -115,7 +115,8 @@ class Frontend(Commander, lifecycle.Managed):
         actuators: indices or names, also of groups, of any types (None: all).
         step: iterations from row to row, whole or a fraction (50 / 3: 30 rows a second at 500 Hz).
         ease: iterations of a take-over, or as a float its time [s] (None: those that the limits
-            need, at least a step and at most half of what is ahead).
+            need, at least a step and at most half of what is ahead; without a limit of
+            acceleration 0.1 s, or a step if that is longer).
         profile: between rows: "smooth", a curve through them; "monotone", one that stays between
             them; "linear"; or "hold".
         ensemble: mix each new row with the plan, as ACT does: share exp(-ensemble * i) of the i-th
