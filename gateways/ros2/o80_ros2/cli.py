@@ -11,7 +11,8 @@ from o80.errors import InvalidArgument
 from o80_ros2 import ros
 from o80_ros2.gateway import Gateway
 
-app = typer.Typer(help="Publish robots in ROS 2, and take commands.", subcommand_metavar="")
+BEHIND = {"allow_interspersed_args": True}  # options may stand behind names
+app = typer.Typer(context_settings=BEHIND, subcommand_metavar="")
 Names = Annotated[list[str] | None, typer.Argument(help="Segments (default: all that come).")]
 Rates = Annotated[
     list[str] | None,

@@ -96,7 +96,7 @@ class Commands:
         mean = 0.8 * self._every + 0.2 * interval if self._every else interval
         self._every = mean if interval < SLOW else 0.0
         every = self._every if self._every > self._arm.period else None
-        self._arm.add_command(None, list(message.data), every=every)
+        self._arm.add_command(None, list(message.data), mode="overwrite", every=every)
         self._sent.append(("commands", self._arm.pulse()))
 
     def _trajectory(self, message: Any) -> None:

@@ -48,7 +48,7 @@ class Source:
         period = 1.0 / rate if rate else EVERY_ROW
         left_out = int((now - self.due) / period) if self.due else 0
         self.due = (self.due or now) + (left_out + 1) * period
-        if left_out and rate:  # otherwise rows wait, until they are overwritten
+        if left_out and rate and not self.gone:  # with `all` rows wait, and may be missed
             self.late += left_out
             text = f"behind: {self.late} periods of '{self.segment}' were left out so far"
             self._log.warning(f"{text}; a lower --rate helps", throttle_duration_sec=5.0)
@@ -68,7 +68,7 @@ class Source:
         if robot is None or self.topics is None or robot.published < self._next:
             return
         since = max(self._next, robot.oldest) if every else robot.published
-        most = max(1, min(MOST_ROWS, MOST_BYTES // robot._layout.size))
+        most = max(1, min(MOST_ROWS, MOST_BYTES // robot._layout.size)) if every else 1
         rows = robot.history(since=since, until=since + most - 1).rows
         if not len(rows):
             return

@@ -10,9 +10,11 @@ from collections.abc import Callable
 from typing import Any
 
 import rclpy
+from diagnostic_msgs.msg import DiagnosticArray
 from rcl_interfaces.msg import Parameter, ParameterValue
 from rcl_interfaces.srv import SetParametersAtomically
 from rclpy.qos import DurabilityPolicy, QoSProfile
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import JointState
 from std_msgs.msg import String
 from std_srvs.srv import Trigger
@@ -29,13 +31,15 @@ def spin_until(condition: Callable[[], object]) -> None:
 
 def listen(robot: str, count: int) -> dict[str, Any]:
     """Samples as bytes of the wire; what the graph says about the topic."""
-    raw: list[bytes] = []
-    texts: list[String] = []
+    raw, texts = list[bytes](), list[String]()
+    reports, clocks = list[DiagnosticArray](), list[Clock]()
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
     topic = f"/{robot}/joint_states"
     node.create_subscription(JointState, topic, raw.append, count + 10, raw=True)
     node.create_subscription(String, f"/{robot}/robot_description", texts.append, latched)
-    spin_until(lambda: raw and texts)
+    node.create_subscription(DiagnosticArray, "/diagnostics", reports.append, 10)
+    node.create_subscription(Clock, "/clock", clocks.append, 10)
+    spin_until(lambda: raw and texts and reports and clocks)
     print("ready", flush=True)
     spin_until(lambda: len(raw) > count)
     (publisher,) = node.get_publishers_info_by_topic(topic)
@@ -44,6 +48,7 @@ def listen(robot: str, count: int) -> dict[str, Any]:
         "hash": str(publisher.topic_type_hash),
         "services": sorted(name for name, _ in node.get_service_names_and_types()),
         "urdf": texts[0].data,
+        "reports": {each.name: each.message for each in reports[-1].status},
         "samples": [each.hex() for each in raw],
     }
 

@@ -1,8 +1,4 @@
-"""A client of Cyclone DDS without ROS: judge_dds.py ROBOT COUNT, as `judge.py listen`.
-
-It prints the times of the samples [ns]; with the word `bare` it never knows that it should not
-trust the type information of Fast DDS.
-"""
+"""A client of Cyclone DDS: prints times of samples [ns], as `judge.py listen`; bare: as it is."""
 
 # mypy: disable-error-code="type-arg"
 import json

@@ -13,6 +13,8 @@ def test_rates_are_numbers_or_every_row_for_all_or_for_one_segment() -> None:
     for wrong in ("0", "-1", "arm=fast", "nan", "1e9"):
         with pytest.raises(o80.InvalidArgument, match="--rate"):
             cli.rates_of([wrong])
+    found = CliRunner().invoke(cli.app, ["arm", "--rate", "fast"])
+    assert isinstance(found.exception, o80.InvalidArgument), "options may stand behind names"
 
 
 def test_without_rclpy_one_sentence_says_what_to_install() -> None:

@@ -113,6 +113,7 @@ def test_every_sample_after_discovery_arrives_and_rosbags_decodes_it(
         assert (found["node"], found["hash"]) == ("o80_ros2", HASH)
         assert {"/sim/halt", "/sim/resume", "/sim/requests/home"} <= {*found["services"]}
         assert found["urdf"].startswith("<robot")
+        assert found["reports"]["o80: sim"] == "bursting"
         store = get_typestore(Stores.ROS2_JAZZY)
         states: Any = [
             store.deserialize_cdr(bytes.fromhex(each), "sensor_msgs/msg/JointState")

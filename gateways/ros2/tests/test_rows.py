@@ -72,10 +72,8 @@ def test_a_rate_gives_the_newest_row_once(carry: Carry) -> None:
         robot.burst(7)
         carried.tick()
         carried.tick()
-        assert [nanoseconds(each) for each in carried.sent("joint_states")] == [
-            0,
-            robot.latest().time,
-        ]
+        times = [nanoseconds(each) for each in carried.sent("joint_states")]
+        assert times == [0, robot.latest().time]
 
 
 def test_a_gateway_that_is_behind_counts_the_periods_that_it_left_out(carry: Carry) -> None:

@@ -90,7 +90,7 @@ class _Urdf:
         return found
 
     def _add_joints(self, body: int) -> None:
-        """The joints of a body one after the other, with a link behind each."""
+        """The joints of a body one after the other, with links between them."""
         model, frame = self._model, self._frames[body]
         parent = int(model.body_parentid[body])
         link, at = self._frames[parent], np.zeros(3)  # at: of the link, in the body
@@ -99,8 +99,10 @@ class _Urdf:
         for joint in range(first, first + int(model.body_jntnum[body])):
             name, limited = model.joint(joint).name or f"joint_{joint}", model.jnt_limited[joint]
             kinds = {SLIDE: "prismatic", HINGE: "revolute" if limited else "continuous"}
-            kind, behind = kinds.get(int(model.jnt_type[joint]), "floating"), f"{frame}/{joint}"
-            SubElement(self._element, "link", name=behind)
+            kind, behind = kinds.get(int(model.jnt_type[joint]), "floating"), frame
+            if model.jnt_pos[joint].any() or joint + 1 < first + model.body_jntnum[body]:
+                behind = f"{frame}/{joint}"
+                SubElement(self._element, "link", name=behind)
             origin = origin @ _placed(model.jnt_pos[joint] - at)
             made = self._joint(self._joints.get(name, name), kind, (link, behind), origin)
             SubElement(made, "axis", xyz=_text(model.jnt_axis[joint]))
@@ -108,7 +110,8 @@ class _Urdf:
                 low, high = map(str, model.jnt_range[joint])
                 SubElement(made, "limit", lower=low, upper=high, effort="0", velocity="1")
             link, origin, at = behind, np.eye(4), model.jnt_pos[joint]
-        self._joint(f"{frame}/fixed", "fixed", (link, frame), origin @ _placed(-at))
+        if link != frame:
+            self._joint(f"{frame}/fixed", "fixed", (link, frame), origin @ _placed(-at))
 
     def _joint(self, name: str, kind: str, links: tuple[str, str], origin: Numbers) -> Element:
         made = SubElement(self._element, "joint", name=name, type=kind)
