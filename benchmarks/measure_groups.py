@@ -52,7 +52,7 @@ def instructions(program: Path, side: str, bursts: int, robot: list[str]) -> int
 def main() -> None:
     measure("pam", "pam", {})
     settings = RigSettings()
-    balls = ball_options(settings.balls_of(0))
+    balls = ball_options()
     measure("twin", "mujoco", {"model": MODEL, "timestep": settings.period, **balls})
 
 

@@ -44,7 +44,7 @@ class Plain:
         balls = balls_from(None, 0, PERIOD)
         flights = [balls.flight(number).states[:1] for number in range(copies)]
         self._flights = np.vstack(flights)
-        options = {"model": MODEL, "joints": JOINT_NAMES, "timestep": PERIOD, **ball_options(1)}
+        options = {"model": MODEL, "joints": JOINT_NAMES, "timestep": PERIOD, **ball_options()}
         texts = ctypes.c_char_p * len(options)
         names = texts(*(name.encode() for name in options))
         values = texts(*(text_of(value).encode() for value in options.values()))
@@ -60,7 +60,7 @@ class Plain:
             stack.callback(library.plain_destroy, ctypes.c_void_p(plain))
         # those of random actions
         with closing(accelerated_environment(rig=rig)) as one:
-            pressures, commanded = one.rig.arm.range, one.rig.arm.commanded()[0]
+            pressures, commanded = one.task.range, one.task.commanded()[0]
         raw = []
         for action in random_actions(episode, MUSCLES):
             commanded = changed_pressures(commanded, action, factor=TASK.factor)

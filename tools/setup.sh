@@ -252,17 +252,11 @@ install_programs() {
         qemu-user-static relacy-dev spin strace rt-tests qemu-system-x86 busybox-static \
         cpio chromium
       need_renderer
-<<<<<<< ours
       [ -e build/lerobot ] || rm -f .venv/stamps/lerobot # after make clean
       once lerobot "$(state_of tools/lerobot.txt tools/torchvision.py)" install_lerobot
       [ -e build/ros ] || rm -f .venv/stamps/ros
-      once ros "$(state_of gateways/ros2/pyproject.toml)" install_ros ||
-        say "continuing without rclpy, which has no wheels for this Python"
-=======
-      once lerobot "$lerobot" install_lerobot
       # there are wheels for this processor only
       [ "$(uname -m)" != x86_64 ] || once ros "$(state_of gateways/ros2/pyproject.toml)" install_ros
->>>>>>> theirs
       ;;
   esac
 }

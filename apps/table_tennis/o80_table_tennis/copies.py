@@ -273,7 +273,7 @@ class TableTennisCopies(HybridTask):
 
     def idle(self) -> None:
         """10 ms in which nothing is asked of the arm, by its clock."""
-        if self.single.lateness > self.max_late:
+        if self.single.stalled or self.single.lateness > self.max_late:
             self.single.begin()
         self._move(None, EVERY)
 

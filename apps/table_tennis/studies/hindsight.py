@@ -9,7 +9,7 @@ gradient steps as 20 worlds; 20 worlds. Writes hindsight.png and hindsight.json.
 
 import argparse
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Any
@@ -68,7 +68,7 @@ def trained(worlds: int, updates: int, balls: int, seed: int) -> list[tuple[floa
     return played
 
 
-def draw(path: Path, found: dict[str, Sequence[Any]]) -> None:
+def draw(path: Path, found: Mapping[str, Sequence[Any]]) -> None:
     """Share of touched balls against the number of played ones: mean and span of the seeds."""
     figure = Figure(figsize=(6, 3.6), layout="constrained")
     axes = figure.subplots()

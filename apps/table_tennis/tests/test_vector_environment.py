@@ -31,6 +31,7 @@ RIGS = {
     "standard": RigSettings(start_noise=0.02),
     "identified": RigSettings(preset="identified"),
     "another frequency": RigSettings(frequency=250.0),
+    "worlds": RigSettings(worlds=3),
 }
 NOISY = NoiseSettings(0.005, 0.1, 0.1, latency=0.013, pressure=0.01, start_posture=0.02)
 TASKS = {

@@ -201,7 +201,7 @@ class Single:
 
     def begin(self) -> None:
         """The next step follows the newest row: by a clock the robot has made some since."""
-        self._begins, self._planned_until = False, None
+        self._begins, self._planned_until, self.stalled = False, None, ""
         if self._clocked:
             before = self.motion.standing(self.robot.last)[0]
             self.robot.rows[...] = self._robot.history(1).rows

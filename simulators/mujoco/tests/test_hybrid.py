@@ -534,6 +534,10 @@ def test_by_the_clock_a_step_may_send_nothing() -> None:
         engine.step(None, EVERY, made.task.until_halted)
         assert (engine.span[2], engine.counts.steps) == (before[0] + 5, before[1] + 1)
         assert engine.counts.late_actions == before[2]
+        engine.stalled = "the caller paused"
+        engine.begin()
+        engine.step(None, EVERY, made.task.until_halted)
+        assert (engine.stalled, engine.counts.steps) == ("", before[1] + 2)
         row = made.task.robot.rows[0]
         np.testing.assert_array_equal(row["desired"][-1], np.full(2, 0.3, np.float32))
 

@@ -60,8 +60,6 @@ class LabSettings:
     folder: Path = Path("build/lab")
     fifo: bool = True
     """Ask for real-time scheduling of the arm and of the motion capture."""
-    max_late: int = 20
-    """Rows of the arm by which the environment may lag behind between two balls."""
     parts: tuple[str, ...] = NINE
     """Parts that are started."""
     rig: RigSettings = field(default_factory=lambda: RigSettings(preset="identified"))

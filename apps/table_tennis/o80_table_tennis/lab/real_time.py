@@ -156,8 +156,7 @@ def play_in_real_time(
             console.print(f"{what}: {found['measured']} ({wanted}){missed}", highlight=False)
         if not all(found["reached"] for found in report["wanted"].values()):
             console.print("`o80 doctor --frequency 500` says what is in the way on this computer")
-        for sentence in report["not_measured"]:
-            console.print(sentence, highlight=False)
+        console.print(f"balls: {report['balls']}", highlight=False)
         console.print(f"report: {settings.folder / 'report.json'}")
         return report
 

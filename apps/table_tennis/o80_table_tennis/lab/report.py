@@ -16,7 +16,6 @@ from o80.base.finite import json_text
 
 from ..world.timing import ITERATIONS, PERIOD
 from .environment_row import Phase
-from .lacking import not_measured, not_played
 from .loops import Loop
 from .parts import (
     ARM,
@@ -47,9 +46,8 @@ def write_report(
     """Writes the report, and returns what it holds."""
     rows = _Rows(settings)
     processes = {name: _process(name, loop, rows, usage.get(name)) for name, loop in loops.items()}
-    balls = _balls(rows)
     report = {
-        "balls": balls,
+        "balls": _balls(rows),
         "processes": processes,
         "processor_percent": {name: round(used, 1) for name, used in usage.items()},
         "processors": os.cpu_count(),
@@ -63,7 +61,6 @@ def write_report(
         "wall_clock": time.strftime("%Y-%m-%d %H:%M:%S"),
         "kernel": os.uname().version,
     }
-    report["not_measured"] = [*not_played(balls, settings.balls), *not_measured(report)]
     path = settings.folder / REPORT
     path.write_text(json_text(report, indent=2) + "\n")
     return report
