@@ -134,7 +134,7 @@ def play(
     return found
 
 
-def figures(desired: NDArray[np.float64], wall: NDArray[np.float64]) -> dict[str, float]:
+def figures(desired: NDArray[Any], wall: NDArray[Any]) -> dict[str, float]:
     """Lag [ms], rest error [deg], and the largest change of velocity in 20 ms [deg/s]."""
     lags = np.arange(-0.1, 0.6, 0.002)
     errors = [float(np.sqrt(np.mean((desired - truth(wall - lag)) ** 2))) for lag in lags]

@@ -52,12 +52,13 @@ class ChunkClient(RobotClient):
             names = [number.actuator for number in self._numbers]
             step = arm.frequency / config.fps
             self.plan = arm.chunks(names, step=step)
-            self._step, self._usual = step, self.plan.ease
+            self._step: float = step
+            self._usual: int = self.plan.ease
             self.sent: list[SentChunk] = []  #: the answers
         except BaseException:
             self.robot.disconnect()
             raise
-        self._lead = round(config.chunk_size_threshold * config.actions_per_chunk * step)
+        self._lead: int = round(config.chunk_size_threshold * config.actions_per_chunk * step)
         self._answered = threading.Event()
         self._failure: BaseException | None = None
 
@@ -85,7 +86,7 @@ class ChunkClient(RobotClient):
 
     def _ask(self, task: str) -> dict[str, Any]:
         self._answered.clear()
-        observation = self.robot.get_observation()
+        observation: dict[str, Any] = self.robot.get_observation()
         row = self.robot.seen
         assert row is not None
         self.send_observation(
@@ -103,13 +104,8 @@ class ChunkClient(RobotClient):
     ) -> None:
         """Sends an answer. LeRobot calls it for each, in the thread of receive_actions."""
         try:
-            rows = np.array([each.get_action().numpy() for each in incoming_actions], np.float64)
-            rows /= [number.scale for number in self._numbers]
-            rows = np.clip(
-                rows,
-                [number.minimum for number in self._numbers],
-                [number.maximum for number in self._numbers],
-            )
+            actions = np.array([each.get_action().numpy() for each in incoming_actions])
+            rows = self.robot.segment.targets(actions)
             seen = incoming_actions[0].get_timestep()
             self.plan.ease = self._ease(rows, seen)
             self.sent.append(self.plan.send(rows, seen=seen))
@@ -121,8 +117,8 @@ class ChunkClient(RobotClient):
 
     def _ease(self, rows: NDArray[np.float64], seen: int) -> int:
         """Iterations that the take-over needs within the limits of the joints (docs/chunks.md)."""
-        arm = self.robot.segment.checked()
-        now = min(int((arm.published - seen) / self._step), len(rows) - 1)
+        arm: o80.Frontend = self.robot.segment.checked()
+        now: int = min(int((arm.published - seen) / self._step), len(rows) - 1)
         planned = self.plan.planned(seen, now + 1)
         here = planned[now] if len(planned) > now else self._desired(arm.latest())
         needed = 0.0
@@ -134,7 +130,8 @@ class ChunkClient(RobotClient):
                 (60 * distance / limits.jerk) ** (1 / 3),
                 1.9 * distance / limits.speed,
             )
-        return max(self._usual, math.ceil(needed * arm.frequency))
+        enough = math.ceil(float(needed) * float(arm.frequency))
+        return max(self._usual, enough)
 
     def _desired(self, row: o80.Observation) -> NDArray[np.float64]:
         return np.array([value_of(row, number.column) for number in self._numbers])

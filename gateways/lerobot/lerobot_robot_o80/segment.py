@@ -4,6 +4,9 @@ import contextlib
 from collections.abc import Mapping
 from typing import Any, Literal
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 import o80
 from o80.base.errors import sentence
 from o80.datasets.lerobot_numbers import Number, numbers_of
@@ -78,6 +81,14 @@ class Segment:
             for name, number in self.numbers().items()
         }
         return row, found
+
+    def targets(self, actions: ArrayLike) -> NDArray[np.float64]:
+        """Actions (n, numbers) in LeRobot's units as targets within the bounds, for `chunks`."""
+        numbers = self.numbers("desired").values()
+        rows = np.asarray(actions, np.float64) / [number.scale for number in numbers]
+        bounds = np.array([(number.minimum, number.maximum) for number in numbers]).T
+        targets: NDArray[np.float64] = np.clip(rows, *bounds)
+        return targets
 
     def checked(self) -> o80.Frontend:
         """The frontend of a robot that runs. Raises BackendGone, BackendHalted."""

@@ -1,9 +1,12 @@
 """Robots that LeRobot drives."""
 
+import os
 from collections.abc import Iterator
 
 import pytest
 from starting import Start, starting
+
+os.environ.setdefault("OMP_NUM_THREADS", "1")  # before torch: its threads spin on busy processors
 
 
 @pytest.fixture

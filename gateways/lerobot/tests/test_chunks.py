@@ -81,14 +81,17 @@ def test_each_action_acts_in_its_iteration_however_late_the_answer_comes(start: 
     compared = 0
     places = np.degrees(rows.desired.joints[:, 0])
     for chunk, following, command in zip(taken, taken[1:], commands, strict=False):
-        assert chunk.first is not None
-        assert chunk.shift is not None
-        limited = np.flatnonzero(rows.clamped[chunk.begins : following.begins, 0])
-        settled = chunk.begins + (30 + limited.max() if len(limited) else 0)  # on its rows again
+        first, shift, begins, end = chunk.first, chunk.shift, chunk.begins, following.begins
+        assert first is not None
+        assert shift is not None
+        assert begins is not None
+        assert end is not None
+        limited = np.flatnonzero(rows.clamped[begins:end, 0])
+        settled = begins + (30 + limited.max() if len(limited) else 0)  # on its rows again
         reached = zip(command.due, command.targets[0], strict=True)
-        for due, row in itertools.islice(reached, chunk.first, None):
-            if settled <= due + chunk.shift < following.begins:
-                assert places[due + chunk.shift] == pytest.approx(np.degrees(row), abs=1e-3)
+        for due, row in itertools.islice(reached, first, None):
+            if settled <= due + shift < end:
+                assert places[due + shift] == pytest.approx(np.degrees(row), abs=1e-3)
                 compared += 1
     assert compared >= 10
 

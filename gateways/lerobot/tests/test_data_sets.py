@@ -1,9 +1,7 @@
 """Data sets of o80 as LeRobot reads them; its own SO-101 driver writes the same numbers."""
 
-import math
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -13,11 +11,15 @@ from lerobot.datasets.lerobot_dataset import LeRobotDataset
 from lerobot.datasets.utils import dataset_to_policy_features, hw_to_dataset_features
 from lerobot.policies.act.configuration_act import ACTConfig
 from lerobot.policies.act.modeling_act import ACTPolicy
+from lerobot.policies.factory import make_pre_post_processors
 from lerobot.robots.so_follower import SO101Follower, SO101FollowerConfig
+from pages import programs
+from starting import Start
 
 import o80
 from o80.datasets import lerobot
 from o80.datasets.episodes import episodes_of
+from o80.datasets.lerobot_numbers import Units
 from o80_arms import fakes
 
 pytestmark = pytest.mark.check
@@ -50,15 +52,23 @@ def exported(fake: fakes.FakeArm, tmp_path_factory: pytest.TempPathFactory) -> P
                 arm.burst(5, seen=arm.latest())
             recording.mark("episode_end", reward=1.0)
     found = episodes_of(o80.open(folder / "run.mcap"), every=5)
-    lerobot.write(folder / "set", found, sensors=["measured.velocity"])
+    lerobot.write(folder / "set", found, sensors=["observed"])
     return folder / "set"
 
 
+@pytest.mark.parametrize("units", ["degrees", "normalised"])  # the first is the default
 def test_they_have_names_units_and_numbers_of_lerobots_own_driver(
-    fake: fakes.FakeArm, exported: Path, tmp_path: Path
+    fake: fakes.FakeArm, exported: Path, tmp_path: Path, units: Units
 ) -> None:
+    if units != "degrees":
+        found = episodes_of(o80.open(exported.parent / "run.mcap"), every=5)
+        exported = tmp_path / "ours"
+        lerobot.write(exported, found, units=units)
     config = SO101FollowerConfig(
-        port=str(fake.chain.port), id="fake", calibration_dir=fake.file.parent
+        port=str(fake.chain.port),
+        id="fake",
+        calibration_dir=fake.file.parent,
+        use_degrees=units == "degrees",
     )
     robot = SO101Follower(config)
     ports = robot.bus.port_handler
@@ -85,6 +95,8 @@ def test_they_have_names_units_and_numbers_of_lerobots_own_driver(
     assert last["observation.state"].numpy() == pytest.approx(
         first["observation.state"].numpy(), abs=0.2
     )
+    if units != "degrees":
+        return
     middles = np.array([(795 + 3300) / 2, (910 + 3185) / 2, (944 + 3151) / 2])
     assert ours[0]["observation.state"].numpy()[:3] == pytest.approx(
         (np.array(PLACES[:3]) - middles) * 360 / 4095, abs=0.1
@@ -113,28 +125,27 @@ def test_lerobot_loads_iterates_and_takes_only_state_and_action_for_a_policy(
     }
 
 
-def test_a_policy_of_lerobot_learns_from_one(exported: Path) -> None:
+def test_a_policy_of_lerobot_learns_from_one_and_plays_the_arm(
+    exported: Path, start: Start, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     window = {"action": [i / 30 for i in range(8)]}
     read = LeRobotDataset("o80/ours", root=exported, delta_timestamps=window)
     features = dataset_to_policy_features(read.features)
-    small: dict[str, Any] = {"dim_model": 32, "n_heads": 2, "dim_feedforward": 64}
     torch.manual_seed(1)
-    policy = ACTPolicy(
-        ACTConfig(
-            input_features={k: v for k, v in features.items() if k != "action"},
-            output_features={"action": features["action"]},
-            chunk_size=8,
-            n_action_steps=8,
-            device="cpu",
-            **small,
-        )
+    config = ACTConfig(
+        input_features={k: v for k, v in features.items() if k != "action"},
+        output_features={"action": features["action"]},
+        chunk_size=8,
+        n_action_steps=8,
+        device="cpu",
+        dim_model=32,
+        n_heads=2,
+        dim_feedforward=64,
     )
+    policy = ACTPolicy(config)
+    before, after = make_pre_post_processors(config, dataset_stats=read.meta.stats)
+    batch = before(next(iter(torch.utils.data.DataLoader(read, batch_size=40))))
     optimizer = torch.optim.Adam(policy.parameters(), 1e-3)
-    batch = next(iter(torch.utils.data.DataLoader(read, batch_size=40)))
-    statistics = read.meta.stats
-    for name in ("observation.state", "action"):
-        mean, std = (torch.as_tensor(statistics[name][each]).float() for each in ("mean", "std"))
-        batch[name] = (batch[name] - mean) / (std + 1)
     losses = []
     for _ in range(20):
         loss, _ = policy.forward(batch)
@@ -143,4 +154,19 @@ def test_a_policy_of_lerobot_learns_from_one(exported: Path) -> None:
         optimizer.step()
         losses.append(float(loss))
     assert losses[-1] < losses[0]
-    assert math.isfinite(losses[-1])
+
+    monkeypatch.chdir(tmp_path)
+    folder = tmp_path / "trained/checkpoints/last/pretrained_model"
+    for part in (policy, before, after):
+        part.save_pretrained(folder)
+    segment = start("so101_twin")
+    program = programs("lerobot.md")[0]
+    for there, here in (('"so101"', repr(segment)), ("range(20)", "range(3)")):
+        assert there in program
+        program = program.replace(there, here)
+    exec(compile(program, "lerobot.md", "exec"), {})
+    with o80.Frontend(segment, read_only=True) as arm:
+        entries = [each for each in arm.journal() if each.kind == "taken"]
+        answers = [c for entry in entries for c in entry.commands if c.pace == "chunk"]
+        assert [len(each.due) for each in answers] == [8, 8, 8]
+        assert arm.halted is None
