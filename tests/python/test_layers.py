@@ -220,7 +220,7 @@ CEILINGS = {
     "apps/table_tennis": (10_180, 6_015),
     "benchmarks, tools": (5_700, 0),
     "examples": (2_080, 0),
-    "tests, conftest.py": (0, 67_340),
+    "tests, conftest.py": (0, 67_440),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -84,13 +84,14 @@ def test_the_recordings_hold_what_a_journal_can_tell(name: str) -> None:
         *("interrupted", "fresh_start", "ended", "snapshot"),
     }
     assert {command.kind for command in commands} == {
-        *("command", "purge", "request", "take_control", "release_control", "resume")
+        *("command", "purge", "request", "take_control", "release_control", "resume"),
+        "close_plan",
     }
     assert {command.pace for command in commands} - {""} == {
-        *("direct", "duration", "speed", "until", "iterations", "fastest")
+        *("direct", "duration", "speed", "until", "iterations", "fastest", "chunk")
     }
     assert {command.profile for command in commands} - {""} == {
-        *("linear", "minimum_jerk", "cubic")
+        *("linear", "minimum_jerk", "monotone", "smooth")
     }
     assert {command.mode for command in commands} - {""} == {"queue", "overwrite"}
     assert {command.start for command in commands} - {""} == {"desired", "observed"}

@@ -134,9 +134,7 @@ class Commands:
         if chosen not in self._plans:
             self._plans[chosen] = arm.chunks(list(chosen), step=1)
         plan = self._plans[chosen]
-        fields = plan._kind.names  # of a state with several numbers the first one is given
-        targets = {fields[0]: rows} if fields else rows
-        sent = plan.send(targets, seen=anchor, due=due, fixed=bool(stamp), final=True)
+        sent = plan.send(rows, seen=anchor, due=due, fixed=bool(stamp), final=True)
         self._moves = sent.batch
         self._sent.append(("joint_trajectory", sent.batch))
 
