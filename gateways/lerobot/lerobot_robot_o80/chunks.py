@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import o80
 from lerobot_robot_o80.robot import O80
-from o80.frontend.chunks import SentChunk
+from o80.frontend.chunk_parts import SentChunk
 from o80.rows.columns import value_of
 
 PATIENCE = 2.0

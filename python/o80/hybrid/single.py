@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.errors import Error, InvalidArgument, TimeoutError
-from o80.frontend.chunks import SentChunk
+from o80.frontend.chunk_parts import SentChunk
 from o80.frontend.frontend import Frontend
 from o80.groups.inline_group import InlineGroup
 from o80.hybrid.mirror import Motion
