@@ -70,7 +70,7 @@ class NotInstalled:
 
 def pytest_configure(config: pytest.Config) -> None:
     if config.option.markexpr == "not check":
-        sys.meta_path.insert(0, NotInstalled())  # type: ignore[arg-type]
+        sys.meta_path.insert(0, NotInstalled())
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
