@@ -51,6 +51,7 @@ def test_a_suspended_robot_is_to_be_continued_not_killed(
     process: o80.robots.Process, segment: str
 ) -> None:
     os.kill(process.pid, signal.SIGSTOP)
+    os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
     try:
         with pytest.raises(o80.TimeoutError, match=f"`kill -CONT {process.pid}`") as refused:
             o80.stop(segment, timeout=0.0)
