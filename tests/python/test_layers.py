@@ -213,14 +213,14 @@ CEILINGS = {
     "python/o80/view/page": (1_225, 0),
     "devices": (8_850, 4_500),
     "gateways/lerobot": (900, 900),
-    "gateways/ros2": (900, 900),
+    "gateways/ros2": (900, 915),
     "robots/arms": (4_450, 3_100),
     "robots/pam, robots/two_joints": (2_144, 1_208),
     "simulators/mujoco": (5_240, 4_580),
     "apps/table_tennis": (10_180, 6_015),
     "benchmarks, tools": (5_700, 0),
     "examples": (2_080, 0),
-    "tests, conftest.py": (0, 67_440),
+    "tests, conftest.py": (0, 67_450),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

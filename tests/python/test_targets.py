@@ -398,6 +398,11 @@ def test_a_trajectory_across_types_gives_each_its_first_field(robot: Robot) -> N
     assert third.joints["position"].tolist() == [0.7, 0.8]
 
 
+def test_a_truth_value_that_is_no_number_is_refused(robot: Robot) -> None:
+    with pytest.raises(o80.InvalidArgument, match="not a finite number"):
+        robot.frontend.add_trajectory([[0.5, float("nan")]], ["drive", "valve"])
+
+
 def test_a_path_is_the_name_of_a_number_in_rows_too(robot: Robot) -> None:
     robot.frontend.add_trajectory({"a.position": [0.5], "b.count": [7]}, ["a", "b"])
     robot.frontend.pulse()
@@ -408,8 +413,9 @@ def test_a_path_is_the_name_of_a_number_in_rows_too(robot: Robot) -> None:
     assert row["desired.valve"] == row.desired.valve
     assert history["desired.a.position"].tolist() == [0.0, 0.5]
     assert history["desired.drive"].shape == (2,)
-    with pytest.raises(o80.InvalidArgument, match=r"a row has no number 'desired.c'"):
-        row["desired.c"]
+    for path in ("desired.c", "desired.\udcff"):
+        with pytest.raises(o80.InvalidArgument, match=f"a row has no number '{path}'"):
+            row[path]
     with pytest.raises(TypeError):
         iter(row)  # type: ignore[call-overload]
 

@@ -15,7 +15,7 @@ from o80_ros2 import ros
 from o80_ros2.topics import desired_numbers
 
 PATIENCE, RESUME = 30.0, 5.0
-"""Longest waits: for a request, which goes on, or a step; for the end of a halt [s]."""
+"""Longest waits: for a request or a step, which the robot still ends; for the end of a halt [s]."""
 SLOW = 0.5
 """Set-points further apart are no stream [s]."""
 SLACK = 1.01

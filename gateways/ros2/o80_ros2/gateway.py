@@ -15,8 +15,8 @@ from o80_ros2.wall_clock import WallClock
 
 USUAL, USUAL_OF_MANY, MANY = 100.0, 20.0, 10
 """Rate of a robot, and of each of more than MANY robots [Hz]."""
-BETWEEN_LISTS, BETWEEN_REPORTS, BETWEEN_LOOKS = 1.0, 1.0, 0.1
-"""Times between looks for segments, between diagnostics, between looks for a change of them [s]."""
+BETWEEN_LISTS, BETWEEN_REPORTS, BETWEEN_POLLS = 1.0, 1.0, 0.1
+"""Intervals: lists of segments, diagnostics, checks whether a diagnostic has changed [s]."""
 
 SWITCH = 0.0005
 """Longest time for which a thread that publishes keeps those waiting that serve [s]."""
@@ -49,7 +49,7 @@ class Gateway:
         self._array = ros.of("diagnostic_msgs.msg.DiagnosticArray")
         self._diagnostics = node.create_publisher(self._array, "/diagnostics", 10)
         self._reported: Any = None
-        self._report_at = self._list_at = self._look_at = 0.0
+        self._report_at = self._list_at = self._poll_at = 0.0
         self._clock: Any = None  # publisher of /clock, and the time published last [ns]
         self._simulated = -1
         self._sources: dict[str, Source] = {}
@@ -63,7 +63,7 @@ class Gateway:
             try:
                 executor.spin()
             except Exception as error:  # of rclpy, if what it waits for is destroyed meanwhile
-                self._log.warning(f"goes on after {error!r}", throttle_duration_sec=1.0)
+                self._log.warning(f"continues after {error!r}", throttle_duration_sec=1.0)
 
     def run(self, stop: StopRequest) -> None:
         """Reads all robots, each at its rate."""
@@ -71,20 +71,20 @@ class Gateway:
             now = time.monotonic()
             if now >= self._list_at:
                 self._list_at = now + BETWEEN_LISTS
-                self._look_for_segments()
+                self._update_sources()
             usual = USUAL_OF_MANY if len(self._sources) > MANY else USUAL
             for source in self._sources.values():
                 if source.due <= now:
                     source.tick(now, usual)
             self._publish_clock()
-            if now >= self._look_at:
-                self._look_at = now + BETWEEN_LOOKS
+            if now >= self._poll_at:
+                self._poll_at = now + BETWEEN_POLLS
                 self._report(now)
-            due = min([self._look_at, *(each.due for each in self._sources.values())])
+            due = min([self._poll_at, *(each.due for each in self._sources.values())])
             time.sleep(max(0.0005, due - time.monotonic()))
 
-    def _look_for_segments(self) -> None:
-        """Begins with segments that are new, and forgets those that are gone."""
+    def _update_sources(self) -> None:
+        """Adds segments that are new, and removes those that are gone."""
         alive = [each.name for each in o80.segments() if each.alive]
         carried = {source.name: segment for segment, source in self._sources.items()}
         for segment in self._names or alive:
@@ -133,7 +133,7 @@ class Gateway:
         self._diagnostics.publish(message)
 
     def close(self) -> None:
-        """Ends the node. Robots go on, and so does what was sent to them."""
+        """Ends the node. Robots and the commands that they have continue."""
         self._ends = True
         for source in self._sources.values():
             source.close(topics=True)

@@ -6,7 +6,7 @@ from o80_ros2.commands import Commands
 from o80_ros2.ros import Shared
 from o80_ros2.topics import Topics
 
-BETWEEN_LOOKS, EVERY_ROW = 0.5, 0.005
+BETWEEN_POLLS, EVERY_ROW = 0.5, 0.005
 """Times between attempts to attach, and between readings if every row is published [s]."""
 MOST_ROWS, MOST_BYTES = 200, 4 << 20
 """Rows that are read at once; the others wait, so that other robots have their turn."""
@@ -24,7 +24,7 @@ class Source:
         self.topics: Topics | None = None
         self._commands: Commands | None = None
         self._next = 0  # iteration that was not read yet
-        self._look_at = 0.0
+        self._poll_at = 0.0
         self._problem = ""  # why it is not read
         self.due = 0.0  #: when it wants to be read again [s]
         self.published = self.missed = self.late = self.refused = 0
@@ -55,8 +55,8 @@ class Source:
         gone, robot = self.gone, self._frontend  # before the last rows are read
         self._publish(every=not rate)
         is_read = robot is None or robot.published < self._next
-        if gone and is_read and now >= self._look_at:
-            self._look_at = now + BETWEEN_LOOKS
+        if gone and is_read and now >= self._poll_at:
+            self._poll_at = now + BETWEEN_POLLS
             if self._attach():
                 self._publish(every=not rate)
                 self.due = 0.0  # that took long

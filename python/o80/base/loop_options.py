@@ -101,5 +101,6 @@ def text_of(value: Any) -> str:
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
     """Ends an error about an unknown name, if another one is near."""
-    near = _core.nearest_name(name, list(known))
+    readable = name.encode(errors="replace").decode()  # half a letter is none in C++
+    near = _core.nearest_name(readable, list(known))
     return f". Did you mean '{near}'?" if near else ""

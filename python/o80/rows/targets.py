@@ -172,6 +172,8 @@ def _cast(column: Any, kind: np.dtype[Any]) -> NDArray[Any]:
             if not np.all((array >= numbers.min) & (array <= numbers.max)):
                 raise OverflowError(f"they must be from {numbers.min} to {numbers.max}")
         if base.kind == "b" and array.dtype.kind == "f":
+            if not np.isfinite(array).all():
+                raise ValueError("one is not a finite number")
             array = array >= 0.5
         return array.astype(base, copy=False)
     except (TypeError, ValueError, OverflowError) as error:
