@@ -213,7 +213,7 @@ CEILINGS = {
     "python/o80/view/page": (1_225, 0),
     "devices": (8_850, 4_500),
     "gateways/lerobot": (900, 900),
-    "gateways/ros2": (900, 915),
+    "gateways/ros2": (900, 932),
     "robots/arms": (4_450, 3_100),
     "robots/pam, robots/two_joints": (2_144, 1_208),
     "simulators/mujoco": (5_240, 4_580),

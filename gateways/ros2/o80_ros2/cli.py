@@ -11,8 +11,7 @@ from o80.errors import InvalidArgument
 from o80_ros2 import ros
 from o80_ros2.gateway import Gateway
 
-BEHIND = {"allow_interspersed_args": True}  # options may stand behind names
-app = typer.Typer(context_settings=BEHIND, subcommand_metavar="")
+app = typer.Typer(context_settings={"allow_interspersed_args": True}, subcommand_metavar="")
 Names = Annotated[list[str] | None, typer.Argument(help="Segments (default: all that come).")]
 Rates = Annotated[
     list[str] | None,

@@ -23,7 +23,7 @@ SLACK = 1.01
 
 
 class Commands:
-    """Takes the messages and calls of one robot, in threads of the executor."""
+    """Takes the messages and calls of one robot."""
 
     def __init__(self, shared: ros.Shared, arm: o80.Frontend, refuse: Any) -> None:
         """refuse: gets what was refused, and why."""
@@ -35,28 +35,33 @@ class Commands:
         self._sent: deque[tuple[str, Any]] = deque(maxlen=64)  # batches that have not ended
         self._moves: Any = None  # the batch of the newest trajectory
         self._last = self._every = 0.0  # of set-points: time of the last one, interval [s]
-        self._made: list[tuple[Callable[[Any], object], Any]] = []
-        if shared.settings.step and arm.bursting:
-            self._trigger("step", partial(self._step, shared.settings.step), shared.calls)
-        if not shared.settings.command:
-            return
-        for kind, name, take, depth in (
-            ("trajectory_msgs.msg.JointTrajectory", "joint_trajectory", self._trajectory, 1000),
-            ("std_msgs.msg.Float64MultiArray", "commands", self._set_points, 1),
-        ):
-            taken = partial(self._tried, name, take)
-            self._make(shared.node, "subscription", kind, name, taken, depth)
-        self._trigger("halt", self._halt, shared.node)
-        self._trigger("resume", self._resume, shared.calls)
-        requests = [each["name"] for each in arm.schema["requests"]]
-        for request, path in zip(requests, ros.names_of(requests), strict=True):
-            self._serve_request(request, f"requests/{path}")
+        self._made: list[Callable[[], object]] = []  # what takes topics and services away
+        self._calls = ros.Served(f"{self._name}_calls")  # they take long: a halt does not wait
+        calls, halt = self._calls.node, partial(o80.halt, arm.segment, "requested over ROS 2")
+        if (n := shared.settings.step) and arm.bursting:
+            step = partial(arm.burst, n, timeout=PATIENCE)
+            self._trigger("step", lambda: f"iteration {step().iteration}", calls)
+        if shared.settings.command:
+            for kind, name, take, depth in (
+                ("trajectory_msgs.msg.JointTrajectory", "joint_trajectory", self._trajectory, 1000),
+                ("std_msgs.msg.Float64MultiArray", "commands", self._set_points, 1),
+            ):
+                taken = partial(self._tried, name, take)
+                self._make(shared.node, "subscription", kind, name, taken, depth)
+            self._trigger("halt", lambda: f"halt {halt()} is requested", shared.node)
+            ended = ("there was no halt", "the halt has ended")
+            self._trigger("resume", lambda: ended[arm.resume(timeout=RESUME)], calls)
+            requests = [each["name"] for each in arm.schema["requests"]]
+            for request, path in zip(requests, ros.names_of(requests), strict=True):
+                self._serve_request(request, f"requests/{path}")
+        self._calls.start()
 
     def close(self) -> None:
         """Closes the frontend, which ends its waits; takes topics and services away."""
         self._arm.close()
-        for destroy, made in self._made:
-            destroy(made)
+        self._calls.close()
+        for destroy in self._made:
+            destroy()
 
     def poll(self) -> None:
         """Reports commands that the backend rejected; keeps a trajectory alive until its end."""
@@ -83,7 +88,8 @@ class Commands:
     def _make(self, node: Any, what: str, kind: str, name: str, *rest: Any) -> None:
         """Makes a subscription or a service."""
         create, destroy = (getattr(node, f"{verb}_{what}") for verb in ("create", "destroy"))
-        self._made.append((destroy, create(ros.of(kind), f"/{self._name}/{name}", *rest)))
+        made = create(ros.of(kind), f"/{self._name}/{name}", *rest)
+        self._made += [partial(destroy, made)] if node is self._shared.node else []
 
     def _set_points(self, message: Any) -> None:
         """A set-point for each actuator, in their order."""
@@ -170,16 +176,7 @@ class Commands:
             return answer
 
         kind = "rcl_interfaces.srv.SetParametersAtomically"
-        self._make(self._shared.calls, "service", kind, path, serve)
-
-    def _step(self, iterations: int) -> str:
-        return f"iteration {self._arm.burst(iterations, timeout=PATIENCE).iteration}"
-
-    def _halt(self) -> str:
-        return f"halt {o80.halt(self._arm.segment, 'requested over ROS 2')} is requested"
-
-    def _resume(self) -> str:
-        return "the halt has ended" if self._arm.resume(timeout=RESUME) else "there was no halt"
+        self._make(self._calls.node, "service", kind, path, serve)
 
 
 def nanoseconds(time: Any) -> int:

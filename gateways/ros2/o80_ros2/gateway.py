@@ -1,7 +1,5 @@
 """The gateway: a node, the robots that it carries, and the loop that reads them."""
 
-import sys
-import threading
 import time
 from collections.abc import Sequence
 from typing import Any
@@ -18,8 +16,8 @@ USUAL, USUAL_OF_MANY, MANY = 100.0, 20.0, 10
 BETWEEN_LISTS, BETWEEN_REPORTS, BETWEEN_POLLS = 1.0, 1.0, 0.1
 """Intervals: lists of segments, diagnostics, checks whether a diagnostic has changed [s]."""
 
-SWITCH = 0.0005
-"""Longest time for which a thread that publishes keeps those waiting that serve [s]."""
+LEAST = 0.0005
+"""Time for messages and calls before the next reading, also when readings are late [s]."""
 
 
 class Gateway:
@@ -27,43 +25,22 @@ class Gateway:
 
     def __init__(self, names: Sequence[str], settings: ros.Settings) -> None:
         """names: of segments; empty for all, also those that start later."""
-        handlers = ros.of("rclpy.signals.SignalHandlerOptions").NO
-        ros.of("rclpy.init")(signal_handler_options=handlers)
-        name, create = settings.robot("o80_ros2"), ros.of("rclpy.create_node")
-        self._ends = False
-        self._served: list[tuple[Any, Any, threading.Thread]] = []
-        # calls that take long have a node and a thread of their own, so that a halt does not wait
-        for each in (name, f"{name}_calls"):
-            executor = ros.of("rclpy.executors.SingleThreadedExecutor")()
-            node = create(each, start_parameter_services=False)
-            executor.add_node(node)
-            thread = threading.Thread(target=self._serve, args=(executor,))
-            self._served.append((node, executor, thread))
-        calls, node, self._names, tf = node, self._served[0][0], names, None
-        self._node, self._log = node, node.get_logger()
+        none = ros.of("rclpy.signals.SignalHandlerOptions").NO
+        ros.of("rclpy.init")(signal_handler_options=none)
+        self._served, self._names, tf = ros.Served(settings.robot("o80_ros2")), names, None
+        node, self._log = self._served.node, self._served.node.get_logger()
         try:
             tf = node.create_publisher(ros.of("tf2_msgs.msg.TFMessage"), "/tf", 100)
         except MissingExtra:
             self._log.warning("there is no tf2_msgs, which its wheels lack: /tf is not published")
-        self._shared = ros.Shared(node, calls, settings, WallClock(), tf)
+        self._shared = ros.Shared(node, settings, WallClock(), tf)
         self._array = ros.of("diagnostic_msgs.msg.DiagnosticArray")
         self._diagnostics = node.create_publisher(self._array, "/diagnostics", 10)
         self._reported: Any = None
         self._report_at = self._list_at = self._poll_at = 0.0
-        self._clock: Any = None  # publisher of /clock, and the time published last [ns]
-        self._simulated = -1
+        self._clock: Any = None  # publisher of /clock
+        self._simulated = -1  # its last time [ns]
         self._sources: dict[str, Source] = {}
-        sys.setswitchinterval(SWITCH)
-        for *_, thread in self._served:
-            thread.start()
-
-    def _serve(self, executor: Any) -> None:
-        """Serves messages and calls until the end."""
-        while not self._ends:
-            try:
-                executor.spin()
-            except Exception as error:  # of rclpy, if what it waits for is destroyed meanwhile
-                self._log.warning(f"continues after {error!r}", throttle_duration_sec=1.0)
 
     def run(self, stop: StopRequest) -> None:
         """Reads all robots, each at its rate."""
@@ -81,7 +58,7 @@ class Gateway:
                 self._poll_at = now + BETWEEN_POLLS
                 self._report(now)
             due = min([self._poll_at, *(each.due for each in self._sources.values())])
-            time.sleep(max(0.0005, due - time.monotonic()))
+            self._served.serve(max(due, time.monotonic() + LEAST))
 
     def _update_sources(self) -> None:
         """Adds segments that are new, and removes those that are gone."""
@@ -105,11 +82,11 @@ class Gateway:
     def _publish_clock(self) -> None:
         """The simulated time of the first robot that has one."""
         topics = (each.topics for each in self._sources.values())
-        first = next((each for each in topics if each is not None and each.is_simulated), None)
-        if first is None or first.time == self._simulated:
+        first = next((each for each in topics if each and each.is_simulated), None)
+        if not first or first.time == self._simulated:
             return
         self._simulated, kind = first.time, ros.of("rosgraph_msgs.msg.Clock")
-        self._clock = self._clock or self._node.create_publisher(kind, "/clock", 10)
+        self._clock = self._clock or self._served.node.create_publisher(kind, "/clock", 10)
         message = kind()
         message.clock.sec, message.clock.nanosec = divmod(first.time, 10**9)
         self._clock.publish(message)
@@ -125,7 +102,7 @@ class Gateway:
             ros.of(f"diagnostic_msgs.msg.{n}") for n in ("DiagnosticStatus", "KeyValue")
         )
         message = self._array()
-        message.header.stamp = self._node.get_clock().now().to_msg()
+        message.header.stamp = self._served.node.get_clock().now().to_msg()
         for name, (level, text, values) in zip(self._sources, found, strict=True):
             each = status(level=level, name=f"o80: {name}", message=text, hardware_id=name)
             each.values = [pair(key=key, value=str(value)) for key, value in values.items()]
@@ -134,11 +111,7 @@ class Gateway:
 
     def close(self) -> None:
         """Ends the node. Robots and the commands that they have continue."""
-        self._ends = True
         for source in self._sources.values():
             source.close(topics=True)
-        for node, executor, thread in self._served:
-            executor.shutdown()
-            thread.join()
-            node.destroy_node()
+        self._served.close()
         ros.of("rclpy.try_shutdown")()

@@ -1,7 +1,10 @@
 """Packages and names of ROS 2, and what all parts of the gateway share."""
 
 import importlib
+import math
 import re
+import threading
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -9,6 +12,9 @@ from typing import Any
 from o80.errors import MissingExtra
 from o80.recording.epoch import topic_of
 from o80_ros2.wall_clock import WallClock
+
+LONGEST = 0.1
+"""Longest wait for messages, then the end is polled [s]."""
 
 
 def of(path: str) -> Any:
@@ -42,12 +48,42 @@ class Settings:
         return names_of(self.prefix + (name or f"joint_{i}") for i, name in enumerate(names))
 
 
+class Served:
+    """A node that one thread uses and serves: with two, rclpy loses wake-ups and can hang."""
+
+    def __init__(self, name: str) -> None:
+        self.node = of("rclpy.create_node")(name, start_parameter_services=False)
+        self._executor = of("rclpy.executors.SingleThreadedExecutor")()
+        self._executor.add_node(self.node)
+        self._ends = False
+        self._thread = threading.Thread(target=self.serve, args=(math.inf,))
+
+    def serve(self, until: float) -> None:
+        """Takes messages and calls, up to a time of the monotonic clock [s]."""
+        while (left := until - time.monotonic()) > 0 and not self._ends:
+            try:
+                self._executor.spin_once(timeout_sec=min(left, LONGEST))
+            except Exception as error:  # of rclpy: others may send what it cannot read
+                text = f"continues after {error!r}"
+                self.node.get_logger().warning(text, throttle_duration_sec=1.0)
+
+    def start(self) -> None:
+        """Lets a thread of its own use and serve the node until it is closed."""
+        self._thread.start()
+
+    def close(self) -> None:
+        self._ends = True
+        if self._thread.ident:
+            self._thread.join()
+        self._executor.shutdown()
+        self.node.destroy_node()
+
+
 @dataclass(frozen=True)
 class Shared:
     """Parts that the robots of a gateway share. tf: publisher of /tf; None without tf2_msgs."""
 
     node: Any
-    calls: Any  #: node of services that take long
     settings: Settings
     clock: WallClock
     tf: Any

@@ -59,8 +59,7 @@ def _sensors(
     described: Mapping[str, Any], structs: tuple[str, ...], size: list[int]
 ) -> Iterator[Sensor]:
     fields = {each["name"]: each for each in described["fields"]}
-    flags = [n for n in ("visible", "valid") if n in fields and not fields[n]["shape"]]
-    single = flags[0] if flags else ""
+    single = next((n for n in ("visible", "valid") if fields.get(n, {}).get("shape") == []), "")
     for name, field in fields.items():
         if field["kind"] == "struct" and not field["shape"]:
             yield from _sensors(field["type"], (*structs, name), size)

@@ -25,10 +25,9 @@ class Source:
         self._commands: Commands | None = None
         self._next = 0  # iteration that was not read yet
         self._poll_at = 0.0
-        self._problem = ""  # why it is not read
+        self._problem = self._why = ""  # why it is not read, and of the last refusal
         self.due = 0.0  #: when it wants to be read again [s]
         self.published = self.missed = self.late = self.refused = 0
-        self._why = ""  # of the last refusal
 
     @property
     def gone(self) -> bool:

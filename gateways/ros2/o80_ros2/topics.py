@@ -155,8 +155,7 @@ def _message(kind: str, header: Any, values: Sequence[NDArray[Any]], frame: str 
 
 def _gathered(raw: NDArray[np.uint8], numbers: Iterable[Number]) -> NDArray[np.float64]:
     """Numbers of rows (n, bytes of a row): (n, numbers)."""
-    count, step = len(raw), raw.strides[0]
-    columns = [np.ndarray((count,), each.kind, raw, each.offset, (step,)) for each in numbers]
+    columns = [np.ndarray((len(raw),), n.kind, raw, n.offset, raw.strides[:1]) for n in numbers]
     return np.stack(columns, axis=1).astype(float)
 
 

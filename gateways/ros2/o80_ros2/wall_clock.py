@@ -14,7 +14,7 @@ Clock = Callable[[], int]
 
 
 class WallClock:
-    """Reads the offset again and again. May be used from several threads."""
+    """Reads the offset again and again."""
 
     def __init__(self, wall: Clock = time.time_ns, monotonic: Clock = time.monotonic_ns) -> None:
         self._wall, self._monotonic = wall, monotonic

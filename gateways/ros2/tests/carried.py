@@ -21,7 +21,7 @@ class Carried:
         self.clock = WallClock(lambda: self.monotonic + OFFSET, lambda: self.monotonic)
         kind = stand_in_ros.of("tf2_msgs.msg.TFMessage")
         self.tf = self.node.create_publisher(kind, "/tf", 100)
-        shared = ros.Shared(self.node, self.node, settings, self.clock, self.tf)
+        shared = ros.Shared(self.node, settings, self.clock, self.tf)
         self.source = Source(shared, robot.segment)
 
     def tick(self) -> None:

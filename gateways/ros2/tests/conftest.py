@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from contextlib import ExitStack
+from functools import partial
 from typing import Any
 
 import pytest
@@ -21,6 +22,7 @@ def carry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Carry]:
         def carried(robot: o80.Frontend, **given: Any) -> Carried:
             settings = ros.Settings(**{"rates": {"": 0.0}, "command": True, **given})
             made = Carried(robot, settings)
+            monkeypatch.setattr(ros, "Served", partial(stand_in_ros.Served, made.node))
             stack.callback(made.source.close)
             made.tick()
             return made

@@ -5,6 +5,7 @@ judge.py command ROBOT: moves, halts, resumes and requests.
 """
 
 import json
+import signal
 import sys
 from collections.abc import Callable
 from typing import Any
@@ -20,6 +21,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
+signal.alarm(120)  # ends if there is no gateway
 rclpy.init()
 node = rclpy.create_node("judge")
 

@@ -128,3 +128,18 @@ class Node:
         if parameters:
             return answer.result.successful, answer.result.reason
         return answer.success, answer.message
+
+
+class Served:
+    """A node of calls, which are served in the thread that calls them."""
+
+    def __init__(self, others: Node, name: str) -> None:
+        """others: finds the services of this node too."""
+        self.node, self._others = Node(), others
+
+    def start(self) -> None:
+        self._others.served |= self.node.served
+
+    def close(self) -> None:
+        for name in self.node.served:
+            del self._others.served[name]

@@ -10,7 +10,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from sysconfig import get_path
 from typing import Any
 
 import numpy as np
@@ -42,7 +41,6 @@ def environment(domain: int, **more: str) -> dict[str, str]:
     own = {
         "ROS_DOMAIN_ID": str(domain),
         "ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST",
-        "FASTDDS_BUILTIN_TRANSPORTS": "UDPv4",  # leaves no files in /dev/shm
     }
     return os.environ | own | more
 
@@ -77,10 +75,11 @@ def line(process: "subprocess.Popen[str]") -> str:
 
 @pytest.fixture(scope="module", autouse=True)
 def traces() -> Iterator[None]:
-    """The tracing library of the wheels leaves files in /dev/shm: those of these tests go."""
+    """Files that the wheels' libraries leave in /dev/shm, where one of these programs is killed."""
 
     def found() -> set[Path]:
-        return set(Path("/dev/shm").glob("lttng-ust-wait-*"))
+        names = ("lttng-ust-wait-*", "fast*_*", "sem.fast*_*")
+        return {path for name in names for path in Path("/dev/shm").glob(name)}
 
     before = found()
     yield
@@ -88,12 +87,12 @@ def traces() -> Iterator[None]:
         file.unlink(missing_ok=True)
 
 
-@pytest.fixture(scope="module", params=["jazzy"])  # one under Kilted hangs at times: docs/ros2.md
+@pytest.fixture(scope="module", params=VERSIONS)
 def domain(request: pytest.FixtureRequest) -> Iterator[int]:
     """The domain of a gateway under one version of ROS, which carries `sim` and `arm`."""
     python, domain = python_of(request.param), free_domain()
     # the interpreter is that of ROS, o80 that of the tests
-    env = environment(domain, PYTHONPATH=get_path("purelib"))
+    env = environment(domain, PYTHONPATH=str(Path(o80.__file__).parents[1]))
     two_joints = o80.robots.load("two_joints")
     words = (python, "-m", "o80", "ros2", "--command", "--rate", "all")
     sim, arm = two_joints.start("sim", bursting=True), two_joints.start("arm", frequency=200)
