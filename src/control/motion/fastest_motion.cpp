@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "base/root.hpp"
+#include "base/whole.hpp"
 
 namespace o80 {
 namespace {
@@ -16,6 +17,10 @@ constexpr double kRootForTime = 1e-6;
 constexpr double kExact = 1e-16;
 constexpr double kBracket = 1e-3;
 constexpr int kMaxCorrections = 8;
+constexpr double kRounding = 4e-16;
+constexpr double kReached = 1e-13;
+constexpr int kGuesses = 4;
+constexpr int kNewtonSteps = 6;   // of Newton's method: it is exact once both counts stay
 constexpr double kMissed = 1e-9;  // beyond rounding; a share of the distance and of a step
 
 }  // namespace
@@ -46,23 +51,143 @@ FastestMotion::FastestMotion(const Moment& start, double target, const Rates& ra
 
   // the speed after the present acceleration has faded out: the lowest cruising speed
   const double size = std::abs(start_acceleration_);
-  const double steps = size > 0.0 ? std::floor(size / rates_.jerk) : 0.0;
+  const double steps = size > 0.0 ? whole_below(size / rates_.jerk) : 0.0;
   const double fading =
       steps > 0.0 ? steps * size - rates_.jerk * steps * (steps + 1.0) / 2.0 : 0.0;
   const double flat = start_speed_ + std::copysign(fading, start_acceleration_);
   const double lowest = std::clamp(flat, 0.0, rates_.speed);
-  const double most = std::ceil(time_to(rates_.speed) * (1.0 - kTimeRounding));
+  if (!solve(lowest)) search(lowest);
+}
+
+/// About the cruising speed of a motion in so many iterations, 0 for the fewest, without counting
+/// whole ones: four steps of Newton's method.
+double FastestMotion::guess(double iterations, double highest) const noexcept {
+  const double kink = rates_.acceleration * (rates_.acceleration / rates_.jerk);
+  struct Time {
+    double value;
+    double slope;
+  };
+  const auto time_for = [&](double change) {
+    const double size = std::max(std::abs(change), std::numeric_limits<double>::min());
+    if (size >= kink) {
+      return Time{size / rates_.acceleration + rates_.acceleration / rates_.jerk,
+                  1.0 / rates_.acceleration};
+    }
+    const double half = std::sqrt(size / rates_.jerk);
+    return Time{2.0 * half, half / size};
+  };
+  // as if it had begun without acceleration, or began once that has faded
+  const double speed = start_speed_;
+  double base = 0.0;
+  double time = 0.0;
+  double way = 0.0;
+  const auto begin = [&](double side) {
+    const double faded = side * start_acceleration_ / rates_.jerk;
+    base = speed - start_acceleration_ * faded / 2.0;
+    time = iterations + faded;
+    way = distance_ + speed / 2.0 + base * faded + start_acceleration_ * faded * faded / 6.0;
+  };
+  begin(1.0);
+  double cruise = 0.0;
+  if (iterations > 0.0) {
+    if (base > 0.0 && base * (time - time_for(base).value / 2.0) > way) begin(-1.0);
+    cruise = std::clamp(way / time, 0.0, highest);
+  } else {
+    // from the place where it has turned back
+    const double back = std::min(base, 0.0);
+    const double left = std::max(0.0, way + back * back / (2.0 * rates_.acceleration));
+    const double far = std::sqrt(rates_.acceleration * left);
+    const double near = std::cbrt(rates_.jerk / 4.0 * left * left);
+    cruise = std::min(highest, std::max(base, 0.0) + std::min(far, near));
+  }
+  for (int i = 0; i < kGuesses; ++i) {
+    const Time up = time_for(cruise - base);
+    const Time down = time_for(cruise);
+    const double up_slope = cruise < base ? -up.slope : up.slope;
+    const double mean = (base + cruise) / 2.0;
+    double missing = mean * up.value + cruise / 2.0 * down.value - way;
+    double slope = (up.value + down.value) / 2.0 + mean * up_slope + cruise / 2.0 * down.slope;
+    if (iterations > 0.0) {
+      const double rest = time - up.value - down.value;
+      missing += rest * cruise;
+      slope += rest - cruise * (up_slope + down.slope);
+    }
+    if (!(slope > 0.0)) break;
+    cruise = std::clamp(cruise - missing / slope, 0.0, highest);
+  }
+  return cruise;
+}
+
+/// Plans the shortest motion by Newton's method: the distance is a piecewise linear and increasing
+/// function of the cruising speed. False if that does not find it.
+bool FastestMotion::solve(double lowest) noexcept {
+  double cruise = std::max(guess(0.0, rates_.speed), lowest);
+  for (int i = 0; i < kNewtonSteps; ++i) {
+    cruise_at(cruise);
+    const VelocityChange& up = to_cruise_;
+    const VelocityChange& down = to_rest_;
+    const double missing = up.displacement() + up.time() * cruise + down.displacement() - distance_;
+    const bool is_full = cruise == rates_.speed && missing <= 0.0;
+    if (is_full || std::abs(missing) <= kRootForTime * std::abs(distance_)) {
+      double before = whole_above(up.time() * (1.0 - kTimeRounding));
+      if (is_full) {
+        const double left = distance_ - up.displacement() - before * cruise - down.displacement();
+        before += std::max(0.0, whole_above(left / cruise * (1.0 - kTimeRounding)));
+      }
+      before_ = static_cast<std::int64_t>(before);
+      if (reach(cruise, lowest, 0)) return true;
+      if (distance(lowest, before) <= distance_) return false;
+      mix(lowest);
+      settle();
+      return true;
+    }
+    const double slope = up.slope() + up.time() + cruise * up.time_slope() - down.slope();
+    if (!(slope > 0.0)) return false;
+    cruise = std::clamp(cruise - missing / slope, lowest, rates_.speed);
+  }
+  return false;
+}
+
+/// The cruising speed with which it gets to the target exactly, from one that nearly does: in
+/// `before_` iterations before it slows down, or in so many iterations in total. False if there is
+/// none.
+bool FastestMotion::reach(double cruise, double lowest, std::int64_t iterations) noexcept {
+  for (int i = 1;; ++i) {
+    if (iterations > 0) before_ = iterations - to_rest_.steps();
+    const auto before = static_cast<double>(before_);
+    const double missing =
+        to_cruise_.displacement() + before * cruise + to_rest_.displacement() - distance_;
+    const double size = std::abs(distance_) + before * cruise;
+    const double slope = to_cruise_.slope() + before - to_rest_.slope();
+    if (!(slope > 0.0)) return false;
+    const double change = missing / slope;
+    if (std::abs(missing) <= kRounding * size || std::abs(change) <= kRounding * cruise ||
+        i == kNewtonSteps) {
+      if (to_cruise_.steps() > before_ || std::abs(missing) > kReached * size) return false;
+      cruise_ = cruise;
+      count();
+      return true;
+    }
+    cruise -= change;
+    if (!(cruise >= lowest && cruise <= rates_.speed)) return false;
+    cruise_at(cruise);
+  }
+}
+
+/// The same as solve(), by searching.
+void FastestMotion::search(double lowest) noexcept {
+  const double most = whole_above(time_to(rates_.speed) * (1.0 - kTimeRounding));
   const double at_most = distance(rates_.speed, most) - distance_;
   if (at_most <= 0.0) {
     // the target is farther: cruise at full speed
     cruise_ = rates_.speed;
-    before_ = static_cast<std::int64_t>(most +
-                                        std::ceil(-at_most / rates_.speed * (1.0 - kTimeRounding)));
+    before_ = static_cast<std::int64_t>(
+        most + whole_above(-at_most / rates_.speed * (1.0 - kTimeRounding)));
   } else {
     // the target is nearer: reduce the cruising speed until there is no time to cruise
     // for the number of iterations; the speed that fits them is found below, a little beyond it
     cruise_ = cruise_for({}, lowest, rates_.speed, kRootForTime);
-    before_ = static_cast<std::int64_t>(std::ceil(time_to(cruise_) * (1.0 - kTimeRounding)));
+    before_ = static_cast<std::int64_t>(whole_above(time_to(cruise_) * (1.0 - kTimeRounding)));
   }
   if (distance(lowest, static_cast<double>(before_)) > distance_) {
     mix(lowest);
@@ -137,6 +262,12 @@ double FastestMotion::cruise_for(std::optional<double> before, double low, doubl
 void FastestMotion::stretch(std::int64_t iterations) noexcept {
   if (iterations <= iterations_ || before_ == 0) return;
   const FastestMotion shortest = *this;
+  if (!mixed_) {
+    const double cruise = guess(static_cast<double>(iterations), cruise_);
+    cruise_at(cruise);
+    if (reach(cruise, 0.0, iterations)) return;
+  }
+  *this = shortest;
   // a mean of two motions that happens to have the right length still needs its own cruising speed
   bool exact = !mixed_;
   mixed_ = false;

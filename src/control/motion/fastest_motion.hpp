@@ -53,11 +53,21 @@ class FastestMotion {
   double time_to(double cruise) const noexcept {
     return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
   }
+  double guess(double iterations, double highest) const noexcept;
+  bool solve(double lowest) noexcept;
+  bool reach(double cruise, double lowest, std::int64_t iterations) noexcept;
+  void search(double lowest) noexcept;
   double cruise_for(std::optional<double> before, double low, double high,
                     double tolerance) const noexcept;
+  void cruise_at(double speed) noexcept {
+    to_cruise_ = VelocityChange(speed - start_speed_, start_acceleration_, rates_);
+    to_rest_ = VelocityChange(-speed, 0.0, rates_);
+  }
   void settle() noexcept {
-    to_cruise_ = VelocityChange(cruise_ - start_speed_, start_acceleration_, rates_);
-    to_rest_ = VelocityChange(-cruise_, 0.0, rates_);
+    cruise_at(cruise_);
+    count();
+  }
+  void count() noexcept {
     speed_ = start_speed_;
     const std::int64_t cruising = cruises_ ? before_ + to_rest_.steps() : farther_.steps();
     iterations_ = std::max({std::int64_t{1}, cruising, nearer_.steps()});

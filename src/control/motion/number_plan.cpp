@@ -77,11 +77,25 @@ std::int64_t NumberPlan::propose(const PlanTask& task) noexcept {
   if (requested > 0 && is_smooth && std::isfinite(task.rates.acceleration) && smooth(requested)) {
     return requested;
   }
+  const bool keeps_speed = is_smooth && std::isfinite(task.cruise);
+  if (keeps_speed && smooth_from_rest()) return std::max(requested, smooth_for_);
   std::int64_t least = fewest();
-  if (is_smooth && std::isfinite(task.cruise) && least <= kLongestPlan) {
-    least = fewest_smooth(least);
-  }
+  if (keeps_speed && least <= kLongestPlan) least = fewest_smooth(least);
   return std::max(requested, least);
+}
+
+/// Plans the shortest smooth motion from rest, without a search: its peaks of speed, acceleration
+/// and jerk are known. False for other motions, or if the fewest iterations are not these.
+bool NumberPlan::smooth_from_rest() noexcept {
+  if (task_.from.speed != 0.0 || task_.from.acceleration != 0.0) return false;
+  const double way = std::abs(task_.target - task_.from.position);
+  const Rates& most = task_.rates;
+  const double time = std::max({15.0 / 8.0 * way / std::min(most.speed, task_.cruise),
+                                std::sqrt(10.0 / std::sqrt(3.0) * way / most.acceleration),
+                                std::cbrt(60.0 * way / most.jerk), 1.0});
+  if (!(time <= static_cast<double>(kLongestPlan))) return false;
+  const auto fewest = static_cast<std::int64_t>(std::ceil(time * (1.0 - kPlanRounding / 2.0)));
+  return !(fewest > 1 && smooth(fewest - 1)) && smooth(fewest);
 }
 
 /// The fewest iterations of a motion at full speed, or at the cruising speed asked for.

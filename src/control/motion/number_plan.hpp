@@ -158,6 +158,7 @@ class NumberPlan {
   double at(std::int64_t done) const noexcept;
   std::int64_t fewest() noexcept;
   std::int64_t fewest_smooth(std::int64_t least) noexcept;
+  bool smooth_from_rest() noexcept;
   bool smooth(std::int64_t iterations) noexcept;
   bool fits(const SmoothMotion& motion) const noexcept;
   bool stop_then_smooth(std::int64_t iterations) noexcept;

@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "base/whole.hpp"
+
 namespace o80 {
 namespace {
 
@@ -25,7 +27,7 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
   const double size = std::abs(change);
   if (!std::isfinite(acceleration_)) acceleration_ = size;
   const double steps =
-      std::min(std::ceil(size / acceleration_ * (1.0 - kChangeRounding)), kMaxSteps);
+      std::min(whole_above(size / acceleration_ * (1.0 - kChangeRounding)), kMaxSteps);
   steps_ = static_cast<std::int64_t>(std::max(steps, 1.0));
   shorter_ = steps_ - 1;
   const auto n = static_cast<double>(shorter_);
@@ -33,17 +35,18 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
   share_ = share_between(size, static_cast<double>(steps_) * acceleration_, before);
   // sum over i of v(i) - v(steps)
   displacement_ = sign_ * (acceleration_ * n * (n - 1.0) / 2.0 + (size - before) * n);
+  slope_ = -n;
+  time_slope_ = -sign_ / acceleration_;
 }
 
 /// The sums of trough(), for its three parts: down, along the limit, up.
-VelocityChange::Sums VelocityChange::sums(double steps) const noexcept {
+VelocityChange::Sums VelocityChange::sums(const Ratios& ratios, double steps) const noexcept {
   if (steps <= 0.0) return {};
   O80_COUNT(trapezoid);
-  const double meet = std::floor((start_ / jerk_ + steps) / 2.0);
-  const double down =
-      std::clamp(std::min(meet, std::floor((start_ + acceleration_) / jerk_)), 0.0, steps);
-  const double up = std::clamp(std::max(meet + 1.0, std::ceil(steps - acceleration_ / jerk_)),
-                               down + 1.0, steps + 1.0);
+  const double meet = whole_below((ratios.start + steps) / 2.0);
+  const double down = std::clamp(std::min(meet, ratios.deepest), 0.0, steps);
+  const double up =
+      std::clamp(std::max(meet + 1.0, whole_above(steps - ratios.most)), down + 1.0, steps + 1.0);
   Sums all;
   all.change = down * start_ - jerk_ * down * (down + 1.0) / 2.0;
   all.moment =
@@ -64,20 +67,23 @@ VelocityChange::Sums VelocityChange::sums(double steps) const noexcept {
 
 void VelocityChange::plan_with_jerk(double change) noexcept {
   if (change == 0.0 && start_ == 0.0) return;
-  const double fewest = std::ceil(std::abs(start_) / jerk_ * (1.0 - kChangeRounding));
+  Ratios ratios{start_ / jerk_, whole_below((start_ + acceleration_) / jerk_),
+                acceleration_ / jerk_};
+  const double fewest = whole_above(std::abs(ratios.start) * (1.0 - kChangeRounding));
 
   // compare the change with that of the direct way to acceleration 0, and of its mirror image
-  Sums straight = sums(fewest);
+  Sums straight = sums(ratios, fewest);
   if (change >= straight.change) {
     start_ = -start_;
-    const Sums crest = sums(fewest);
+    ratios.start = -ratios.start;
+    ratios.deepest = whole_below((start_ + acceleration_) / jerk_);
+    const Sums crest = sums(ratios, fewest);
     if (change <= -crest.change) {
       // in between: the mean of the two ways of fewest steps
       start_ = -start_;
       steps_ = shorter_ = static_cast<std::int64_t>(fewest);
       crest_ = true;
-      share_ = share_between(change, straight.change, -crest.change);
-      displacement_ = -((1.0 - share_) * straight.moment - share_ * crest.moment);
+      mean(change, straight, {-crest.change, -crest.moment});
       return;
     }
     sign_ = -1.0;
@@ -95,19 +101,19 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
   const double enough = change + kChangeRounding * std::max(std::abs(change), std::abs(start_));
   double low = fewest;  // steps that are too few
   Sums other = straight;
-  steps = std::clamp(std::floor(steps), fewest + 1.0, kMaxSteps);
-  Sums own = sums(steps);
+  steps = std::clamp(whole_below(steps), fewest + 1.0, kMaxSteps);
+  Sums own = sums(ratios, steps);
   for (double stride = 1.0; own.change > enough && steps < kMaxSteps; stride *= 2.0) {
     low = steps;
     other = own;
     steps = std::min(steps + stride, kMaxSteps);
-    own = sums(steps);
+    own = sums(ratios, steps);
   }
   bool first = true;  // try one step less first: the estimate is seldom off by more than one
   while (steps - low > 1.0) {
     const double tried =
-        std::exchange(first, false) ? steps - 1.0 : std::floor((low + steps) / 2.0);
-    const Sums there = sums(tried);
+        std::exchange(first, false) ? steps - 1.0 : whole_below((low + steps) / 2.0);
+    const Sums there = sums(ratios, tried);
     if (there.change > enough) {
       low = tried;
       other = there;
@@ -118,10 +124,18 @@ void VelocityChange::plan_with_jerk(double change) noexcept {
   }
   steps_ = static_cast<std::int64_t>(steps);
   shorter_ = steps_ - 1;
-  const double rising = start_ > 0.0 ? std::floor(start_ / jerk_) : 0.0;
+  const double rising = start_ > 0.0 ? whole_below(start_ / jerk_) : 0.0;
   detour_ = sign_ * (rising * start_ - jerk_ * rising * (rising + 1.0) / 2.0);
+  mean(change, own, other);
+}
+
+void VelocityChange::mean(double change, const Sums& own, const Sums& other) noexcept {
   share_ = share_between(change, own.change, other.change);
   displacement_ = -sign_ * ((1.0 - share_) * own.moment + share_ * other.moment);
+  const double range = own.change - other.change;
+  if (range == 0.0) return;
+  slope_ = (other.moment - own.moment) / range;
+  time_slope_ = crest_ ? 0.0 : sign_ / range;
 }
 
 double VelocityChange::acceleration(std::int64_t i) const noexcept {
@@ -143,11 +157,11 @@ double VelocityChange::run_before_turn(double speed) const noexcept {
   // v(i) = v + i a(0) - jerk i (i + 1) / 2 while the acceleration is above 0
   const double b = start_ - jerk_ / 2.0;
   const double discriminant = b * b + 2.0 * jerk_ * v;
-  const double most = std::floor(start_ / jerk_);
+  const double most = whole_below(start_ / jerk_);
   const double steps =
       discriminant <= 0.0 || b <= 0.0
           ? most
-          : std::clamp(std::floor((b - std::sqrt(discriminant)) / jerk_), 0.0, most);
+          : std::clamp(whole_below((b - std::sqrt(discriminant)) / jerk_), 0.0, most);
   return sign_ * (steps * v + start_ * steps * (steps + 1.0) / 2.0 -
                   jerk_ * steps * (steps + 1.0) * (steps + 2.0) / 6.0);
 }

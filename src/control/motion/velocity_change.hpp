@@ -65,6 +65,10 @@ class VelocityChange {
   double acceleration(std::int64_t i) const noexcept;
   /// Displacement within steps() minus that of the final speed: the sum of v(i) - v(steps).
   double displacement() const noexcept { return displacement_; }
+  /// Derivatives of displacement() and time() with respect to the change: both are piecewise linear
+  /// in it.
+  double slope() const noexcept { return slope_; }
+  double time_slope() const noexcept { return time_slope_; }
   /// Largest change of the speed away from its target, in the direction of the present
   /// acceleration, signed; 0 if there is none.
   double detour() const noexcept { return detour_; }
@@ -84,7 +88,15 @@ class VelocityChange {
   double trough(double start, double i, double steps) const noexcept {
     return i >= steps ? 0.0 : std::max({-acceleration_, start - i * jerk_, -(steps - i) * jerk_});
   }
-  Sums sums(double steps) const noexcept;
+  /// Of limits and a(0), which all trapezoids share, in iterations.
+  struct Ratios {
+    double start;    // a(0) / jerk
+    double deepest;  // whole iterations from a(0) to the limit of acceleration
+    double most;     // acceleration / jerk
+  };
+  Sums sums(const Ratios& ratios, double steps) const noexcept;
+  /// The mean of two ways that changes the speed by `change`; all are mirrored.
+  void mean(double change, const Sums& own, const Sums& other) noexcept;
 
   // mirrored by sign_, so that the trough is negative
   double sign_ = 1.0;
@@ -96,6 +108,8 @@ class VelocityChange {
   bool crest_ = false;        // the other one is the crest with as many steps
   double share_ = 0.0;        // weight of the other one
   double displacement_ = 0.0;
+  double slope_ = 0.0;
+  double time_slope_ = 0.0;
   double detour_ = 0.0;
 };
 

@@ -22,9 +22,11 @@ constexpr std::int64_t kPlayed = 500;  // iterations of a motion, at most
 
 // a root of FastestMotion: the changes of speed of each evaluation
 constexpr std::uint32_t kRoot = 2 * (60 + 2);
-// two roots, and what is done once or bisects a number of iterations
-constexpr std::uint32_t kStart = 2 * kRoot + 50;
-constexpr std::uint32_t kStretch = 8 * (kRoot + 2);
+// two roots, if steps of Newton's method do not find it, and what is done once or bisects a number
+// of iterations
+constexpr std::uint32_t kNewton = 2 * 6;
+constexpr std::uint32_t kStart = 2 * kRoot + 2 * kNewton + 50;
+constexpr std::uint32_t kStretch = kNewton + 8 * (kRoot + 2);
 // the searches of a NumberLimiter that follows
 constexpr std::uint32_t kFollow = 2 * 16 + 8;
 // of a VelocityChange: it searches by doubling and halving, up to 1e12 iterations
@@ -137,12 +139,12 @@ TEST_F(PlansTest, OfAnArmUsuallyNeedFewChangesOfSpeed) {
     start(1 + some_of(100));
     stretched.push_back(work_since_last_asked().speed_changes);
   }
-  EXPECT_LE(usual_of(from_rest).median, 30U);
-  EXPECT_LE(usual_of(from_rest).p99, 45U);
-  EXPECT_LE(usual_of(moving).median, 30U);
-  EXPECT_LE(usual_of(moving).p99, 120U);
-  EXPECT_LE(usual_of(stretched).median, 100U);
-  EXPECT_LE(usual_of(stretched).p99, 300U);
+  EXPECT_LE(usual_of(from_rest).median, 6U);
+  EXPECT_LE(usual_of(from_rest).p99, 9U);
+  EXPECT_LE(usual_of(moving).median, 9U);
+  EXPECT_LE(usual_of(moving).p99, 16U);
+  EXPECT_LE(usual_of(stretched).median, 16U);
+  EXPECT_LE(usual_of(stretched).p99, 130U);
 }
 
 }  // namespace
