@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "memory/ring/lane_sender.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/backend.hpp"

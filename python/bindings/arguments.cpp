@@ -100,8 +100,10 @@ o80::Timeout timeout_of(nb::handle seconds) {
   return std::chrono::nanoseconds(std::llround(std::fmax(number, 0.0) * 1e9));
 }
 
+namespace {
+
 o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
-                      nb::handle iterations, bool fastest) {
+                      nb::handle iterations, nb::handle fastest) {
   o80::PaceSpec pace = o80::direct();
   int given = 0;
   if (!duration.is_none() && ++given == 1) {
@@ -112,7 +114,7 @@ o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
   if (!iterations.is_none() && ++given == 1) {
     pace = o80::iterations(count_of(iterations, "iterations"));
   }
-  if (fastest && ++given == 1) pace = o80::fastest();
+  if (truth_of(fastest, "fastest") && ++given == 1) pace = o80::fastest();
   if (given > 1) {
     throw InvalidArgument(
         "a command has one pace: give one of duration, speed, until, iterations and fastest (or "
@@ -121,10 +123,40 @@ o80::PaceSpec pace_of(nb::handle duration, nb::handle speed, nb::handle until,
   return pace;
 }
 
-o80::CommandOptions command_options(const o80::PaceSpec& pace, nb::handle mode, nb::handle profile,
-                                    nb::handle start) {
-  o80::CommandOptions options{.pace = pace, .mode = mode_of(mode), .start = start_of(start)};
-  if (!profile.is_none()) options.profile = profile_of(profile);
+/// `every`: time between the set-points of a stream, seconds, or iterations if it is an integer.
+void set_every(o80::PaceSpec& pace, nb::handle every, std::int64_t period) {
+  if (pace.pace != o80::Pace::direct) {
+    throw o80::InvalidArgument(
+        "every is for set-points, which have no pace: leave out every, or the pace");
+  }
+  const bool counts = PyIndex_Check(every.ptr()) != 0;
+  if (PyBool_Check(every.ptr()) != 0 || (counts && count_of(every, "every") > INT64_MAX / period)) {
+    throw o80::InvalidArgument("every must be seconds or a number of iterations, got " +
+                               nb::cast<std::string>(nb::repr(every)));
+  }
+  const std::chrono::nanoseconds time =
+      counts ? std::chrono::nanoseconds(count_of(every, "every") * period)
+             : nanoseconds_of(every, "every");
+  if (time.count() <= 0) {
+    throw o80::InvalidArgument("every must be positive, got " +
+                               nb::cast<std::string>(nb::repr(every)));
+  }
+  pace = o80::direct(time);
+}
+
+}  // namespace
+
+o80::CommandOptions command_options(nb::handle duration, nb::handle speed, nb::handle until,
+                                    nb::handle iterations, nb::handle fastest, nb::handle mode,
+                                    nb::handle profile, nb::handle start, nb::handle every,
+                                    std::int64_t period, bool of_rows) {
+  o80::CommandOptions options{.pace = pace_of(duration, speed, until, iterations, fastest),
+                              .mode = mode_of(mode),
+                              .start = start_of(start)};
+  if (!profile.is_none()) {
+    options.profile = of_rows ? profile_of_trajectory(profile) : profile_of(profile);
+  }
+  if (!every.is_none()) set_every(options.pace, every, period);
   return options;
 }
 

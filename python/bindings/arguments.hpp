@@ -22,13 +22,14 @@ std::int64_t count_of(nanobind::handle value, const char* name);
 /// [s] => [ns]
 std::chrono::nanoseconds nanoseconds_of(nanobind::handle value, const char* name);
 
-/// At most one of the paces may be given.
-o80::PaceSpec pace_of(nanobind::handle duration, nanobind::handle speed, nanobind::handle until,
-                      nanobind::handle iterations, bool fastest = false);
-
-/// The options of a command; a profile of None is the default one.
-o80::CommandOptions command_options(const o80::PaceSpec& pace, nanobind::handle mode,
-                                    nanobind::handle profile, nanobind::handle start);
+/// At most one pace may be given; a profile of None is the default one. `period`: of the robot
+/// [ns], for an `every` in iterations. `of_rows`: of a trajectory.
+o80::CommandOptions command_options(nanobind::handle duration, nanobind::handle speed,
+                                    nanobind::handle until, nanobind::handle iterations,
+                                    nanobind::handle fastest, nanobind::handle mode,
+                                    nanobind::handle profile, nanobind::handle start,
+                                    nanobind::handle every, std::int64_t period,
+                                    bool of_rows = false);
 /// True for a list of actuators, or None (all); false for one index or name.
 bool names_several(nanobind::handle actuators);
 

@@ -133,6 +133,12 @@ void Frontend::clip(nb::handle clip, Targets& targets) const {
 }
 
 Targets Frontend::targets_of(nb::handle named, nb::handle targets) const {
+  if (!names_several(expanded(named)))
+    return of_each(nb::make_tuple(named), nb::make_tuple(targets));
+  return of_each(expanded(named), targets);
+}
+
+Targets Frontend::of_each(nb::handle named, nb::handle targets) const {
   std::vector<std::uint32_t> chosen = actuators(named);
   const o80::Schema& schema = decoder_->description->schema;
   if (length_of(targets) != static_cast<Py_ssize_t>(chosen.size())) {

@@ -45,7 +45,7 @@ class Frontend {
   /// Each returns the index of its record in the batch.
   std::uint32_t add_command(nanobind::handle named, nanobind::handle target,
                             const o80::CommandOptions& options) const;
-  /// The targets of one command for several actuators (None: all).
+  /// The targets of one command: for one actuator, a group, a list of actuators, or all (None).
   Targets targets_of(nanobind::handle named, nanobind::handle targets) const;
   /// The actuators of a group, by its name; what is no name of a group stays what it is.
   nanobind::object expanded(nanobind::handle named) const;
@@ -65,6 +65,8 @@ class Frontend {
  private:
   std::string name_of(std::uint32_t index) const;
   std::vector<std::uint32_t> actuators(nanobind::handle named) const;
+  /// From a sequence of actuators, or None, and a sequence of targets.
+  Targets of_each(nanobind::handle named, nanobind::handle targets) const;
 
   std::shared_ptr<o80::UntypedFrontend> untyped_;
   std::shared_ptr<o80::InlineRobot> robot_;

@@ -12,7 +12,6 @@
 #include "control/motion/state_layout.hpp"
 #include "frontend.hpp"
 #include "states.hpp"
-#include "verb.hpp"
 #include "waiting.hpp"
 
 namespace nb = nanobind;
@@ -74,19 +73,13 @@ void set_tolerances(const o80::Schema& schema, nb::handle given, const Targets& 
   }
 }
 
+/// `timeout`, of the wait that follows, is refused before anything is sent.
 Move start_move(const Frontend& self, nb::handle actuators, nb::handle targets,
-                nb::handle tolerance, nb::handle duration, nb::handle speed, nb::handle until,
-                nb::handle iterations, nb::handle fastest, nb::handle mode, nb::handle profile,
-                nb::handle start) {
+                nb::handle tolerance, nb::handle timeout, const o80::CommandOptions& command) {
+  timeout_of(timeout);
   const auto frontend = self.shared();
-  MoveOptions options{.command = command_options(
-                          pace_of(duration, speed, until, iterations, truth_of(fastest, "fastest")),
-                          mode, profile, start)};
-  const nb::object named = self.expanded(actuators);
-  const bool several = names_several(named);
-  const Targets chosen = several
-                             ? self.targets_of(named, targets)
-                             : self.targets_of(nb::make_tuple(actuators), nb::make_tuple(targets));
+  MoveOptions options{.command = command};
+  const Targets chosen = self.targets_of(actuators, targets);
   set_tolerances(self.decoder()->description->schema, tolerance, chosen, options);
   const Waiting waiting;
   return frontend->start_move(chosen.actuators, chosen.states, options, chosen.masks);
@@ -105,33 +98,15 @@ Observation wait_for_move(const Frontend& self, const Move& move, nb::handle tim
   });
 }
 
-Observation move_to(const Frontend& self, nb::handle actuators, nb::handle targets,
-                    nb::handle tolerance, nb::handle timeout, nb::handle duration, nb::handle speed,
-                    nb::handle until, nb::handle iterations, nb::handle fastest, nb::handle mode,
-                    nb::handle profile, nb::handle start) {
-  timeout_of(timeout);  // refused before anything is sent
-  return wait_for_move(self,
-                       start_move(self, actuators, targets, tolerance, duration, speed, until,
-                                  iterations, fastest, mode, profile, start),
-                       timeout);
-}
-
 }  // namespace
 
 void bind_moving(nb::module_& m, nb::class_<Frontend>& frontend) {
   nb::class_<Move>(m, "Move", "A motion that was sent.").def_prop_ro("batch", [](const Move& self) {
     return self.batch();
   });
-  def_verb(frontend, "move_to", verbs::move_to, &move_to, "actuators"_a.none(), "targets"_a.none(),
-           nb::kw_only(), "tolerance"_a.none(), "timeout"_a = nb::none(), "duration"_a = nb::none(),
-           "speed"_a = nb::none(), "until"_a = nb::none(), "iterations"_a = nb::none(),
-           "fastest"_a.none() = false, "mode"_a.none() = "queue", "profile"_a = nb::none(),
-           "start"_a.none() = "desired");
   frontend
-      .def("_start_move", &start_move, "actuators"_a.none(), "targets"_a.none(), nb::kw_only(),
-           "tolerance"_a.none(), "duration"_a.none(), "speed"_a.none(), "until"_a.none(),
-           "iterations"_a.none(), "fastest"_a.none(), "mode"_a.none(), "profile"_a.none(),
-           "start"_a.none())
+      .def("_start_move", &start_move, "actuators"_a.none(), "targets"_a.none(),
+           "tolerance"_a.none(), "timeout"_a.none(), "options"_a)
       .def("_wait_for_move", &wait_for_move, "move"_a, "timeout"_a.none(),
            nb::sig("def _wait_for_move(self, move: Move, timeout: float | None) -> Observation"));
 }

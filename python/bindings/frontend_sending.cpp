@@ -17,11 +17,11 @@
 #include "base/printable.hpp"
 #include "batch.hpp"
 #include "buffer.hpp"
-#include "control/batch/batch_builder.hpp"
 #include "control/batch/command_check.hpp"
 #include "control/batch/record.hpp"
 #include "control/motion/number_plan.hpp"
 #include "control/motion/state_layout.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
 #include "runtime/frontend/link.hpp"
@@ -35,50 +35,18 @@ using o80::UntypedFrontend;
 
 namespace {
 
-/// `every`: time between the set-points of a stream, seconds, or iterations if it is an integer.
-void set_every(o80::PaceSpec& pace, nb::handle every, std::int64_t period) {
-  if (pace.pace != o80::Pace::direct) {
-    throw o80::InvalidArgument(
-        "every is for set-points, which have no pace: leave out every, or the pace");
-  }
-  const bool counts = PyIndex_Check(every.ptr()) != 0;
-  if (PyBool_Check(every.ptr()) != 0 || (counts && count_of(every, "every") > INT64_MAX / period)) {
-    throw o80::InvalidArgument("every must be seconds or a number of iterations, got " +
-                               nb::cast<std::string>(nb::repr(every)));
-  }
-  const std::chrono::nanoseconds time =
-      counts ? std::chrono::nanoseconds(count_of(every, "every") * period)
-             : nanoseconds_of(every, "every");
-  if (time.count() <= 0) {
-    throw o80::InvalidArgument("every must be positive, got " +
-                               nb::cast<std::string>(nb::repr(every)));
-  }
-  pace = o80::direct(time);
-}
-
-o80::CommandOptions options_of(const Frontend& self, nb::handle duration, nb::handle speed,
-                               nb::handle until, nb::handle iterations, nb::handle fastest,
-                               nb::handle mode, nb::handle profile, nb::handle start,
-                               nb::handle every) {
-  const bool is_fastest = truth_of(fastest, "fastest");
-  o80::CommandOptions options = command_options(
-      pace_of(duration, speed, until, iterations, is_fastest), mode, profile, start);
-  if (!every.is_none()) set_every(options.pace, every, self.shared()->schema().head.period);
-  return options;
-}
-
 std::uint32_t add_command(const Frontend& self, nb::handle actuator, nb::handle target,
                           nb::handle duration, nb::handle speed, nb::handle until,
                           nb::handle iterations, nb::handle fastest, nb::handle mode,
                           nb::handle profile, nb::handle start, nb::handle every, nb::handle clip) {
   const o80::CommandOptions options =
-      options_of(self, duration, speed, until, iterations, fastest, mode, profile, start, every);
-  const nb::object named = self.expanded(actuator);
-  const bool several = names_several(named);
-  if (!several && clip.is(nb::bool_(false))) return self.add_command(actuator, target, options);
+      command_options(duration, speed, until, iterations, fastest, mode, profile, start, every,
+                      self.untyped().schema().head.period);
+  if (clip.is(nb::bool_(false)) && !names_several(self.expanded(actuator))) {
+    return self.add_command(actuator, target, options);
+  }
   const auto frontend = self.shared();
-  Targets targets = several ? self.targets_of(named, target)
-                            : self.targets_of(nb::make_tuple(named), nb::make_tuple(target));
+  Targets targets = self.targets_of(actuator, target);
   self.clip(clip, targets);
   return frontend->add_commands(targets.actuators, targets.states, options, targets.masks);
 }
@@ -106,20 +74,12 @@ o80::UntypedObservation row_with(const Frontend& self, nb::handle actuators, nb:
 }
 
 /// How much later, why, and the desired blocks.
-nb::tuple preview(const Frontend& self, nb::handle given, nb::handle target, nb::handle initial,
-                  nb::handle duration, nb::handle speed, nb::handle until, nb::handle iterations,
-                  nb::handle fastest, nb::handle profile, nb::handle start, nb::handle every) {
+nb::tuple preview(const Frontend& self, nb::handle actuators, nb::handle target, nb::handle initial,
+                  const o80::CommandOptions& options) {
   const auto frontend = self.shared();
-  const o80::CommandOptions options = options_of(self, duration, speed, until, iterations, fastest,
-                                                 nb::str("queue"), profile, start, every);
-  const nb::object named = self.expanded(given);
-  const bool several = names_several(named);
-  const auto each = [&](nb::handle one) {
-    return several ? nb::borrow(one) : nb::object(nb::make_tuple(one));
-  };
-  const Targets to = self.targets_of(each(named), each(target));
+  const Targets to = self.targets_of(actuators, target);
   std::optional<o80::UntypedObservation> row;
-  if (!initial.is_none()) row = row_with(self, each(named), each(initial));
+  if (!initial.is_none()) row = row_with(self, actuators, initial);
   const o80::Preview preview = [&] {
     const Waiting waiting;
     return row ? frontend->preview_from(*row, to.actuators, to.states, options, to.masks)
@@ -155,13 +115,8 @@ Targets rows_of(const Frontend& self, const std::vector<std::uint32_t>& actuator
 std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint32_t>& actuators,
                                std::uint32_t rows, nb::handle states,
                                const std::vector<std::uint64_t>& masks, nb::handle times,
-                               nb::handle speed, nb::handle iterations, nb::handle mode,
-                               nb::handle profile, nb::handle start, nb::handle clip) {
+                               const o80::CommandOptions& options, nb::handle clip) {
   const auto frontend = self.shared();
-  o80::CommandOptions options{.pace = pace_of(nb::none(), speed, nb::none(), iterations),
-                              .mode = mode_of(mode),
-                              .start = start_of(start)};
-  if (!profile.is_none()) options.profile = profile_of_trajectory(profile);
   std::vector<std::int64_t> ends;
   if (!times.is_none()) {
     const Bytes bytes(times);
@@ -321,7 +276,7 @@ std::array<nb::bytes, 3> plan_of_rows(const std::array<double, 3>& start,
   const o80::Profile shape = profile_of_rows(profile);
   std::array<std::vector<double>, 3> plan;
   o80::NumberPlan way;
-  way.stand({start[0], start[1], start[2]});
+  way.start_from({start[0], start[1], start[2]});
   const auto iterations = [&](std::size_t row) {
     return ends[row] - (row == 0 ? 0 : ends[row - 1]);
   };
@@ -416,6 +371,12 @@ std::uint32_t add_request(const Frontend& self, nb::handle name, const nb::kwarg
 }  // namespace
 
 void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
+  nb::class_<o80::CommandOptions>(m, "CommandOptions",
+                                  "Pace, mode, profile and start of a command.")
+      .def(nb::new_(&command_options), nb::kw_only(), "duration"_a = nb::none(),
+           "speed"_a = nb::none(), "until"_a = nb::none(), "iterations"_a = nb::none(),
+           "fastest"_a.none() = false, "mode"_a.none() = "queue", "profile"_a.none(),
+           "start"_a.none(), "every"_a = nb::none(), "period"_a = 0, "of_rows"_a = false);
   m.def("plan_of_rows", &plan_of_rows, "start"_a, "rows"_a, "ends"_a, "profile"_a, "most"_a,
         "low"_a, "high"_a);
   m.def("first_row", &first_row, "due"_a, "begins"_a, "ease"_a, "starts"_a, "rows"_a, "rates"_a);
@@ -466,8 +427,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
 
   frontend
       .def("_add_trajectories", &add_trajectories, "actuators"_a, "rows"_a, "states"_a, "masks"_a,
-           "times"_a.none(), "speed"_a.none(), "iterations"_a.none(), "mode"_a.none(),
-           "profile"_a.none(), "start"_a.none(), "clip"_a.none())
+           "times"_a.none(), "options"_a, "clip"_a.none())
       .def(
           "_clip",
           [](const Frontend& self, const std::vector<std::uint32_t>& actuators, std::uint32_t rows,
@@ -490,7 +450,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
       .def(
           "_since",
           [](const Frontend& self, nb::handle seen) {
-            return self.shared()->link()->told(seen_of(seen))->since;
+            return self.shared()->link()->with_newest_row(seen_of(seen))->since;
           },
           "seen"_a)
       .def("_purge_own",
@@ -506,14 +466,10 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
            [](const Frontend& self) {
              return send_alone(self, [](o80::BatchBuilder& batch) { batch.release_control(); });
            })
-      .def("_preview", &preview, "actuator"_a.none(), "target"_a.none(), "initial"_a.none(),
-           "duration"_a.none(), "speed"_a.none(), "until"_a.none(), "iterations"_a.none(),
-           "fastest"_a.none(), "profile"_a.none(), "start"_a.none(), "every"_a.none(),
-           nb::sig("def _preview(self, actuator: typing.Any, target: typing.Any, "
-                   "initial: typing.Any, duration: float | None, speed: float | None, "
-                   "until: int | None, iterations: int | None, fastest: bool, "
-                   "profile: str | None, start: str, every: float | int | None) "
-                   "-> tuple[int, str, bytes]"))
+      .def("_preview", &preview, "actuators"_a.none(), "target"_a.none(), "initial"_a.none(),
+           "options"_a,
+           nb::sig("def _preview(self, actuators: typing.Any, target: typing.Any, initial: "
+                   "typing.Any, options: CommandOptions) -> tuple[int, str, bytes]"))
       .def("_index", &Frontend::actuator, "named"_a.none())
       .def("_send_request", &send_request, "name"_a.none(), "fields"_a, "seen"_a.none())
       .def("_wait_until_ended", &wait_until_ended, "batch"_a, "timeout"_a.none())

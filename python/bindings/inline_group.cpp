@@ -50,15 +50,14 @@ class PreparedBurst {
   /// From, to, stride, size: as in o80::InlineGroup::Feed [bytes].
   using Feed = std::tuple<std::uint32_t, std::uint32_t, std::uint32_t, std::uint32_t>;
 
-  PreparedBurst(std::vector<std::uint32_t> actuators, std::uint32_t steps, nb::handle each,
-                nb::handle mode, nb::handle profile, nb::handle start, std::int64_t delay,
-                std::int64_t iterations, nb::handle targets, nb::handle rows)
+  PreparedBurst(std::vector<std::uint32_t> actuators, std::uint32_t steps,
+                const o80::CommandOptions& options, std::int64_t delay, std::int64_t iterations,
+                nb::handle targets, nb::handle rows)
       : targets_(std::in_place, targets, PyBUF_WRITABLE),
         rows_(std::in_place, rows, PyBUF_WRITABLE) {
     plan_.actuators = std::move(actuators);
     plan_.steps = steps;
-    plan_.command =
-        command_options(pace_of(nb::none(), nb::none(), nb::none(), each), mode, profile, start);
+    plan_.command = options;
     plan_.iterations = iterations;
     plan_.delay = delay;
     plan_.targets = targets_->writable();
@@ -244,10 +243,9 @@ void bind_inline_group(nb::module_& m) {
                                   "The compiled half of o80.PreparedBurst and o80.GroupBurst.");
   refuse_to_pickle(burst, "a prepared burst", "its targets and its rows");
   burst
-      .def(nb::init<std::vector<std::uint32_t>, std::uint32_t, nb::handle, nb::handle, nb::handle,
-                    nb::handle, std::int64_t, std::int64_t, nb::handle, nb::handle>(),
-           "actuators"_a, "steps"_a, "each"_a, "mode"_a, "profile"_a, "start"_a, "delay"_a,
-           "iterations"_a, "targets"_a, "rows"_a)
+      .def(nb::init<std::vector<std::uint32_t>, std::uint32_t, const o80::CommandOptions&,
+                    std::int64_t, std::int64_t, nb::handle, nb::handle>(),
+           "actuators"_a, "steps"_a, "options"_a, "delay"_a, "iterations"_a, "targets"_a, "rows"_a)
       .def(nb::init<const PreparedBurst&, const Group&, const PreparedBurst&,
                     const std::vector<PreparedBurst::Feed>&>(),
            "first"_a, "group"_a, "following"_a, "feeds"_a, nb::keep_alive<1, 2>(),

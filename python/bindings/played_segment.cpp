@@ -1,4 +1,4 @@
-#include "runtime/replay/played_segment.hpp"
+#include "runtime/playing/played_segment.hpp"
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/string.h>

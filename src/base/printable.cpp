@@ -8,14 +8,14 @@ namespace o80 {
 
 namespace {
 
-struct Range {
+struct CodeRange {
   char32_t first;
   char32_t last;
 };
 
 /// Categories Cc, Cf, Co, noncharacters, and the separators of lines and paragraphs. Surrogates are
 /// no UTF-8.
-constexpr Range kControls[] = {
+constexpr CodeRange kControls[] = {
     {0x0000, 0x001F},   {0x007F, 0x009F},   {0x00AD, 0x00AD},   {0x0600, 0x0605},
     {0x061C, 0x061C},   {0x06DD, 0x06DD},   {0x070F, 0x070F},   {0x0890, 0x0891},
     {0x08E2, 0x08E2},   {0x180E, 0x180E},   {0x200B, 0x200F},   {0x2028, 0x202E},
@@ -28,7 +28,7 @@ bool controls(char32_t code) noexcept {
   if (code >= ' ' && code <= '~') return false;
   if ((code & 0xFFFE) == 0xFFFE) return true;  // noncharacters at the end of each plane
   return std::ranges::any_of(
-      kControls, [code](Range range) { return range.first <= code && code <= range.last; });
+      kControls, [code](CodeRange range) { return range.first <= code && code <= range.last; });
 }
 
 struct Character {

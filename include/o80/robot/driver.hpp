@@ -152,13 +152,13 @@ class Reading {
   /// Sets the text that frontends see while it runs; at most 247 characters.
   template <class Request>
   void progress(std::string_view text) {
-    tell(report<Request>(), RequestAnswer::running, text);
+    store_report(report<Request>(), RequestAnswer::running, text);
   }
   /// Ends it with this row: done, rejected (the sender reads the reason), failed (the loop ends) or
   /// start_afresh (with the row of the fresh start). No effect if none of this kind runs.
   template <class Request>
   void ended(const Served& how) {
-    tell(report<Request>(), static_cast<RequestAnswer>(how.kind), how.why());
+    store_report(report<Request>(), static_cast<RequestAnswer>(how.kind), how.why());
   }
 
   /// True in the reading of a fresh start: after a request that answered start_afresh, and after
@@ -200,7 +200,7 @@ class Reading {
     return view_.requests[kIndex];
   }
   /// The first end of a request in a reading counts.
-  void tell(RequestReport& report, RequestAnswer answer, std::string_view text) {
+  void store_report(RequestReport& report, RequestAnswer answer, std::string_view text) {
     if (report.runs == 0 || (report.changed != 0 && report.answer != RequestAnswer::running))
       return;
     const std::size_t size =

@@ -85,22 +85,21 @@ class Waits:
     ) -> _core.Observation:
         """Sends the robot to targets and waits until it is there; see `Frontend.move_to`."""
         frontend = self._frontend
-        options: dict[str, Any] = {
-            "tolerance": tolerance,
-            "duration": duration,
-            "speed": speed,
-            "until": until,
-            "iterations": iterations,
-            "fastest": fastest,
-            "mode": mode,
-            "profile": profile,
-            "start": start,
-        }
-        if frontend._is_inline:
-            return await in_thread(
-                lambda: frontend.move_to(actuators, targets, timeout=timeout, **options)
-            )
-        move = frontend._start_move(actuators, targets, **options)
+        options = _core.CommandOptions(
+            duration=duration,
+            speed=speed,
+            until=until,
+            iterations=iterations,
+            fastest=fastest,
+            mode=mode,
+            profile=profile,
+            start=start,
+        )
+
+        def start_move() -> _core.Move:
+            return frontend._start_move(actuators, targets, tolerance, timeout, options)
+
+        move = await in_thread(start_move) if frontend._is_inline else start_move()
         return await in_thread(lambda: frontend._wait_for_move(move, timeout))
 
     async def burst(

@@ -222,19 +222,16 @@ class Commander(Reader):
             iterations = 1
         chosen, single = self._chosen(actuators)
         states, rows, masks = states_of(targets, chosen, single, self._layout)
-        return self._add_trajectories(
-            chosen,
-            rows,
-            states,
-            masks,
-            None if times is None else times_of(times),
-            speed,
-            iterations,
-            mode,
-            profile,
-            start,
-            clip,
+        ends = None if times is None else times_of(times)
+        options = _core.CommandOptions(
+            speed=speed,
+            iterations=iterations,
+            mode=mode,
+            profile=profile,
+            start=start,
+            of_rows=True,
         )
+        return self._add_trajectories(chosen, rows, states, masks, ends, options, clip)
 
     def _chosen(self, actuators: int | str | Sequence[int | str] | None) -> tuple[list[int], bool]:
         """Indices of the actuators; True if a single one was named without a list."""
@@ -339,19 +336,18 @@ class Commander(Reader):
         than a million iterations, for states that the driver interpolates in C++ (`blend`), and for
         fields with the bound of an integral, which depends on what will be observed.
         """
-        late, text, desired = self._preview(
-            actuator,
-            target,
-            initial,
-            duration,
-            speed,
-            until,
-            iterations,
-            fastest,
-            profile,
-            start,
-            every,
+        options = _core.CommandOptions(
+            duration=duration,
+            speed=speed,
+            until=until,
+            iterations=iterations,
+            fastest=fastest,
+            profile=profile,
+            start=start,
+            every=every,
+            period=self.schema["period"],
         )
+        late, text, desired = self._preview(actuator, target, initial, options)
         rows = np.frombuffer(desired, np.dtype([("desired", self._layout.states)]))
         from o80.frontend.results import Preview
 
@@ -359,43 +355,53 @@ class Commander(Reader):
 
     # ------------------------------------------------------------------ motions to the end
 
-    if TYPE_CHECKING:
+    def move_to(
+        self,
+        actuators: SupportsIndex | str | Sequence[SupportsIndex | str] | None,
+        targets: Any,
+        *,
+        tolerance: Tolerance,
+        timeout: float | None = None,
+        duration: float | None = None,
+        speed: float | None = None,
+        until: int | None = None,
+        iterations: int | None = None,
+        fastest: bool = False,
+        mode: ModeWord = "queue",
+        profile: ProfileWord | None = None,
+        start: StartWord = "desired",
+    ) -> _core.Observation:
+        """Sends a command at once and waits until the robot is observed at its targets.
 
-        def move_to(
-            self,
-            actuators: SupportsIndex | str | Sequence[SupportsIndex | str] | None,
-            targets: Any,
-            *,
-            tolerance: Tolerance,
-            timeout: float | None = None,
-            duration: float | None = None,
-            speed: float | None = None,
-            until: int | None = None,
-            iterations: int | None = None,
-            fastest: bool = False,
-            mode: ModeWord = "queue",
-            profile: ProfileWord | None = None,
-            start: StartWord = "desired",
-        ) -> _core.Observation:
-            """Sends a command at once and waits until the robot is observed at its targets.
+        actuators, targets, duration, speed, until, iterations, fastest, mode, profile, start:
+            as in add_command.
+        tolerance: largest distance between observed and target, in the unit of the field: a
+            number for all fields that have a target, a mapping from fields to numbers (other
+            fields are not judged), or a sequence with one of these for each actuator.
+            Booleans and enumerations must be equal.
+        timeout: how long to wait [s].
 
-            actuators, targets, duration, speed, until, iterations, fastest, mode, profile, start:
-                as in add_command.
-            tolerance: largest distance between observed and target, in the unit of the field: a
-                number for all fields that have a target, a mapping from fields to numbers (other
-                fields are not judged), or a sequence with one of these for each actuator.
-                Booleans and enumerations must be equal.
-            timeout: how long to wait [s].
+        It first waits until the command has ended. It needs no pulse; what was added and not
+        pulsed stays added. A bursting backend runs until the robot is there; `timeout` is then
+        time of the robot (iterations x period), so that a script always ends alike.
 
-            It first waits until the command has ended. It needs no pulse; what was added and not
-            pulsed stays added. A bursting backend runs until the robot is there; `timeout` is then
-            time of the robot (iterations x period), so that a script always ends alike.
-
-            Returns the observation in which it was within the tolerance. Raises NotReached after
-            the timeout, which says where the robot is; commands that have not ended continue.
-            Raises NotCompleted if the command ended otherwise than completed, BackendHalted,
-            BackendGone, InvalidArgument, and the exceptions of pulse.
-            """
+        Returns the observation in which it was within the tolerance. Raises NotReached after
+        the timeout, which says where the robot is; commands that have not ended continue.
+        Raises NotCompleted if the command ended otherwise than completed, BackendHalted,
+        BackendGone, InvalidArgument, and the exceptions of pulse.
+        """
+        options = _core.CommandOptions(
+            duration=duration,
+            speed=speed,
+            until=until,
+            iterations=iterations,
+            fastest=fastest,
+            mode=mode,
+            profile=profile,
+            start=start,
+        )
+        move = self._start_move(actuators, targets, tolerance, timeout, options)
+        return self._wait_for_move(move, timeout)
 
     # ------------------------------------------------------------------ bursts
 

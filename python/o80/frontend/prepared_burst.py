@@ -42,11 +42,11 @@ class BurstArrays:
         else:
             self._targets = states.swapaxes(-1, -2)
         self._rows: NDArray[Any] = np.zeros((*copies, count), layout.row)
-        each = _checked(each, "each")
-        memory = states.view(np.uint8), self._rows.view(np.uint8)
-        self._compiled = _core.PreparedBurst(
-            actuators, steps, each, mode, profile, start, delay, count, *memory
+        options = _core.CommandOptions(
+            iterations=_checked(each, "each"), mode=mode, profile=profile, start=start
         )
+        memory = states.view(np.uint8), self._rows.view(np.uint8)
+        self._compiled = _core.PreparedBurst(actuators, steps, options, delay, count, *memory)
 
     @property
     def targets(self) -> NDArray[Any]:

@@ -10,6 +10,10 @@
 
 namespace o80 {
 
+/// A block in the pool of the backend.
+using BlockIndex = std::uint32_t;
+inline constexpr BlockIndex kNoBlock = 0xFFFFFFFF;
+
 /// A lane transports blocks of 64 bytes; every record starts at a block.
 inline constexpr std::size_t kBlockBytes = 64;
 struct alignas(kBlockBytes) Block {

@@ -48,7 +48,7 @@ class IntegralBound {
       const double time = period_ + 4.0 * reaction_;
       const double highest = std::max(0.0, (guard_.maximum() - observed_) / time);
       const double lowest = std::min(0.0, (guard_.minimum() - observed_) / time);
-      stands_ = (wanted > 0.0 ? highest : -lowest) <= kStands * std::abs(wanted);
+      is_blocked_ = (wanted > 0.0 ? highest : -lowest) <= kBlocked * std::abs(wanted);
       if (wanted > highest) return {Limit::above_integral, highest};
       return wanted < lowest ? Admitted{Limit::below_integral, lowest}
                              : Admitted{Limit::none, wanted};
@@ -59,17 +59,17 @@ class IntegralBound {
     const double ahead = now.position * period_ + (now.position - change) * reaction_;
     guard_.place({observed_ + ahead, now.position * period_, now.speed * period_});
     const Limit bound = guard_.nearest_speed(wanted * period_);
-    stands_ = guard_.stays();
+    is_blocked_ = guard_.stays();
     if (bound == Limit::none) return {Limit::none, wanted};
     return {bound == Limit::maximum ? Limit::above_integral : Limit::below_integral,
             guard_.moment().speed / period_};
   }
   /// After admit(): the velocity may become 0 at once.
-  bool stands() const noexcept { return stands_; }
+  bool is_blocked() const noexcept { return is_blocked_; }
 
  private:
   // without a limit of acceleration: less than this share of what is wanted is no motion
-  static constexpr double kStands = 0.01;
+  static constexpr double kBlocked = 0.01;
 
   std::uint32_t number_;
   double period_;    // [s]
@@ -77,7 +77,7 @@ class IntegralBound {
   NumberLimiter guard_;
   NumberLimiter moving_;
   double observed_ = 0.0;
-  bool stands_ = false;
+  bool is_blocked_ = false;
 };
 
 }  // namespace o80

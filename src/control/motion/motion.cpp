@@ -114,7 +114,7 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
     const double start =
         at_published ? layout_.number(each.number, from()) : each.motion.position();
     if (is_row_) {
-      if (observed != nullptr || !each.motion.is_planned()) each.motion.stand({start}, false);
+      if (observed != nullptr || !each.motion.is_planned()) each.motion.start_from({start}, false);
       continue;
     }
     Requested requested = course;

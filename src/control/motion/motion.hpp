@@ -143,9 +143,9 @@ class Motion {
     return all([](auto& each) { return each.arrived(); });
   }
   /// True if bounds of an integral hold a number back, which stands, and the others have arrived.
-  bool stands() const noexcept {
-    return has_integrals_ && any([](auto& each) { return each.stands(); }) &&
-           all([](auto& each) { return each.stands() || each.arrived(); });
+  bool is_blocked() const noexcept {
+    return has_integrals_ && any([](auto& each) { return each.is_blocked(); }) &&
+           all([](auto& each) { return each.is_blocked() || each.arrived(); });
   }
   /// True if such bounds have changed the motion since begin().
   bool was_held_back() const noexcept {

@@ -61,7 +61,7 @@ class NumberLimiter {
   void restart(double position) noexcept {
     now_.position = position;
     begin(bounds_);
-    stand();
+    stop_now();
   }
   /// It does not move any more.
   void rest() noexcept {
@@ -189,7 +189,7 @@ class NumberLimiter {
     if (!stop_known_) know_stop(VelocityChange(-now_.speed, now_.acceleration, rates_));
   }
   void slow_down() noexcept;
-  void stand() noexcept {
+  void stop_now() noexcept {
     now_.speed = now_.acceleration = 0.0;
     know_stop({});
   }
@@ -197,7 +197,7 @@ class NumberLimiter {
   void forget_rounding() noexcept {
     const double nothing = slack() / 100.0 + 2.0 * rounding();
     const bool steady = !std::isfinite(rates_.jerk) || std::abs(now_.acceleration) <= nothing;
-    if (steady && std::abs(now_.speed) <= nothing) stand();
+    if (steady && std::abs(now_.speed) <= nothing) stop_now();
   }
   Span speeds() const noexcept;
   /// The next accelerations that the limits of acceleration and jerk allow.

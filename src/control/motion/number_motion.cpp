@@ -41,7 +41,7 @@ Limit NumberMotion::move(Move&& move) noexcept {
   const double before = guard_.position();
   if (integral_) integral_->note(guard_);
   move();
-  stands_ = false;
+  is_blocked_ = false;
   const Limit bound = integral_ ? hold_back() : Limit::none;
   former_difference_ = std::exchange(difference_, guard_.position() - before);
   return bound;
@@ -55,7 +55,7 @@ Limit NumberMotion::hold_back() noexcept {
   if (!guard_.pass(velocity)) guard_.follow(velocity);
   follows_ = planned_;
   held_back_ = true;
-  stands_ = integral_->stands();
+  is_blocked_ = integral_->is_blocked();
   return bound;
 }
 
@@ -94,7 +94,7 @@ bool NumberMotion::brake() noexcept {
     moves = moves || guard_.position() != before || !stays();
   });
   // what stands at a bound is no longer held away from rest
-  if (stands_) held_ = false;
+  if (is_blocked_) held_ = false;
   return moves || bound != Limit::none;
 }
 

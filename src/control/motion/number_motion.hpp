@@ -30,7 +30,7 @@ class NumberMotion {
   /// True if these bounds have changed its motion since begin().
   bool was_held_back() const noexcept { return held_back_; }
   /// True if they hold it back in this iteration, and it stands.
-  bool stands() const noexcept { return stands_; }
+  bool is_blocked() const noexcept { return is_blocked_; }
   /// First (order 1) or second difference of its positions, to the iteration before.
   double difference(std::uint32_t order) const noexcept {
     return order == 1 ? difference_ : difference_ - former_difference_;
@@ -50,7 +50,7 @@ class NumberMotion {
   /// Sets the position, at rest.
   void restart(double position) noexcept {
     guard_.restart(position);
-    planned_ = follows_ = of_rows_ = held_ = leaves_ = held_back_ = stands_ = false;
+    planned_ = follows_ = of_rows_ = held_ = leaves_ = held_back_ = is_blocked_ = false;
     difference_ = former_difference_ = 0.0;
   }
   /// One iteration of a motion that was made elsewhere.
@@ -76,10 +76,10 @@ class NumberMotion {
   /// Rows begin: from the plan of the rows before them, whatever limits made of that; else from the
   /// motion of this number.
   void take_over() noexcept {
-    const bool goes_on = planned_ && of_rows_;
+    const bool continues = planned_ && of_rows_;
     const Moment from = moment();
     begin();
-    stand(from, goes_on);
+    start_from(from, continues);
   }
   /// Where they would begin.
   Moment moment() const noexcept {
@@ -87,11 +87,11 @@ class NumberMotion {
     return rests_ ? Moment{guard_.position()} : guard_.moment();
   }
   /// Or they begin here.
-  void stand(const Moment& from, bool goes_on) noexcept {
-    plan_.stand(from);
+  void start_from(const Moment& from, bool continues) noexcept {
+    plan_.start_from(from);
     Span span = guard_.stop();
     span.include(from.position);
-    goes_on ? guard_.reach(span) : guard_.begin(span);
+    continues ? guard_.reach(span) : guard_.begin(span);
     planned_ = follows_ = of_rows_ = true;
   }
   bool is_planned() const noexcept { return planned_; }
@@ -198,7 +198,7 @@ class NumberMotion {
   double former_difference_ = 0.0;
   std::unique_ptr<IntegralBound> integral_;
   bool held_back_ = false;
-  bool stands_ = false;
+  bool is_blocked_ = false;
 };
 
 }  // namespace o80

@@ -97,7 +97,7 @@ class NumberPlan {
   }
 
   /// Rows of a chunk: the plan is here, with these derivatives.
-  void stand(const Moment& from) noexcept {
+  void start_from(const Moment& from) noexcept {
     line(from.position, from.position);
     done_ = iterations_;
     to_ = from;

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "control/batch/command_check.hpp"
-#include "control/batch/record_check.hpp"
+#include "control/receiving/record_check.hpp"
 
 namespace o80 {
 namespace {
@@ -75,7 +75,7 @@ ActuatorQueue::Moved ActuatorQueue::advance(Iteration iteration) noexcept {
   const Limited limited = motion_.step(iteration, desired_);
   if (limited.limit != Limit::none && late_ == 0) reason_ = limited;
   if (iteration >= motion_.last() && rows_left_ == 0) {
-    if (motion_.stands()) {
+    if (motion_.is_blocked()) {
       // bounds of an integral hold it back: it ends where it is
       const BlockIndex record = leave();
       end_motion();

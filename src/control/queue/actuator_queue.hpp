@@ -5,13 +5,13 @@
 #include <utility>
 #include <vector>
 
-#include "control/batch/chunk.hpp"
-#include "control/batch/ledger.hpp"
-#include "control/batch/pool.hpp"
 #include "control/motion/duration.hpp"
 #include "control/motion/motion.hpp"
 #include "control/motion/state_layout.hpp"
 #include "control/queue/lane_lists.hpp"
+#include "control/receiving/chunk_rows.hpp"
+#include "control/receiving/ledger.hpp"
+#include "control/receiving/pool.hpp"
 
 namespace o80 {
 
@@ -79,9 +79,9 @@ class ActuatorQueue {
   Moved step(Iteration iteration, const std::byte* observed, std::uint32_t& late_budget) noexcept {
     motion_.observe(observed);
     // mostly the row of a command goes on
-    const bool goes_on = runs_ == Runs::queued && !needs_row(iteration);
-    return goes_on || begin(iteration, observed, late_budget) ? advance(iteration)
-                                                              : come_to_rest(observed);
+    const bool continues = runs_ == Runs::queued && !needs_row(iteration);
+    return continues || begin(iteration, observed, late_budget) ? advance(iteration)
+                                                                : come_to_rest(observed);
   }
   /// It has moved, or had a command, in this iteration.
   void acted(Iteration iteration) noexcept { acted_last_ = iteration; }

@@ -8,14 +8,14 @@
 #include <utility>
 #include <vector>
 
-#include "control/batch/batch_plan.hpp"
-#include "control/batch/ledger.hpp"
-#include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
-#include "control/batch/status_sink.hpp"
 #include "control/motion/state_layout.hpp"
 #include "control/queue/actuator_queue.hpp"
 #include "control/queue/purge_tickets.hpp"
+#include "control/receiving/batch_plan.hpp"
+#include "control/receiving/ledger.hpp"
+#include "control/receiving/pool.hpp"
+#include "control/receiving/status_sink.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80 {
@@ -281,7 +281,7 @@ class Controller {
     }
   }
   /// The next step finds out whether actuators that are starved still are.
-  void look_at_starved() noexcept {
+  void report_starved() noexcept {
     for (std::size_t word = 0; word < busy_.size(); ++word) busy_[word] |= starved_mask_[word];
   }
   bool awaits_chunk(std::uint32_t actuator, bool& known) noexcept;

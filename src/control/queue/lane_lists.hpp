@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <vector>
 
-#include "control/batch/ledger.hpp"
-#include "control/batch/pool.hpp"
+#include "control/receiving/ledger.hpp"
+#include "control/receiving/pool.hpp"
 
 namespace o80 {
 

@@ -23,7 +23,7 @@ Spinner::Spinner() noexcept : Spinner(kProcessors) {}
 
 Spinner Spinner::lasting(std::int64_t longest) noexcept { return Spinner(kProcessors, longest); }
 
-bool Spinner::worth() noexcept {
+bool Spinner::should_spin() noexcept {
   const auto relaxed = std::memory_order_relaxed;
   const std::uint32_t refused = refused_.load(relaxed);
   const bool probe = refused + 1 >= kProbe;

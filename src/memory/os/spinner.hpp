@@ -48,14 +48,14 @@ class Spinner {
       : processors_(processors), longest_(longest) {}
 
   /// Whether this wait should spin.
-  bool worth() noexcept;
+  bool should_spin() noexcept;
   void ended(bool success) noexcept;
 
   /// Spins until done() is true, at most `longest`; true if done. Calls done() at least once.
   template <class Done>
   bool spin(Done&& done) noexcept {
     if (done()) return true;
-    if (!worth()) return false;
+    if (!should_spin()) return false;
     const std::int64_t begin = monotonic_now();
     std::int64_t now = begin;
     do {

@@ -76,12 +76,12 @@ Waited wait_for_first_row(std::span<const RowOf> rows, const Deadline& deadline,
     if (gone != rows.end() && !ready()) gone->segment->throw_if_gone();
   };
   Sleep sleep(rows);
-  std::int64_t look_at = monotonic_now() + kSlice;
+  std::int64_t poll_at = monotonic_now() + kSlice;
   while (!deadline.over()) {
-    sleep.sleep(deadline.left(std::max<std::int64_t>(0, look_at - monotonic_now())));
+    sleep.sleep(deadline.left(std::max<std::int64_t>(0, poll_at - monotonic_now())));
     if (ready()) return Waited::ready;
-    if (monotonic_now() < look_at && std::ranges::none_of(rows, has_ended)) continue;
-    look_at = monotonic_now() + kSlice;
+    if (monotonic_now() < poll_at && std::ranges::none_of(rows, has_ended)) continue;
+    poll_at = monotonic_now() + kSlice;
     if (keep_waiting && !keep_waiting())
       throw Cancelled("the wait for the first of several rows was cancelled");
     throw_if_gone();

@@ -84,27 +84,27 @@ bool HistoryReader::is_damaged() const noexcept {
     std::atomic_thread_fence(std::memory_order_seq_cst);
     const Iteration under_way = begun();
     std::atomic_thread_fence(std::memory_order_seq_cst);
-    if (under_way <= before + 1 || under_way == first_there() || published() != before)
+    if (under_way <= before + 1 || under_way == first_available() || published() != before)
       return false;
   }
   return true;
 }
 
-Iteration HistoryReader::first_there() const noexcept {
+Iteration HistoryReader::first_available() const noexcept {
   return std::clamp<Iteration>(counters_->first.load(std::memory_order_relaxed), 0, kFarthest);
 }
 
 Iteration HistoryReader::oldest() const noexcept {
   // `published` before `first`: who sees a row after a gap sees the gap
   const Iteration newest = published();
-  return std::max(first_there(), newest - static_cast<Iteration>(rows()) + 1);
+  return std::max(first_available(), newest - static_cast<Iteration>(rows()) + 1);
 }
 
 const std::byte* HistoryReader::slot(Iteration k) const noexcept {
   return slots_begin_ + static_cast<std::uint64_t>(k) % slots_ * row_bytes_;
 }
 
-Iteration HistoryReader::first_true() const noexcept {
+Iteration HistoryReader::first_intact() const noexcept {
   std::atomic_thread_fence(std::memory_order_acquire);  // sync row
   return begun() - static_cast<Iteration>(slots_) + 1;
 }
@@ -112,7 +112,7 @@ Iteration HistoryReader::first_true() const noexcept {
 bool HistoryReader::read(Iteration k, std::byte* to) const noexcept {
   if (k < oldest() || k > published()) return false;
   load_words(to, slot(k), row_bytes_);
-  return k >= first_true() && k >= first_there();
+  return k >= first_intact() && k >= first_available();
 }
 
 Iteration HistoryReader::latest(std::byte* to) const noexcept {
@@ -121,7 +121,7 @@ Iteration HistoryReader::latest(std::byte* to) const noexcept {
     const Iteration k = published();
     if (k < 0) return -1;
     load_words(to, slot(k), row_bytes_);
-    if (k >= first_true()) return k;
+    if (k >= first_intact()) return k;
     // the writer has overwritten the row during the copy: try again
     tries = k == last ? tries + 1 : 0;
     last = k;
@@ -149,7 +149,7 @@ HistoryReader::Range HistoryReader::read_range(Iteration first, std::size_t coun
   load_words(to + before_end * row_bytes_, slots_begin_, (rows - before_end) * row_bytes_);
 
   // drop rows that the writer may have overwritten during the copy
-  const Iteration kept = std::max({begin, first_true(), first_there()});
+  const Iteration kept = std::max({begin, first_intact(), first_available()});
   const auto lost = static_cast<std::uint64_t>(kept - begin);
   if (lost >= rows) return {kept, 0};
   if (lost > 0) std::memmove(to, to + lost * row_bytes_, (rows - lost) * row_bytes_);

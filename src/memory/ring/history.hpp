@@ -70,10 +70,10 @@ class HistoryReader {
   /// The row that is being written; else the newest.
   Iteration begun() const noexcept;
   /// Rows before this one are missing.
-  Iteration first_there() const noexcept;
+  Iteration first_available() const noexcept;
   /// The first intact row: rows from here on that were copied before this call were not overwritten
   /// during the copy.
-  Iteration first_true() const noexcept;
+  Iteration first_intact() const noexcept;
 
   const Counters* counters_;
   const std::byte* slots_begin_;

@@ -14,7 +14,7 @@ LaneReceiver::LaneReceiver(const SegmentView& view, std::uint32_t lane, bool* an
 
 std::uint32_t LaneReceiver::available() noexcept {
   committed_ = page_->committed.load(std::memory_order_acquire);  // sync lane
-  meet_owner();
+  poll_owner();
   if (!is_possible(cursor_)) reset();
   return static_cast<std::uint32_t>(committed_ - cursor_);
 }
@@ -40,14 +40,14 @@ std::uint64_t LaneReceiver::peek_word(std::size_t offset) const noexcept {
 void LaneReceiver::reset() noexcept {
   const std::uint64_t former = owner_;
   committed_ = page_->committed.load(std::memory_order_acquire);  // sync lane
-  meet_owner();
+  poll_owner();
   const bool is_of_another = owner_ != former || static_cast<std::int64_t>(first_ - cursor_) > 0;
   move_to(is_of_another && is_possible(first_) ? first_ : committed_);
   ++resets_;
   flag();
 }
 
-void LaneReceiver::meet(std::uint64_t owner) noexcept {
+void LaneReceiver::on_new_owner(std::uint64_t owner) noexcept {
   owner_ = owner;
   feedback_->incarnation.store(owner, std::memory_order_release);  // sync met
   first_ = page_->owner_begin.load(std::memory_order_relaxed);
@@ -162,7 +162,7 @@ LaneReceivers::LaneReceivers(const SegmentView& view, std::size_t ticket_offset)
   for (std::uint32_t i = 0; i < view.shape.lanes; ++i) lanes_.emplace_back(view, i, &any_news_);
 }
 
-bool LaneReceivers::look() noexcept {
+bool LaneReceivers::poll() noexcept {
   const std::uint32_t bell = view_.bell().rung.load(std::memory_order_acquire);  // sync bell
   if (bell == bell_seen_ && !pending_) return false;
   bell_seen_ = bell;

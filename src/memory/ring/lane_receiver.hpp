@@ -50,9 +50,9 @@ class LaneReceiver {
   void reset() noexcept;
   /// Reads whether the lane has a new owner. Moves the cursor back to its first batch if a former
   /// owner has decreased `committed`.
-  void meet_owner() noexcept {
+  void poll_owner() noexcept {
     const std::uint64_t owner = incarnation();
-    if (owner != owner_) meet(owner);
+    if (owner != owner_) on_new_owner(owner);
   }
   /// Number of resets so far.
   std::uint64_t resets() const noexcept { return resets_; }
@@ -106,9 +106,9 @@ class LaneReceiver {
   std::uint64_t closed() const noexcept {
     return page_->closed.load(std::memory_order_acquire);  // sync closed
   }
-  /// Incarnation of the last owner that died and was replaced, else 0. Calls meet_owner().
+  /// Incarnation of the last owner that died and was replaced, else 0. Calls poll_owner().
   std::uint64_t dead_predecessor() noexcept {
-    meet_owner();
+    poll_owner();
     const std::uint64_t dead = page_->dead_incarnation.load(std::memory_order_relaxed);
     return dead < owner_ ? dead : 0;
   }
@@ -123,7 +123,7 @@ class LaneReceiver {
  private:
   bool is_possible(std::uint64_t cursor) const noexcept;
   bool is_among_cancelled(std::uint64_t id) const noexcept;
-  void meet(std::uint64_t owner) noexcept;
+  void on_new_owner(std::uint64_t owner) noexcept;
   void note_news() noexcept {
     has_news_ = true;
     if (any_news_ != nullptr) *any_news_ = true;
@@ -144,7 +144,7 @@ class LaneReceiver {
   std::uint64_t messages_ = 0;
   std::uint64_t resets_ = 0;
   std::uint64_t ids_ = 1;    // all ids below belong to batches that were staged
-  std::uint64_t owner_ = 0;  // incarnation of the owner at the last meet_owner()
+  std::uint64_t owner_ = 0;  // incarnation of the owner at the last poll_owner()
   std::uint64_t first_ = 0;  // blocks that were committed before that owner
   bool flagged_ = false;
   bool has_news_ = false;
@@ -170,7 +170,7 @@ class LaneReceivers {
 
   /// Starts a scan: stores the value of the bell and the ticket counter. False if nothing can have
   /// been committed since the last scan.
-  bool look() noexcept;
+  bool poll() noexcept;
   /// The lane of the batch with the lowest ticket, if that is below the stored ticket counter; else
   /// empty. `begun` has the ticket of each batch that was taken in part, kNoTicket for other lanes.
   /// Without `begun`, take the whole batch (or reset the lane) before the next call.
@@ -193,16 +193,16 @@ class LaneReceivers {
   bool are_quiet() const noexcept {
     return std::ranges::all_of(lanes_, [](const LaneReceiver& lane) { return lane.is_quiet(); });
   }
-  /// The next look() starts a scan even if the bell is unchanged (the owner of a lane died).
-  void look_again() noexcept { pending_ = true; }
+  /// The next poll() starts a scan even if the bell is unchanged (the owner of a lane died).
+  void rescan() noexcept { pending_ = true; }
   /// The same, but only if next() found batches in other lanes, or if this lane has more. Later
   /// commits ring the bell.
-  void look_again_after(std::uint32_t lane) noexcept {
+  void rescan_after(std::uint32_t lane) noexcept {
     pending_ = others_wait_ || !lanes_[lane].is_quiet();
   }
   /// True if the last scan may have left batches.
   bool has_pending() const noexcept { return pending_; }
-  /// The value of the bell at the last look(), for BellWaiter::wait().
+  /// The value of the bell at the last poll(), for BellWaiter::wait().
   std::uint32_t bell_seen() const noexcept { return bell_seen_; }
   /// Flushes every lane; true if a thread sleeps on `lane_wake`. The caller wakes it.
   bool announce() noexcept { return std::exchange(any_news_, false) && flush(); }

@@ -271,7 +271,7 @@ void LaneSender::sleep(std::uint32_t seen, std::int64_t at_most) {
     futex_wait(wake, now, at_most);
 }
 
-bool LaneSender::look_around(const KeepWaiting& keep_waiting) const {
+bool LaneSender::poll(const KeepWaiting& keep_waiting) const {
   if (keep_waiting && !keep_waiting())
     throw Cancelled("the wait for segment '" + segment_->name() + "' was cancelled");
   return segment_->gone();

@@ -103,8 +103,8 @@ class LaneSender {
   template <class Done>
   Waited wait_until(Done&& done, const Deadline& deadline, const KeepWaiting& keep_waiting = {},
                     std::optional<std::uint32_t> events_before_send = {}) {
-    std::int64_t look_at = 0;
-    std::int64_t nap = slice_;  // time until look_at [ns]
+    std::int64_t poll_at = 0;
+    std::int64_t nap = slice_;  // time until poll_at [ns]
     while (true) {
       if (watched_) show_life();
       const std::uint32_t seen = events();
@@ -117,14 +117,14 @@ class LaneSender {
         if (gone) segment_->throw_if_gone();
         return Waited::timed_out;
       }
-      if (look_at == 0) look_at = monotonic_now() + slice_;
+      if (poll_at == 0) poll_at = monotonic_now() + slice_;
       sleep(seen, deadline.left(nap));
-      nap = look_at - monotonic_now();
+      nap = poll_at - monotonic_now();
       if (nap > 0 && !segment_->has_ended()) continue;
-      look_at = monotonic_now() + slice_;
+      poll_at = monotonic_now() + slice_;
       nap = slice_;
       // first the end, then the result: a result counts even if the backend has ended since
-      const bool gone = look_around(keep_waiting);
+      const bool gone = poll(keep_waiting);
       if (done()) return Waited::ready;
       if (gone) segment_->throw_if_gone();
     }
@@ -135,7 +135,7 @@ class LaneSender {
   /// Sleeps until `events` is no longer `seen`, at most so long [ns].
   void sleep(std::uint32_t seen, std::int64_t at_most);
   /// True if the backend has ended. Throws Cancelled.
-  bool look_around(const KeepWaiting& keep_waiting) const;
+  bool poll(const KeepWaiting& keep_waiting) const;
 
   const AttachedSegment* segment_;
   SegmentView view_;

@@ -159,8 +159,8 @@ class SegmentSearch {
       : name_(name), access_(access), options_(options), path_(segment_path(name)) {}
 
   /// True if found() fits. Throws BackendFailed.
-  bool look() {
-    if (!found_ || !leads_to(path_, found_->descriptor()))
+  bool poll() {
+    if (!found_ || !is_path_of(path_, found_->descriptor()))
       found_ = AttachedSegment::open(name_, access_, reason_);
     if (!found_) return false;
     if (found_->epoch() == options_.ignore_epoch) {
@@ -198,7 +198,7 @@ AttachedSegment AttachedSegment::attach(std::string_view name, Access access,
                                         const Deadline& deadline, const AttachOptions& options) {
   SegmentSearch search(name, access, options);
   for (int polls = 0;; ++polls) {
-    if (search.look()) return search.found();
+    if (search.poll()) return search.found();
     if (deadline.over())
       throw TimeoutError(segment_called(name) + " has no running backend" +
                          (polls == 0 ? ": " : " within the time given: ") + search.reason() + ".");
@@ -240,7 +240,7 @@ Life AttachedSegment::life() const noexcept {
   // only observers query the segment file: they can place many read locks on it, which would slow
   // the query of a commander
   const int held = access_ == Access::read_write ? commands_descriptor() : descriptor();
-  const Life now = judge_life(held, view_.counters().state);
+  const Life now = life_of(held, view_.counters().state);
   if (is_over(now)) {
     over_.store(static_cast<std::uint32_t>(now), std::memory_order_relaxed);
     return now;

@@ -39,7 +39,7 @@ class HaltLatch {
   explicit HaltLatch(const SegmentView& view) noexcept;
 
   /// True if a halt was requested since the last call; it is in force from now on.
-  bool look() noexcept {
+  bool poll() noexcept {
     const std::uint64_t requested =
         view_.bell().halts.load(std::memory_order_seq_cst);  // sync halts
     if (requested == seen_) return false;
@@ -59,7 +59,7 @@ class HaltLatch {
   void latch(std::uint64_t requested) noexcept;
 
   SegmentView view_;
-  std::uint64_t seen_ = 0;  // the counter at the last look()
+  std::uint64_t seen_ = 0;  // the counter at the last poll()
   Halt halt_;
 };
 

@@ -64,7 +64,7 @@ struct LaneLiveness::Watched {
 
   void check_names() noexcept {
     if (socket) NameSocket::drain(*socket);
-    if (nameless.load(std::memory_order_relaxed) || !names.lead_elsewhere()) return;
+    if (nameless.load(std::memory_order_relaxed) || !names.are_replaced()) return;
     // read after the names: a backend stores its end before it removes its files
     const auto state = static_cast<BackendState>(
         view.counters().state.load(std::memory_order_acquire));  // sync state

@@ -43,7 +43,7 @@ void sweep(const std::string& name, std::uint64_t epoch) {
   LockFile lock = LockFile::open(commands, O_RDWR | O_NOFOLLOW);
   if (lock.is_open()) {
     // the holder of the lock builds this segment, or is its living backend
-    if (!lock.try_lock(kBackendByte) || !leads_to(commands, lock.descriptor())) return;
+    if (!lock.try_lock(kBackendByte) || !is_path_of(commands, lock.descriptor())) return;
   } else if (errno != ENOENT) {
     return;
   }
@@ -95,7 +95,7 @@ bool NamedSegment::try_lock() noexcept {
   return can_lock_ && (commands_.is_open() ? commands_ : file_).try_lock(kBackendByte);
 }
 
-bool NamedSegment::is_current() const noexcept { return leads_to(path_, descriptor()); }
+bool NamedSegment::is_current() const noexcept { return is_path_of(path_, descriptor()); }
 
 bool NamedSegment::is_alive() const {
   const std::int64_t end = monotonic_now() + patience(descriptor());

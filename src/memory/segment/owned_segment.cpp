@@ -269,7 +269,7 @@ void OwnedSegment::remove() noexcept {
   socket_.close();
   // we hold byte 0, so no other segment can get the name between the check and the unlink
   O80_CRASH_POINT("segment.before_unlink");
-  if (leads_to(path_, lock_.descriptor())) unlink(path_.c_str());
+  if (is_path_of(path_, lock_.descriptor())) unlink(path_.c_str());
   O80_CRASH_POINT("segment.between_unlinks");
   unlink(commands_path_.c_str());
   O80_CRASH_POINT("segment.after_unlink");

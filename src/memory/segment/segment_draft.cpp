@@ -162,7 +162,7 @@ bool SegmentDraft::create_commands() {
     unlink(commands_path_.c_str());
     throw SegmentError("cannot create segment '" + name_ + "': " + why + ".");
   }
-  if (!leads_to(commands_path_, commands_.descriptor())) return false;
+  if (!is_path_of(commands_path_, commands_.descriptor())) return false;
   O80_CRASH_POINT("create.after_lock");
   return true;
 }

@@ -25,13 +25,13 @@ std::string text_of(const char* chars, std::size_t most) {
 
 }  // namespace
 
-bool leads_to(const std::string& path, int descriptor) noexcept {
+bool is_path_of(const std::string& path, int descriptor) noexcept {
   struct stat named, open;
   return lstat(path.c_str(), &named) == 0 && fstat(descriptor, &open) == 0 &&
          named.st_dev == open.st_dev && named.st_ino == open.st_ino;
 }
 
-bool FileNames::lead_elsewhere() const noexcept {
+bool FileNames::are_replaced() const noexcept {
   return std::ranges::any_of(names, [](const Name& name) {
     struct stat found, open;
     // a refused call says nothing
@@ -41,7 +41,7 @@ bool FileNames::lead_elsewhere() const noexcept {
   });
 }
 
-bool bears_the_mark(int descriptor) noexcept {
+bool has_magic(int descriptor) noexcept {
   std::uint64_t magic = 0;
   return pread(descriptor, &magic, sizeof magic, 0) == sizeof magic && magic == kSegmentMagic;
 }
@@ -62,7 +62,7 @@ std::string inspect_segment(int descriptor, SegmentHeader& header, SegmentOffset
   if (fstat(descriptor, &status) != 0) return std::strerror(errno);
   if (!S_ISREG(status.st_mode)) return "it is not a regular file";
   if (pread(descriptor, &header, 1, 0) < 0) return std::strerror(errno);
-  if (!bears_the_mark(descriptor)) return "it was not made by o80";
+  if (!has_magic(descriptor)) return "it was not made by o80";
   if (!read_header(descriptor, header)) return "it is truncated";
   if (header.version != kSegmentVersion || header.header_bytes != sizeof header)
     return "it is of version " + std::to_string(header.version) + ", this o80 reads version " +
@@ -130,7 +130,7 @@ const char* SegmentState::word() const noexcept {
   return played && life == Life::running ? "played" : name_of(life);
 }
 
-Life judge_life(int descriptor, const std::atomic<std::uint32_t>& state) noexcept {
+Life life_of(int descriptor, const std::atomic<std::uint32_t>& state) noexcept {
   // load the state after the lock: a backend stores its end before it releases the lock
   const bool held = is_byte_locked(descriptor, kBackendByte);
   switch (static_cast<BackendState>(state.load(std::memory_order_acquire))) {  // sync state

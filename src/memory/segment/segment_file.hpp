@@ -13,7 +13,7 @@
 namespace o80 {
 
 /// True if `path` leads to the file of the descriptor.
-bool leads_to(const std::string& path, int descriptor) noexcept;
+bool is_path_of(const std::string& path, int descriptor) noexcept;
 
 /// Names of open files. The files can be removed or replaced, or a file system can be mounted over
 /// their directory: then the names lead elsewhere.
@@ -24,11 +24,11 @@ struct FileNames {
   };
   std::vector<Name> names{};
 
-  bool lead_elsewhere() const noexcept;
+  bool are_replaced() const noexcept;
 };
 
 /// True if the file starts with the magic number of a segment, of any version.
-bool bears_the_mark(int descriptor) noexcept;
+bool has_magic(int descriptor) noexcept;
 
 /// Reads the header without a check; false if the file is too short.
 bool read_header(int descriptor, SegmentHeader& header) noexcept;
@@ -52,7 +52,7 @@ mode_t commanders_mode(mode_t permission) noexcept;
 /// Decides the Life of a backend from its state word and the lock of its byte. `descriptor` must
 /// not hold the lock itself. It is the segment file for observers, else the commanders' file
 /// (src/memory/README.md#locks).
-Life judge_life(int descriptor, const std::atomic<std::uint32_t>& state) noexcept;
+Life life_of(int descriptor, const std::atomic<std::uint32_t>& state) noexcept;
 
 /// Stores the end, and wakes all waiters if the view has the commanders' file.
 void end_segment(const SegmentView& view, BackendState state) noexcept;

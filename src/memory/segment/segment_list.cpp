@@ -47,7 +47,7 @@ SegmentEntry describe(const std::string& name) {
   std::uint32_t word = 0;
   if (!reads(word, offsetof(Counters, state))) return entry;
   const std::atomic<std::uint32_t> state(word);
-  entry.life = judge_life(file.descriptor(), state);
+  entry.life = life_of(file.descriptor(), state);
   entry.readable = true;
   std::uint64_t halt = 0;
   entry.halted = reads(halt, offsetof(Counters, halted)) && halt != 0;
@@ -65,7 +65,7 @@ SegmentEntry describe(const std::string& name) {
 /// True if the name leads to a file that this user may read and that is no segment of any version.
 bool is_foreign(const std::string& name) {
   const LockFile file = LockFile::open(segment_path(name), O_RDONLY | O_NOFOLLOW);
-  return file.is_open() && !bears_the_mark(file.descriptor());
+  return file.is_open() && !has_magic(file.descriptor());
 }
 
 /// True if the files of this backend have their names, whether it lives or is just ending.
@@ -152,7 +152,7 @@ std::vector<std::string> clean_dead() {
     if (file.kind != SegmentFileName::Kind::segment) continue;
     NamedSegment segment = NamedSegment::open(file.name);
     bool is_removed = false;
-    if (segment.is_open() && bears_the_mark(segment.descriptor())) remove_dead(segment, is_removed);
+    if (segment.is_open() && has_magic(segment.descriptor())) remove_dead(segment, is_removed);
     if (is_removed) removed.push_back(file.name);
   }
   return removed;

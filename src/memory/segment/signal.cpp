@@ -26,17 +26,17 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline,
     return published.load(std::memory_order_acquire) >= k;  // sync published
   };
   if (spinner_.spin(ready)) return Waited::ready;
-  std::int64_t look_at = monotonic_now() + kSlice;
-  std::int64_t nap = kSlice;  // time until look_at [ns]
+  std::int64_t poll_at = monotonic_now() + kSlice;
+  std::int64_t nap = kSlice;  // time until poll_at [ns]
   while (!deadline.over()) {
     if (segment_->access() == Access::read_write)
       sleep(k, deadline.left(nap));
     else
       poll(k, deadline.left(nap));
     if (ready()) return Waited::ready;
-    nap = look_at - monotonic_now();
+    nap = poll_at - monotonic_now();
     if (nap > 0 && !segment_->has_ended()) continue;
-    look_at = monotonic_now() + kSlice;
+    poll_at = monotonic_now() + kSlice;
     nap = kSlice;
     if (keep_waiting && !keep_waiting())
       throw Cancelled("the wait for a row of segment '" + segment_->name() + "' was cancelled");

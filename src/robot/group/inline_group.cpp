@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "base/sentence.hpp"
-#include "control/batch/batch_builder.hpp"
 #include "control/batch/command_check.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "memory/os/futex.hpp"
 #include "memory/segment/signal.hpp"
 #include "robot/group/descriptor_limit.hpp"
@@ -159,7 +159,7 @@ InlineGroup::InlineGroup(const RobotTable& table, const OptionValues& options, c
                          const KeepWaiting& keep_waiting)
     : name_(table.name),
       otherwise_(keep_waiting),
-      go_on_([this] { return go_on(); }),
+      may_continue_([this] { return may_continue(); }),
       pool_(group.sharing != nullptr ? group.sharing->pool_
                                      : std::make_shared<WorkerPool>(threads_of(group) - 1)) {
   if (group.copies == 0) throw InvalidArgument("a group needs at least one copy, got 0");
@@ -182,7 +182,7 @@ void InlineGroup::add_copy(const RobotTable& table, const OptionValues& options,
   own.segment = name_ + "[" + std::to_string(copies_.size()) + "]";
   own.anonymous = true;
   copies_.push_back(std::make_unique<Copy>(std::make_shared<InlineRobot>(
-      std::make_unique<DriverInstance>(table, options), std::move(own), go_on_)));
+      std::make_unique<DriverInstance>(table, options), std::move(own), may_continue_)));
   const auto schema_of = [](const Copy& copy) { return copy.frontend.link()->segment.schema(); };
   if (!std::ranges::equal(schema_of(*copies_.back()), schema_of(*copies_.front()))) {
     throw DriverError("copy " + std::to_string(copies_.size() - 1) + " of '" + name_ +
@@ -238,17 +238,17 @@ bool InlineGroup::runs_here() const noexcept {
 }
 
 /// Whether the iterations of a copy go on; called about every 50 ms of a burst.
-bool InlineGroup::go_on() {
+bool InlineGroup::may_continue() {
   InlineGroup* const leader = leader_.load(std::memory_order_relaxed);
-  if (leader != nullptr && working_for == leader) return leader->go_on();
+  if (leader != nullptr && working_for == leader) return leader->may_continue();
   // a frontend of a single copy
   if (working_for != this) return !otherwise_ || otherwise_();
-  if (std::this_thread::get_id() == caller_) look_around();
+  if (std::this_thread::get_id() == caller_) poll();
   return !cancelled_.load(std::memory_order_relaxed);
 }
 
 /// In the calling thread: asks every 50 ms whether the call goes on.
-void InlineGroup::look_around() noexcept {
+void InlineGroup::poll() noexcept {
   const std::int64_t now = monotonic_now();
   if (now < ask_at_ || cancelled_.load(std::memory_order_relaxed)) return;
   ask_at_ = now + kSlice;
@@ -285,8 +285,8 @@ void InlineGroup::for_each(std::span<const std::uint32_t> chosen, Timeout timeou
     }
     working_for = before;
   };
-  const auto look = [this]() noexcept { look_around(); };
-  pool_->run(static_cast<std::uint32_t>(chosen.size()), task, look);
+  const auto poll_caller = [this]() noexcept { poll(); };
+  pool_->run(static_cast<std::uint32_t>(chosen.size()), task, poll_caller);
   if (guard_.forked()) check_usable();
   if (failed_.load(std::memory_order_relaxed) || cancelled_.load(std::memory_order_relaxed)) {
     throw_failures();
@@ -412,7 +412,7 @@ void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uin
       if (!plan.actuators.empty()) plan.add_targets(copy.frontend, to);
       PulseOptions pulse;
       if (plan.delay > 0) pulse.at = copy.frontend.published() + 1 + plan.delay;
-      copy.frontend.burst_rows(own, {}, go_on_, pulse);
+      copy.frontend.burst_rows(own, {}, may_continue_, pulse);
     }
   } catch (const BackendHalted&) {
     show_last_row(i, own);
@@ -501,7 +501,7 @@ void InlineGroup::request(std::uint32_t request, std::span<const std::uint32_t> 
     BatchBuilder batch;
     batch.request(static_cast<std::uint16_t>(request), payloads.subspan(place * size, size));
     const Batch sent = copy.frontend.pulse_to_end(batch);
-    copy.frontend.wait_until_ended(sent, {}, go_on_);
+    copy.frontend.wait_until_ended(sent, {}, may_continue_);
     throw_unless_completed(request, sent);
     copy.frontend.latest(copy.bytes());
     read_gathered(chosen[place], copy.bytes());
@@ -538,12 +538,12 @@ void InlineGroup::resume(std::span<const std::uint32_t> chosen, Timeout timeout,
   if (halted.empty()) return;
   for_each(halted, timeout, keep_waiting, [&](std::uint32_t place, Copy& copy) {
     // the braking has ended in the iteration after the first row that shows none
-    for (bool is_at_rest = false; !is_at_rest; copy.frontend.burst(1, {}, go_on_)) {
+    for (bool is_at_rest = false; !is_at_rest; copy.frontend.burst(1, {}, may_continue_)) {
       const UntypedObservation row = copy.frontend.latest();
       is_at_rest = row.head().halted != 0 && !row.any_braking();
     }
     const std::optional<Halt> halt = copy.frontend.halted();
-    if (halt) copy.frontend.resume(halt->number, {}, go_on_);
+    if (halt) copy.frontend.resume(halt->number, {}, may_continue_);
     copy.frontend.latest(copy.bytes());
     read_gathered(halted[place], copy.bytes());
   });

@@ -162,8 +162,8 @@ class InlineGroup {
                 const BackendOptions& backend);
   Copy& at(std::size_t copy) const;
   bool runs_here() const noexcept;
-  bool go_on();
-  void look_around() noexcept;
+  bool may_continue();
+  void poll() noexcept;
   template <class Each>
   void for_each(std::span<const std::uint32_t> chosen, Timeout timeout,
                 const KeepWaiting& keep_waiting, Each&& each);
@@ -183,8 +183,8 @@ class InlineGroup {
   std::vector<std::unique_ptr<Copy>> copies_;
   RowGather gather_;
   Gathered gathered_;
-  KeepWaiting otherwise_;  // asked in bursts that are no call of the group
-  KeepWaiting go_on_;      // calls go_on()
+  KeepWaiting otherwise_;     // asked in bursts that are no call of the group
+  KeepWaiting may_continue_;  // calls may_continue()
 
   // of the call that runs
   std::atomic<std::uint32_t> running_{0};      // 1: a call runs

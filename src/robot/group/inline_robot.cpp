@@ -61,9 +61,9 @@ InlineRobot::InlineRobot(std::unique_ptr<DriverInstance> robot, BackendOptions o
 
 void InlineRobot::run() {
   const Turn turn(*this, keep_waiting_);
-  if (keep_waiting_) looked_at_ = monotonic_now();
+  if (keep_waiting_) polled_at_ = monotonic_now();
   Step step = Step::run;
-  while (!stopping_ && (step = loop_.run_granted(at_once_)) == Step::run) look_around();
+  while (!stopping_ && (step = loop_.run_granted(at_once_)) == Step::run) poll();
   throw_if_ended(step);
 }
 
@@ -74,7 +74,7 @@ std::optional<std::size_t> InlineRobot::run(const DirectBurst& burst, std::span<
   const auto iterations = static_cast<std::size_t>(burst.iterations);
   const std::size_t size = loop_.backend().layout().size;
   // a burst shorter than the next look at the clock needs no clock
-  if (keep_waiting_ && iterations >= at_once_) looked_at_ = monotonic_now();
+  if (keep_waiting_ && iterations >= at_once_) polled_at_ = monotonic_now();
   std::size_t done = 0;
   std::uint32_t unlooked = 0;
   // one step more than iterations: it sees what came of the last one, as run() does
@@ -83,7 +83,7 @@ std::optional<std::size_t> InlineRobot::run(const DirectBurst& burst, std::span<
     if (done < iterations) std::memcpy(rows.data() + done++ * size, loop_.row(), size);
     if (++unlooked < at_once_) continue;
     unlooked = 0;
-    look_around();
+    poll();
   }
   throw_if_ended(step);
   return done;
@@ -106,13 +106,13 @@ void InlineRobot::refuse_nested() const {
 
 /// Calls `keep_waiting` once every kSlice. The slower the robot, the fewer iterations run between
 /// looks at the clock.
-void InlineRobot::look_around() {
+void InlineRobot::poll() {
   if (!keep_waiting_) return;
   const std::int64_t now = monotonic_now();
-  const std::int64_t took = now - std::exchange(looked_at_, now);
+  const std::int64_t took = now - std::exchange(polled_at_, now);
   at_once_ = took > kLongAtOnce ? std::max(1U, at_once_ / 2) : std::min(kMaxAtOnce, at_once_ * 2);
-  if (now < look_at_) return;
-  look_at_ = now + kSlice;
+  if (now < poll_at_) return;
+  poll_at_ = now + kSlice;
   try {
     if (!keep_waiting_()) {
       throw Cancelled("the burst of '" + segment() + "' was cancelled by the caller");

@@ -11,7 +11,7 @@
 #include "o80/runtime/frontend.hpp"
 #include "robot/loop/loop.hpp"
 #include "runtime/backend/direct_burst.hpp"
-#include "runtime/backend/inline_runner.hpp"
+#include "runtime/protocol/inline_runner.hpp"
 
 namespace o80 {
 
@@ -46,7 +46,7 @@ class InlineRobot final : public InlineRunner {
 
  private:
   class Turn;
-  void look_around();
+  void poll();
   void throw_if_ended(Step step);
 
   std::atomic<std::uint32_t> turn_{0};     // futex lock of Turn: 0 free, 1 held, 2 contended
@@ -54,8 +54,8 @@ class InlineRobot final : public InlineRunner {
   std::atomic<bool> stopping_{false};
   ForkGuard guard_;
   KeepWaiting keep_waiting_;
-  std::int64_t look_at_ = 0;    // time of the next call of `keep_waiting` [ns]
-  std::int64_t looked_at_ = 0;  // time of the last look at the clock [ns]
+  std::int64_t poll_at_ = 0;    // time of the next call of `keep_waiting` [ns]
+  std::int64_t polled_at_ = 0;  // time of the last look at the clock [ns]
   std::uint32_t at_once_;       // iterations between looks at the clock
   Loop loop_;
 };

@@ -36,11 +36,11 @@ class WorkerPool {
   void release() noexcept { claimed_.store(false, std::memory_order_release); }
 
   /// Calls task(i) once for each i below `count`, in all threads; returns when all have returned.
-  /// `look_around` is called in the calling thread between its tasks, and about every 50 ms while
+  /// `poll` is called in the calling thread between its tasks, and about every 50 ms while
   /// it waits for the workers. Neither may throw. In a child that was forked inside one of them it
   /// returns at once, because the workers exist in the parent only.
   template <class Task, class Look>
-  void run(std::uint32_t count, const Task& task, const Look& look_around) noexcept {
+  void run(std::uint32_t count, const Task& task, const Look& poll) noexcept {
     const auto call = [](const void* object, std::uint32_t i) {
       (*static_cast<const Task*>(object))(i);
     };
@@ -49,9 +49,9 @@ class WorkerPool {
     while (!guard_.forked() && take(round_.load(std::memory_order_relaxed), 0, i)) {
       task(i);
       finished();
-      look_around();
+      poll();
     }
-    while (!guard_.forked() && !wait_for_workers(count)) look_around();
+    while (!guard_.forked() && !wait_for_workers(count)) poll();
   }
 
  private:

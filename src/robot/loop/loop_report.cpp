@@ -26,7 +26,7 @@ void say(const std::string& text) { std::fprintf(stderr, "o80: %s\n", text.c_str
 /// What lasts, so that it is the status of the service too.
 void say_state(const std::string& text) {
   say(text);
-  tell_service_manager("STATUS=" + text);
+  notify_service_manager("STATUS=" + text);
 }
 
 std::string words_for(const Halt& halt) {
@@ -39,7 +39,7 @@ std::string words_for(const Halt& halt) {
 }
 }  // namespace
 
-std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t now) {
+std::optional<std::string> OverrunReport::poll(const RowHead& row, std::int64_t now) {
   if (!first_ || row.overruns == first_->overruns) {
     first_ = row;
     return std::nullopt;
@@ -56,7 +56,7 @@ std::optional<std::string> OverrunReport::look(const RowHead& row, std::int64_t 
          "docs/real_time.md, or lower --frequency";
 }
 
-std::optional<std::string> HangReport::look(const LoopState& loop, std::int64_t now) {
+std::optional<std::string> HangReport::poll(const LoopState& loop, std::int64_t now) {
   std::string text = loop.hang();
   if (text.empty()) {
     return std::exchange(hangs_, false) ? std::optional("the loop continues") : std::nullopt;
@@ -88,11 +88,11 @@ LoopReport::~LoopReport() {
 void LoopReport::run() noexcept {
   try {
     // the loop may have ended before this thread began: then stop waiting for its segment
-    const KeepWaiting goes_on = [this] { return stop_.load(std::memory_order_acquire) == 0; };
+    const KeepWaiting continues = [this] { return stop_.load(std::memory_order_acquire) == 0; };
     // attach before row 0, so that a start() that hangs is reported too
     const UntypedFrontend watcher(
         segment_,
-        {.timeout = {}, .access = Access::read_only, .starting = true, .keep_waiting = goes_on});
+        {.timeout = {}, .access = Access::read_only, .starting = true, .keep_waiting = continues});
     OverrunReport overruns(watcher.period());
     HangReport hangs;
     std::uint64_t halted = 0;
@@ -100,10 +100,10 @@ void LoopReport::run() noexcept {
     while (stop_.load(std::memory_order_acquire) == 0) {
       const std::int64_t moment = monotonic_now();
       if (const auto line = lost_priority()) say(*line);
-      if (const auto line = hangs.look(loop_state(watcher, moment), moment)) say(*line);
+      if (const auto line = hangs.poll(loop_state(watcher, moment), moment)) say(*line);
       if (watcher.published() >= 0) {
         const RowHead row = watcher.latest().head();
-        if (const auto line = overruns.look(row, moment)) say(*line);
+        if (const auto line = overruns.poll(row, moment)) say(*line);
         if (row.starvations > 0 && !std::exchange(has_starved, true)) {
           say("a plan of chunks ran out of rows: its policy answers too late, or has not closed "
               "it. "

@@ -17,7 +17,7 @@ class OverrunReport {
  public:
   explicit OverrunReport(std::int64_t period) : period_(period) {}
   /// The newest row, now [ns] => a line if there are new late iterations.
-  std::optional<std::string> look(const RowHead& row, std::int64_t now);
+  std::optional<std::string> poll(const RowHead& row, std::int64_t now);
 
  private:
   std::int64_t period_;
@@ -29,7 +29,7 @@ class OverrunReport {
 class HangReport {
  public:
   /// The loop, now [ns] => a line if the loop has begun or ceased to hang.
-  std::optional<std::string> look(const LoopState& loop, std::int64_t now);
+  std::optional<std::string> poll(const LoopState& loop, std::int64_t now);
 
  private:
   bool hangs_ = false;        // and that was reported

@@ -253,12 +253,12 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
     for (const std::string& refused : set_up_real_time(real_time)) complain(refused.c_str());
   });
   announce(table, loop->backend());
-  tell_service_manager("READY=1\nSTATUS=runs on segment '" + loop->backend().name() + "'");
+  notify_service_manager("READY=1\nSTATUS=runs on segment '" + loop->backend().name() + "'");
   const Ended ended = loop->run();
   report.reset();
   if (!ended.in_order) complain(ended.fault.c_str());
-  tell_service_manager("STOPPING=1\nSTATUS=" +
-                       (ended.in_order ? "stopped" : printable(ended.fault)));
+  notify_service_manager("STOPPING=1\nSTATUS=" +
+                         (ended.in_order ? "stopped" : printable(ended.fault)));
   return ended.in_order ? 0 : 1;
 }
 

@@ -10,7 +10,7 @@
 
 namespace o80 {
 
-void tell_service_manager(const std::string& state) noexcept {
+void notify_service_manager(const std::string& state) noexcept {
   const char* const path = secure_getenv("NOTIFY_SOCKET");
   sockaddr_un address{};
   if (path == nullptr || (*path != '/' && *path != '@')) return;

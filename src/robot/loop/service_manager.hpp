@@ -8,6 +8,6 @@ namespace o80 {
 /// protocol of sd_notify (systemd). No effect without NOTIFY_SOCKET.
 ///
 /// Realtime: no.
-void tell_service_manager(const std::string& state) noexcept;
+void notify_service_manager(const std::string& state) noexcept;
 
 }  // namespace o80

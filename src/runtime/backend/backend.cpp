@@ -204,7 +204,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   fill_row(fresh);
   history.publish(current, row());
   watch_row(fresh);
-  tell_ended_requests(fresh);
+  report_ended_requests(fresh);
   if (!fresh) end_iteration();
   journal.flush();
   wake_sleepers(segment.view(),

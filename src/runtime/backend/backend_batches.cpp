@@ -71,7 +71,7 @@ void UntypedBackend::Body::take_all_due() noexcept {
 
 /// Takes batches from the lanes within the budget of one iteration.
 void UntypedBackend::Body::take_batches() noexcept {
-  if (!lanes.look()) {
+  if (!lanes.poll()) {
     if (!burst_.runs()) queue_.is_empty();
     return;
   }
@@ -83,8 +83,8 @@ void UntypedBackend::Body::take_batches() noexcept {
   const bool all_taken = take_in_order();
   if (burst_.runs()) {
     queue_.bursts(burst_.lane(), current);
-    lanes.look_again_after(burst_.lane());
-    if (staging.busy()) lanes.look_again();
+    lanes.rescan_after(burst_.lane());
+    if (staging.busy()) lanes.rescan();
   } else if (all_taken) {
     queue_.is_empty();
   } else {
@@ -101,10 +101,10 @@ bool UntypedBackend::Body::take_in_order() noexcept {
     const std::optional<std::uint32_t> lane = lanes.next(staging.tickets());
     if (!lane) return true;
     const std::uint32_t before = share_.work;
-    const bool goes_on = (staging.has_staged(*lane) || stage(*lane, share_.work)) &&
-                         (!staging.has_staged(*lane) || take_staged(*lane));
+    const bool continues = (staging.has_staged(*lane) || stage(*lane, share_.work)) &&
+                           (!staging.has_staged(*lane) || take_staged(*lane));
     queue_.spent(*lane, before - share_.work);
-    if (!goes_on) return false;
+    if (!continues) return false;
   }
   return true;
 }
@@ -153,7 +153,7 @@ void UntypedBackend::Body::take_express() noexcept {
 bool UntypedBackend::Body::stage(std::uint32_t lane, std::uint32_t& budget) noexcept {
   // the death of an owner is handled before the first batch of its successor
   if (staging.is_between_batches(lane)) on_owner_death(lane, lanes[lane].dead_predecessor());
-  return staging.go_on(lane, budget);
+  return staging.advance(lane, budget);
 }
 
 bool UntypedBackend::Body::take_staged(std::uint32_t lane) noexcept {
@@ -168,11 +168,11 @@ bool UntypedBackend::Body::take_staged(std::uint32_t lane) noexcept {
 
 /// Takes a batch, schedules it for its iteration, or rejects it.
 void UntypedBackend::Body::accept(const StagedBatch& sent) noexcept {
-  break_silence(sent.lane);
+  note_life(sent.lane);
   // A process may have halted and then sent this batch since the step has begun. The halt begins
   // before the batch, or its resume would find no halt in force and do nothing.
-  if (halts.look()) begin_halt();
-  if (!suits_halt(sent)) return;
+  if (halts.poll()) begin_halt();
+  if (!admitted_during_halt(sent)) return;
   const BatchRecord batch = pool.batch(sent.batch);
   const bool bursts = batch.burst > 0 || (batch.flags & kBurstUntilEnded) != 0;
   const bool is_for_later = sent.at > current;
@@ -210,7 +210,7 @@ void UntypedBackend::Body::take(const StagedBatch& sent) noexcept {
 }
 
 void UntypedBackend::Body::take_checked(const StagedBatch& sent) noexcept {
-  taking_owner_ = sent.had_left ? 0 : sent.incarnation;
+  taking_owner_ = sent.sender_left ? 0 : sent.incarnation;
   deciding_ = &sent;
   if (pool.batch(sent.batch).records > 0) journal.acts();
   controller.take(sent.lane, sent.batch, *this);
@@ -219,16 +219,16 @@ void UntypedBackend::Body::take_checked(const StagedBatch& sent) noexcept {
 
 /// True if a batch may be taken in this iteration; otherwise ends it.
 bool UntypedBackend::Body::admit(const StagedBatch& sent) noexcept {
-  if (!suits_halt(sent) || ends_for_silence(sent)) return false;
+  if (!admitted_during_halt(sent) || ends_for_silence(sent)) return false;
   watch_holder();
-  const std::uint64_t sender = sent.had_left ? 0 : sent.incarnation;
+  const std::uint64_t sender = sent.sender_left ? 0 : sent.incarnation;
   const bool is_holders = holder_.is(sent.lane, sender);
   // control covers commands only: any commander may resume and mark
   const bool is_free = holder_.is_nobody() || controller.effort(sent.batch).free;
   if (!is_free && !is_holders) return reject(sent, Reason::exclusive, holder_.lane());
   if (sent.at < current && !sent.late_now) return reject(sent, Reason::late);
   if (stale_ == Stale::purge && is_of_dead(sent)) return reject(sent, Reason::dead_frontend);
-  return suits_followers(sent);
+  return admitted_by_followers(sent);
 }
 
 bool UntypedBackend::Body::is_of_dead(const StagedBatch& sent) noexcept {

@@ -163,7 +163,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   bool is_granted() const noexcept { return schema.head.bursting == 0 || burst_.runs(); }
   /// Deaths and halts => ended commands. Then the fresh start that an ended request needs.
   void watch() noexcept {
-    look_at_lives();
+    poll_liveness();
     watch_halt();
     start_afresh_after_request();
   }
@@ -216,7 +216,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
 
   // halts
   void watch_halt() noexcept {
-    if (halts.look()) {
+    if (halts.poll()) {
       begin_halt();
     } else if (halt_stage_ == HaltStage::unexplained) {
       complete_reason();
@@ -231,7 +231,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void count_missed() noexcept;
   void begin_halt() noexcept;
   void end_scheduled() noexcept;
-  bool suits_halt(const StagedBatch& sent) noexcept;
+  bool admitted_during_halt(const StagedBatch& sent) noexcept;
   bool ends_for_silence(const StagedBatch& sent) noexcept;
 
   // requests
@@ -239,16 +239,16 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   Outcome start_afresh(std::uint32_t lane, CommandId id) noexcept;
   void start_afresh_after_request() noexcept;
   void end_running(RunningRequests::Entry& entry, const Outcome& outcome) noexcept;
-  void tell_ended_requests(bool fresh) noexcept;
+  void report_ended_requests(bool fresh) noexcept;
   void drop_running(const Outcome& outcome) noexcept;
 
   // deaths and silence of commanders
-  void look_at_lives() noexcept;
+  void poll_liveness() noexcept;
   void on_owner_death(std::uint32_t lane, std::uint64_t incarnation) noexcept;
   void watch_holder() noexcept;
   void halt_nameless() noexcept;
   void watch_silence() noexcept;
-  void break_silence(std::uint32_t lane) noexcept;
+  void note_life(std::uint32_t lane) noexcept;
   void stale(std::uint32_t lane, Reason reason) noexcept;
   void fail(std::string_view text) noexcept;
   void note_failure(std::string_view text) noexcept;
@@ -262,7 +262,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler {
   void begin_to_watch() noexcept;
   void watch_readings() noexcept;
   void watch_followers(bool fresh) noexcept;
-  bool suits_followers(const StagedBatch& sent) noexcept;
+  bool admitted_by_followers(const StagedBatch& sent) noexcept;
   double since_reading() const noexcept;
   bool judge_against_first() noexcept;
   bool is_misread(const std::byte* observed, std::string_view cure,

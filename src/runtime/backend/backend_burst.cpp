@@ -12,8 +12,8 @@ void UntypedBackend::Body::grant(const StagedBatch& sent, const BatchRecord& bat
   burst_.begin(sent.lane, sent.incarnation, batch.id,
                until_ended ? BurstGrant::kUntilEnded : batch.burst);
   journal.burst(sent.lane, batch.id,
-                {until_ended ? -1 : batch.burst, sent.had_left ? 0 : sent.incarnation});
-  if (sent.had_left || is_called_off()) stop_burst();
+                {until_ended ? -1 : batch.burst, sent.sender_left ? 0 : sent.incarnation});
+  if (sent.sender_left || is_called_off()) stop_burst();
 }
 
 /// True if the sender of the burst has cancelled it or has closed its lane.
@@ -37,7 +37,7 @@ void UntypedBackend::Body::stop_burst(BurstEnd end) noexcept {
   if (!burst_.runs()) return;
   if (is_under_way()) return burst_.shorten();
   end_burst(current - 1, end);
-  lanes.look_again();
+  lanes.rescan();
 }
 
 // ------------------------------------------------------------------------------ direct bursts
@@ -68,7 +68,7 @@ bool UntypedBackend::Body::begin_direct(const DirectBurst& burst) noexcept {
 
 /// An iteration of a direct burst.
 Step UntypedBackend::Body::step_direct() noexcept {
-  look_at_lives();
+  poll_liveness();
   watch_halt();
   if (stop.load(std::memory_order_relaxed)) return Step::ended;
   if (!burst_.runs()) return Step::standing;  // cut by the halt

@@ -115,7 +115,7 @@ void UntypedBackend::Body::begin_halt() noexcept {
 void UntypedBackend::Body::end_scheduled() noexcept {
   for (std::uint32_t i = 0; i < kScheduledPerIteration && schedule.has_aside(); ++i) {
     const StagedBatch sent = schedule.take_aside();
-    if (!suits_halt(sent)) continue;
+    if (!admitted_during_halt(sent)) continue;
     if (ends_for_silence(sent)) continue;
     if (schedule.has_room(sent.lane, sent.at)) {
       schedule.add(sent);
@@ -134,7 +134,7 @@ bool UntypedBackend::Body::ends_for_silence(const StagedBatch& sent) noexcept {
 
 /// True if halts permit the batch. Otherwise ends it: as halted if it was sent before the halt, as
 /// rejected if it was sent while the halt is in force.
-bool UntypedBackend::Body::suits_halt(const StagedBatch& sent) noexcept {
+bool UntypedBackend::Body::admitted_during_halt(const StagedBatch& sent) noexcept {
   const bool before = sent.ticket < halted_below_;
   if ((!before && !halts.acts()) || !controller.effort(sent.batch).moves) return true;
   end_batch(sent, Reason::halted, 0, before ? Status::halted : Status::rejected);

@@ -34,7 +34,7 @@ void UntypedBackend::Body::stale(std::uint32_t lane, Reason reason) noexcept {
   }
 }
 
-void UntypedBackend::Body::look_at_lives() noexcept {
+void UntypedBackend::Body::poll_liveness() noexcept {
   const bool has_sender = burst_.runs() && !burst_.is_direct();
   if (has_sender) {
     const std::uint64_t dead = lanes[burst_.lane()].dead_predecessor();
@@ -44,7 +44,7 @@ void UntypedBackend::Body::look_at_lives() noexcept {
   // any frontend can corrupt the bell, so all lanes are scanned after each round of the helper
   const std::uint32_t rounds = liveness.rounds();
   if (rounds != seen_rounds_) {
-    lanes.look_again();
+    lanes.rescan();
     if (schema.head.bursting == 0 && liveness.nameless() && !std::exchange(is_nameless_, true))
       halt_nameless();
   }
@@ -54,7 +54,7 @@ void UntypedBackend::Body::look_at_lives() noexcept {
   if (changes == seen_changes_) return;
   seen_changes_ = changes;
   for (std::uint32_t i = 0; i < lanes.size(); ++i) {
-    lanes[i].meet_owner();
+    lanes[i].poll_owner();
     lives_[i] = liveness.lane(i);
     const bool died = lives_[i].state == LaneState::died;
     on_owner_death(i, died ? lives_[i].incarnation : lanes[i].dead_predecessor());
@@ -79,7 +79,7 @@ void UntypedBackend::Body::on_owner_death(std::uint32_t lane, std::uint64_t inca
   stale(lane, Reason::dead_frontend);
   if (burst_.runs_for(lane) && burst_.incarnation() <= incarnation) stop_burst();
   // it may have died between its commit and the bell
-  lanes.look_again();
+  lanes.rescan();
 }
 
 /// Releases control if its holder has closed, has died, or no longer owns the lane.
@@ -96,9 +96,7 @@ void UntypedBackend::Body::watch_holder() noexcept {
 }
 
 /// Counts a batch as a sign of life of its sender.
-void UntypedBackend::Body::break_silence(std::uint32_t lane) noexcept {
-  last_life_[lane] = current;
-}
+void UntypedBackend::Body::note_life(std::uint32_t lane) noexcept { last_life_[lane] = current; }
 
 /// The watchdog: applies the policy to commanders that gave no sign of life for too long while they
 /// hold control or one of their commands acts.

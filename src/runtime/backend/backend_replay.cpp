@@ -95,7 +95,7 @@ void UntypedBackend::Body::take_recorded(const JournalEntry& entry) noexcept {
                          .batch = chain.first,
                          .lane = entry.lane,
                          .incarnation = entry.owner,
-                         .had_left = entry.owner == 0};
+                         .sender_left = entry.owner == 0};
   pool.batch(chain.first).ticket = entry.ticket;
   if (entry.kind == JournalKind::taken) {
     take_checked(sent);

@@ -187,7 +187,7 @@ void UntypedBackend::Body::watch_followers(bool fresh) noexcept {
 
 /// True if actuators without a command that follow can be where they are read; else rejects what
 /// moves.
-bool UntypedBackend::Body::suits_followers(const StagedBatch& sent) noexcept {
+bool UntypedBackend::Body::admitted_by_followers(const StagedBatch& sent) noexcept {
   if (followed_.empty() || !controller.effort(sent.batch).moves) return true;
   const auto fault = followed_.find_idle(controller.active_mask(), controller.braking_mask());
   if (!fault) return true;
@@ -268,7 +268,7 @@ void UntypedBackend::Body::end_running(RunningRequests::Entry& entry,
 
 /// Reports requests that the driver has ended, after the row with their end is published. A request
 /// that needs a fresh start is reported with the row of that.
-void UntypedBackend::Body::tell_ended_requests(bool fresh) noexcept {
+void UntypedBackend::Body::report_ended_requests(bool fresh) noexcept {
   running.each([&](RunningRequests::Entry& entry) {
     if (!entry.end) return;
     const Served how = *entry.end;

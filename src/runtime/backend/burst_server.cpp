@@ -19,7 +19,7 @@ bool BurstServer::may_begin(std::int64_t at_most) noexcept {
   if (!burst_.runs()) {
     wake_sleepers(view_, {.lanes = lanes_.announce()});
     bell_.wait(lanes_.bell_seen(), std::min(at_most, kSlice));
-    lanes_.look_again();  // also if the bell is damaged
+    lanes_.rescan();  // also if the bell is damaged
     take_bursts();
   }
   return burst_.runs();
@@ -33,7 +33,7 @@ void BurstServer::count(Iteration row, bool wakes_readers) noexcept {
 
 /// Takes batches in the order of their pulses until one grants a burst.
 void BurstServer::take_bursts() noexcept {
-  if (!lanes_.look()) return;
+  if (!lanes_.poll()) return;
   while (!burst_.runs()) {
     const auto lane = lanes_.next();
     if (!lane) return;
@@ -43,7 +43,7 @@ void BurstServer::take_bursts() noexcept {
 
 void BurstServer::take(std::uint32_t lane) noexcept {
   LaneReceiver& from = lanes_[lane];
-  const bool had_left = from.owner_of_next() == 0 || from.next_is_of_dead();
+  const bool sender_left = from.owner_of_next() == 0 || from.next_is_of_dead();
   const std::uint64_t incarnation = from.incarnation();
   Block block{};
   const bool taken = from.available_of_one() > 0 && from.take(block.bytes.data());
@@ -59,7 +59,7 @@ void BurstServer::take(std::uint32_t lane) noexcept {
   from.set_status(batch.id, status(Status::active, last_ + 1));
   from.set_status(batch.id + 1, status(Status::completed, last_ + 1));
   burst_.begin(lane, incarnation, batch.id, batch.burst);
-  if (had_left || is_called_off()) end_burst(BurstEnd::done);
+  if (sender_left || is_called_off()) end_burst(BurstEnd::done);
 }
 
 /// True if the sender of the burst has cancelled it, has closed its lane, or has died.

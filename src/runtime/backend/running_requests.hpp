@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "base/short_text.hpp"
-#include "control/batch/pool.hpp"
+#include "control/receiving/pool.hpp"
 #include "memory/segment/running_slot.hpp"
 #include "o80/describe/schema.hpp"
 #include "o80/runtime/request_server.hpp"

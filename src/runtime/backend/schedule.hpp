@@ -5,12 +5,9 @@
 #include <vector>
 
 #include "runtime/journal/staged_batch.hpp"
+#include "runtime/protocol/schedule_limits.hpp"
 
 namespace o80 {
-
-// most batches of one lane that may wait for later iterations; `pulse` refuses more
-inline constexpr std::uint32_t kMaxScheduled = 256;
-inline constexpr std::uint32_t kMaxScheduledAt = 16;  // for the same iteration
 
 /// Batches sent for a later iteration, ordered by iteration and ticket.
 ///

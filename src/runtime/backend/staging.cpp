@@ -37,7 +37,7 @@ bool Staging::begin(std::uint32_t lane, std::uint32_t& budget) noexcept {
   return true;
 }
 
-bool Staging::go_on(std::uint32_t lane, std::uint32_t& budget) noexcept {
+bool Staging::advance(std::uint32_t lane, std::uint32_t& budget) noexcept {
   if (budget == 0) return false;
   Stage& stage = stages_[lane];
   if (!stage.copying && !begin(lane, budget)) return true;
@@ -52,7 +52,7 @@ bool Staging::copy_and_check(std::uint32_t lane, std::uint32_t& budget) noexcept
   if (stage.left > 0 && budget > 0) {
     const std::uint32_t first = stage.chain.blocks;
     const Waiting& sender = stage.sender;
-    journal_.begin_blocks(lane, sender.had_left ? 0 : sender.incarnation,
+    journal_.begin_blocks(lane, sender.sender_left ? 0 : sender.incarnation,
                           std::min(stage.left, budget));
     const bool valid = copy(lane, budget);
     if (stage.chain.blocks > 0) {
@@ -160,7 +160,7 @@ StagedBatch Staging::staged(std::uint32_t lane, BlockIndex batch) const noexcept
           .batch = batch,
           .lane = lane,
           .incarnation = sender.incarnation,
-          .had_left = sender.had_left,
+          .sender_left = sender.sender_left,
           .of_dead = sender.of_dead,
           .late_now = record.late_now != 0};
 }

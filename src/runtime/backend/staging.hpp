@@ -5,8 +5,8 @@
 #include <span>
 #include <vector>
 
-#include "control/batch/pool.hpp"
 #include "control/queue/controller.hpp"
+#include "control/receiving/pool.hpp"
 #include "memory/ring/lane_receiver.hpp"
 #include "runtime/backend/schedule.hpp"
 #include "runtime/journal/journal_author.hpp"
@@ -26,7 +26,7 @@ class Staging {
 
   /// Copies and checks the next batch of a lane and takes its blocks off `budget`. True when that
   /// batch is staged or was dropped as invalid; false when the budget ended first.
-  bool go_on(std::uint32_t lane, std::uint32_t& budget) noexcept;
+  bool advance(std::uint32_t lane, std::uint32_t& budget) noexcept;
   /// True if no batch of this lane is half copied.
   bool is_between_batches(std::uint32_t lane) const noexcept { return !stages_[lane].copying; }
   /// True if the next batch of the lane claims to be express. Call only between batches, if the
@@ -49,7 +49,7 @@ class Staging {
   /// Data of a staged batch that are not in its record; indexed by its first block.
   struct Waiting {
     BlockIndex next = kNoBlock;
-    bool had_left = false;
+    bool sender_left = false;
     bool of_dead = false;
     std::uint64_t incarnation = 0;
   };

@@ -40,14 +40,14 @@ void StatusOutbox::report_the_begin() noexcept {
 
 void StatusOutbox::report_now(const Run& run, bool ends) noexcept {
   note(run);
-  tell(run, ends);
+  report(run, ends);
 }
 
 void StatusOutbox::report_waiting() noexcept {
   // first the journal: it has each end that a frontend sees
   for (const Run& end : waiting_) note(end);
   journal_.flush();
-  for (const Run& end : waiting_) tell(end, true);
+  for (const Run& end : waiting_) report(end, true);
   waiting_.clear();
 }
 
@@ -64,7 +64,7 @@ void StatusOutbox::report_no_row() noexcept {
 }
 
 /// Reports to the lane.
-void StatusOutbox::tell(const Run& run, bool ends) noexcept {
+void StatusOutbox::report(const Run& run, bool ends) noexcept {
   LaneReceiver& lane = lanes_[run.lane];
   for (std::uint32_t i = 0; i < run.count; ++i) {
     O80_COUNT(status_told);

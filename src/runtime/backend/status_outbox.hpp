@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "control/batch/status_sink.hpp"
+#include "control/receiving/status_sink.hpp"
 #include "memory/ring/lane_receiver.hpp"
 #include "memory/ring/status_word.hpp"
 #include "runtime/journal/journal_author.hpp"
@@ -60,7 +60,7 @@ class StatusOutbox {
   void note(const Run& run) noexcept {
     if (run.of_records) journal_.statuses(run.lane, {run.first_id, run.count, run.word});
   }
-  void tell(const Run& run, bool ends) noexcept;
+  void report(const Run& run, bool ends) noexcept;
 
   LaneReceivers& lanes_;
   JournalAuthor& journal_;

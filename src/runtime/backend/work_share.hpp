@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "control/batch/batch_plan.hpp"
 #include "control/batch/record.hpp"
+#include "control/receiving/batch_plan.hpp"
 
 namespace o80 {
 

@@ -3,7 +3,7 @@
 #include <mutex>
 #include <utility>
 
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "runtime/frontend/link.hpp"
 
 namespace o80 {

@@ -183,9 +183,9 @@ std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout 
                    : Timeout();
   };
   // a later member may fail during the wait for an earlier one
-  const auto look_at_all = [&] { std::ranges::for_each(bursts, &Burst::throw_if_failed); };
+  const auto check_all = [&] { std::ranges::for_each(bursts, &Burst::throw_if_failed); };
   const KeepWaiting watch = [&] {
-    look_at_all();
+    check_all();
     return !keep_waiting || keep_waiting();
   };
   std::vector<UntypedObservation> observations;
@@ -195,7 +195,7 @@ std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout 
       try {
         observations.push_back(burst.wait(left(), watch));
       } catch (const TimeoutError&) {
-        look_at_all();  // prefer a failure over the timeout
+        check_all();  // prefer a failure over the timeout
         throw;
       }
     }

@@ -80,9 +80,9 @@ void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadli
   link_->check_usable();
   if (bursting()) return;
   // rows may come so fast that wait_for_row never calls keep_waiting: call it here
-  const KeepWaiting goes_on = link_->guarded(keep_waiting);
+  const KeepWaiting continues = link_->guarded(keep_waiting);
   while (true) {
-    const bool is_called_off = !goes_on();
+    const bool is_called_off = !continues();
     const std::optional<Halt> acting = link_->halt();
     if (!acting || acting->number != number) return;
     const bool is_latched = acting->iteration >= 0;
@@ -92,7 +92,7 @@ void UntypedFrontend::wait_for_rest(std::uint64_t number, const Deadline& deadli
       if (!row.any_braking()) return;
       next = row.iteration() + 1;
     }
-    if (is_called_off || link_->rows.wait_for_row(next, deadline, goes_on) == Waited::timed_out) {
+    if (is_called_off || link_->rows.wait_for_row(next, deadline, continues) == Waited::timed_out) {
       throw TimeoutError("halt " + std::to_string(number) + " of '" + segment() + "' " +
                          (is_latched ? "still brakes the robot" : "is not in force yet") +
                          ": pass a longer timeout to resume");

@@ -15,9 +15,9 @@ namespace {
 constexpr std::chrono::nanoseconds kShortestBurst = std::chrono::seconds(1);
 
 /// Calls a KeepWaiting about every 50 ms in a loop whose waits may be too short to call it.
-class LookAround {
+class Poll {
  public:
-  LookAround(const Link& link, const KeepWaiting& keep_waiting)
+  Poll(const Link& link, const KeepWaiting& keep_waiting)
       : link_(link), keep_waiting_(keep_waiting) {}
 
   void operator()() {
@@ -92,12 +92,12 @@ UntypedObservation UntypedFrontend::wait_for_move(const Move& move, Timeout time
     give_up(latest());
   }
   const KeepWaiting guarded = link_->guarded(keep_waiting);
-  LookAround look_around(*link_, guarded);
+  Poll poll(*link_, guarded);
   while (!move.goal_->misses(row).empty()) {
     if (deadline.over()) give_up(row);
     throw_if_halted(*link_);
     keep_alive();
-    look_around();
+    poll();
     const Iteration next = row.iteration() + 1;
     if (link_->rows.wait_for_row(next, deadline, guarded) == Waited::timed_out) {
       give_up(row);
@@ -115,10 +115,10 @@ UntypedObservation UntypedFrontend::burst_to(const Move& move, Timeout timeout,
                                  : std::numeric_limits<Iteration>::max();
   const Timeout each = timeout ? std::max(*timeout, kShortestBurst) : timeout;
   const KeepWaiting guarded = link_->guarded(keep_waiting);
-  LookAround look_around(*link_, guarded);
+  Poll poll(*link_, guarded);
   BatchBuilder nothing;
   while (true) {
-    look_around();
+    poll();
     UntypedObservation row = burst(nothing, 1, each, keep_waiting, {});
     const bool ended = move.batch_.ended();
     if (ended) move.batch_.throw_unless_completed();

@@ -6,9 +6,9 @@
 
 #include "base/short_text.hpp"
 #include "o80/runtime/frontend.hpp"
-#include "runtime/backend/schedule.hpp"
 #include "runtime/frontend/link.hpp"
 #include "runtime/frontend/sent.hpp"
+#include "runtime/protocol/schedule_limits.hpp"
 
 namespace o80 {
 
@@ -536,7 +536,7 @@ CommandId UntypedFrontend::draw_ids(LaneSender& lane, std::uint64_t n, bool stay
 
 /// What a batch says about the row by which it was decided: also, which iteration was the newest
 /// then.
-std::optional<Seen> Link::told(const std::optional<Seen>& seen) const {
+std::optional<Seen> Link::with_newest_row(const std::optional<Seen>& seen) const {
   if (!seen) return {};
   if (seen->epoch == 0 || seen->iteration < 0 || seen->iteration > kMaxIterations) {
     throw InvalidArgument("seen: row " + std::to_string(seen->iteration) + " of run " +
@@ -544,22 +544,22 @@ std::optional<Seen> Link::told(const std::optional<Seen>& seen) const {
                           " is no row: give an observation that a frontend or a recording has "
                           "returned");
   }
-  Seen told = *seen;
-  told.since = -1;
+  Seen sent = *seen;
+  sent.since = -1;
   if (seen->epoch == description->epoch) {
-    if (seen->iteration <= history.published()) told.since = seen->iteration;
+    if (seen->iteration <= history.published()) sent.since = seen->iteration;
   } else if (seen->time >= 0 && seen->clock == description->schema.head.clock) {
     const Iteration newest = iteration_at(seen->time);
-    if (newest >= history.oldest()) told.since = newest;
+    if (newest >= history.oldest()) sent.since = newest;
   }
-  return told;
+  return sent;
 }
 
 /// Seals a batch, sends it, and lets an inline robot take it.
 Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted,
                            const std::optional<Seen>& seen, Requested requested) {
   Sent sent;
-  sent.seen = link_->told(seen);
+  sent.seen = link_->with_newest_row(seen);
   std::shared_ptr<InlineRunner> runner;
   {
     const auto lock = link_->lock_to_send();

@@ -10,17 +10,17 @@
 #include <string>
 #include <vector>
 
-#include "control/batch/batch_builder.hpp"
 #include "control/batch/command_check.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "memory/ring/history.hpp"
 #include "memory/ring/lane_sender.hpp"
 #include "memory/segment/attached_segment.hpp"
 #include "memory/segment/halt_word.hpp"
 #include "memory/segment/signal.hpp"
 #include "o80/runtime/observation.hpp"
-#include "runtime/backend/inline_runner.hpp"
 #include "runtime/frontend/ids_in_flight.hpp"
 #include "runtime/frontend/sent_commands.hpp"
+#include "runtime/protocol/inline_runner.hpp"
 
 namespace o80 {
 
@@ -75,7 +75,7 @@ struct Link {
   /// As UntypedFrontend::iteration_at.
   Iteration iteration_at(std::int64_t time) const;
   SegmentError damaged() const;
-  std::optional<Seen> told(const std::optional<Seen>& seen) const;
+  std::optional<Seen> with_newest_row(const std::optional<Seen>& seen) const;
 
   AttachedSegment segment;
   std::shared_ptr<const Description> description;

@@ -53,7 +53,7 @@ void JournalAuthor::dropped(std::uint32_t lane, CommandId batch) noexcept {
 
 namespace {
 JournalBatch payload_of(const StagedBatch& sent) noexcept {
-  return {sent.ticket, sent.had_left ? 0 : sent.incarnation, sent.at};
+  return {sent.ticket, sent.sender_left ? 0 : sent.incarnation, sent.at};
 }
 }  // namespace
 

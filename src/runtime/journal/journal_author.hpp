@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "control/batch/record.hpp"
-#include "control/batch/status_sink.hpp"
+#include "control/receiving/status_sink.hpp"
 #include "memory/ring/journal.hpp"
 #include "memory/ring/status_word.hpp"
 #include "o80/describe/rows.hpp"

@@ -61,9 +61,9 @@ void JournalEncoder::put_records(LittleEndianWriter& put, const JournalHead& hea
   const std::size_t count = blocks.size() / kBlockBytes;
   const bool is_whole = count > 0 && blocks.size() % kBlockBytes == 0;
   const bool begins = is_whole && head.what == 0 && blocks.front() == kBatchKind;
-  const bool goes_on =
+  const bool continues =
       is_whole && open.blocks > 0 && open.id == head.id && open.blocks == head.what;
-  if (!begins && !goes_on) {
+  if (!begins && !continues) {
     open = {};
     return put_lengths(put, journal_format::kLost, 0, 0, 0);
   }

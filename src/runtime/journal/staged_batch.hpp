@@ -2,7 +2,7 @@
 
 #include <cstdint>
 
-#include "control/batch/pool.hpp"
+#include "control/receiving/pool.hpp"
 
 namespace o80 {
 
@@ -13,7 +13,7 @@ struct StagedBatch {
   BlockIndex batch = kNoBlock;
   std::uint32_t lane = 0;
   std::uint64_t incarnation = 0;  // owner of the lane when staging began
-  bool had_left = false;          // the sender had closed or lost the lane by then
+  bool sender_left = false;       // the sender had closed or lost the lane by then
   bool of_dead = false;           // and was known to be dead
   bool late_now = false;
   bool silent = false;  // the watchdog has found the sender silent since

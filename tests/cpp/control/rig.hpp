@@ -9,10 +9,10 @@
 #include <utility>
 #include <vector>
 
-#include "control/batch/batch_builder.hpp"
-#include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
 #include "control/queue/controller.hpp"
+#include "control/receiving/pool.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80::test {

@@ -8,7 +8,7 @@
 #include <memory>
 #include <random>
 
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "memory/ring/lane_sender.hpp"
 #include "runtime/station.hpp"
 

@@ -9,7 +9,7 @@
 #include <thread>
 #include <vector>
 
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "memory/private_directory.hpp"
 #include "message_of.hpp"
 #include "o80/robot/plant_requests.hpp"

@@ -79,8 +79,8 @@ void LinearReference::pulse(std::uint32_t lane) {
   const Queued* before = nullptr;
   for (Queued& queued : batches_[lane]) {
     if (queued.step->group != 0) {
-      const bool goes_on = before != nullptr && before->step->group == queued.step->group;
-      queued.group = goes_on ? before->group : std::make_shared<Group>();
+      const bool continues = before != nullptr && before->step->group == queued.step->group;
+      queued.group = continues ? before->group : std::make_shared<Group>();
       queued.group->places.push_back(queued.place);
       ++queued.group->open;
     }

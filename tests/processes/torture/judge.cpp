@@ -6,7 +6,7 @@
 #include <map>
 
 #include "control/batch/record.hpp"
-#include "control/batch/status_sink.hpp"
+#include "control/receiving/status_sink.hpp"
 
 namespace torture {
 

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <set>
 
-#include "control/batch/status_sink.hpp"
+#include "control/receiving/status_sink.hpp"
 #include "torture/judge.hpp"
 
 namespace torture {

@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"
 #include "memory/os/atomic_words.hpp"

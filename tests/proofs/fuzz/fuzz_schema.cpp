@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "control/batch/command_check.hpp"
-#include "control/batch/pool.hpp"
 #include "control/queue/controller.hpp"
+#include "control/receiving/pool.hpp"
 #include "describe/table.hpp"
 #include "fuzz/bytes.hpp"
 #include "fuzz/robot.hpp"

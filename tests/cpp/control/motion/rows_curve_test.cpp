@@ -27,7 +27,7 @@ struct Row {
 class Played {
  public:
   Played(const Moment& start, const std::vector<Row>& rows, const Span& bounds = kUnbounded) {
-    plan.stand(start);
+    plan.start_from(start);
     double before = start.position;
     for (std::size_t i = 0; i < rows.size(); ++i) {
       RowsAhead ahead;
@@ -154,7 +154,7 @@ TEST(RowsCurve, ATakeOverAtAnyMomentOfASineKeepsItsAcceleration) {
                         rows_of_sine(0, kStep, kStep, static_cast<int>(at / kStep) + 3));
     // the plan as it is then
     NumberPlan plan;
-    plan.stand({sine(0.0), sine(0.0) - sine(-1.0)});
+    plan.start_from({sine(0.0), sine(0.0) - sine(-1.0)});
     const std::vector<Row> rows = rows_of_sine(0, kStep, kStep, static_cast<int>(at / kStep) + 3);
     for (std::size_t i = 0; i <= static_cast<std::size_t>(at / kStep); ++i) {
       plan.curve_on(Profile::smooth, rows[i].place, kStep,

@@ -31,14 +31,14 @@ void run_for(std::int64_t duration) {
 }
 
 bool fails_once(Spinner& spinner) {
-  const bool spun = spinner.worth();
+  const bool spun = spinner.should_spin();
   if (spun) spinner.ended(false);
   return spun;
 }
 
 TEST(Spinner, NeverSpinsOnASingleProcessor) {
   Spinner spinner(1);
-  for (std::uint32_t i = 0; i < 3 * Spinner::kProbe; ++i) EXPECT_FALSE(spinner.worth());
+  for (std::uint32_t i = 0; i < 3 * Spinner::kProbe; ++i) EXPECT_FALSE(spinner.should_spin());
 }
 
 TEST(Spinner, SpinsInAPinnedThreadOfAProcessThatMayUseMoreProcessors) {
@@ -51,7 +51,7 @@ TEST(Spinner, SpinsInAPinnedThreadOfAProcessThatMayUseMoreProcessors) {
     CPU_SET(sched_getcpu(), &one);
     ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
     Spinner spinner;
-    EXPECT_TRUE(spinner.worth());
+    EXPECT_TRUE(spinner.should_spin());
   }).join();
 }
 
@@ -68,7 +68,7 @@ TEST(Spinner, IsRestoredByOneSuccess) {
   Spinner spinner(2);
   while (fails_once(spinner)) {
   }
-  while (!spinner.worth()) {
+  while (!spinner.should_spin()) {
   }
   spinner.ended(true);
 
@@ -135,7 +135,7 @@ class SpinnerAmongOthers : public testing::Test {
   /// Spins in vain until only probes spin, and waits until the next one is due.
   void await_probe() {
     for (std::uint32_t i = 0; i < Spinner::kPatience; ++i) spinner_.ended(false);
-    for (std::uint32_t i = 1; i < Spinner::kProbe; ++i) EXPECT_FALSE(spinner_.worth());
+    for (std::uint32_t i = 1; i < Spinner::kProbe; ++i) EXPECT_FALSE(spinner_.should_spin());
   }
 
   Spinner spinner_{2};

@@ -23,7 +23,7 @@ class LaneTest : public SegmentTest {
  protected:
   std::vector<std::uint64_t> take_all() {
     std::vector<std::uint64_t> numbers;
-    if (!lanes_.look()) return numbers;
+    if (!lanes_.poll()) return numbers;
     while (const auto lane = lanes_.next()) numbers.push_back(take_batch(lanes_[*lane]));
     return numbers;
   }
@@ -45,7 +45,7 @@ TEST_F(LaneTest, CarriesBatchesWholeAroundItsEndManyTimes) {
     const std::size_t count = 1 + static_cast<std::size_t>(round * 7 % 16);
     send(sender, ++number, count);
     std::size_t taken = 0;
-    ASSERT_TRUE(lanes_.look());
+    ASSERT_TRUE(lanes_.poll());
     const auto lane = lanes_.next();
     ASSERT_TRUE(lane);
     EXPECT_EQ(take_batch(lanes_[*lane], &taken), number);
@@ -56,11 +56,11 @@ TEST_F(LaneTest, CarriesBatchesWholeAroundItsEndManyTimes) {
 
 TEST_F(LaneTest, HasNothingToLookAtUntilTheBellRings) {
   EXPECT_THAT(take_all(), ElementsAre());
-  EXPECT_FALSE(lanes_.look());
+  EXPECT_FALSE(lanes_.poll());
   LaneSender sender(attached_);
   send(sender, 1);
   EXPECT_THAT(take_all(), ElementsAre(1));
-  EXPECT_FALSE(lanes_.look());
+  EXPECT_FALSE(lanes_.poll());
 }
 
 TEST_F(LaneTest, RefusesABatchThatDoesNotFitAndSendsNothingOfIt) {
@@ -95,7 +95,7 @@ TEST_F(LaneTest, TakesBatchesOfAllLanesInTheOrderOfTheirTickets) {
 TEST_F(LaneTest, LeavesForTheNextLookWhatWasSentAfterThisOne) {
   LaneSender sender(attached_);
   send(sender, 1);
-  ASSERT_TRUE(lanes_.look());
+  ASSERT_TRUE(lanes_.poll());
   send(sender, 2);
   const auto lane = lanes_.next();
   ASSERT_TRUE(lane);
@@ -244,7 +244,7 @@ TEST_F(LaneTest, TakesABatchWhoseTicketNobodyDrew) {
 TEST_F(LaneTest, ForgetsGarbageWhenToldTo) {
   LaneSender sender(attached_);
   send(sender, 1, 3);
-  ASSERT_TRUE(lanes_.look());
+  ASSERT_TRUE(lanes_.poll());
   ASSERT_TRUE(lanes_.next());
   lanes_[0].reset();
   flush();
@@ -288,7 +288,7 @@ TEST_F(LaneTest, TakesTheBatchOfASuccessorWherePartOfALaneWasTakenBack) {
     }
     LaneSender successor(attached_);
     // no room until the backend has seen whose lane it is
-    lanes_[0].meet_owner();
+    lanes_[0].poll_owner();
     flush();
     EXPECT_EQ(successor.free_blocks(), 16U);
     send(successor, 7, blocks);

@@ -130,7 +130,7 @@ TEST_F(StressTest, SendersThatComeAndGoLoseNothing) {
   std::uint64_t taken = 0;
   while (true) {
     const bool over = left == 0;
-    bool news = lanes.look();
+    bool news = lanes.poll();
     while (news) {
       const std::optional<std::uint32_t> lane = lanes.next();
       if (!lane) break;

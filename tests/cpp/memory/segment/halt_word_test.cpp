@@ -20,7 +20,7 @@ class HaltWordTest : public SegmentTest {
 };
 
 TEST_F(HaltWordTest, NoHaltActsAtFirst) {
-  EXPECT_FALSE(latch_.look());
+  EXPECT_FALSE(latch_.poll());
   EXPECT_FALSE(latch_.acts());
   EXPECT_EQ(shown_halt(attach().view()), std::nullopt);
 }
@@ -28,9 +28,9 @@ TEST_F(HaltWordTest, NoHaltActsAtFirst) {
 TEST_F(HaltWordTest, AHaltIsLatchedAndShownWithWhoAndWhy) {
   const AttachedSegment frontend = attach();
   EXPECT_EQ(request_halt(frontend.view(), HaltCause::frontend, "pid 7 (python)", "it smokes"), 1U);
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   EXPECT_TRUE(latch_.show(12));
-  EXPECT_FALSE(latch_.look());
+  EXPECT_FALSE(latch_.poll());
   const auto halt = shown_halt(attach("arm", Access::read_only).view());
   ASSERT_TRUE(halt);
   EXPECT_EQ(halt->number, 1U);
@@ -43,7 +43,7 @@ TEST_F(HaltWordTest, AHaltIsLatchedAndShownWithWhoAndWhy) {
 TEST_F(HaltWordTest, AReasonThatComesAfterTheHaltIsReadBeforeTheBackendShowsIt) {
   const AttachedSegment frontend = attach();
   frontend.view().bell().halts.fetch_add(1);  // the first step of request_halt
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   EXPECT_FALSE(latch_.show(12));
   EXPECT_EQ(requested_halt(frontend.view())->reason(), "");
   put_halt(frontend.view(), 1, HaltCause::frontend, "pid 7 (python)", "it smokes");  // the second
@@ -56,12 +56,12 @@ TEST_F(HaltWordTest, AReasonThatComesAfterTheHaltIsReadBeforeTheBackendShowsIt) 
 TEST_F(HaltWordTest, ANewerHaltThanTheOneThatWasSeenIsNotCleared) {
   const AttachedSegment frontend = attach();
   request_halt(frontend.view(), HaltCause::frontend, "a", "first");
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   latch_.show(1);
   request_halt(frontend.view(), HaltCause::frontend, "b", "second");
   EXPECT_FALSE(latch_.clear());
   EXPECT_TRUE(latch_.acts());
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   latch_.show(2);
   EXPECT_EQ(shown_halt(frontend.view())->reason(), "second");
   EXPECT_TRUE(latch_.clear());
@@ -72,7 +72,7 @@ TEST_F(HaltWordTest, ANewerHaltThanTheOneThatWasSeenIsNotCleared) {
 TEST_F(HaltWordTest, TextsThatAreTooLongAreCut) {
   const std::string long_text(1000, 'x');
   request_halt(segment_.view(), HaltCause::driver, long_text, long_text);
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   EXPECT_TRUE(latch_.show(0));
   EXPECT_EQ(latch_.halt().who_text(), std::string(63, 'x'));
   EXPECT_EQ(latch_.halt().reason(), std::string(247, 'x'));
@@ -84,15 +84,15 @@ TEST_F(HaltWordTest, AHaltNeedsNoLane) {
   const LaneSender one(first);
   const LaneSender two(second);  // that is all of them
   request_halt(attach().view(), HaltCause::frontend, "", "");
-  EXPECT_TRUE(latch_.look());
+  EXPECT_TRUE(latch_.poll());
 }
 
 TEST_F(HaltWordTest, ACounterThatIsTurnedBackIsAHaltToo) {
   segment_.view().bell().halts = 5;
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   ASSERT_TRUE(latch_.clear());
   segment_.view().bell().halts = 0;
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   EXPECT_TRUE(latch_.acts());
   EXPECT_TRUE(latch_.clear());
 }
@@ -100,9 +100,9 @@ TEST_F(HaltWordTest, ACounterThatIsTurnedBackIsAHaltToo) {
 TEST_F(HaltWordTest, AHaltWakesABackendThatStandsStill) {
   BellWaiter bell(segment_.view());
   std::thread backend([&] {
-    while (!latch_.look()) {
+    while (!latch_.poll()) {
       const std::uint32_t seen = bell.value();
-      if (!latch_.look()) bell.wait(seen);
+      if (!latch_.poll()) bell.wait(seen);
       if (latch_.acts()) break;
     }
   });
@@ -137,7 +137,7 @@ TEST_F(HaltWordTest, EachHaltThatIsShownHasItsOwnReason) {
   std::uint64_t last = 0;
   Iteration iteration = 0;
   while (asking > 0 || last < 3 * kEach) {
-    if (!latch_.look()) continue;
+    if (!latch_.poll()) continue;
     EXPECT_GT(latch_.halt().number, last);
     last = latch_.halt().number;
     latch_.show(iteration++);
@@ -153,7 +153,7 @@ TEST_F(HaltWordTest, AForkedChildMayHalt) {
     request_halt(frontend.view(), HaltCause::frontend, "the child", "");
   });
   EXPECT_EQ(child.wait(), 0);
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   EXPECT_TRUE(latch_.show(0));
   EXPECT_EQ(latch_.halt().who_text(), "the child");
 }
@@ -164,7 +164,7 @@ TEST_F(HaltWordTest, TheHaltOfAKilledProcessStands) {
     stand();
   });
   child.kill_now();
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   EXPECT_TRUE(latch_.show(0));
   EXPECT_EQ(latch_.halt().reason(), "last word");
 }
@@ -173,7 +173,7 @@ TEST_F(HaltWordTest, TheHaltOfAKilledProcessStands) {
 TEST_F(HaltWordTest, AHaltWithoutItsReasonActs) {
   request_halt(segment_.view(), HaltCause::frontend, "before", "");
   segment_.view().bell().halts.fetch_add(1);
-  ASSERT_TRUE(latch_.look());
+  ASSERT_TRUE(latch_.poll());
   EXPECT_FALSE(latch_.show(3));
   EXPECT_EQ(latch_.halt().number, 2U);
   EXPECT_EQ(latch_.halt().cause, HaltCause::none);

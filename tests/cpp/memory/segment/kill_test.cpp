@@ -148,7 +148,7 @@ TEST_F(KillTest, FreesTheLaneOfADeadFrontendAndKeepsWhatItCommitted) {
   send(next, 2, 5);
 
   std::vector<std::uint64_t> taken;
-  ASSERT_TRUE(lanes.look());
+  ASSERT_TRUE(lanes.poll());
   while (const auto lane = lanes.next()) taken.push_back(take_batch(lanes[*lane]));
   EXPECT_THAT(taken, ElementsAre(1, 2));
 }

@@ -26,31 +26,31 @@ RowHead row(std::int64_t iteration, std::uint32_t overruns, std::uint32_t skippe
 
 TEST(OverrunReport, SaysNothingWhileAllIterationsAreInTime) {
   OverrunReport report(kPeriod);
-  EXPECT_FALSE(report.look(row(1000, 0), kSecond));
-  EXPECT_FALSE(report.look(row(2000, 0), 2 * kSecond));
+  EXPECT_FALSE(report.poll(row(1000, 0), kSecond));
+  EXPECT_FALSE(report.poll(row(2000, 0), 2 * kSecond));
 }
 
 TEST(OverrunReport, SaysHowManyAtOnceAndThenAtALimitedRate) {
   OverrunReport report(kPeriod);
-  EXPECT_FALSE(report.look(row(0, 0), kSecond / 2));
-  EXPECT_THAT(report.look(row(1000, 303, 12), kSecond).value_or(""),
+  EXPECT_FALSE(report.poll(row(0, 0), kSecond / 2));
+  EXPECT_THAT(report.poll(row(1000, 303, 12), kSecond).value_or(""),
               AllOf(HasSubstr("303 of the last 1000 iterations were late or missed their tick"),
                     HasSubstr("100 Hz reached of 1000, 12 periods were skipped")));
   for (int second = 2; second < 11; ++second) {
-    EXPECT_FALSE(report.look(row(second * 1000, 303 * static_cast<std::uint32_t>(second)),
+    EXPECT_FALSE(report.poll(row(second * 1000, 303 * static_cast<std::uint32_t>(second)),
                              second * kSecond));
   }
-  EXPECT_THAT(report.look(row(11000, 3333, 12), 11 * kSecond).value_or(""),
+  EXPECT_THAT(report.poll(row(11000, 3333, 12), 11 * kSecond).value_or(""),
               AllOf(HasSubstr("3030 of the last 10000 iterations were late"),
                     HasSubstr("0 periods were skipped")));
-  EXPECT_FALSE(report.look(row(30000, 3333, 12), 30 * kSecond)) << "none since";
+  EXPECT_FALSE(report.poll(row(30000, 3333, 12), 30 * kSecond)) << "none since";
 }
 
 TEST(OverrunReport, CountsOnlyRowsSinceTheLastOnesInTime) {
   OverrunReport report(kPeriod);
-  EXPECT_FALSE(report.look(row(0, 0), kSecond));
-  EXPECT_FALSE(report.look(row(5000, 0), 50 * kSecond));
-  EXPECT_THAT(report.look(row(5100, 3), 51 * kSecond).value_or(""),
+  EXPECT_FALSE(report.poll(row(0, 0), kSecond));
+  EXPECT_FALSE(report.poll(row(5000, 0), 50 * kSecond));
+  EXPECT_THAT(report.poll(row(5100, 3), 51 * kSecond).value_or(""),
               HasSubstr("3 of the last 100 iterations"));
 }
 
@@ -60,20 +60,20 @@ TEST(HangReport, SaysWhatHangsAtALimitedRateAndWhenItIsOver) {
   loop.period = kPeriod;
   loop.row_age = 0;
   HangReport report;
-  EXPECT_FALSE(report.look(loop, kSecond));
+  EXPECT_FALSE(report.poll(loop, kSecond));
 
   loop.row_age = 10 * kSecond;
   loop.slow_verb = Verb::read;
   loop.slow_for = 9 * kSecond;
-  EXPECT_THAT(report.look(loop, 2 * kSecond).value_or(""),
+  EXPECT_THAT(report.poll(loop, 2 * kSecond).value_or(""),
               Eq("no row for 10 s: read() of the driver has been running for 9 s"));
-  EXPECT_FALSE(report.look(loop, 11 * kSecond));
-  EXPECT_TRUE(report.look(loop, 12 * kSecond));
+  EXPECT_FALSE(report.poll(loop, 11 * kSecond));
+  EXPECT_TRUE(report.poll(loop, 12 * kSecond));
 
   loop.row_age = 0;
   loop.slow_verb = Verb::none;
-  EXPECT_EQ(report.look(loop, 13 * kSecond).value_or(""), "the loop continues");
-  EXPECT_FALSE(report.look(loop, 14 * kSecond));
+  EXPECT_EQ(report.poll(loop, 13 * kSecond).value_or(""), "the loop continues");
+  EXPECT_FALSE(report.poll(loop, 14 * kSecond));
 }
 
 TEST(LoopReport, EndsAtOnceAlthoughItHasFoundNoBackend) {

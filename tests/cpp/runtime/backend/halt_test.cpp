@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/station.hpp"
 

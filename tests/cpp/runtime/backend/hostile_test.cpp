@@ -12,7 +12,7 @@
 #include <thread>
 #include <vector>
 
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "memory/child_process.hpp"
 #include "memory/ring/lane_sender.hpp"
 #include "memory/segment/segment_name.hpp"

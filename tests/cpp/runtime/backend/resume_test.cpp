@@ -6,7 +6,7 @@
 #include <cmath>
 #include <thread>
 
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/station.hpp"
 

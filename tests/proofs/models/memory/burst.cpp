@@ -65,7 +65,7 @@ struct Bursts : rl::test_suite<Bursts, 4> {
     o80::RowSignal signal(segment.view);
     const auto bursts = static_cast<o80::Iteration>(kBursts + 1);
     for (o80::Iteration row = 0; row < bursts;) {
-      const bool news = lanes.look();
+      const bool news = lanes.poll();
       const std::optional<std::uint32_t> lane = news ? lanes.next() : std::nullopt;
       if (!lane) {
         o80::wake_sleepers(segment.view, {.lanes = lanes.announce()});
@@ -79,7 +79,7 @@ struct Bursts : rl::test_suite<Bursts, 4> {
       lanes[*lane].set_burst_done(id, row);
       lanes[*lane].free(1);
       o80::wake_sleepers(segment.view, {.lanes = lanes.announce(), .rows = signal.announce(row)});
-      lanes.look_again();
+      lanes.rescan();
       ++row;
     }
   }

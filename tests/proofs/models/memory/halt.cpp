@@ -54,13 +54,13 @@ struct Halts : rl::test_suite<Halts, 2 + kAskers> {
     std::uint64_t last = 0;
     while (last < kAskers * kEach) {
       const std::uint32_t seen = bell.value();
-      if (halts.look()) {
+      if (halts.poll()) {
         model::check(halts.halt().number > last, "numbers of halts grow");
         last = halts.halt().number;
         show(halts, last);
         const bool cleared = halts.clear();
         const std::uint64_t now = segment.view.bell().halts.load(std::memory_order_seq_cst);
-        if (cleared && now > last && halts.look()) last = show_rest(halts, last);
+        if (cleared && now > last && halts.poll()) last = show_rest(halts, last);
         continue;
       }
       bell.wait(seen);

@@ -57,7 +57,7 @@ struct Lanes : rl::test_suite<Lanes, 3> {
     o80::BellWaiter bell(segment.view);
     std::vector<std::uint64_t> taken;
     while (taken.size() < 5) {
-      bool news = lanes.look();
+      bool news = lanes.poll();
       while (news) {
         const std::optional<std::uint32_t> lane = lanes.next();
         if (!lane) break;

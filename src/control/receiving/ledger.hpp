@@ -6,10 +6,10 @@
 #include <new>
 
 #include "control/batch/chunk.hpp"
-#include "control/batch/command_group.hpp"
-#include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
-#include "control/batch/status_sink.hpp"
+#include "control/receiving/command_group.hpp"
+#include "control/receiving/pool.hpp"
+#include "control/receiving/status_sink.hpp"
 
 namespace o80 {
 
@@ -53,16 +53,16 @@ class Ledger {
   /// Tells what was decided of a chunk, by the active status of its batch (TakenChunk).
   void note_decided(BlockIndex record, const TakenChunk& chunk, Iteration iteration) noexcept {
     const TakenBatch& of = batch(pool_.head(record).own[Own::kBatch]);
-    tell(of.lane, of.id, {Status::active, Reason::none, chunk.detail(), chunk.shift & 0xFFFF},
-         iteration, StatusChange::Of::chunk);
+    report(of.lane, of.id, {Status::active, Reason::none, chunk.detail(), chunk.shift & 0xFFFF},
+           iteration, StatusChange::Of::chunk);
   }
   /// Tells what was decided when it begins, by the status of the end of its batch (BegunChunk).
   void note_begun(BlockIndex record, const BegunChunk& chunk, Iteration iteration) noexcept {
     TakenBatch& of = batch(pool_.head(record).own[Own::kBatch]);
     of.of_chunk = chunk.detail();
     of.late_of_chunk = chunk.late();
-    tell(of.lane, of.id + 1, {Status::active, Reason::none, of.of_chunk, of.late_of_chunk},
-         iteration, StatusChange::Of::chunk);
+    report(of.lane, of.id + 1, {Status::active, Reason::none, of.of_chunk, of.late_of_chunk},
+           iteration, StatusChange::Of::chunk);
   }
   /// A record has ended; reported at once. A group is reported when its last member has ended, with
   /// the first end status that is not completed.
@@ -141,8 +141,8 @@ class Ledger {
     last_ = group;
   }
   void member_ended(BlockIndex group, const Outcome& outcome, Iteration iteration) noexcept;
-  void tell(std::uint32_t lane, CommandId id, const Outcome& outcome, Iteration iteration,
-            StatusChange::Of of) noexcept {
+  void report(std::uint32_t lane, CommandId id, const Outcome& outcome, Iteration iteration,
+              StatusChange::Of of) noexcept {
     // as much of a delay as a status can tell
     const auto late = static_cast<std::uint16_t>(std::min<std::int64_t>(outcome.late, 0xFFFF));
     sink_.changed({lane, id, outcome.status, outcome.reason, outcome.detail, iteration, of, late});

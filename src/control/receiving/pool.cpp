@@ -1,4 +1,4 @@
-#include "control/batch/pool.hpp"
+#include "control/receiving/pool.hpp"
 
 #include <algorithm>
 #include <cerrno>

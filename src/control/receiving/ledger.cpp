@@ -1,4 +1,4 @@
-#include "control/batch/ledger.hpp"
+#include "control/receiving/ledger.hpp"
 
 namespace o80 {
 
@@ -7,7 +7,7 @@ void Ledger::enter(std::uint32_t lane, BlockIndex block, const BlockChain& spare
   open_groups_ += groups;
   undecided_groups_ += groups;
   TakenBatch& taken = take(lane, block, spare, pool_.batch(block).records, iteration);
-  tell(lane, taken.id, {Status::active}, iteration, StatusChange::Of::batch);
+  report(lane, taken.id, {Status::active}, iteration, StatusChange::Of::batch);
   if (missing_from >= taken.records) return;
   taken.told = missing_from;
   taken.reason = Reason::invalid;
@@ -27,8 +27,8 @@ void Ledger::reject(std::uint32_t lane, BlockIndex block, const Outcome& outcome
   taken.detail = outcome.detail;
   taken.reported_as = outcome.status;
   taken.told = 0;
-  tell(lane, taken.id, {Status::rejected, outcome.reason, outcome.detail}, iteration,
-       StatusChange::Of::batch);
+  report(lane, taken.id, {Status::rejected, outcome.reason, outcome.detail}, iteration,
+         StatusChange::Of::batch);
   if (records > 0) append(block);
   close(block, iteration);
 }
@@ -46,7 +46,7 @@ void Ledger::activate(BlockIndex record, Iteration iteration, const Outcome& out
       --undecided_groups_;
     }
   }
-  tell(lane_of(record), id, outcome, iteration, StatusChange::Of::record);
+  report(lane_of(record), id, outcome, iteration, StatusChange::Of::record);
 }
 
 void Ledger::end(BlockIndex record, const Outcome& outcome, Iteration iteration) noexcept {
@@ -57,7 +57,7 @@ void Ledger::end(BlockIndex record, const Outcome& outcome, Iteration iteration)
   const BlockIndex block = head.own[Own::kBatch];
   const auto blocks = static_cast<std::uint32_t>(blocks_of(head.payload_bytes));
   const std::uint32_t lane = batch(block).lane;
-  if (!of_group) tell(lane, id, outcome, iteration, StatusChange::Of::record);
+  if (!of_group) report(lane, id, outcome, iteration, StatusChange::Of::record);
   pool_.release(record, head.own[Own::kLast], blocks);
   sink_.freed(lane, blocks);
   if (of_group) return member_ended(group, outcome, iteration);
@@ -93,7 +93,7 @@ void Ledger::ended(BlockIndex block, Iteration iteration) noexcept {
 
   Outcome outcome{taken.end, Reason::none, taken.of_chunk, taken.late_of_chunk};
   if (taken.end == Status::rejected) outcome = {taken.end, taken.reason, taken.detail};
-  tell(taken.lane, taken.id + 1, outcome, taken.last_end, StatusChange::Of::batch_end);
+  report(taken.lane, taken.id + 1, outcome, taken.last_end, StatusChange::Of::batch_end);
   sink_.freed(taken.lane, 1 + taken.spare.blocks);
   pool_.release(taken.spare);
   pool_.release(block, block, 1);
@@ -120,8 +120,8 @@ std::uint32_t Ledger::report_ends(std::uint32_t most) noexcept {
       const auto of =
           taken.end == Status::rejected ? StatusChange::Of::of_rejected : StatusChange::Of::record;
       for (; taken.told < taken.records && budget > 0; ++taken.told, --taken.open, --budget) {
-        tell(taken.lane, record_id(taken.id, taken.told),
-             {taken.reported_as, taken.reason, taken.detail}, taken.taken_at, of);
+        report(taken.lane, record_id(taken.id, taken.told),
+               {taken.reported_as, taken.reason, taken.detail}, taken.taken_at, of);
       }
       // keeps the batch open until all are reported
       if (taken.told < taken.records) return most;

@@ -19,7 +19,7 @@
 #include "o80/describe/schema.hpp"
 #include "o80/runtime/provenance.hpp"
 #include "runtime/backend/burst_server.hpp"
-#include "runtime/replay/journal_player.hpp"
+#include "runtime/playing/journal_player.hpp"
 
 namespace o80 {
 

@@ -1,4 +1,4 @@
-#include "runtime/replay/played_segment.hpp"
+#include "runtime/playing/played_segment.hpp"
 
 #include <time.h>
 
@@ -169,7 +169,7 @@ void PlayedSegment::show_halt(Iteration k, bool halted) {
   const Halt& recorded = journal_.halt();
   const bool is_new = halted && recorded.number > halts_.halt().number;
   if (halts_.acts() && (!halted || is_new)) {
-    while (!halts_.clear()) halts_.look();
+    while (!halts_.clear()) halts_.poll();
   }
   if (!halted || halts_.acts()) return;
   if (recorded.number > 0) {
@@ -178,7 +178,7 @@ void PlayedSegment::show_halt(Iteration k, bool halted) {
   } else {
     request_halt(segment_.view(), HaltCause::none, {}, {});
   }
-  halts_.look();
+  halts_.poll();
   halts_.show(recorded.number > 0 ? recorded.iteration : k);
 }
 

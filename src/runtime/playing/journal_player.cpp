@@ -1,4 +1,4 @@
-#include "runtime/replay/journal_player.hpp"
+#include "runtime/playing/journal_player.hpp"
 
 #include <algorithm>
 #include <cstring>

@@ -1,4 +1,4 @@
-#include "runtime/replay/played_segment.hpp"
+#include "runtime/playing/played_segment.hpp"
 
 #include <gmock/gmock.h>
 #include <signal.h>

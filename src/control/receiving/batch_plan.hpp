@@ -4,10 +4,10 @@
 #include <optional>
 #include <vector>
 
-#include "control/batch/ledger.hpp"
-#include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
-#include "control/batch/record_check.hpp"
+#include "control/receiving/ledger.hpp"
+#include "control/receiving/pool.hpp"
+#include "control/receiving/record_check.hpp"
 
 namespace o80 {
 

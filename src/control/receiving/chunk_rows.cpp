@@ -1,4 +1,4 @@
-#include "control/batch/chunk.hpp"
+#include "control/receiving/chunk_rows.hpp"
 
 namespace o80 {
 
@@ -91,7 +91,7 @@ void ChunkRows::join(Notes& notes) noexcept {
   }
 }
 
-bool is_sane(const ChunkHead& chunk) noexcept {
+bool is_valid(const ChunkHead& chunk) noexcept {
   return chunk.rows > 0 && chunk.rows <= kMaxChunkRows && chunk.first < chunk.rows &&
          chunk.ease <= kLatestDue && chunk.fixed <= 1 && chunk.reject_late <= 1 &&
          chunk.final <= 1 && chunk.anchor >= -static_cast<Iteration>(kLatestDue) &&

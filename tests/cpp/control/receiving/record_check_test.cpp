@@ -1,4 +1,4 @@
-#include "control/batch/record_check.hpp"
+#include "control/receiving/record_check.hpp"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "control/batch/record_check.hpp"
+#include "control/receiving/record_check.hpp"
 
 #include <algorithm>
 #include <cmath>
@@ -62,9 +62,9 @@ RecordCheck::Verdict RecordCheck::begin(BlockPool& pool, BlockIndex block,
       return begin_command(head, progress);
     case RecordKind::group:
       return verdict(head.rows > 0 && head.rows <= targets_.actuators() &&
-                     (is_chunk(head)
-                          ? head.payload_bytes == kChunkGroupBytes && is_sane(chunk_of(pool, block))
-                          : head.payload_bytes == 0));
+                     (is_chunk(head) ? head.payload_bytes == kChunkGroupBytes &&
+                                           is_valid(chunk_of(pool, block))
+                                     : head.payload_bytes == 0));
     case RecordKind::request:
       return verdict(is_request(head, progress.payload));
     case RecordKind::purge:
@@ -119,8 +119,8 @@ RecordCheck::Verdict RecordCheck::begin_command(const RecordHead& head,
   return Verdict::unfinished;
 }
 
-RecordCheck::Verdict RecordCheck::go_on(BlockPool& pool, BlockIndex block, Progress& progress,
-                                        std::uint32_t& budget) noexcept {
+RecordCheck::Verdict RecordCheck::advance(BlockPool& pool, BlockIndex block, Progress& progress,
+                                          std::uint32_t& budget) noexcept {
   const RecordHead& head = pool.head(block);
   const StateLayout& layout = targets_.layout(head.actuator);
   const std::uint64_t* mask = head.masked != 0 ? mask_.data() : nullptr;
@@ -128,7 +128,7 @@ RecordCheck::Verdict RecordCheck::go_on(BlockPool& pool, BlockIndex block, Progr
     Cursor(pool, block, sizeof(RecordHead), head.payload_bytes)
         .read(mask_.data(), 8 * layout.mask_words());
   }
-  if (is_chunk(head)) return go_on_with_chunk(pool, block, progress, budget, mask);
+  if (is_chunk(head)) return advance_chunk(pool, block, progress, budget, mask);
   // payload in the block of the head is free
   constexpr std::int64_t kWithHead = kBlockBytes - sizeof(RecordHead);
   auto bytes_left = static_cast<std::int64_t>(std::uint64_t{budget} * kBlockBytes) + kWithHead;
@@ -155,9 +155,9 @@ RecordCheck::Verdict RecordCheck::go_on(BlockPool& pool, BlockIndex block, Progr
 }
 
 /// Walks to the rows, notes them, and joins the notes from the last one on.
-RecordCheck::Verdict RecordCheck::go_on_with_chunk(BlockPool& pool, BlockIndex block,
-                                                   Progress& progress, std::uint32_t& budget,
-                                                   const std::uint64_t* mask) noexcept {
+RecordCheck::Verdict RecordCheck::advance_chunk(BlockPool& pool, BlockIndex block,
+                                                Progress& progress, std::uint32_t& budget,
+                                                const std::uint64_t* mask) noexcept {
   const RecordHead& head = pool.head(block);
   const StateLayout& layout = targets_.layout(head.actuator);
   ChunkRows rows(pool, block, layout);

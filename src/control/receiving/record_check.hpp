@@ -3,11 +3,11 @@
 #include <cstdint>
 #include <vector>
 
-#include "control/batch/chunk.hpp"
 #include "control/batch/command_check.hpp"
-#include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
 #include "control/motion/state_layout.hpp"
+#include "control/receiving/chunk_rows.hpp"
+#include "control/receiving/pool.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80 {
@@ -57,13 +57,13 @@ class RecordCheck {
   /// pool. The planner walks over what was not read of a payload.
   Verdict begin(BlockPool& pool, BlockIndex block, Progress& progress) noexcept;
   /// Continues with times and rows for about `budget` blocks, and reduces `budget` by them.
-  Verdict go_on(BlockPool& pool, BlockIndex block, Progress& progress,
-                std::uint32_t& budget) noexcept;
+  Verdict advance(BlockPool& pool, BlockIndex block, Progress& progress,
+                  std::uint32_t& budget) noexcept;
 
  private:
   Verdict begin_command(const RecordHead& head, Progress& progress) noexcept;
-  Verdict go_on_with_chunk(BlockPool& pool, BlockIndex block, Progress& progress,
-                           std::uint32_t& budget, const std::uint64_t* mask) noexcept;
+  Verdict advance_chunk(BlockPool& pool, BlockIndex block, Progress& progress,
+                        std::uint32_t& budget, const std::uint64_t* mask) noexcept;
   bool is_request(const RecordHead& head, Cursor& payload) noexcept {
     if (head.actuator >= requests_.size()) return false;
     const StateLayout* layout = requests_[head.actuator];

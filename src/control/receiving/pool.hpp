@@ -13,9 +13,6 @@
 
 namespace o80 {
 
-using BlockIndex = std::uint32_t;
-inline constexpr BlockIndex kNoBlock = 0xFFFFFFFF;
-
 /// A linked list of blocks in the pool, for example a batch.
 struct BlockChain {
   BlockIndex first = kNoBlock;

@@ -1,4 +1,4 @@
-#include "control/batch/batch_builder.hpp"
+#include "control/sending/batch_builder.hpp"
 
 #include <algorithm>
 #include <cassert>

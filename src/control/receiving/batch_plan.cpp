@@ -1,11 +1,11 @@
-#include "control/batch/batch_plan.hpp"
+#include "control/receiving/batch_plan.hpp"
 
 #include <algorithm>
 #include <array>
 #include <cstddef>
 #include <utility>
 
-#include "control/batch/chunk.hpp"
+#include "control/receiving/chunk_rows.hpp"
 
 namespace o80 {
 namespace {
@@ -103,7 +103,7 @@ struct BatchPlanner::Lane : Batch {
       --budget;
     }
     if (verdict == Verdict::unfinished) {
-      verdict = shared.check.go_on(pool, cursor, progress, budget);
+      verdict = shared.check.advance(pool, cursor, progress, budget);
       if (verdict == Verdict::unfinished) return false;
       stop_reading();
     }
@@ -443,16 +443,16 @@ bool BatchPlanner::check(std::uint32_t lane_index, BlockIndex batch,
     lane.begin_part();
   }
   lane.budget = budget;
-  bool goes_on = true;
-  while (goes_on && lane.place < record.records && lane.cursor != kNoBlock) {
-    goes_on = lane.budget > 0 && lane.check_record();
+  bool continues = true;
+  while (continues && lane.place < record.records && lane.cursor != kNoBlock) {
+    continues = lane.budget > 0 && lane.check_record();
   }
-  if (goes_on) {
+  if (continues) {
     lane.complete(record);
     known_[batch] = Known::plan;
   }
   budget = lane.budget;
-  return goes_on;
+  return continues;
 }
 
 Effort BatchPlanner::effort(BlockIndex batch) const noexcept {

@@ -4,8 +4,8 @@
 #include <cstdint>
 #include <utility>
 
-#include "control/batch/pool.hpp"
 #include "control/batch/record.hpp"
+#include "control/receiving/pool.hpp"
 
 namespace o80 {
 
