@@ -147,7 +147,7 @@ constexpr void each_option(Config& config, Visit&& visit) {
   });
 }
 
-/// How many options a Config has, and whether a name stands for two of them.
+/// How many options a Config has, and whether two of them have one name.
 template <class Config>
 constexpr std::size_t option_count() {
   std::size_t count = 0;

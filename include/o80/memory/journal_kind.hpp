@@ -9,7 +9,7 @@ namespace o80 {
 /// Kind of an entry of a journal. See src/runtime/README.md#journal.
 enum class JournalKind : std::uint8_t {
   none,
-  records,           // blocks of a batch, as they came from its lane
+  records,           // blocks of a batch, as its lane had them
   dropped,           // the batch that was being copied is invalid
   owner,             // the process that owns a lane
   taken,             // a batch was taken

@@ -84,7 +84,7 @@ struct JournalEntry {
   std::int64_t burst = 0;              // iterations; -1: until the batch has ended
   std::vector<JournalRecord> records;  // empty with `records_lost`
   bool records_lost = false;           // they were overwritten before they were read
-  std::vector<std::byte> blocks;       // the batch as it came; empty with `records_lost`
+  std::vector<std::byte> blocks;       // the batch as it was sent; empty with `records_lost`
   std::optional<Seen> seen{};          // by which row it was decided, as its sender says
   // status, rejected
   Status status = Status::none;

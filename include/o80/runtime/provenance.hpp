@@ -7,7 +7,7 @@
 
 namespace o80 {
 
-/// How a backend was started: what is needed to start the same robot again. It stands in the
+/// How a backend was started: what is needed to start the same robot again. It is stored in the
 /// segment, which holds it from the moment it has its name.
 struct Provenance {
   /// Names and texts of options, with which the same robot can be started.

@@ -56,7 +56,7 @@ struct FreshReading {
   std::byte* desired;  // used if has_desired is set; otherwise desired = observed
   bool has_desired = false;
   bool follows = false;    // actuators without a command follow until the next fresh start
-  bool may_fail = false;   // a robot that cannot be read now goes on halted
+  bool may_fail = false;   // a robot that cannot be read now stays halted
   std::string_view why{};  // why it could not be read
 };
 

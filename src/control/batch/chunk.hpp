@@ -46,7 +46,7 @@ inline bool is_chunk(const RecordHead& head) noexcept { return head.pace == Pace
 /// A note about kRows rows of a member: where they are, when they are due, and between which values
 /// each number stays from there to the last row.
 ///
-/// The sender leaves room for the notes before the rows. So a look at a few blocks finds a row,
+/// The sender leaves room for the notes before the rows. So reading a few blocks finds a row,
 /// however many rows there are.
 struct RowNote {
   static constexpr std::uint32_t kRows = 8;
@@ -90,7 +90,7 @@ struct ChunkPlaces {
   std::uint64_t payload_bytes;
 };
 
-/// What the active status of its batch tells of a chunk that was taken: the shift in its delay and
+/// The active status of the batch of a chunk that was taken: the shift in its delay and
 /// in 6 bits of its detail. A bit tells this status from the one before, of the batch alone.
 struct TakenChunk {
   static constexpr std::int64_t kMostShift = (std::int64_t{1} << 22) - 1;
@@ -110,7 +110,7 @@ struct TakenChunk {
  private:
   static constexpr std::uint8_t kIsTaken = 0x40;
 };
-/// What the status of the end of its batch tells of a chunk that has begun, in 16 bits of the delay
+/// The status of the end of the batch of a chunk that has begun, in 16 bits of the delay
 /// and 7 of the detail.
 struct BegunChunk {
   static constexpr std::int64_t kMostNeeded = 4095;

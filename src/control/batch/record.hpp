@@ -31,7 +31,7 @@ enum class RecordKind : std::uint8_t {
   group,   // one command for several actuators, with one status; `rows` members follow
   member,
   mark,        // a note for the journal; the payload is its text
-  seen,        // the row by which the batch was decided; only the journal's readers look at it
+  seen,        // the row by which the batch was decided; only the journal's readers use it
   close_plan,  // no chunk of the sender's plan `amount` follows; 0: of none of its plans
   // set by BatchPlanner only; invalid when sent by a frontend
   overwritten_list = 0x80,  // first of a list of records with this end status, in no queue

@@ -98,7 +98,7 @@ class Motion {
       if (each.is_commanded) each.motion.follow_as_sent(layout_.number(each.number, target()));
     }
   }
-  /// The plan goes on until this iteration or later.
+  /// The plan continues until this iteration or later.
   void extend(Iteration last) noexcept { last_ = std::max(last_, last); }
   /// What is followed reaches to this state, too.
   void widen(const std::byte* row) noexcept {
@@ -142,7 +142,7 @@ class Motion {
   bool arrived() const noexcept {
     return all([](auto& each) { return each.arrived(); });
   }
-  /// True if bounds of an integral hold a number back, which stands, and the others have arrived.
+  /// True if bounds of an integral keep a number at rest, and the others have arrived.
   bool is_blocked() const noexcept {
     return has_integrals_ && any([](auto& each) { return each.is_blocked(); }) &&
            all([](auto& each) { return each.is_blocked() || each.arrived(); });

@@ -74,7 +74,7 @@ class NumberLimiter {
     scale_ = std::abs(now_.position);
     reach(span);
   }
-  /// What it follows goes on in another way: inside the bounds and inside `span`.
+  /// The plan that it follows changes: stays inside the bounds and inside `span`.
   void reach(const Span& span) noexcept {
     span_ = {std::max(bounds_.low, span.low), std::min(bounds_.high, span.high)};
   }

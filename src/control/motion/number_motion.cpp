@@ -93,7 +93,7 @@ bool NumberMotion::brake() noexcept {
     }
     moves = moves || guard_.position() != before || !stays();
   });
-  // what stands at a bound is no longer held away from rest
+  // a number at rest at a bound is no longer held away from its resting value
   if (is_blocked_) held_ = false;
   return moves || bound != Limit::none;
 }

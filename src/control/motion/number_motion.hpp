@@ -29,7 +29,7 @@ class NumberMotion {
   }
   /// True if these bounds have changed its motion since begin().
   bool was_held_back() const noexcept { return held_back_; }
-  /// True if they hold it back in this iteration, and it stands.
+  /// True if they keep it at rest in this iteration.
   bool is_blocked() const noexcept { return is_blocked_; }
   /// First (order 1) or second difference of its positions, to the iteration before.
   double difference(std::uint32_t order) const noexcept {
@@ -136,7 +136,7 @@ class NumberMotion {
   }
   bool follows() const noexcept { return follows_; }
   /// The plan ends, at its target if that is `arrived`: what follows is another command, or none.
-  /// If the shortest stop would leave the bounds, the plan goes on until it stays inside.
+  /// If the shortest stop would leave the bounds, the plan continues until it stays inside.
   void end(bool arrived = false) noexcept {
     if (planned_ && !follows_ && !guard_.stops_inside()) {
       former_ = plan_;
@@ -190,7 +190,7 @@ class NumberMotion {
   bool jumps_at_once_ = false;  // propose() needed no plan
   Requested requested_;         // then
   bool jumps_ = false;          // the plan begins at its start
-  // goes on with the former plan, until a stop would stay inside the bounds
+  // continues with the former plan, until a stop would stay inside the bounds
   bool leaves_ = false;
   NumberPlan former_;
   double former_target_ = 0.0;

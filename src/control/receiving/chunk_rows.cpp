@@ -99,7 +99,7 @@ bool is_valid(const ChunkHead& chunk) noexcept {
 }
 
 Reason judge(ChunkHead& chunk, const ChunkRows& rows, const ChunkSurroundings& at) noexcept {
-  // standing still does not count: there is nothing that must go on until the rows begin
+  // standing still does not count: there is no motion to continue until the rows begin
   const bool stood = at.stand && chunk.fixed == 0 && at.acted_last < at.now - 1;
   const Iteration last = at.now - 1;
   chunk.shift = 0;

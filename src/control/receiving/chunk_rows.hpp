@@ -119,7 +119,7 @@ struct ChunkSurroundings {
   bool stand = false;         // none of them has a command, and no chunk waits
 };
 /// Decides when a chunk begins; Reason::late if all its rows are, or if its
-/// actuators stood still for too long after its anchor to tell the shift.
+/// actuators stood still for too long after its anchor: the shift does not fit a status.
 Reason judge(ChunkHead& chunk, const ChunkRows& rows, const ChunkSurroundings& at) noexcept;
 
 }  // namespace o80

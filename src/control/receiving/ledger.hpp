@@ -143,7 +143,7 @@ class Ledger {
   void member_ended(BlockIndex group, const Outcome& outcome, Iteration iteration) noexcept;
   void report(std::uint32_t lane, CommandId id, const Outcome& outcome, Iteration iteration,
               StatusChange::Of of) noexcept {
-    // as much of a delay as a status can tell
+    // as much of a delay as a status can hold
     const auto late = static_cast<std::uint16_t>(std::min<std::int64_t>(outcome.late, 0xFFFF));
     sink_.changed({lane, id, outcome.status, outcome.reason, outcome.detail, iteration, of, late});
   }

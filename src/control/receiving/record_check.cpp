@@ -22,7 +22,7 @@ bool sane_pace(const RecordHead& head) noexcept {
   }
 }
 
-/// True if the profile suits the pace, and the other options too if that is `chunk`.
+/// True if the profile fits the pace, and the other options too if that is `chunk`.
 bool sane_profile(const RecordHead& head) noexcept {
   if (is_chunk(head)) {
     return head.kind == RecordKind::member &&

@@ -12,7 +12,7 @@ namespace o80 {
 
 namespace {
 
-constexpr std::int64_t kGlance = 1'000'000;  // between looks at what cannot be slept on [ns]
+constexpr std::int64_t kGlance = 1'000'000;  // between polls of what cannot be slept on [ns]
 
 bool is_there(const RowOf& wanted) noexcept {
   const Counters& counters = wanted.segment->view().counters();
@@ -87,7 +87,7 @@ Waited wait_for_first_row(std::span<const RowOf> rows, const Deadline& deadline,
     throw_if_gone();
     if (ready()) return Waited::ready;
   }
-  // a wait too short to look around learns of an end all the same
+  // a wait too short for a poll detects an end all the same
   throw_if_gone();
   return ready() ? Waited::ready : Waited::timed_out;
 }

@@ -21,7 +21,7 @@ namespace {
 // above any iteration of a backend; counters of a damaged file are clamped to it, to exclude
 // overflows
 constexpr Iteration kFarthest = Iteration{1} << 60;
-constexpr int kReadings = 100;  // attempts while `published` stands still
+constexpr int kReadings = 100;  // attempts while `published` does not change
 
 }  // namespace
 

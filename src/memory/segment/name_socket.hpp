@@ -20,7 +20,7 @@ struct NameHolder {
   friend bool operator==(const NameHolder&, const NameHolder&) = default;
 };
 
-/// Move-only: an abstract Unix socket that stands for user, directory and name of a segment.
+/// Move-only: an abstract Unix socket named after user, directory and name of a segment.
 ///
 /// Files can be removed under a living backend. The socket cannot: while its process lives, a
 /// second start of that name is refused, and `o80 list` and `o80 stop` find the process. It is an

@@ -17,7 +17,7 @@ enum class Waited { ready, timed_out };
 /// Registers for the wake-up of row k; the value of `row_wake` to sleep on, or nothing if there is
 /// nothing to wait for: the row is there, or the backend has ended. Needs Access::read_write.
 std::optional<std::uint32_t> register_for_row(const AttachedSegment& segment, Iteration k) noexcept;
-/// After a sleep on `seen`: the writer woke one, and the first awake tells the rest.
+/// After a sleep on `seen`: the writer woke one, and the first awake wakes the rest.
 void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept;
 
 /// Waits for rows (src/memory/README.md#waiting).

@@ -237,7 +237,7 @@ bool InlineGroup::runs_here() const noexcept {
   return is_inside(this) || is_inside(leader_.load(std::memory_order_relaxed));
 }
 
-/// Whether the iterations of a copy go on; called about every 50 ms of a burst.
+/// Whether the iterations of a copy continue; called about every 50 ms of a burst.
 bool InlineGroup::may_continue() {
   InlineGroup* const leader = leader_.load(std::memory_order_relaxed);
   if (leader != nullptr && working_for == leader) return leader->may_continue();
@@ -247,7 +247,7 @@ bool InlineGroup::may_continue() {
   return !cancelled_.load(std::memory_order_relaxed);
 }
 
-/// In the calling thread: asks every 50 ms whether the call goes on.
+/// In the calling thread: asks every 50 ms whether the call continues.
 void InlineGroup::poll() noexcept {
   const std::int64_t now = monotonic_now();
   if (now < ask_at_ || cancelled_.load(std::memory_order_relaxed)) return;

@@ -118,7 +118,7 @@ class InlineGroup {
   void publish_as(std::size_t copy, const std::string& name);
 
   /// Throws InvalidArgument if the memory of the plan does not have the size it needs, or if its
-  /// iterations do not fit into the history, or if the burst that follows does not suit it.
+  /// iterations do not fit into the history, or if the burst that follows does not fit it.
   void check(const BurstPlan& plan) const;
   /// Sends the targets of the chosen copies and runs their iterations, then those of the same
   /// copies of the group that follows, if any. `chosen`: their numbers, each once. Copies between

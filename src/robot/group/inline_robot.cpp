@@ -14,7 +14,7 @@ namespace o80 {
 
 namespace {
 
-constexpr std::uint32_t kMaxAtOnce = 64;           // iterations between looks at the clock
+constexpr std::uint32_t kMaxAtOnce = 64;           // iterations between reads of the clock
 constexpr std::int64_t kLongAtOnce = kSlice / 10;  // [ns] longest time between these looks
 
 BackendOptions bursting(BackendOptions options) {
@@ -73,11 +73,11 @@ std::optional<std::size_t> InlineRobot::run(const DirectBurst& burst, std::span<
   if (stopping_ || !loop_.begin_direct(burst)) return {};
   const auto iterations = static_cast<std::size_t>(burst.iterations);
   const std::size_t size = loop_.backend().layout().size;
-  // a burst shorter than the next look at the clock needs no clock
+  // a burst shorter than the next read of the clock needs no clock
   if (keep_waiting_ && iterations >= at_once_) polled_at_ = monotonic_now();
   std::size_t done = 0;
   std::uint32_t unlooked = 0;
-  // one step more than iterations: it sees what came of the last one, as run() does
+  // one step more than iterations: it detects the end of the last one, as run() does
   Step step = Step::run;
   while (!stopping_ && (step = loop_.run_granted(1)) == Step::run) {
     if (done < iterations) std::memcpy(rows.data() + done++ * size, loop_.row(), size);
@@ -105,7 +105,7 @@ void InlineRobot::refuse_nested() const {
 }
 
 /// Calls `keep_waiting` once every kSlice. The slower the robot, the fewer iterations run between
-/// looks at the clock.
+/// reads of the clock.
 void InlineRobot::poll() {
   if (!keep_waiting_) return;
   const std::int64_t now = monotonic_now();

@@ -55,8 +55,8 @@ class InlineRobot final : public InlineRunner {
   ForkGuard guard_;
   KeepWaiting keep_waiting_;
   std::int64_t poll_at_ = 0;    // time of the next call of `keep_waiting` [ns]
-  std::int64_t polled_at_ = 0;  // time of the last look at the clock [ns]
-  std::uint32_t at_once_;       // iterations between looks at the clock
+  std::int64_t polled_at_ = 0;  // time of the last read of the clock [ns]
+  std::uint32_t at_once_;       // iterations between reads of the clock
   Loop loop_;
 };
 

@@ -9,7 +9,7 @@
 
 namespace o80 {
 
-/// A number of a row: where it stands, and its type.
+/// A number of a row: its offset and its type.
 struct RowNumber {
   std::uint32_t at = 0;  // [bytes] from the begin of the row
   Kind kind = Kind::float64;

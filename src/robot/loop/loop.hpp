@@ -62,7 +62,7 @@ class Loop final : public RequestServer {
   bool load_snapshot(std::uint32_t slot, std::span<const std::byte> bytes) noexcept {
     return robot_->load_snapshot(slot, bytes);
   }
-  /// Serves the request `restore` without a fresh start: what was asked goes on. Call it between
+  /// Serves the request `restore` without a fresh start: commands continue. Call it between
   /// two iterations; false if the driver refuses.
   bool restore(std::uint32_t slot) noexcept;
   /// Cancels the rest of the current burst.

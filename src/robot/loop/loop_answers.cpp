@@ -20,7 +20,7 @@ void Loop::note_requests(const ReadingView& view) noexcept {
   }
 }
 
-/// Ticks came so fast that speed limits, which count iterations, no longer hold: halts, and sleeps
+/// Ticks were so fast that speed limits, which count iterations, no longer hold: halts, and sleeps
 /// so that the robot brakes within its limits.
 void Loop::hold_back() noexcept {
   if (backend_.halted().number == 0) {

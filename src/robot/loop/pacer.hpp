@@ -35,7 +35,7 @@ class Pacer {
   bool runs_ahead() const noexcept { return excess() > 0; }
   /// Time by which ticks are farther ahead than that [ns].
   std::int64_t excess() const noexcept { return ahead_ - kMaxPeriodsAhead * period_; }
-  /// The caller has slept after a tick that came too early.
+  /// The caller has slept after a tick that was too early.
   void slept(std::int64_t time) noexcept {
     ahead_ -= time;
     due_ += time;

@@ -25,66 +25,27 @@ std::size_t largest_request(const Schema& schema) {
 
 }  // namespace
 
-UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options, RequestServer* server,
-                           RecordedDecisions* recorded)
-    : schema(prepared(std::move(given), options)),
-      layout(row_layout(schema)),
-      provenance(provenance_of(schema, options)),
-      segment(segment_of(schema, provenance, options)),
-      history(segment.view()),
-      journal(segment.view()),
-      row_signal(segment.view()),
-      bell(segment.view()),
-      lanes(segment.view(), offsetof(BatchRecord, ticket)),
-      liveness(segment),
-      pool(lanes.size() * segment.view().shape.lane_blocks),
-      controller(schema, pool, *this, lanes.size()),
-      staging(lanes, pool, controller, journal),
-      schedule(lanes.size()),
-      halts(segment.view()),
-      running(schema, segment.view()),
-      verbs(segment.view()),
-      server_(server),
-      recorded_(recorded),
-      lives_(lanes.size()),
-      handled_deaths_(lanes.size()),
-      row_(layout.size / 8),
-      payload_(largest_request(schema), std::byte{0}),
-      fresh_desired_(layout.block / 8),
-      stale_(options.stale_policy()),
-      silence_(options.silence),
-      last_life_(lanes.size()),
+UntypedBackend::Body::Body(Schema&& given, const BackendOptions& options,
+                           RequestServer* server_or_null, RecordedDecisions* recorded_or_null)
+    : BackendCore(std::move(given), options, server_or_null, recorded_or_null, *this),
+      bursts(*this),
+      readings(*this, options),
+      halts(*this, bursts, readings, options),
+      commanders(*this, bursts, halts, options),
+      intake(*this, bursts, readings, halts, commanders, *this),
       // ends of commands in one step: completed and late ones, and those of their batches
-      outbox_(lanes, journal,
-              2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
-      queue_(segment.view()),
-      errors_(schema),
-      readings_(schema),
-      followed_(schema, options.bursting || recorded != nullptr ? ReadingWatch::Of::none
-                                                                : ReadingWatch::Of::followers),
-      judges_first_(!options.bursting && recorded == nullptr && !options.accept_reading &&
-                    !readings_.empty()),
-      judges_fresh_(options.has_loop && recorded == nullptr &&
-                    schema.head.of_the_world >= (options.bursting ? 3 : 1) &&
-                    !schema.head.is_simulated()),
-      last_row_(layout.size / 8),
-      overruns_(options.max_overruns),
-      gaps_(recorded == nullptr ? longest_gap(schema, options) : 0) {
-  express_lanes_.reserve(lanes.size());
-  for (std::uint32_t i = 0; i < lanes.size(); ++i) lives_[i] = liveness.lane(i);
-}
+      outbox(lanes, journal, 2 * (schema.actuators.size() + 2 * Controller::kStatusesPerIteration)),
+      verbs(segment.view()),
+      payload_(largest_request(schema), std::byte{0}),
+      fresh_desired_(layout.block / 8) {}
 
 // ------------------------------------------------------------------------------ state and time
 
 /// True in a child that was forked since: the robot and the segment belong to its parent.
 bool UntypedBackend::Body::is_in_forked_child() noexcept {
-  if (!guard_.forked()) return false;
+  if (!guard.forked()) return false;
   note_failure("this process was forked: the backend belongs to its parent");
   return true;
-}
-
-std::int64_t UntypedBackend::Body::real_time() const noexcept {
-  return recorded_ == nullptr ? monotonic_now() : recorded_->time(current);
 }
 
 // ------------------------------------------------------------------------------ step
@@ -92,39 +53,46 @@ std::int64_t UntypedBackend::Body::real_time() const noexcept {
 /// Commands => desired, in four stages: watch, take, wait, move. A bursting backend waits at most
 /// `at_most` [ns] for a burst.
 Step UntypedBackend::Body::step(std::int64_t at_most) noexcept {
-  if (recorded_ != nullptr) return step_recorded();
-  if (burst_.is_direct()) return step_direct();
+  if (recorded != nullptr) return step_recorded();
+  if (bursts.is_direct()) return step_direct();
   const std::int64_t give_up =
       at_most > 0 && at_most < kForEver ? monotonic_now() + at_most : at_most;
-  const bool waited = !is_granted();
+  const bool waited = !bursts.is_granted();
   std::uint32_t scans = 0;
   while (true) {
     watch();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
     take_commands();
     if (stop.load(std::memory_order_relaxed)) return Step::ended;
-    if (is_granted()) {
+    if (bursts.is_granted()) {
       // a pulse that came in this step is a sign of life; a halt may end the burst
-      watch_silence();
-      watch_halt();
-      if (is_granted()) break;
+      commanders.watch_silence();
+      halts.watch();
+      if (bursts.is_granted()) break;
     }
     if (!wait_for_burst(give_up, scans)) return Step::standing;
   }
   O80_CRASH_POINT("backend.after_take");
-  if (burst_.runs()) begin_iteration_of_burst(waited);
+  if (bursts.runs()) begin_iteration_of_burst(waited);
   move(Phase::iterating);
   show_acts();
   O80_CRASH_POINT("backend.after_step");
   return Step::run;
 }
 
+/// Deaths and halts => ended commands. Then the fresh start that an ended request needs.
+void UntypedBackend::Body::watch() noexcept {
+  commanders.poll_liveness();
+  halts.watch();
+  start_afresh_after_request();
+}
+
 /// Batches => queues, within the budget of an iteration; none during a burst.
 void UntypedBackend::Body::take_commands() noexcept {
-  share_ = {};
-  if (burst_.runs()) return;
-  take_due();
-  take_batches();
+  intake.begin_iteration();
+  if (bursts.runs()) return;
+  intake.take_due();
+  intake.take_new();
 }
 
 /// Waits for the bell, until `give_up` [ns]; false if that is over. First reports all pending
@@ -133,7 +101,7 @@ bool UntypedBackend::Body::wait_for_burst(std::int64_t give_up, std::uint32_t& s
   const bool all_told = controller.finish_pending();
   journal.flush();
   wake_sleepers(segment.view(), {.lanes = lanes.announce()});
-  if (staging.busy() || !all_told) return true;
+  if (intake.busy() || !all_told) return true;
   // invalid blocks may have used up the budget of this scan: scan again, a limited number of times
   const std::uint32_t max_scans = 2 + pool.size() / kWorkPerIteration;
   if (lanes.has_pending() && ++scans < max_scans) return true;
@@ -149,18 +117,33 @@ void UntypedBackend::Body::begin_iteration_of_burst(bool first) noexcept {
   // a burst does not depend on how long the backend has waited before.
   while (first && !controller.finish_pending()) {
   }
-  if (!burst_.runs()) return;  // its commands have ended
-  share_ = {};
-  take_due();
-  if (burst_.is_in_last_iteration()) history.expect(current);
+  if (!bursts.runs()) return;  // its commands have ended
+  intake.begin_iteration();
+  intake.take_due();
+  if (bursts.is_in_last_iteration()) history.expect(current);
 }
 
 /// Queues => desired.
 void UntypedBackend::Body::move(Phase under_way) noexcept {
   enter(under_way);
-  outbox_.begin_step();
+  outbox.begin_step();
   controller.step(current, row() + layout.observed);
-  outbox_.end_step();
+  outbox.end_step();
+}
+
+/// Updates Counters::acts before the desired states are written. If this backend is killed while
+/// commands act, its successor starts halted.
+void UntypedBackend::Body::show_acts() noexcept {
+  if (schema.head.bursting != 0) return;
+  const std::uint64_t* active = controller.active_mask();
+  const bool moves = running.moves() || std::any_of(active, active + layout.mask_words,
+                                                    [](std::uint64_t word) { return word != 0; });
+  const bool stays =
+      moves || !commanders.holder().is_nobody() || (shown_acts_ != 0 && controller.holds());
+  const std::uint32_t acts = stays ? 1 : 0;
+  if (acts == shown_acts_) return;
+  shown_acts_ = acts;
+  segment.view().counters().acts.store(acts, std::memory_order_relaxed);
 }
 
 /// One iteration before an end in order: commands have ended, actuators brake.
@@ -180,11 +163,16 @@ Step UntypedBackend::Body::brake() noexcept {
   return Step::run;
 }
 
+void UntypedBackend::Body::purge_to_stop() noexcept {
+  controller.purge(kEveryActuator, current, Reason::stopped);
+  drop_running({Status::purged, Reason::stopped});
+}
+
 // ------------------------------------------------------------------------------ publish
 
 bool UntypedBackend::Body::publish_first() noexcept {
-  if (!can_begin(row() + layout.observed, "the first reading")) return false;
-  if (!agrees_with_first()) return false;
+  if (!readings.can_begin(row() + layout.observed, "the first reading")) return false;
+  if (!readings.agrees_with_first()) return false;
   if (!stop.load(std::memory_order_relaxed)) failure[0] = 0;  // that of a row 0 refused before
   publish(false);
   return true;
@@ -195,8 +183,8 @@ bool UntypedBackend::Body::publish_first() noexcept {
 void UntypedBackend::Body::publish(bool fresh) noexcept {
   if (!has_begun()) {
     controller.restart(row() + layout.observed, begins_with, current);
-    if (recorded_ == nullptr) {
-      watch_halt();
+    if (recorded == nullptr) {
+      halts.watch();
     } else {
       obey_recorded();
     }
@@ -245,33 +233,44 @@ void UntypedBackend::Body::fill_row(bool fresh) noexcept {
 /// Row => halts: error limits, readings, gaps.
 void UntypedBackend::Body::watch_row(bool fresh) noexcept {
   // before a fresh start the robot may be away from its desired states
-  if (!errors_.empty() && has_begun() && !fresh && !will_start_afresh()) watch_errors();
-  watch_readings();
-  if (!followed_.empty()) watch_followers(fresh);
-  if (gaps_.is_on()) watch_gaps(fresh);
+  if (halts.has_error_limits() && has_begun() && !fresh && !will_start_afresh()) {
+    halts.watch_errors();
+  }
+  if (halts.acts()) readings.add();
+  readings.watch_followers(fresh);
+  halts.watch_gaps(fresh);
+}
+
+/// Status => outbox. A burst may run until its batch has ended (pulse_to_end).
+void UntypedBackend::Body::changed(const StatusChange& change) noexcept {
+  if (change.of == StatusChange::Of::batch && deciding != nullptr) {
+    journal.decided(*deciding, change);
+  }
+  outbox.put(change);
+  if (bursts.ends_with(change.lane, change.id)) bursts.stop();
 }
 
 /// Reports the statuses that belong to the row, and counts the iteration of a burst.
 void UntypedBackend::Body::end_iteration() noexcept {
-  outbox_.report_row();
+  outbox.report_row();
   controller.finish_pending();
   if (phase == Phase::iterating) {
     enter(Phase::ready);
   } else if (phase == Phase::braking) {
     enter(Phase::stopping);
   }
-  count_burst();
+  bursts.count_iteration();
   if (journal.lacks_rest() && is_at_rest()) journal.at_rest();
 }
 
 void UntypedBackend::Body::end(BackendState state, std::string_view text) noexcept {
-  if (guard_.forked()) return;  // only the parent ends its backend
+  if (guard.forked()) return;  // only the parent ends its backend
   if (phase == Phase::ended) return;
   enter(Phase::ended);
   // the current burst gets no last row: its waiter raises BackendGone
-  burst_.end();
-  reject_all(Reason::stopped);
-  outbox_.report_no_row();
+  bursts.end();
+  intake.reject_all(Reason::stopped);
+  outbox.report_no_row();
   controller.purge(kEveryActuator, current, Reason::stopped);
   drop_running({Status::purged, Reason::stopped});
   while (!controller.finish_pending()) {
@@ -301,12 +300,12 @@ void UntypedBackend::publish_as(const std::string& name) { body_->segment.publis
 
 std::byte* UntypedBackend::observed() noexcept { return body_->row() + body_->layout.observed; }
 std::byte* UntypedBackend::extended() noexcept { return body_->row() + body_->layout.extended; }
-bool UntypedBackend::watches_readings() const noexcept { return body_->watches_readings(); }
-bool UntypedBackend::judge_first(bool again) noexcept { return body_->judge_first(again); }
+bool UntypedBackend::watches_readings() const noexcept { return !body_->readings.empty(); }
+bool UntypedBackend::judge_first(bool again) noexcept { return body_->readings.judge_first(again); }
 bool UntypedBackend::publish() noexcept {
   if (body_->is_in_forked_child()) return false;
   if (!body_->has_begun()) return body_->publish_first();
-  if (!body_->agrees_with_first()) return false;
+  if (!body_->readings.agrees_with_first()) return false;
   body_->publish(false);
   return true;
 }
@@ -322,7 +321,7 @@ Step UntypedBackend::step_within(std::int64_t at_most) noexcept {
   if (body_->is_in_forked_child()) return Step::ended;
   return body_->step(std::max<std::int64_t>(at_most, 0));
 }
-void UntypedBackend::cut_burst() noexcept { body_->stop_burst(); }
+void UntypedBackend::cut_burst() noexcept { body_->bursts.stop(); }
 const std::byte* UntypedBackend::desired() const noexcept { return body_->controller.desired(); }
 const std::uint64_t* UntypedBackend::active() const noexcept {
   return body_->controller.active_mask();
@@ -336,7 +335,7 @@ const std::uint64_t* UntypedBackend::braking() const noexcept {
 Phase UntypedBackend::phase() const noexcept { return body_->phase; }
 Iteration UntypedBackend::iteration() const noexcept { return body_->current; }
 std::int64_t UntypedBackend::time() const noexcept { return body_->time(); }
-void UntypedBackend::set_timing(const Timing& timing) noexcept { body_->set_timing(timing); }
+void UntypedBackend::set_timing(const Timing& timing) noexcept { body_->halts.set_timing(timing); }
 Step UntypedBackend::brake() noexcept {
   return body_->is_in_forked_child() ? Step::ended : body_->brake();
 }
@@ -345,7 +344,7 @@ void UntypedBackend::enter(Verb verb) noexcept { body_->verbs.enter(verb); }
 void UntypedBackend::leave() noexcept { body_->verbs.leave(); }
 
 void UntypedBackend::halt(HaltCause cause, std::string_view text) noexcept {
-  body_->ask_to_halt(cause, text);
+  body_->halts.request(cause, text);
 }
 const Halt& UntypedBackend::halted() const noexcept { return body_->halts.halt(); }
 

@@ -9,7 +9,7 @@ namespace o80 {
 /// Step of a replay: recorded decisions => desired.
 Step UntypedBackend::Body::step_recorded() noexcept {
   const bool granted = obey_recorded();
-  recorded_->end_decisions(current);
+  recorded->end_decisions(current);
   if (stop.load(std::memory_order_relaxed)) return Step::ended;
   // as before a burst: see step()
   while (granted && !controller.finish_pending()) {
@@ -22,20 +22,20 @@ Step UntypedBackend::Body::step_recorded() noexcept {
 /// publishes a row, after which the decisions of the next iteration follow.
 bool UntypedBackend::Body::obey_recorded() noexcept {
   bool granted = false;
-  while (const JournalEntry* entry = recorded_->next(current)) {
+  while (const JournalEntry* entry = recorded->next(current)) {
     if (entry->kind == JournalKind::interrupted && entry->iteration == current) {
-      if (!entry->before_step || recorded_->has_driver()) break;  // its reading follows the step
+      if (!entry->before_step || recorded->has_driver()) break;  // its reading follows the step
       interrupt(entry->actuator);
       continue;
     }
     if (entry->kind == JournalKind::burst) granted = true;
     const bool is_fresh = entry->kind == JournalKind::fresh_start && entry->iteration == current;
-    if (is_fresh && !recorded_->has_driver()) {
+    if (is_fresh && !recorded->has_driver()) {
       start_afresh(entry->lane, 0);  // confirms the entry
     } else if (is_fresh && running.wanting_fresh_start() != nullptr) {
       start_afresh_after_request();
     } else {
-      obey(recorded_->take());
+      obey(recorded->take());
     }
     if (stop.load(std::memory_order_relaxed)) break;
   }
@@ -45,8 +45,8 @@ bool UntypedBackend::Body::obey_recorded() noexcept {
 /// True if a request that ran has ended and the next step begins with a fresh start.
 bool UntypedBackend::Body::will_start_afresh() const noexcept {
   if (running.wanting_fresh_start() != nullptr) return true;
-  return recorded_ != nullptr && !recorded_->has_driver() &&
-         recorded_->begins_with_fresh_start(current + 1);
+  return recorded != nullptr && !recorded->has_driver() &&
+         recorded->begins_with_fresh_start(current + 1);
 }
 
 void UntypedBackend::Body::obey(const JournalEntry& entry) noexcept {
@@ -55,14 +55,14 @@ void UntypedBackend::Body::obey(const JournalEntry& entry) noexcept {
     case JournalKind::rejected:
       return take_recorded(entry);
     case JournalKind::halt:
-      recorded_->compare_halt(entry);
+      recorded->compare_halt(entry);
       put_halt(segment.view(), entry.halt, entry.cause, entry.who, entry.text);
-      return watch_halt();
+      return halts.watch();
     case JournalKind::died:
       controller.close_plan(entry.lane, ActuatorQueue::kEveryPlan);
       [[fallthrough]];
     case JournalKind::silent:
-      if (stale_ == Stale::purge) {
+      if (commanders.policy() == Stale::purge) {
         const bool died = entry.kind == JournalKind::died;
         controller.purge_lane(entry.lane, kEveryActuator, current,
                               died ? Reason::dead_frontend : Reason::silence);
@@ -76,7 +76,7 @@ void UntypedBackend::Body::obey(const JournalEntry& entry) noexcept {
     case JournalKind::fresh_start:
     case JournalKind::interrupted:
       // confirmed when the driver repeats them
-      return recorded_->not_repeated(entry);
+      return recorded->not_repeated(entry);
     default:
       return;
   }
@@ -98,7 +98,7 @@ void UntypedBackend::Body::take_recorded(const JournalEntry& entry) noexcept {
                          .sender_left = entry.owner == 0};
   pool.batch(chain.first).ticket = entry.ticket;
   if (entry.kind == JournalKind::taken) {
-    take_checked(sent);
+    intake.take_decided(sent);
   } else {
     end_batch(sent, entry.reason, entry.detail, Status::rejected);
   }

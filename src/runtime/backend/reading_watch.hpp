@@ -12,8 +12,8 @@
 
 namespace o80 {
 
-/// Tells whether readings may become desired states: a robot cannot move farther than its limits of
-/// speed allow, nor lie far outside its bounds.
+/// Checks whether readings may become desired states: a robot cannot move farther than its limits
+/// of speed allow, nor lie far outside its bounds.
 ///
 /// A number is farther than it can be if it has moved by more than its speed allows since the
 /// reading before, and a tenth of its error limit; or if it lies outside its bounds by more than

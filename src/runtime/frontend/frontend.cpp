@@ -91,7 +91,7 @@ void UntypedFrontend::latest(std::byte* row) const {
   if (link_->history.latest(row) < 0) wait_for_latest(row);
 }
 
-/// There is no row, or the next one follows a gap: until it is there, readers cannot tell whether
+/// There is no row, or the next one follows a gap: until it is there, readers do not know whether
 /// the newest one is being overwritten.
 void UntypedFrontend::wait_for_latest(std::byte* row) const {
   const Deadline deadline(std::chrono::seconds(5));

@@ -40,7 +40,7 @@ bool append_record(LittleEndianReader& get, std::vector<std::byte>& blocks) {
   LittleEndianReader list(get.bytes(fields));
   const std::span<const std::byte> part = get.bytes(here);
   if (get.failed() || here > payload) return false;
-  // payloads that go on in the next entry end with a block
+  // payloads that continue in the next entry end with a block
   const auto ends_here = [&](std::size_t head) {
     return here == payload || (head + here) % kBlockBytes == 0;
   };

@@ -20,7 +20,7 @@
 //   u16 kind, u16 length of its fields, u32 length of its payload, u32 bytes of the payload here
 //   then the fields and the payload, whose parts are those that RecordHead describes.
 // The blocks of a large batch are several entries in memory. Where one of them ends in a payload,
-// the next one goes on with a record kMore, whose fields are empty.
+// the next one continues with a record kMore, whose fields are empty.
 //
 // Rules, so that files stay readable:
 // - The numbers of kinds and of other enumerations are part of the format: append only.
@@ -42,7 +42,7 @@ static_assert(static_cast<int>(JournalKind::records) == 1 &&
               static_cast<int>(JournalKind::snapshot) == 24);
 
 // records that are none in memory
-inline constexpr std::uint16_t kMore = 256;  // the payload of the record before goes on
+inline constexpr std::uint16_t kMore = 256;  // the payload of the record before continues
 /// Blocks that are no whole batch: invalid, or the blocks before them were missed.
 inline constexpr std::uint16_t kLost = 257;
 
