@@ -260,7 +260,7 @@ void Controller::take_chunk(const Taking& from, BlockIndex group, BatchHandler& 
       {Status::overwritten}, now, chunk.begins);
   const Waiting waiting{group, from.lane, chunk.begins};
   if (waiting.begins == now) return begin_chunk(group, from.lane, now);
-  report_starved();
+  recheck_starved();
   waiting_.insert(std::ranges::upper_bound(waiting_, waiting.begins, {}, &Waiting::begins),
                   waiting);
 }
@@ -333,7 +333,7 @@ void Controller::close_plan(std::uint32_t lane, std::uint64_t plan) noexcept {
     if (each.lane == lane && is_meant) chunk.final = 1;
   }
   for (ActuatorQueue& queue : actuators_) queue.close_plan(lane, plan);
-  report_starved();
+  recheck_starved();
 }
 
 /// True if a chunk of this actuator waits for its begin. `known`: of_chunk_ has the actuators of

@@ -281,7 +281,7 @@ class Controller {
     }
   }
   /// The next step finds out whether actuators that are starved still are.
-  void report_starved() noexcept {
+  void recheck_starved() noexcept {
     for (std::size_t word = 0; word < busy_.size(); ++word) busy_[word] |= starved_mask_[word];
   }
   bool awaits_chunk(std::uint32_t actuator, bool& known) noexcept;

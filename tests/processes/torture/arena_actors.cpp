@@ -32,7 +32,7 @@ void before_label() {
   if (is_backend(own_slot->role)) own_round->lives[own_slot->generation].doomed_at = now;
 }
 
-void after_label() { own_slot->continues(o80::monotonic_now()); }
+void after_label() { own_slot->continued_at(o80::monotonic_now()); }
 
 }  // namespace
 

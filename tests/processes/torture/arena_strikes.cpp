@@ -57,7 +57,7 @@ void Arena::go_on(Running& running) {
   ::kill(running.slot->pid, SIGCONT);
   // we may have been without a processor until now; who stopped itself tells it itself
   if (running.slot->label_signal != SIGSTOP || running.slot->label_reached == 0)
-    running.slot->continues(o80::monotonic_now());
+    running.slot->continued_at(o80::monotonic_now());
 }
 
 /// A call that never returns is not judged by who made it.

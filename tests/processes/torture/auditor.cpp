@@ -25,10 +25,10 @@ class Auditor {
 
   void run() {
     while (static_cast<std::uint32_t>(actor_.phase()) < static_cast<std::uint32_t>(Phase::audit)) {
-      for (std::uint32_t i = 0; i < segments_; ++i) poll_at(i);
+      for (std::uint32_t i = 0; i < segments_; ++i) audit_segment(i);
       actor_.pause(kMillisecond);
     }
-    for (std::uint32_t i = 0; i < segments_; ++i) poll_at(i);
+    for (std::uint32_t i = 0; i < segments_; ++i) audit_segment(i);
     for (Kept& kept : kept_) {
       if (kept.frontend.life() == o80::Life::running) drain(kept);
     }
@@ -39,7 +39,7 @@ class Auditor {
   }
 
  private:
-  void poll_at(std::uint32_t segment) {
+  void audit_segment(std::uint32_t segment) {
     try {
       // a peek first: the newest of that name is known already
       const std::uint64_t epoch = epoch_of(segment_name(segment));

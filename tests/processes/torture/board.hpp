@@ -219,7 +219,7 @@ struct Slot {
   std::array<AskedResume, kMaxResumes> requested_resumes;
 
   void stops(std::int64_t now) { stopped.fetch_sub(now); }
-  void continues(std::int64_t now) { stopped.fetch_add(now); }
+  void continued_at(std::int64_t now) { stopped.fetch_add(now); }
   bool is_stopped() const { return stopped < 0; }
   /// [ns] until now.
   std::int64_t stopped_for(std::int64_t now) const {
