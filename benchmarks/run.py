@@ -1,88 +1,214 @@
-"""Measures the budgets of o80, each beside its limit: a table, and files in build/bench."""
+"""Measures the budgets of o80, each beside its limit: a table, and files in build/bench.
+
+Every budget is a row of rows.csv:
+
+| column | what it is |
+|---|---|
+| name | for --rows |
+| program, measured | a program that measures (command_of), and the name of its sample |
+| limit, of | a fixed limit, or a factor of a baseline `of` that the same program measures |
+| plain | of USUAL: scales a fixed limit of time by what the plain loop takes here |
+| at_least | yes: more is better |
+| row, budget | the same in words |
+
+A program prints a line a sample: name, unit, value, with tabs between. Its first argument is how
+often each measurement is repeated, alternating with its baseline.
+"""
 
 import argparse
+import csv
+import json
+import os
+import platform
+import subprocess
+import sys
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
+from statistics import median
+from typing import Any
 
-from rich.console import Console
-
-from page import PAGE, conditions, text_of
-from programs import ROOT, NotMeasuredError, Samples, run
-from results import Result, print_table, result_of, write
-from rows import ROWS, Row
-
+ROOT = Path(__file__).resolve().parent.parent
+PAGE = ROOT / "docs" / "results" / "benchmarks.md"
+RESULTS = ROOT / "build" / "bench" / "results.json"
+LONGEST = 300  # of one program [s]
 ROUNDS = 21
 ROUNDS_QUICK = 3
+USUAL = {"plain_cpp": 12.0, "plain_python": 34.0}
+"""Times of a plain loop on the machine for which fixed limits are meant [ns].
+
+Found in proportion: on another machine, where the copies took 22 ns and the calls 63.5 ns, the
+copies of whole histories (baseline of `history`) took 1.9 times as long, and so did `latest`.
+"""
+HEAD = """\
+# Results: benchmarks
+
+This page has one run of [the benchmarks](../../benchmarks/README.md). `make bench ARGS=--page`
+writes it; do not edit it. Each figure is a median. A limit is a factor of a baseline that the same
+run measured, or a fixed figure, scaled by a plain loop that was measured beside it.
+"""
+
+Samples = dict[str, tuple[str, list[float]]]
+"""Units and values of samples by name."""
+Row = dict[str, str]
+"""A line of rows.csv by column."""
+Result = dict[str, Any]
+"""A row, measured or with the reason why it was not (README.md has its keys)."""
 
 
-def arguments() -> argparse.Namespace:
-    parser = argparse.ArgumentParser(description=__doc__)
-    names = [row.name for row in ROWS]
-    parser.add_argument("--rows", nargs="+", choices=names, default=names, metavar="ROW",
-                        help="only these: " + ", ".join(names))  # fmt: skip
-    parser.add_argument("--quick", action="store_true", help="few repetitions: rough figures")
-    parser.add_argument("--rounds", type=int, help=f"repetitions of each (default: {ROUNDS})")
-    parser.add_argument("--built", type=Path, default=ROOT / "build" / "release", metavar="FOLDER",
-                        help="where the programs were built (default: build/release)")  # fmt: skip
-    parser.add_argument("--page", action="store_true",
-                        help="write docs/results/benchmarks.md, too: of all rows")  # fmt: skip
-    requested = parser.parse_args()
-    if requested.page and (requested.rows != names or requested.quick):
-        parser.error("--page is for a run of all rows: without --rows and --quick")
-    return requested
+class NotMeasuredError(Exception):
+    """Why a program gave no figures."""
 
 
-def plain(rows: Sequence[Row], program: str, built: Path) -> dict[str, Samples]:
-    """The plain loops by which limits of the rows of a program are scaled, measured after it."""
-    names = sorted({row.plain for row in rows if row.program == program and row.plain is not None})
-    found: dict[str, Samples] = {}
-    for name in names:
-        found |= run(name.replace("_", "-"), ROUNDS, built)
-    return found
+def command_of(program: str, rounds: int, built: Path) -> list[str]:
+    """Command that runs the program of a row."""
+    python = ROOT / "benchmarks" / f"measure_{program.replace('-', '_')}.py"
+    if python.exists():
+        return [sys.executable, str(python), str(rounds), str(built)]
+    compiled = built / "bin" / f"o80-bench-{program}"
+    if not compiled.exists():
+        raise NotMeasuredError(f"{compiled.name} is not built")
+    paths = [str(built / "bin" / "o80-run"), "two_joints"] if program == "start" else []
+    return [str(compiled), str(rounds), *paths]
 
 
-def measure(rows: Sequence[Row], rounds: int, built: Path, console: Console) -> list[Result]:
-    measured: dict[str, dict[str, Samples] | str] = {}
-    for program in dict.fromkeys(row.program for row in rows):
-        with console.status(f"measuring: {program}"):
-            try:
-                measured[program] = run(program, rounds, built) | plain(rows, program, built)
-            except NotMeasuredError as reason:
-                measured[program] = str(reason)
-    results = []
-    for row in rows:
-        samples = measured[row.program]
-        if isinstance(samples, str):
-            results.append(Result(row=row.row, budget=row.budget, not_measured=samples))
-        else:
-            results.append(result_of(row, samples))
-    return results
+def run(program: str, rounds: int, built: Path) -> Samples:
+    """Runs a program to its end. Raises NotMeasuredError."""
+    command = command_of(program, rounds, built)
+    try:
+        ended = subprocess.run(command, capture_output=True, text=True, timeout=LONGEST)
+    except subprocess.TimeoutExpired:
+        raise NotMeasuredError(f"'{program}' took longer than {LONGEST} s") from None
+    samples: Samples = {}
+    for line in ended.stdout.splitlines():
+        name, unit, value = line.split("\t")
+        samples.setdefault(name, (unit, []))[1].append(float(value))
+    if ended.returncode != 0:
+        last_words = (ended.stderr.strip() or "it said nothing").splitlines()[-1].strip()
+        if not samples:
+            raise NotMeasuredError(last_words)
+        print(f"{program} failed: {last_words}", file=sys.stderr)
+    return samples
 
 
-def main() -> int:
-    requested = arguments()
-    rounds = requested.rounds or (ROUNDS_QUICK if requested.quick else ROUNDS)
-    console = Console()
-    if not console.is_terminal:
-        console = Console(width=150)
-    chosen = [row for row in ROWS if row.name in requested.rows]
-    where = conditions()
-    results = measure(chosen, rounds, requested.built.resolve(), console)
-    print_table(results, console)
-    path = ROOT / "build" / "bench" / "results.json"
-    write(results, path)
-    pages = [path.with_name("benchmarks.md"), *([PAGE] if requested.page else [])]
-    for page in pages:
-        page.write_text(text_of(results, where))
-    missed = [result.row for result in results if result.met is False]
-    unknown = sum(result.met is None for result in results)
-    console.print(
-        f"{len(results) - len(missed) - unknown} budgets met, {len(missed)} missed, "
-        f"{unknown} not measured; figures in {path.relative_to(ROOT)}, "
-        f"table in {pages[-1].relative_to(ROOT)}"
+def measure(rows: Sequence[Row], rounds: int, built: Path) -> list[Result]:
+    """Runs the programs of these rows; after each its plain loops, which scale its limits."""
+    measured: dict[str, Samples | str] = {}
+    for program in dict.fromkeys(row["program"] for row in rows):
+        print(f"measuring: {program}", file=sys.stderr)
+        plain = {row["plain"] for row in rows if row["program"] == program and row["plain"]}
+        try:
+            samples = run(program, rounds, built)
+            for name in sorted(plain):
+                samples |= run(name.replace("_", "-"), ROUNDS, built)
+            measured[program] = samples
+        except NotMeasuredError as reason:
+            measured[program] = str(reason)
+    return [result_of(row, measured[row["program"]]) for row in rows]
+
+
+def result_of(row: Row, samples: Samples | str) -> Result:
+    """Holds the medians of a program, and of plain loops beside it, against the budget of a row."""
+    result: Result = dict.fromkeys(("unit", "measured", "limit", "met", "best", "not_measured"))
+    result |= {"row": row["row"], "budget": row["budget"], "rounds": 0, "baseline": {}}
+    if isinstance(samples, str):
+        return result | {"not_measured": samples}
+    for name in filter(None, (row["measured"], row["of"])):
+        if name not in samples:
+            return result | {"not_measured": f"no '{name}' was given"}
+    limit, beside = float(row["limit"]), row["of"] or row["plain"]
+    if beside in samples:
+        result["baseline"][beside] = base = median(samples[beside][1])
+        limit *= base if row["of"] else base / USUAL[beside]
+    unit, values = samples[row["measured"]]
+    value, at_least = median(values), row["at_least"] == "yes"
+    return result | {
+        "unit": unit,
+        "measured": value,
+        "limit": limit,
+        "met": value >= limit if at_least else value <= limit,
+        "best": max(values) if at_least else min(values),
+        "rounds": len(values),
+    }
+
+
+def output(*command: str) -> str:
+    """First line of what a command prints; empty if it fails."""
+    try:
+        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+    except (OSError, subprocess.CalledProcessError):
+        return ""
+    return done.stdout.partition("\n")[0]
+
+
+def conditions() -> str:
+    """State of the machine that a run depends on; read before it, because of the load."""
+    lines = Path("/proc/cpuinfo").read_text().splitlines()
+    models = [line.partition(":")[2].strip() for line in lines if line.startswith("model name")]
+    processor = models[0] if models else platform.machine()
+    load = ", ".join(f"{each:.1f}" for each in os.getloadavg())
+    return (
+        f"commit {output('git', 'describe', '--always', '--dirty') or 'unknown'}; "
+        f"{datetime.now(UTC):%Y-%m-%d}; {processor}, {len(os.sched_getaffinity(0))} processors; "
+        f"Linux {platform.release()}; {output('c++', '--version') or 'unknown compiler'}; "
+        f"Python {platform.python_version()}; load before the run {load}."
     )
-    return 0
+
+
+def line_of(result: Result) -> str:
+    """A result as a row of the table."""
+    row, budget = (result[key].replace("|", "\\|") for key in ("row", "budget"))
+    if result["measured"] is None:
+        return f"| {row} | not measured: {result['not_measured']} | | | | |"
+    both = (result[key] for key in ("measured", "limit"))
+    shown = " | ".join(f"{each:.3g}" if abs(each) < 1000 else f"{each:.0f}" for each in both)
+    met = "yes" if result["met"] else "**no**"
+    return f"| {row} | {shown} | {result['unit']} | {budget} | {met} |"
+
+
+def page_of(results: Sequence[Result], where: str) -> str:
+    """The page of results: one table of one run, and on what it was run."""
+    loops = [
+        f"{name} {max(found) / usual:.1f}"
+        for name, usual in USUAL.items()
+        if (found := [each["baseline"][name] for each in results if name in each["baseline"]])
+    ]
+    slow = f" Times as slow as usual, at worst, were the plain loops: {', '.join(loops)}."
+    head = "| what | measured | limit | unit | beside what | met |\n|---|---:|---:|---|---|---|"
+    where = f"Run on: {where}{slow if loops else ''}"
+    return "\n".join([HEAD, where, "", head, *map(line_of, results)]) + "\n"
+
+
+def main() -> None:
+    with (ROOT / "benchmarks" / "rows.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    names = [row["name"] for row in rows]
+    parser = argparse.ArgumentParser(description="Measures the budgets of o80.")
+    option = parser.add_argument
+    every = "only these: " + ", ".join(names)
+    option("--rows", nargs="+", choices=names, default=names, metavar="ROW", help=every)
+    option("--quick", action="store_true", help="few repetitions: rough figures")
+    option("--rounds", type=int, help=f"repetitions of each (default: {ROUNDS})")
+    built = ROOT / "build" / "release"
+    option("--built", type=Path, default=built, help="folder of the programs (build/release)")
+    option("--page", action="store_true", help=f"write {PAGE.relative_to(ROOT)}, too: of all rows")
+    given = parser.parse_args()
+    if given.page and (given.rows != names or given.quick):
+        parser.error("--page is for a run of all rows: without --rows and --quick")
+    rounds = given.rounds or (ROUNDS_QUICK if given.quick else ROUNDS)
+    where = conditions()
+    chosen = [row for row in rows if row["name"] in given.rows]
+    results = measure(chosen, rounds, given.built.resolve())
+    RESULTS.parent.mkdir(parents=True, exist_ok=True)
+    RESULTS.write_text(json.dumps(results, indent=2) + "\n")
+    page = page_of(results, where)
+    for path in [RESULTS.with_name("benchmarks.md"), *([PAGE] if given.page else [])]:
+        path.write_text(page)
+    print(page[page.index("| what") :], end="")
+    met = [result["met"] for result in results]
+    counts = f"{met.count(True)} budgets met, {met.count(False)} missed, {met.count(None)}"
+    print(f"{counts} not measured; figures in {RESULTS.relative_to(ROOT)}")
 
 
 if __name__ == "__main__":
-    raise SystemExit(main())
+    main()
