@@ -3,6 +3,7 @@
 #include <utility>
 
 #include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
@@ -49,19 +50,8 @@ TEST_F(BackendTest, IsStartingUntilRowZeroAndRunningFromThenOn) {
 }
 
 TEST_F(BackendTest, TakesABatchWholeForAllActuators) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 1.0, {.pace = iterations(2)});
-  station.run(2);
-  add(frontend, 1, 2.0, {.pace = iterations(2)});
-  station.run(1);
-  EXPECT_THAT(desired(frontend, 0, 3), ElementsAre(0, 0, 0, 0)) << "nothing was pulsed yet";
-  const Batch batch = frontend.pulse();
-  station.run(3);
-  EXPECT_THAT(desired(frontend, 3, 6), ElementsAre(0, 0.5, 1, 1));
-  EXPECT_THAT(desired(frontend, 3, 6, 1), ElementsAre(0, 1, 2, 2));
-  EXPECT_EQ(batch.first_iteration(), 4);
-  EXPECT_EQ(batch.last_iteration(), 5);
+  play(R"(0 to 1 over 2; run 2; 1 to 2 over 2; run 1; 0 rows 0: 0 0 0 0  # nothing was pulsed yet
+    a = pulse; run 3; 0 rows 3: 0 0.5 1 1; 1 rows 3: 0 1 2 2; a taken 4; a ended 5)");
 }
 
 // rule B2
@@ -87,40 +77,14 @@ TEST_F(BackendTest, TakesBatchesInTheOrderOfTheirPulsesAcrossFrontends) {
 
 // rule B3
 TEST_F(BackendTest, TakesABatchAtItsIterationExactly) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 1.0);
-  const Batch later = frontend.pulse({.at = 5});
-  add(frontend, 0, 2.0);
-  const Batch sooner = frontend.pulse({.at = 3});
-  add(frontend, 1, 7.0);
-  const Batch now = frontend.pulse({.at = 1});
-  station.run(6);
-  EXPECT_THAT(desired(frontend, 1, 6), ElementsAre(0, 0, 2, 2, 1, 1));
-  EXPECT_EQ(desired(frontend.wait_for(1, kAtOnce), 1), 7.0);
-  EXPECT_EQ(later.first_iteration(), 5);
-  EXPECT_EQ(sooner.first_iteration(), 3);
-  EXPECT_EQ(now.first_iteration(), 1);
+  play(R"(later = 0 to 1 at 5; sooner = 0 to 2 at 3; now = 1 to 7 at 1; run 6
+    0 rows 1: 0 0 2 2 1 1; 1 rows 1: 7; later taken 5; sooner taken 3; now taken 1)");
 }
 
 // rule B3
 TEST_F(BackendTest, RejectsABatchWhoseIterationHasBegunUnlessItMayBeLate) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  station.run(4);
-  add(frontend, 0, 1.0);
-  const Batch late = frontend.pulse({.at = 4});
-  add(frontend, 1, 2.0);
-  const Batch now = frontend.pulse({.at = 4, .late = PulseOptions::Late::now});
-  station.run(2);
-  EXPECT_EQ(late.handle(0).status, Status::rejected);
-  EXPECT_EQ(late.handle(0).reason, Reason::late);
-  EXPECT_EQ(late.handle(0).iteration, 5);
-  EXPECT_NE(late.rejection(), "");
-  EXPECT_EQ(now.handle(0).status, Status::completed);
-  EXPECT_EQ(desired(frontend.latest(), 0), 0.0);
-  EXPECT_EQ(desired(frontend.latest(), 1), 2.0);
-  EXPECT_THROW(frontend.pulse({.at = -7}), InvalidArgument);
+  play(R"(run 4; a = 0 to 1 at 4; b = 1 to 2 at 4 late; run 2
+    a rejected late @5; b completed; 0 is 0; 1 is 2)");
 }
 
 // rule S2
@@ -274,13 +238,7 @@ TEST_F(BackendTest, StartsAfreshInARowOfItsOwn) {
 }
 
 TEST_F(BackendTest, AloneAFreshStartEndsItsBatchInItsOwnRow) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  add_request(frontend, Reset{.seed = 5});
-  const Batch batch = frontend.pulse();
-  station.run(1);
-  EXPECT_EQ(batch.last_iteration(), 1);
-  EXPECT_EQ(frontend.wait_for(1, kAtOnce).head().fresh, 1U);
+  play("a = reset 5; run 1; a ended 1; 0 rows 1: 5");
 }
 
 TEST_F(BackendTest, ItsPhaseFollowsStepPublishBrakeAndEnd) {

@@ -5,6 +5,7 @@
 #include "control/sending/batch_builder.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
@@ -151,28 +152,12 @@ TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
 
 // rule H1
 TEST_F(HaltTest, NobodysExclusiveControlStopsIt) {
-  StartedStation station;
-  UntypedFrontend holder("pair");
-  UntypedFrontend other("pair");
-  holder.add_take_control();
-  add(holder, 0, 9.0, {.pace = iterations(9)});
-  const Batch batch = holder.pulse();
-  station.run(2);
-  other.halt("stop it");
-  station.run(1);
-  EXPECT_EQ(batch.handle(1).status, Status::halted);
+  play(R"(take; 0 to 9 over 9; a = pulse; run 2; B: halt; run 1; a.1 halted)");
 }
 
 // rule H1
 TEST_F(HaltTest, NeedsNoLane) {
-  StartedStation station({.segment = "pair", .lanes = 1});
-  UntypedFrontend holder("pair");
-  const Batch batch = send(holder, 0, 9.0, {.pace = iterations(9)});
-  station.run(1);
-  UntypedFrontend other("pair");
-  other.halt("");
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::halted);
+  play({.segment = "pair", .lanes = 1}, "a = 0 to 9 over 9; run 1; B: halt; run 1; a halted");
 }
 
 // rule H3

@@ -9,6 +9,7 @@
 #include "control/sending/batch_builder.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
@@ -86,35 +87,13 @@ TEST_F(ResumeTest, IsRefusedUntilTheRobotHasBraked) {
 
 // rule H9
 TEST_F(ResumeTest, ClearsNoHaltThatCameAfterTheOneItNames) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  frontend.halt("first");
-  station.run(1);
-  frontend.halt("second");
-  station.run(1);
-  for (const std::uint64_t number : {1, 3}) {
-    const Batch resume = send_resume(frontend, number);
-    station.run(1);
-    EXPECT_EQ(resume.handle(0).status, Status::rejected);
-    EXPECT_THAT(resume.handle(0).text,
-                HasSubstr(number == 1 ? "halt 2 came after it" : "there is no halt 3"));
-    ASSERT_TRUE(frontend.halted());
-  }
-  EXPECT_EQ(frontend.halted()->reason(), "second");
+  play(R"(halt; run 1; halt; run 1; r = resume 1; run 1; r rejected; r says halt 2 came after it
+    halted; r = resume 3; run 1; r rejected; r says there is no halt 3; halted)");
 }
 
 // rule H9
 TEST_F(ResumeTest, LosesAgainstALaterHaltInTheSameIteration) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  const std::uint64_t number = frontend.halt("");
-  station.run(1);
-  const Batch resume = send_resume(frontend, number);
-  frontend.halt("second");
-  station.run(1);
-  EXPECT_EQ(resume.handle(0).status, Status::rejected);
-  EXPECT_TRUE(frontend.halted());
-  EXPECT_EQ(frontend.latest().head().halted, 1U);
+  play("halt; run 1; r = resume 1; halt; run 1; r rejected; halted");
 }
 
 void limit_shoulder(Schema& schema) {
@@ -228,31 +207,13 @@ TEST_F(ResumeTest, NeedsNoControl) {
 }
 
 TEST_F(ResumeTest, WithoutAHaltChangesNothing) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  const Batch running = send(frontend, 0, 9.0, {.pace = iterations(9)});
-  const Batch resume = send_resume(frontend, 7);
-  station.run(3);
-  EXPECT_EQ(resume.handle(0).status, Status::completed);
-  EXPECT_EQ(running.handle(0).status, Status::active);
+  play("a = 0 to 9 over 9; r = resume 7; run 3; r completed; a active");
 }
 
 // rule H7
 TEST_F(ResumeTest, IsNotNeededByRequestsThatAreServedWhileHalted) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  frontend.halt("");
-  station.run(1);
-  add_request(frontend, Reset{.seed = 5});
-  const Batch marked = frontend.pulse();
-  add_request<Refuse>(frontend);
-  const Batch other = frontend.pulse();
-  station.run(1);
-  EXPECT_EQ(marked.handle(0).status, Status::completed);
-  EXPECT_EQ(other.handle(0).status, Status::rejected);
-  EXPECT_EQ(other.handle(0).reason, Reason::halted);
-  EXPECT_EQ(desired(frontend.latest()), 5.0) << "a plant that was reset is where it is";
-  EXPECT_TRUE(frontend.halted()) << "and the halt stands";
+  play(R"(halt; run 1; a = reset 5; b = refuse; run 1; a completed; b rejected halted
+    0 is 5; halted  # a plant that was reset is where it is, and the halt stands)");
 }
 
 }  // namespace

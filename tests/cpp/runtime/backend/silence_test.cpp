@@ -6,6 +6,7 @@
 #include "o80/base/error.hpp"
 #include "runtime/liar.hpp"
 #include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
@@ -20,15 +21,8 @@ BackendOptions watched(Stale stale, std::int64_t silence = 5) {
 
 // rule W1
 TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
-  StartedStation station(watched(Stale::purge));
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
-  station.run(6);
-  EXPECT_EQ(batch.handle(0).status, Status::active);
-  station.run(2);
-  EXPECT_EQ(batch.handle(0).status, Status::purged);
-  EXPECT_EQ(batch.handle(0).reason, Reason::silence);
-  EXPECT_EQ(desired(frontend.latest()), 6.0) << "five iterations after the batch";
+  play(watched(Stale::purge), R"(a = 0 to 100 over 100; run 6; a active; run 2
+    a purged silence; 0 is 6  # five iterations after the batch)");
 }
 
 // rule K11
@@ -82,63 +76,24 @@ TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
 }
 
 TEST_F(SilenceTest, CountsNoPeriodsThatWereMissedWhileHalted) {
-  StartedStation station(watched(Stale::purge, 50));
-  UntypedFrontend holder("pair");
-  UntypedFrontend other("pair");
-  holder.add_take_control();
-  holder.pulse();
-  station.run(2);
-  const std::uint64_t number = other.halt("");
-  station.run(2);
-  station.backend.set_timing({.skipped = 1000});
-  station.run(2);
-  const Batch resume = send_resume(other, number);
-  station.run(20);
-  EXPECT_EQ(resume.handle(0).status, Status::completed);
-  const Batch refused = send(other, 0, 1.0);
-  station.run(1);
-  EXPECT_EQ(refused.rejected_by(), Reason::exclusive) << "the holder has kept its control";
+  play(watched(Stale::purge, 50), R"(take; a = pulse; run 2; B: halt; run 2; missed 1000; run 2
+    B: resumed = resume 1; run 20; resumed completed
+    B: b = 0 to 1; run 1; b rejected exclusive  # the holder has kept its control)");
 }
 
 // rule W4
 TEST_F(SilenceTest, EndsWhatTheSilentCommanderHasScheduled) {
-  StartedStation station(watched(Stale::purge));
-  UntypedFrontend silent("pair");
-  UntypedFrontend lively("pair");
-  send(silent, 0, 100.0, {.pace = iterations(100)});
-  add(silent, 1, 5.0);
-  silent.add_take_control();
-  const Batch later = silent.pulse({.at = 20});
-  add(lively, 1, 3.0);
-  const Batch others = lively.pulse({.at = 20});
-  station.run(7);
-  EXPECT_EQ(later.handle(0).status, Status::purged);
-  EXPECT_EQ(later.handle(0).reason, Reason::silence);
-  EXPECT_EQ(later.handle(0).iteration, 7) << "when the silence is noticed, not when it was due";
-  EXPECT_EQ(later.handle(1).status, Status::purged);
-  station.run(14);
-  EXPECT_EQ(others.handle(0).status, Status::completed);
-  EXPECT_EQ(desired(lively.latest(), 1), 3.0) << "what others scheduled acts";
-  // its sender is free to begin again
-  EXPECT_EQ(desired(silent.latest(), 0), 6.0);
-  send(silent, 0, 1.0);
-  station.run(1);
-  EXPECT_EQ(desired(silent.latest(), 0), 1.0);
+  play(watched(Stale::purge), R"(0 to 100 over 100; a = pulse; 1 to 5; take; later = pulse at 20
+    B: b = 1 to 3 at 20; run 7
+    later purged silence @7; later.1 purged  # when the silence is noticed, not when it was due
+    run 14; b completed; 1 is 3  # what others scheduled acts
+    0 is 6; again = 0 to 1; run 1; 0 is 1  # its sender is free to begin again)");
 }
 
 TEST_F(SilenceTest, AHaltEndsItTooAlsoWhatAHaltWouldLeave) {
-  StartedStation station(watched(Stale::halt));
-  UntypedFrontend silent("pair");
-  send(silent, 0, 100.0, {.pace = iterations(100)});
-  add(silent, 1, 5.0);
-  const Batch command = silent.pulse({.at = 20});
-  add_request(silent, Reset{.seed = 9});  // is served while halted
-  const Batch request = silent.pulse({.at = 20});
-  station.run(7);
-  ASSERT_TRUE(silent.halted());
-  EXPECT_EQ(command.handle(0).status, Status::halted);
-  EXPECT_EQ(request.handle(0).status, Status::purged);
-  EXPECT_EQ(request.handle(0).reason, Reason::silence);
+  play(watched(Stale::halt), R"(a = 0 to 100 over 100; command = 1 to 5 at 20
+    request = reset 9 at 20; run 7  # it is served while halted
+    halted; command halted; request purged silence)");
 }
 
 TEST_F(SilenceTest, StopsIfToldSo) {
@@ -153,88 +108,40 @@ TEST_F(SilenceTest, StopsIfToldSo) {
 }
 
 TEST_F(SilenceTest, HaltsIfToldSo) {
-  StartedStation station(watched(Stale::halt));
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
-  station.run(7);
-  EXPECT_EQ(batch.handle(0).status, Status::halted);
-  EXPECT_EQ(batch.handle(0).iteration, 7) << "in the very iteration in which it was noticed";
-  ASSERT_TRUE(frontend.halted());
-  EXPECT_EQ(frontend.halted()->cause, HaltCause::silence);
-  EXPECT_THAT(std::string(frontend.halted()->reason()), HasSubstr("pid "));
+  play(watched(Stale::halt), R"(a = 0 to 100 over 100; run 7
+    a halted @7; halted silence  # in the very iteration in which it was noticed
+    a says pid)");
 }
 
 TEST_F(SilenceTest, BatchesOfAnotherFrontendAreNoLife) {
-  StartedStation station(watched(Stale::purge));
-  UntypedFrontend silent("pair");
-  UntypedFrontend lively("pair");
-  const Batch batch = send(silent, 0, 100.0, {.pace = iterations(100)});
-  for (int i = 0; i < 8; ++i) {
-    send(lively, 1, i);
-    station.run(1);
-  }
-  EXPECT_EQ(batch.handle(0).status, Status::purged);
-  EXPECT_EQ(desired(lively.latest(), 1), 7.0) << "those of the other go on";
+  play(watched(Stale::purge), R"(a = 0 to 100 over 100
+    B: b = 1 to 0; run 1; B: b = 1 to 1; run 1; B: b = 1 to 2; run 1; B: b = 1 to 3; run 1
+    B: b = 1 to 4; run 1; B: b = 1 to 5; run 1; B: b = 1 to 6; run 1; B: b = 1 to 7; run 1
+    a purged; 1 is 7  # those of the other go on)");
 }
 
 TEST_F(SilenceTest, RejectedBatchesAreLifeOfTheirSenderOnly) {
-  StartedStation station(watched(Stale::purge));
-  UntypedFrontend holder("pair");
-  UntypedFrontend other("pair");
-  holder.add_take_control();
-  add(holder, 0, 100.0, {.pace = iterations(100)});
-  const Batch batch = holder.pulse();
-  for (int i = 0; i < 8; ++i) {
-    send(other, 1, i);
-    station.run(1);
-  }
-  EXPECT_EQ(batch.handle(1).status, Status::purged);
+  play(watched(Stale::purge), R"(take; 0 to 100 over 100; a = pulse
+    B: b = 1 to 0; run 1; B: b = 1 to 1; run 1; B: b = 1 to 2; run 1; B: b = 1 to 3; run 1
+    B: b = 1 to 4; run 1; B: b = 1 to 5; run 1; B: b = 1 to 6; run 1; B: b = 1 to 7; run 1
+    b completed; a.1 purged)");
 }
 
 TEST_F(SilenceTest, ControlIsSomethingThatActsAndEnds) {
-  StartedStation station(watched(Stale::purge));
-  UntypedFrontend holder("pair");
-  UntypedFrontend other("pair");
-  holder.add_take_control();
-  holder.pulse();
-  station.run(3);
-  const Batch refused = send(other, 0, 1.0);
-  station.run(1);
-  EXPECT_EQ(refused.handle(0).reason, Reason::exclusive);
-  station.run(4);
-  const Batch taken = send(other, 0, 1.0);
-  station.run(1);
-  EXPECT_EQ(taken.handle(0).status, Status::completed);
+  play(watched(Stale::purge), R"(take; a = pulse; run 3; B: b = 0 to 1; run 1
+    b rejected exclusive; run 4; B: c = 0 to 1; run 1; c completed)");
 }
 
 // rule W2
 TEST_F(SilenceTest, KeepAliveAndPulsesAreLife) {
-  StartedStation station(watched(Stale::purge));
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
-  for (int i = 0; i < 5; ++i) {
-    station.run(5);
-    frontend.keep_alive();
-  }
-  EXPECT_EQ(batch.handle(0).status, Status::active);
-  for (int i = 0; i < 5; ++i) {
-    station.run(5);
-    send(frontend, 1, i);
-  }
-  EXPECT_EQ(batch.handle(0).status, Status::active);
+  play(watched(Stale::purge), R"(a = 0 to 100 over 100
+    run 5; alive; run 5; alive; run 5; alive; run 5; alive; run 5; a active
+    b = 1 to 1; run 5; b = 1 to 2; run 5; b = 1 to 3; run 5; b = 1 to 4; run 5; a active)");
 }
 
 TEST_F(SilenceTest, LifeCountsFromWhenItWasShown) {
-  StartedStation station(watched(Stale::purge, 10));
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
-  station.run(4);
-  frontend.keep_alive();  // it knows row 4
-  station.run(10);
-  EXPECT_EQ(batch.handle(0).status, Status::active);
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::purged);
-  EXPECT_EQ(batch.handle(0).iteration, 15);
+  play(watched(Stale::purge, 10), R"(a = 0 to 100 over 100; run 4; alive  # it knows row 4
+    run 10; a active; run 1; a purged @15)");
 }
 
 // rule W2
@@ -267,41 +174,21 @@ TEST_F(SilenceTest, AWaitForOnesOwnBatchIsLife) {
 }
 
 TEST_F(SilenceTest, NothingThatActsNoSilence) {
-  StartedStation station(watched(Stale::stop));
-  UntypedFrontend frontend("pair");
-  send(frontend, 0, 1.0);
-  station.run(50);
-  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
-  station.run(5);
-  EXPECT_EQ(batch.handle(0).status, Status::active) << "nor is the time before counted";
+  play(watched(Stale::stop), R"(a = 0 to 1; run 50; b = 0 to 100 over 100; run 5
+    b active  # nor is the time before counted)");
 }
 
 // rule W3
 TEST_F(SilenceTest, ABurstIsItsSendersLifeAndStandingStillCountsNone) {
   BackendOptions options = watched(Stale::purge);
   options.bursting = true;
-  StartedStation station(options);
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 100.0, {.pace = iterations(100)});
-  const Burst burst = frontend.start_burst(50);
-  EXPECT_EQ(station.drive(), Step::standing);
-  EXPECT_EQ(burst.batch().handle(0).status, Status::active);
-  EXPECT_EQ(station.drive(), Step::standing);
-  frontend.start_burst(10);
-  EXPECT_EQ(station.drive(), Step::standing);
-  EXPECT_EQ(burst.batch().handle(0).status, Status::active);
+  play(options, "a = 0 to 100 over 100; burst 50; a active; burst 10; a active");
 }
 
 TEST_F(SilenceTest, AnothersBurstIsNot) {
   BackendOptions options = watched(Stale::purge);
   options.bursting = true;
-  StartedStation station(options);
-  UntypedFrontend silent("pair");
-  UntypedFrontend other("pair");
-  const Batch batch = send(silent, 0, 100.0, {.pace = iterations(100)});
-  other.start_burst(20);
-  EXPECT_EQ(station.drive(), Step::standing);
-  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  play(options, "a = 0 to 100 over 100; B: burst 20; a purged");
 }
 
 TEST_F(SilenceTest, LifeFromTheFutureIsThatOfNow) {
@@ -332,14 +219,9 @@ void rest_at_zero(Schema& schema) {
 
 // rule W1
 TEST_F(SilenceTest, ADirectValueThatStillActsCountsAlthoughNothingIsQueued) {
-  StartedStation station(watched(Stale::purge), rest_at_zero);
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 3.0);
-  station.run(6);
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
-  EXPECT_EQ(desired(frontend.latest()), 3.0) << "a streamed velocity stays until the next one";
-  station.run(1);
-  EXPECT_EQ(desired(frontend.latest()), 0.0) << "but not when its sender hangs";
+  play(watched(Stale::purge), R"(a = 0 to 3; run 6; a completed; 0 is 3  # until the next one
+    run 1; 0 is 0  # but not when its sender hangs)",
+       rest_at_zero);
 }
 
 // rule W6
