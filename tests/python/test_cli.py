@@ -161,18 +161,6 @@ def test_echo_prints_rows_in_order(folder: Path, robot: "subprocess.Popen[str]")
     assert line.rstrip().endswith("idle")
 
 
-@pytest.mark.parametrize("rate", ["0", "-2", "nan", "inf"])
-def test_echo_refuses_a_rate_that_is_not_positive(folder: Path, rate: str) -> None:
-    said = o80(folder, "echo", "nobody", "--rate", rate, fails=True)
-    assert f"rate must be positive, got {rate}" in in_a_line(said)
-
-
-def test_echo_refuses_odd_numbers(folder: Path) -> None:
-    assert "'--count'" in o80(folder, "echo", "nobody", "--count=-1", fails=True)
-    said = o80(folder, "echo", "nobody", "--timeout", "nan", fails=True)
-    assert "timeout must not be negative, got nan" in in_a_line(said)
-
-
 def test_a_mark_stands_in_the_journal(folder: Path, robot: "subprocess.Popen[str]") -> None:
     said = o80(folder, "mark", "two_joints", "changed the battery")
     iteration = int(said.split("iteration ")[1].split(":")[0])

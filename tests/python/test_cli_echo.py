@@ -81,6 +81,19 @@ def test_a_field_that_is_not_there_is_answered_with_the_nearest(
     assert said in echo(segment, "--fields", path, fails=True)
 
 
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        *((f"--rate={rate}", f"rate must be positive, got {rate}") for rate in ("0", "nan", "inf")),
+        ("--count=-1", "'--count'"),
+        ("--timeout=nan", "timeout must not be negative, got nan"),
+    ],
+)
+def test_odd_numbers_are_refused(words: str, said: str) -> None:
+    printed = run_o80("echo", "nobody", words, code=None).stderr
+    assert said in " ".join(printed.replace("│", " ").split())
+
+
 def test_a_missing_segment_is_said_at_once(segment: str) -> None:
     begin = time.monotonic()
     said = echo(segment, fails=True)

@@ -15,16 +15,6 @@ def test_actuators_go_by_index_or_name(arm: o80.Frontend) -> None:
     assert arm.burst(1).desired.tolist() == [0.25, 0.5]
 
 
-@pytest.mark.parametrize("target", [3.1, float("nan"), float("inf"), "fast", None, [1, 2], {}])
-def test_a_target_that_cannot_be_followed_is_refused_when_it_is_added(
-    arm: o80.Frontend, target: object
-) -> None:
-    with pytest.raises(o80.InvalidArgument, match="elbow"):
-        arm.add_command("elbow", target)
-
-    assert arm.added == 0
-
-
 @pytest.mark.parametrize("target", [1, 0.5, np.float32(0.5), np.int8(1), np.array(0.5), True])
 def test_every_number_is_a_target(arm: o80.Frontend, target: float) -> None:
     arm.add_command("elbow", target)
@@ -32,25 +22,18 @@ def test_every_number_is_a_target(arm: o80.Frontend, target: float) -> None:
     assert arm.burst(1).desired[1] == float(target)
 
 
-@pytest.mark.parametrize(
-    "pace",
-    [
-        {"duration": -1.0},
-        {"duration": float("nan")},
-        {"duration": 1e300},
-        {"duration": "1 s"},
-        {"speed": 0.0},
-        {"speed": -1.0},
-        {"until": -1},
-        {"until": 2.5},
-        {"iterations": 0},
-        {"iterations": 2**70},
-        {"mode": "replace"},
-        {"profile": "smooth"},
-        {"start": "here"},
-        {"mode": 1},
-    ],
+WRONG_PACES = (
+    *({"duration": wrong} for wrong in (-1.0, float("nan"), 1e300, "1 s")),
+    *({"speed": wrong} for wrong in (0.0, -1.0)),
+    *({"until": wrong} for wrong in (-1, 2.5)),
+    *({"iterations": wrong} for wrong in (0, 2**70)),
+    *({"mode": wrong} for wrong in ("replace", 1)),
+    {"profile": "smooth"},
+    {"start": "here"},
 )
+
+
+@pytest.mark.parametrize("pace", WRONG_PACES)
 def test_a_pace_that_cannot_be_is_refused(arm: o80.Frontend, pace: dict[str, object]) -> None:
     with pytest.raises(o80.InvalidArgument):
         arm.add_command(0, 0.5, **pace)  # type: ignore[arg-type]

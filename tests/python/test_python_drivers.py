@@ -479,6 +479,7 @@ def test_a_recording_cannot_name_a_class_to_import(segment: str, tmp_path: Path)
             joint.burst(5)
     by_readings = o80.replay(tmp_path / "run.mcap")
     assert str(by_readings) == f"{segment}: 6 rows, no driver was started: desired states identical"
+    assert any("the robot may be hardware" in note for note in by_readings.runs[0].notes)
     with pytest.raises(o80.DriverError, match="joint"):
         o80.replay(tmp_path / "simulated.mcap")
 

@@ -273,16 +273,6 @@ def test_a_flipped_bit_is_found_in_its_row_and_field(
     assert (report.difference.iteration, report.difference.field) == (row, name)
 
 
-def test_a_robot_that_may_be_hardware_is_not_started(segment: str) -> None:
-    with o80.Backend(segment, ["a"], bursting=True) as backend:
-        backend.publish()
-        with o80.Frontend(segment) as frontend:
-            (run,) = o80.replay(frontend)
-    assert (run.identical, run.rows, run.driver) == (True, 1, False)
-    assert str(run) == f"{segment}: 1 row, no driver was started: desired states identical"
-    assert any("the robot may be hardware" in note for note in run.notes)
-
-
 @dataclass(frozen=True)
 class FromElsewhere(Flipped):
     """A run with one flipped bit that another build of o80, or another machine, recorded."""

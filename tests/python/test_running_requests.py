@@ -57,24 +57,17 @@ def test_it_is_active_with_its_progress_until_it_ends(backend: o80.Backend, segm
         assert not backend.running("home")
 
 
-def test_it_may_end_with_a_fresh_start(backend: o80.Backend, segment: str) -> None:
+def test_it_may_be_ended_by_another_with_a_fresh_start_or_a_reason(
+    backend: o80.Backend, segment: str
+) -> None:
+    backend.on("abandon", lambda _: backend.end_request("home", rejected="abandoned"))
     with o80.Frontend(segment) as frontend:
         batch = home(frontend)
         iterate(backend, frontend)
         backend.end_request("home", o80.StartAfresh([0.0, 0.0]))
         iterate(backend, frontend)
         assert batch.statuses == [o80.Status.COMPLETED]
-        fresh = frontend.wait_for(batch.last_iteration)
-        assert fresh.fresh
-        assert fresh.desired.tolist() == [0.0, 0.0]
-
-
-def test_another_request_may_end_it(backend: o80.Backend, segment: str) -> None:
-    def abandon(_: o80.Record) -> None:
-        backend.end_request("home", rejected="abandoned")
-
-    backend.on("abandon", abandon)
-    with o80.Frontend(segment) as frontend:
+        assert frontend.wait_for(batch.last_iteration).desired.tolist() == [0.0, 0.0]
         batch = home(frontend)
         iterate(backend, frontend)
         frontend.add_request("abandon")
