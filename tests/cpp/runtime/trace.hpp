@@ -20,6 +20,7 @@ namespace o80::test {
 /// which is opened at its first mention; without a name it is A.
 ///
 ///     0 to 5 over 9         adds a command for actuator 0: `over` iterations, `speed`, `overwrite`
+///     0,1 to 5 6            one command for several
 ///     purge, purge own, take, release, note, reset 5, refuse     adds one of these
 ///     a = 0 to 5, a = pulse at 20 late      sends what was added, with that command or without, as
 ///     a a = resume 1          sends the resume of a halt run 3, missed 100, read 0 1.5, close,
@@ -58,6 +59,12 @@ class Trace {
     const auto found = std::ranges::find(words_, word);
     return found == words_.end() ? 0 : static_cast<std::size_t>(found - words_.begin());
   }
+  /// Words from the third on.
+  std::string rest() const {
+    std::string text = words_[2];
+    for (std::size_t i = 3; i < words_.size(); ++i) text += " " + words_[i];
+    return text;
+  }
   void drop(std::ptrdiff_t count) { words_.erase(words_.begin(), words_.begin() + count); }
 
   void play_statement() {
@@ -92,9 +99,21 @@ class Trace {
     if (words_.size() > 2 && words_[1] == "to") {
       CommandOptions options;
       if (find("over") > 0) options.pace = iterations(whole(find("over") + 1));
+      if (find("until") > 0) options.pace = until(whole(find("until") + 1));
       if (find("speed") > 0) options.pace = speed(number(find("speed") + 1));
       if (find("overwrite") > 0) options.mode = Mode::overwrite;
-      add(frontend, small(0), number(2), options);
+      std::vector<std::uint32_t> actuators;
+      std::vector<double> targets;
+      std::istringstream each(words_[0]);
+      for (std::string actuator; std::getline(each, actuator, ',');) {
+        actuators.push_back(static_cast<std::uint32_t>(std::stoul(actuator)));
+        targets.push_back(number(1 + actuators.size()));
+      }
+      if (actuators.size() == 1) {
+        add(frontend, actuators[0], targets[0], options);
+      } else {
+        frontend.add_commands(actuators, std::as_bytes(std::span(targets)), options);
+      }
     } else if (verb == "purge" && find("own") > 0) {
       frontend.add_purge_own();
     } else if (verb == "purge") {
@@ -163,9 +182,12 @@ class Trace {
       } else if (verb == "ended") {
         EXPECT_EQ(batch.last_iteration(), whole(2));
       } else if (verb == "says") {
-        std::string text;
-        for (std::size_t i = 2; i < words_.size(); ++i) text += (i > 2 ? " " : "") + words_[i];
-        EXPECT_THAT(handle.text, ::testing::HasSubstr(text));
+        EXPECT_THAT(handle.text, ::testing::HasSubstr(rest()));
+      } else if (verb == "waits" && words_.size() == 2) {
+        batch.wait(kAtOnce);
+      } else if (verb == "waits") {
+        EXPECT_THAT(message_of<NotCompleted>([&] { batch.wait(kAtOnce); }),
+                    ::testing::HasSubstr(rest()));
       } else {
         EXPECT_EQ(to_text(handle.status), verb);
         expect_words(2, std::string(to_text(handle.reason)), handle.iteration);

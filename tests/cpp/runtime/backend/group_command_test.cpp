@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
@@ -25,20 +26,8 @@ std::uint32_t add_both(UntypedFrontend& frontend, double shoulder, double elbow,
 class GroupCommandTest : public StationTest {};
 
 TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  add_both(frontend, 2.0, 4.0, {.pace = iterations(2)});
-  EXPECT_EQ(frontend.added(), 1U);
-  const Batch batch = frontend.pulse();
-  EXPECT_EQ(batch.size(), 1U);
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::active);
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
-  EXPECT_EQ(batch.handle(0).iteration, 2);
-  EXPECT_TRUE(batch.ended());
-  EXPECT_THAT(desired(frontend, 1, 2), ElementsAre(1, 2));
-  EXPECT_THAT(desired(frontend, 1, 2, 1), ElementsAre(2, 4));
+  play(R"(a = 0,1 to 2 4 over 2; run 1; a active; run 1; a completed @2; a ended 2
+    0 rows 1: 1 2; 1 rows 1: 2 4)");
 }
 
 TEST_F(GroupCommandTest, ATrajectoryIsOneToo) {
@@ -133,45 +122,16 @@ TEST_F(GroupCommandTest, ABatchStagedOverSeveralIterationsActsWhole) {
 // ------------------------------------------------------------------------------ losing members
 
 TEST_F(GroupCommandTest, EndsAtOnceWhenAllItsMembersDo) {
-  const auto ends_as = [](auto&& end, Status status) {
-    StartedStation station;
-    UntypedFrontend frontend("pair");
-    add_both(frontend, 8.0, 8.0, {.pace = iterations(8)});
-    add_both(frontend, 9.0, 9.0, {.pace = iterations(8)});
-    const Batch batch = frontend.pulse();
-    station.run(2);
-    end(frontend);
-    station.run(1);
-    for (const std::size_t i : {0, 1}) {
-      EXPECT_EQ(batch.handle(i).status, status);
-      EXPECT_EQ(batch.handle(i).iteration, 3);
-    }
-    EXPECT_TRUE(batch.ended());
-  };
-  ends_as([](UntypedFrontend& frontend) { frontend.halt("enough"); }, Status::halted);
-  ends_as(
-      [](UntypedFrontend& frontend) {
-        frontend.add_purge();
-        frontend.pulse();
-      },
-      Status::purged);
-  ends_as(
-      [](UntypedFrontend& frontend) {
-        add_both(frontend, 1.0, 1.0, {.mode = Mode::overwrite});
-        frontend.pulse();
-      },
-      Status::overwritten);
+  for (const std::string end :
+       {"halt; run 1; a halted @3; a.1 halted @3", "b = purge; run 1; a purged @3; a.1 purged @3",
+        "b = 0,1 to 1 1 overwrite; run 1; a overwritten @3; a.1 overwritten"}) {
+    play("0,1 to 8 8 over 8; 0,1 to 9 9 over 8; a = pulse; run 2;" + end + "; a ended 3");
+  }
 }
 
 TEST_F(GroupCommandTest, EndsWithItsFrontendIfToldSo) {
-  StartedStation station({.segment = "pair", .stale = Stale::purge, .silence = 5});
-  UntypedFrontend frontend("pair");
-  add_both(frontend, 100.0, 100.0, {.pace = iterations(100)});
-  const Batch batch = frontend.pulse();
-  station.run(20);
-  const Handle handle = batch.handle(0);
-  EXPECT_EQ(handle.status, Status::purged);
-  EXPECT_EQ(handle.reason, Reason::silence);
+  play({.segment = "pair", .stale = Stale::purge, .silence = 5},
+       "a = 0,1 to 100 100 over 100; run 20; a purged silence");
 }
 
 // ------------------------------------------------------------------------------ bursting

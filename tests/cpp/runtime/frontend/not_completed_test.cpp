@@ -1,6 +1,7 @@
 #include "o80/runtime/not_completed.hpp"
 
 #include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
@@ -8,6 +9,8 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+
+using NotCompletedTraces = StationTest;
 
 class NotCompletedTest : public StationTest {
  protected:
@@ -46,114 +49,51 @@ TEST_F(NotCompletedTest, ACommandThatAnotherFrontendOverwroteIsAnError) {
 }
 
 // rule S4
-TEST_F(NotCompletedTest, OneThatTheSameFrontendOverwroteIsNone) {
-  const Batch first = send(one_, 0, 9.0, {.pace = iterations(9)});
-  station_.run(2);
-  send(one_, 0, 5.0, {.pace = iterations(2), .mode = Mode::overwrite});
-  station_.run(1);
-  ASSERT_EQ(first.handle(0).status, Status::overwritten);
-  first.wait(kAtOnce);
-
-  add(one_, 0, 1.0, {.pace = iterations(9)});
-  add(one_, 0, 2.0, {.mode = Mode::overwrite});
-  const Batch both = one_.pulse();
-  station_.run(1);
-  ASSERT_EQ(both.handle(0).status, Status::overwritten) << "by a later one of its own batch";
-  both.wait(kAtOnce);
+TEST_F(NotCompletedTraces, OneThatTheSameFrontendOverwroteIsNone) {
+  play(R"(a = 0 to 9 over 9; run 2; b = 0 to 5 over 2 overwrite; run 1; a overwritten; a waits
+    0 to 1 over 9; 0 to 2 overwrite; both = pulse; run 1
+    both overwritten; both waits  # by a later one of its own batch)");
 }
 
-TEST_F(NotCompletedTest, OneThatASetPointOfTheSameFrontendWaitedToOverwriteIsNone) {
-  add(one_, 0, 5.0, {.mode = Mode::overwrite});
-  one_.pulse({.at = 4});
-  const Batch mine = send(one_, 0, 9.0, {.pace = iterations(9)});
-  station_.run(4);
-  ASSERT_EQ(mine.handle(0).status, Status::overwritten);
-  mine.wait(kAtOnce);
-  const Batch next = send(one_, 0, 9.0, {.pace = iterations(9)});
-  station_.run(1);
-  send(two_, 0, 5.0, {.mode = Mode::overwrite});
-  station_.run(1);
-  EXPECT_THAT(told(next), HasSubstr("was overwritten"));
+TEST_F(NotCompletedTraces, OneThatASetPointOfTheSameFrontendWaitedToOverwriteIsNone) {
+  play(R"(a = 0 to 5 overwrite at 4; b = 0 to 9 over 9; run 4; b overwritten; b waits
+    c = 0 to 9 over 9; run 1; B: d = 0 to 5 overwrite; run 1; c waits was overwritten)");
 }
 
-TEST_F(NotCompletedTest, AnOverwriteOfAnotherActuatorOrAnEarlierOneDoesNotExcuse) {
-  send(one_, 0, 1.0, {.mode = Mode::overwrite});
-  const Batch mine = send(one_, 0, 9.0, {.pace = iterations(9)});
-  send(one_, 1, 1.0, {.mode = Mode::overwrite});
-  station_.run(2);
-  send(two_, 0, 5.0, {.mode = Mode::overwrite});
-  station_.run(1);
-  EXPECT_THAT(told(mine), HasSubstr("'shoulder' was overwritten"));
+TEST_F(NotCompletedTraces, AnOverwriteOfAnotherActuatorOrAnEarlierOneDoesNotExcuse) {
+  play(R"(a = 0 to 1 overwrite; b = 0 to 9 over 9; c = 1 to 1 overwrite; run 2
+    B: d = 0 to 5 overwrite; run 1; b waits 'shoulder' was overwritten)");
 }
 
-TEST_F(NotCompletedTest, ACommandOfSeveralActuatorsNamesThemAll) {
-  const std::array<std::uint32_t, 2> actuators{0, 1};
-  const std::array<double, 2> targets{9.0, 9.0};
-  one_.add_commands(actuators, std::as_bytes(std::span(targets)), {.pace = iterations(9)});
-  const Batch group = one_.pulse();
-  station_.run(2);
-  send(two_, 1, 5.0, {.mode = Mode::overwrite});
-  station_.run(9);
-  EXPECT_THAT(told(group), HasSubstr("'shoulder', 'elbow' were overwritten"));
-
-  one_.add_commands(actuators, std::as_bytes(std::span(targets)), {.pace = iterations(9)});
-  const Batch next = one_.pulse();
-  station_.run(2);
-  send(one_, 1, 5.0, {.mode = Mode::overwrite});
-  station_.run(9);
-  next.wait(kAtOnce);
+TEST_F(NotCompletedTraces, ACommandOfSeveralActuatorsNamesThemAll) {
+  play(R"(a = 0,1 to 9 9 over 9; run 2; B: b = 1 to 5 overwrite; run 9
+    a waits 'shoulder', 'elbow' were overwritten
+    c = 0,1 to 9 9 over 9; run 2; d = 1 to 5 overwrite; run 9; c waits)");
 }
 
-TEST_F(NotCompletedTest, APurgeOfAnybodyIsAnError) {
-  const Batch mine = send(one_, 0, 9.0, {.pace = iterations(9)});
-  station_.run(1);
-  two_.add_purge();
-  const Batch purge = two_.pulse();
-  station_.run(1);
-  EXPECT_THAT(told(mine), HasSubstr("'shoulder' was purged in iteration 2"));
-  purge.wait(kAtOnce);
-  const Batch again = send(one_, 0, 9.0, {.pace = iterations(9)});
-  station_.run(1);
-  one_.add_purge_own();
-  one_.pulse();
-  station_.run(1);
-  EXPECT_THAT(told(again), HasSubstr("was purged"));
+TEST_F(NotCompletedTraces, APurgeOfAnybodyIsAnError) {
+  play(R"(a = 0 to 9 over 9; run 1; B: b = purge; run 1
+    a waits 'shoulder' was purged in iteration 2; b waits
+    c = 0 to 9 over 9; run 1; d = purge own; run 1; c waits was purged)");
 }
 
-TEST_F(NotCompletedTest, SoIsAFreshStart) {
-  const Batch mine = send(one_, 0, 9.0, {.pace = iterations(9)});
-  station_.run(1);
-  add_request(two_, Reset{});
-  two_.pulse();
-  station_.run(2);
-  EXPECT_THAT(told(mine), HasSubstr("'shoulder' was purged"));
-  EXPECT_THAT(told(mine), HasSubstr("fresh start"));
+TEST_F(NotCompletedTraces, SoIsAFreshStart) {
+  play(R"(a = 0 to 9 over 9; run 1; B: b = reset 0; run 2
+    a waits 'shoulder' was purged; a waits fresh start)");
 }
 
-TEST_F(NotCompletedTest, SoIsACommandThatIsTooLate) {
-  station_.run(5);
-  const Batch mine = send(one_, 1, 1.0, {.pace = until(3)});
-  station_.run(1);
-  EXPECT_THAT(told(mine), AllOf(HasSubstr("'elbow' was rejected"), HasSubstr("came after")));
+TEST_F(NotCompletedTraces, SoIsACommandThatIsTooLate) {
+  play(R"(run 5; a = 1 to 1 until 3; run 1; a waits 'elbow' was rejected; a waits came after)");
 }
 
-TEST_F(NotCompletedTest, SoIsABatchThatIsTooLate) {
-  station_.run(5);
-  add(one_, 1, 1.0);
-  const Batch mine = one_.pulse({.at = 3});
-  station_.run(1);
-  EXPECT_THAT(told(mine), HasSubstr("the batch sent to 'pair' was rejected: it came after"));
+TEST_F(NotCompletedTraces, SoIsABatchThatIsTooLate) {
+  play(R"(run 5; a = 1 to 1 at 3; run 1
+    a waits the batch sent to 'pair' was rejected: it came after)");
 }
 
-TEST_F(NotCompletedTest, SoIsARequestThatIsRejected) {
-  add(one_, 0, 1.0);
-  add_request(one_, Refuse{});
-  const Batch mine = one_.pulse();
-  station_.run(1);
-  EXPECT_THAT(told(mine), AllOf(HasSubstr("1 of 2 commands"),
-                                HasSubstr("request 'refuse' was "
-                                          "rejected"),
-                                HasSubstr("it does not want to")));
+TEST_F(NotCompletedTraces, SoIsARequestThatIsRejected) {
+  play(R"(0 to 1; refuse; a = pulse; run 1; a waits 1 of 2 commands
+    a waits request 'refuse' was rejected; a waits it does not want to)");
 }
 
 TEST_F(NotCompletedTest, ListsFiveEndsAtMost) {
