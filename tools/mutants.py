@@ -176,7 +176,7 @@ def write(tree: Path, count: int, seed: int, without: list[int]) -> None:
 def likely_first(tree: Path, one: Mutant) -> str:
     """Files of tests/python, those first that name the module or the function of the mutant."""
     words = re.compile(rf"\b_?(?:{Path(one.file).stem.strip('_')}|{one.function.strip('_')})\b")
-    files = sorted((tree / "tests/python").glob("test_*.py"))
+    files = sorted((tree / "tests/python").rglob("test_*.py"))
     files.sort(key=lambda file: -len(words.findall(file.read_text())))
     return " ".join(str(file.relative_to(tree)) for file in files)
 

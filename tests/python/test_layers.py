@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (10_180, 6_015),
     "benchmarks, tools": (5_490, 0),
     "examples": (2_080, 0),
-    "tests, conftest.py": (0, 67_020),
+    "tests, conftest.py": (0, 67_030),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -6,7 +6,7 @@ import pytest
 
 from selection import NoSuchTestsError, select
 
-LANE, BURSTS = "tests/cpp/memory/ring/lane_test.cpp", "tests/python/test_bursts.py"
+LANE, BURSTS = "tests/cpp/memory/ring/lane_test.cpp", "tests/python/frontend/test_bursts.py"
 IN_LANE = "memory.LaneTest.SendsABatch"
 IN_FOLDER = "memory.KillTest.Dies"
 

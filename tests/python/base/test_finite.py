@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from o80.base.finite import json_text
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 ROOMS = (
     "python/o80",
     "devices/o80_devices",

@@ -18,7 +18,7 @@ from room_sensor import Joint, Paced, RoomSensor
 import o80
 from o80.drivers import Reading
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 
 
 def command(*words: str, code: int = 0) -> str:
@@ -545,7 +545,7 @@ def test_a_simulation_in_python_is_replayed_from_its_segment(
 
 
 def test_the_thermometer_of_the_page_runs(segment: str, tmp_path: Path) -> None:
-    page = Path(__file__).parents[2] / "docs" / "drivers.md"
+    page = Path(__file__).parents[3] / "docs" / "drivers.md"
     section = page.read_text().split("## A driver in Python")[1]
     file = tmp_path / "room_of_the_page.py"
     file.write_text(re.findall(r"```python\n(.*?)```", section, re.DOTALL)[0])

@@ -13,7 +13,7 @@ from processes import O80, WAIT
 
 import o80
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 PACKAGES = (
     "python/o80",
     "devices/o80_devices",

@@ -17,7 +17,7 @@ WORDS_OF_A_CRASH = ("Fatal", "terminate", "exception not rethrown", "Abort", "Se
 
 def run(program: str, *flags: str) -> subprocess.CompletedProcess[str]:
     """A program of its own; it must end by itself."""
-    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parent)}
+    environment = os.environ | {"PYTHONPATH": str(Path(__file__).parents[1])}
     return run_python(*flags, "-c", program, code=None, env=environment)
 
 

@@ -1,6 +1,6 @@
 """System calls that a sandbox refuses (profiles of containers, gVisor): halts happen all the same.
 
-`python tests/python/test_refused_calls.py` prints the table of all calls.
+`python tests/python/ends/test_refused_calls.py` prints the table of all calls.
 """
 
 import collections

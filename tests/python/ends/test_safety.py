@@ -15,7 +15,7 @@ from processes import O80, WAIT, run_o80, run_program
 
 import o80
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 
 
 def until(true: Callable[[], object]) -> None:

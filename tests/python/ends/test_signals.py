@@ -77,7 +77,7 @@ def test_ctrl_c_ends_every_wait_and_leaves_everything_usable(
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
+        env={**os.environ, "PYTHONPATH": str(Path(__file__).parents[1])},
     )
     assert program.stdout is not None
     assert program.stderr is not None

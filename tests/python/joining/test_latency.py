@@ -11,7 +11,7 @@ from processes import run_o80
 import o80
 from o80.rows.columns import columns_of
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "time.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "time.md"
 
 PERIOD = 2_000_000  # [ns]
 

@@ -36,7 +36,7 @@ from o80.learning.training.learner import load
 
 pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "learning.md"
+PAGE = Path(__file__).resolve().parents[3] / "docs" / "learning.md"
 SMALL = {"rollout": 48, "batch_size": 16, "n_epochs": 2, "hidden": 8}
 SETTINGS = TrainingSettings(Guess, seed=4, copies=4, decisions=480, ppo=SMALL)
 
@@ -298,7 +298,7 @@ def test_a_file_of_settings_is_trained_and_words_of_the_command_replace_its_valu
     (tmp_path / "guess.json").write_text(json.dumps(held))
     words = [sys.executable, "-m", "o80.learning", "train", str(tmp_path / "guess.json")]
     words += ["--out", str(tmp_path / "out"), "--seed", "3", "--ppo", "gamma=0.5"]
-    subprocess.run(words, cwd=Path(__file__).parent, check=True, capture_output=True)
+    subprocess.run(words, cwd=Path(__file__).parents[1], check=True, capture_output=True)
     settings, _ = load(tmp_path / "out")
     wanted = TrainingSettings(NamedTask(**task), 3, 4, 96, {**SMALL, "gamma": 0.5})
     assert settings == wanted
@@ -320,7 +320,7 @@ def test_a_stopped_command_saves_and_says_how_to_go_on(
     words += ["--out", str(folder), "--copies", "4", "--import", "rule=training_tasks:Squared"]
     for name, value in SMALL.items():
         words += ["--ppo", f"{name}={value}"]
-    here = Path(__file__).parent
+    here = Path(__file__).parents[1]
     terminal, inside = pty.openpty()
     errors = inside if number == signal.SIGHUP else subprocess.PIPE
     with subprocess.Popen(words, stdout=inside, stderr=errors, cwd=here) as process:

@@ -26,7 +26,7 @@ from o80.recording.scan import content_of, index_of, scan
 from o80.replaying.recorded_run import FileRun, runs_in
 from o80.rows.provenance import Provenance
 
-RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
+RECORDINGS = Path(__file__).resolve().parents[2] / "data" / "recordings"
 RECORDING = RECORDINGS / "codec_1.mcap"
 
 

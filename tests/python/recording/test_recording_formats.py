@@ -15,7 +15,7 @@ from o80.cli.export import export
 from o80.cli.plot import plot
 from o80.recording.scan import scan
 
-RECORDINGS = Path(__file__).resolve().parents[1] / "data" / "recordings"
+RECORDINGS = Path(__file__).resolve().parents[2] / "data" / "recordings"
 NAMES = [path.stem for path in sorted(RECORDINGS.glob("*.mcap"))]
 WAIT = 60.0  # [s] longer than anything should take
 CODECS = {"codec_1": 1}

@@ -1,17 +1,15 @@
 """A replay repeats every row of a run bit for bit, and finds the first one that differs."""
 
 import random
-import subprocess
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from flipped import Flipped, o80_replay
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from processes import run_o80
 
 import o80
 from o80 import _core
@@ -224,29 +222,6 @@ def test_each_run_of_each_segment_is_replayed(segment: str, tmp_path: Path) -> N
     assert [run.rows for run in report] == [31] * 4
 
 
-@dataclass(frozen=True)
-class Flipped:
-    """A recorded run in which one bit of a row is changed."""
-
-    run: FileRun
-    row: int
-    byte: int
-    bit: int
-    segment: str = "flipped"
-    number: int = 0
-
-    def __getattr__(self, name: str) -> Any:
-        return getattr(self.run, name)
-
-    def blocks(self) -> Iterator[o80.History]:
-        for block in self.run.blocks():
-            raw = bytearray(block.rows.tobytes())
-            place = self.row - int(block.iteration[0])
-            if 0 <= place < len(block):
-                raw[place * block.rows.itemsize + self.byte] ^= self.bit
-            yield o80.History(block._decoder, np.frombuffer(bytes(raw), block.rows.dtype))
-
-
 @pytest.fixture(scope="module")
 def run_in_file(tmp_path_factory: pytest.TempPathFactory) -> RecordedRun:
     """A random run of two joints in a file."""
@@ -307,10 +282,6 @@ def test_another_machine_is_noted(run_in_file: FileRun) -> None:
     report = RunReplay(run).report()
     assert report.identical, report
     assert any("glibc 2.1 recorded it" in note for note in report.notes)
-
-
-def o80_replay(*words: str) -> subprocess.CompletedProcess[str]:
-    return run_o80("replay", *words, code=None)
 
 
 def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, Literal
 
 import numpy as np
 import pytest
-from test_replay import Flipped, o80_replay
+from flipped import Flipped, o80_replay
 
 import o80
 from o80.drivers import Desired, Reading

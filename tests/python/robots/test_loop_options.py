@@ -12,7 +12,7 @@ import o80
 from o80.base.loop_options import LoopOption, loop_options
 
 WAIT = 30.0  # [s] longer than any wait should take
-DOCS = Path(__file__).parents[2] / "docs" / "options.md"
+DOCS = Path(__file__).parents[3] / "docs" / "options.md"
 
 Start = Callable[..., Any]
 

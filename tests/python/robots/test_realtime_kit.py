@@ -15,7 +15,7 @@ from realtime_kit import RealtimeKit
 
 import o80
 
-HERE = Path(__file__).parent
+HERE = Path(__file__).parents[1]
 GRANTED = os.SCHED_RR | os.SCHED_RESET_ON_FORK
 ORDINARY = os.SCHED_OTHER | os.SCHED_RESET_ON_FORK
 NOWHERE = "unix:path=/nowhere"

@@ -12,7 +12,7 @@ from processes import run_python
 
 import o80
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 WAIT = 30.0  # [s] longer than any wait should take
 
 

@@ -270,7 +270,7 @@ def test_info_lists_the_labels(segment: str) -> None:
 
 
 def test_the_page_says_what_works(segment: str) -> None:
-    page = (Path(__file__).parents[2] / "docs" / "python.md").read_text()
+    page = (Path(__file__).parents[3] / "docs" / "python.md").read_text()
     block = page.partition("## Enumerations")[2].partition("```python")[2].partition("```")[0]
     described = {
         "gear": IntEnum("Gear", {"low": 1, "high": 2}),

@@ -1,0 +1,39 @@
+"""A recorded run with a wrong bit, and the command that replays recordings."""
+
+import subprocess
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from processes import run_o80
+
+import o80
+from o80.replaying.recorded_run import FileRun
+
+
+@dataclass(frozen=True)
+class Flipped:
+    """A recorded run in which one bit of a row is changed."""
+
+    run: FileRun
+    row: int
+    byte: int
+    bit: int
+    segment: str = "flipped"
+    number: int = 0
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.run, name)
+
+    def blocks(self) -> Iterator[o80.History]:
+        for block in self.run.blocks():
+            raw = bytearray(block.rows.tobytes())
+            place = self.row - int(block.iteration[0])
+            if 0 <= place < len(block):
+                raw[place * block.rows.itemsize + self.byte] ^= self.bit
+            yield o80.History(block._decoder, np.frombuffer(bytes(raw), block.rows.dtype))
+
+
+def o80_replay(*words: str) -> subprocess.CompletedProcess[str]:
+    return run_o80("replay", *words, code=None)
