@@ -280,8 +280,12 @@ std::optional<Failure> ScriptWorld::hear_end(SentCommand& command, const StatusC
   command.status = change.status;
   if (command.is_member && command.active_since != kNever) command.status = Status::completed;
   command.ended_at = change.iteration;
-  ended.push_back(&command);
   std::erase(members, &command);
+  // an interrupt between iterations was the end of the others: this one had arrived
+  const bool is_left = command.is_member && command.status == Status::completed &&
+                       change.status == Status::interrupted && change.iteration < iteration;
+  if (is_left) return arrived(command);
+  ended.push_back(&command);
   return std::nullopt;
 }
 
@@ -310,18 +314,25 @@ std::optional<Failure> ScriptWorld::find_drivers() {
       member.ended_at = iteration - 1;
       std::erase(members, &member);
       std::erase(ended, &member);
-      for (std::size_t n = 0; n < actuator.numbers.size(); ++n) {
-        if (member.told.status == Status::rejected) break;
-        const bool rests = script.actuators[a].numbers[n].resting;
-        if (!names(member, n) || rests ||
-            actuator.numbers[n].before == target(member, rows_of(member) - 1, n)) {
-          continue;
-        }
-        return Failure{"target", where(a, n) + "a member left its group before it arrived"};
-      }
+      if (auto failure = arrived(member)) return failure;
     }
     std::erase_if(running_[a], [](const SentCommand* each) { return each->ended_at != kNever; });
     if (actuator.driver != nullptr) actuator.last = actuator.driver;
+  }
+  return std::nullopt;
+}
+
+/// A member that ended before this iteration, and before the others of its group, is at its target.
+std::optional<Failure> ScriptWorld::arrived(const SentCommand& member) const {
+  if (member.told.status == Status::rejected) return std::nullopt;
+  const std::size_t a = step_of(member).actuator;
+  for (std::size_t n = 0; n < actuators[a].numbers.size(); ++n) {
+    const bool rests = script.actuators[a].numbers[n].resting;
+    if (!names(member, n) || rests ||
+        actuators[a].numbers[n].before == target(member, rows_of(member) - 1, n)) {
+      continue;
+    }
+    return Failure{"target", where(a, n) + "a member left its group before it arrived"};
   }
   return std::nullopt;
 }

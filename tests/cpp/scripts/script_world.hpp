@@ -126,6 +126,7 @@ class ScriptWorld {
   std::optional<Failure> hear();
   std::optional<Failure> hear_end(SentCommand& command, const StatusChange& change);
   std::optional<Failure> find_drivers();
+  std::optional<Failure> arrived(const SentCommand& member) const;
   bool may_arrive_before_others(const SentCommand& command) const;
   bool gives_way(const SentCommand& command, const SentCommand& next) const;
 
