@@ -182,8 +182,8 @@ class InlineGroup(Closeable):
     ) -> Gather:
         """Reads observations and event flags of the newest rows from now on, in C++.
 
-        numbers: paths in a row ("observed", "observed.elbow", "extended.force[2]"), or Gathered
-            with an offset, a scale and limits. A path of several numbers stands for all of them.
+        numbers: paths as of a row (`row["observed.joint1.position"]`), or Gathered with an offset,
+            a scale and limits. A path of several numbers stands for all of them.
         flags: for each name a path of a number that is not 0, or a comparison such as
             `("extended.height", "<", 0.1)`.
 

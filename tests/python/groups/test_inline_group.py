@@ -171,6 +171,28 @@ def test_gathers_what_numpy_would(group: o80.InlineGroup) -> None:
     assert np.array_equal(gather.observations[~reset], expected[~reset])
 
 
+def test_gathers_at_the_paths_that_rows_have() -> None:
+    class ArmAndGripper:
+        """At rest."""
+
+        joint = np.dtype([("position", "f8"), ("torque", "f4")])
+        actuators = {"joints": (joint, ["left", "right"]), "gripper": float}  # noqa: RUF012
+        simulated = True
+
+        def read(self, reading: Any) -> None:
+            reading.observed["joints"], reading.observed["gripper"] = [(1, 2), (3, 4)], 5
+
+    paths = ["observed.left.position", "observed.gripper", "observed.right", "observed.joints"]
+    with o80.robots.load(ArmAndGripper).inline(copies=1) as group:
+        gather = group.gather(paths)
+        burst = group.prepared_burst(1)
+        burst.targets = np.zeros_like(burst.targets)
+        burst.run()
+        assert gather.observations.tolist() == [[1, 5, 3, 4, 1, 2, 3, 4]]
+        row = group[0].latest()
+        assert np.hstack([row[path] for path in paths]).tolist() == gather.observations[0].tolist()
+
+
 def test_a_prepared_request_does_what_a_request_does_bit_for_bit(group: o80.InlineGroup) -> None:
     with o80.robots.load("two_joints").inline(copies=COPIES, threads=1) as other:
         for each in (group, other):
