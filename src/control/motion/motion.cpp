@@ -114,7 +114,11 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
     const double start =
         at_published ? layout_.number(each.number, from()) : each.motion.position();
     if (is_row_) {
-      if (observed != nullptr || !each.motion.is_planned()) each.motion.start_from({start}, false);
+      if (observed != nullptr) {
+        each.motion.start_at(start);
+      } else if (!each.motion.is_planned()) {
+        each.motion.start_from({start}, false);
+      }
       continue;
     }
     Requested requested = course;

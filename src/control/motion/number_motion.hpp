@@ -94,6 +94,11 @@ class NumberMotion {
     continues ? guard_.reach(span) : guard_.begin(span);
     planned_ = follows_ = of_rows_ = true;
   }
+  /// Or at an observed position: without limits the number jumps there, which is no speed.
+  void start_at(double position) noexcept {
+    if (!has_rates() && guard_.admits(position)) guard_.restart(position);
+    start_from({position}, false);
+  }
   bool is_planned() const noexcept { return planned_; }
   /// Then the plan to the next row, as NumberPlan has it.
   void line_on(double target, std::int64_t iterations) noexcept {

@@ -277,7 +277,7 @@ def test_every_row_of_the_page_names_tests_that_exist() -> None:
     rows = [line for line in table.splitlines() if line.startswith("| ") and "`" in line]
     sources = "\n".join(
         path.read_text()
-        for pattern in ("cpp/**/*.cpp", "python/*.py", "processes/*.py")
+        for pattern in ("cpp/**/*.cpp", "python/**/*.py", "processes/*.py")
         for path in ROOT.glob(f"tests/{pattern}")
     )
     assert len(rows) >= 12

@@ -71,6 +71,24 @@ TEST(Trajectory, ItsRowsArePlayedAsThoseOfAChunk) {
   }
 }
 
+/// Without limits rows jump to the observed state, which is no speed for the command after them.
+TEST(Trajectory, AJumpToTheObservedStateIsNoSpeed) {
+  ChunkRig rig(plain_robot(1));
+  rig.run_to(10);
+  rig.observe(0, 100.0);
+  RecordHead rows = from_observed(over(7));
+  rows.profile = Profile::monotone;
+  rig.add_rows(0, rows, 1, {0.0});
+  rig.pulse();
+  rig.run_to(11);
+  rig.add(0, overwriting(smoothly(at_speed(2000.0))), {0.0});
+  rig.pulse();
+  rig.run_to(12);
+  // the motion that it overwrites goes by 5.5 in its first iteration, and by 12 at its fastest
+  EXPECT_NEAR(rig.at(10), 94.5, 0.1);
+  EXPECT_GT(rig.at(11), rig.at(10) - 20.0);
+}
+
 // rule K9
 TEST(Trajectory, ACurveThroughAParabolaHasItsSlopes) {
   // the slope of both at three points is that of their parabola

@@ -1,8 +1,8 @@
 // The burst hand-shake with deaths: a frontend asks, the backend grants, runs, answers; either may
 // be killed anywhere.
 //
-// Transcribed from src/runtime/backend/backend.cpp (step, publish), backend_burst.cpp (end_burst),
-// backend_lives.cpp (look_at_lives, on_owner_death), src/runtime/frontend/batch.cpp
+// Transcribed from src/runtime/backend/backend.cpp (step, publish), bursts.hpp (end_at),
+// commanders.cpp (poll_liveness, on_owner_death), src/runtime/frontend/batch.cpp
 // (Burst::wait_done), src/memory/ring/lane_sender.cpp (wait_until, sleep), lane_receiver.cpp (flush)
 // and src/memory/segment/signal.cpp (BellWaiter, ring_bell). Sleeps are cut into
 // slices, which end at any time, but do end.
@@ -115,7 +115,7 @@ proctype Backend() {
   :: ALL_OVER && runs == STILL && !requested[0] && !requested[1] && !requested[FRONTENDS - 1] ->
      break
   :: else ->
-     // look_at_lives: the helper thread has said who is dead
+     // poll_liveness: the helper thread has said who is dead
      if
 #ifndef DEATH_IGNORED
      :: runs != STILL && dead[runs] && left > 1 -> left = 1

@@ -3,7 +3,7 @@
 //
 // Transcribed from src/memory/ring/lane_sender.cpp (LaneSender, count_in, send, give_back),
 // lane_receiver.cpp (dead_predecessor, next_is_of_dead), src/memory/segment/liveness.cpp (ask_lane),
-// src/runtime/backend/backend_lives.cpp (look_at_lives, on_owner_death), backend_batches.cpp
+// src/runtime/backend/commanders.cpp (poll_liveness, on_owner_death), intake.cpp
 // (stage, admit) and staging.cpp (begin).
 //
 // safety: each batch is dealt with once and in order; a living owner's is never refused as a dead

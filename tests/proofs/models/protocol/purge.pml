@@ -2,8 +2,8 @@
 // lanes before it, and ends what was sent before it wherever that is: in a queue, in staging, in a
 // lane.
 //
-// Transcribed from src/memory/ring/lane_sender.cpp (send), lane_receiver.cpp (look, next) and
-// src/runtime/backend/backend_batches.cpp (take_batches, take_in_order, stage_ahead, take_express),
+// Transcribed from src/memory/ring/lane_sender.cpp (send), lane_receiver.cpp (poll, next) and
+// src/runtime/backend/intake.cpp (take_new, take_in_order, stage_ahead, take_express),
 // src/control/queue/controller.cpp (take_commands, take_step) and src/control/queue/purge_tickets.hpp.
 // An iteration copies one block in order and one ahead in each lane; a command has two blocks.
 //
