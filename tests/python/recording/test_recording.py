@@ -1,5 +1,6 @@
 """Recording robots: restarts, patterns, gaps, marks, and what stands in the way."""
 
+import math
 import contextlib
 from collections.abc import Callable
 from pathlib import Path
@@ -222,6 +223,7 @@ def test_a_chunk_is_due_when_the_journal_fills(segment: str, tmp_path: Path) -> 
         arm.burst(20_000)
         recorder._begun -= 60.0
         recorder.catch_up()
+        recorder._polled = math.inf  # the time since then is no reason either
         commands = 0
         while not recorder.is_due() and commands < 4000:  # before the rows are a reason
             arm.add_command("elbow", 0.1)
