@@ -58,7 +58,6 @@ class Launching:
         self._launches = Watched(settings.segment(COUNTERPARTS))
         self._random = np.random.default_rng(settings.seed)
         self._batch: o80.Batch | None = None
-        self._requested = False
         self.number = 0
         """Number of the last launch that was found."""
         self.failed = False
