@@ -207,7 +207,7 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_300, 0),
+    "include, src": (34_310, 0),
     "python/bindings": (5_700, 0),
     "python/o80": (30_600, 0),
     "python/o80/hybrid": (2_400, 0),
@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (9_630, 5_910),
     "benchmarks, tools": (5_490, 0),
     "examples": (2_080, 0),
-    "tests, conftest.py": (0, 67_040),
+    "tests, conftest.py": (0, 67_090),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -1,7 +1,7 @@
 """Recording robots: restarts, patterns, gaps, marks, and what stands in the way."""
 
-import math
 import contextlib
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
