@@ -79,6 +79,7 @@ const JournalEntry* RecordedDecisions::next(Iteration iteration) const noexcept 
 JournalEntry RecordedDecisions::take() {
   JournalEntry entry = std::move(entries_.front());
   entries_.pop_front();
+  stops_ = stops_ || entry.kind == JournalKind::stopping;
   return entry;
 }
 
@@ -155,6 +156,7 @@ void RecordedDecisions::compare_halt(const JournalEntry& halt) {
 }
 
 void RecordedDecisions::end_decisions(Iteration iteration) {
+  if (stops_) requested_.clear();  // the recorded backend did not poll halts any more
   if (requested_.empty()) return;
   note(iteration, "halt", "none", halt_text(requested_[0].cause, requested_[0].text));
   requested_.clear();

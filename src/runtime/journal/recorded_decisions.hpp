@@ -104,6 +104,7 @@ class RecordedDecisions {
   Iteration first_time_ = 0;
   std::vector<std::int64_t> times_;
   std::vector<RequestedHalt> requested_;
+  bool stops_ = false;  // the recorded backend ends in order
   std::optional<DecisionMismatch> mismatch_;
 };
 

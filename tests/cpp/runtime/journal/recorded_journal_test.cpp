@@ -9,6 +9,7 @@
 
 #include "runtime/frontend/raw_journal.hpp"
 #include "runtime/journal/journal_author.hpp"
+#include "runtime/journal/recorded_decisions.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {
@@ -129,6 +130,18 @@ TEST_F(RecordedJournalTest, EntriesBeforeTheFirstAreNotReturned) {
   ASSERT_FALSE(entries.empty());
   EXPECT_GE(entries.front().number, 60U);
   EXPECT_EQ(entries.front().missed, 0U);
+}
+
+/// In the row before an end in order nobody polls any more for a halt of its driver.
+TEST(RecordedDecisions, AHaltBeforeAnEndInOrderNeedsNoEntry) {
+  for (const bool stops : {false, true}) {
+    RecordedDecisions recorded;
+    if (stops) recorded.add({.kind = JournalKind::stopping, .iteration = 7});
+    recorded.ask_to_halt(HaltCause::driver, "too high");
+    if (stops) recorded.take();
+    recorded.end_decisions(7);
+    EXPECT_EQ(recorded.mismatch().has_value(), !stops);
+  }
 }
 
 }  // namespace
