@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (9_630, 5_910),
     "benchmarks, tools": (5_490, 0),
     "examples": (2_080, 0),
-    "tests, conftest.py": (0, 67_105),
+    "tests, conftest.py": (0, 67_108),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

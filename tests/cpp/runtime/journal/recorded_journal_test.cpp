@@ -136,7 +136,10 @@ TEST_F(RecordedJournalTest, EntriesBeforeTheFirstAreNotReturned) {
 TEST(RecordedDecisions, AHaltBeforeAnEndInOrderNeedsNoEntry) {
   for (const bool stops : {false, true}) {
     RecordedDecisions recorded;
-    if (stops) recorded.add({.kind = JournalKind::stopping, .iteration = 7});
+    JournalEntry stopping;
+    stopping.kind = JournalKind::stopping;
+    stopping.iteration = 7;
+    if (stops) recorded.add(stopping);
     recorded.ask_to_halt(HaltCause::driver, "too high");
     if (stops) recorded.take();
     recorded.end_decisions(7);
