@@ -11,9 +11,8 @@ from pathlib import Path
 import pytest
 
 import o80
-from o80_table_tennis.lab.parts import Part
 from o80_table_tennis.lab.parts import o80_command as command
-from o80_table_tennis.lab.processes import PartEndedError, Processes
+from o80_table_tennis.lab.processes import Part, PartEndedError, Processes
 
 WAITING = 30.0
 """For what takes milliseconds on a quiet machine [s]."""
@@ -69,13 +68,13 @@ def test_a_process_that_ends_at_its_start_is_named_with_its_last_lines(
     assert caught.value.lines == ("loading", "no such arm")
 
 
-def test_what_does_not_run_in_time_is_named_with_its_last_lines(
+def test_what_does_not_run_in_time_is_named_with_what_it_needs(
     lab: Callable[..., Processes],
 ) -> None:
-    silent = Part("silent", ASLEEP.command, says="never")
+    silent = Part("silent", ASLEEP.command, says="never", needs=("arm", "world"))
     processes = lab(silent)
     processes.start()
-    with pytest.raises(o80.TimeoutError, match="do not run yet:\n'silent': "):
+    with pytest.raises(o80.TimeoutError, match="'silent', which needs arm, world"):
         processes.wait_until_running(0.3)
 
 
@@ -100,24 +99,32 @@ def test_closing_ends_all_and_removes_the_segments_of_killed_ones(
     processes.start()
     processes.wait_until_running(WAITING)
     pids = [processes.pid(name) for name in processes.running]
-    os.kill(processes.pid("left"), signal.SIGKILL)
+    processes.kill("left")
     processes.close()
     assert not any(lives(pid) for pid in pids)
     assert not [each for each in o80.segments() if each.name.startswith("lab-test-")]
 
 
-def test_the_last_of_the_table_ends_first(lab: Callable[..., Processes], tmp_path: Path) -> None:
+def test_those_that_others_need_end_last(lab: Callable[..., Processes], tmp_path: Path) -> None:
     text = (
         "import signal, sys, time\n"
         "def end(*_): open({file!r}, 'a').write({name!r} + ' '); sys.exit()\n"
         "signal.signal(signal.SIGTERM, end); print('up'); time.sleep(1e4)"
     )
     file = tmp_path / "order"
-    names = ("world", "cameras", "tracker")
+    needs = {"world": (), "cameras": ("world",), "tracker": ("cameras",)}
     processes = lab(
-        *(program(name, text.format(file=str(file), name=name), "up") for name in names)
+        *(
+            Part(
+                name,
+                (sys.executable, "-u", "-c", text.format(file=str(file), name=name)),
+                says="up",
+                needs=its,
+            )
+            for name, its in needs.items()
+        )
     )
-    processes.start(reversed(names))
+    processes.start()
     processes.wait_until_running(WAITING)
     processes.close()
     assert file.read_text().split() == ["tracker", "cameras", "world"]
@@ -137,7 +144,7 @@ with ends_in_order(), Processes([robot("arm"), ASLEEP], Path({folder!r})) as pro
     processes.wait_until_running(WAITING)
     print(*[processes.pid(name) for name in processes.running], flush=True)
     while True:
-        processes.ended(0.5)
+        processes.check(0.5)
 """
 
 
