@@ -215,7 +215,7 @@ CEILINGS = {
     "python/o80/view/page": (1_225, 0),
     "devices": (8_850, 4_500),
     "gateways/lerobot": (530, 690),
-    "gateways/ros2": (900, 935),
+    "gateways/ros2": (900, 955),
     "robots/arms": (4_450, 3_100),
     "robots/pam, robots/two_joints": (2_144, 1_208),
     "simulators/mujoco": (5_240, 4_580),

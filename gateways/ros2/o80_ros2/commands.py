@@ -16,10 +16,9 @@ from o80_ros2.topics import desired_numbers
 
 PATIENCE, RESUME = 30.0, 5.0
 """Longest waits: for a request or a step, which the robot still ends; for the end of a halt [s]."""
-SLOW = 0.5
-"""Set-points further apart are no stream [s]."""
-SLACK = 1.01
-"""Factor by which speeds may exceed their limit: times are rounded to iterations."""
+SLOW = 0.5  # set-points further apart are no stream [s]
+SLACK = 1.01  # factor by which speeds may exceed their limit: times are rounded to iterations
+LARGEST = 1 << 19  # of a message [bytes]; rclpy needs seconds to read larger ones
 
 
 class Commands:
@@ -46,8 +45,8 @@ class Commands:
                 ("trajectory_msgs.msg.JointTrajectory", "joint_trajectory", self._trajectory, 1000),
                 ("std_msgs.msg.Float64MultiArray", "commands", self._set_points, 1),
             ):
-                taken = partial(self._tried, name, take)
-                self._make(shared.node, "subscription", kind, name, taken, depth)
+                taken = partial(self._tried, name, partial(self._read, ros.of(kind), take))
+                self._make(shared.node, "subscription", kind, name, taken, depth, raw=True)
             self._trigger("halt", lambda: f"halt {halt()} is requested", shared.node)
             ended = ("there was no halt", "the halt has ended")
             self._trigger("resume", lambda: ended[arm.resume(timeout=RESUME)], calls)
@@ -85,11 +84,16 @@ class Commands:
             self._refuse(what, error)
             return False, str(error)
 
-    def _make(self, node: Any, what: str, kind: str, name: str, *rest: Any) -> None:
+    def _make(self, node: Any, what: str, kind: str, name: str, *rest: Any, **more: Any) -> None:
         """Makes a subscription or a service."""
         create, destroy = (getattr(node, f"{verb}_{what}") for verb in ("create", "destroy"))
-        made = create(ros.of(kind), f"/{self._name}/{name}", *rest)
+        made = create(ros.of(kind), f"/{self._name}/{name}", *rest, **more)
         self._made += [partial(destroy, made)] if node is self._shared.node else []
+
+    def _read(self, kind: type, take: Callable[[Any], None], data: bytes) -> None:
+        if len(data) > LARGEST:
+            raise InvalidArgument(f"it has {len(data)} bytes, and more than {LARGEST} are not read")
+        take(ros.of("rclpy.serialization.deserialize_message")(data, kind))
 
     def _set_points(self, message: Any) -> None:
         """A set-point for each actuator, in their order."""

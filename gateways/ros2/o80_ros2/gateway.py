@@ -16,8 +16,7 @@ USUAL, USUAL_OF_MANY, MANY = 100.0, 20.0, 10
 BETWEEN_LISTS, BETWEEN_REPORTS, BETWEEN_POLLS = 1.0, 1.0, 0.1
 """Intervals: lists of segments, diagnostics, checks whether a diagnostic has changed [s]."""
 
-LEAST = 0.0005
-"""Time for messages and calls before the next reading, also when readings are late [s]."""
+LEAST = 0.0005  # time for messages and calls before the next reading, also when that is late [s]
 
 
 class Gateway:

@@ -13,8 +13,7 @@ from o80.errors import MissingExtra
 from o80.recording.epoch import topic_of
 from o80_ros2.wall_clock import WallClock
 
-LONGEST = 0.1
-"""Longest wait for messages, then the end is polled [s]."""
+LONGEST = 0.1  # wait for messages, then the end is polled [s]
 
 
 def of(path: str) -> Any:

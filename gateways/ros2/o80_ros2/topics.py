@@ -14,10 +14,8 @@ from o80.view.urdf import WORLD, Links, Place
 from o80_ros2 import ros
 from o80_ros2.sensors import Sensor, png, sensors_of
 
-BETWEEN_IMAGES = 100_000_000
-"""Smallest distance of two images: packing one takes long [ns]."""
-DEPTH = 1000
-"""Messages that a reliable topic keeps until its subscribers have acknowledged them."""
+BETWEEN_IMAGES = 100_000_000  # smallest distance of two images: packing one takes long [ns]
+DEPTH = 1000  # messages that a reliable topic keeps until its subscribers have acknowledged them
 STATE, TEXT = "sensor_msgs.msg.JointState", "std_msgs.msg.String"
 TYPES = {
     "pose": ("geometry_msgs.msg.PoseStamped", ("pose.position", "pose.orientation")),

@@ -35,7 +35,7 @@ class Carried:
         return self.node.published[name].sent
 
     def send(self, topic: str, message: Any) -> None:
-        self.node.subscribed[f"/{self.source.name}/{topic}"](message)
+        self.node.subscribed[f"/{self.source.name}/{topic}"](stand_in_ros.Raw(message))
 
     def call(self, service: str, **parameters: Any) -> tuple[bool, str]:
         return self.node.call(f"/{self.source.name}/{service}", **parameters)

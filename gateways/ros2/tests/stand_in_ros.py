@@ -64,7 +64,18 @@ def of(path: str) -> Any:
         "qos_profile_sensor_data": "best effort",
         "DurabilityPolicy": SimpleNamespace(TRANSIENT_LOCAL="transient local"),
         "parameter_value_to_python": lambda value: value,
+        "deserialize_message": lambda data, kind: data.message,
     }.get(name, object)
+
+
+class Raw:
+    """A message as it comes, with its size on the wire."""
+
+    def __init__(self, message: Any) -> None:
+        self.message = message
+
+    def __len__(self) -> int:
+        return len(STORE.serialize_cdr(_plain(self.message), self.message.ros_name))
 
 
 class Publisher:
@@ -102,8 +113,9 @@ class Node:
         return self.published[name]
 
     def create_subscription(
-        self, kind: type, name: str, take: Callable[[Any], None], qos: Any
+        self, kind: type, name: str, take: Callable[[Any], None], qos: Any, *, raw: bool
     ) -> str:
+        assert raw
         self.subscribed[name] = take
         return name
 

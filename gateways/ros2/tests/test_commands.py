@@ -142,6 +142,15 @@ def test_set_points_go_to_all_actuators(carry: Carry) -> None:
         assert (robot.burst(2).desired[0], carried.source.refused) == (0.1, 3)
 
 
+def test_a_message_that_would_hold_up_a_halt_is_not_read(carry: Carry) -> None:
+    with o80.robots.load("two_joints").inline() as robot:
+        carried = carry(robot)
+        carried.send("commands", numbers(*[0.0] * 70_000))
+        points = [(0.001 * i, [0.1]) for i in range(1, 20_000)]
+        carried.send("joint_trajectory", trajectory(["elbow"], points))
+        assert refusals(carried).count("more than 524288 are not read") == 2
+
+
 def test_a_command_that_the_backend_rejects_is_reported(carry: Carry) -> None:
     with o80.robots.load("two_joints").inline() as robot:
         carried = carry(robot)
