@@ -196,6 +196,8 @@ void bind_batch(nb::module_& m) {
                      return begun ? std::optional(std::pair(begun->row, begun->needed))
                                   : std::nullopt;
                    })
+      .def_prop_ro("clipped", &Batch::clipped,
+                   "Numbers of its targets that `clip` has put inside their bounds.")
       .def_prop_ro("ended", &Batch::ended, "True if all of them have ended.")
       .def_prop_ro(
           "taken", [](const Batch& self) { return self.first_iteration() >= 0; },

@@ -118,18 +118,26 @@ std::vector<std::uint32_t> Frontend::actuators(nb::handle named) const {
   return indices;
 }
 
-void Frontend::clip(nb::handle clip, Targets& targets) const {
+void Frontend::clip(nb::handle clip, Targets& targets, std::uint32_t rows) const {
   if (!truth_of(clip, "clip")) return;
-  const o80::CommandCheck& check = untyped_->command_check();
+  const std::shared_ptr<UntypedFrontend> frontend = untyped_;
+  const o80::CommandCheck& check = frontend->command_check();
   std::span<std::byte> states = targets.states;
   std::span<const std::uint64_t> masks = targets.masks;
   for (const std::uint32_t index : targets.actuators) {
-    const std::size_t size = check.layout(index).size();
+    const std::size_t size =
+        std::min<std::size_t>(states.size(), rows * check.layout(index).size());
     const auto mask = masks.first(masks.empty() ? 0 : check.words_of_mask(index));
-    clipped += static_cast<std::int64_t>(check.clip(index, states.first(size), mask));
+    targets.clipped += check.clip(index, states.first(size), mask);
     states = states.subspan(size);
     masks = masks.subspan(mask.size());
   }
+}
+
+void Frontend::note_clipped(const Targets& targets) const {
+  if (targets.clipped == 0) return;
+  clipped += static_cast<std::int64_t>(targets.clipped);
+  untyped_->note_clipped(targets.clipped);
 }
 
 Targets Frontend::targets_of(nb::handle named, nb::handle targets) const {

@@ -25,6 +25,7 @@ struct Targets {
   std::vector<std::uint32_t> actuators;
   std::vector<std::byte> states;
   std::vector<std::uint64_t> masks;
+  std::size_t clipped = 0;  // numbers that were put inside their bounds
 };
 
 /// The compiled half of o80.Frontend.
@@ -49,8 +50,10 @@ class Frontend {
   Targets targets_of(nanobind::handle named, nanobind::handle targets) const;
   /// The actuators of a group, by its name; what is no name of a group stays what it is.
   nanobind::object expanded(nanobind::handle named) const;
-  /// Puts targets inside their bounds if `clip`; counts those that were outside.
-  void clip(nanobind::handle clip, Targets& targets) const;
+  /// Puts `rows` targets of each actuator inside their bounds if `clip`.
+  void clip(nanobind::handle clip, Targets& targets, std::uint32_t rows = 1) const;
+  /// Counts what was clipped of targets that were added.
+  void note_clipped(const Targets& targets) const;
   std::vector<std::byte> request_bytes(std::uint32_t index, nanobind::handle fields) const;
   Observation blank() const { return Observation(decoder_); }
 

@@ -48,7 +48,10 @@ std::uint32_t add_command(const Frontend& self, nb::handle actuator, nb::handle 
   const auto frontend = self.shared();
   Targets targets = self.targets_of(actuator, target);
   self.clip(clip, targets);
-  return frontend->add_commands(targets.actuators, targets.states, options, targets.masks);
+  const std::uint32_t place =
+      frontend->add_commands(targets.actuators, targets.states, options, targets.masks);
+  self.note_clipped(targets);
+  return place;
 }
 
 /// The newest row, with these actuators at `initial`.
@@ -96,17 +99,7 @@ Targets rows_of(const Frontend& self, const std::vector<std::uint32_t>& actuator
                 nb::handle clip) {
   const Bytes all(states);
   Targets targets{actuators, {all.span().begin(), all.span().end()}, masks};
-  if (!truth_of(clip, "clip")) return targets;
-  const o80::CommandCheck& check = self.shared()->command_check();
-  std::span<std::byte> left = targets.states;
-  std::span<const std::uint64_t> given = masks;
-  for (const std::uint32_t index : actuators) {
-    const std::size_t size = std::min<std::size_t>(left.size(), rows * check.layout(index).size());
-    const auto mask = given.first(given.empty() ? 0 : check.words_of_mask(index));
-    self.clipped += static_cast<std::int64_t>(check.clip(index, left.first(size), mask));
-    left = left.subspan(size);
-    given = given.subspan(mask.size());
-  }
+  self.clip(clip, targets, rows);
   return targets;
 }
 
@@ -123,8 +116,11 @@ std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint
     ends.resize(bytes.span().size() / sizeof(std::int64_t));
     std::memcpy(ends.data(), bytes.span().data(), ends.size() * sizeof(std::int64_t));
   }
-  Targets targets = rows_of(self, actuators, rows, states, masks, clip);
-  return frontend->add_trajectories(actuators, rows, targets.states, options, ends, masks);
+  const Targets targets = rows_of(self, actuators, rows, states, masks, clip);
+  const std::uint32_t place =
+      frontend->add_trajectories(actuators, rows, targets.states, options, ends, masks);
+  self.note_clipped(targets);
+  return place;
 }
 
 Batch pulse(const Frontend& self, nb::handle at, nb::handle late, nb::handle seen) {
@@ -245,7 +241,8 @@ Batch send_alone(const Frontend& self, Fill&& fill, const std::optional<o80::See
 Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuators, nb::handle due,
                  nb::handle states, const std::vector<std::uint64_t>& masks, o80::Iteration anchor,
                  std::uint64_t plan, std::uint32_t ease, std::uint32_t first, bool fixed,
-                 bool reject_late, bool final, nb::handle profile, nb::handle seen) {
+                 bool reject_late, bool final, nb::handle profile, nb::handle seen,
+                 std::size_t clipped) {
   const Bytes iterations(due);
   std::vector<std::uint32_t> ends(iterations.span().size() / sizeof(std::uint32_t));
   if (!ends.empty()) std::memcpy(ends.data(), iterations.span().data(), iterations.span().size());
@@ -260,8 +257,11 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
   const Bytes all(states);
   const auto fill = [&](o80::BatchBuilder& batch) {
     self.untyped().add_chunk(batch, actuators, ends, all.span(), options, masks);
+    batch.note_clipped(clipped);
   };
-  return send_alone(self, fill, seen_of(seen));
+  const Batch sent = send_alone(self, fill, seen_of(seen));
+  self.clipped += static_cast<std::int64_t>(clipped);
+  return sent;
 }
 
 using Moments = std::vector<std::array<double, 3>>;  // place, slope and curvature
@@ -432,15 +432,13 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
           "_clip",
           [](const Frontend& self, const std::vector<std::uint32_t>& actuators, std::uint32_t rows,
              nb::handle states, const std::vector<std::uint64_t>& masks) {
-            const std::int64_t before = self.clipped;
             const Targets inside = rows_of(self, actuators, rows, states, masks, nb::bool_(true));
-            return std::pair(nb::bytes(inside.states.data(), inside.states.size()),
-                             self.clipped - before);
+            return std::pair(nb::bytes(inside.states.data(), inside.states.size()), inside.clipped);
           },
           "actuators"_a, "rows"_a, "states"_a, "masks"_a)
       .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "masks"_a, "anchor"_a,
            "plan"_a, "ease"_a, "first"_a, "fixed"_a, "reject_late"_a, "final"_a, "profile"_a,
-           "seen"_a.none())
+           "seen"_a.none(), "clipped"_a)
       .def(
           "_close_plan",
           [](const Frontend& self, std::uint64_t plan) {

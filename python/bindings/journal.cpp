@@ -79,6 +79,16 @@ std::vector<o80::JournalEntry> entries_of(o80::Journal& journal, std::size_t mos
   return entries;
 }
 
+/// Actuator, number, and place, slope and curvature of each.
+nb::list starts_of(const o80::JournalEntry& self) {
+  nb::list starts;
+  for (const o80::ChunkStart& each : self.starts) {
+    starts.append(nb::make_tuple(each.actuator, each.number,
+                                 nb::make_tuple(each.place, each.slope, each.curvature)));
+  }
+  return starts;
+}
+
 /// The text of a mark, which may be any bytes.
 nb::str text_of(const std::string& bytes) {
   const std::string clean = o80::printable(bytes);
@@ -183,6 +193,11 @@ void bind_journal(nb::module_& m) {
       .def_ro("seen", &JournalEntry::seen, nb::sig("def seen(self) -> Seen | None"))
       .def_ro("records", &JournalEntry::records)
       .def_ro("records_lost", &JournalEntry::records_lost)
+      .def_ro("clipped", &JournalEntry::clipped)
+      .def_ro("row", &JournalEntry::row)
+      .def_ro("shift", &JournalEntry::shift)
+      .def_prop_ro("starts", &starts_of,
+                   nb::sig("def starts(self) -> list[tuple[int, int, tuple[float, float, float]]]"))
       .def_prop_ro("blocks", [](const JournalEntry& self) { return bytes_of(self.blocks); })
       .def_prop_ro("status", enumeration(&JournalEntry::status),
                    nb::sig("def status(self) -> Status"))

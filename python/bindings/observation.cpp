@@ -25,6 +25,7 @@ Decoder::Decoder(std::shared_ptr<const o80::Description> what, nb::object how)
       clamped(layout.attr("clamped")),
       braking(layout.attr("braking")),
       starved(layout.attr("starved")),
+      off_plan(layout.attr("off_plan")),
       flat(layout.attr("flat")),
       text(layout.attr("text")) {}
 
@@ -187,6 +188,11 @@ The arrays are views of this observation's own copy of the row, which does not c
           "starved", [](nb::handle self) { return decoded(self, &Decoder::starved); },
           nb::sig("def starved(self) -> numpy.typing.NDArray[numpy.bool_]"),
           "True where a plan of chunks has no row left and is not closed: bool (actuators,).")
+      .def_prop_ro(
+          "off_plan", [](nb::handle self) { return decoded(self, &Decoder::off_plan); },
+          nb::sig("def off_plan(self) -> numpy.typing.NDArray[numpy.float32]"),
+          "How far the desired states are from what commands ask for, where limits change them: "
+          "(actuators,), the most of the numbers of each, in their units.")
       .def(
           "flat",
           [](nb::handle self, nb::handle dtype) {

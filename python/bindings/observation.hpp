@@ -12,8 +12,8 @@ struct Decoder {
   Decoder(std::shared_ptr<const o80::Description> description, nanobind::object layout);
 
   std::shared_ptr<const o80::Description> description;
-  nanobind::object layout, desired, observed, extended, active, clamped, braking, starved, flat,
-      text;
+  nanobind::object layout, desired, observed, extended, active, clamped, braking, starved, off_plan,
+      flat, text;
 };
 
 /// A row and its decoder. Python sees the bytes as a buffer.

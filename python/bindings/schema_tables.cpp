@@ -209,6 +209,7 @@ nb::dict of_row(const RowLayout& layout) {
                                                          {"clamped", layout.clamped},
                                                          {"braking", layout.braking},
                                                          {"starved", layout.starved},
+                                                         {"off_plan", layout.off_plan},
                                                          {"mask_words", layout.mask_words},
                                                          {"extended_size", layout.extended_size}};
   for (const auto& [name, value] : parts) found[name] = value;

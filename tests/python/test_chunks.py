@@ -625,8 +625,13 @@ def test_rows_outside_the_limits_are_put_on_them_where_that_is_wanted(segment: s
         arm.add_command("gripper", 7.0, clip=True)
         arm.add_command("joints", [{"torque": 1e30}, {"torque": 0.5}], clip=True)
         assert arm.clipped == 6
-        arm.pulse()
+        batch = arm.pulse()
+        assert (batch.clipped, arm.pulse().clipped) == (4, 0)
         robot.run(6)
+        taken = [each.clipped for each in arm.journal() if each.kind == "taken" and each.clipped]
+        assert taken == [2, 4]
+        told = run_o80("info", segment).stdout
+        assert "6 numbers of targets were clipped, in 2 batches" in told
         assert arm.latest().desired.gripper == 1.0
         assert arm.latest().desired.joints["torque"].tolist() == [1.0, 0.5]
 
@@ -721,7 +726,7 @@ def test_a_plan_that_limits_hold_back_goes_on_until_its_last_row_is_desired(segm
 
 
 def test_a_row_that_is_gone_is_named_and_the_plan_goes_on(segment: str) -> None:
-    with stepped(segment, history=64) as robot:
+    with stepped(segment, history=64, journal=0) as robot:
         plan = robot.frontend.chunks("left", step=5)
         plan.send([0.1] * 100)
         robot.run(200)
@@ -835,7 +840,7 @@ def test_the_journal_and_the_rows_give_the_plans(arm: o80.Frontend, seed: int) -
             end = planned.begins + len(planned.places)
             end = end if after is None else min(end, after.begins)
             wanted = history.desired[planned.begins : end, i]
-            assert planned.places[: len(wanted)] == pytest.approx(wanted, abs=1e-12)
+            assert planned.places[: len(wanted)].tolist() == wanted.tolist(), "bit for bit"
     legend = plot({"arm": history}, ["elbow"], planned={"arm": found}).axes[0].get_legend()
     assert legend is not None
     assert "planned by chunks" in [text.get_text() for text in legend.get_texts()]
@@ -855,8 +860,58 @@ def test_plans_of_the_journal_go_on_only_from_what_was_in_force(arm: o80.Fronten
     history = arm.history()
     first, second = planned_by_chunks(arm.journal(), history)["shoulder"]
     assert (first.begins, second.begins) == (101, 151)
-    assert first.places[:30] == pytest.approx(history.desired[101:131, 0], abs=1e-12)
-    assert second.places == pytest.approx(history.desired[151:171, 0], abs=1e-12)
+    assert first.places[:30].tolist() == history.desired[101:131, 0].tolist()
+    assert second.places.tolist() == history.desired[151:171, 0].tolist()
+
+
+@pytest.mark.parametrize("options", [{}, {"journal": 0}])
+def test_the_plan_behind_a_command_is_known_from_the_journal(
+    segment: str, options: dict[str, Any]
+) -> None:
+    robot = o80.robots.load("two_joints")
+    with robot.inline(segment, **options) as arm, arm.chunks(step=10) as plan:
+        plan.send([[0.3, 0.2]] * 3)
+        arm.burst(1)
+        assert plan.planned(0)[-1].tolist() == [0.3, 0.2], "from rest no journal is needed"
+        arm.burst(20)
+        arm.add_command(None, [-0.5, 0.7], iterations=50, mode="overwrite")
+        arm.burst(20)
+        plan.send([[0.0, 0.1], [0.2, -0.2]])
+        since = arm.published
+        arm.burst(1)
+        if options:
+            with pytest.raises(o80.InvalidArgument, match="needs the journal of"):
+                plan.planned(since)
+            return
+        planned = plan.planned(since, step=1)
+        arm.burst(len(planned) - 1)
+        assert arm.history(len(planned)).desired.tolist() == planned.tolist()
+
+
+def test_rows_tell_how_far_they_are_from_the_plan(segment: str) -> None:
+    limits = {
+        name: o80.Limits(speed=5.0, acceleration=20.0, jerk=100.0) for name in ("left", "right")
+    }
+    choose = random.Random(3)
+    with stepped(segment, limits=limits) as robot:
+        arm = robot.frontend
+        with arm.chunks(step=20) as plan:
+            for _ in range(8):
+                plan.send(rows_of(choose, float(arm.latest().desired[0]), 12))
+                robot.run(choose.randrange(20, 120))
+        history = arm.history()
+        found = planned_by_chunks(arm.journal(), history)
+    for i, name in enumerate(("left", "right")):
+        wanted = np.full(history.iteration[-1] + 30_000, np.nan)
+        for each in found[name]:
+            wanted[each.begins : each.begins + len(each.places)] = each.places
+        rows = history[np.isfinite(wanted[history.iteration]).argmax() :]
+        distance = abs(rows.desired[:, i] - wanted[rows.iteration])
+        told = np.isfinite(distance)
+        assert rows.off_plan[told, i] == pytest.approx(distance[told], rel=1e-6, abs=1e-9)
+        assert rows.off_plan[told, i].max() > 1e-3
+        assert not rows.off_plan[~rows.clamped[:, i], i].any()
+    assert history[-1].off_plan.tolist() == history.off_plan[-1].tolist()
 
 
 def test_a_row_for_another_year_fills_no_memory(arm: o80.Frontend) -> None:

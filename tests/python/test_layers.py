@@ -207,8 +207,8 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_310, 0),
-    "python/bindings": (5_700, 0),
+    "include, src": (34_460, 0),
+    "python/bindings": (5_725, 0),
     "python/o80": (30_600, 0),
     "python/o80/hybrid": (2_400, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (10_180, 6_015),
     "benchmarks, tools": (5_490, 0),
     "examples": (2_080, 0),
-    "tests, conftest.py": (0, 67_108),
+    "tests, conftest.py": (0, 67_180),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

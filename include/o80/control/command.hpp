@@ -114,4 +114,13 @@ struct ChunkOptions {
   Profile profile = Profile::smooth;  ///< Or monotone, linear or hold.
 };
 
+/// Where one number was in the iteration before a chunk began: the take-over leads on from there.
+struct ChunkStart {
+  std::uint32_t actuator = 0;
+  std::uint32_t number = 0;  ///< Index in its state.
+  double place = 0.0;        ///< Of the plan in force, not of what limits made of it.
+  double slope = 0.0;        ///< [1/iteration]
+  double curvature = 0.0;    ///< [1/iteration^2]
+};
+
 }  // namespace o80

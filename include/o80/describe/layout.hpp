@@ -30,6 +30,9 @@ struct RowLayout {
   std::uint32_t clamped = 0;  // mask
   std::uint32_t braking = 0;  // mask
   std::uint32_t starved = 0;  // mask
+  /// A float for each actuator: how far `desired` is from what its command asks for, the most of
+  /// its numbers.
+  std::uint32_t off_plan = 0;
   std::uint32_t size = 0;
   std::uint32_t mask_words = 0;
   std::uint32_t block = 0;
@@ -51,7 +54,9 @@ inline RowLayout row_layout(const Schema& schema) {
   layout.clamped = layout.active + layout.mask_words * 8;
   layout.braking = layout.clamped + layout.mask_words * 8;
   layout.starved = layout.braking + layout.mask_words * 8;
-  layout.size = layout.starved + layout.mask_words * 8;
+  layout.off_plan = layout.starved + layout.mask_words * 8;
+  const auto actuators = static_cast<std::uint32_t>(schema.actuators.size());
+  layout.size = layout.off_plan + round_up(actuators * sizeof(float), 8);
   if (schema.head.extended == kNoType) return layout;
   const TypeRow& extended = schema.types.at(schema.head.extended);
   for (std::uint32_t i = extended.first_field; i < extended.first_field + extended.fields; ++i) {

@@ -33,9 +33,10 @@ enum class JournalKind : std::uint8_t {
   ended,        // the backend has ended
   statuses,     // many of `status` in one entry; readers get each of them
   snapshot,     // the driver keeps its state in a slot: the state
-  at_rest       // nothing acts from this row on; for replays, readers do not get it
+  at_rest,      // nothing acts from this row on; for replays, readers do not get it
+  chunk_begun   // a chunk begins: with its rows, all that its plan depends on
 };
-inline constexpr std::size_t kJournalKinds = static_cast<std::size_t>(JournalKind::at_rest) + 1;
+inline constexpr std::size_t kJournalKinds = static_cast<std::size_t>(JournalKind::chunk_begun) + 1;
 
 std::string_view to_text(JournalKind kind) noexcept;
 

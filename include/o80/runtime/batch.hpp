@@ -56,6 +56,8 @@ class Batch {
   CommandId id() const { return id_; }
   std::size_t size() const { return records_; }
   bool empty() const { return records_ == 0; }
+  /// Numbers of its targets that its sender has put inside their bounds.
+  std::uint32_t clipped() const { return clipped_; }
   /// Status of the record with this index, in the order in which records were added.
   Handle handle(std::size_t place) const;
   std::vector<Handle> handles() const;
@@ -107,6 +109,7 @@ class Batch {
   std::shared_ptr<LaneSender> lane_;
   CommandId id_ = 0;
   std::uint32_t records_ = 0;
+  std::uint32_t clipped_ = 0;
   std::optional<Seen> seen_;
   std::shared_ptr<Kept> kept_;
 };

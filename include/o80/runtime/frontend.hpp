@@ -147,6 +147,8 @@ class UntypedFrontend {
   std::uint32_t add_chunk(BatchBuilder& batch, std::span<const std::uint32_t> actuators,
                           std::span<const std::uint32_t> due, std::span<const std::byte> states,
                           const ChunkOptions& options, std::span<const std::uint64_t> masks);
+  /// So many numbers of the added targets were put inside their bounds: the batch counts them.
+  void note_clipped(std::size_t numbers);
   /// No chunk of this plan follows (ChunkOptions::plan; 0: of no plan of this frontend): when its
   /// rows end, it is not starved. Changes no motion.
   std::uint32_t add_close_plan(std::uint64_t plan = 0);

@@ -76,7 +76,7 @@ struct JournalEntry {
   std::uint32_t lane = kNoLane;
   std::uint64_t owner = 0;  // incarnation of the lane's owner that caused it; 0: unknown
   std::string who;          // its process, "pid 4711 (python)"; empty: unknown
-  CommandId id = 0;         // of the batch, or, for a status, of the record
+  CommandId id = 0;         // of the batch, or, for a status and a chunk that begins, of the record
 
   // taken, scheduled, rejected
   std::uint64_t ticket = 0;
@@ -86,10 +86,15 @@ struct JournalEntry {
   bool records_lost = false;           // they were overwritten before they were read
   std::vector<std::byte> blocks;       // the batch as it was sent; empty with `records_lost`
   std::optional<Seen> seen{};          // by which row it was decided, as its sender says
+  std::uint32_t clipped = 0;           // numbers of its targets that were put inside their bounds
   // status, rejected
   Status status = Status::none;
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
+  // chunk_begun: the first row that is reached; its rows are so many iterations later; from where
+  std::uint32_t row = 0;
+  std::int64_t shift = 0;
+  std::vector<ChunkStart> starts;
   // halt, halt_reason, resume: the number; burst_ended: whether it was cut
   std::uint64_t halt = 0;
   HaltCause cause = HaltCause::none;

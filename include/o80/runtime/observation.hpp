@@ -56,6 +56,11 @@ class UntypedObservation {
   bool braking(std::uint32_t actuator) const { return bit(layout().braking, actuator); }
   /// True if a plan of chunks has no row left for this actuator, and is not closed.
   bool starved(std::uint32_t actuator) const { return bit(layout().starved, actuator); }
+  /// How far the desired state of this actuator is from what its command asks for, in its units:
+  /// the most of its numbers. 0 where no limit changed it.
+  float off_plan(std::uint32_t actuator) const {
+    return unpack<float>(bytes() + layout().off_plan + actuator * sizeof(float));
+  }
   /// True if any actuator brakes.
   bool any_braking() const {
     for (std::uint32_t word = 0; word < layout().mask_words; ++word) {

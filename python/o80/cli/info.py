@@ -11,6 +11,7 @@ import o80._core as _core
 from o80.base.screen import Column, print_json, print_table, style
 from o80.cli.attach import attach
 from o80.frontend.backend_texts import (
+    clipped_text,
     halt_text,
     latency_percentiles,
     latency_text,
@@ -59,10 +60,11 @@ def info(
         for said in (halt, trouble, starved, watchdog_text(schema), *running):
             if said:
                 print(said)
-        if line := latency_text(
-            latency_percentiles(latencies_of(frontend.journal())), schema["period"]
-        ):
-            print(line)
+        entries = frontend.journal()
+        latency = latency_text(latency_percentiles(latencies_of(entries)), schema["period"])
+        for line in (latency, clipped_text(entries)):
+            if line:
+                print(line)
         if schema["actuators"]:
             print()
             heads = [Column("", right=True), *(Column(name) for name in ACTUATOR_HEADS[1:])]

@@ -7,7 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import o80._core as _core
 from o80.base.screen import Column, bytes_text, plain, print_json, print_table, style
-from o80.frontend.backend_texts import age_text, latency_percentiles, latency_text, starved_text
+from o80.frontend.backend_texts import (
+    age_text,
+    clipped_text,
+    latency_percentiles,
+    latency_text,
+    starved_text,
+)
 from o80.rows.provenance import started_with
 
 if TYPE_CHECKING:
@@ -54,7 +60,8 @@ def recording_info(path: Path, *, as_json: bool = False) -> None:
         print(plain(line))
     for name, number, epoch in runs:
         latency = latency_text(latency_of(epoch), epoch.schema["period"])
-        for line in (latency, starved_text(starvations_of(epoch))):
+        clipped = clipped_text(_last_entries(epoch))
+        for line in (latency, clipped, starved_text(starvations_of(epoch))):
             if line:
                 print(plain(f"{_of_run(name, number)}: {line}"))
     _print_marks(recording.marks)
@@ -158,11 +165,15 @@ def latency_of(epoch: "RecordedEpoch") -> dict[str, int]:
     """The decision latency of the batches in the last entries of its journal, of recorded rows."""
     from o80.rows.journal import latencies_of
 
+    return latency_percentiles(latencies_of(_last_entries(epoch)))
+
+
+def _last_entries(epoch: "RecordedEpoch") -> "list[_core.JournalEntry]":
+    """The last entries of its journal, of recorded rows; none of a newer o80."""
     if epoch.journal_codec is None or epoch.journal_codec > _core.JOURNAL_CODEC:
-        return {}
+        return []
     rows = range(epoch.first_row, epoch.next_row)
-    entries = [each for each in epoch.last_entries(MAX_ENTRIES) if each.iteration in rows]
-    return latency_percentiles(latencies_of(entries))
+    return [each for each in epoch.last_entries(MAX_ENTRIES) if each.iteration in rows]
 
 
 def starvations_of(epoch: "RecordedEpoch") -> int:

@@ -27,6 +27,7 @@ class RowValues:
             "clamped": [bool(value) for value in row.clamped],
             "braking": [bool(value) for value in row.braking],
             "starved": [bool(value) for value in row.starved],
+            "off_plan": [float(value) for value in row.off_plan],
             "halted": row.halted,
             "overruns": row.overruns,
             "missed_ticks": row.skipped,

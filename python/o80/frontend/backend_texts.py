@@ -1,9 +1,13 @@
 """Texts about halted, hanging and late backends."""
 
-from typing import Any
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any
 
 import o80._core as _core
 from o80.base.errors import sentence
+
+if TYPE_CHECKING:
+    from o80.rows.journal import JournalEntry
 
 
 def halt_text(
@@ -58,6 +62,13 @@ def starved_text(starvations: int) -> str:
     """How often a plan of chunks ran out of rows; empty if it never did."""
     times = "once" if starvations == 1 else f"{starvations} times"
     return f"plans of chunks ran out of rows {times} (docs/chunks.md)" if starvations else ""
+
+
+def clipped_text(entries: "Iterable[JournalEntry | _core.JournalEntry]") -> str:
+    """How many numbers `clip` has put inside their bounds, in how many batches; empty if none."""
+    counts = [each.clipped for each in entries if each.kind == "taken" and each.clipped]
+    batches = "1 batch" if len(counts) == 1 else f"{len(counts)} batches"
+    return f"{sum(counts)} numbers of targets were clipped, in {batches}" if counts else ""
 
 
 def latency_percentiles(latencies: list[int]) -> dict[str, int]:

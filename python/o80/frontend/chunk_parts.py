@@ -12,12 +12,16 @@ class SentChunk:
     loop, `skipped`, `first` and `needed_ease` until it has begun, and all if it was rejected.
     """
 
-    def __init__(self, batch: _core.Batch, sent: ChunkRows, clipped: int = 0) -> None:
+    def __init__(self, batch: _core.Batch, sent: ChunkRows) -> None:
         self.batch = batch  #: with this chunk as its only command
-        self.clipped = clipped  #: numbers of its rows that `clip` has put inside their bounds
         self._sent = sent
         self._decision: Decision | None = None
         self._take_over: tuple[int, int] | None = None  # first row, iterations needed
+
+    @property
+    def clipped(self) -> int:
+        """Numbers of its rows that `clip` has put inside their bounds."""
+        return self.batch.clipped
 
     @property
     def decided(self) -> bool:

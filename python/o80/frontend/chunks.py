@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
     from o80.frontend.commander import Commander
 
+#: place, slope and curvature
+Start = tuple[float, float, float]
+
 #: Time of a take-over where no number has a limit of acceleration, if a step is not longer [s].
 EASE = 0.1
 
@@ -36,6 +39,7 @@ _MOST_ITERATIONS = 2**47
 # chunks that are sent, and iterations that pass, before send() looks at what became of the former
 # ones, if nobody asks for the plan
 _UNSETTLED, _UNSEEN = 16, 1000
+_ENTRIES = 1000  # of the journal that are read at once
 
 
 def _from_to(value: Any, name: str, low: int, high: int) -> int:
@@ -138,6 +142,9 @@ class Chunks(Managed):
         self._settled = 0  # the anchor at which these were looked at by send()
         self._parts: list[ChunkPart] = []
         self._over = 0  # of these, so many from the first one on are over
+        self._journal = _core.Journal(arm)
+        self._journal.seek_end()
+        self._starts: dict[int, dict[tuple[int, int], Start]] = {}  # of an iteration, by number
         self._answers: dict[int, int] = {}  # for a due iteration, how many chunks had a row for it
 
     # ------------------------------------------------------------------ sending
@@ -213,10 +220,11 @@ class Chunks(Managed):
                 bool(final),
                 self.profile,
                 seen if isinstance(seen, _core.Observation) else None,
+                clipped,
             )
             if self.ensemble is not None:
                 self._count_answers(anchor + after)
-            sent = SentChunk(batch, ChunkRows(anchor, after, ease, first, numbers), clipped)
+            sent = SentChunk(batch, ChunkRows(anchor, after, ease, first, numbers))
             self._arm._open_plans.add(self._number)
             self._open.append(sent)
             self._newest = sent
@@ -394,9 +402,8 @@ class Chunks(Managed):
             # what it goes on from is not there any more, or not yet
             while i > 0 and self._parts[i - 1].acts(self._parts[i].begins - 1):
                 i -= 1
-            before = self._parts[i].begins - 1
-            if before <= self._arm.published:
-                self._motion(before)
+            if self._parts[i].sent._begun is not None:
+                self._start_of(self._parts[i])
             return None
 
     def _settle(self) -> None:
@@ -437,40 +444,56 @@ class Chunks(Managed):
     def _begin(self, parts: list[ChunkPart], former: ChunkPart | None) -> None:
         """Notes from where each part begins, as far as that is there."""
         for part in parts:
-            before = part.begins - 1
+            has_begun = part.sent._begun is not None
             if part.known:
                 pass
-            elif former is not None and former.acts(before):
+            elif former is not None and former.acts(part.begins - 1):
                 if former.known:
-                    part.begin(former.at(before, alone=True))
-            elif before <= self._arm.published:
-                with contextlib.suppress(RowOverwritten):
-                    decided = before < self._arm.published or part.sent._begun is not None
-                    part.begin(self._motion(before), known=decided)
+                    part.begin(former.at(part.begins - 1, alone=True))
+            elif has_begun:
+                with contextlib.suppress(RowOverwritten, InvalidArgument):
+                    part.begin(self._start_of(part))
             else:
                 # it waits: if nobody else commands, what rests goes on to rest
                 latest = self._arm.latest()
                 if part.start is None and not latest.active[self._actuators].any():
-                    place = self._given.desired(latest)
-                    rests = np.zeros_like(place)
-                    part.begin((place, rests, rests), known=False)
+                    part.begin(self._rest_in(latest), known=False)
             former = part
 
-    def _motion(self, iteration: int) -> Moment:
-        """Desired places and differences of a row, from the history; 0 for what does not act."""
-        rows = [self._arm.wait_for(iteration)]
-        chosen = np.array(self._actuators)[self._given.places]
-        active = [row.active[chosen] for row in rows]
-        places = [self._given.desired(row) for row in rows]
-        rests = np.zeros_like(places[0])
-        if not active[0].any():
-            return places[0], rests, rests
-        for before in (iteration - 1, iteration - 2):
-            row = self._arm.wait_for(max(0, before))
-            active.append(row.active[chosen])
-            places.append(self._given.desired(row))
-        speed, former = (np.where(active[i], places[i] - places[i + 1], 0.0) for i in (0, 1))
-        return places[0], speed, np.where(active[0], speed - former, 0.0)
+    def _start_of(self, part: ChunkPart) -> Moment:
+        """Places and derivatives in the iteration before a chunk that has begun, from the journal.
+
+        Raises RowOverwritten; InvalidArgument behind a command without a journal.
+        """
+        before = part.begins - 1
+        if not self._journal.exists:
+            row = self._arm.wait_for(before)
+            if not row.active[self._actuators].any():
+                return self._rest_in(row)
+            raise InvalidArgument(
+                f"the plan of a chunk behind a command needs the journal of '{self._arm.segment}': "
+                "start the robot with one (--journal)"
+            )
+        while entries := self._journal.read(_ENTRIES):
+            for entry in entries:
+                if entry.kind == "chunk_begun":
+                    of_it = self._starts.setdefault(entry.iteration, {})
+                    of_it.update({(actuator, number): at for actuator, number, at in entry.starts})
+        # those of chunks before it are not needed any more
+        self._starts = {key: of_it for key, of_it in self._starts.items() if key >= part.begins}
+        of_it = self._starts.get(part.begins, {})
+        keys = self._given.keys
+        moves = [not each for each in self._given.switches]
+        if not all(key in of_it for key in itertools.compress(keys, moves)):
+            raise RowOverwritten(f"the journal no longer has the chunk that began in {part.begins}")
+        starts = np.array([of_it.get(key, (0.0, 0.0, 0.0)) for key in keys]).reshape(-1, 3)
+        places, slopes, curvatures = starts.T
+        return places, slopes, curvatures
+
+    def _rest_in(self, row: _core.Observation) -> Moment:
+        places = self._given.desired(row)
+        rests = np.zeros_like(places)
+        return places, rests, rests
 
     # ------------------------------------------------------------------ its end
 

@@ -76,6 +76,7 @@ def row_type(layout: Layout) -> MessageType:
             )
             for mask in ("active", "clamped", "braking", "starved")
         ]
+        members.append(Member("off_plan", "float32", 4, row["off_plan"], layout.actuators))
     if layout.extras.itemsize:
         extended = _struct(layout.schema["extended"], "Extended")
         members.append(Member("extended", extended.name, 0, row["extended"], None, extended))

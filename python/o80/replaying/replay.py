@@ -335,7 +335,7 @@ class RunReplay:
 
     @staticmethod
     def _numbers(frontend: Frontend) -> list[str]:
-        parts = ["desired", "observed"] if frontend.actuators else []
+        parts = ["desired", "observed", "off_plan"] if frontend.actuators else []
         return [*parts, "extended"] if "extended" in frontend._layout.schema else parts
 
     def _first_difference(self, recorded: "History", replayed: "History") -> Difference | None:

@@ -122,6 +122,12 @@ class Actuator:
     numbers: tuple[Number, ...]  #: of its state, in order
 
     @property
+    def paths(self) -> list[str]:
+        """The paths of its numbers: "elbow", or "elbow.position" and more."""
+        name = self.name or str(self.index)
+        return [".".join(filter(None, (name, each.name))) for each in self.numbers]
+
+    @property
     def limits(self) -> Limits:
         """The limits of the first number."""
         return self.numbers[0].limits

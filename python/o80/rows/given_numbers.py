@@ -39,6 +39,8 @@ class GivenNumbers:
             self._numbers += [each for each in numbers if bits >> each.nth & 1]
         #: place of the actuator of each number
         self.places = np.array([each.place for each in self._numbers], np.intp)
+        #: actuator of each number, and its index in the state
+        self.keys = [(actuators[each.place], each.nth) for each in self._numbers]
         self.switches = [each.switches for each in self._numbers]
         known = actuators_of(schema)
         self.limits: list[NumberLimits] = [

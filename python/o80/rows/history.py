@@ -319,6 +319,16 @@ class History:
         mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "starved")
         return mask
 
+    @property
+    def off_plan(self) -> NDArray[np.float32]:
+        """How far the desired states are from what commands ask for, where limits change them.
+
+        (T, actuators), the most of the numbers of each actuator, in their units.
+        """
+        if not self._layout.actuators:
+            return np.zeros((len(self), 0), np.float32)
+        return self._part("off_plan")
+
     def flat(self, dtype: Any = None) -> NDArray[Any]:
         """All observed numbers, then all extended ones: (T, numbers), float32 by default."""
         numbers: NDArray[Any] = self._layout.many_flat(self.rows, dtype)
@@ -366,7 +376,7 @@ def columns_in(history: History) -> dict[str, NDArray[Any]]:
     for column in columns_of(history.schema):
         columns[column.name] = values_of(history, column)
     names = [actuator["name"] for actuator in history.schema["actuators"]]
-    for part in ("active", "clamped", "braking", "starved"):
+    for part in ("active", "clamped", "braking", "starved", "off_plan"):
         mask = getattr(history, part)
         columns.update({f"{part}.{name}": mask[:, i].copy() for i, name in enumerate(names)})
     return columns

@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
+from o80.base.cached import cached
 from o80.base.words import CommandEnd, Reason, Status
+from o80.rows.actuators import actuators_of
 from o80.rows.enumerations import labelled
 from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, request_fields
 from o80.rows.record import Record
@@ -66,13 +68,13 @@ class JournalEntry:
     number: int
     #: taken, scheduled, rejected, status, halt, halt_reason, resume, control_taken,
     #: control_released, control_lost, burst, burst_ended, died, silent, interrupted, fresh_start,
-    #: order_lost, stopping, ended or snapshot
+    #: order_lost, stopping, ended, snapshot or chunk_begun
     kind: str
     iteration: int
     missed: int = 0  #: entries before this one that were overwritten before they were read
     lane: int | None = None  #: the lane of the frontend that caused it
     sender: str = ""  #: its process, or that of the halt; empty if unknown
-    id: int | None = None  #: of the batch; of a `status`: of the command
+    id: int | None = None  #: of the batch; of `status` and chunk_begun: of the command
     ticket: int | None = None  #: place of a batch in the order of all pulses
     at: int | None = None  #: the iteration that a batch was sent for, if it is another one
     burst: int | None = None  #: iterations that a burst may run; -1 until its batch has ended
@@ -81,6 +83,13 @@ class JournalEntry:
     follows: bool = False  #: of fresh_start: idle actuators follow from there on
     commands: tuple[JournalCommand, ...] = ()
     commands_lost: bool = False  #: they were overwritten before they were read
+    clipped: int = 0  #: numbers of its targets that `clip` has put inside their bounds
+    #: Of chunk_begun: the row that is reached first, by how many iterations its rows are later than
+    #: they were sent for, and for each number ("elbow", "elbow.position") place, slope
+    #: [1/iteration] and curvature in the iteration before. They and the rows make the plan.
+    row: int | None = None
+    shift: int | None = None
+    starts: dict[str, tuple[float, float, float]] | None = None
     status: Status | None = None
     reason: Reason | None = None
     halt: int | None = None  #: number of a halt
@@ -167,6 +176,9 @@ def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:
     return ends
 
 
+_OF_ONE = ("status", "burst", "burst_ended", "chunk_begun")
+
+
 class EntryDecoder:
     """Converts native entries with the schema of a robot."""
 
@@ -189,7 +201,7 @@ class EntryDecoder:
             missed=native.missed,
             lane=native.lane if of_lane else None,
             sender=native.who,
-            id=native.id if of_batch or kind in ("status", "burst", "burst_ended") else None,
+            id=native.id if of_batch or kind in _OF_ONE else None,
             ticket=native.ticket if of_batch else None,
             at=native.at if of_batch and native.at not in (-1, native.iteration) else None,
             burst=native.burst if native.burst != 0 else None,
@@ -198,6 +210,10 @@ class EntryDecoder:
             follows=native.follows,
             commands=tuple(self.command(record) for record in native.records),
             commands_lost=native.records_lost,
+            clipped=native.clipped,
+            row=native.row if kind == "chunk_begun" else None,
+            shift=native.shift if kind == "chunk_begun" else None,
+            starts=self._starts(native) if kind == "chunk_begun" else None,
             status=native.status if has_status else None,
             reason=native.reason if has_status else None,
             halt=native.halt or None,
@@ -207,6 +223,13 @@ class EntryDecoder:
             slot=native.slot if kind == "snapshot" else None,
             unknown=native.unknown,
         )
+
+    def _starts(self, native: _core.JournalEntry) -> dict[str, tuple[float, float, float]]:
+        return {self._paths[i][number]: start for i, number, start in native.starts}
+
+    @cached
+    def _paths(self) -> list[list[str]]:
+        return [each.paths for each in actuators_of(self._schema)]
 
     def _name(self, index: int) -> str:
         name: str = self._names[index] if index < len(self._names) else str(index)

@@ -29,6 +29,10 @@ class JournalText:
             return self._batch(entry)
         if entry.kind == "status":
             return self._status(entry)
+        if entry.kind == "chunk_begun":
+            what = self._open.get((entry.lane, entry.id or 0), f"chunk {entry.id}")
+            later = f", {entry.shift} iterations later" if entry.shift else ""
+            return f"  {what}: plays from row {entry.row}{later}"
         if entry.kind == "none":
             return f"something of a newer o80 ({entry.unknown})"
         who = f"{_sender(entry)}: "

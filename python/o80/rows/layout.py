@@ -204,6 +204,7 @@ class Layout:
         self._clamped_at: int = row["clamped"]
         self._braking_at: int = row["braking"]
         self._starved_at: int = row["starved"]
+        self._off_plan_at: int = row["off_plan"]
         self._mask_bytes: int = row["mask_words"] * 8
         self._is_array = self.states.subdtype is not None
         self._element, self._shape = self.states.subdtype or (self.states, ())
@@ -237,6 +238,7 @@ class Layout:
                 ("clamped", mask, self._clamped_at),
                 ("braking", mask, self._braking_at),
                 ("starved", mask, self._starved_at),
+                ("off_plan", np.dtype(("f4", (self.actuators,))), self._off_plan_at),
             ]
         if self.extras.itemsize:
             parts.append(("extended", self.extras, self._extended_at))
@@ -330,6 +332,9 @@ class Layout:
 
     def starved(self, row: Any) -> NDArray[np.bool_]:
         return self._mask(row, self._starved_at)
+
+    def off_plan(self, row: Any) -> NDArray[np.float32]:
+        return np.ndarray((self.actuators,), np.float32, row, self._off_plan_at)
 
     def flat(self, row: Any, dtype: Any = None) -> NDArray[Any]:
         kind = np.dtype(np.float32 if dtype is None else dtype)

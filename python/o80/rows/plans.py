@@ -10,11 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base.words import Status
 from o80.rows.actuators import Number, actuators_of
-from o80.rows.columns import Column, columns_of
-from o80.rows.history import History, values_of
-from o80.rows.journal import ENDS, JournalCommand, JournalEntry
+from o80.rows.columns import columns_of
+from o80.rows.history import History
+from o80.rows.journal import JournalCommand, JournalEntry
 
 MOST_AHEAD = 20_000  # of the newest row [iterations]
 
@@ -39,8 +38,7 @@ class Decision:
 
     shift: int
     begins: int
-    late: int
-    stood: bool
+    late: int = 0
 
 
 def decide(sent: ChunkRows, taken: int, shift: int, stood: bool) -> Decision:
@@ -48,7 +46,7 @@ def decide(sent: ChunkRows, taken: int, shift: int, stood: bool) -> Decision:
     anchor = sent.anchor + shift
     first = 0 if stood else sent.first
     begins = max(taken, anchor + (int(sent.due[first - 1]) if first else 0) + 1)
-    return Decision(shift, begins, int(np.searchsorted(sent.due, taken - anchor)), stood)
+    return Decision(shift, begins, int(np.searchsorted(sent.due, taken - anchor)))
 
 
 class NumberLimits(NamedTuple):
@@ -160,22 +158,17 @@ class Planned(NamedTuple):
 
 
 class ChunkEntries:
-    """Entries of a journal that say what became of chunks; at most the newest `most`."""
+    """Entries of a journal that plans of chunks depend on; at most the newest `most`."""
 
     def __init__(self, most: int | None = None) -> None:
         self.entries: deque[JournalEntry] = deque(maxlen=most)
-        self._open: set[tuple[int | None, int | None]] = set()  # lane and id
 
     def add(self, entries: Iterable[JournalEntry]) -> None:
-        for entry in entries:
-            chunks = [each.id for each in entry.commands if each.pace == "chunk"]
-            if entry.kind == "taken" and chunks:
-                self._open.update((entry.lane, each) for each in chunks)
-                self.entries.append(entry)
-            elif entry.kind == "status" and (entry.lane, entry.id) in self._open:
-                self.entries.append(entry)
-                if entry.status in ENDS:
-                    self._open.discard((entry.lane, entry.id))
+        self.entries.extend(
+            each
+            for each in entries
+            if each.kind == "chunk_begun" or any(one.pace == "chunk" for one in each.commands)
+        )
 
 
 def planned_by_chunks(
@@ -183,100 +176,47 @@ def planned_by_chunks(
 ) -> dict[str, list[Planned]]:
     """The plans of the chunks that began in these rows, by number: "elbow", "elbow.position".
 
-    They begin where the plan of the chunk before them was if that was in force, else at the desired
-    state, with its differences. Chunks whose begin or the row before it is not there are left out,
-    and iterations far ahead of the newest row.
+    Chunks that began before the oldest row are left out, and iterations far ahead of the newest.
     """
     found: dict[str, list[Planned]] = {}
-    iterations = history.iteration
-    if not len(iterations):
+    if not len(history):
         return found
-    columns = {each.name: each for each in columns_of(history.schema)}
-    latest = int(iterations[-1]) + MOST_AHEAD
-    number_of = _numbers_by_name(history.schema)
-    waiting: dict[tuple[int | None, int | None], tuple[JournalEntry, JournalCommand]] = {}
-    numbers: dict[tuple[int | None, int | None], list[str]] = {}
-    ends: dict[str, tuple[int, Status | None]] = {}  # of the last chunk of each number
+    columns = {each.name for each in columns_of(history.schema)}
+    oldest, newest = int(history.iteration[0]), int(history.iteration[-1])
+    number_of: dict[str, Number] = {}
+    for each in actuators_of(history.schema):
+        number_of.update(zip(each.paths, each.numbers, strict=True))
+    waiting: dict[tuple[int | None, int | None], JournalCommand] = {}
     for entry in entries:
-        key = entry.lane, entry.id
         if entry.kind == "taken":
-            for command in entry.commands:
-                if command.pace == "chunk":
-                    waiting[entry.lane, command.id] = entry, command
-        elif entry.kind == "status" and entry.status in ENDS:
-            ends |= dict.fromkeys(numbers.pop(key, ()), (entry.iteration, entry.status))
-        elif entry.kind == "status" and entry.status == Status.ACTIVE and key in waiting:
-            taken, command = waiting.pop(key)
-            begins = entry.iteration
-            place = int(np.searchsorted(iterations, begins - 1))
-            if place >= len(iterations) or iterations[place] != begins - 1:
-                continue
-            shift = _shift(taken, command, history)
-            given = [each for each in _numbers(command) if f"desired.{each[0]}" in columns]
-            numbers[key] = [number for number, _ in given]
-            if not given:
-                continue
-            starts: list[Moment] = []
-            for number, _ in given:
-                before = found.setdefault(number, [])[-1:]
-                start = _start(before, ends.pop(number, None), begins)
-                if start is None:
-                    start = _desired(history, columns[f"desired.{number}"], place, command)
-                starts.append(start)
-            limits = [limits_of(number_of[n], rows.dtype, history.schema) for n, rows in given]
-            switches = [rows.dtype.kind == "b" for _, rows in given]
-            values = np.stack([rows.astype(np.float64) for _, rows in given], axis=1)
-            way = _way(taken, command, values, shift, begins, limits, switches)
-            at = tuple(np.concatenate(each) for each in zip(*starts, strict=True))
-            plan = way.places(cast("Moment", at), latest - begins)
-            for i, (number, _) in enumerate(given):
-                places, *derivatives = (each[:, i] for each in plan)
-                found[number].append(Planned(begins, places, np.array(derivatives)))
+            waiting.update({(entry.lane, each.id): each for each in entry.commands if each.due})
+        command = waiting.pop((entry.lane, entry.id), None) if entry.starts is not None else None
+        begins = entry.iteration
+        if command is None or not oldest < begins <= newest + 1:
+            continue
+        given = [each for each in _numbers(command) if f"desired.{each[0]}" in columns]
+        if not given:
+            continue
+        # numbers that switch have no start: their rows are held
+        starts = [(entry.starts or {}).get(name, (0.0, 0.0, 0.0)) for name, _ in given]
+        limits = [limits_of(number_of[name], rows.dtype, history.schema) for name, rows in given]
+        anchor = command.anchor or 0
+        sent = ChunkRows(
+            anchor,
+            np.array(command.due, np.int64) - anchor,
+            1 if command.profile == "hold" else command.ease or 0,
+            command.first or 0,
+            np.stack([rows.astype(np.float64) for _, rows in given], axis=1),
+        )
+        switches = [rows.dtype.kind == "b" for _, rows in given]
+        decision = Decision(entry.shift or 0, begins)
+        way = ChunkWay(sent, decision, command.profile, limits, switches)
+        most = newest + MOST_AHEAD - begins
+        plan = way.places(cast("Moment", tuple(np.array(starts).T)), most, entry.row)
+        for i, (name, _) in enumerate(given):
+            places, *derivatives = (each[:, i] for each in plan)
+            found.setdefault(name, []).append(Planned(begins, places, np.array(derivatives)))
     return found
-
-
-def _way(
-    taken: JournalEntry,
-    command: JournalCommand,
-    rows: NDArray[np.float64],
-    shift: int,
-    begins: int,
-    limits: list[NumberLimits],
-    switches: list[bool],
-) -> ChunkWay:
-    anchor = command.anchor or 0
-    due = np.array(command.due, np.int64) - anchor
-    ease = 1 if command.profile == "hold" else command.ease or 0
-    sent = ChunkRows(anchor, due, ease, command.first or 0, rows)
-    decision = decide(sent, taken.iteration, shift, stood=shift > 0)
-    if decision.begins != begins:  # it had a prefix that did not count: the actuators stood
-        decision = decide(sent, taken.iteration, shift, stood=True)
-    return ChunkWay(sent, decision, command.profile, limits, switches)
-
-
-def _numbers_by_name(schema: dict[str, Any]) -> dict[str, Number]:
-    """The numbers of all actuators: "elbow", "elbow.position"."""
-    return {
-        ".".join(filter(None, (each.name or str(each.index), number.name))): number
-        for each in actuators_of(schema)
-        for number in each.numbers
-    }
-
-
-def _indices(history: History, command: JournalCommand) -> list[int]:
-    names = [each["name"] or str(i) for i, each in enumerate(history.schema["actuators"])]
-    return [names.index(name) for name in command.actuators]
-
-
-def _shift(taken: JournalEntry, command: JournalCommand, history: History) -> int:
-    """By how much its rows are later, because its actuators stood still (docs/chunks.md)."""
-    last = taken.iteration - 1
-    if command.fixed or command.anchor is None or command.anchor >= last:
-        return 0
-    moved = history.active[:, _indices(history, command)].any(axis=1)
-    acted = history.iteration[moved & (history.iteration <= last)]
-    acted_last = int(acted[-1]) if len(acted) else -1
-    return last - max(acted_last, command.anchor) if acted_last < last else 0
 
 
 def _numbers(command: JournalCommand) -> Iterable[tuple[str, NDArray[np.generic]]]:
@@ -287,28 +227,3 @@ def _numbers(command: JournalCommand) -> Iterable[tuple[str, NDArray[np.generic]
             rows = np.atleast_1d(np.asarray(values))
             if rows.ndim == 1 and rows.dtype.kind in "fiub":
                 yield f"{actuator}.{field}" if field else actuator, rows
-
-
-def _start(
-    before: list[Planned], end: tuple[int, Status | None] | None, begins: int
-) -> Moment | None:
-    """Place and slope of the plan before, if that is in force until a chunk begins."""
-    if not before or end not in (None, (begins, Status.OVERWRITTEN)):
-        return None
-    at = begins - before[0].begins - 1
-    if not 0 <= at < len(before[0].places):
-        return None
-    slope, curvature = before[0].derivatives[:, at : at + 1]
-    return before[0].places[at : at + 1], slope, curvature
-
-
-def _desired(history: History, column: Column, place: int, command: JournalCommand) -> Moment:
-    """Where the number was in a row, and its differences; 0 if its actuator did not act there."""
-    desired = np.asarray(values_of(history, column), np.float64)
-    acts = np.any(history.active[:, _indices(history, command)], axis=1)
-    speeds = [
-        desired[at] - desired[at - 1] if at > 0 and acts[at] else 0.0
-        for at in (place, max(0, place - 1))
-    ]
-    curvature = speeds[0] - speeds[1] if acts[place] else 0.0
-    return desired[place : place + 1], np.array([speeds[0]]), np.array([curvature])

@@ -119,7 +119,9 @@ struct BatchRecord {
   Iteration at = kNow;
   std::int64_t burst = 0;    // iterations to run; 0: no burst
   std::uint32_t blocks = 1;  // blocks of the whole batch, with this one
-  std::array<std::uint32_t, 5> own{};
+  /// Numbers of its targets that its sender has put inside their bounds.
+  std::uint32_t clipped = 0;
+  std::array<std::uint32_t, 4> own{};
 };
 static_assert(sizeof(BatchRecord) == kBlockBytes && std::is_trivially_copyable_v<BatchRecord> &&
               std::is_standard_layout_v<BatchRecord>);

@@ -175,6 +175,7 @@ Limited Motion::step(Iteration now, std::byte* state) noexcept {
     std::memcpy(state + place.offset, target() + place.offset, place.size);
   }
   const bool over = now >= last_;
+  off_plan_ = 0.0;
   for (Number& each : numbers_) {
     if (!each.is_commanded) {
       each.motion.brake();
@@ -184,6 +185,7 @@ Limited Motion::step(Iteration now, std::byte* state) noexcept {
     const Limit limit = each.motion.step(each.lowest, each.highest);
     const bool first = limit != Limit::none && result.limit == Limit::none;
     if (first || limit >= Limit::below_integral) result = {limit, each.number};
+    if (limit != Limit::none) off_plan_ = std::max(off_plan_, each.motion.off_plan());
     if (over && each.motion.arrived()) {
       clear_sign_of_zero(target() + each.offset, each.kind);
       copy_number(state + each.offset, target() + each.offset, layout_.numbers()[each.number].size);

@@ -106,17 +106,13 @@ class Motion {
       if (each.is_commanded) each.motion.widen(layout_.number(each.number, row));
     }
   }
-  /// Iterations that a take-over to this row needs for its limits, if it is due in `iterations`.
-  double iterations_to_take_over(const std::byte* row, double iterations,
-                                 const std::uint64_t* mask) const noexcept {
-    double most = 0.0;
+  /// Calls visit(number, moment, rates) for each number of the mask: where rows would take over.
+  template <class Visit>
+  void each_moment(const std::uint64_t* mask, Visit&& visit) const noexcept {
     for (const Number& each : numbers_) {
       if (!masked(mask, each.number)) continue;
-      most = std::max(
-          most, o80::iterations_to_take_over(each.motion.moment(), layout_.number(each.number, row),
-                                             iterations, each.motion.guard().rates()));
+      visit(each.number, each.motion.moment(), each.motion.guard().rates());
     }
-    return most;
   }
   /// True if what settle() planned last is the way to a row, and a limit can keep it from there.
   bool follows_rows() const noexcept {
@@ -137,6 +133,8 @@ class Motion {
   }
   /// One iteration of the motion; the limit that changed it, if any.
   Limited step(Iteration now, std::byte* state) noexcept;
+  /// How far that step was from the plan, the most of the numbers; 0 if no limit changed it.
+  double off_plan() const noexcept { return off_plan_; }
   Iteration last() const noexcept { return last_; }
   /// True if the state of the last step() was the target: nothing is left to follow.
   bool arrived() const noexcept {
@@ -277,6 +275,7 @@ class Motion {
   bool begun_ = false;  // the next row begins a command
   std::int64_t requested_by_speed_ = 1;
   Limited slowest_;
+  double off_plan_ = 0.0;
 };
 
 }  // namespace o80

@@ -107,13 +107,15 @@ class NumberMotion {
   }
   void curve_on(Profile profile, double target, std::int64_t iterations,
                 const RowsAhead& ahead) noexcept {
-    const Span reach =
+    Span reach =
         plan_.curve_on(profile, target, iterations, ahead, {guard_.minimum(), guard_.maximum()});
     // the shortest stop from a place before a turning point ends behind it
+    const Rates& rates = guard_.rates();
     const double turn =
-        std::min(ahead.iterations > 0 ? plan_.turn() : 0.0, guard_.rates().acceleration);
-    const double ramp = turn / guard_.rates().jerk;
+        std::min(ahead.iterations > 0 ? plan_.turn(rates.jerk) : 0.0, rates.acceleration);
+    const double ramp = turn / rates.jerk;
     const double room = turn > 0.0 ? turn * (1.0 + ramp * ramp / 24.0) : 0.0;
+    if (turn > 0.0) reach.include(plan_.crest());
     widen(reach.low - room);
     widen(reach.high + room);
   }
@@ -140,6 +142,8 @@ class NumberMotion {
     return !follows_ || (!leaves_ && guard_.position() == plan_.target());
   }
   bool follows() const noexcept { return follows_; }
+  /// How far it is from its plan.
+  double off_plan() const noexcept { return std::abs(plan_.place() - guard_.position()); }
   /// The plan ends, at its target if that is `arrived`: what follows is another command, or none.
   /// If the shortest stop would leave the bounds, the plan continues until it stays inside.
   void end(bool arrived = false) noexcept {

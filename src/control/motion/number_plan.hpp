@@ -119,13 +119,23 @@ class NumberPlan {
   /// to the row stays, and the begin of the way to the next one.
   Span curve_on(Profile profile, double target, std::int64_t iterations, const RowsAhead& ahead,
                 const Span& bounds) noexcept;
-  /// The curvature where the way to a row turns around, if it does: the larger one at its ends.
-  double turn() const noexcept {
-    if (shape_ != Shape::curve || from_.speed * to_.speed > 0.0) return 0.0;
+  /// The curvature where the way to a row turns around, or will sooner than this jerk could end it:
+  /// the larger one at its ends. 0: it does not.
+  double turn(double jerk) const noexcept {
+    if (shape_ != Shape::curve) return 0.0;
+    const double fade = to_.acceleration * to_.acceleration / jerk;
+    const bool will = slows() && std::abs(to_.speed) <= fade;
+    if (from_.speed * to_.speed > 0.0 && !will) return 0.0;
     return std::max(std::abs(from_.acceleration), std::abs(to_.acceleration));
+  }
+  /// Where it would turn around behind the row; else the row.
+  double crest() const noexcept {
+    const double way = to_.speed * std::abs(to_.speed) / (2.0 * std::abs(to_.acceleration));
+    return to_.position + (slows() ? way : 0.0);
   }
   /// Place and derivatives of the curve in the last iteration.
   Moment moment() const noexcept;
+  double place() const noexcept { return done_ >= iterations_ ? task_.target : at(done_); }
   /// True if a bound holds the curve in the last iteration.
   bool is_held() const noexcept;
 
@@ -151,6 +161,7 @@ class NumberPlan {
  private:
   enum class Shape : std::uint8_t { line, smooth, stop_first, fastest, monotone, curve };
 
+  bool slows() const noexcept { return to_.speed * to_.acceleration < 0.0; }
   Span monotone_on(const RowsAhead& ahead) noexcept;
   Span smooth_on(const RowsAhead& ahead, const Span& bounds) noexcept;
   double curve_at(double share) const noexcept;

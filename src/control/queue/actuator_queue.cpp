@@ -203,15 +203,31 @@ void ActuatorQueue::begin_chunk() noexcept {
 
 double ActuatorQueue::to_take_over(BlockIndex member, std::uint32_t row,
                                    std::int64_t iterations) noexcept {
-  const RecordHead& head = pool_->head(member);
-  const std::uint64_t* mask = nullptr;
-  if (head.masked != 0) {
-    mask = next_mask_.data();
-    Cursor(*pool_, member, sizeof(RecordHead), head.payload_bytes)
-        .read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());
-  }
   ChunkRows(*pool_, member, *layout_).cursor(row).read(scratch(), layout_->size());
-  return motion_.iterations_to_take_over(scratch(), static_cast<double>(iterations), mask);
+  double most = 0.0;
+  motion_.each_moment(
+      mask_of(member), [&](std::uint32_t i, const Moment& from, const Rates& rates) {
+        most = std::max(most, iterations_to_take_over(from, layout_->number(i, scratch()),
+                                                      static_cast<double>(iterations), rates));
+      });
+  return most;
+}
+
+std::size_t ActuatorQueue::put_starts(BlockIndex member, std::span<ChunkStart> to) noexcept {
+  std::size_t count = 0;
+  motion_.each_moment(mask_of(member), [&](std::uint32_t i, const Moment& from, const Rates&) {
+    to[count++] = {pool_->head(member).actuator, i, from.position, from.speed, from.acceleration};
+  });
+  return count;
+}
+
+/// The numbers that a command gives, in next_mask_; null: all.
+const std::uint64_t* ActuatorQueue::mask_of(BlockIndex record) noexcept {
+  const RecordHead& head = pool_->head(record);
+  if (head.masked == 0) return nullptr;
+  Cursor(*pool_, record, sizeof(RecordHead), head.payload_bytes)
+      .read(next_mask_.data(), next_mask_.size() * sizeof next_mask_.front());
+  return next_mask_.data();
 }
 
 /// Numbers that switch do not wait for the end of a take-over.

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -100,6 +101,8 @@ class ActuatorQueue {
   }
   /// Iterations that limits need for the take-over to a row of this chunk, due in `iterations`.
   double to_take_over(BlockIndex member, std::uint32_t row, std::int64_t iterations) noexcept;
+  /// From where its numbers take over; returns how many. `to` has room for the whole state.
+  std::size_t put_starts(BlockIndex member, std::span<ChunkStart> to) noexcept;
   static constexpr std::uint64_t kEveryPlan = 0;
   /// No chunk of this plan of a lane follows.
   void close_plan(std::uint32_t lane, std::uint64_t plan) noexcept {
@@ -112,6 +115,8 @@ class ActuatorQueue {
   /// True if no command or given target is running or queued.
   bool empty() const noexcept { return has_no_command() && runs_ == Runs::nothing; }
   bool has_no_command() const noexcept { return queue_.empty() && !has_record(); }
+  /// How far the last step was from the plan, if a limit changed it.
+  float off_plan() const noexcept { return static_cast<float>(motion_.off_plan()); }
   /// For targets that are given without a command, to a queue that has none: begins a row of them.
   void begin_given(Mode mode) noexcept {
     if (mode == Mode::overwrite) carry_.reset();
@@ -225,6 +230,7 @@ class ActuatorQueue {
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
   void give_way(Iteration iteration) noexcept { end(leave(), {Status::overwritten}, iteration); }
   void begin_command(const std::byte* observed) noexcept;
+  const std::uint64_t* mask_of(BlockIndex record) noexcept;
   void begin_chunk() noexcept;
   void switch_passed_rows(Iteration iteration) noexcept;
   bool is_in_force(const SetPoint& next) const noexcept {

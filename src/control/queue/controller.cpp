@@ -33,14 +33,18 @@ Controller::Controller(const Schema& schema, BlockPool& pool, StatusSink& sink, 
   actuators_.reserve(count);
   waiting_.reserve(kMaxWaiting);
   auto* block = reinterpret_cast<std::byte*>(desired_.data());
+  std::size_t numbers = 0;
   for (std::uint32_t i = 0; i < count; ++i) {
     const ActuatorRow& row = schema.actuators[i];
+    numbers += layouts_[row.type]->numbers().size();
     offsets_.push_back(row.offset);
     actuators_.emplace_back(schema, row, *layouts_[row.type], pool_, ledger_, block + row.offset,
                             lanes);
     set(busy_, i);
     if (row.when_idle == WhenIdle::follow) set(follow_, i);
   }
+  starts_.resize(numbers);
+  off_plan_.resize((count + 1) / 2 * 2);  // whole words, as in a row
 }
 
 /// Begins the commands of several actuators whose members are next in all queues.
@@ -104,6 +108,7 @@ void Controller::step(Iteration iteration, const std::byte* observed) noexcept {
       if (moved == Moved::idle && queue.empty() && queue.at_rest()) busy_[word] &= ~bit;
       const bool has_no_command = moved == Moved::idle || moved == Moved::braking;
       if (has_no_command && queue.starved() && !awaits_chunk(i, knows_waiting)) starved |= bit;
+      off_plan_[i] = moved == Moved::clamped ? queue.off_plan() : 0.0F;
       if (moved == Moved::idle) return;
       queue.acted(iteration);
       active |= bit;
@@ -134,8 +139,10 @@ void Controller::step_given(Iteration iteration, const std::byte* observed) noex
     if (masked(dropped_.data(), i)) continue;
     if (first) actuators_[i].begin_given(given_.mode);
     clamped_mask_[i / 64] &= ~(std::uint64_t{1} << (i % 64));
+    off_plan_[i] = 0.0F;
     if (actuators_[i].go_to(iteration, of(i, observed), target) == ActuatorQueue::Moved::clamped) {
       set(clamped_mask_, i);
+      off_plan_[i] = actuators_[i].off_plan();
     }
     actuators_[i].acted(iteration);
     set(stepped_, i);
@@ -314,6 +321,13 @@ BegunChunk Controller::take_over(BlockIndex group, Iteration iteration) noexcept
 void Controller::begin_chunk(BlockIndex group, std::uint32_t lane, Iteration iteration) noexcept {
   const BegunChunk begun = take_over(group, iteration);
   chunk_of(pool_, group).row = begun.row;
+  std::size_t starts = 0;
+  each_member(group, [&](BlockIndex member) {
+    ActuatorQueue& queue = actuators_[pool_.head(member).actuator];
+    starts += queue.put_starts(member, std::span(starts_).subspan(starts));
+  });
+  sink_.begun({lane, pool_.head(group).id, begun.row, chunk_of(pool_, group).shift,
+               std::span(starts_).first(starts)});
   ledger_.note_begun(group, begun, iteration);
   each_member(group, [&](BlockIndex member) {
     pool_.head(member).own[Own::kNext] = kNoBlock;

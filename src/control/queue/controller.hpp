@@ -95,6 +95,7 @@ class Controller {
     for (Mask* mask :
          {&active_mask_, &clamped_mask_, &braking_mask_, &starved_mask_, &interrupted_})
       std::ranges::fill(*mask, 0);
+    std::ranges::fill(off_plan_, 0.0F);
   }
 
   /// One more iteration, after restart(), of a motion that was made elsewhere: its desired block.
@@ -188,6 +189,8 @@ class Controller {
   const std::uint64_t* active_mask() const noexcept { return active_mask_.data(); }
   /// One bit for each actuator: a limit changed the desired state of the last step.
   const std::uint64_t* clamped_mask() const noexcept { return clamped_mask_.data(); }
+  /// For each actuator, how far the desired state of the last step is from its plan.
+  const float* off_plan() const noexcept { return off_plan_.data(); }
   /// One bit for each actuator: it braked in the last step, without a command.
   const std::uint64_t* braking_mask() const noexcept { return braking_mask_.data(); }
   /// One bit for each actuator: in the last step it had no command and no row of a chunk ahead,
@@ -327,6 +330,8 @@ class Controller {
   BatchPlanner planner_;
   PurgeTickets purge_tickets_;
   std::vector<Block> desired_;
+  std::vector<float> off_plan_;
+  std::vector<ChunkStart> starts_;  // of a chunk that begins
   Mask active_mask_;
   Mask clamped_mask_;
   Mask braking_mask_;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "control/batch/record.hpp"
 
@@ -31,10 +32,20 @@ struct StatusChange {
   std::uint16_t late = 0;  // for `limits`: iterations more than requested, at most 65535
 };
 
+/// The begin of a chunk: with its rows, all that its plan depends on.
+struct ChunkBegin {
+  std::uint32_t lane = 0;
+  CommandId id = 0;
+  std::uint32_t row = 0;   // the first that is reached
+  std::int64_t shift = 0;  // its rows are so many iterations later than they were sent for
+  std::span<const ChunkStart> starts;  // of each number that moves
+};
+
 /// Receives status changes from the controller, and decides whether a follower may begin.
 class StatusSink {
  public:
   virtual void changed(const StatusChange& change) noexcept = 0;
+  virtual void begun(const ChunkBegin& /*chunk*/) noexcept {}
   /// Blocks of a lane were returned to the pool, by a record or a batch.
   virtual void freed(std::uint32_t lane, std::uint32_t blocks) noexcept = 0;
   /// Asked before an actuator that has followed while it waited for others begins their command

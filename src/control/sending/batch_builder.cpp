@@ -139,6 +139,7 @@ std::span<const Block> BatchBuilder::seal(const BatchRecord& batch) {
   BatchRecord written = batch;
   written.kind = RecordKind::batch;
   written.records = records_;
+  written.clipped = clipped_;
   written.blocks = static_cast<std::uint32_t>(blocks());
   const bool is_express = !has_commands() && requests() == 0 && of(RecordKind::mark) == 0 &&
                           of(RecordKind::close_plan) == 0 && records_ > 0 &&

@@ -76,6 +76,12 @@ class BatchBuilder {
   /// By which row the batch is decided, if its sender says so: a block behind its records.
   void set_seen(const std::optional<Seen>& seen) noexcept { seen_ = seen; }
 
+  /// So many numbers of its targets were put inside their bounds.
+  void note_clipped(std::size_t numbers) noexcept {
+    clipped_ += static_cast<std::uint32_t>(numbers);
+  }
+  std::uint32_t clipped() const noexcept { return clipped_; }
+
   /// Completes the batch. `batch` has id, ticket, at, late_now, burst and flags. A batch of few
   /// purges and control orders, without `at` and without a burst, is marked as express.
   std::span<const Block> seal(const BatchRecord& batch);
@@ -85,6 +91,7 @@ class BatchBuilder {
     records_ = 0;
     counts_ = {};
     seen_.reset();
+    clipped_ = 0;
   }
   bool empty() const noexcept { return records_ == 0; }
   std::uint32_t records() const noexcept { return records_; }
@@ -128,6 +135,7 @@ class BatchBuilder {
   // of a kind
   std::array<std::uint32_t, static_cast<std::size_t>(RecordKind::close_plan) + 1> counts_{};
   std::optional<Seen> seen_;
+  std::uint32_t clipped_ = 0;
 };
 
 }  // namespace o80

@@ -30,7 +30,8 @@ std::string_view to_text(JournalKind kind) noexcept {
                                                                          "ended",
                                                                          "statuses",
                                                                          "snapshot",
-                                                                         "at_rest"};
+                                                                         "at_rest",
+                                                                         "chunk_begun"};
   const auto i = static_cast<std::size_t>(kind);
   return i < kTexts.size() ? kTexts[i] : "unknown";
 }

@@ -228,6 +228,8 @@ void UntypedBackend::Body::fill_row(bool fresh) noexcept {
     std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
     std::memcpy(row() + layout.starved, controller.starved_mask(), layout.mask_words * 8);
   }
+  if (layout.off_plan < layout.size)
+    std::memcpy(row() + layout.off_plan, controller.off_plan(), layout.size - layout.off_plan);
 }
 
 /// Row => halts: error limits, readings, gaps.

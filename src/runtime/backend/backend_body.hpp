@@ -47,6 +47,7 @@ class UntypedBackend::Body final : public StatusSink, public BatchHandler, publi
 
   // StatusSink
   void changed(const StatusChange& change) noexcept override;
+  void begun(const ChunkBegin& chunk) noexcept override { journal.begun(chunk); }
   void freed(std::uint32_t lane, std::uint32_t blocks) noexcept override {
     lanes[lane].free(blocks);
   }

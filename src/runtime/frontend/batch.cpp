@@ -34,6 +34,7 @@ Batch::Batch(std::shared_ptr<Link> link, Sent sent)
       lane_(std::move(sent.lane)),
       id_(sent.id),
       records_(sent.records),
+      clipped_(sent.clipped),
       seen_(sent.seen),
       kept_(std::make_shared<Kept>()) {
   kept_->commands = std::move(sent.commands);

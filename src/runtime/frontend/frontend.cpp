@@ -209,4 +209,9 @@ void UntypedFrontend::close() {
 
 bool UntypedFrontend::closed() const { return link_->closed.load(std::memory_order_relaxed); }
 
+void UntypedFrontend::note_clipped(std::size_t numbers) {
+  const auto lock = link_->lock_to_add();
+  link_->builder.note_clipped(numbers);
+}
+
 }  // namespace o80

@@ -580,6 +580,7 @@ Sent UntypedFrontend::send(BatchBuilder& builder, const BatchRecord& wanted,
     const std::span<const Block> blocks = builder.seal(record);
     link_->sent_commands.note(blocks, requested == Requested::yes ? &sent.commands : nullptr);
     lane->send(std::as_bytes(blocks), offsetof(BatchRecord, ticket));
+    sent.clipped = builder.clipped();
     builder.clear();
     if (records > 0) link_->ids.sent(record.id, std::uint64_t{records} + 2);
     if (record.at != kNow) link_->scheduled.push_back({record.at, record.id});

@@ -17,6 +17,7 @@ struct Sent {
   std::shared_ptr<LaneSender> lane;
   CommandId id = 0;
   std::uint32_t records = 0;
+  std::uint32_t clipped = 0;
   std::uint32_t events_before_send = 0;  // event count of the lane before the batch was sent
   std::optional<Seen> seen;
   std::vector<SentCommand> commands;  // empty for a burst whose batch nobody gets

@@ -71,6 +71,16 @@ void JournalAuthor::decided(const StagedBatch& sent, const StatusChange& change)
         &payload, sizeof payload);
 }
 
+void JournalAuthor::begun(const ChunkBegin& chunk) noexcept {
+  flush();
+  const auto starts = std::as_bytes(chunk.starts);
+  if (!writer_.fits(sizeof chunk.shift + starts.size())) return;
+  writer_.begin(sizeof chunk.shift + starts.size());
+  writer_.add(reinterpret_cast<const std::byte*>(&chunk.shift), sizeof chunk.shift);
+  writer_.add(starts.data(), starts.size());
+  writer_.end(head(JournalKind::chunk_begun, chunk.lane, chunk.id, chunk.row));
+}
+
 void JournalAuthor::statuses(std::uint32_t lane, JournalStatusRun run) noexcept {
   if (!writer_.is_on()) return;
   while (run.count > 0) {

@@ -96,6 +96,7 @@ class JournalAuthor {
   void scheduled(const StagedBatch& sent, CommandId batch) noexcept;
   /// The batch was taken or rejected.
   void decided(const StagedBatch& sent, const StatusChange& change) noexcept;
+  void begun(const ChunkBegin& chunk) noexcept;
   void order_lost() noexcept { note(JournalKind::order_lost, 0, 0); }
 
   /// Statuses of one lane are gathered in one entry, which ends with the next other entry, or with

@@ -34,13 +34,6 @@ Enum enum_of(std::uint64_t value, std::size_t count) {
   return static_cast<Enum>(value < count ? value : 0);
 }
 
-/// The burst that a batch asks for; -1 until it has ended, 0: none.
-std::int64_t burst_of(const std::vector<std::byte>& blocks) {
-  if (blocks.size() < sizeof(BatchRecord)) return 0;
-  const auto batch = unpack<BatchRecord>(blocks.data());
-  return (batch.flags & kBurstUntilEnded) != 0 ? -1 : std::max<std::int64_t>(batch.burst, 0);
-}
-
 }  // namespace
 
 JournalDecoder::JournalDecoder(std::shared_ptr<const Description> description,
@@ -227,6 +220,10 @@ void JournalDecoder::fill(JournalEntry& entry) {
                           item_.payload.begin() + static_cast<std::ptrdiff_t>(head.id));
       }
       break;
+    case JournalKind::chunk_begun:
+      entry.row = head.what;
+      fill_chunk(entry);
+      break;
     case JournalKind::order_lost:
     case JournalKind::stopping:
     case JournalKind::at_rest:
@@ -246,7 +243,12 @@ void JournalDecoder::fill_batch(JournalEntry& entry) {
   entry.records_lost = found == batches_.end();
   if (entry.records_lost) return;
   Kept& kept = found->second;
-  entry.burst = burst_of(kept.blocks);
+  if (kept.blocks.size() >= sizeof(BatchRecord)) {
+    const auto record = unpack<BatchRecord>(kept.blocks.data());
+    const bool until_ended = (record.flags & kBurstUntilEnded) != 0;
+    entry.burst = until_ended ? -1 : std::max<std::int64_t>(record.burst, 0);
+    entry.clipped = record.clipped;
+  }
   entry.records = records_of(description_->schema, kept.blocks);
   entry.seen = seen_in(kept.blocks);
   // a row that was not there yet, or a claim of it
@@ -257,6 +259,20 @@ void JournalDecoder::fill_batch(JournalEntry& entry) {
   // a scheduled batch is decided on once more
   if (entry.kind != JournalKind::scheduled || kept.scheduled) return drop(found);
   kept.scheduled = true;
+}
+
+/// Starts of numbers that the robot does not have are left out.
+void JournalDecoder::fill_chunk(JournalEntry& entry) const {
+  const Schema& schema = description_->schema;
+  std::size_t at = sizeof entry.shift;
+  if (item_.payload.size() < at) return;
+  entry.shift = unpack<std::int64_t>(item_.payload.data());
+  for (; at + sizeof(ChunkStart) <= item_.payload.size(); at += sizeof(ChunkStart)) {
+    const auto start = unpack<ChunkStart>(item_.payload.data() + at);
+    if (start.actuator >= schema.actuators.size()) continue;
+    const auto type = schema.actuators[start.actuator].type;
+    if (start.number < schema.scalar_count(type)) entry.starts.push_back(start);
+  }
 }
 
 void JournalDecoder::name(JournalEntry& entry, std::uint64_t owner) const {

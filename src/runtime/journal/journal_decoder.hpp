@@ -58,6 +58,7 @@ class JournalDecoder {
   void fill_status(JournalEntry& entry);
   void fill(JournalEntry& entry);
   void fill_batch(JournalEntry& entry);
+  void fill_chunk(JournalEntry& entry) const;
   void name(JournalEntry& entry, std::uint64_t owner) const;
 
   std::shared_ptr<const Description> description_;

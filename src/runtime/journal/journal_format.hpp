@@ -14,7 +14,9 @@
 //   u32 length of the entry, u8 kind, u8 lane, u32 what, u64 number, i64 iteration, u64 id:
 //     as in JournalHead
 //   then, depending on its kind, the fields in visit_payload(), runs of statuses (run_fields), the
-//   records of a batch, or any bytes (a snapshot, and kinds that this o80 does not know).
+//   records of a batch, or any bytes (a snapshot, and kinds that this o80 does not know). Those of
+//   chunk_begun are i64 shift, then for each number u32 actuator, u32 number, and as f64 place,
+//   slope and curvature; `what` is the row that is reached first.
 //
 // A record of a batch:
 //   u16 kind, u16 length of its fields, u32 length of its payload, u32 bytes of the payload here
@@ -52,7 +54,7 @@ inline constexpr std::uint16_t kMark = 10;
 inline constexpr std::uint16_t kSeen = 11;
 
 inline constexpr std::size_t kRecordFields = 27;
-inline constexpr std::size_t kBatchFields = 43;
+inline constexpr std::size_t kBatchFields = 47;
 
 // Lists of fields: `io` writes or reads them.
 
@@ -74,7 +76,7 @@ template <class Io, class Batch>
 void batch_fields(Io& io, Batch& batch) {
   io.u8(batch.late_now);
   io.u16(batch.flags);
-  io.u32(batch.records, batch.blocks);
+  io.u32(batch.records, batch.blocks, batch.clipped);
   io.u64(batch.id, batch.ticket, batch.at, batch.burst);
 }
 

@@ -17,7 +17,8 @@ TEST(RowLayout, PutsThePartsOneBehindTheOther) {
   EXPECT_EQ(layout.active, layout.extended + round_up(sizeof(described::Sensors), 8));
   EXPECT_EQ(layout.mask_words, 1U);
   EXPECT_EQ(layout.starved, layout.braking + 8);
-  EXPECT_EQ(layout.size, layout.starved + 8);
+  EXPECT_EQ(layout.off_plan, layout.starved + 8);
+  EXPECT_EQ(layout.size, layout.off_plan + round_up(schema.actuators.size() * 4, 8));
   EXPECT_EQ(layout.size % 8, 0U);
 }
 

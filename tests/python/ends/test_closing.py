@@ -64,7 +64,7 @@ DATA = {
     "Backend": {"segment", "schema", "close"},
     "Process": {"segment", "frontend"},
     "Burst": {"batch"},
-    "Batch": {"seen"},
+    "Batch": {"seen", "clipped"},
     "Stream": {"__iter__"},
 }
 # of a closed one; a frontend's life is that of its backend

@@ -81,7 +81,7 @@ def test_the_recordings_hold_what_a_journal_can_tell(name: str) -> None:
     assert {entry.kind for entry in entries} == {
         *("taken", "scheduled", "rejected", "status", "halt", "resume", "control_taken"),
         *("control_released", "control_lost", "burst", "burst_ended", "died", "silent"),
-        *("interrupted", "fresh_start", "ended", "snapshot"),
+        *("interrupted", "fresh_start", "ended", "snapshot", "chunk_begun"),
     }
     assert {command.kind for command in commands} == {
         *("command", "purge", "request", "take_control", "release_control", "resume"),

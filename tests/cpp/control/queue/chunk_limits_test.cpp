@@ -49,6 +49,25 @@ TEST(ChunkLimits, ALowJerkLimitDoesNotLeadAstray) {
   EXPECT_LT(worst, 0.025);
 }
 
+TEST(ChunkLimits, ASampledMotionWithinTheLimitsIsNotClamped) {
+  const auto sine = [](Iteration i) {
+    return 0.4 * std::sin(std::numbers::pi * 1e-3 * static_cast<double>(i));
+  };
+  for (const std::uint32_t step : {5U, 10U, 25U, 40U}) {
+    ChunkRig rig(limited_robot(limits_of(5.0, 10.0, 200.0)));
+    const std::vector<std::uint32_t> due = every(step, 1000 / step);
+    for (Iteration anchor = 0; anchor < 8000; anchor += 200) {
+      std::vector<double> rows;
+      for (const std::uint32_t each : due) rows.push_back(sine(anchor + each));
+      rig.chunk(rows, due, {.anchor = anchor});
+      while (rig.next <= anchor + 200) {
+        rig.run_to(rig.next + 1);
+        ASSERT_FALSE(rig.clamped() && anchor > 1000) << step << ' ' << rig.next;
+      }
+    }
+  }
+}
+
 TEST(ChunkLimits, RowsWithinBoundsWithATakeOverOutsideAreClampedAndReached) {
   Schema schema = plain_robot(1);
   schema.actuator(0).limits({.minimum = 0.0, .maximum = 0.505});
