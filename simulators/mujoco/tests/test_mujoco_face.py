@@ -179,6 +179,67 @@ def test_a_velocity_brakes_before_the_range_of_its_joint_ends(tmp_path: Path) ->
         assert arm.latest().desired.velocity_joints["velocity"][0] == 0
 
 
+URDF = """<?xml version="1.0"?>
+<robot name="arm">
+  <!-- <joint name="elbow"><limit velocity="9"/></joint> -->
+  <mujoco><compiler discardvisual="true"/></mujoco>
+  <link name="base"/>
+  <joint name="shoulder" type="revolute">
+    <parent link="base"/><child link="upper"/><axis xyz="0 0 1"/>
+    <limit lower="-1.5" upper="2" effort="30" velocity = '2.5' />
+  </joint>
+  <joint name="elbow" type="revolute">
+    <parent link="upper"/><child link="lower"/><axis xyz="0 0 1"/>
+    <limit lower="0" upper="2.6" effort="0" velocity="0"/>
+  </joint>
+  <joint name="wrist" type="revolute">
+    <parent link="lower"/><child link="hand"/><axis xyz="0 0 1"/>
+    <limit lower="-1" upper="1" effort="5" velocity="3"/>
+  </joint>
+  {links}
+</robot>"""
+LINK = """<link name="{}"><inertial><mass value="1"/>
+  <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+DRIVES = """<mujoco><actuator>
+  <position name="shoulder" joint="shoulder" kp="9" kv="1" inheritrange="1"/>
+  <position name="elbow" joint="elbow" kp="9" kv="1" inheritrange="1"/>
+  <velocity name="wrist" joint="wrist" kv="1" ctrlrange="-2 20"/>
+</actuator></mujoco>"""
+
+
+def urdf_arm(folder: Path, urdf: str = URDF, **options: Any) -> Any:
+    """An arm of three joints from a URDF file, and its drives."""
+    model, things = folder / "arm.urdf", folder / "drives.xml"
+    model.write_text(urdf.replace("{links}", "".join(map(LINK.format, ("upper", "lower", "hand")))))
+    things.write_text(DRIVES)
+    return SIMULATION.inline(model=model, things=things, mode="actuated", **options)
+
+
+@pytest.mark.parametrize(
+    ("limits", "speeds"),
+    [("", [2.5, np.inf]), ("1 20, elbow=4", [1, 4]), ("shoulder=1", [1, np.inf])],
+)
+def test_a_urdf_file_has_the_limits_that_are_not_given(
+    limits: str, speeds: list[float], tmp_path: Path
+) -> None:
+    with urdf_arm(tmp_path, limits=limits) as arm:
+        shoulder, elbow, wrist = arm.actuators
+        assert [shoulder.speed, elbow.speed] == speeds
+        assert (shoulder.minimum, shoulder.maximum) == (-1.5, 2)
+        assert (wrist.minimum, wrist.maximum) == (-2, 3)  # a velocity, by its drive and the file
+
+
+def test_a_joint_of_urdf_keeps_its_limits_under_another_name(tmp_path: Path) -> None:
+    with urdf_arm(tmp_path, joints="first=shoulder") as arm:
+        assert [(each.name, each.speed) for each in arm.actuators] == [("first", 2.5)]
+
+
+@pytest.mark.parametrize("velocity", ["fast", "-1", "1 2"])
+def test_a_speed_of_urdf_that_is_no_number_is_refused(velocity: str, tmp_path: Path) -> None:
+    with pytest.raises(o80.DriverError, match=f"velocity of joint 'wrist' .* got '{velocity}'"):
+        urdf_arm(tmp_path, URDF.replace('velocity="3"', f'velocity="{velocity}"'))
+
+
 def test_joints_can_be_chosen_and_renamed() -> None:
     with SIMULATION.inline(model=TWO_JOINTS, mode="actuated", joints="last=elbow") as arm:
         assert [each.name for each in arm.actuators] == ["last"]

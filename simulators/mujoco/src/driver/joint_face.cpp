@@ -6,11 +6,13 @@
 #include <cstdio>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <string>
 #include <string_view>
 #include <utility>
 
 #include "engine/names.hpp"
+#include "engine/urdf_speeds.hpp"
 #include "o80/base/error.hpp"
 
 namespace o80::mujoco {
@@ -78,7 +80,7 @@ class Builder {
     if (is_like_) {
       take(config.like);
     } else {
-      describe(config.limits);
+      describe(urdf_speeds(config.model), config.limits);
     }
     for (std::uint32_t i = 0; i < schema().actuators.size(); ++i) drive(i);
     for (RequestRow& request : schema().requests) {
@@ -105,7 +107,8 @@ class Builder {
 
   // the face that the model gives
 
-  void describe(const std::string& limits) {
+  /// speeds: the largest ones, by the names of joints.
+  void describe(const std::map<std::string, double>& speeds, const std::string& limits) {
     if (named_.empty()) {
       for (const Servo& servo : servos_) {
         const std::string name = name_of(model_, mjOBJ_JOINT, servo.joint, "joint");
@@ -126,6 +129,7 @@ class Builder {
     for (const Quantity quantity : kQuantities) {
       for (const bool slides : {false, true}) add_group(quantity, slides);
     }
+    for (const auto& [joint, speed] : speeds) limit_speed(joint, speed);
     limit(limits);
   }
 
@@ -176,6 +180,19 @@ class Builder {
     const std::uint32_t type = schema().add_type(words.at(kind), fields);
     schema().add_actuators(group, type, static_cast<std::uint32_t>(names.size()));
     for (std::uint32_t i = 0; i < names.size(); ++i) schema().actuator(first + i).name(names[i]);
+  }
+
+  /// Of positions, and of velocities that are commanded themselves.
+  void limit_speed(const std::string& joint, double speed) {
+    const int id = mj_name2id(&model_, mjOBJ_JOINT, joint.c_str());
+    for (Servo& servo : servos_) {
+      if (servo.joint != id || servo.commanded != Quantity::velocity) continue;
+      servo.allowed = intersection(servo.allowed, {-speed, speed});
+    }
+    for (const Named& named : named_) {
+      if (joint_of(named) != id || commanded(id) != Quantity::position) continue;
+      schema().actuator(named.name).limits({.speed = speed});
+    }
   }
 
   /// "2.5 20 1000 0.35, elbow=2": for all joints, then for one.

@@ -41,11 +41,11 @@ void set_input(const mjModel& model, int actuator, Servo& servo) {
   }
 }
 
+}  // namespace
+
 Range intersection(const Range& a, const Range& b) {
   return {std::max(a.low, b.low), std::min(a.high, b.high)};
 }
-
-}  // namespace
 
 std::vector<Servo> servos_in(const mjModel& model) {
   std::vector<Servo> servos;

@@ -24,6 +24,8 @@ struct Range {
   double high = std::numeric_limits<double>::infinity();
 };
 
+Range intersection(const Range& a, const Range& b);
+
 /// An actuator of the model that drives a hinge or a slide.
 struct Servo {
   int actuator, joint;  // ids
