@@ -182,6 +182,8 @@ def test_a_process_that_is_stopped_hangs_until_it_is_continued(folder: Path, her
         assert "is not removed: it has a backend" in here.o80("clean", "arm", fails=True)
         said = here.o80("stop", "arm", "--timeout", "0", fails=True)
         assert "did not stop in 0 s" in said
+        assert f"`kill -CONT {process.pid}`" in said
+        assert "kill -9" not in said
         process.send_signal(signal.SIGCONT)
         process.wait(timeout=WAIT)
     finally:

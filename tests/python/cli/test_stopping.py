@@ -1,7 +1,6 @@
 """Backends that are stopped by their name."""
 
 import os
-import signal
 import subprocess
 import sys
 from pathlib import Path
@@ -45,20 +44,6 @@ def test_a_backend_that_does_not_stop_in_time_is_told_of(segment: str) -> None:
         with pytest.raises(o80.TimeoutError, match=f"kill -9 {deaf.pid}"):
             o80.stop(segment, timeout=0.0)
         deaf.kill()
-
-
-def test_a_suspended_robot_is_to_be_continued_not_killed(
-    process: o80.robots.Process, segment: str
-) -> None:
-    os.kill(process.pid, signal.SIGSTOP)
-    os.waitid(os.P_PID, process.pid, os.WSTOPPED | os.WNOWAIT)
-    try:
-        with pytest.raises(o80.TimeoutError, match=f"`kill -CONT {process.pid}`") as refused:
-            o80.stop(segment, timeout=0.0)
-        assert "kill -9" not in str(refused.value)
-    finally:
-        os.kill(process.pid, signal.SIGCONT)
-    assert process.wait(WAIT) == 0
 
 
 @pytest.fixture

@@ -352,18 +352,6 @@ def test_leaving_its_block_stops_it_in_order(segment: str) -> None:
     frontend.close()
 
 
-def test_a_closed_backend_says_so(segment: str) -> None:
-    backend = o80.Backend(segment, ["a"])
-    backend.close()
-    backend.close()
-
-    with pytest.raises(o80.Closed, match=segment):
-        backend.publish([0.0])
-    with pytest.raises(o80.Closed):
-        backend.step()
-    assert "closed" in repr(backend)
-
-
 def test_a_mapping_within_a_mapping_fills_the_fields_that_it_names(segment: str) -> None:
     sensors = {"missing": {"arm": bool, "world": bool}, "count": int}
     with o80.Backend(segment, extended=sensors) as backend:

@@ -11,7 +11,6 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 from processes import end_of
 
@@ -166,15 +165,6 @@ def test_a_group_with_one_that_is_closed_does_not_begin(segment: str) -> None:
             o80.burst({one: 5, other: 5})
 
         assert one.published == 0
-
-
-def test_a_burst_is_of_a_whole_number_of_iterations(arm: o80.Frontend) -> None:
-    for wrong in (1.5, "many", None):
-        with pytest.raises(o80.InvalidArgument, match="burst must be a whole number"):
-            arm.burst(wrong)  # type: ignore[call-overload]
-        with pytest.raises(o80.InvalidArgument, match="burst must be a whole number"):
-            o80.burst({arm: wrong})  # type: ignore[dict-item]
-    assert arm.burst(np.int32(2)).iteration == 2  # type: ignore[call-overload]
 
 
 def test_control_that_was_not_waited_for_is_given_back(segment: str) -> None:

@@ -1,6 +1,4 @@
-"""Bursts end early for who sent them; groups begin whole or not at all."""
-
-import pytest
+"""Bursts end early for who sent them, alone or in a group."""
 
 import o80
 
@@ -39,10 +37,3 @@ def test_a_group_may_return_at_once(segment: str) -> None:
         group.cancel()
         rows = group.wait(WAIT)
         assert left.burst(1, timeout=WAIT).iteration == rows[left].iteration + 1
-
-
-def test_no_member_of_a_group_runs_if_one_cannot(arm: o80.Frontend, segment: str) -> None:
-    with o80.robots.load("two_joints").inline(f"{segment}-2") as other:
-        with pytest.raises(o80.InvalidArgument, match=arm.segment):
-            o80.burst({other: 5, arm: 0})
-        assert other.latest().iteration == 0

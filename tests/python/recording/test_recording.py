@@ -87,22 +87,6 @@ def test_segments_of_a_pattern_join_when_they_appear(segment: str, tmp_path: Pat
         file["arm"]
 
 
-def test_rows_that_were_overwritten_are_a_gap(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with o80.robots.load("two_joints").inline(segment, history=16) as arm:
-        recorder = Recorder(path, [segment])
-        recorder.catch_up()
-        arm.burst(100)
-        recorder.catch_up()
-        recorder.finish()
-        oldest = arm.oldest
-    epoch = o80.open(path)[segment].epochs[0]
-
-    assert [gap[:2] for gap in epoch.gaps] == [(1, oldest - 1)]
-    assert recorder.missed == oldest - 1
-    assert epoch.history().iteration.tolist() == [0, *range(oldest, 101)]
-
-
 class RestartsWhenAsked:
     """A frontend whose backend publishes five rows and is restarted when its life is asked for."""
 

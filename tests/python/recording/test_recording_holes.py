@@ -121,6 +121,7 @@ def test_a_run_that_is_recorded_late_is_not_whole(
         recorder.catch_up()
         begin, oldest = recorder.sources[segment].begin, arm.oldest
         recorder.finish()
+        assert recorder.missed == oldest - last - 1
     (epoch,) = o80.open(path)[segment].epochs
     assert epoch.gaps == [Gap(0, begin - 1, LATE), Gap(last + 1, oldest - 1, OVERWRITTEN)]
     assert epoch.missing == begin + oldest - last - 1

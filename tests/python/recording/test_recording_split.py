@@ -49,6 +49,7 @@ def test_a_folder_of_complete_files_is_read_as_one(arm: o80.Frontend, tmp_path: 
     assert all(file.stat().st_size < 16_000 for file in files)
     assert all(messages_of(file) > 0 for file in files)
     assert recording.finished
+    assert recording[arm.segment].schema == arm.schema
     assert epoch.history().rows.tobytes() == there.rows.tobytes()
     assert epoch.history(since=95, until=405).iteration.tolist() == list(range(95, 406))
     assert (
