@@ -19,16 +19,21 @@ namespace o80::test {
 /// Statements end with ';' or a line, and # begins a comment. `B:` before one names the frontend,
 /// which is opened at its first mention; without a name it is A.
 ///
-///     0 to 5 over 9         adds a command for actuator 0: `over` iterations, `speed`, `overwrite`
-///     0,1 to 5 6            one command for several
-///     purge, purge own, take, release, note, reset 5, refuse     adds one of these
-///     a = 0 to 5, a = pulse at 20 late      sends what was added, with that command or without, as
-///     a a = resume 1          sends the resume of a halt run 3, missed 100, read 0 1.5, close,
-///     alive, halt, burst 5 (until it stands) a completed, a.1 purged silence @7    a record's
-///     status, its reason and iteration if given a says out of order   part of the text of its
-///     first record a taken 4, a ended 8  its first and its last iteration 0 is 6; 0 rows 3: 0 0.5
-///     1             desired states: the newest one; those from row 3 on halted, halted silence @7,
-///     running    the halt in force, or none
+// clang-format off
+///     0 to 5 over 9                 adds a command for actuator 0: `over` iterations, `until`,
+///                                   `speed`, `overwrite`
+///     0,1 to 5 6                    one command for several
+///     purge, purge own, take, release, note, reset 5, refuse       adds one of these
+///     a = 0 to 5, a = pulse at 20 late      sends what was added, with that command or without
+///     a = resume 1                  sends the resume of a halt
+///     run 3, missed 100, read 0 1.5, close, alive, halt, burst 5   the last until it stands
+///     a completed, a.1 purged silence @7    a record's status; its reason and iteration if given
+///     a says out of order           part of the text of its first record
+///     a waits, a waits rejected     its wait ends, or raises NotCompleted with this text
+///     a taken 4, a ended 8          its first and its last iteration
+///     0 is 6; 0 rows 3: 0 0.5 1     desired states: the newest one; those from row 3 on
+///     halted, halted silence @7, running    the halt in force, or none
+// clang-format on
 class Trace {
  public:
   explicit Trace(const BackendOptions& options, const std::function<void(Schema&)>& describe = {})

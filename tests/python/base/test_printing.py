@@ -64,9 +64,11 @@ def check(done: subprocess.CompletedProcess[str], on: str, *codes: int) -> None:
 @pytest.mark.parametrize("on", OUTPUTS)
 def test_help_of_every_command_survives_its_output(on: str, tmp_path: Path) -> None:
     path = tmp_path / "codes"
-    done = run(path, *COMMANDS, on=on, program=(sys.executable, "-c", HELP))
+    # each has its own letters; the output is that of one program, but for halt and run
+    commands = [*COMMANDS] if on == "ascii" else ["halt", "run", "list"]
+    done = run(path, *commands, on=on, program=(sys.executable, "-c", HELP))
     codes = [int(code) for code in path.read_text().split()]
-    assert len(codes) == len(COMMANDS)
+    assert len(codes) == len(commands)
     check(done, on, *codes)
 
 
@@ -77,7 +79,7 @@ def robot(segment: str) -> Iterator[None]:
 
 
 @pytest.mark.usefixtures("robot")
-@pytest.mark.parametrize("on", OUTPUTS)
+@pytest.mark.parametrize("on", ["both", "ascii"])
 def test_what_lists_ends_with_words(segment: str, on: str) -> None:
     run("mark", segment, "begin")
     for words in (["list"], ["list", "--watch"], ["info", segment], ["echo", segment]):
@@ -88,7 +90,7 @@ def test_what_lists_ends_with_words(segment: str, on: str) -> None:
 
 
 @pytest.mark.usefixtures("robot")
-@pytest.mark.parametrize("on", OUTPUTS)
+@pytest.mark.parametrize("on", ["both", "ascii"])
 def test_a_recorder_records_on(segment: str, tmp_path: Path, on: str) -> None:
     path = tmp_path / "run.mcap"
     done = run("record", segment, "-o", path, "--seconds", "1", on=on)
