@@ -22,23 +22,6 @@ def test_every_number_is_a_target(arm: o80.Frontend, target: float) -> None:
     assert arm.burst(1).desired[1] == float(target)
 
 
-WRONG_PACES = (
-    *({"duration": wrong} for wrong in (-1.0, float("nan"), 1e300, "1 s")),
-    *({"speed": wrong} for wrong in (0.0, -1.0)),
-    *({"until": wrong} for wrong in (-1, 2.5)),
-    *({"iterations": wrong} for wrong in (0, 2**70)),
-    *({"mode": wrong} for wrong in ("replace", 1)),
-    {"profile": "smooth"},
-    {"start": "here"},
-)
-
-
-@pytest.mark.parametrize("pace", WRONG_PACES)
-def test_a_pace_that_cannot_be_is_refused(arm: o80.Frontend, pace: dict[str, object]) -> None:
-    with pytest.raises(o80.InvalidArgument):
-        arm.add_command(0, 0.5, **pace)  # type: ignore[arg-type]
-
-
 # rule C5
 @pytest.mark.parametrize(
     ("pace", "iterations"),
