@@ -9,7 +9,18 @@ import sys
 
 from outcomes import Outcomes
 from sources import ROOT
-from steps import LEROBOT, LOGS, PYTHON, Step, build, ctest, pytest, run_beside, times, use_tools
+from steps import (
+    LOGS,
+    PYTHON,
+    Step,
+    build,
+    ctest,
+    pytest,
+    pytest_of_lerobot,
+    run_beside,
+    times,
+    use_tools,
+)
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
 PACKAGES = (
@@ -65,7 +76,7 @@ STEPS: dict[str, list[list[str]]] = {
     "mypy": typed(),
     "cpp": [ctest("cpp", "dev", "-L", "^check$")],
     "python": [pytest("python", "-m", "check")],
-    "lerobot": [pytest("lerobot", "gateways/lerobot/tests", processes=2, python=LEROBOT)],
+    "lerobot": [pytest_of_lerobot("gateways/lerobot/tests")],
     "torture": [
         *build("dev", "o80-torture"),
         ["build/dev/bin/o80-torture", *TORTURE, "--python", sys.executable],

@@ -8,20 +8,18 @@ from pathlib import Path
 
 from sources import ROOT
 
-PACKAGES = [
-    each
-    for group in ("robots", "simulators", "gateways", "apps")
-    for each in ROOT.glob(f"{group}/*/")
-]
-PACKAGES = [each for each in (*PACKAGES, ROOT / "devices") if (each / "tests").is_dir()]
+PACKAGES = {
+    tests.parent.name: tests for group in ("", "*/") for tests in ROOT.glob(f"{group}*/tests")
+}
 #: Folders of tests in C++ by the name of their program, o80_test_<name>.
 CPP = {folder.name: folder for folder in ROOT.glob("tests/cpp/*/")} | {
-    package.name: package / "tests/cpp" for package in PACKAGES if (package / "tests/cpp").is_dir()
+    name: tests / "cpp" for name, tests in PACKAGES.items() if (tests / "cpp").is_dir()
 }
 #: Folders of tests by the words that stand for them.
-NAMED = {folder.name: [folder] for folder in ROOT.glob("tests/*/") if folder.name != "data"}
-NAMED |= {name: [folder] for name, folder in CPP.items()}
-NAMED |= {package.name: [package / "tests"] for package in PACKAGES} | {"cpp": [*CPP.values()]}
+NAMED = {file.parent.name: [file.parent] for file in ROOT.glob("tests/*/test_*.py")}
+NAMED |= {name: [folder] for name, folder in (CPP | PACKAGES).items()} | {"cpp": [*CPP.values()]}
+LEROBOT = "gateways/lerobot"
+SUITE = re.compile(r"^(?:TYPED_)?TEST(?:_F|_P)?\((\w+),", re.MULTILINE)
 
 
 class NoSuchTestsError(Exception):
@@ -30,10 +28,11 @@ class NoSuchTestsError(Exception):
 
 @dataclass
 class Selection:
-    """Patterns of the suites chosen in C++ by folder, and paths for pytest."""
+    """The suites chosen in C++ by folder, and paths for pytest: `lerobot` for LeRobot's Python."""
 
     cpp: dict[str, set[str]] = field(default_factory=dict)
     python: list[str] = field(default_factory=list)
+    lerobot: list[str] = field(default_factory=list)
 
     def cpp_pattern(self) -> str:
         """Pattern for ctest of the names of these tests."""
@@ -47,6 +46,25 @@ class Selection:
         """The files in Python among what was asked for."""
         return [ROOT / path.partition("::")[0] for path in self.python if ".py" in path]
 
+    def add(self, place: Path, word: str) -> bool:
+        """Adds the tests of a file or folder; whether there are any."""
+        files = [*place.rglob("*.*")] if place.is_dir() else [place]
+        suites = {
+            name: {suite for file in inside for suite in SUITE.findall(file.read_text())}
+            for name, folder in CPP.items()
+            if (inside := [x for x in files if folder in x.parents and x.suffix == ".cpp"])
+        }
+        for name, found in suites.items():
+            self.cpp.setdefault(name, set()).update(found)
+        path = word if "::" in word else str(place.relative_to(ROOT))
+        theirs = path.startswith(LEROBOT)
+        in_python = any(x.suffix == ".py" and x.name.startswith("test_") for x in files)
+        if in_python:
+            (self.lerobot if theirs else self.python).append(path)
+        if LEROBOT.startswith(f"{path}/"):
+            self.lerobot.append(LEROBOT)
+        return in_python or any(suites.values())
+
 
 def select(words: Iterable[str]) -> Selection:
     """Folders by name, folders and files by path, and single tests as pytest names them."""
@@ -54,27 +72,9 @@ def select(words: Iterable[str]) -> Selection:
     for word in words:
         path = (ROOT / word.partition("::")[0]).resolve()
         places = NAMED.get(word, [path] if "/" in word and path.exists() else [])
-        found = [_add(chosen, place, word) for place in places]
+        found = [chosen.add(place, word) for place in places]
         if not any(found):
             near = difflib.get_close_matches(word, NAMED, 1)
             hint = f", did you mean '{near[0]}'?" if near else "; --help lists what does"
             raise NoSuchTestsError(f"'{word}' names no tests{hint}")
     return chosen
-
-
-def _add(chosen: Selection, place: Path, word: str) -> bool:
-    """Adds the tests of a file or folder; whether there are any."""
-    found: dict[str, set[str]] = {}
-    for name, folder in CPP.items():
-        if folder == place or place in folder.parents:
-            found[name] = {".*"}
-        elif folder in place.parents and (place.is_dir() or place.suffix == ".cpp"):
-            sources = place.rglob("*.cpp") if place.is_dir() else [place]
-            text = "".join(source.read_text() for source in sources)
-            found[name] = set(re.findall(r"^(?:TYPED_)?TEST(?:_F|_P)?\((\w+),", text, re.M))
-    for name, suites in found.items():
-        chosen.cpp.setdefault(name, set()).update(suites)
-    in_python = place.suffix == ".py" or any(place.rglob("test_*.py"))
-    if in_python:
-        chosen.python.append(word if "::" in word else str(place.relative_to(ROOT)))
-    return bool(found) or in_python

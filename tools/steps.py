@@ -17,8 +17,6 @@ BEGIN = time.monotonic()
 JOBS = len(os.sched_getaffinity(0))
 LOGS = ROOT / "build" / "test"
 PYTHON = [sys.executable, "-m"]
-LEROBOT = [str(ROOT / "build/lerobot/bin/python"), "-m"]
-"""Python with LeRobot, which also sees what is installed in .venv."""
 CLOSING = re.compile(  # lines with which ctest and pytest end
     r"^\d+% tests passed|^Total Test time|^left to make check|^left out"
     r"|^=+ .*\b(passed|skipped|deselected)\b.* =+$"
@@ -127,12 +125,16 @@ def ctest(step: str, preset: str, *options: str) -> list[str]:
     return ["ctest", "--preset", preset, "-j", str(JOBS), *report, *options]
 
 
-def pytest(
-    step: str, *options: str, processes: int = JOBS + 1, python: list[str] = PYTHON
-) -> list[str]:
+def pytest(step: str, *options: str, processes: int = JOBS + 1) -> list[str]:
     """Command that runs tests in Python, each file in one process, and writes the report of a step.
 
     Many tests wait: one process more than there are processors keeps these busy.
     """
     several = ["-n", str(processes), "--dist", "loadfile"] if processes > 1 else []
-    return [*python, "pytest", *several, f"--junit-xml={LOGS / f'{step}.xml'}", *options]
+    return [*PYTHON, "pytest", *several, f"--junit-xml={LOGS / f'{step}.xml'}", *options]
+
+
+def pytest_of_lerobot(*options: str) -> list[str]:
+    """The same with LeRobot's Python, which also sees what is installed in .venv."""
+    python = str(ROOT / "build/lerobot/bin/python")
+    return [python, *pytest("lerobot", *options, processes=2)[1:]]

@@ -9,16 +9,15 @@ import subprocess
 import sys
 
 from outcomes import Outcomes
-from selection import NAMED, NoSuchTestsError, Selection, select
+from selection import LEROBOT, NAMED, NoSuchTestsError, Selection, select
 from sources import ROOT, all_left_to_check
 from steps import (
-    LEROBOT,
     LOGS,
-    PYTHON,
     Step,
     build,
     ctest,
     pytest,
+    pytest_of_lerobot,
     run,
     run_beside,
     times,
@@ -26,14 +25,12 @@ from steps import (
 )
 
 NEED_PROGRAMS = ("tests/processes", "tests/consumer")  # of the preset dev
-GATEWAYS = "gateways"  # their tests run with LeRobot, and all of them are marked `check`
 
 
 def set_up(chosen: Selection, *, everything: bool) -> bool:
     """Installs what these tests need: packages for Python, all tools for those marked `check`."""
     purpose = "test" if everything or chosen.python else "tools"
-    gateway = any(path.startswith(GATEWAYS) for path in chosen.python)
-    if gateway or any(all_left_to_check(file) for file in chosen.files()):
+    if not everything and (chosen.lerobot or any(map(all_left_to_check, chosen.files()))):
         purpose = "check"
     return subprocess.run(["tools/setup.sh", purpose], cwd=ROOT).returncode == 0
 
@@ -54,17 +51,15 @@ def some_steps(chosen: Selection, keyword: str | None) -> tuple[list[list[str]],
     if chosen.cpp:
         pattern = chosen.cpp_pattern() + (f".*{keyword}" if keyword else "")
         tests.append(Step("some_cpp", [ctest("some_cpp", "dev", "-R", pattern, "-LE", "^check$")]))
-    theirs = [path for path in chosen.python if path.startswith(GATEWAYS)]
-    ours = [path for path in chosen.python if path not in theirs]
-    for name, paths, python in (("some_python", ours, PYTHON), ("some_lerobot", theirs, LEROBOT)):
-        if not paths:
-            continue
-        only_files = all(".py" in path for path in paths)
-        options = [] if only_files or python is LEROBOT else ["-m", "not check"]
-        options += ["-k", keyword] if keyword else []
+    named = ["-k", keyword] if keyword else []
+    if chosen.python:
+        paths = chosen.python
+        only_files = len(chosen.files()) == len(paths)
+        options = [f"--ignore={LEROBOT}", *([] if only_files else ["-m", "not check"]), *named]
         processes = {"processes": 1} if only_files and len(paths) == 1 else {}
-        command = pytest(name, *options, *paths, python=python, **processes)
-        tests.append(Step(name, [command]))
+        tests.append(Step("some_python", [pytest("some_python", *options, *paths, **processes)]))
+    if chosen.lerobot:
+        tests.append(Step("lerobot", [pytest_of_lerobot(*named, *chosen.lerobot)]))
     return build("dev", *targets) if targets or needs_programs else [], tests
 
 

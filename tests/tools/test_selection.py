@@ -4,33 +4,40 @@ import re
 
 import pytest
 
-from selection import NoSuchTestsError, select
+from selection import NAMED, NoSuchTestsError, select
 
 LANE, BURSTS = "tests/cpp/memory/ring/lane_test.cpp", "tests/python/frontend/test_bursts.py"
 IN_LANE = "memory.LaneTest.SendsABatch"
-IN_FOLDER = "memory.KillTest.Dies"
+IN_FOLDER = "memory.StartRaceTest.IsWonByOne"
+IN_PAM = "pam.Models/PlantWithAnyMuscle.Pulls/0"
+IN_CONTROL = "control.Chunk.EndsAtItsTarget"
+EVERY = [IN_LANE, IN_FOLDER, IN_PAM, IN_CONTROL]
+CHUNKS = "gateways/lerobot/tests/test_chunks.py"
 
 
 @pytest.mark.parametrize(
-    ("words", "cpp", "python"),
+    ("words", "cpp", "python", "lerobot"),
     [
-        ("control", ["control.Motion.EndsAtItsTarget", "control.Seeds/Some.Test/0"], []),
-        (LANE, [IN_LANE], []),
-        (f"{LANE} memory", [IN_LANE, IN_FOLDER], []),
-        (f"tests/cpp/memory {LANE}", [IN_LANE, IN_FOLDER], []),
-        ("pam", ["pam.Muscle.Pulls"], ["robots/pam/tests"]),
-        ("robots/pam", ["pam.Muscle.Pulls"], ["robots/pam"]),
-        ("cpp", [IN_LANE, "pam.Muscle.Pulls", "devices.BlobFinder.Finds"], []),
-        ("python", [], ["tests/python"]),
-        (f"./{BURSTS}", [], [BURSTS]),
-        (f"{BURSTS}::test_one", [], [f"{BURSTS}::test_one"]),
+        ("control", [IN_CONTROL], [], []),
+        (LANE, [IN_LANE], [], []),
+        (f"{LANE} memory", [IN_LANE, IN_FOLDER], [], []),
+        (f"tests/cpp/memory {LANE}", [IN_LANE, IN_FOLDER], [], []),
+        ("pam", [IN_PAM], ["robots/pam/tests"], []),
+        ("robots/pam", [IN_PAM], ["robots/pam"], []),
+        ("cpp", EVERY, [], []),
+        ("python", [], ["tests/python"], []),
+        (f"./{BURSTS}", [], [BURSTS], []),
+        (f"{BURSTS}::test_one", [], [f"{BURSTS}::test_one"], []),
+        ("gateways/ros2", [], ["gateways/ros2"], []),
+        (f"{CHUNKS} ros2", [], ["gateways/ros2/tests"], [CHUNKS]),
+        ("lerobot", [], [], ["gateways/lerobot/tests"]),
+        ("./gateways", [], ["gateways"], ["gateways/lerobot"]),
     ],
 )
-def test_words_choose(words: str, cpp: list[str], python: list[str]) -> None:
+def test_words_choose(words: str, cpp: list[str], python: list[str], lerobot: list[str]) -> None:
     chosen = select(words.split())
-    assert chosen.python == python
-    matched = [test for test in cpp if re.match(chosen.cpp_pattern(), test)]
-    assert (matched, bool(chosen.cpp)) == (cpp, bool(cpp))
+    assert (chosen.python, chosen.lerobot) == (python, lerobot)
+    assert [test for test in EVERY if chosen.cpp and re.match(chosen.cpp_pattern(), test)] == cpp
 
 
 def test_a_file_in_cpp_stands_for_its_own_suites() -> None:
@@ -42,4 +49,10 @@ def test_a_file_in_cpp_stands_for_its_own_suites() -> None:
 def test_a_word_that_names_no_tests_is_refused(word: str) -> None:
     cure = "did you mean 'control'" if word == "contol" else "--help"
     with pytest.raises(NoSuchTestsError, match=rf"'{word}' names no tests.*{cure}"):
+        select([word])
+
+
+def test_each_name_chooses_something() -> None:
+    assert {"python", "tools", "control", "arms", "ros2"} <= set(NAMED)
+    for word in NAMED:
         select([word])
