@@ -2,12 +2,10 @@
 
 import os
 import subprocess
-import time
-from collections.abc import Callable, Sequence
 
+import o80
 from sampling import built, rounds, sample
 
-PROGRAMS = built() / "bin"
 PRIORITY = 80
 PERIODS = 1000  # in each round
 
@@ -27,47 +25,22 @@ def cyclictest(processor: int) -> list[int]:
     return [int(line[2]) for line in fields if len(line) == 3 and line[2].strip().isdigit()]
 
 
-def lateness(segment: str) -> list[int]:
-    """Lateness [ns] of as many iterations, of the same second."""
-    ended = subprocess.run(
-        [PROGRAMS / "o80-bench-lateness", segment, str(PERIODS)],
-        capture_output=True, text=True, check=True,
-    )  # fmt: skip
-    return [int(line) for line in ended.stdout.split()]
-
-
-Command = Sequence[str | os.PathLike[str]]
-
-
-def measure(name: str, beside: Callable[[str], Sequence[Command]] = lambda segment: []) -> None:
-    """beside: commands of the programs that run meanwhile, by the segment of the loop."""
+def main() -> None:
     processor = max(os.sched_getaffinity(0))
     segment = f"bench-jitter-{os.getpid()}"
-    loop: Command = [
-        PROGRAMS / "o80-run", "two_joints", "--segment", segment, "--frequency", "1000",
+    command = [
+        str(built() / "bin/o80-run"), "two_joints", "--segment", segment, "--frequency", "1000",
         "--policy", "fifo", "--priority", str(PRIORITY), "--cpus", str(processor),
         "--lock-memory", "--until-eof",
     ]  # fmt: skip
-    started = []
-    try:
-        for command in (loop, *beside(segment)):
-            started.append(
-                subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL)
-            )
-            if command is loop:
-                time.sleep(0.5)
-        for _ in range(min(rounds(), 12)):
-            bare = cyclictest(processor)
-            sample(f"{name}cyclictest_p99", "us", percentile_99(bare))
-            sample(f"{name}loop_lateness_p99", "us", percentile_99(lateness(segment)))
-    finally:
-        for program in reversed(started):
-            program.terminate()
-            program.wait()
-
-
-def main() -> None:
-    measure("")
+    pipe = subprocess.PIPE
+    with subprocess.Popen(command, stdin=pipe, stdout=subprocess.DEVNULL) as loop:
+        with o80.Frontend(segment, read_only=True) as frontend:
+            for _ in range(min(rounds(), 12)):
+                sample("cyclictest_p99", "us", percentile_99(cyclictest(processor)))
+                rows = frontend.history(PERIODS)  # of the same second
+                sample("loop_lateness_p99", "us", percentile_99(rows.lateness.tolist()))
+        loop.terminate()
 
 
 if __name__ == "__main__":

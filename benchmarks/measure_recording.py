@@ -1,4 +1,4 @@
-"""Processor time of a recorder, and the cost of a recording for an inline training loop.
+"""Processor time of a recorder.
 
 A second process publishes rows of 512 bytes in 1, 4 and 16 segments, 1000 times a second each, with
 a command for each of eight actuators in every iteration. The recorder writes a chunk every 0.1 s,
@@ -10,7 +10,6 @@ import subprocess
 import sys
 import tempfile
 import time
-from contextlib import nullcontext
 from pathlib import Path
 
 import numpy as np
@@ -24,8 +23,6 @@ ACTUATORS = 8
 SENSORS = np.dtype([("force", "f8", 38)])  # makes a row of 512 bytes
 PERIOD = 1e-3  # [s]
 SECONDS = 2.0  # of a measurement
-STEPS = 20_000  # of the training loop
-LAYER = 64
 
 
 def publish(count: int) -> None:
@@ -86,35 +83,6 @@ def poll_for(recorder: Recorder, seconds: float) -> None:
         time.sleep(max(0.0, now + recorder.between_chunks - time.monotonic()))
 
 
-def measure_training(folder: Path) -> int:
-    """Steps a second of an inline robot and a small policy, with and without a recording.
-
-    Returns how many rows the recording missed.
-    """
-    missed = 0
-    random = np.random.default_rng(2)
-    layers = [random.standard_normal(shape) / 8 for shape in ((7, LAYER), (LAYER, 2))]
-    robot = o80.robots.load("two_joints")
-    for recorded in (False, True):
-        path = folder / "training.mcap"
-        with robot.inline(history=50_000) as arm:
-            recording = o80.Recording(path, arm) if recorded else nullcontext()
-            with recording as recorder:
-                begin = time.perf_counter()
-                observation = arm.latest()
-                for _ in range(STEPS):
-                    seen = np.concatenate([observation.flat(np.float64), observation.desired])
-                    action = np.tanh(np.tanh(seen @ layers[0]) @ layers[1])
-                    arm.add_command(None, action)
-                    observation = arm.burst(5)
-                used = time.perf_counter() - begin
-            if recorder is not None:
-                missed = recorder.missed
-        path.unlink(missing_ok=True)
-        sample("training_recorded" if recorded else "training_alone", "steps/s", STEPS / used)
-    return missed
-
-
 def main() -> None:
     if sys.argv[1] == "publish":
         publish(int(sys.argv[2]))
@@ -123,7 +91,6 @@ def main() -> None:
         missed = 0
         for _ in range(min(rounds(), 5)):
             missed += sum(measure_recorder(count, Path(folder)) for count in SEGMENTS)
-            missed += measure_training(Path(folder))
         sample("recording_missed", "rows", missed)  # once: a median would hide a loss
 
 

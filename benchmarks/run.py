@@ -68,8 +68,7 @@ def command_of(program: str, rounds: int, built: Path) -> list[str]:
     compiled = built / "bin" / f"o80-bench-{program}"
     if not compiled.exists():
         raise NotMeasuredError(f"{compiled.name} is not built")
-    paths = [str(built / "bin" / "o80-run"), "two_joints"] if program == "start" else []
-    return [str(compiled), str(rounds), *paths]
+    return [str(compiled), str(rounds)]
 
 
 def run(program: str, rounds: int, built: Path) -> Samples:
