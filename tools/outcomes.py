@@ -15,6 +15,7 @@ class Outcomes:
     def __init__(self) -> None:
         self.passed: set[str] = set()
         self.skipped: dict[str, str] = {}  # by name: the reason
+        self.failed: list[str] = []
 
     def read_report(self, file: Path) -> None:
         """Adds what ctest, pytest, or a program of tests in C++, named as its report, wrote."""
@@ -35,6 +36,8 @@ class Outcomes:
                 self.skipped[name] = told
             elif all(case.find(kind) is None for kind in ("failure", "error")):
                 self.passed.add(name)
+            else:
+                self.failed.append(name)
 
     def read_log(self, step: str, log: Path) -> bool:
         """Adds a step if a line `skipped: why` in its log says that it could not be run."""

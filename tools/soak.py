@@ -15,13 +15,13 @@ import sys
 import tempfile
 import threading
 import time
-import xml.etree.ElementTree as ET
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from outcomes import Outcomes
 from sources import ROOT
-from steps import JOBS, PYTHON, Step, build, run, use_tools
+from steps import JOBS, PYTHON, Step, build, ctest, pytest, run, use_tools
 
 FOLDER = ROOT / "build" / "soak"
 GROUPS = Path("/sys/fs/cgroup")
@@ -242,15 +242,14 @@ def python_files(mark: str) -> list[str]:
 def commands_of(this: Round, chosen: argparse.Namespace) -> dict[str, list[str]]:
     """The two runners, by name."""
     mark = "check" if chosen.check else "not check"
-    cpp = ["ctest", "--preset", "dev", "-j", str(JOBS), "-L" if chosen.check else "-LE", "^check$"]
-    cpp += ["--output-junit", str(this.folder / "cpp.xml")]
+    labels = ["-L" if chosen.check else "-LE", "^check$"]
+    cpp = ctest(str(this.folder / "cpp"), "dev", *labels)
     if chosen.cpp:
         cpp += ["-R", chosen.cpp]
     one_of = max(1, round(1.0 / chosen.share))
     if one_of > 1:
         cpp += ["-I", f"{this.random.randint(1, one_of)},,{one_of}"]
-    python = [*PYTHON, "pytest", "-n", str(JOBS + 1), "--dist", "loadfile", "-m", mark]
-    python += [f"--junit-xml={this.folder / 'python.xml'}"]
+    python = pytest(str(this.folder / "python"), "-m", mark)
     files = list(chosen.python)
     if not files and (this.shuffled or one_of > 1):
         files = python_files(mark)
@@ -281,24 +280,15 @@ def play(this: Round, names: list[str], chosen: argparse.Namespace) -> list[str]
         finally:
             for runner in this.runners:
                 runner.terminate()
-    failed = [each for name in commands for each in failures(this.folder / f"{name}.xml")]
+    failed = []
     for name, status in zip(commands, returned, strict=True):
-        if status != 0 and not failures(this.folder / f"{name}.xml"):
+        found, report = Outcomes(), this.folder / f"{name}.xml"
+        if report.exists():
+            found.read_report(report)
+        failed += found.failed
+        if status != 0 and not found.failed:
             failed.append(f"the runner itself, with status {status}: {this.folder / name}.log")
     return failed
-
-
-def failures(report: Path) -> list[str]:
-    """The tests that failed, as a runner reported them."""
-    if not report.exists():
-        return []
-    return [
-        f"{case.get('classname')}: {case.get('name')}"
-        for case in ET.parse(report).getroot().iter("testcase")
-        if case.get("status") == "fail"
-        or case.find("failure") is not None
-        or case.find("error") is not None
-    ]
 
 
 def main() -> int:

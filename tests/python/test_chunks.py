@@ -115,7 +115,7 @@ def test_a_wait_is_a_sign_of_life_for_each_row_and_says_when_the_robot_is_halted
             plan.wait(lead=100, timeout=0.0)  # this row was returned
         while arm.halted is None:
             backend.publish(backend.step())
-        with pytest.raises(o80.BackendHalted, match=rf"'{segment}' is halted \(.*`resume` it"):
+        with pytest.raises(o80.BackendHalted, match=rf"'{segment}' is halted \(.*`resume` it"):  # type: ignore[unreachable]
             plan.wait(lead=100, timeout=0.0)
         arm.close()
 

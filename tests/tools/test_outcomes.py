@@ -47,6 +47,7 @@ def found(tmp_path: Path) -> Outcomes:
 
 def test_reports_tell_what_passed_and_why_a_test_was_skipped(found: Outcomes) -> None:
     assert found.passed == {"robot.Loop.Runs", "tests.python.test_a.test_passes"}
+    assert found.failed == ["robot.Loop.Breaks", "tests.python.test_a.test_fails"]
     assert found.skipped == {
         "robot.RealTime.Locks": "no user may be given a real-time priority here",
         "tests.python.test_a.test_skips": "no strace",

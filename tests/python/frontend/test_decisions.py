@@ -43,7 +43,7 @@ def test_a_batch_tells_the_latency_of_its_decision(arm: o80.Frontend) -> None:
 
     assert batch.first_iteration == 9
     assert batch.decision_latency is not None
-    assert batch.decision_latency.iterations == 6
+    assert batch.decision_latency.iterations == 6  # type: ignore[unreachable]
     assert batch.decision_latency.seconds == pytest.approx(6 * arm.period)
     arm.add_command("elbow", 0.1)
     plain = arm.pulse()

@@ -277,7 +277,7 @@ def test_silence_of_the_leader_halts_the_follower(
     arm.resume(arm.halted.number)
     arm.burst(1)
     assert arm.halted is None
-    assert not robots.step()
+    assert not robots.step()  # type: ignore[unreachable]
     arm.burst(1)
     assert arm.halted is None
 
@@ -413,7 +413,7 @@ def test_demonstrations_are_of_a_robot_that_follows(
                 session.tell()
                 arm.resume()
                 while not robots.engaged:
-                    hand.burst(10)
+                    hand.burst(10)  # type: ignore[unreachable]
                     arm.burst(10)
                     robots.step()
             arm.burst(20)

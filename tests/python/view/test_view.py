@@ -62,7 +62,7 @@ def test_a_view_ends_with_its_block_and_may_be_closed_twice(arm: o80.Frontend) -
     with o80.View(arm) as view:
         assert view.alive
     assert not view.alive
-    view.close()
+    view.close()  # type: ignore[unreachable]
     with pytest.raises(OSError):  # noqa: PT011
         look(view.url)
 
