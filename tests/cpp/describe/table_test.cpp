@@ -5,6 +5,7 @@
 #include <cstring>
 #include <random>
 
+#include "cases.hpp"
 #include "describe/described.hpp"
 #include "o80/describe/layout.hpp"
 
@@ -63,20 +64,8 @@ TEST(Table, ADescriptionWithoutAModelHasTheBytesOfEarlierVersions) {
 
 TEST(Table, RefusesADamagedModel) {
   const std::vector<std::byte> good = to_bytes(shown_robot());
-  const std::size_t begin = to_bytes(schema_of<MixedRobot>()).size();
   std::vector<std::byte> cut(good.begin(), good.end() - 1);
   EXPECT_THAT(message_of<SegmentError>([&] { schema_from_bytes(cut); }), HasSubstr("cut off"));
-  std::mt19937 random(1);
-  for (int i = 0; i < 20000; ++i) {
-    std::vector<std::byte> bytes = good;
-    const std::size_t at = begin + random() % (good.size() - begin);
-    bytes[at] = static_cast<std::byte>(random());
-    try {
-      (void)schema_from_bytes(bytes);
-    } catch (const SegmentError&) {
-      continue;
-    }
-  }
 }
 
 /// What `check` says of a change to the robot with a model.
@@ -269,11 +258,12 @@ TEST(Table, TheOriginOfAFieldIsKeptAndAnUnknownOneIsRefused) {
 }
 
 TEST(Table, GarbageIsRefusedAndNeverCrashes) {
-  const std::vector<std::byte> good = to_bytes(schema_of<MixedRobot>());
+  const std::vector<std::byte> robots[] = {to_bytes(schema_of<MixedRobot>()),
+                                           to_bytes(shown_robot())};
   std::mt19937 random(7);  // NOLINT(bugprone-random-generator-seed)
   int survived = 0;
-  for (int round = 0; round < 5000; ++round) {
-    std::vector<std::byte> bytes = good;
+  for (int round = 0; round < test::cases(5000); ++round) {
+    std::vector<std::byte> bytes = robots[round % 2];
     const int changes = 1 + static_cast<int>(random() % 4);
     for (int i = 0; i < changes; ++i) {
       const std::size_t at = random() % (bytes.size() - 4);

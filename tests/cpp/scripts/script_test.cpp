@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "cases.hpp"
 #include "scripts/script_generator.hpp"
 #include "scripts/script_player.hpp"
 #include "scripts/script_shrink.hpp"
@@ -18,11 +19,7 @@ namespace o80::test {
 namespace {
 
 constexpr std::uint64_t kScriptsOfEachRun = 1000;
-#ifdef O80_TEST_SANITIZED
-constexpr std::uint64_t kPlannedScripts = 1000;
-#else
 constexpr std::uint64_t kPlannedScripts = 8000;
-#endif
 constexpr std::size_t kMaxShown = 6;
 
 std::uint64_t from_environment(const char* name, std::uint64_t otherwise) {
@@ -52,12 +49,12 @@ void expect_promises_kept(Script (*script_of)(std::uint64_t), std::uint64_t scri
 
 // rules C3, C18, L2
 TEST(Script, KeepsEveryPromise) {
-  expect_promises_kept(random_script, from_environment("O80_SCRIPTS", kScriptsOfEachRun));
+  expect_promises_kept(random_script, from_environment("O80_SCRIPTS", cases(kScriptsOfEachRun)));
 }
 
 // rules C5, C13, C14, L3
 TEST(Script, OfPlannedMotionsKeepsEveryPromise) {
-  expect_promises_kept(planned_script, from_environment("O80_SCRIPTS", kPlannedScripts));
+  expect_promises_kept(planned_script, from_environment("O80_SCRIPTS", cases(kPlannedScripts)));
 }
 
 // scripts that once broke a promise

@@ -8,6 +8,7 @@
 #include <limits>
 #include <random>
 
+#include "cases.hpp"
 #include "control/chunk_rig.hpp"
 
 namespace o80::test {
@@ -142,7 +143,7 @@ TEST(ChunkHostile, RandomBytesAreSafe) {
 /// is.
 // rule S1
 TEST(ChunkHostile, AmongCommandsPurgesHaltsAndFreshStartsEachEndsOnce) {
-  for (unsigned seed = 0; seed < 60; ++seed) {
+  for (unsigned seed = 0; seed < cases(60U); ++seed) {
     std::mt19937 dice(seed);
     const auto pick = [&](int low, int high) {
       return std::uniform_int_distribution<int>(low, high)(dice);

@@ -6,6 +6,7 @@
 #include <numbers>
 #include <random>
 
+#include "cases.hpp"
 #include "control/chunk_rig.hpp"
 
 namespace o80::test {
@@ -153,7 +154,7 @@ TEST(ChunkLimits, PlansAreHeldAtTheBoundsAndThatIsSaid) {
 /// Random chunks under random limits: all differences within them, all ends at the last row.
 // rule K10
 TEST(ChunkLimits, RandomScriptsStayWithinLimitsAndEndAtTheirLastRow) {
-  for (unsigned seed = 0; seed < 60; ++seed) {
+  for (unsigned seed = 0; seed < cases(60U); ++seed) {
     std::mt19937 dice(seed);
     const auto draw = [&](double low, double high) {
       return std::exp(std::uniform_real_distribution<double>(std::log(low), std::log(high))(dice));

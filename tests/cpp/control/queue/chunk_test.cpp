@@ -6,6 +6,7 @@
 #include <cmath>
 #include <functional>
 
+#include "cases.hpp"
 #include "control/chunk_rig.hpp"
 
 namespace o80::test {
@@ -471,7 +472,7 @@ TEST(Chunk, AStatusTellsItsShiftOrItIsLate) {
 // rule K8
 TEST(Chunk, EveryRowThatIsDueIsShown) {
   std::size_t exact = 0;
-  for (unsigned seed = 0; seed < 200; ++seed) {
+  for (unsigned seed = 0; seed < cases(200U); ++seed) {
     ChunkRig rig;
     ChunkScript script(seed);
     script.run(rig, 1500);
@@ -500,7 +501,7 @@ TEST(Chunk, EveryRowThatIsDueIsShown) {
     }
     EXPECT_TRUE(rig.all_blocks_back());
   }
-  EXPECT_GT(exact, 10'000U);
+  EXPECT_GT(exact, cases(10'000U));
 }
 
 // rule K3

@@ -6,6 +6,7 @@
 #include <functional>
 #include <random>
 
+#include "cases.hpp"
 #include "control/chunk_rig.hpp"
 
 namespace o80::test {
@@ -114,7 +115,7 @@ TEST(Chunk, TheMarkOfAStarvedPlanIsWhatTheScriptSays) {
     std::uint64_t plan;
   };
   std::size_t marks = 0;
-  for (unsigned seed = 0; seed < 60; ++seed) {
+  for (unsigned seed = 0; seed < cases(60U); ++seed) {
     std::mt19937 dice(seed);
     const auto pick = [&](int low, int high) {
       return std::uniform_int_distribution<int>(low, high)(dice);
@@ -222,7 +223,7 @@ TEST(Chunk, TheMarkOfAStarvedPlanIsWhatTheScriptSays) {
       }
     }
   }
-  EXPECT_GT(marks, 2000U);
+  EXPECT_GT(marks, cases(2000U));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <random>
 #include <vector>
 
+#include "cases.hpp"
 #include "control/rig.hpp"
 
 namespace o80::test {
@@ -61,7 +62,7 @@ End end_of(const Rig& rig, CommandId id, std::uint32_t lane) {
 }
 
 TEST(BatchPlan, ABatchIsTakenAsIfItsRecordsWereTakenOneAfterTheOther) {
-  for (std::uint32_t seed = 0; seed < 400; ++seed) {
+  for (std::uint32_t seed = 0; seed < cases(400U); ++seed) {
     std::mt19937 random(seed);  // NOLINT(bugprone-random-generator-seed)
     Rig whole(robot());
     Rig single(robot());

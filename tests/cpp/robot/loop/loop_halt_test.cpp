@@ -8,9 +8,9 @@
 #include <stdexcept>
 #include <thread>
 
+#include "cases.hpp"
 #include "dice.hpp"
 #include "memory/segment/verb_word.hpp"
-#include "readings_played.hpp"
 #include "robot/loop/loop.hpp"
 #include "robot/puppet.hpp"
 
@@ -263,7 +263,7 @@ TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
   Dice dice(3);
   constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const double period = 1e-3;
-  for (int i = 0; i < readings_played(63); ++i) {
+  for (int i = 0; i < cases(63); ++i) {
     Limits limits{.minimum = -5.0, .maximum = 5.0, .speed = dice.real(0.5, 4.0)};
     if (i % 2 == 0) limits.error = dice.real(0.1, 1.0);
     begin(limits);
@@ -334,7 +334,7 @@ TEST_F(ReadingTest, OneTurnOffInEveryRowIsRefusedUntilItIsAccepted) {
 // rule R5
 TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
   Dice dice(5);
-  for (int i = 0; i < readings_played(20); ++i) {
+  for (int i = 0; i < cases(20); ++i) {
     const Limits limits{.speed = dice.real(0.5, 4.0), .error = dice.real(0.1, 1.0)};
     begin(limits);
     double place = 0.0;

@@ -6,8 +6,8 @@
 #include <limits>
 #include <random>
 
+#include "cases.hpp"
 #include "o80/runtime/typed_backend.hpp"
-#include "readings_played.hpp"
 #include "runtime/station.hpp"
 
 namespace o80::test {
@@ -108,7 +108,7 @@ TEST_F(FollowerTest, IsCommandedOnlyFromWhereItCanBe) {
   const auto uniform = [&](double low, double high) {
     return std::uniform_real_distribution(low, high)(random);
   };
-  for (int i = 0; i < readings_played(60); ++i) {
+  for (int i = 0; i < cases(60); ++i) {
     Limits limits{.speed = uniform(0.5, 4.0)};
     limits.noise = uniform(0.01, 0.1);
     Follower follower(limits);

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "cases.hpp"
 #include "control/motion/state_layout.hpp"
 #include "describe/described.hpp"
 #include "o80/runtime/typed_backend.hpp"
@@ -182,7 +183,7 @@ TEST_F(PreviewTest, IsWhatTheBackendThenDoesBitForBit) {
   int previewed = 0;
   int later = 0;
   int refused = 0;
-  for (std::uint32_t seed = 1; seed <= 30; ++seed) {
+  for (std::uint32_t seed = 1; seed <= cases(30U); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     const bool plain = seed % 2 == 0;
     Random robot(seed, plain);
@@ -228,9 +229,9 @@ TEST_F(PreviewTest, IsWhatTheBackendThenDoesBitForBit) {
       later += preview.late > 0 ? 1 : 0;
     }
   }
-  EXPECT_GT(previewed, 200);
-  EXPECT_GT(later, 40);
-  EXPECT_GT(refused, 40);
+  EXPECT_GT(previewed, cases(200));
+  EXPECT_GT(later, cases(40));
+  EXPECT_GT(refused, cases(40));
 }
 
 // rule C4
