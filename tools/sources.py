@@ -4,30 +4,13 @@ import re
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
-FOLDERS = (
-    "include",
-    "src",
-    "python",
-    "robots",
-    "simulators",
-    "devices",
-    "gateways",
-    "apps",
-    "gateways",
-    "examples",
-    "benchmarks",
-    "tests",
-    "tools",
-)
 
 
 def cpp_files() -> list[str]:
     """All C++ files, relative to the root."""
+    folders = (folder for folder in ROOT.glob("[!.]*/") if folder.name != "build")
     return sorted(
-        str(file.relative_to(ROOT))
-        for folder in FOLDERS
-        for suffix in ("hpp", "cpp")
-        for file in (ROOT / folder).rglob(f"*.{suffix}")
+        str(file.relative_to(ROOT)) for folder in folders for file in folder.rglob("*.[hc]pp")
     )
 
 
