@@ -57,10 +57,9 @@ class Selection:
         for name, found in suites.items():
             self.cpp.setdefault(name, set()).update(found)
         path = word if "::" in word else str(place.relative_to(ROOT))
-        theirs = path.startswith(LEROBOT)
         in_python = any(x.suffix == ".py" and x.name.startswith("test_") for x in files)
         if in_python:
-            (self.lerobot if theirs else self.python).append(path)
+            (self.lerobot if path.startswith(LEROBOT) else self.python).append(path)
         if LEROBOT.startswith(f"{path}/"):
             self.lerobot.append(LEROBOT)
         return in_python or any(suites.values())
