@@ -1,4 +1,4 @@
-"""Kills each process of a running lab, and looks what the others say: see `lab_kill_table`.
+"""Kills each process of a running lab, and looks what the others say: see the table of parts.
 
 As a program it prints the times, and writes kills.json.
 """
@@ -7,18 +7,37 @@ from __future__ import annotations
 
 import argparse
 import json
+import os
+import signal
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any
 
 import numpy as np
-from lab_kill_table import KILLS, SUPERVISOR, Kill, Mark
+from numpy.typing import NDArray
 
 import o80
-from o80_table_tennis.lab.parts import ENVIRONMENT, NINE, RATES, RECORDER, VIEW, LabSettings
-from o80_table_tennis.lab.processes import PartEndedError
-from o80_table_tennis.lab.real_time import Lab
+from o80_devices.ball_tracking.ball_row import Reason as TrackerReason
+from o80_devices.motion_capture.sensor import Reason as CaptureReason
+from o80_table_tennis.lab.parts import (
+    COUNTERPARTS,
+    DIED,
+    ENVIRONMENT,
+    NINE,
+    NO_IMAGE,
+    NO_RACKET,
+    RATES,
+    RECORDER,
+    SUPERVISOR,
+    VIEW,
+    WORLD,
+    LabSettings,
+    Part,
+    lab_parts,
+)
+from o80_table_tennis.lab.processes import Processes
 
 WITHIN = 60.0
 """For what takes a fraction of a second on a quiet machine [s]."""
@@ -28,6 +47,24 @@ ROWS_ON = 20
 """Rows that every surviving process must still publish."""
 LOOK = 0.005
 """[s]"""
+
+
+def _missing(part: str) -> Callable[[o80.History], NDArray[np.bool_]]:
+    return lambda rows: np.asarray(rows.extended.missing[part], np.bool_)
+
+
+def _no_racket(rows: o80.History) -> NDArray[np.bool_]:
+    seen: Any = rows.extended
+    return np.asarray((seen.reason == CaptureReason.SEEN) & ~seen.racket.visible)
+
+
+# the cameras mark images of a world that stands still, or is gone, by a capture time of 0
+SAID: dict[str, Callable[[o80.History], NDArray[np.bool_]]] = {
+    NO_IMAGE: lambda rows: np.asarray(rows.extended.reason == TrackerReason.no_image),
+    NO_RACKET: _no_racket,
+    **{f"`missing.{part}`": _missing(part) for part in RATES | {WORLD: 0.0}},
+}
+"""Selects the rows that say so, by the words of the table."""
 
 
 @dataclass
@@ -63,12 +100,12 @@ class Outcome:
 class Killer:
     """Kills processes of a lab, one after the other."""
 
-    def __init__(self, lab: Lab) -> None:
-        self._lab = lab
+    def __init__(self, processes: Processes, recording: Path) -> None:
+        self._processes, self._recording = processes, recording
         self._segments = {
             name: part.segment
-            for name, part in lab.processes.parts.items()
-            if part.segment is not None and name in NINE
+            for name, part in processes.parts.items()
+            if part.segment is not None and name != COUNTERPARTS
         }
 
     def kill(self, name: str) -> Outcome:
@@ -76,7 +113,7 @@ class Killer:
 
         Raises AssertionError, with what did not happen.
         """
-        kill, outcome = KILLS[name], Outcome(name)
+        kill, outcome = self._processes.parts[name], Outcome(name)
         wait_until(lambda: self._nobody_misses(kill), f"{name} is there before it is killed")
         observers = {
             part: o80.Frontend(segment, timeout=WITHIN, read_only=True)
@@ -84,9 +121,8 @@ class Killer:
         }
         try:
             last = self._kill(name, observers, outcome)
-            for mark in kill.marks:
-                if mark.part != SUPERVISOR:
-                    outcome.said.append(said(mark, observers[mark.part], last, outcome.ended_at))
+            for part, says in (kill.missed or {}).items():
+                outcome.said.append(said(part, says, observers[part], last, outcome.ended_at))
             self._look_at_others(kill, observers, outcome)
         finally:
             for each in observers.values():
@@ -96,57 +132,53 @@ class Killer:
 
     def _kill(self, name: str, observers: dict[str, o80.Frontend], outcome: Outcome) -> int:
         """Time of the last row of the process, or of the kill if it has no rows by the clock."""
-        lab = self._lab
-        before = time.monotonic_ns()
-        ended: PartEndedError = lab.processes.kill(name)
+        before, processes = time.monotonic_ns(), self._processes
+        os.kill(processes.pid(name), signal.SIGKILL)
+        assert name in processes.ended(WITHIN)
+        ended = processes.collected(name)
         outcome.ended_at = time.monotonic_ns()
-        lab.events.add(name, str(ended))
         assert ended.code == -9, f"{name} ended before it was killed: {ended}"
-        outcome.said.append(Said(SUPERVISOR, (time.monotonic_ns() - before) * 1e-9, 0))
+        outcome.said.append(Said(SUPERVISOR, (outcome.ended_at - before) * 1e-9, 0))
         observer = observers.get(name)
         if observer is None or observer.bursting:
             return before
         return int(observer.latest().time)
 
     def _look_at_others(
-        self, kill: Kill, observers: dict[str, o80.Frontend], outcome: Outcome
+        self, kill: Part, observers: dict[str, o80.Frontend], outcome: Outcome
     ) -> None:
         """Rows of those that go on come; none of those that stand still."""
         still = {name: observers[name].published for name in kill.halts}
-        for name in kill.goes_on:
-            if name in observers:
-                observer = observers[name]
-                if not observer.bursting or ENVIRONMENT in kill.goes_on:
-                    wait_for_rows(observer, name)
-            else:
-                assert self._lab.processes.runs(name), f"{name} has ended with {kill.killed}"
-            outcome.went_on.append(name)
+        on = [name for name in self._processes.running if name not in (COUNTERPARTS, *kill.halts)]
+        for name in on:
+            observer = observers.get(name)
+            if observer is None:
+                assert self._processes.runs(name), f"{name} has ended with {kill.name}"
+            elif not observer.bursting or ENVIRONMENT in on:
+                wait_for_rows(observer, name)
         for name, rows in still.items():
-            assert observers[name].published == rows, f"{name} goes on without {kill.killed}"
-            outcome.stood_still.append(name)
+            assert observers[name].published == rows, f"{name} goes on without {kill.name}"
+        outcome.went_on, outcome.stood_still = on, list(still)
 
-    def _start_again(self, kill: Kill, outcome: Outcome) -> None:
-        lab, name, recording = self._lab, kill.killed, self._lab.settings.recording
+    def _start_again(self, kill: Part, outcome: Outcome) -> None:
+        name, recording = kill.name, self._recording
         size = recording.stat().st_size
-        lab.processes.start((name,))
-        lab.processes.wait_until_running(WITHIN)
+        self._processes.start((name,))
+        self._processes.wait_until_running(WITHIN)
         if name == RECORDER:  # a lab that ends before would end it, too
             wait_until(lambda: recording.stat().st_size > size, "the recorder goes on")
-        lab.events.add(name, "started again")
         wait_until(lambda: self._nobody_misses(kill), f"{name} is missed no more")
         outcome.joined = True
 
-    def _nobody_misses(self, kill: Kill) -> bool:
+    def _nobody_misses(self, kill: Part) -> bool:
         """The newest rows of those that would say so do not."""
-        for mark in kill.marks:
-            if mark.holds is None:
+        for part, says in (kill.missed or {}).items():
+            if says not in SAID:
                 continue
-            with o80.Frontend(
-                self._segments[mark.part], timeout=WITHIN, read_only=True
-            ) as observer:
-                if bool(mark.holds(observer.history(1))[0]):
+            with o80.Frontend(self._segments[part], timeout=WITHIN, read_only=True) as observer:
+                if bool(SAID[says](observer.history(1))[0]):
                     return False
-        return all(self._lab.processes.runs(name) for name in (kill.killed, ENVIRONMENT))
+        return all(self._processes.runs(name) for name in (kill.name, ENVIRONMENT))
 
     def wait_for_a_ball(self) -> None:
         """Until the environment has played another ball, from its launch to its end."""
@@ -160,28 +192,28 @@ class Killer:
             wait_until(another, "a ball is played")
 
 
-def said(mark: Mark, observer: o80.Frontend, last: int, ended_at: int) -> Said:
+def said(part: str, says: str, observer: o80.Frontend, last: int, ended_at: int) -> Said:
     """The first row, or entry, after the time `last` [ns] that says so, after the end [ns]."""
     found: list[int] = []
 
     def look() -> bool:
-        found[:] = _first(mark, observer, last)
+        found[:] = _first(says, observer, last)
         return bool(found)
 
-    wait_until(look, f"{mark.part} says: {mark.says}")
+    wait_until(look, f"{part} says: {says}")
     begin = min(max(last, ended_at), found[0])
     rows = observer.history().select(from_time=begin, to_time=found[0])
-    return Said(mark.part, (found[0] - last) * 1e-9, len(rows))
+    return Said(part, (found[0] - last) * 1e-9, len(rows))
 
 
-def _first(mark: Mark, observer: o80.Frontend, last: int) -> list[int]:
+def _first(says: str, observer: o80.Frontend, last: int) -> list[int]:
     """Its time [ns]; empty: none yet."""
     rows = observer.history()
-    if mark.holds is not None:
-        saying = mark.holds(rows) & (rows.time > last)
+    if says != DIED:
+        saying = SAID[says](rows) & (rows.time > last)
         return [int(rows.time[saying.argmax()])] if saying.any() else []
     for entry in observer.journal():
-        if entry.kind == mark.journal and entry.iteration in rows.iteration:
+        if entry.kind == "died" and entry.iteration in rows.iteration:
             when = int(rows.at_iteration(entry.iteration).time)
             if when > last:
                 return [when]
@@ -203,6 +235,19 @@ def wait_until(holds: object, what: str) -> None:
         time.sleep(LOOK)
 
 
+def started(settings: LabSettings) -> Processes:
+    """The running lab. Raises PartEndedError, o80.TimeoutError."""
+    settings.recording.unlink(missing_ok=True)
+    processes = Processes(lab_parts(settings).values(), settings.folder / "processes")
+    try:
+        processes.start()
+        processes.wait_until_running(WITHIN)
+    except BaseException:
+        processes.close()
+        raise
+    return processes
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--output", type=Path, default=LabSettings().folder)
@@ -210,8 +255,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     given = parser.parse_args(arguments)
     settings = LabSettings(balls=0, prefix=given.prefix, folder=given.output)
     outcomes = []
-    with Lab(settings) as lab:
-        killer = Killer(lab)
+    with started(settings) as processes:
+        killer = Killer(processes, settings.recording)
         killer.wait_for_a_ball()
         for name in NINE:
             outcome = killer.kill(name)

@@ -7,23 +7,23 @@ import sys
 from pathlib import Path
 
 import pytest
-from lab_kill_table import KILLS, SUPERVISOR, as_markdown
-from lab_kills import Killer, wait_until
+from lab_kills import Killer, started, wait_until
 
 import o80
-from o80_table_tennis.lab.environment_row import Phase
+from o80_table_tennis.lab.environment_process import Phase
 from o80_table_tennis.lab.parts import (
     ARM,
     COUNTERPARTS,
     ENVIRONMENT,
     LAUNCHER,
+    NAMED,
     NINE,
     RATES,
+    SUPERVISOR,
     WORLD,
     LabSettings,
     lab_parts,
 )
-from o80_table_tennis.lab.real_time import Lab
 
 PAGE = Path(__file__).parents[3] / "docs" / "lab.md"
 LONGEST = 300.0
@@ -34,48 +34,54 @@ def settings(folder: Path, balls: int = 0) -> LabSettings:
     return LabSettings(balls=balls, prefix=f"lab-test-{os.getpid()}", folder=folder, fifo=False)
 
 
-def test_the_lab_has_nine_processes_and_their_counterparts(tmp_path: Path) -> None:
-    parts = lab_parts(settings(tmp_path))
-    assert set(parts) == {*NINE, COUNTERPARTS}
-    assert set(KILLS) == set(NINE)
-    for part in parts.values():
-        assert set(part.needs) <= set(parts)
-        assert part.segment is None or part.says is None
+def as_markdown() -> str:
+    """The others' part of the table, as the page shows it."""
+    lines = [
+        "| killed | who says so, and how | who stands still | who goes on | besides |",
+        "|---|---|---|---|---|",
+    ]
+    for name, part in lab_parts(LabSettings()).items():
+        if name != COUNTERPARTS:
+            marks = {**(part.missed or {}), SUPERVISOR: NAMED}.items()
+            said = "; ".join(f"{by}: {says}" for by, says in marks)
+            on = f"the other {8 - len(part.halts)}" if part.halts else "all others"
+            lines.append(f"| {name} | {said} | {', '.join(part.halts)} | {on} | {part.besides} |")
+    return "\n".join(lines) + "\n"
 
 
-def test_the_page_shows_the_table_of_kills() -> None:
+def test_the_page_shows_what_the_others_do_when_one_dies() -> None:
+    assert len(NINE) == 9
     assert as_markdown() in PAGE.read_text()
 
 
 @pytest.mark.check
 def test_a_killed_process_is_missed_within_200_ms_and_joins_again(tmp_path: Path) -> None:
-    with Lab(settings(tmp_path)) as lab:
-        killer = Killer(lab)
+    chosen = settings(tmp_path)
+    with started(chosen) as lab:
+        killer = Killer(lab, chosen.recording)
         for name in NINE:
-            outcome = killer.kill(name)
+            outcome, part = killer.kill(name), lab.parts[name]
             assert outcome.joined
             assert [each.part for each in outcome.said if not each.in_time] == []
-            assert {each.part for each in outcome.said} == {m.part for m in KILLS[name].marks}
-            assert set(outcome.went_on) == set(KILLS[name].goes_on)
-            assert set(outcome.stood_still) == set(KILLS[name].halts)
+            assert {each.part for each in outcome.said} == {*(part.missed or {}), SUPERVISOR}
+            assert set(outcome.went_on) == {*NINE} - {name, *part.halts}
+            assert set(outcome.stood_still) == set(part.halts)
             if name in (LAUNCHER, ENVIRONMENT):  # a ball needs all that were killed before
                 killer.wait_for_a_ball()
-        recording = lab.settings.recording
     with pytest.raises(o80.TimeoutError):
-        o80.Frontend(lab.settings.segment(ARM), timeout=0.0)
+        o80.Frontend(chosen.segment(ARM), timeout=0.0)
     # the arm was started twice; its recorder was killed while the second one ran
-    runs = o80.open(recording)[lab.settings.segment(ARM)].epochs
+    runs = o80.open(chosen.recording)[chosen.segment(ARM)].epochs
     assert [len(run.gaps) for run in runs] == [0, 0]
 
 
 @pytest.mark.check
 def test_a_supervisor_that_looks_late_misses_nothing(tmp_path: Path) -> None:
-    with Lab(settings(tmp_path, balls=1)) as lab:
-        observer = o80.Frontend(lab.settings.segment(ENVIRONMENT), timeout=LONGEST)
+    chosen = settings(tmp_path, balls=1)
+    with started(chosen) as lab:
+        observer = o80.Frontend(chosen.segment(ENVIRONMENT), timeout=LONGEST)
         wait_until(lambda: observer.latest().extended.phase == Phase.over, "all balls are played")
-        assert not lab.look(0.0)
-        assert set(lab.loops()) == set(NINE) - {"recorder", "view"}
-    assert "has played all balls" in (tmp_path / "events.jsonl").read_text()
+        assert set(lab.running) == {*NINE, COUNTERPARTS}
 
 
 @pytest.mark.check
@@ -93,7 +99,7 @@ def test_balls_are_played_and_reported(tmp_path: Path) -> None:
     report = json.loads((tmp_path / "report.json").read_text())
     assert report["balls"]["played"] == 2
     assert report["launcher"]["completed"] >= 2
-    assert set(report["processes"]) == set(NINE) - {"recorder", "view"}
+    assert set(report["processes"]) == set(RATES)
     assert report["processes"][ARM]["scheduling"] == "other"
     # a busy machine may take no image of a flight
     tracking = report["tracking_error_mm"]
@@ -101,7 +107,6 @@ def test_balls_are_played_and_reported(tmp_path: Path) -> None:
     for found in (report["motion_capture_error_mm"], tracked):
         assert found is None or found["50%"] < 5.0
         assert found or report["processes"][ARM]["missed_percent"] > 1.0, "this machine kept up"
-    assert SUPERVISOR in report["processor_percent"]
     marks = {(mark.name, *mark.rows) for mark in o80.open(tmp_path / "run.mcap").marks}
     launches = {name for name, _ in marks}
     assert len(launches) == 2

@@ -11,8 +11,9 @@ from pathlib import Path
 import pytest
 
 import o80
+from o80_table_tennis.lab.parts import Part
 from o80_table_tennis.lab.parts import o80_command as command
-from o80_table_tennis.lab.processes import Part, PartEndedError, Processes
+from o80_table_tennis.lab.processes import PartEndedError, Processes
 
 WAITING = 30.0
 """For what takes milliseconds on a quiet machine [s]."""
@@ -68,13 +69,13 @@ def test_a_process_that_ends_at_its_start_is_named_with_its_last_lines(
     assert caught.value.lines == ("loading", "no such arm")
 
 
-def test_what_does_not_run_in_time_is_named_with_what_it_needs(
+def test_what_does_not_run_in_time_is_named_with_its_last_lines(
     lab: Callable[..., Processes],
 ) -> None:
-    silent = Part("silent", ASLEEP.command, says="never", needs=("arm", "world"))
+    silent = Part("silent", ASLEEP.command, says="never")
     processes = lab(silent)
     processes.start()
-    with pytest.raises(o80.TimeoutError, match="'silent', which needs arm, world"):
+    with pytest.raises(o80.TimeoutError, match="do not run yet:\n'silent': "):
         processes.wait_until_running(0.3)
 
 
@@ -99,32 +100,24 @@ def test_closing_ends_all_and_removes_the_segments_of_killed_ones(
     processes.start()
     processes.wait_until_running(WAITING)
     pids = [processes.pid(name) for name in processes.running]
-    processes.kill("left")
+    os.kill(processes.pid("left"), signal.SIGKILL)
     processes.close()
     assert not any(lives(pid) for pid in pids)
     assert not [each for each in o80.segments() if each.name.startswith("lab-test-")]
 
 
-def test_those_that_others_need_end_last(lab: Callable[..., Processes], tmp_path: Path) -> None:
+def test_the_last_of_the_table_ends_first(lab: Callable[..., Processes], tmp_path: Path) -> None:
     text = (
         "import signal, sys, time\n"
         "def end(*_): open({file!r}, 'a').write({name!r} + ' '); sys.exit()\n"
         "signal.signal(signal.SIGTERM, end); print('up'); time.sleep(1e4)"
     )
     file = tmp_path / "order"
-    needs = {"world": (), "cameras": ("world",), "tracker": ("cameras",)}
+    names = ("world", "cameras", "tracker")
     processes = lab(
-        *(
-            Part(
-                name,
-                (sys.executable, "-u", "-c", text.format(file=str(file), name=name)),
-                says="up",
-                needs=its,
-            )
-            for name, its in needs.items()
-        )
+        *(program(name, text.format(file=str(file), name=name), "up") for name in names)
     )
-    processes.start()
+    processes.start(reversed(names))
     processes.wait_until_running(WAITING)
     processes.close()
     assert file.read_text().split() == ["tracker", "cameras", "world"]
@@ -144,7 +137,7 @@ with ends_in_order(), Processes([robot("arm"), ASLEEP], Path({folder!r})) as pro
     processes.wait_until_running(WAITING)
     print(*[processes.pid(name) for name in processes.running], flush=True)
     while True:
-        processes.check(0.5)
+        processes.ended(0.5)
 """
 
 

@@ -1,8 +1,10 @@
-"""`python -m o80_table_tennis.lab`: the laboratory."""
+"""`python -m o80_table_tennis.lab`: plays balls in real time with all nine processes."""
 
 from __future__ import annotations
 
+import os
 import sys
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -12,9 +14,18 @@ from rich.console import Console
 import o80
 from o80.base.screen import keep_printing
 
-from .parts import LabSettings
-from .processes import PartEndedError
-from .real_time import play_in_real_time
+from ..ending import ends_in_order
+from .environment_process import Phase
+from .parts import ENVIRONMENT, RATES, VIEW, LabSettings, lab_parts
+from .processes import PartEndedError, Processes
+from .report import Figures, write_report
+from .watched import Watched
+
+STARTS_WITHIN = 60.0
+"""All processes, on a busy machine [s]."""
+LOOK = 0.5
+"""Between two looks at the row of the environment [s]."""
+CLASSES = {os.SCHED_OTHER: "other", os.SCHED_FIFO: "fifo", os.SCHED_RR: "rr"}
 
 
 def main(
@@ -28,12 +39,78 @@ def main(
 ) -> None:
     """Plays balls with nine processes, and writes report.json."""
     settings = LabSettings(count, seed, policy, prefix, output, fifo)
-    console = Console()
+    console = Console(highlight=False)
     try:
-        play_in_real_time(settings, console, restart=restart)
+        report = write_report(settings, play(settings, console, restart=restart))
     except (o80.Error, PartEndedError) as error:
         console.print(str(error), markup=False, style="red")
         sys.exit(1)
+    for what, found in report["wanted"].items():
+        missed = "" if found["reached"] else ": not reached"
+        console.print(f"{what}: {found['measured']} ({found['wanted']}){missed}", markup=False)
+    if not all(found["reached"] for found in report["wanted"].values()):
+        console.print("`o80 doctor --frequency 500` says what is in the way on this computer")
+    console.print(f"balls: {report['balls']}\nreport: {settings.folder / 'report.json'}")
+
+
+def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str, Figures]:
+    """Plays all balls. Returns how the loops kept their rates, by process.
+
+    A process that ends is started again with `restart`; else raises PartEndedError.
+    """
+    settings.recording.unlink(missing_ok=True)
+    folder = settings.folder / "processes"
+    console.print(f"starts nine processes; what they print is in {folder}")
+    with ends_in_order(), Processes(lab_parts(settings).values(), folder) as processes:
+        processes.start()
+        processes.wait_until_running(STARTS_WITHIN)
+        console.print(f"see it at {processes.printed(VIEW).splitlines()[0]}")
+        watched = {name: Watched(settings.segment(name)) for name in RATES}
+        begin = found = loops(processes, watched, {})
+        shown = ""
+        while True:
+            for name in processes.ended(LOOK):
+                ended = processes.collected(name)
+                if not restart:
+                    raise ended
+                console.print(f"{ended}\nIt is started again.", markup=False)
+                processes.start((name,))
+            found = found | loops(processes, watched, begin)
+            environment = watched[ENVIRONMENT].frontend()
+            if environment is None:
+                continue
+            row = environment.latest().extended
+            said = f"{row.balls_played} balls, {row.balls_touched} touched, {row.balls_returned} "
+            missing = ", ".join(name for name in row.missing if row.missing[name])
+            said += "returned" + (f"; missing: {missing}" if missing else "")
+            if said != shown:
+                console.print(shown := said)
+            if row.phase == Phase.over:
+                return found
+
+
+def loops(
+    processes: Processes, watched: Mapping[str, Watched], begin: Mapping[str, Figures]
+) -> dict[str, Figures]:
+    """Rates, and periods missed since `begin`, of the processes that are there."""
+    found = {}
+    for name, observer in watched.items():
+        frontend = observer.frontend()
+        if frontend is None or name not in processes.running:
+            continue
+        pid, counts = processes.pid(name), (frontend.published, frontend.missed_ticks)
+        before = begin.get(name, {}).get("counts", (0, 0))
+        before = before if before[0] <= counts[0] else (0, 0)  # it was started again
+        rows, missed = (now - then for now, then in zip(counts, before, strict=True))
+        kind, priority = os.sched_getscheduler(pid), os.sched_getparam(pid).sched_priority
+        found[name] = {
+            "asked": RATES[name],
+            "measured": frontend.rate_reached,
+            "missed_percent": 100.0 * missed / max(1, rows + missed),
+            "scheduling": f"{CLASSES.get(kind, kind)} {priority or ''}".rstrip(),
+            "counts": counts,
+        }
+    return found
 
 
 if __name__ == "__main__":

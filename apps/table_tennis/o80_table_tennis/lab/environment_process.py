@@ -2,38 +2,86 @@
 
 Every 10 ms it publishes a row: by the clock of the arm while arm and world are there, else by its
 own. It waits for what it needs, and says in each row what is missing; a ball during which arm or
-world end is given up. When all balls were played its rows say so until it is asked to end: who
-looks late misses nothing.
+world end is given up. When all balls were played its rows say so until it is asked to end.
 """
 
 from __future__ import annotations
 
-import argparse
 import signal
 import time
-from collections.abc import Sequence
-from types import FrameType
+from dataclasses import replace
+from enum import IntEnum
 from typing import Any
 
 import numpy as np
+import typer
 
 import o80
 from o80.base.screen import keep_printing
 
 from ..balls.launches import Launch
 from ..environment import TableTennisEnvironment
+from ..players.learned_policy import shipped_policy
+from ..players.policies import DEFAULT_FACTOR, Policy, default_policy
+from ..rig.arm_numbers import ArmNumbers
 from ..rig.home import LONGEST_RETURN
-from .environment_row import EXTENDED, UNITS, WATCHED, Phase
+from ..rig.rig import arm_options
+from ..settings import Pacing, TaskSettings
 from .launching import Launching
-from .parts import ARM, ENVIRONMENT, RATES, TRACKER, WORLD, LabSettings
-from .player import home_of, opened, policy_of
+from .parts import (
+    ARM,
+    CAMERAS,
+    ENVIRONMENT,
+    LAUNCHER,
+    MOTION_CAPTURE,
+    RATES,
+    RIG,
+    TRACKER,
+    WORLD,
+    LabSettings,
+)
 from .tracked_perception import TrackedPerception
 from .watched import Watched
 
 STEP = 1.0 / RATES[ENVIRONMENT]
 """[s]"""
+WATCHED = (ARM, WORLD, LAUNCHER, CAMERAS, TRACKER, MOTION_CAPTURE)
+"""Parts of which a row says whether they are missing."""
 OPENING = (o80.BackendGone, o80.TimeoutError, o80.SegmentError)
 """Errors that are raised while arm or world end, or are missing."""
+
+
+class Phase(IntEnum):
+    """Phase in which the environment is."""
+
+    waiting = 0
+    """Arm or world is missing."""
+    returning = 1
+    """The arm goes back to its start."""
+    launching = 2
+    """The launcher was asked, or could not be asked yet; no ball has left it."""
+    playing = 3
+    over = 4
+    """All balls were played."""
+
+
+BALLS = ("ball", *(f"balls_{what}" for what in ("played", "touched", "returned", "given_up")))
+COUNTS = (*BALLS, "launch", "launches_failed")
+TIMES = ("arm_time", "ball_time", "observed_at")
+PLACES = ("observed_ball", "true_ball")
+EXTENDED: dict[str, Any] = {
+    "phase": Phase,
+    "missing": dict.fromkeys(WATCHED, np.bool_),
+    "seen": np.bool_,
+    "age": np.float64,
+    **dict.fromkeys(("arm_row", "world_row", "late", *COUNTS, *TIMES), np.int64),
+    **dict.fromkeys(PLACES, (np.float64, (3,))),
+}
+"""late: rows of the arm that were newer than the one used. launch: number of the launch that is
+played, 0 between balls. observed_ball: what the policy observed last; observed_at: the time of the
+row of the arm when it did. The ball was seen in images of ball_time, `age` [s] before that.
+true_ball: of the world, now."""
+UNITS = {"age": "s"} | dict.fromkeys(TIMES, "ns") | dict.fromkeys(PLACES, "m")
 
 
 class EndRequestedError(Exception):
@@ -48,24 +96,27 @@ class EnvironmentProcess:
         self._watched = {name: Watched(settings.segment(name)) for name in WATCHED}
         self._tracker = Watched(settings.segment(TRACKER))
         self._launching = Launching(settings)
-        self._policy, self._home = policy_of(settings), home_of(settings)
+        self._policy, self._task = policy_of(settings.policy)
+        with o80.robots.load("pam").inline(**arm_options(RIG)) as arm:  # where the arm starts
+            row = arm.latest()
+            self._home = np.array(row.desired), np.array(row.extended.joint_positions)
         self._environment: TableTennisEnvironment | None = None
         self._perception: TrackedPerception | None = None
         self._due = time.monotonic() + STEP
         self.row: dict[str, Any] = {"phase": Phase.waiting, "arm_row": -1, "world_row": -1}
-        for name in EXTENDED:
-            if name.startswith("ball") or name in ("launch", "launches_failed"):
-                self.row[name] = 0
-        self.stopping = False
+        self.row |= dict.fromkeys((*COUNTS, "ball_time"), 0)
+        self._stopping = False
 
-    # ------------------------------------------------------------------ rows
+    def stop(self, *_signal: object) -> None:
+        """The next row is the last one."""
+        self._stopping = True
 
     def publish(self) -> None:
         """A row, and the beginning of the next one. Raises EndRequestedError."""
         row = self.row
         row["missing"] = {name: watched.missing for name, watched in self._watched.items()}
         self._backend.publish(extended=row)
-        if self._backend.step() is None or self.stopping:
+        if self._backend.step() is None or self._stopping:
             raise EndRequestedError
 
     def _after_step(self) -> None:
@@ -138,11 +189,17 @@ class EnvironmentProcess:
         self._by_own_clock()
         if any(self._watched[name].frontend() is None for name in (ARM, WORLD)):
             return
+        of = self._settings.segment
+        rig = replace(
+            RIG, pacing=Pacing.REAL_TIME, attach=True, arm_segment=of(ARM), twin_segment=of(WORLD)
+        )
         try:
-            self._environment = opened(self._settings, self._policy, self._home)
+            self._environment = TableTennisEnvironment(rig=rig, task=self._task)
         except OPENING:
             return
         task = self._environment.task
+        # the arm may stand anywhere now
+        task.home_of_arm.pressures, task.home_of_arm.angles = self._home
         self._perception = TrackedPerception(self._tracker.frontend, self._arm_time)
         task.observer.look_through(self._perception)
         task.after_step, task.returns_at_reset = self._after_step, False
@@ -184,7 +241,7 @@ class EnvironmentProcess:
 
     def _play(self, environment: TableTennisEnvironment, launch: Launch) -> None:
         """One ball, from the launch on."""
-        flight = launch.flight(self._settings.rig.period)
+        flight = launch.flight(RIG.period)
         seed = self._settings.seed if self.row["balls_played"] == 0 else None
         observation, _ = environment.reset(seed=seed, options={"flight": flight})
         self._policy.reset()
@@ -211,33 +268,29 @@ class EnvironmentProcess:
             self.row["launch"] = 0
 
 
-def run(settings: LabSettings) -> None:
-    """Plays until the end, Ctrl-C or SIGTERM."""
+def policy_of(name: str) -> tuple[Policy, TaskSettings]:
+    """A policy, and the task with its own actions and observation."""
+    if name == "learned":
+        learned = shipped_policy()  # its noise sets the filter of the observer
+        return learned, learned.conditions.task(fly_out=False)
+    return default_policy(ArmNumbers.of_rig(RIG)), TaskSettings(factor=DEFAULT_FACTOR)
+
+
+def main(prefix: str = "lab", balls: int = 5, seed: int = 1, policy: str = "learned") -> None:
+    """Plays so many balls (0: without end); ends at Ctrl-C, SIGTERM or `o80 stop`."""
+    settings = LabSettings(balls, seed, policy, prefix)
     with o80.Backend(
         settings.segment(ENVIRONMENT), extended=EXTENDED, units=UNITS, frequency=RATES[ENVIRONMENT]
     ) as backend:
         process = EnvironmentProcess(settings, backend)
-
-        def end(_number: int, _frame: FrameType | None) -> None:
-            process.stopping = True
-
         for number in (signal.SIGINT, signal.SIGTERM):
-            signal.signal(number, end)
+            signal.signal(number, process.stop)
         process.run()
-        played, returned = process.row["balls_played"], process.row["balls_returned"]
-        print(f"{played} balls played, {returned} returned")
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    usual = LabSettings()
-    parser = argparse.ArgumentParser(prog="python -m o80_table_tennis.lab.environment_process")
-    parser.add_argument("--prefix", default=usual.prefix, help="of the names of all segments")
-    parser.add_argument("--balls", type=int, default=usual.balls, help="to play; 0: no end")
-    parser.add_argument("--seed", type=int, default=usual.seed)
-    parser.add_argument("--policy", choices=("learned", "scripted"), default=usual.policy)
-    run(LabSettings(**vars(parser.parse_args(arguments))))
+        print(
+            f"{process.row['balls_played']} balls played, {process.row['balls_returned']} returned"
+        )
 
 
 if __name__ == "__main__":
     keep_printing()
-    main()
+    typer.run(main)

@@ -1,7 +1,7 @@
-"""The nine processes of the lab, and the counterpart of the devices: what each is, how it starts.
+"""The table of the lab: its processes in the order of their start, and what follows if one dies.
 
 Every command is one that a user could type: `o80 run`, `o80 record`, `o80 view`, or a module of
-this package.
+this package. The processes end in the opposite order.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ import socket
 import sys
 import sysconfig
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,31 +19,26 @@ from o80.base.loop_options import text_of
 from ..rig.rig import arm_options, world_options
 from ..settings import RigSettings
 from ..world.timing import PERIOD
-from .processes import Part
 
 ARM, WORLD, LAUNCHER, CAMERAS = "arm", "world", "launcher", "cameras"
 TRACKER, MOTION_CAPTURE, ENVIRONMENT = "tracker", "motion_capture", "environment"
-RECORDER, VIEW, COUNTERPARTS = "recorder", "view", "counterparts"
+RECORDER, VIEW, COUNTERPARTS, SUPERVISOR = "recorder", "view", "counterparts", "supervisor"
 NINE = (
     *(ARM, WORLD, LAUNCHER, CAMERAS, TRACKER),
     *(MOTION_CAPTURE, ENVIRONMENT, RECORDER, VIEW),
 )
 """The processes of the lab; the four cameras are one."""
-LAUNCHES = "launches"
-"""Segment of the counterparts: the balls that have left the launcher, as its model drew them."""
+RECORDED = (ARM, WORLD, LAUNCHER, TRACKER, MOTION_CAPTURE, ENVIRONMENT)
+"""No images."""
 RATES = {ARM: 500.0, LAUNCHER: 50.0, CAMERAS: 180.0, TRACKER: 180.0, MOTION_CAPTURE: 300.0} | {
     ENVIRONMENT: 100.0
 }
 """Rows a second."""
-CAMERAS_ROBOT = "o80_devices.ball_tracking:SyntheticCameras"
-TRACKER_ROBOT = "o80_devices.ball_tracking:BallTracker"
+RIG = RigSettings(preset="identified")
 SUBJECTS = ("racket", "base", "table")
 """Subjects that the motion capture sees."""
-RECORDED = (ARM, WORLD, LAUNCHER, TRACKER, MOTION_CAPTURE, ENVIRONMENT)
-"""No images."""
-LOGS = "processes"
-SETS_WITHIN, LAUNCHES_WITHIN = 0.1, 0.4
-"""Time that the fake launcher takes to set its motors, and for a launch [s]."""
+NO_IMAGE, NO_RACKET = "`reason` is `no_image`", "`racket.visible` is false"
+DIED, NAMED = "journal: `died`", "names it, with its last lines"
 
 
 @dataclass(frozen=True)
@@ -60,9 +55,6 @@ class LabSettings:
     folder: Path = Path("build/lab")
     fifo: bool = True
     """Ask for real-time scheduling of the arm and of the motion capture."""
-    parts: tuple[str, ...] = NINE
-    """Parts that are started."""
-    rig: RigSettings = field(default_factory=lambda: RigSettings(preset="identified"))
 
     def segment(self, part: str) -> str:
         """Name of the segment of a part."""
@@ -74,141 +66,126 @@ class LabSettings:
         return self.folder / "run.mcap"
 
 
+@dataclass(frozen=True)
+class Part:
+    """One process of the lab, and what the others do when it is killed."""
+
+    name: str
+    command: tuple[str, ...]
+    segment: str | None = None
+    """Name of its backend's segment; the part counts as running while the segment does."""
+    says: str | None = None
+    """Text of a process without a segment: it runs when it has printed this."""
+    missed: Mapping[str, str] | None = None
+    """How others say that it is missing, by part; the supervisor always does."""
+    halts: tuple[str, ...] = ()
+    """Parts that stand still until it is back."""
+    besides: str = ""
+    """Further consequences."""
+
+
 def lab_parts(settings: LabSettings) -> dict[str, Part]:
-    """All parts by name, the counterparts first. Ports are chosen now."""
-    launcher, qualisys = f"tcp://127.0.0.1:{free_port()}", free_port()
-    of = settings.segment
-    parts = [
-        Part(
+    """The table. Ports are chosen now."""
+    of, seed = settings.segment, settings.seed
+    launcher, qualisys = f"tcp://127.0.0.1:{_free_port()}", _free_port()
+    fifo = ("--policy=fifo", "--lock-memory") if settings.fifo else ()
+    recorded = [of(part) for part in RECORDED]
+
+    def robot(
+        name: str, driver: str, options: Mapping[str, Any], *words: str, **death: Any
+    ) -> Part:
+        rate: dict[str, Any] = {"frequency": RATES[name]} if name in RATES else {}
+        flags = _flags({"segment": of(name), **rate, **options})
+        return Part(name, (o80_command(), "run", driver, *flags, *words), of(name), **death)
+
+    def seen_by_environment(part: str, *blind: str) -> dict[str, str]:
+        return {ENVIRONMENT: f"`missing.{part}`"} | dict.fromkeys(blind, NO_IMAGE)
+
+    parts = (
+        robot(
             COUNTERPARTS,
-            (
-                *_module("counterparts"),
-                *flags(
-                    launcher=launcher,
-                    qualisys=qualisys,
-                    arm=of(ARM),
-                    launches=of(LAUNCHES),
-                    seed=settings.seed,
-                ),
-            ),
-            segment=of(LAUNCHES),
+            "o80_table_tennis.lab.counterparts:Counterparts",
+            {"launcher": launcher, "qualisys": qualisys, "arm": of(ARM), "seed": seed},
         ),
-        _robot(settings, ARM, "pam", _real_time(settings) | arm_options(settings.rig)),
-        _robot(
-            settings,
+        robot(
+            ARM,
+            "pam",
+            {"stale": "purge"} | ({"priority": 80} if fifo else {}) | arm_options(RIG),
+            "--resume",  # it is simulated: one that was killed goes on at once
+            *fifo,
+            missed=seen_by_environment(ARM, TRACKER) | {MOTION_CAPTURE: NO_RACKET},
+            halts=(WORLD,),
+            besides="the ball is given up; the next one is played when the arm is back",
+        ),
+        robot(
             WORLD,
             "mujoco",
-            {"frequency": 1.0 / PERIOD, "bursting": True} | world_options(settings.rig),
+            {"frequency": 1.0 / PERIOD} | world_options(RIG),
+            "--bursting",
+            missed=seen_by_environment(WORLD, TRACKER),
+            besides="the ball is given up; the arm keeps its pressures",
         ),
-        _robot(
-            settings,
+        robot(
             LAUNCHER,
             "o80_devices.ball_launcher:BallLauncher",
-            {"frequency": RATES[LAUNCHER], "address": launcher, "resume": True},
-            needs=(COUNTERPARTS,),
+            {"address": launcher},
+            "--resume",
+            missed=seen_by_environment(LAUNCHER),
+            besides="a ball in flight is played to its end; no other one starts",
         ),
-        _robot(settings, CAMERAS, *_cameras(settings), needs=(WORLD,)),
-        _robot(
-            settings,
+        robot(
+            CAMERAS,
+            "o80_devices.ball_tracking:SyntheticCameras",
+            {"history": 4, "seed": seed, "ball": of(WORLD), "times": of(ENVIRONMENT)},
+            missed=seen_by_environment(CAMERAS, TRACKER),
+        ),
+        robot(
             TRACKER,
-            TRACKER_ROBOT,
-            {"frequency": RATES[TRACKER], "cameras": of(CAMERAS), "timeout": 60},
-            needs=(CAMERAS,),
+            "o80_devices.ball_tracking:BallTracker",
+            {"cameras": of(CAMERAS), "timeout": 60},
+            missed=seen_by_environment(TRACKER),
+            besides="a ball in flight is played on as the filter of the observation predicts it",
         ),
-        _robot(
-            settings,
+        robot(
             MOTION_CAPTURE,
             "o80_devices.motion_capture:Qualisys",
-            {
-                "frequency": RATES[MOTION_CAPTURE],
-                "port": qualisys,
-                "subjects": ",".join(SUBJECTS),
-                **({"policy": "fifo", "priority": 40} if settings.fifo else {}),
-            },
-            needs=(COUNTERPARTS,),
+            {"port": qualisys, "subjects": SUBJECTS} | ({"priority": 40} if fifo else {}),
+            *fifo[:1],
+            missed=seen_by_environment(MOTION_CAPTURE),
         ),
         Part(
             ENVIRONMENT,
             (
-                *_module("environment_process"),
-                *flags(
-                    prefix=settings.prefix,
-                    balls=settings.balls,
-                    seed=settings.seed,
-                    policy=settings.policy,
-                ),
+                *(sys.executable, "-u", "-m", "o80_table_tennis.lab.environment_process"),
+                *(f"--prefix={settings.prefix}", f"--balls={settings.balls}"),
+                *(f"--seed={seed}", f"--policy={settings.policy}"),
             ),
-            segment=of(ENVIRONMENT),
-            rate=RATES[ENVIRONMENT],
-            needs=(ARM, WORLD, TRACKER, LAUNCHER),
+            of(ENVIRONMENT),
+            missed={ARM: DIED, TRACKER: NO_IMAGE},
+            halts=(WORLD,),
+            besides="the arm purges what was asked of it, and keeps its pressures",
         ),
         Part(
             RECORDER,
             (
-                *(o80_command(), "record", *(of(part) for part in RECORDED), of(LAUNCHES)),
+                *(o80_command(), "record", *recorded, of(COUNTERPARTS)),
                 *("-o", str(settings.recording), "--continue"),
             ),
             says=f"'{of(ENVIRONMENT)}' ",  # what becomes of its rows
-            needs=RECORDED,
-            output=settings.recording,
+            besides="started again, it goes on in the same file, without a gap",
         ),
         Part(
             VIEW,
-            (o80_command(), "view", *(of(part) for part in RECORDED), "--no-browser"),
+            (o80_command(), "view", *recorded, "--no-browser"),
             says="http",
-            needs=RECORDED,
+            besides="started again, it has another address",
         ),
-    ]
-    return {part.name: part for part in parts if part.name in (*settings.parts, COUNTERPARTS)}
+    )
+    return {part.name: part for part in parts}
 
 
-def _real_time(settings: LabSettings) -> dict[str, Any]:
-    """How the loop of the arm runs. The arm is simulated: one that was killed goes on at once."""
-    options: dict[str, Any] = {"frequency": RATES[ARM], "stale": "purge", "resume": True}
-    if settings.fifo:
-        options |= {"policy": "fifo", "priority": 80, "lock_memory": True}
-    return options
-
-
-def _cameras(settings: LabSettings) -> tuple[str, dict[str, Any]]:
-    options = {
-        "frequency": RATES[CAMERAS],
-        "history": 4,
-        "seed": settings.seed,
-        "ball": settings.segment(WORLD),
-        "times": settings.segment(ENVIRONMENT),
-    }
-    return CAMERAS_ROBOT, options
-
-
-def _robot(
-    settings: LabSettings,
-    name: str,
-    robot: str,
-    options: Mapping[str, Any],
-    needs: tuple[str, ...] = (),
-) -> Part:
-    command = (o80_command(), "run", robot, *flags(segment=settings.segment(name), **options))
-    return Part(name, command, settings.segment(name), rate=RATES.get(name), needs=needs)
-
-
-def flags(**options: Any) -> list[str]:
-    """Options as words of a command: `--name=text`, switches without a text."""
-    words = []
-    for name, value in options.items():
-        flag = f"--{name.replace('_', '-')}" if name in SWITCHES else f"--{name}"
-        if name in SWITCHES:
-            words += [flag] if value else []
-        elif value is not None:
-            words.append(f"{flag}={text_of(value)}")
-    return words
-
-
-SWITCHES = ("bursting", "resume", "lock_memory")
-
-
-def _module(name: str) -> tuple[str, ...]:
-    return (sys.executable, "-u", "-m", f"o80_table_tennis.lab.{name}")
+def _flags(options: Mapping[str, Any]) -> list[str]:
+    return [f"--{name}={text_of(value)}" for name, value in options.items() if value is not None]
 
 
 def o80_command() -> str:
@@ -216,8 +193,7 @@ def o80_command() -> str:
     return str(Path(sysconfig.get_path("scripts")) / "o80")
 
 
-def free_port() -> int:
-    """A port of this computer that nobody listens on."""
+def _free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port: int = listener.getsockname()[1]
         return port

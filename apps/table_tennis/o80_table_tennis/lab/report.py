@@ -14,118 +14,43 @@ import o80
 from o80.base.arrays import IntArray
 from o80.base.finite import json_text
 
-from ..world.timing import ITERATIONS, PERIOD
-from .environment_row import Phase
-from .loops import Loop
-from .parts import (
-    ARM,
-    CAMERAS,
-    ENVIRONMENT,
-    LAUNCHER,
-    MOTION_CAPTURE,
-    RATES,
-    TRACKER,
-    WORLD,
-    LabSettings,
-)
+from ..world.timing import ITERATIONS
+from .environment_process import BALLS, Phase
+from .parts import ARM, ENVIRONMENT, LAUNCHER, MOTION_CAPTURE, RATES, TRACKER, LabSettings
 
-REPORT = "report.json"
-
-MAX_MISSED = {ARM: 0.1} | dict.fromkeys((CAMERAS, TRACKER, MOTION_CAPTURE, ENVIRONMENT), 1.0)
+Figures = dict[str, Any]
+MAX_MISSED = {name: 0.1 if name == ARM else 1.0 for name in RATES if name != LAUNCHER}
 """Periods that may be missed on a quiet machine [%]."""
 SETTLING = 1.0
 """Left out at the beginning, while processes still start [s]."""
 
 
-def write_report(
-    settings: LabSettings,
-    loops: Mapping[str, Loop],
-    usage: Mapping[str, float],
-    seconds: float,
-) -> dict[str, Any]:
-    """Writes the report, and returns what it holds."""
-    rows = _Rows(settings)
-    processes = {name: _process(name, loop, rows, usage.get(name)) for name, loop in loops.items()}
+def write_report(settings: LabSettings, loops: Mapping[str, Figures]) -> Figures:
+    """Writes the report, and returns it. loops: counters of the processes, by name."""
+    recording, rows = o80.open(settings.recording), {}
+    for part in RATES:
+        name = settings.segment(part)
+        if name in recording and recording[name].epochs:
+            history = recording[name].epochs[-1].history()  # of its last run
+            begin = int(np.searchsorted(history.time, history.time[:1] + round(SETTLING * 1e9))[0])
+            if len(history) - begin > 2:
+                rows[part] = history[begin:]
+    processes = {name: dict(loop) | _jitter(name, rows.get(name)) for name, loop in loops.items()}
     report = {
-        "balls": _balls(rows),
+        "balls": _balls(rows.get(ENVIRONMENT)),
         "processes": processes,
-        "processor_percent": {name: round(used, 1) for name, used in usage.items()},
         "processors": os.cpu_count(),
         "latency_ms": _latencies(rows),
-        "tracking_error_mm": _tracking_error(rows),
-        "motion_capture_error_mm": _motion_capture_error(rows),
-        "launcher": _launcher(rows),
-        "seconds": round(seconds, 1),
+        "tracking_error_mm": _tracking_error(rows.get(TRACKER), rows.get(ENVIRONMENT)),
+        "motion_capture_error_mm": _motion_capture_error(rows.get(MOTION_CAPTURE), rows.get(ARM)),
+        "launcher": _last(rows.get(LAUNCHER), "completed", "rejected", "not_sent", "timed_out"),
         "settings": {"policy": settings.policy, "seed": settings.seed, "balls": settings.balls},
         "wanted": _wanted(processes),
         "wall_clock": time.strftime("%Y-%m-%d %H:%M:%S"),
         "kernel": os.uname().version,
     }
-    path = settings.folder / REPORT
-    path.write_text(json_text(report, indent=2) + "\n")
+    (settings.folder / "report.json").write_text(json_text(report, indent=2) + "\n")
     return report
-
-
-class _Rows:
-    """The recorded rows of each part; None: there are none."""
-
-    def __init__(self, settings: LabSettings) -> None:
-        self._recording = o80.open(settings.recording)
-        self._settings = settings
-
-    def of(self, part: str) -> o80.History | None:
-        """Rows of the last run of a part, without its beginning."""
-        name = self._settings.segment(part)
-        if name not in self._recording:
-            return None
-        epochs = self._recording[name].epochs
-        history = epochs[-1].history() if epochs else None
-        if history is None or len(history) < 2:
-            return None
-        begin = history.time[0] + round(SETTLING * 1e9)
-        settled = history[int(np.searchsorted(history.time, begin)) :]
-        return settled if len(settled) > 2 else history
-
-    def whole(self, part: str) -> o80.History | None:
-        """All rows of the last run of a part."""
-        name = self._settings.segment(part)
-        if name not in self._recording or not self._recording[name].epochs:
-            return None
-        history: o80.History = self._recording[name].epochs[-1].history()
-        return history if len(history) > 1 else None
-
-
-def _process(name: str, loop: Loop, rows: _Rows, usage: float | None) -> dict[str, Any]:
-    """Rate, missed periods and jitter: by its rows, or without them by its counters."""
-    found: dict[str, Any] = {
-        "asked": RATES.get(name),
-        "measured": loop.rate,
-        "missed_percent": loop.missed_percent,
-        "scheduling": loop.scheduling,
-        "processor_percent": None if usage is None else round(usage, 1),
-        "from": "counters",
-    }
-    history = rows.of(name)
-    if name not in RATES or history is None:
-        return found
-    found |= regularity(history.time, history.skipped, 1e9 / RATES[name])
-    if name == ENVIRONMENT:  # it skips no step, but makes up for those that came late
-        late = np.asarray(history.extended.late) >= ITERATIONS
-        found["missed_percent"] = 100.0 * float(late.mean())
-    return found
-
-
-def regularity(times: IntArray, skipped: NDArray[np.uint32], period: float) -> dict[str, Any]:
-    """Regularity of rows, from their times and counts of skipped periods; period [ns]."""
-    between = np.diff(times)
-    missed = int(skipped[-1]) - int(skipped[0])
-    return {
-        "from": "rows",
-        "rows": len(times),
-        "measured": float(1e9 / between.mean()),
-        "missed_percent": 100.0 * missed / (len(between) + missed),
-        "jitter_us": spread(np.abs(between - period) * 1e-3),
-    }
 
 
 def spread(values: NDArray[np.floating[Any]]) -> dict[str, float] | None:
@@ -138,120 +63,92 @@ def spread(values: NDArray[np.floating[Any]]) -> dict[str, float] | None:
     return {name: round(float(value), 4) for name, value in named.items()}
 
 
-def _balls(rows: _Rows) -> dict[str, int]:
-    history = rows.of(ENVIRONMENT)
-    if history is None:
+def _last(rows: o80.History | None, *names: str) -> dict[str, int]:
+    return {} if rows is None else {name: int(rows.extended[name][-1]) for name in names}
+
+
+def _balls(rows: o80.History | None) -> dict[str, int]:
+    counts = _last(rows, *BALLS[1:], "launches_failed")
+    return {name.removeprefix("balls_"): count for name, count in counts.items()}
+
+
+def _jitter(name: str, rows: o80.History | None) -> Figures:
+    """Distance of neighbouring rows from the period [us]."""
+    if rows is None:
         return {}
-    last = history.extended
-    names = ("played", "touched", "returned", "given_up")
-    found = {name: int(last[f"balls_{name}"][-1]) for name in names}
-    return found | {"launches_failed": int(last.launches_failed[-1])}
-
-
-def _latencies(rows: _Rows) -> dict[str, Any]:
-    """From capture to the row that shows it [ms]."""
-    found: dict[str, Any] = {}
-    if (tracker := rows.of(TRACKER)) is not None:
-        taken = np.asarray(tracker.extended.image_time)
-        found["image to row of the tracker"] = _ages(tracker.time, taken)
-    if (system := rows.of(MOTION_CAPTURE)) is not None:
-        taken = np.asarray(system.extended.capture_time)
-        found["frame to row of the motion capture"] = _ages(system.time, taken)
-    if (environment := rows.of(ENVIRONMENT)) is not None:
-        seen = environment.extended
-        found["row of the arm to row of the environment"] = _ages(
-            environment.time, np.asarray(seen.arm_time)
-        )
-        found["image to row of the environment"] = _ages(
-            environment.time, np.asarray(seen.ball_time)
-        )
+    found: Figures = {"jitter_us": spread(np.abs(np.diff(rows.time) - 1e9 / RATES[name]) * 1e-3)}
+    if name == ENVIRONMENT:  # it skips no step, but makes up for those that came late
+        late = np.asarray(rows.extended.late) >= ITERATIONS
+        found["missed_percent"] = 100.0 * float(late.mean())
     return found
 
 
-def _ages(now: IntArray, then: IntArray) -> dict[str, float] | None:
-    """Ages at `now` of captures at `then` (0: none), in [ns]; returned in [ms]."""
-    return spread((now - then)[then > 0] * 1e-6)
+def _latencies(rows: Mapping[str, o80.History]) -> Figures:
+    """From capture to the row that shows it [ms]."""
+    captures = (
+        ("image to row of the tracker", TRACKER, "image_time"),
+        ("frame to row of the motion capture", MOTION_CAPTURE, "capture_time"),
+        ("row of the arm to row of the environment", ENVIRONMENT, "arm_time"),
+        ("image to row of the environment", ENVIRONMENT, "ball_time"),
+    )
+    found = {}
+    for what, part, field in captures:
+        if part in rows:
+            now, then = rows[part].time, np.asarray(rows[part].extended[field])
+            found[what] = spread((now - then)[then > 0] * 1e-6)
+    return found
 
 
-def _tracking_error(rows: _Rows) -> dict[str, Any] | None:
-    """Errors of the tracker against the ball of the world when the images were taken [mm], and
-    of the ball that the policy observed against the world at the same time."""
-    tracker, world, environment = rows.of(TRACKER), rows.whole(WORLD), rows.of(ENVIRONMENT)
-    if tracker is None or world is None or environment is None:
+def _between(at: IntArray, times: IntArray, places: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Places (n, 3) at other times, NaN outside."""
+    axes = (np.interp(at, times, axis, left=np.nan, right=np.nan) for axis in places.T)
+    return np.stack(list(axes), axis=1)
+
+
+def _tracking_error(tracker: o80.History | None, environment: o80.History | None) -> Figures | None:
+    """Errors [mm] of the tracker, at the times of its images against the ball of the world between
+    rows of the environment, and of the ball that the policy observed."""
+    if tracker is None or environment is None:
         return None
-    played, seen = environment.extended, tracker.extended
-    playing = (played.phase == Phase.playing) & (played.world_row >= 0)
-    # the world mirrors five rows of the arm for each row of the environment
-    row_at, time_at = np.asarray(played.world_row)[playing], np.asarray(played.arm_time)[playing]
-    at = np.asarray(seen.capture_time)
-    found = np.searchsorted(time_at, at)
-    good = (at > 0) & (found < len(time_at))
-    found, at = found[good], at[good]
-    back = (time_at[found] - at) / (1e9 * PERIOD)
-    first = int(world.iteration[0])
-    place = row_at[found] - back - first
-    good_place = (back < ITERATIONS) & (place >= 0) & (place <= len(world) - 1)
-    balls = world.rows["observed"]["balls"].reshape(len(world), -1)[:, 0]["position"]
-    below = np.floor(place[good_place]).astype(int)
-    share = (place[good_place] - below)[:, None]
-    true = (1 - share) * balls[below] + share * balls[np.minimum(below + 1, len(world) - 1)]
-    away = np.asarray(seen.position)[good][good_place] - true
+    rows: Any = environment.extended
+    playing = rows.phase == Phase.playing
+    if not playing.any():
+        return None
+    times, seen = np.asarray(rows.arm_time), np.asarray(rows.seen)
+    true = np.where(playing[:, None], rows.true_ball, np.nan)
+    images = np.asarray(tracker.extended.capture_time)
+    away = np.asarray(tracker.extended.position) - _between(images, times, true)
     # an observation is published with the next row of the environment
-    when, seen_then = np.asarray(played.observed_at), np.asarray(played.seen)
-    then = np.minimum(np.searchsorted(played.arm_time, when), len(when) - 1)
-    seen_then = seen_then & (np.asarray(played.arm_time)[then] == when)
-    observed = np.asarray(played.observed_ball) - np.asarray(played.true_ball)[then]
-    in_play = np.asarray(played.seen)[played.phase == Phase.playing]
+    observed = np.asarray(rows.observed_ball) - _between(np.asarray(rows.observed_at), times, true)
     return {
-        "at the time of the images": spread(1e3 * np.linalg.norm(away, axis=1)),
+        "at the time of the images": spread(1e3 * np.linalg.norm(away[images > 0], axis=1)),
         "as observed, flown on to the row of the arm": spread(
-            1e3 * np.linalg.norm(observed[np.asarray(played.seen)], axis=1)
+            1e3 * np.linalg.norm(observed[seen], axis=1)
         ),
-        "share of the rows with a ball that was seen": round(float(np.mean(in_play)), 4)
-        if len(in_play) > 0
-        else None,
+        "share of the rows with a ball that was seen": round(float(seen[playing].mean()), 4),
     }
 
 
-def _motion_capture_error(rows: _Rows) -> dict[str, float] | None:
+def _motion_capture_error(system: o80.History | None, arm: o80.History | None) -> Figures | None:
     """Error of the racket against the rows of the arm at the same times [mm]."""
-    system, arm = rows.of(MOTION_CAPTURE), rows.of(ARM)
     if system is None or arm is None:
         return None
-    racket = system.extended.racket
-    at = np.asarray(system.extended.capture_time)
-    good = np.asarray(racket.visible) & (at > arm.time[0]) & (at < arm.time[-1])
-    true = np.stack(
-        [np.interp(at[good], arm.time, axis) for axis in arm.extended.racket_position.T], axis=1
-    )
-    away = np.asarray(racket.position)[good] - true
-    return spread(1e3 * np.linalg.norm(away, axis=1))
+    racket: Any = system.extended.racket
+    true = _between(system.extended.capture_time, arm.time, arm.extended.racket_position)
+    good = np.asarray(racket.visible)
+    return spread(1e3 * np.linalg.norm((np.asarray(racket.position) - true)[good], axis=1))
 
 
-def _launcher(rows: _Rows) -> dict[str, int]:
-    history = rows.of(LAUNCHER)
-    if history is None:
-        return {}
-    names = ("completed", "rejected", "not_sent", "timed_out")
-    return {name: int(history.extended[name][-1]) for name in names}
-
-
-def _wanted(processes: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+def _wanted(processes: Mapping[str, Figures]) -> Figures:
     """Targets of a quiet machine, and whether this run has reached them."""
-    wanted: dict[str, Any] = {}
+    wanted: Figures = {}
     for name, most in MAX_MISSED.items():
         if name in processes:
-            missed = processes[name]["missed_percent"]
-            wanted[f"{name}: missed periods [%]"] = {
-                "most": most,
-                "measured": round(missed, 3),
-                "reached": bool(missed < most),
-            }
+            missed = round(processes[name]["missed_percent"], 3)
+            said = {"wanted": f"less than {most}", "measured": missed, "reached": missed < most}
+            wanted[f"{name}: missed periods [%]"] = said
     if ARM in processes:
-        scheduling = processes[ARM]["scheduling"]
-        wanted["arm: scheduling"] = {
-            "wanted": "fifo",
-            "measured": scheduling,
-            "reached": scheduling.startswith("fifo"),
-        }
+        kind = processes[ARM]["scheduling"]
+        said = {"wanted": "fifo", "measured": kind, "reached": kind.startswith("fifo")}
+        wanted["arm: scheduling"] = said
     return wanted
