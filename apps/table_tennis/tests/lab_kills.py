@@ -1,17 +1,12 @@
-"""Kills each process of a running lab, and looks what the others say: see the table of parts.
-
-As a program it prints the times, and writes kills.json.
-"""
+"""Kills each process of a running lab, and looks what the others say: see the table of parts."""
 
 from __future__ import annotations
 
-import argparse
-import json
 import os
 import signal
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Callable
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -25,13 +20,10 @@ from o80_table_tennis.lab.parts import (
     COUNTERPARTS,
     DIED,
     ENVIRONMENT,
-    NINE,
     NO_IMAGE,
     NO_RACKET,
     RATES,
     RECORDER,
-    SUPERVISOR,
-    VIEW,
     WORLD,
     LabSettings,
     Part,
@@ -39,6 +31,7 @@ from o80_table_tennis.lab.parts import (
 )
 from o80_table_tennis.lab.processes import Processes
 
+SUPERVISOR = "supervisor"
 WITHIN = 60.0
 """For what takes a fraction of a second on a quiet machine [s]."""
 SAYS_WITHIN = 0.2
@@ -72,8 +65,6 @@ class Said:
     """How a part said that another one was missing."""
 
     part: str
-    seconds: float
-    """From the last row of the killed process to the row that says so."""
     rows: int
     """Rows of that part from the end of the killed process on; a busy machine may need long."""
 
@@ -133,12 +124,12 @@ class Killer:
     def _kill(self, name: str, observers: dict[str, o80.Frontend], outcome: Outcome) -> int:
         """Time of the last row of the process, or of the kill if it has no rows by the clock."""
         before, processes = time.monotonic_ns(), self._processes
-        os.kill(processes.pid(name), signal.SIGKILL)
+        os.kill(processes.running[name].pid, signal.SIGKILL)
         assert name in processes.ended(WITHIN)
         ended = processes.collected(name)
         outcome.ended_at = time.monotonic_ns()
         assert ended.code == -9, f"{name} ended before it was killed: {ended}"
-        outcome.said.append(Said(SUPERVISOR, (outcome.ended_at - before) * 1e-9, 0))
+        outcome.said.append(Said(SUPERVISOR, 0))
         observer = observers.get(name)
         if observer is None or observer.bursting:
             return before
@@ -163,7 +154,7 @@ class Killer:
     def _start_again(self, kill: Part, outcome: Outcome) -> None:
         name, recording = kill.name, self._recording
         size = recording.stat().st_size
-        self._processes.start((name,))
+        self._processes.start(name)
         self._processes.wait_until_running(WITHIN)
         if name == RECORDER:  # a lab that ends before would end it, too
             wait_until(lambda: recording.stat().st_size > size, "the recorder goes on")
@@ -203,7 +194,7 @@ def said(part: str, says: str, observer: o80.Frontend, last: int, ended_at: int)
     wait_until(look, f"{part} says: {says}")
     begin = min(max(last, ended_at), found[0])
     rows = observer.history().select(from_time=begin, to_time=found[0])
-    return Said(part, (found[0] - last) * 1e-9, len(rows))
+    return Said(part, len(rows))
 
 
 def _first(says: str, observer: o80.Frontend, last: int) -> list[int]:
@@ -246,28 +237,3 @@ def started(settings: LabSettings) -> Processes:
         processes.close()
         raise
     return processes
-
-
-def main(arguments: Sequence[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--output", type=Path, default=LabSettings().folder)
-    parser.add_argument("--prefix", default=LabSettings().prefix)
-    given = parser.parse_args(arguments)
-    settings = LabSettings(balls=0, prefix=given.prefix, folder=given.output)
-    outcomes = []
-    with started(settings) as processes:
-        killer = Killer(processes, settings.recording)
-        killer.wait_for_a_ball()
-        for name in NINE:
-            outcome = killer.kill(name)
-            if name not in (RECORDER, VIEW):
-                killer.wait_for_a_ball()
-            outcomes.append(outcome)
-            for each in outcome.said:
-                print(f"{name:>14} killed: {each.part} says so after {1e3 * each.seconds:.0f} ms")
-    text = json.dumps([asdict(outcome) for outcome in outcomes], indent=2)
-    (settings.folder / "kills.json").write_text(text + "\n")
-
-
-if __name__ == "__main__":
-    main()

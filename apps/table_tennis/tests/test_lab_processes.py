@@ -11,15 +11,14 @@ from pathlib import Path
 import pytest
 
 import o80
-from o80_table_tennis.lab.parts import Part
-from o80_table_tennis.lab.parts import o80_command as command
+from o80_table_tennis.lab.parts import COMMAND, Part
 from o80_table_tennis.lab.processes import PartEndedError, Processes
 
 WAITING = 30.0
 """For what takes milliseconds on a quiet machine [s]."""
 
 
-def program(name: str, text: str, says: str | None = None) -> Part:
+def program(name: str, text: str, says: str = "") -> Part:
     return Part(name, (sys.executable, "-u", "-c", text), says=says)
 
 
@@ -29,7 +28,7 @@ BROKEN = program("broken", "print('loading'); print('no such arm'); raise System
 
 def robot(name: str) -> Part:
     segment = f"lab-test-{os.getpid()}-{name}"
-    return Part(name, (command(), "run", "two_joints", f"--segment={segment}"), segment)
+    return Part(name, (COMMAND, "run", "two_joints", f"--segment={segment}"), segment)
 
 
 @pytest.fixture
@@ -66,7 +65,7 @@ def test_a_process_that_ends_at_its_start_is_named_with_its_last_lines(
     processes.start()
     with pytest.raises(PartEndedError, match="'broken' ended with exit code 3") as caught:
         processes.wait_until_running(WAITING)
-    assert caught.value.lines == ("loading", "no such arm")
+    assert caught.value.lines == ["loading", "no such arm"]
 
 
 def test_what_does_not_run_in_time_is_named_with_its_last_lines(
@@ -81,13 +80,13 @@ def test_what_does_not_run_in_time_is_named_with_its_last_lines(
 
 def test_a_killed_process_is_told_and_can_be_started_again(lab: Callable[..., Processes]) -> None:
     processes = lab(robot("left"), robot("right"))
-    processes.start(("right", "left"))
+    processes.start("right", "left")
     processes.wait_until_running(WAITING)
-    os.kill(processes.pid("left"), signal.SIGKILL)
+    os.kill(processes.running["left"].pid, signal.SIGKILL)
     assert processes.ended(WAITING) == ["left"]
     assert "was killed by SIGKILL" in str(processes.collected("left"))
-    assert processes.running == ["right"]
-    processes.start(("left",))
+    assert list(processes.running) == ["right"]
+    processes.start("left")
     processes.wait_until_running(WAITING)
     with o80.Frontend(processes.parts["left"].segment or "") as left:
         left.wait_for_next(timeout=WAITING)
@@ -99,8 +98,8 @@ def test_closing_ends_all_and_removes_the_segments_of_killed_ones(
     processes = lab(robot("left"), robot("right"), ASLEEP)
     processes.start()
     processes.wait_until_running(WAITING)
-    pids = [processes.pid(name) for name in processes.running]
-    os.kill(processes.pid("left"), signal.SIGKILL)
+    pids = [each.pid for each in processes.running.values()]
+    os.kill(processes.running["left"].pid, signal.SIGKILL)
     processes.close()
     assert not any(lives(pid) for pid in pids)
     assert not [each for each in o80.segments() if each.name.startswith("lab-test-")]
@@ -117,7 +116,7 @@ def test_the_last_of_the_table_ends_first(lab: Callable[..., Processes], tmp_pat
     processes = lab(
         *(program(name, text.format(file=str(file), name=name), "up") for name in names)
     )
-    processes.start(reversed(names))
+    processes.start(*reversed(names))
     processes.wait_until_running(WAITING)
     processes.close()
     assert file.read_text().split() == ["tracker", "cameras", "world"]
@@ -128,14 +127,13 @@ import sys, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
 from test_lab_processes import ASLEEP, WAITING, robot
-from o80_table_tennis.lab.parts import o80_command as command
 from o80_table_tennis.lab.processes import Processes
 from o80_table_tennis.ending import ends_in_order
 
 with ends_in_order(), Processes([robot("arm"), ASLEEP], Path({folder!r})) as processes:
     processes.start()
     processes.wait_until_running(WAITING)
-    print(*[processes.pid(name) for name in processes.running], flush=True)
+    print(*[each.pid for each in processes.running.values()], flush=True)
     while True:
         processes.ended(0.5)
 """

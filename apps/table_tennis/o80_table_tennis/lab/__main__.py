@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated
 
@@ -15,11 +14,10 @@ import o80
 from o80.base.screen import keep_printing
 
 from ..ending import ends_in_order
-from .environment_process import Phase
-from .parts import ENVIRONMENT, RATES, VIEW, LabSettings, lab_parts
-from .processes import PartEndedError, Processes
-from .report import Figures, write_report
-from .watched import Watched
+from .environment_process import COUNTS, Phase
+from .parts import ENVIRONMENT, VIEW, LabSettings, lab_parts
+from .processes import PartEndedError, Processes, Watched
+from .report import write_report
 
 STARTS_WITHIN = 60.0
 """All processes, on a busy machine [s]."""
@@ -53,8 +51,8 @@ def main(
     console.print(f"balls: {report['balls']}\nreport: {settings.folder / 'report.json'}")
 
 
-def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str, Figures]:
-    """Plays all balls. Returns how the loops kept their rates, by process.
+def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str, str]:
+    """Plays all balls. Returns the scheduling class of each process.
 
     A process that ends is started again with `restart`; else raises PartEndedError.
     """
@@ -65,52 +63,31 @@ def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str,
         processes.start()
         processes.wait_until_running(STARTS_WITHIN)
         console.print(f"see it at {processes.printed(VIEW).splitlines()[0]}")
-        watched = {name: Watched(settings.segment(name)) for name in RATES}
-        begin = found = loops(processes, watched, {})
-        shown = ""
+        observer, shown = Watched(settings.segment(ENVIRONMENT)), ""
         while True:
             for name in processes.ended(LOOK):
                 ended = processes.collected(name)
                 if not restart:
                     raise ended
                 console.print(f"{ended}\nIt is started again.", markup=False)
-                processes.start((name,))
-            found = found | loops(processes, watched, begin)
-            environment = watched[ENVIRONMENT].frontend()
+                processes.start(name)
+            environment = observer.frontend()
             if environment is None:
                 continue
             row = environment.latest().extended
-            said = f"{row.balls_played} balls, {row.balls_touched} touched, {row.balls_returned} "
-            missing = ", ".join(name for name in row.missing if row.missing[name])
-            said += "returned" + (f"; missing: {missing}" if missing else "")
+            played, touched, returned, _ = (row[count] for count in COUNTS)
+            missing = "".join(f"; {name} is missing" for name in row.missing if row.missing[name])
+            said = f"{played} balls, {touched} touched, {returned} returned{missing}"
             if said != shown:
                 console.print(shown := said)
             if row.phase == Phase.over:
-                return found
+                return {name: scheduling(each.pid) for name, each in processes.running.items()}
 
 
-def loops(
-    processes: Processes, watched: Mapping[str, Watched], begin: Mapping[str, Figures]
-) -> dict[str, Figures]:
-    """Rates, and periods missed since `begin`, of the processes that are there."""
-    found = {}
-    for name, observer in watched.items():
-        frontend = observer.frontend()
-        if frontend is None or name not in processes.running:
-            continue
-        pid, counts = processes.pid(name), (frontend.published, frontend.missed_ticks)
-        before = begin.get(name, {}).get("counts", (0, 0))
-        before = before if before[0] <= counts[0] else (0, 0)  # it was started again
-        rows, missed = (now - then for now, then in zip(counts, before, strict=True))
-        kind, priority = os.sched_getscheduler(pid), os.sched_getparam(pid).sched_priority
-        found[name] = {
-            "asked": RATES[name],
-            "measured": frontend.rate_reached,
-            "missed_percent": 100.0 * missed / max(1, rows + missed),
-            "scheduling": f"{CLASSES.get(kind, kind)} {priority or ''}".rstrip(),
-            "counts": counts,
-        }
-    return found
+def scheduling(pid: int) -> str:
+    """Scheduling class of a process, and its priority if it is real time."""
+    kind, priority = os.sched_getscheduler(pid), os.sched_getparam(pid).sched_priority
+    return f"{CLASSES.get(kind, kind)} {priority or ''}".rstrip()
 
 
 if __name__ == "__main__":

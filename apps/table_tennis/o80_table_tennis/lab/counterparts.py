@@ -1,43 +1,49 @@
-"""The driver that plays the hardware behind the drivers: the ball launcher, the motion capture."""
+"""The hardware behind the drivers: what plays it, and how the environment asks it for a ball.
+
+The recorded launcher stands on the floor and shoots faster than the policies know. Here it is
+raised so far that its balls leave it where those of the simulated shots `wide` begin.
+"""
 
 from __future__ import annotations
 
+import math
 import threading
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
 
+import o80
 from o80.drivers import Reading, Seed, option
-from o80_devices.ball_launcher.launch_model import Launch
+from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch
+from o80_devices.ball_launcher.wheel_speeds import actuation_of
 from o80_devices.fakes.ball_launcher import Behaviour, FakeLauncher
 from o80_devices.fakes.qualisys import FakeQualisys, Pose
 
+from ..balls import launches
+from ..balls.launches import WIDE
 from ..world.table import TABLE
-from .launching import PLACE
-from .parts import SUBJECTS
-from .watched import Watched
+from .parts import COUNTERPARTS, LAUNCHER, SUBJECTS, LabSettings
+from .processes import Watched
 
+_X, _Y, _Z = WIDE.position
+PLACE = ((_X, _Y, _Z - LAUNCH_MODEL.muzzle[2]), -math.pi / 2)
+"""Position [m] and yaw [rad] of the launcher in the world: it shoots along -y."""
+TOP_SPINS = (0.0, 60.0)
+"""Least and most [rad/s]: with the scatter of the launcher, within those of `wide`."""
+SPREAD = 0.2
+"""Spread of each component of the velocity, either way [m/s]; the launcher adds its scatter."""
+STATE = ("position", "velocity", "spin")
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Counterparts:
-    """Its row is the last launch, in the world, as the launch model drew it; number 0: none yet.
-
-    The fake launcher takes its time. The fake Qualisys server sees the racket of the arm, its base
-    and the table.
-    """
+    """Driver of the fakes: its row is the last launch, in the world; number 0: none yet."""
 
     simulated = True
     frequency = 200.0
-    extended: ClassVar = {
-        "number": np.int64,
-        "capture_time": np.int64,
-        "position": (np.float64, (3,)),
-        "velocity": (np.float64, (3,)),
-        "spin": (np.float64, (3,)),
-    }
-    units: ClassVar = {"capture_time": "ns", "position": "m", "velocity": "m/s", "spin": "rad/s"}
+    extended: ClassVar = {"number": np.int64, **dict.fromkeys(STATE, (np.float64, (3,)))}
+    units: ClassVar = {"position": "m", "velocity": "m/s", "spin": "rad/s"}
 
     @dataclass
     class Config:
@@ -47,13 +53,11 @@ class Counterparts:
         seed: Seed = Seed(0)  # noqa: RUF009
 
     def __init__(self, config: Config) -> None:
-        self._config, self._now = config, 0
-        self._row: dict[str, Any] = {"number": 0}
+        self._config, self._row = config, dict[str, Any](number=0)
 
     def start(self) -> None:
-        behaviour = Behaviour(
-            state_time=0.1, launch_time=0.4, magazine=10**6, seed=int(self._config.seed)
-        )
+        seed = int(self._config.seed)
+        behaviour = Behaviour(state_time=0.1, launch_time=0.4, magazine=10**6, seed=seed)
         self._arm, self._lock = Watched(self._config.arm), threading.Lock()
         self._launcher = FakeLauncher(behaviour, on_launch=self._on_launch)
         self._launcher.bind(self._config.launcher)
@@ -61,8 +65,7 @@ class Counterparts:
         self._server.__enter__()
 
     def read(self, reading: Reading) -> None:
-        self._now = reading.time
-        self._launcher.step(self._now)
+        self._launcher.step(reading.time)
         for name, value in self._row.items():
             reading.extended[name] = value
 
@@ -72,9 +75,9 @@ class Counterparts:
         self._arm.close()
 
     def _on_launch(self, ball: Launch) -> None:
-        placed = ball.placed(PLACE.offset, PLACE.yaw)
-        self._row = {"number": self._row["number"] + 1, "capture_time": self._now}
-        self._row |= {name: getattr(placed, name) for name in ("position", "velocity", "spin")}
+        placed = ball.placed(*PLACE)
+        state = {name: getattr(placed, name) for name in STATE}
+        self._row = {"number": self._row["number"] + 1} | state
 
     def _pose(self, name: str, when: int) -> Pose | None:
         """Pose of a body at a time [ns]; None: it is not there. Each connection is a thread."""
@@ -88,3 +91,62 @@ class Counterparts:
         racket, since = row.extended, (when - row.time) * 1e-9
         position = racket.racket_position + since * racket.racket_velocity
         return position.tolist(), racket.racket_rotation.tolist()
+
+
+def drawn_aim(rng: np.random.Generator) -> list[float]:
+    """Angles and motors (5,) of the launcher for another ball: the launch model, inverted."""
+    model = LAUNCH_MODEL
+    velocity = np.array(WIDE.velocity) + SPREAD * rng.uniform(-1.0, 1.0, 3)
+    difference = (rng.uniform(*TOP_SPINS) - model.spin) / model.spin_gain  # of upper and lower
+    speed = float(np.linalg.norm(velocity))
+    bottom = (speed - 2 * model.top_gain * difference) / (2 * model.top_gain + model.bottom_gain)
+    aside, ahead, up = velocity[0], -velocity[1], velocity[2]
+    azimuth, altitude = math.atan2(aside, ahead), math.atan2(up, math.hypot(aside, ahead))
+    phi = 0.5 + (azimuth - model.azimuth) / model.azimuth_range
+    theta = 0.5 + (altitude - model.altitude - model.lift * difference) / model.altitude_range
+    upper = actuation_of(bottom + difference)
+    return [phi, theta, upper, upper, actuation_of(bottom)]
+
+
+class Launching:
+    """Sets the motors, asks for a launch, and finds the ball; never blocks."""
+
+    def __init__(self, settings: LabSettings) -> None:
+        self._launcher = Watched(settings.segment(LAUNCHER), read_only=False)
+        self._launches = Watched(settings.segment(COUNTERPARTS))
+        self._random = np.random.default_rng(settings.seed)
+        self._batch: o80.Batch | None = None
+        self.number = 0
+        """Number of the last launch that was found."""
+        self.failed = False
+        """The launcher has refused the last launch, or has lost it."""
+
+    def ask(self) -> None:
+        """The next ball is wanted: the launcher is asked as soon as it is there and ready."""
+        self._batch, self.failed = None, False
+        self._aim = drawn_aim(self._random)
+        row = self._newest()
+        self.number = self.number if row is None else int(row.number)  # others are none of ours
+
+    def came(self) -> launches.Launch | None:
+        """The ball that has left the launcher since `ask`; None: none yet."""
+        launcher, row = self._launcher.frontend(), self._newest()
+        if self._batch is not None:
+            self.failed = launcher is None or (
+                self._batch.ended and self._batch.statuses[-1] is not o80.Status.COMPLETED
+            )
+        elif launcher is not None and bool(launcher.latest().extended.connected):
+            launcher.add_command(None, self._aim, mode="overwrite")
+            launcher.add_request("launch")
+            self._batch = launcher.pulse()
+        if row is None:
+            return None
+        if self._batch is None or row.number <= self.number:
+            self.number = min(self.number, int(row.number))  # the counterpart was started again
+            return None
+        self.number = int(row.number)
+        return launches.Launch(np.array(row.position), np.array(row.velocity), np.array(row.spin))
+
+    def _newest(self) -> Any:
+        frontend = self._launches.frontend()
+        return None if frontend is None else frontend.latest().extended

@@ -22,14 +22,11 @@ from ..world.timing import PERIOD
 
 ARM, WORLD, LAUNCHER, CAMERAS = "arm", "world", "launcher", "cameras"
 TRACKER, MOTION_CAPTURE, ENVIRONMENT = "tracker", "motion_capture", "environment"
-RECORDER, VIEW, COUNTERPARTS, SUPERVISOR = "recorder", "view", "counterparts", "supervisor"
-NINE = (
-    *(ARM, WORLD, LAUNCHER, CAMERAS, TRACKER),
-    *(MOTION_CAPTURE, ENVIRONMENT, RECORDER, VIEW),
-)
+RECORDER, VIEW, COUNTERPARTS = "recorder", "view", "counterparts"
+WATCHED = (ARM, WORLD, LAUNCHER, CAMERAS, TRACKER, MOTION_CAPTURE)
+"""Parts of which a row of the environment says whether they are missing."""
+NINE = (*WATCHED, ENVIRONMENT, RECORDER, VIEW)
 """The processes of the lab; the four cameras are one."""
-RECORDED = (ARM, WORLD, LAUNCHER, TRACKER, MOTION_CAPTURE, ENVIRONMENT)
-"""No images."""
 RATES = {ARM: 500.0, LAUNCHER: 50.0, CAMERAS: 180.0, TRACKER: 180.0, MOTION_CAPTURE: 300.0} | {
     ENVIRONMENT: 100.0
 }
@@ -38,7 +35,11 @@ RIG = RigSettings(preset="identified")
 SUBJECTS = ("racket", "base", "table")
 """Subjects that the motion capture sees."""
 NO_IMAGE, NO_RACKET = "`reason` is `no_image`", "`racket.visible` is false"
-DIED, NAMED = "journal: `died`", "names it, with its last lines"
+DIED = "journal: `died`"
+OPTIONS = ("prefix", "balls", "seed", "policy")
+"""Settings of the process of the environment."""
+COMMAND = str(Path(sysconfig.get_path("scripts")) / "o80")
+"""The command `o80` of this installation."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class LabSettings:
     """To play; 0: until Ctrl-C."""
     seed: int = 1
     policy: str = "learned"
-    """learned or scripted."""
+    """learned, scripted, or the folder of a training."""
     prefix: str = "lab"
     """Prefix of the names of all segments."""
     folder: Path = Path("build/lab")
@@ -74,7 +75,7 @@ class Part:
     command: tuple[str, ...]
     segment: str | None = None
     """Name of its backend's segment; the part counts as running while the segment does."""
-    says: str | None = None
+    says: str = ""
     """Text of a process without a segment: it runs when it has printed this."""
     missed: Mapping[str, str] | None = None
     """How others say that it is missing, by part; the supervisor always does."""
@@ -89,18 +90,24 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
     of, seed = settings.segment, settings.seed
     launcher, qualisys = f"tcp://127.0.0.1:{_free_port()}", _free_port()
     fifo = ("--policy=fifo", "--lock-memory") if settings.fifo else ()
-    recorded = [of(part) for part in RECORDED]
+    recorded = [of(part) for part in (*WATCHED, ENVIRONMENT) if part != CAMERAS]
 
     def robot(
-        name: str, driver: str, options: Mapping[str, Any], *words: str, **death: Any
+        name: str,
+        driver: str,
+        options: Mapping[str, Any],
+        *words: str,
+        missed: Mapping[str, str] | None = None,
+        **death: Any,
     ) -> Part:
         rate: dict[str, Any] = {"frequency": RATES[name]} if name in RATES else {}
-        flags = _flags({"segment": of(name), **rate, **options})
-        return Part(name, (o80_command(), "run", driver, *flags, *words), of(name), **death)
+        given = {"segment": of(name), **rate, **options}.items()
+        flags = [f"--{key}={text_of(value)}" for key, value in given if value is not None]
+        if name != COUNTERPARTS:
+            missed = {ENVIRONMENT: f"`missing.{name}`", **(missed or {})}
+        return Part(name, (COMMAND, "run", driver, *flags, *words), of(name), "", missed, **death)
 
-    def seen_by_environment(part: str, *blind: str) -> dict[str, str]:
-        return {ENVIRONMENT: f"`missing.{part}`"} | dict.fromkeys(blind, NO_IMAGE)
-
+    blind = {TRACKER: NO_IMAGE}
     parts = (
         robot(
             COUNTERPARTS,
@@ -113,7 +120,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
             {"stale": "purge"} | ({"priority": 80} if fifo else {}) | arm_options(RIG),
             "--resume",  # it is simulated: one that was killed goes on at once
             *fifo,
-            missed=seen_by_environment(ARM, TRACKER) | {MOTION_CAPTURE: NO_RACKET},
+            missed=blind | {MOTION_CAPTURE: NO_RACKET},
             halts=(WORLD,),
             besides="the ball is given up; the next one is played when the arm is back",
         ),
@@ -122,7 +129,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
             "mujoco",
             {"frequency": 1.0 / PERIOD} | world_options(RIG),
             "--bursting",
-            missed=seen_by_environment(WORLD, TRACKER),
+            missed=blind,
             besides="the ball is given up; the arm keeps its pressures",
         ),
         robot(
@@ -130,20 +137,18 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
             "o80_devices.ball_launcher:BallLauncher",
             {"address": launcher},
             "--resume",
-            missed=seen_by_environment(LAUNCHER),
             besides="a ball in flight is played to its end; no other one starts",
         ),
         robot(
             CAMERAS,
             "o80_devices.ball_tracking:SyntheticCameras",
             {"history": 4, "seed": seed, "ball": of(WORLD), "times": of(ENVIRONMENT)},
-            missed=seen_by_environment(CAMERAS, TRACKER),
+            missed=blind,
         ),
         robot(
             TRACKER,
             "o80_devices.ball_tracking:BallTracker",
             {"cameras": of(CAMERAS), "timeout": 60},
-            missed=seen_by_environment(TRACKER),
             besides="a ball in flight is played on as the filter of the observation predicts it",
         ),
         robot(
@@ -151,14 +156,12 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
             "o80_devices.motion_capture:Qualisys",
             {"port": qualisys, "subjects": SUBJECTS} | ({"priority": 40} if fifo else {}),
             *fifo[:1],
-            missed=seen_by_environment(MOTION_CAPTURE),
         ),
         Part(
             ENVIRONMENT,
             (
                 *(sys.executable, "-u", "-m", "o80_table_tennis.lab.environment_process"),
-                *(f"--prefix={settings.prefix}", f"--balls={settings.balls}"),
-                *(f"--seed={seed}", f"--policy={settings.policy}"),
+                *(f"--{key}={getattr(settings, key)}" for key in OPTIONS),
             ),
             of(ENVIRONMENT),
             missed={ARM: DIED, TRACKER: NO_IMAGE},
@@ -167,30 +170,18 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
         ),
         Part(
             RECORDER,
-            (
-                *(o80_command(), "record", *recorded, of(COUNTERPARTS)),
-                *("-o", str(settings.recording), "--continue"),
-            ),
+            (COMMAND, "record", *recorded, "-o", str(settings.recording), "--continue"),
             says=f"'{of(ENVIRONMENT)}' ",  # what becomes of its rows
             besides="started again, it goes on in the same file, without a gap",
         ),
         Part(
             VIEW,
-            (o80_command(), "view", *recorded, "--no-browser"),
+            (COMMAND, "view", *recorded, "--no-browser"),
             says="http",
             besides="started again, it has another address",
         ),
     )
     return {part.name: part for part in parts}
-
-
-def _flags(options: Mapping[str, Any]) -> list[str]:
-    return [f"--{name}={text_of(value)}" for name, value in options.items() if value is not None]
-
-
-def o80_command() -> str:
-    """The command `o80` of this installation."""
-    return str(Path(sysconfig.get_path("scripts")) / "o80")
 
 
 def _free_port() -> int:

@@ -13,7 +13,7 @@ import os
 import signal
 import subprocess
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
 import o80
@@ -26,6 +26,10 @@ LOOK = 0.05
 """Between two looks whether a process has ended, or runs [s]."""
 GRACE = 5.0
 """For a process to end in order; then it is killed [s]."""
+RETRY = 0.05
+"""Between two attempts to attach [s]."""
+SILENT = 0.1
+"""Without a row for so long a segment that does not burst counts as missing [s]."""
 LAST_LINES = 8
 """Number of the last lines of its output, which say why a process has ended."""
 PR_SET_PDEATHSIG = 1
@@ -35,13 +39,12 @@ _libc = ctypes.CDLL(None, use_errno=True)
 class PartEndedError(RuntimeError):
     """A process has ended that nobody had asked to."""
 
-    def __init__(self, part: str, code: int, lines: Sequence[str]) -> None:
-        self.part, self.code, self.lines = part, code, tuple(lines)
+    def __init__(self, part: str, code: int, lines: list[str]) -> None:
+        self.code, self.lines = code, lines
         how = f"ended with exit code {code}"
-        if code < 0:
-            with contextlib.suppress(ValueError):
-                how = f"was killed by {signal.Signals(-code).name}"
-        told = "".join(f"\n  {line}" for line in lines) or "\n  (it printed nothing)"
+        if -code in set(signal.Signals):
+            how = f"was killed by {signal.Signals(-code).name}"
+        told = "".join(f"\n  {line}" for line in lines or ["(it printed nothing)"])
         super().__init__(f"the process '{part}' {how}. It printed last:{told}")
 
 
@@ -56,22 +59,33 @@ class Processes(Closeable):
 
     def __init__(self, parts: Iterable[Part], folder: Path) -> None:
         self.parts: dict[str, Part] = {part.name: part for part in parts}
+        self.running: dict[str, subprocess.Popen[bytes]] = {}
+        """Processes that were started and have not been collected."""
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
-        self._running: dict[str, subprocess.Popen[bytes]] = {}
 
-    def start(self, names: Iterable[str] | None = None) -> None:
-        """Starts processes, in this order, without waiting; None: all. See `wait_until_running`."""
-        for name in self.parts if names is None else names:
-            with self._output_of(name).open("ab") as output:
-                self._running[name] = subprocess.Popen(
+    def start(self, *names: str) -> None:
+        """Starts processes, in this order, without waiting; none named: all.
+
+        See `wait_until_running`.
+        """
+        supervisor = os.getpid()
+
+        def end_with_it() -> None:
+            _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
+            if os.getppid() != supervisor:  # it died before the kernel was asked
+                os._exit(1)
+
+        for name in names or self.parts:
+            with (self._folder / f"{name}.txt").open("ab") as output:
+                self.running[name] = subprocess.Popen(
                     self.parts[name].command,
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=subprocess.STDOUT,
                     # Ctrl-C reaches only the supervisor, which ends the others in order
                     process_group=0,
-                    preexec_fn=_ends_with(os.getpid()),
+                    preexec_fn=end_with_it,
                 )
 
     def wait_until_running(self, timeout: float) -> None:
@@ -80,8 +94,7 @@ class Processes(Closeable):
         Raises PartEndedError if one ends meanwhile, o80.TimeoutError with those that do not run.
         """
         end = time.monotonic() + timeout
-        missing = list(self._running)
-        while missing := [name for name in missing if not self.runs(name)]:
+        while missing := [name for name in self.running if not self.runs(name)]:
             if time.monotonic() > end:
                 lines = [f"'{name}': {' / '.join(self._last_lines(name))}" for name in missing]
                 raise o80.TimeoutError(
@@ -92,74 +105,83 @@ class Processes(Closeable):
 
     def runs(self, name: str) -> bool:
         """Whether a process is there and has begun its work."""
-        popen, part = self._running.get(name), self.parts[name]
+        popen, part = self.running.get(name), self.parts[name]
         if popen is None or popen.poll() is not None:
             return False
         if part.segment is None:
-            return part.says is None or part.says in self.printed(name)
-        return any(
-            each.name == part.segment and each.pid == popen.pid and each.life == "running"
-            for each in o80.segments()
-        )
+            return part.says in self.printed(name)
+        found = {(each.name, each.pid, each.life) for each in o80.segments()}
+        return (part.segment, popen.pid, "running") in found
 
     def ended(self, timeout: float = 0.0) -> list[str]:
         """The processes that have ended and were not collected; waits for one at most so long."""
         end = time.monotonic() + timeout
         while True:
-            found = [name for name, popen in self._running.items() if popen.poll() is not None]
+            found = [name for name, popen in self.running.items() if popen.poll() is not None]
             if found or time.monotonic() >= end:
                 return found
             time.sleep(LOOK)
 
     def collected(self, name: str) -> PartEndedError:
         """Takes a process that has ended off the list, and tells how; it may be started again."""
-        code = self._running.pop(name).wait()
-        return PartEndedError(name, code, self._last_lines(name))
-
-    def pid(self, name: str) -> int:
-        """Process id of a process that runs. Raises KeyError."""
-        return self._running[name].pid
-
-    @property
-    def running(self) -> list[str]:
-        """Names of the processes that were started and have not been collected."""
-        return list(self._running)
+        return PartEndedError(name, self.running.pop(name).wait(), self._last_lines(name))
 
     def printed(self, name: str) -> str:
         """Output of a process, over all its starts."""
-        with contextlib.suppress(FileNotFoundError):
-            return self._output_of(name).read_text(errors="replace")
-        return ""
+        return (self._folder / f"{name}.txt").read_text(errors="replace")
 
     def _last_lines(self, name: str) -> list[str]:
         return self.printed(name).rstrip().splitlines()[-LAST_LINES:]
-
-    def _output_of(self, name: str) -> Path:
-        return self._folder / f"{name}.txt"
 
     def close(self) -> None:
         """Ends all, the last of the table first, and removes the segments of those killed."""
         try:
             for name in reversed(self.parts):
-                if name in self._running:
-                    end_child(self._running[name], GRACE, signal.SIGTERM)
-                    del self._running[name]
+                if name in self.running:
+                    end_child(self.running[name], GRACE, signal.SIGTERM)
+                    del self.running[name]
         finally:
-            for popen in self._running.values():
+            for popen in self.running.values():
                 end_child(popen, 0.0)
-            self._running.clear()
+            self.running.clear()
             for part in self.parts.values():
                 if part.segment is not None:
                     with contextlib.suppress(o80.Error):
                         o80.clean(part.segment)
 
 
-def _ends_with(supervisor: int) -> Callable[[], None]:
-    """First call of a new process: asks the kernel for SIGTERM when the supervisor dies."""
+class Watched:
+    """An observer of a segment that may end and come back."""
 
-    def ask() -> None:
-        _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-        if os.getppid() != supervisor:  # it died before the kernel was asked
-            os._exit(1)
+    def __init__(self, segment: str, *, read_only: bool = True) -> None:
+        self.segment = segment
+        self._read_only = read_only
+        self._frontend: o80.Frontend | None = None
+        self._next_try = 0.0
 
-    return ask
+    def frontend(self) -> o80.Frontend | None:
+        """Attached to the living backend; None: there is none."""
+        if self._frontend is not None and not self._frontend.alive:
+            self.close()
+        if self._frontend is None and time.monotonic() >= self._next_try:
+            self._next_try = time.monotonic() + RETRY
+            try:
+                self._frontend = o80.Frontend(self.segment, timeout=0.0, read_only=self._read_only)
+            except o80.Error:
+                return None
+        return self._frontend
+
+    @property
+    def missing(self) -> bool:
+        """There is no backend, or it has published nothing for a while."""
+        frontend = self.frontend()
+        if frontend is None:
+            return True
+        age = frontend.row_age
+        return age is not None and age > SILENT
+
+    def close(self) -> None:
+        """Detaches; the next look attaches again."""
+        if self._frontend is not None:
+            self._frontend.close()
+        self._frontend = None

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import time
 from collections.abc import Mapping
 from typing import Any
 
@@ -15,18 +13,18 @@ from o80.base.arrays import IntArray
 from o80.base.finite import json_text
 
 from ..world.timing import ITERATIONS
-from .environment_process import BALLS, Phase
+from .environment_process import COUNTS, Phase
 from .parts import ARM, ENVIRONMENT, LAUNCHER, MOTION_CAPTURE, RATES, TRACKER, LabSettings
 
 Figures = dict[str, Any]
-MAX_MISSED = {name: 0.1 if name == ARM else 1.0 for name in RATES if name != LAUNCHER}
+MAX_MISSED = {ARM: 0.1, TRACKER: 1.0, MOTION_CAPTURE: 1.0, ENVIRONMENT: 1.0}
 """Periods that may be missed on a quiet machine [%]."""
 SETTLING = 1.0
 """Left out at the beginning, while processes still start [s]."""
 
 
-def write_report(settings: LabSettings, loops: Mapping[str, Figures]) -> Figures:
-    """Writes the report, and returns it. loops: counters of the processes, by name."""
+def write_report(settings: LabSettings, scheduling: Mapping[str, str]) -> Figures:
+    """Writes the report, and returns it. scheduling: class of each process, by name."""
     recording, rows = o80.open(settings.recording), {}
     for part in RATES:
         name = settings.segment(part)
@@ -35,19 +33,20 @@ def write_report(settings: LabSettings, loops: Mapping[str, Figures]) -> Figures
             begin = int(np.searchsorted(history.time, history.time[:1] + round(SETTLING * 1e9))[0])
             if len(history) - begin > 2:
                 rows[part] = history[begin:]
-    processes = {name: dict(loop) | _jitter(name, rows.get(name)) for name, loop in loops.items()}
+    processes = {
+        name: _regularity(name, history) | {"scheduling": scheduling.get(name, "ended")}
+        for name, history in rows.items()
+    }
+    played = _last(rows.get(ENVIRONMENT), *COUNTS)
     report = {
-        "balls": _balls(rows.get(ENVIRONMENT)),
+        "balls": {name.removeprefix("balls_"): number for name, number in played.items()},
         "processes": processes,
-        "processors": os.cpu_count(),
         "latency_ms": _latencies(rows),
         "tracking_error_mm": _tracking_error(rows.get(TRACKER), rows.get(ENVIRONMENT)),
         "motion_capture_error_mm": _motion_capture_error(rows.get(MOTION_CAPTURE), rows.get(ARM)),
         "launcher": _last(rows.get(LAUNCHER), "completed", "rejected", "not_sent", "timed_out"),
         "settings": {"policy": settings.policy, "seed": settings.seed, "balls": settings.balls},
         "wanted": _wanted(processes),
-        "wall_clock": time.strftime("%Y-%m-%d %H:%M:%S"),
-        "kernel": os.uname().version,
     }
     (settings.folder / "report.json").write_text(json_text(report, indent=2) + "\n")
     return report
@@ -67,20 +66,19 @@ def _last(rows: o80.History | None, *names: str) -> dict[str, int]:
     return {} if rows is None else {name: int(rows.extended[name][-1]) for name in names}
 
 
-def _balls(rows: o80.History | None) -> dict[str, int]:
-    counts = _last(rows, *BALLS[1:], "launches_failed")
-    return {name.removeprefix("balls_"): count for name, count in counts.items()}
-
-
-def _jitter(name: str, rows: o80.History | None) -> Figures:
-    """Distance of neighbouring rows from the period [us]."""
-    if rows is None:
-        return {}
-    found: Figures = {"jitter_us": spread(np.abs(np.diff(rows.time) - 1e9 / RATES[name]) * 1e-3)}
+def _regularity(name: str, rows: o80.History) -> Figures:
+    """Rate, missed periods and jitter: distance of neighbouring rows from the period [us]."""
+    between, skipped = np.diff(rows.time), np.asarray(rows.skipped)
+    missed = int(skipped[-1]) - int(skipped[0])
+    percent = 100.0 * missed / (len(between) + missed)
     if name == ENVIRONMENT:  # it skips no step, but makes up for those that came late
-        late = np.asarray(rows.extended.late) >= ITERATIONS
-        found["missed_percent"] = 100.0 * float(late.mean())
-    return found
+        percent = 100.0 * float((np.asarray(rows.extended.late) >= ITERATIONS).mean())
+    return {
+        "asked": RATES[name],
+        "measured": float(1e9 / between.mean()),
+        "missed_percent": percent,
+        "jitter_us": spread(np.abs(between - 1e9 / RATES[name]) * 1e-3),
+    }
 
 
 def _latencies(rows: Mapping[str, o80.History]) -> Figures:
@@ -114,7 +112,7 @@ def _tracking_error(tracker: o80.History | None, environment: o80.History | None
     playing = rows.phase == Phase.playing
     if not playing.any():
         return None
-    times, seen = np.asarray(rows.arm_time), np.asarray(rows.seen)
+    times, seen = np.asarray(rows.arm_time), np.asarray(rows.ball_time) > 0
     true = np.where(playing[:, None], rows.true_ball, np.nan)
     images = np.asarray(tracker.extended.capture_time)
     away = np.asarray(tracker.extended.position) - _between(images, times, true)
@@ -142,13 +140,15 @@ def _motion_capture_error(system: o80.History | None, arm: o80.History | None) -
 def _wanted(processes: Mapping[str, Figures]) -> Figures:
     """Targets of a quiet machine, and whether this run has reached them."""
     wanted: Figures = {}
+
+    def want(what: str, target: str, measured: object, *, reached: bool) -> None:
+        wanted[what] = {"wanted": target, "measured": measured, "reached": reached}
+
     for name, most in MAX_MISSED.items():
         if name in processes:
             missed = round(processes[name]["missed_percent"], 3)
-            said = {"wanted": f"less than {most}", "measured": missed, "reached": missed < most}
-            wanted[f"{name}: missed periods [%]"] = said
+            want(f"{name}: missed periods [%]", f"less than {most}", missed, reached=missed < most)
     if ARM in processes:
         kind = processes[ARM]["scheduling"]
-        said = {"wanted": "fifo", "measured": kind, "reached": kind.startswith("fifo")}
-        wanted["arm: scheduling"] = said
+        want("arm: scheduling", "fifo", kind, reached=kind.startswith("fifo"))
     return wanted

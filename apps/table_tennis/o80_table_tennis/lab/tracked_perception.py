@@ -40,8 +40,7 @@ class TrackedPerception:
 
     def __init__(self, tracker: Callable[[], o80.Frontend | None], now: Callable[[], int]) -> None:
         self._tracker, self._now = tracker, now
-        self._began = self._used = 0
-        self._seen_yet = False
+        self._used, self._seen_yet = 0, False
         self.ball: FloatArray = np.zeros(6)
         """Ball that was perceived last, also as a guess."""
         self.at = 0
@@ -57,7 +56,7 @@ class TrackedPerception:
     ) -> Perceived:
         """The ball has just begun to fly: no image shows it yet."""
         self.at = self._now()
-        self._began, self._used, self._seen_yet = self.at, 0, False
+        self._used, self._seen_yet = self.at, False
         self.ball, self.ball_time = np.array([*WIDE.position, *WIDE.velocity]), 0
         return self._perceived(state, seen=False)
 
@@ -67,8 +66,8 @@ class TrackedPerception:
         if found is None:
             self.ball_time = 0
             return self._perceived(state, seen=False)
-        self.ball_time, ball = found
-        self._used = self.ball_time
+        self._used, ball = found
+        self.ball_time = self._used
         self.ball = flown(ball, (self.at - self.ball_time) * 1e-9)
         first, self._seen_yet = not self._seen_yet, True
         return self._perceived(state, seen=True, first=first)
@@ -83,10 +82,9 @@ class TrackedPerception:
             return None
         row = tracker.latest().extended
         time = int(row.capture_time)
-        newest = max(self._began, self._used, self.at - round(OLDEST * 1e9))
-        if row.reason != Reason.seen or time <= newest:
-            return None
-        if np.max(np.diag(row.covariance)[3:6]) > KNOWN_VELOCITY**2:
+        old = time <= max(self._used, self.at - round(OLDEST * 1e9))
+        unknown = np.max(np.diag(row.covariance)[3:6]) > KNOWN_VELOCITY**2
+        if row.reason != Reason.seen or old or unknown:
             return None
         return time, np.concatenate([row.position, row.velocity, row.spin])
 
