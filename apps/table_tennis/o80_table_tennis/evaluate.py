@@ -6,7 +6,7 @@ Every policy plays the same balls. Prints a table and draws where the balls land
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -21,11 +21,12 @@ from o80.base.finite import json_text
 from o80.base.screen import keep_printing
 
 from .ending import unwind_on_sigterm
-from .learning.evaluation import VERDICT_BALLS, VERDICT_SEED, Evaluation, evaluate
 from .learning.paired import Paired
 from .players.conditions import Conditions
 from .players.learned_policy import LearnedPolicy, shipped_policy
 from .players.policies import DEFAULT_FACTOR, Policy, RandomPolicy, StillPolicy, default_policy
+from .playing import VERDICT_BALLS, VERDICT_SEED, evaluate
+from .report.statistics import Played
 from .rig.arm_numbers import ArmNumbers
 from .settings import Pacing
 from .world.table import TARGET
@@ -78,16 +79,16 @@ def main(
     pacings = [Pacing.INLINE, Pacing.REAL_TIME] if real_time else [Pacing.INLINE]
     try:
         with Progress(console=console, transient=True) as bars:
-            played = [
-                _play(name, match, pacing, bars, named=len(pacings) > 1)
+            played = {
+                f"{name}, {pacing.value}" if real_time else name: _play(name, match, pacing, bars)
                 for name in policies
                 for pacing in pacings
-            ]
+            }
     except (ValueError, OSError, o80.Error) as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
     _print(played, console)
-    paired = _paired(policies, played) if real_time else {}
+    paired = _paired(policies, [*played.values()]) if real_time else {}
     for name, pair in paired.items():
         console.print(f"{name}: {pair}", highlight=False)
     _write(played, paired, output, console)
@@ -111,14 +112,12 @@ def named_policy(name: str, **changed: str) -> tuple[Policy, Conditions]:
     return policy, conditions
 
 
-def _play(name: str, match: Match, pacing: Pacing, bars: Progress, *, named: bool) -> Evaluation:
+def _play(name: str, match: Match, pacing: Pacing, bars: Progress) -> Played:
     policy, conditions = named_policy(name, **match.changed)
     simulated = conditions.balls in ("wide", "narrow", "launcher")
     count = VERDICT_BALLS if match.count is None and simulated else match.count
-    label = f"{name}, {pacing.value}" if named else name
-    bar = bars.add_task(label, total=count)
+    bar = bars.add_task(f"{name}, {pacing.value}", total=count)
     return evaluate(
-        label,
         policy,
         conditions,
         balls=count,
@@ -128,16 +127,16 @@ def _play(name: str, match: Match, pacing: Pacing, bars: Progress, *, named: boo
     )
 
 
-def _print(played: Sequence[Evaluation], console: Console) -> None:
+def _print(played: Mapping[str, Played], console: Console) -> None:
     """A row for each policy."""
     table = Table()
     for name in COLUMNS:
         table.add_column(name, justify="left" if name == "policy" else "right")
-    for each in played:
+    for label, each in played.items():
         low, high = (100 * share for share in each.interval)
-        any_returned = each.returned > 0
+        any_returned = each.returns > 0
         table.add_row(
-            each.name,
+            label,
             str(len(each.episodes)),
             f"{100 * each.touched:.1f} %",
             f"{100 * each.returned:.1f} %",
@@ -149,20 +148,20 @@ def _print(played: Sequence[Evaluation], console: Console) -> None:
     console.print(table)
 
 
-def _paired(policies: list[str], played: list[Evaluation]) -> dict[str, Paired]:
+def _paired(policies: list[str], played: Sequence[Played]) -> dict[str, Paired]:
     """By policy; each was played accelerated, then in real time."""
     ways = zip(played[::2], played[1::2], strict=True)
     return {name: Paired.of(*each) for name, each in zip(policies, ways, strict=True)}
 
 
 def _write(
-    played: list[Evaluation], paired: dict[str, Paired], output: Path, console: Console
+    played: Mapping[str, Played], paired: dict[str, Paired], output: Path, console: Console
 ) -> None:
     from .learning.landing_plot import plot_landings
 
     output.mkdir(parents=True, exist_ok=True)
     plot_landings(output / "landings.png", played)
-    figures: dict[str, Any] = {each.name: each.as_json() for each in played}
+    figures: dict[str, Any] = {label: each.as_json() for label, each in played.items()}
     figures |= {f"{name}, paired": each.as_json() for name, each in paired.items()}
     (output / "evaluation.json").write_text(json_text(figures, indent=2) + "\n")
     console.print(f"landings.png, evaluation.json: {output}", soft_wrap=True)

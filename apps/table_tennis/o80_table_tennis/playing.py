@@ -1,4 +1,4 @@
-"""Playing episodes with a policy."""
+"""Playing episodes with a policy, and how well it plays numbered balls."""
 
 from __future__ import annotations
 
@@ -8,10 +8,17 @@ from typing import Any
 
 import gymnasium
 
+from .balls.sources import balls_from
 from .environment import TableTennisEnvironment
+from .players.conditions import Conditions
 from .players.policies import Policy
 from .report.episode_summary import EpisodeSummary
 from .report.statistics import Played
+from .settings import Pacing
+
+VERDICT_SEED = 7_000_001
+"""Seed of the shots and of the noise of a verdict."""
+VERDICT_BALLS = 400
 
 
 def play(
@@ -42,3 +49,21 @@ def play(
         after_each(summary)
     seconds = time.monotonic() - begin
     return Played(episodes=episodes, statistics=inner.statistics(), seconds=seconds)
+
+
+def evaluate(
+    policy: Policy,
+    conditions: Conditions,
+    *,
+    balls: int | None = VERDICT_BALLS,
+    seed: int = VERDICT_SEED,
+    pacing: Pacing = Pacing.INLINE,
+    after_each: Callable[[EpisodeSummary], None] = lambda _: None,
+) -> Played:
+    """Plays the first `balls` of the conditions' balls, each once; None: all of a recording."""
+    task = conditions.task(ball_seed=seed)
+    available = len(balls_from(task.balls, seed))
+    count = available if balls is None else min(balls, available)
+    with TableTennisEnvironment(rig=conditions.rig(pacing), task=task) as environment:
+        played = play(environment, policy, range(count), seed=seed, after_each=after_each)
+    return played

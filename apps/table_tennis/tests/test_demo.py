@@ -13,7 +13,6 @@ from typing import Any
 import pytest
 
 import o80
-from o80_table_tennis.demo import command_of_o80
 from o80_table_tennis.report.recorded_episodes import recorded_episodes
 
 RECORDINGS = Path(__file__).resolve().parents[4] / "shared" / "data" / "ball_gun_2019"
@@ -72,13 +71,8 @@ def test_every_step_was_exact(report: dict[str, Any], mode: str) -> None:
     assert numbers["steps"] > 0
 
 
-def test_every_mode_tells_its_rate(report: dict[str, Any]) -> None:
-    """How fast they are is measured by `make bench`: a busy machine slows each as it likes."""
-    assert min(report["modes"][mode]["bare_steps_per_second"] for mode in MODES) > 0
-
-
 def test_processes_and_inline_played_the_same(report: dict[str, Any]) -> None:
-    told = ("returned", "touched", "mean_reward", "best_reward", "steps")
+    told = ("returned", "touched", "reward", "steps")
     processes, inline = report["modes"]["processes"], report["modes"]["inline"]
     assert [processes[key] for key in told] == [inline[key] for key in told]
 
@@ -88,13 +82,11 @@ def test_baselines_stand_beside_the_policy(report: dict[str, Any]) -> None:
     assert list(policies) == [
         *("scripted", "learned", "still arm", "random, fine", "random, coarse")
     ]
-    inline = report["modes"]["inline"]
-    for key in ("episodes", "touched", "returned", "mean_reward"):
-        assert policies["scripted"][key] == inline[key]
     for numbers in policies.values():
-        share = numbers["returned"] / numbers["episodes"]
-        assert numbers["returned_at_least"] <= share <= numbers["returned_at_most"]
-        assert numbers["returned"] <= numbers["touched"] <= numbers["episodes"] == EPISODES
+        assert numbers["balls"] == EPISODES
+        assert numbers["returned_at_least"] <= numbers["returned"] <= numbers["returned_at_most"]
+        assert numbers["returned"] <= numbers["touched"] <= 1
+    assert policies["scripted"]["reward"] == report["modes"]["inline"]["reward"]
     assert policies["scripted"]["returned"] > policies["still arm"]["returned"]
 
 
@@ -105,23 +97,6 @@ def test_it_tells_how_the_arm_kept_its_time(report: dict[str, Any]) -> None:
     assert lateness == sorted(lateness)
     for key in ("arm_overruns", "arm_skipped", "late_actions", "largest_lateness_rows"):
         assert numbers[key] >= 0
-
-
-def test_every_printed_number_is_in_the_report(
-    played: tuple[Path, str], report: dict[str, Any]
-) -> None:
-    values = [value for numbers in report["modes"].values() for value in numbers.values()]
-    values += [value for numbers in report["policies"].values() for value in numbers.values()]
-    values += [value for key, value in report.items() if key not in ("modes", "policies")]
-    texts = {f"{value:g}" if isinstance(value, float) else str(value) for value in values}
-    columns = [
-        cell.strip()
-        for line in played[1].splitlines()
-        if line.startswith("│")
-        for cell in line.strip("│").split("│")[1:]
-    ]
-    assert columns
-    assert {cell for cell in columns if cell} <= texts
 
 
 @pytest.mark.parametrize("mode", MODES)
@@ -148,17 +123,6 @@ def test_what_it_says_to_type_works_in_the_terminal_in_which_it_ran(
             ["sh", "-c", line], env=PLAIN, capture_output=True, text=True, check=False
         )
         assert done.returncode == 0, done.stdout + done.stderr
-
-
-def test_what_it_says_to_type_is_a_path_although_make_finds_more(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    program = Path(sys.executable).with_name("o80")
-    monkeypatch.setenv("PATH", str(program.parent), prepend=os.pathsep)
-    monkeypatch.chdir(program.parent.parent)
-    assert command_of_o80() == f"{program.parent.name}/o80"
-    monkeypatch.chdir(tmp_path)
-    assert command_of_o80() == str(program)
 
 
 @pytest.mark.parametrize("sent", [signal.SIGINT, signal.SIGTERM])

@@ -11,10 +11,10 @@ from typer.testing import CliRunner
 
 from o80_table_tennis import evaluate as program
 from o80_table_tennis.evaluate import named_policy
-from o80_table_tennis.learning.evaluation import evaluate
 from o80_table_tennis.learning.paired import Paired
 from o80_table_tennis.players.conditions import Conditions
 from o80_table_tennis.players.policies import StillPolicy
+from o80_table_tennis.playing import evaluate
 
 
 @pytest.fixture
@@ -25,11 +25,11 @@ def runner() -> tuple[CliRunner, typer.Typer]:
 
 
 def test_an_evaluation_counts_what_came_of_each_ball_and_repeats() -> None:
-    first, again = (evaluate("still", StillPolicy(), Conditions(), balls=4) for _ in range(2))
+    first, again = (evaluate(StillPolicy(), Conditions(), balls=4) for _ in range(2))
     assert [episode.ball for episode in first.episodes] == [0, 1, 2, 3]
     assert first.episodes == again.episodes
     assert first.touched == np.mean([episode.touched for episode in first.episodes])
-    other = evaluate("still", StillPolicy(), Conditions(), balls=4, seed=5)
+    other = evaluate(StillPolicy(), Conditions(), balls=4, seed=5)
     assert [e.reward for e in other.episodes] != [e.reward for e in first.episodes]
 
 
@@ -37,7 +37,7 @@ def test_every_named_policy_plays_in_its_own_conditions() -> None:
     for name in ("still", "random", "scripted"):
         policy, conditions = named_policy(name, balls="narrow")
         assert conditions.balls == "narrow"
-        assert len(evaluate(name, policy, conditions, balls=1).episodes) == 1
+        assert len(evaluate(policy, conditions, balls=1).episodes) == 1
     _, scripted = named_policy("scripted", preset="standard")
     assert scripted.preset == "standard"
     assert scripted.observation == "published"
@@ -89,7 +89,7 @@ def test_the_same_balls_are_compared_accelerated_and_in_real_time(
 
 
 def test_pairs_are_of_the_same_balls() -> None:
-    one = evaluate("still", StillPolicy(), Conditions(), balls=2)
+    one = evaluate(StillPolicy(), Conditions(), balls=2)
     first, second = (replace(one.episodes[0], returned=each) for each in (True, False))
     accelerated, real_time = (
         replace(one, episodes=[replace(first, ball=0), replace(other, ball=1)])

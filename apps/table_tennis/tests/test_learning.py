@@ -8,9 +8,9 @@ import pytest
 from gymnasium.vector import AutoresetMode
 
 from o80.learning.training import Training, TrainingSettings, curve, make_vec
-from o80_table_tennis.learning.evaluation import evaluate
 from o80_table_tennis.players.conditions import Conditions
 from o80_table_tennis.players.learned_policy import TASK, LearnedPolicy
+from o80_table_tennis.playing import evaluate
 
 pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
 
@@ -46,4 +46,4 @@ def test_a_short_training_earns_more_than_at_its_beginning_and_its_policy_plays(
     assert points[-1].reward > first.reward  # by how much depends on the processor's bits
     policy = LearnedPolicy.load(tmp_path)
     assert policy.conditions == Conditions()
-    assert len(evaluate("learned", policy, policy.conditions, balls=2).episodes) == 2
+    assert len(evaluate(policy, policy.conditions, balls=2).episodes) == 2

@@ -37,18 +37,3 @@ def test_the_ranges_are_the_limits_of_the_arm(
         found = PressureRange.of(arm)
     np.testing.assert_array_equal(found.least, least)
     np.testing.assert_array_equal(found.most, most)
-
-
-@pytest.mark.parametrize(
-    ("least", "most", "text"),
-    [
-        ((1, 1, 5), (5, 5, 5), "muscle 2: .* below the most.* got 5 and 5"),
-        ((1, -np.inf), (5, 5), "muscle 1"),
-        ((1, 1), (5,), "got 2 and 1"),
-    ],
-)
-def test_a_range_that_is_none_is_refused(
-    least: tuple[float, ...], most: tuple[float, ...], text: str
-) -> None:
-    with pytest.raises(ValueError, match=text):
-        PressureRange(least, most)

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from ..report.statistics import Played
 from ..world.table import TABLE, TARGET
-from .evaluation import Evaluation
 
 RESOLUTION = 110
 """[dots per inch]"""
 
 
-def plot_landings(path: Path, evaluations: Sequence[Evaluation]) -> None:
+def plot_landings(path: Path, evaluations: Mapping[str, Played]) -> None:
     """The table from above, one for each evaluation; the arm stands on the left."""
     figure = Figure(figsize=(8.5, 4.2 * len(evaluations)), layout="constrained")
     panels = figure.subplots(len(evaluations), 1, squeeze=False)[:, 0]
-    for axes, evaluation in zip(panels, evaluations, strict=True):
+    for axes, (name, played) in zip(panels, evaluations.items(), strict=True):
         x, y, _ = TABLE.centre
         width, length, _ = TABLE.size
         near, left = y - length / 2, x - width / 2
@@ -33,7 +33,7 @@ def plot_landings(path: Path, evaluations: Sequence[Evaluation]) -> None:
             places = np.array(
                 [
                     episode.landing
-                    for episode in evaluation.episodes
+                    for episode in played.episodes
                     if episode.landing is not None and episode.returned is returned
                 ]
             ).reshape(-1, 3)
@@ -55,10 +55,10 @@ def plot_landings(path: Path, evaluations: Sequence[Evaluation]) -> None:
             markeredgecolor="black",
             label="target",
         )
-        count = len(evaluation.episodes)
+        count = len(played.episodes)
         axes.set_title(
-            f"{evaluation.name}: {100 * evaluation.returned:.1f} % of {count} balls returned, "
-            f"{100 * evaluation.touched:.1f} % touched",
+            f"{name}: {100 * played.returned:.1f} % of {count} balls returned, "
+            f"{100 * played.touched:.1f} % touched",
             fontsize=10,
         )
         axes.set_xlabel("y, towards the opponent [m]")

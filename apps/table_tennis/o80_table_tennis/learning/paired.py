@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from .evaluation import Evaluation
+from ..report.statistics import Played
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Paired:
     """Episodes that ended because the player fell too far behind."""
 
     @classmethod
-    def of(cls, accelerated: Evaluation, real_time: Evaluation) -> Paired:
+    def of(cls, accelerated: Played, real_time: Played) -> Paired:
         """Pairs two evaluations of the same balls. Raises ValueError if the balls differ."""
         if [each.ball for each in accelerated.episodes] != [
             each.ball for each in real_time.episodes

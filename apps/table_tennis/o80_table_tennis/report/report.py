@@ -14,7 +14,6 @@ from rich.markup import escape
 from rich.table import Table as Grid
 
 from o80.base.finite import json_text
-from o80.learning.training import wilson
 
 from ..settings import Pacing
 from ..world.timing import ITERATIONS
@@ -28,8 +27,7 @@ LABELS = {
     "episodes": "episodes",
     "returned": "returned to the opponent's half",
     "touched": "touched by the racket",
-    "mean_reward": "mean reward",
-    "best_reward": "best reward",
+    "reward": "mean reward",
     "steps": "steps of the environment",
     "steps_per_second": "steps a second, policy included [1/s]",
     "bare_steps_per_second": "steps a second, policy left out [1/s]",
@@ -106,16 +104,10 @@ def write_report(
 
 def policy_numbers(played: Played) -> dict[str, Value]:
     """How well a policy played."""
-    episodes = len(played.episodes)
-    least, most = wilson(played.returns, episodes)
-    return {
-        "episodes": episodes,
-        "touched": played.touches,
-        "returned": played.returns,
-        "returned_at_least": round(least, 3),
-        "returned_at_most": round(most, 3),
-        "mean_reward": round(float(np.mean([each.reward for each in played.episodes])), 4),
-    }
+    numbers = played.as_json()
+    del numbers["ends"], numbers["speed"]
+    low, high = numbers.pop("returned_95_percent")
+    return numbers | {"returned_at_least": low, "returned_at_most": high}
 
 
 def mode_numbers(
@@ -124,13 +116,11 @@ def mode_numbers(
     """All numbers of one mode."""
     statistics = played.statistics
     period = 1e6 * statistics.step_seconds / ITERATIONS
-    rewards = [episode.reward for episode in played.episodes]
     numbers: dict[str, Value] = {
         "episodes": len(played.episodes),
         "returned": played.returns,
         "touched": played.touches,
-        "mean_reward": round(float(np.mean(rewards)), 4),
-        "best_reward": round(float(np.max(rewards)), 4),
+        "reward": round(played.reward, 4),
         "steps": statistics.steps,
         "steps_per_second": round(statistics.steps_per_second, 1),
         "bare_steps_per_second": round(statistics.bare_steps_per_second, 1),

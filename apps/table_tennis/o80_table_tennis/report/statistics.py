@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
 import o80
 from o80.base.arrays import FloatArray
 from o80.hybrid.worlds import Counts
+from o80.learning.training import wilson
 
 from .episode_summary import EpisodeSummary
 
@@ -100,7 +103,7 @@ def statistics_of(
 
 @dataclass(frozen=True)
 class Played:
-    """Episodes of one environment."""
+    """Episodes of one policy in one environment."""
 
     episodes: Sequence[EpisodeSummary]
     statistics: Statistics
@@ -108,11 +111,58 @@ class Played:
     """From the first reset to the last step."""
 
     @property
+    def touches(self) -> int:
+        """Episodes in which the racket met the ball."""
+        return sum(episode.touched for episode in self.episodes)
+
+    @property
     def returns(self) -> int:
         """Episodes in which the ball was returned, see `task.outcome`."""
         return sum(episode.returned for episode in self.episodes)
 
     @property
-    def touches(self) -> int:
-        """Episodes in which the racket met the ball."""
-        return sum(episode.touched for episode in self.episodes)
+    def touched(self) -> float:
+        """Share of the balls."""
+        return self.touches / max(1, len(self.episodes))
+
+    @property
+    def returned(self) -> float:
+        """Share of the balls."""
+        return self.returns / max(1, len(self.episodes))
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Wilson's interval of the share of returned balls, 95 %."""
+        return wilson(self.returns, len(self.episodes))
+
+    @property
+    def reward(self) -> float:
+        """Mean of an episode."""
+        return float(np.mean([episode.reward for episode in self.episodes]))
+
+    @property
+    def speed(self) -> float:
+        """Median of the largest speeds of the returned balls after the touch [m/s]; NaN without."""
+        speeds = [episode.speed for episode in self.episodes if episode.returned]
+        return float(np.median(speeds)) if speeds else float("nan")
+
+    def distance(self, target: Sequence[float]) -> float:
+        """Median distance of the returned balls' landings from a target [m]; NaN without any."""
+        apart = [
+            float(np.hypot(episode.landing[0] - target[0], episode.landing[1] - target[1]))
+            for episode in self.episodes
+            if episode.returned and episode.landing is not None
+        ]
+        return float(np.median(apart)) if apart else float("nan")
+
+    def as_json(self) -> dict[str, Any]:
+        """The figures."""
+        return {
+            "balls": len(self.episodes),
+            "touched": round(self.touched, 4),
+            "returned": round(self.returned, 4),
+            "returned_95_percent": [round(each, 4) for each in self.interval],
+            "speed": round(self.speed, 2) if self.returns else None,
+            "reward": round(self.reward, 4),
+            "ends": dict(Counter(episode.end for episode in self.episodes).most_common()),
+        }

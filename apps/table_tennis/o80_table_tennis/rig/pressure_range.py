@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
@@ -12,20 +11,9 @@ from o80.base.arrays import FloatArray
 
 
 class PressureRange:
-    """The least and the most raw pressure (8,) of each muscle. Raises ValueError."""
+    """The least and the most raw pressure (8,) of each muscle."""
 
     def __init__(self, least: Sequence[float], most: Sequence[float]) -> None:
-        if len(least) != len(most):
-            raise ValueError(
-                f"least and most must have one pressure for each muscle, got {len(least)} and "
-                f"{len(most)}"
-            )
-        for muscle, (low, high) in enumerate(zip(least, most, strict=True)):
-            if not (math.isfinite(low) and math.isfinite(high) and low < high):
-                raise ValueError(
-                    f"muscle {muscle}: the least pressure must be below the most, and both must be "
-                    f"finite, got {low:g} and {high:g}"
-                )
         self.least: FloatArray = np.array(least, dtype=np.float64)
         self._span: FloatArray = np.array(most, dtype=np.float64) - self.least
         self.scale: FloatArray = 1.0 / self._span
