@@ -1,6 +1,5 @@
 """Wrong arguments are refused with what to give instead."""
 
-import math
 import sys
 import time
 import warnings
@@ -9,7 +8,6 @@ from contextlib import closing
 from typing import Any
 
 import gymnasium
-import numpy as np
 import pytest
 from opened_environment import STILL, opened, played_out
 
@@ -19,20 +17,12 @@ from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
 from o80_table_tennis.task.ball_play import ReturnTask
 from o80_table_tennis.task.rewards import OrderedReward
-from o80_table_tennis.world.arm import MUSCLES
 
 
 @pytest.fixture
 def inline() -> Iterator[TableTennisEnvironment]:
     with closing(opened()) as environment:
         yield environment
-
-
-@pytest.mark.parametrize("action", [np.zeros(7), np.full(MUSCLES, np.nan)])
-def test_a_wrong_action_is_refused(inline: TableTennisEnvironment, action: np.ndarray) -> None:
-    inline.reset(seed=1)
-    with pytest.raises(ValueError, match="an action"):
-        inline.step(action)
 
 
 def test_a_step_needs_an_episode(inline: TableTennisEnvironment) -> None:
@@ -104,24 +94,15 @@ def test_an_arm_of_another_frequency_is_refused() -> None:
     [
         ({"pacing": "inline"}, TypeError, r"one of Pacing\.REAL_TIME, .*got 'inline'"),
         ({"worlds": 0}, ValueError, "worlds must be at least 1, got 0"),
-        ({"worlds": 1.5}, ValueError, "worlds must be a whole number, got 1.5"),
         ({"frequency": 0}, ValueError, "frequency must be a positive number"),
-        ({"frequency": math.nan}, ValueError, "frequency must be a positive number"),
-        ({"factor": math.nan}, ValueError, "factor must be a positive number, got nan"),
-        ({"factor": -1}, ValueError, "factor must be a positive number, got -1"),
         ({"factor": "fine"}, ValueError, "factor must be a positive number, got 'fine'"),
-        ({"delay": 1.5}, ValueError, "delay must be a whole number, got 1.5"),
-        ({"ball_seed": -1}, ValueError, "ball_seed must be at least 0, got -1"),
         ({"max_late": -3}, ValueError, "max_late must be at least 0, got -3"),
         ({"task": ReturnTask}, TypeError, r"task must be an object: write ReturnTask\(\)"),
         ({"task": "retrun"}, ValueError, "there are: return, smash"),
         ({"task": 3}, TypeError, "an object with .* no low, high, begin"),
         ({"delay": 5}, ValueError, "within its step"),
         ({"delay": 10, "repeat": 2, "chunk_size": 3}, ValueError, "between 0 and 9 iterations"),
-        ({"chunk_size": 0}, ValueError, "chunk_size must be at least 1, got 0"),
-        ({"action_steps": 2}, ValueError, "action_steps must be at most 1"),
         ({"chunk_size": 3, "action_steps": 4}, ValueError, "action_steps must be at most 3"),
-        ({"ball_count": 0}, ValueError, "ball_count must be at least 1, got 0"),
         ({"reward": "publshed"}, ValueError, "there are: ordered, publish"),
         ({"reward": 3}, TypeError, r"an object like .*OrderedReward\(\), got 3"),
         ({"reward": OrderedReward}, TypeError, "or an object like"),

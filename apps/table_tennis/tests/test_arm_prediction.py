@@ -27,14 +27,6 @@ def test_speeds_follow_the_torques_of_the_model() -> None:
         assert change == pytest.approx(acceleration, abs=0.02)
 
 
-def test_muscles_make_the_torques_of_their_pressures() -> None:
-    muscles = HittingSettings().muscles
-    q = np.array([0.3, 1.1, 1.4, -0.5])
-    for torque in np.random.default_rng(1).uniform(-8.0, 8.0, (20, 4)):
-        pressures = muscles.pressures(torque, q, 0.45)
-        assert muscles.torque(pressures.ravel(), q) == pytest.approx(torque)
-
-
 def test_the_motion_of_the_dead_time_is_predicted_from_the_actions_in_flight() -> None:
     """Nearer by far than the present state, or its speed continued."""
     rng, steps, dead_steps = np.random.default_rng(3), 60, [4, 4, 2, 1]

@@ -65,22 +65,6 @@ def test_one_ball_and_many_get_the_same_bits(seen: FloatArray) -> None:
         np.testing.assert_array_equal(many.estimates(PLANE, some), found[some])
 
 
-def test_a_new_flight_of_one_ball_leaves_the_others_alone(seen: FloatArray) -> None:
-    filters = [ball_filter(SETTINGS, SHOTS) for _ in range(2)]
-    nothing = np.zeros(SHOTS, np.bool_)
-    for each in filters:
-        each.begin(seen[:, 0])
-    for step in range(1, 70):
-        if step == 30:
-            filters[1].begin(seen[[7], 0], np.array([7]))
-        for each in filters:
-            each.step(seen[:, step], nothing)
-    others = np.arange(SHOTS) != 7
-    one, other = (each.estimates(PLANE) for each in filters)
-    np.testing.assert_array_equal(one[others], other[others])
-    assert not np.array_equal(one[7], other[7])
-
-
 def test_the_estimate_is_much_nearer_than_what_is_measured(
     flights: Flights, seen: FloatArray
 ) -> None:

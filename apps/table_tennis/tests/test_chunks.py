@@ -7,7 +7,7 @@ from typing import Any
 import gymnasium
 import numpy as np
 import pytest
-from opened_environment import WAITING, opened
+from opened_environment import opened
 
 import o80
 import o80_table_tennis
@@ -120,18 +120,6 @@ def test_a_decision_that_is_told_after_the_last_row_is_waited_for(
         assert asked.count(True) == ANSWERS
         assert len(asked) >= 3 * ANSWERS
         assert environment.statistics().late_actions == 0
-
-
-def test_by_the_clock_late_rows_are_skipped_and_counted() -> None:
-    with closing(opened(Pacing.REAL_TIME, task=CHUNKED)) as environment:
-        environment.reset(seed=1)
-        environment.step(chunks()[0])
-        before, k = environment.statistics(), environment.task.single.span[2]
-        environment.arm.wait_for(k + 31, timeout=WAITING)
-        environment.step(chunks()[1])
-        after = environment.statistics()
-        assert after.late_actions - before.late_actions >= 3  # due in k + 21, k + 26, k + 31
-        assert after.steps == 8
 
 
 def test_an_episode_is_given_up_when_nothing_was_planned_for_too_long(

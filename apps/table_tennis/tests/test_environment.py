@@ -5,9 +5,8 @@ from contextlib import closing
 
 import numpy as np
 import pytest
-from opened_environment import ALL_MODES, PUSH, STILL, opened, played_out
+from opened_environment import PUSH, STILL, opened, played_out
 
-import o80
 from o80_table_tennis.balls.simulated_shots import SimulatedShots
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.environment import TableTennisEnvironment
@@ -22,21 +21,6 @@ from o80_table_tennis.world.timing import ITERATIONS, PERIOD
 def inline() -> Iterator[TableTennisEnvironment]:
     with closing(opened()) as environment:
         yield environment
-
-
-@pytest.mark.parametrize("pacing", ALL_MODES)
-def test_every_step_is_five_iterations_of_the_arm_and_five_of_each_twin(pacing: Pacing) -> None:
-    with closing(opened(pacing, worlds=2)) as environment:
-        environment.reset(seed=1)
-        steps = played_out(environment)
-        summary, statistics = environment.summary, environment.statistics()
-
-        assert summary.steps == len(steps)
-        assert summary.arm_last - summary.arm_first == ITERATIONS * len(steps)
-        assert summary.twin_last - summary.twin_first == ITERATIONS * len(steps)
-        assert statistics.steps == len(steps)
-        twins = [twin.published for twin in environment.twins]
-        assert twins == [summary.twin_last] * 2
 
 
 @pytest.mark.parametrize("delay", [0, 1, 3])
@@ -72,23 +56,6 @@ def test_a_step_that_repeats_its_action_is_several_steps_with_this_action(pacing
             seen.append((moved, observation.tobytes()))
             assert environment.statistics().steps == repeat * steps
     assert seen[0] == seen[1]
-
-
-@pytest.mark.parametrize("pacing", ALL_MODES)
-def test_every_twin_mirrors_every_row_of_the_arm_bit_for_bit(pacing: Pacing) -> None:
-    with closing(opened(pacing, worlds=2)) as environment:
-        environment.reset(seed=1)
-        for _ in range(20):
-            environment.step(PUSH)
-        rows = 20 * ITERATIONS
-        # the arm may have moved on by its own clock
-        last = environment.task.single.span[2]
-        arm = environment.arm.history(since=last + 1 - rows, until=last).extended
-        for twin in environment.twins:
-            seen = twin.history(rows).observed.joints
-            np.testing.assert_array_equal(seen["position"], arm.joint_positions)
-            np.testing.assert_array_equal(seen["velocity"], arm.joint_velocities)
-        assert np.abs(arm.joint_velocities[:, 0]).max() > 0.5
 
 
 def test_the_ball_starts_with_the_first_step(inline: TableTennisEnvironment) -> None:
@@ -177,15 +144,3 @@ def test_extra_balls_are_judged_as_if_each_were_played_alone() -> None:
             assert terminated
             assert reward == pytest.approx(paid[ball], abs=1e-6)
             assert info["touched"] == each["touched"][ball]
-
-
-@pytest.mark.parametrize("pacing", ALL_MODES)
-def test_closing_leaves_nothing_behind(pacing: Pacing) -> None:
-    environment = opened(pacing, worlds=2)
-    names = {each.segment for each in (environment.arm, *environment.twins)}
-    assert names <= {segment.name for segment in o80.segments()}
-    environment.close()
-    environment.close()
-
-    left = {segment.name for segment in o80.segments() if segment.life == "running"}
-    assert not names & left

@@ -1,8 +1,6 @@
 """Fitted flights are kept in files: found again, never stale, never in the way."""
 
 import dataclasses
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +8,7 @@ import pytest
 from recorded_rows import frames_of_a_reader, rows_seen, write_ball_gun, write_shots
 
 import o80_table_tennis.balls.flight_cache
-from o80_table_tennis.balls.flight_cache import ARRAYS, cached_flight, folder
+from o80_table_tennis.balls.flight_cache import ARRAYS
 from o80_table_tennis.balls.recordings import load_trajectories
 from o80_table_tennis.balls.sampled_flight import SampledFlight
 from o80_table_tennis.balls.simulated_shots import simulated_shot
@@ -113,34 +111,6 @@ def test_a_folder_that_cannot_be_written_is_no_obstacle(
     for _ in range(2):
         recorded_balls(shots / "b.hdf5").flight(0)
     assert len(fits) == 2
-
-
-FIT_ALL = """
-import sys
-from o80_table_tennis.balls.sources import recorded_balls
-
-source = recorded_balls(sys.argv[1])
-print([source.flight(ball).states.tobytes().hex() for ball in range(len(source))])
-"""
-
-
-def test_several_processes_may_fit_at_once(shots: Path) -> None:
-    command = [sys.executable, "-c", FIT_ALL, str(shots)]
-    processes = [subprocess.Popen(command, stdout=subprocess.PIPE) for _ in range(3)]
-    outputs = [process.communicate(timeout=60)[0] for process in processes]
-    assert [process.returncode for process in processes] == [0] * 3
-    assert len(set(outputs)) == 1
-    assert len(list(folder().iterdir())) == 3
-    assert not list(folder().glob(".*"))
-
-
-def test_nothing_is_kept_of_a_fit_that_fails(cache: Path) -> None:
-    def fit() -> SampledFlight:
-        raise ValueError("too few rows")
-
-    with pytest.raises(ValueError, match="too few rows"):
-        cached_flight(b"rows", "shot", 0.002, fit)
-    assert not cache.exists()
 
 
 def test_the_key_covers_everything_a_flight_has() -> None:

@@ -94,15 +94,6 @@ def test_the_ball_gun_flights_are_those_that_were_measured() -> None:
     assert np.median(tangential) == pytest.approx(0.69, abs=0.04)
 
 
-@pytest.mark.recordings("ball_gun_2019")
-def test_fitted_velocities_change_as_gravity_and_air_would_have_it() -> None:
-    for shot in ball_gun_shots()[:5]:
-        times = np.arange(shot.fit.start, shot.fit.bounce_times[0] - 0.05, 0.01)
-        _, fitted = shot.fit.at(times)
-        # gravity, and at most 3 m/s^2 of drag and spin
-        assert np.all(np.abs(np.diff(fitted[:, 2]) / 0.01 + 9.81) < 3)
-
-
 @pytest.mark.recordings("spin_2022")
 @pytest.mark.parametrize(("name", "turn"), [("mn5008_topspin", 0.35), ("mn5008_no_spin", 0.18)])
 def test_the_shots_of_the_launcher_show_their_spin(name: str, turn: float) -> None:

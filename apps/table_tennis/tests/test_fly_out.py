@@ -102,28 +102,6 @@ def test_it_works_in_every_way_of_pacing_and_replays(pacing: Pacing, tmp_path: P
     assert all(result.identical for result in results)
 
 
-def test_a_ball_that_is_never_touched_is_played_to_its_end() -> None:
-    still = np.zeros(MUSCLES, np.float32)
-    outcomes = []
-    for fly_out in (False, True):
-        task = TaskSettings(factor=COARSE, fly_out=fly_out)
-        with opened(task=task) as environment:
-            environment.reset(seed=1, options={"ball": 0})
-            steps: list[Step] = []
-            while not steps or not steps[-1][2]:
-                steps.append(environment.step(still))
-        outcomes.append((len(steps), steps[-1][1], steps[-1][4]["end"]))
-    assert outcomes[0] == outcomes[1]
-
-
-def test_it_saves_the_steps_after_the_touch() -> None:
-    with closing(opened(task=flying_out())) as environment:
-        flown = [len(played(environment, ball)[0]) for ball in range(5)]
-    with closing(opened(task=TaskSettings(factor=COARSE))) as environment:
-        whole = [len(played(environment, ball)[0]) for ball in range(5)]
-    assert sum(flown) < 0.75 * sum(whole)
-
-
 def test_it_is_refused_where_it_cannot_be() -> None:
     with pytest.raises(ValueError, match="give fly_out=False, or worlds=1 instead of 4"):
         TableTennisEnvironment(rig=RigSettings(worlds=4), task=TaskSettings(fly_out=True))

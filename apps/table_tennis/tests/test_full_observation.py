@@ -3,14 +3,11 @@
 from contextlib import closing
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 from numpy.typing import NDArray
 from opened_environment import opened
 
-from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.settings import TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.full_observation import FullObservation
@@ -18,7 +15,6 @@ from o80_table_tennis.task.noise import NoiseSettings
 
 FULL = FullObservation()
 PLACES = FULL.places()
-NOISY = NoiseSettings(0.005, 0.1, missed_frames=0.1, latency=0.012, pressure=0.01)
 
 
 def part(observation: Any, name: str) -> Any:
@@ -100,28 +96,3 @@ def test_everything_is_scaled_to_about_one() -> None:
     spread = np.abs(rows)
     assert np.percentile(spread, 99, axis=0).max() < 3.0
     assert np.mean(spread) < 1.0
-
-
-def test_each_ball_has_estimates_of_their_own() -> None:
-    task = full_task(noise=NoiseSettings.tracker())
-    with closing(opened(task=task, worlds=4)) as environment:
-        _, info = environment.reset(seed=2)
-        assert info["worlds"]["observation"].shape == (4, 73)
-        for _ in range(40):
-            _, _, _, _, info = environment.step(np.zeros(8, np.float32))
-        true = environment.task.state.ball.copy()
-    seen = part(info["worlds"]["observation"], "ball_position")
-    np.testing.assert_allclose(seen[:, 0], true[:, 0], atol=0.01)
-
-
-@pytest.mark.parametrize("task", ["return", "smash"])
-def test_gymnasium_accepts_it(task: str) -> None:
-    settings = TaskSettings(task=task, observation="full", noise=NOISY)
-    with closing(gymnasium.make("o80/TableTennis-v0", task=settings)) as environment:
-        check_env(environment.unwrapped, skip_render_check=True)
-
-
-def test_more_changes_make_a_longer_observation() -> None:
-    task = TaskSettings(observation=FullObservation(changes=6, plane=0.2))
-    with closing(TableTennisEnvironment(task=task)) as environment:
-        assert environment.reset(seed=1)[0].shape == (73 + 16,)

@@ -45,11 +45,3 @@ def test_out_of_reach_the_racket_comes_near(
 ) -> None:
     position = racket_pose(posture_towards(point, 0.0)).position
     assert position == pytest.approx((nearest, 0.0, SHOULDER), abs=0.005)
-
-
-def test_below_its_reach_the_forearm_points_at_the_ball() -> None:
-    posture = posture_towards((0.5, 0.0, 0.8), 0.0)
-    assert posture[1] == JOINT_LIMIT
-    x, _, z = racket_pose(posture).position
-    assert x < 0.5
-    assert z < SHOULDER - 0.3

@@ -58,13 +58,6 @@ def test_the_noise_is_as_large_as_asked_for_and_white() -> None:
     assert len({tuple(row) for row in off}) == STEPS  # no block comes twice
 
 
-def test_each_episode_has_noise_of_its_own_from_its_generator() -> None:
-    noise = NoiseSettings.tracker()
-    first, again, other = (perceived(noise, STANDING, seed=seed)[0] for seed in (3, 3, 4))
-    np.testing.assert_array_equal(first, again)
-    assert not np.array_equal(first, other)
-
-
 def test_a_missed_ball_stays_where_it_was_seen_last() -> None:
     noise = NoiseSettings(missed_frames=0.3)
     balls = STANDING + 0.01 * np.arange(STEPS)[:, None]

@@ -34,30 +34,6 @@ def test_without_air_and_table_the_flight_is_a_parabola(
     np.testing.assert_allclose(flight.velocities, velocity + gravity * t, atol=1e-9)
 
 
-def test_drag_alone_slows_a_ball_by_the_closed_form() -> None:
-    air = Aerodynamics(gravity=0.0)
-    flight = predict((0.0, 0.0, 3.0), (5.0, 0.0, 0.0), 1.0, aerodynamics=air, table=None)
-
-    growth = 1 + air.drag * 5.0 * flight.stamps
-    np.testing.assert_allclose(flight.velocities[:, 0], 5.0 / growth, rtol=1e-6)
-    np.testing.assert_allclose(flight.positions[:, 0], np.log(growth) / air.drag, atol=1e-6)
-
-
-def test_top_spin_of_a_ball_towards_the_arm_pulls_it_down() -> None:
-    spinning = predict(START, VELOCITY, 0.4, spin=(60.0, 0.0, 0.0), table=None)
-    plain = predict(START, VELOCITY, 0.4, table=None)
-
-    assert spinning.positions[-1, 2] < plain.positions[-1, 2] - 0.05
-
-
-def test_spin_decays() -> None:
-    lasting = Aerodynamics(spin_decay=0.0)
-    kept = predict(START, VELOCITY, 0.5, spin=(60.0, 0.0, 0.0), aerodynamics=lasting, table=None)
-    lost = predict(START, VELOCITY, 0.5, spin=(60.0, 0.0, 0.0), table=None)
-
-    assert kept.positions[-1, 2] < lost.positions[-1, 2]
-
-
 def test_a_bounce_without_spin_keeps_the_named_shares_of_the_velocity() -> None:
     table = Table(normal_restitution=0.9, tangential_restitution=0.6, friction=math.inf)
     touch = predict_crossing(START, VELOCITY, axis=2, at=table.bounce_height, table=table)
@@ -68,28 +44,6 @@ def test_a_bounce_without_spin_keeps_the_named_shares_of_the_velocity() -> None:
     assert touch.position[2] == pytest.approx(0.795, abs=1e-6)
     expected = touch.velocity * np.array([0.6, 0.6, -0.9])
     np.testing.assert_allclose(after.velocities[-1], expected, atol=1e-4)
-
-
-def test_a_ball_beside_the_table_falls_past_it() -> None:
-    beside = (1.4, 1.57, 1.2)
-
-    assert predict(beside, (0.0, 0.0, 0.0), 0.6).positions[-1, 2] < 0
-
-
-@settings(max_examples=30, deadline=None)
-@given(height=st.floats(0.8, 1.5), vz=st.floats(-3, 3))
-def test_a_ball_over_the_table_never_sinks_into_it(height: float, vz: float) -> None:
-    flight = predict((0.4, 1.57, height), (0.0, 0.0, vz), 3.0, period=0.002)
-
-    assert flight.positions[:, 2].min() > 0.795 - 1e-3
-
-
-def test_the_energy_of_a_bouncing_ball_falls() -> None:
-    flight = predict((0.4, 1.57, 1.3), (0.0, 0.0, 0.0), 2.5)
-
-    energy = 9.81 * flight.positions[:, 2] + 0.5 * np.sum(flight.velocities**2, axis=1)
-    assert np.all(np.diff(energy) < 1e-3)
-    assert energy[-1] < energy[0] - 0.5
 
 
 def test_a_crossing_lies_on_the_plane_and_on_the_flight() -> None:

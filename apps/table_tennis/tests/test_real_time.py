@@ -9,7 +9,6 @@ import pytest
 from opened_environment import PUSH, STILL, WAITING, opened
 
 import o80
-from o80.rows.journal import decisions
 from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.settings import Pacing, TaskSettings
 
@@ -52,30 +51,6 @@ def test_an_action_that_comes_late_acts_at_once_and_is_counted() -> None:
         assert after.late_actions == before.late_actions + 1
         assert after.largest_lateness >= 2
         assert after.steps == 2
-
-
-def test_arm_and_twin_say_by_which_rows_of_the_arm_they_were_commanded() -> None:
-    with closing(opened(Pacing.REAL_TIME)) as environment:
-        environment.reset(seed=1)
-        arm, (twin,) = environment.arm, environment.twins
-        expected = dict[int, int]()
-        for _ in range(8):
-            move_on(environment, 3)  # the arm makes more rows than the twin
-            before = twin.published
-            environment.step(PUSH)
-            seen = environment.task.single.span[2]
-            expected |= dict.fromkeys(range(before + 1, twin.published + 1), seen)
-        joined = o80.align({"twin": twin, "arm": arm}, by="seen")
-        rows = np.isin(joined["twin"].iteration, list(expected))
-        latency = decisions(arm.journal()).latency
-
-        assert joined["arm"].found[rows].all()
-        assert joined["arm"].iteration[rows].tolist() == list(expected.values())
-        motion = joined["arm"].extended.joint_positions[rows][4::5]
-        mirrored = joined["twin"].rows["observed"]["joints"]["position"][rows][4::5]
-        np.testing.assert_allclose(motion, mirrored, atol=1e-9)
-        assert len(latency) == 8
-        assert latency[1:].min() > 3
 
 
 def test_a_real_arm_goes_back_to_its_start_by_commands() -> None:

@@ -1,39 +1,19 @@
 """Recordings of environments: every row, every episode, what each step was worth."""
 
-import signal
-import subprocess
-import sys
-from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 from opened_environment import PATIENT, PUSH, STILL, WAITING, opened, played_out
 
 import o80
-import o80_table_tennis
 from o80_table_tennis.report.recorded_episodes import RecordedEpisode, recorded_episodes
 from o80_table_tennis.settings import Pacing, TaskSettings
 
 SHORT = 200  # rows of a history
 Rows = dict[str, NDArray[Any]]
-KILLED = """
-import os, signal, sys
-import numpy as np
-from o80_table_tennis.environment import TableTennisEnvironment
-
-with TableTennisEnvironment(record=sys.argv[1]) as environment:
-    environment.reset(seed=1)
-    while environment.statistics().episodes < 2:
-        _, _, terminated, truncated, _ = environment.step(np.zeros(8))
-        if terminated or truncated:
-            environment.reset()
-    environment.step(np.zeros(8))
-    os.kill(os.getpid(), signal.SIGKILL)
-"""
 
 
 def rows_in(path: Path) -> Rows:
@@ -42,22 +22,6 @@ def rows_in(path: Path) -> Rows:
     assert recording.finished
     assert not any(epoch.gaps for name in recording for epoch in recording[name].epochs)
     return {name: recording[name].history().rows for name in recording}
-
-
-@pytest.mark.parametrize("pacing", list(Pacing))
-def test_a_recording_holds_every_row_bit_for_bit(pacing: Pacing, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with opened(pacing, record=path, worlds=2, history=4096) as environment:
-        environment.reset(seed=1)
-        played_out(environment)
-        frontends = [environment.arm, *environment.twins]
-        live = {each.segment: each.history().rows for each in frontends}
-    recorded = rows_in(path)
-
-    assert list(recorded) == list(live)
-    for name, rows in live.items():
-        assert rows["iteration"][0] == recorded[name]["iteration"][0] == 0
-        assert recorded[name][: len(rows)].tobytes() == rows.tobytes()
 
 
 @pytest.mark.parametrize("pacing", [Pacing.INLINE, Pacing.PROCESSES])
@@ -152,22 +116,6 @@ def test_an_abandoned_episode_is_left_out(tmp_path: Path) -> None:
     ]
 
 
-def test_what_a_killed_program_recorded_is_there_and_is_continued(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    done = subprocess.run([sys.executable, "-c", KILLED, str(path)], timeout=60, check=False)
-    assert done.returncode == -signal.SIGKILL
-    o80.clean()  # what is left of its arm and twin
-
-    assert not o80.open(path).finished
-    first = recorded_episodes(path)
-    assert [episode.summary.number for episode in first] == [0, 1]
-    with opened(record=path) as environment:
-        environment.reset(seed=1)
-        played_out(environment)
-    assert [episode.summary.number for episode in recorded_episodes(path)] == [0, 1, 0]
-    check_rows(first[1])
-
-
 def test_a_stalled_episode_is_recorded_as_such(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     task = TaskSettings(max_late=200)
@@ -181,22 +129,3 @@ def test_a_stalled_episode_is_recorded_as_such(tmp_path: Path) -> None:
     (episode,) = recorded_episodes(path)
     assert (episode.summary.end, episode.summary.terminated) == ("stalled", False)
     assert len(episode.actions) == len(episode.rewards) == episode.summary.steps
-
-
-def test_a_recording_through_gymnasium_needs_no_import(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with closing(gymnasium.make(o80_table_tennis.ACCELERATED, record=str(path))) as environment:
-        environment.reset(seed=1)
-        environment.step(STILL)
-
-    assert [mark.name for mark in o80.open(path).marks] == ["environment", "episode"]
-
-
-def test_a_recording_that_cannot_be_made_leaves_nothing_behind(tmp_path: Path) -> None:
-    with pytest.raises(o80.RecordingError, match=r"must end in \.mcap"):
-        opened(record=tmp_path / "run.npz")
-    assert not [segment.name for segment in o80.segments() if segment.life == "running"]
-
-    path = tmp_path / "run.mcap"
-    with opened(record=path), pytest.raises(o80.RecordingError, match="another recorder"):
-        opened(record=path)

@@ -13,7 +13,7 @@ from gymnasium.utils.env_checker import check_env
 import o80_table_tennis
 from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.players.policies import default_policy
-from o80_table_tennis.settings import TASKS, RigSettings, TaskSettings
+from o80_table_tennis.settings import TASKS, TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.ball_play import ReturnTask
 from o80_table_tennis.task.state import State
@@ -71,27 +71,6 @@ def test_a_smash_is_the_return_times_the_speed_of_the_ball() -> None:
     assert 1.5 < returned[-1] <= 2.0
     assert smashed[-1] - 1.0 == pytest.approx(info["speed"] * (returned[-1] - 1.0))
     assert info["speed"] > 3.0
-
-
-def test_balls_of_other_worlds_are_judged_by_the_task_too() -> None:
-    settings = TaskSettings(factor=COARSE)
-    policy = default_policy()
-    with closing(TableTennisEnvironment(rig=RigSettings(worlds=41), task=settings)) as env:
-        observation, info = env.reset(seed=2)
-        paid, over = np.zeros(41), False
-        cut, touched = np.zeros((2, 41), np.bool_)
-        while not over:
-            observation, _, terminated, truncated, info = env.step(policy.act(observation))
-            each = info["worlds"]
-            paid += each["reward"]
-            cut |= each["truncated"]
-            touched |= each["touched"] & each["running"]
-            over = terminated or truncated
-    assert touched.any()
-    assert np.all(paid[touched & ~cut] > 0)
-    assert (cut & ~touched).any()
-    np.testing.assert_array_equal(paid[cut], 0.0)
-    assert np.all(paid[~touched & ~cut] < 0)
 
 
 def test_a_users_own_task_is_paid_in_every_step() -> None:

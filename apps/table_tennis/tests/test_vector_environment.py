@@ -109,17 +109,6 @@ def test_equals_single_environments_when_balls_are_returned(
     assert assert_equals_single_ones(mode, Scripted(), steps=200, task=task) >= COPIES
 
 
-def test_the_scripted_policy_returns_balls() -> None:
-    task = TaskSettings(factor=COARSE)
-    with made(mode=AutoresetMode.SAME_STEP, task=task) as vector:
-        seen, _ = vector.reset(seed=5)
-        policy, returned = Scripted(), 0
-        for number in range(200):
-            seen, _, _, _, infos = vector.step(policy(seen, number))
-            returned += int(infos.get("final_info", {}).get("returned", np.zeros(1)).sum())
-        assert returned >= COPIES
-
-
 def test_resets_some_copies_with_a_ball_of_the_callers() -> None:
     mode = AutoresetMode.DISABLED
     make = partial(gymnasium.make, o80_table_tennis.ACCELERATED)
@@ -165,14 +154,6 @@ def test_a_rig_that_copies_cannot_have_is_refused(rig: RigSettings, text: str) -
         made(2, rig=rig)
 
 
-def test_wrong_arguments_are_named() -> None:
-    wrong: Any = {"preset": "identified"}
-    with pytest.raises(TypeError, match=r"RigSettings\(preset='identified'\)"):
-        made(2, rig=wrong)
-    with pytest.raises(ValueError, match="unknown render mode 'human'; there are: rgb_array"):
-        made(2, render_mode="human")
-
-
 def test_waits_for_its_copies_however_long_the_process_stands_still(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -192,13 +173,3 @@ def test_waits_for_its_copies_however_long_the_process_stands_still(
         vector.step(np.zeros(vector.action_space.shape, np.float32))
     assert timeouts
     assert set(timeouts) == {None}
-
-
-@pytest.mark.check
-def test_renders_all_copies() -> None:
-    with made(3, render_mode="rgb_array") as vector:
-        vector.reset(seed=1)
-        pictures = vector.render()
-        assert pictures is not None
-        assert [picture.shape for picture in pictures] == [(480, 640, 3)] * 3
-        assert (pictures[0] != pictures[1]).any()  # other balls
