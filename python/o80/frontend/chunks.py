@@ -485,6 +485,10 @@ class Chunks(Managed):
         keys = self._given.keys
         moves = [not each for each in self._given.switches]
         if not all(key in of_it for key in itertools.compress(keys, moves)):
+            if self._given.blends and part.begins in self._starts:
+                raise InvalidArgument(
+                    f"no plan is known of {self._given.blends}: its state interpolates by itself"
+                )
             raise RowOverwritten(f"the journal no longer has the chunk that began in {part.begins}")
         starts = np.array([of_it.get(key, (0.0, 0.0, 0.0)) for key in keys]).reshape(-1, 3)
         places, slopes, curvatures = starts.T

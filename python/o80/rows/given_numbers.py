@@ -30,6 +30,9 @@ class GivenNumbers:
         rows = [schema["actuators"][each] for each in actuators]
         types = [schema["groups"][row["group"]]["type"] for row in rows]
         self._sizes = [dtype_of_type(each).itemsize for each in types]
+        blends = (row["name"] for row, each in zip(rows, types, strict=True) if "blends" in each)
+        #: the first actuator whose state interpolates by itself; empty: none
+        self.blends: str = next(blends, "")
         words = iter(masks)
         self._numbers: list[_Number] = []
         for place, described in enumerate(types):

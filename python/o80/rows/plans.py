@@ -183,6 +183,11 @@ def planned_by_chunks(
         return found
     columns = {each.name for each in columns_of(history.schema)}
     oldest, newest = int(history.iteration[0]), int(history.iteration[-1])
+    # no plan is known of states that interpolate by themselves
+    types = [each["type"] for each in history.schema["groups"]]
+    blending = {
+        each["name"] for each in history.schema["actuators"] if "blends" in types[each["group"]]
+    }
     number_of: dict[str, Number] = {}
     for each in actuators_of(history.schema):
         number_of.update(zip(each.paths, each.numbers, strict=True))
@@ -194,11 +199,12 @@ def planned_by_chunks(
         begins = entry.iteration
         if command is None or not oldest < begins <= newest + 1:
             continue
-        given = [each for each in _numbers(command) if f"desired.{each[0]}" in columns]
+        # numbers that switch have no start: their rows are held
+        of_it = entry.starts or {}
+        given = [each for each in _numbers(command, blending) if f"desired.{each[0]}" in columns]
         if not given:
             continue
-        # numbers that switch have no start: their rows are held
-        starts = [(entry.starts or {}).get(name, (0.0, 0.0, 0.0)) for name, _ in given]
+        starts = [of_it.get(name, (0.0, 0.0, 0.0)) for name, _ in given]
         limits = [limits_of(number_of[name], rows.dtype, history.schema) for name, rows in given]
         anchor = command.anchor or 0
         sent = ChunkRows(
@@ -208,7 +214,7 @@ def planned_by_chunks(
             command.first or 0,
             np.stack([rows.astype(np.float64) for _, rows in given], axis=1),
         )
-        switches = [rows.dtype.kind == "b" for _, rows in given]
+        switches = [name not in of_it for name, _ in given]
         decision = Decision(entry.shift or 0, begins)
         way = ChunkWay(sent, decision, command.profile, limits, switches)
         most = newest + MOST_AHEAD - begins
@@ -219,9 +225,13 @@ def planned_by_chunks(
     return found
 
 
-def _numbers(command: JournalCommand) -> Iterable[tuple[str, NDArray[np.generic]]]:
-    """Each number that it gives rows of, with the rows (rows,)."""
+def _numbers(
+    command: JournalCommand, blending: set[str]
+) -> Iterable[tuple[str, NDArray[np.generic]]]:
+    """Each number that it gives rows of, with the rows (rows,), but for these actuators."""
     for actuator, target in zip(command.actuators, command.targets, strict=True):
+        if actuator in blending:
+            continue
         fields = target if isinstance(target, dict) else {"": target}
         for field, values in fields.items():
             rows = np.atleast_1d(np.asarray(values))

@@ -14,7 +14,7 @@ namespace {
 
 constexpr auto kNowhere = std::string_view::npos;
 
-/// Cuts the first tag off the text, without its brackets: `limit upper="1"/`; empty at the end.
+/// Cuts the first tag off the text, without angles: `limit upper="1"/`; empty at the end.
 std::string_view next_tag(std::string_view& text) {
   while (true) {
     text.remove_prefix(std::min(text.find('<'), text.size()));
