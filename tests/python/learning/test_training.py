@@ -12,6 +12,7 @@ import signal
 import subprocess
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -323,7 +324,10 @@ def test_a_stopped_command_saves_and_says_how_to_go_on(
     here = Path(__file__).parents[1]
     terminal, inside = pty.openpty()
     errors = inside if number == signal.SIGHUP else subprocess.PIPE
-    with subprocess.Popen(words, stdout=inside, stderr=errors, cwd=here) as process:
+    heard = partial(signal.signal, number, signal.SIG_DFL)  # nohup and & ignore two of them
+    with subprocess.Popen(
+        words, stdout=inside, stderr=errors, cwd=here, preexec_fn=heard
+    ) as process:
         os.close(inside)
         said = b""
         while b"decisions" not in said:
