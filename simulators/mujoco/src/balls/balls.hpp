@@ -93,8 +93,7 @@ class Balls {
   /// Goes on with the same model with another step of the engine, which must outlive this.
   void take(const mjModel& model) noexcept { model_ = &model; }
 
-  const State& state() const noexcept { return now_; }
-  void restore(const State& state) noexcept { now_ = state; }
+  State& state() noexcept { return now_; }
 
  private:
   /// A surface that balls meet, and the geom that it follows.

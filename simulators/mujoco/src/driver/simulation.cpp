@@ -28,25 +28,10 @@ Simulation::Simulation(const Config& config)
   now_.joints.resize(now_.targets.joints.size());
   const std::size_t moved = now_.joints.size() + (balls_ ? balls_->degrees_of_freedom() : 0);
   integrates_ = moved != static_cast<std::size_t>(model_.model->nv) || model_.model->na != 0;
-  data_ = make_data("the model");
+  data_.reset(mj_makeData(model_.model.get()));
+  if (!data_) throw DriverError("there is not enough memory for the model");
   add_slots(config.slots);
-  make_room_for_bytes();
   reset();
-}
-
-DataPointer Simulation::make_data(const char* purpose) const {
-  DataPointer data(mj_makeData(model_.model.get()));
-  if (!data) throw DriverError("there is not enough memory for " + std::string(purpose));
-  return data;
-}
-
-void Simulation::add_slots(std::uint32_t count) {
-  slots_.resize(count);
-  for (Slot& slot : slots_) {
-    slot.data = make_data("so many slots: give fewer (slots=...)");
-    slot.state = now_;
-    if (balls_) slot.balls = balls_->state();
-  }
 }
 
 void Simulation::reset() noexcept {
@@ -56,11 +41,7 @@ void Simulation::reset() noexcept {
   now_.strength = 1;
   mj_resetDataKeyframe(model_.model.get(), data_.get(), model_.keyframe);
   if (model_.face) model_.face->hold(*data_);
-  if (integrates_ || !model_.sensors.empty()) {
-    mj_forward(model_.model.get(), data_.get());
-  } else {
-    mj_kinematics(model_.model.get(), data_.get());  // all that anybody looks at
-  }
+  forward();
   for (std::size_t i = 0; i < now_.joints.size(); ++i) {
     const auto [position, velocity] = joint(i);
     const Line& line = model_.joints[i].line;
@@ -73,21 +54,13 @@ void Simulation::reset() noexcept {
   now_.engine_contacts = static_cast<std::uint32_t>(data_->ncon);
 }
 
-bool Simulation::snapshot(std::size_t slot) noexcept {
-  if (slot >= slots_.size()) return false;
-  mj_copyData(slots_[slot].data.get(), model_.model.get(), data_.get());
-  slots_[slot].state = now_;
-  if (balls_) slots_[slot].balls = balls_->state();
-  slots_[slot].filled = true;
-  return true;
-}
-
-bool Simulation::restore(std::size_t slot) noexcept {
-  if (slot >= slots_.size() || !slots_[slot].filled) return false;
-  mj_copyData(data_.get(), model_.model.get(), slots_[slot].data.get());
-  now_ = slots_[slot].state;
-  if (balls_) balls_->restore(slots_[slot].balls);
-  return true;
+/// Computes all that is read of the engine's state.
+void Simulation::forward() noexcept {
+  if (integrates_ || !model_.sensors.empty()) {
+    mj_forward(model_.model.get(), data_.get());
+  } else {
+    mj_kinematics(model_.model.get(), data_.get());
+  }
 }
 
 // targets => steps of engine, joints and balls => states and sensors

@@ -74,8 +74,8 @@ class Simulation {
   /// False if the slot holds no snapshot.
   bool restore(std::size_t slot) noexcept;
   std::size_t slots() const noexcept { return slots_.size(); }
-  /// The snapshot in a slot, valid until the next call; empty if the slot holds none.
-  std::span<const std::byte> snapshot_bytes(std::size_t slot) noexcept;
+  /// The snapshot in a slot; empty if the slot holds none.
+  std::span<const std::byte> snapshot_bytes(std::size_t slot) const noexcept;
   /// Fills a slot; false if there is no such slot, or if the bytes are those of another model.
   bool load_snapshot(std::size_t slot, std::span<const std::byte> bytes) noexcept;
 
@@ -106,17 +106,14 @@ class Simulation {
     std::vector<JointState> joints;  // imposed ones, at the end of the last iteration
   };
   struct Slot {
-    DataPointer data;
-    State state;
-    Balls::State balls;
+    std::vector<std::byte> bytes;
     bool filled = false;
   };
 
-  DataPointer make_data(const char* purpose) const;
   void add_slots(std::uint32_t count);
-  void make_room_for_bytes();
   template <class Bytes>
-  void each_part(Slot& slot, Bytes& bytes) noexcept;
+  void each_part(Bytes& bytes) noexcept;
+  void forward() noexcept;
   void step(std::uint32_t number) noexcept;
   void teleport_joints() noexcept;
   void impose_joints(std::uint32_t number) noexcept;
@@ -131,9 +128,7 @@ class Simulation {
   DataPointer data_;
   State now_;
   std::vector<Slot> slots_;
-  // of a snapshot as bytes
-  std::vector<mjtNum> engine_state_;
-  std::vector<std::byte> bytes_;
+  std::vector<mjtNum> engine_state_;  // of a snapshot
 };
 
 }  // namespace o80::mujoco
