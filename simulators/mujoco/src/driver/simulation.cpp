@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <string>
+#include <utility>
 
 #include "o80/base/error.hpp"
 
@@ -39,6 +40,7 @@ void Simulation::reset() noexcept {
   now_.relaxed = false;
   now_.teleports = true;
   now_.strength = 1;
+  forwarded_ = false;
   mj_resetDataKeyframe(model_.model.get(), data_.get(), model_.keyframe);
   if (model_.face) model_.face->hold(*data_);
   forward();
@@ -81,13 +83,33 @@ void Simulation::advance() noexcept {
 void Simulation::step(std::uint32_t number) noexcept {
   const double strength = now_.relaxed ? 0 : now_.strength;
   if (strength < 1) model_.face->weaken(strength, *model_.model, *data_);
-  if (integrates_) {
-    mj_step(model_.model.get(), data_.get());
-  } else {
+  if (!integrates_) {
     data_->time += model_.model->opt.timestep;
+  } else if (number == 0 && std::exchange(forwarded_, false)) {
+    step_on();
+  } else {
+    mj_step(model_.model.get(), data_.get());
   }
   impose_joints(number);
   if (balls_) balls_->step(*data_, {now_.clock, number, steps_});
+}
+
+/// mj_step() where update_sensors() has computed what follows from positions and velocities.
+void Simulation::step_on() noexcept {
+  const mjModel* model = model_.model.get();
+  mjData* data = data_.get();
+  mj_checkPos(model, data);
+  mj_checkVel(model, data);
+  mj_forwardSkip(model, data, mjSTAGE_VEL, 1);
+  mj_checkAcc(model, data);
+  switch (model->opt.integrator) {
+    case mjINT_EULER:
+      return mj_Euler(model, data);
+    case mjINT_RK4:
+      return mj_RungeKutta(model, data, 4);
+    default:
+      return mj_implicit(model, data);
+  }
 }
 
 /// What mirrors a robot does not sweep from the model's start to where the robot is, through the
@@ -95,6 +117,7 @@ void Simulation::step(std::uint32_t number) noexcept {
 void Simulation::teleport_joints() noexcept {
   now_.teleports = false;
   if (!integrates_) return;
+  forwarded_ = false;
   now_.joints = now_.targets.joints;
   for (std::size_t i = 0; i < now_.joints.size(); ++i) impose(i, now_.joints[i]);
 }
@@ -119,9 +142,11 @@ void Simulation::impose_joints(std::uint32_t number) noexcept {
   mj_kinematics(model_.model.get(), data_.get());
 }
 
-/// Sensors show the state that is published.
+/// Sensors show the state that is published; the next step begins with what was computed for them.
 void Simulation::update_sensors() noexcept {
-  if (!model_.sensors.empty()) mj_forward(model_.model.get(), data_.get());
+  if (model_.sensors.empty()) return;
+  mj_forward(model_.model.get(), data_.get());
+  forwarded_ = true;
 }
 
 JointState Simulation::joint(std::size_t i) const noexcept {

@@ -61,6 +61,7 @@ class Simulation {
 
   const std::vector<FreeBody>& free_bodies() const noexcept { return free_bodies_; }
   Served place(const PlaceBody& request) noexcept {
+    forwarded_ = false;
     return mujoco::place(*model_.model, *data_, free_bodies_, request);
   }
 
@@ -115,6 +116,7 @@ class Simulation {
   void each_part(Bytes& bytes) noexcept;
   void forward() noexcept;
   void step(std::uint32_t number) noexcept;
+  void step_on() noexcept;
   void teleport_joints() noexcept;
   void impose_joints(std::uint32_t number) noexcept;
   void impose(std::size_t i, const JointState& state) noexcept;
@@ -127,6 +129,7 @@ class Simulation {
   bool integrates_;
   DataPointer data_;
   State now_;
+  bool forwarded_ = false;  // mj_forward() was the last to compute
   std::vector<Slot> slots_;
   std::vector<mjtNum> engine_state_;  // of a snapshot
 };

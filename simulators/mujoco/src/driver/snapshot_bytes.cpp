@@ -65,6 +65,7 @@ bool Simulation::restore(std::size_t slot) noexcept {
   mj_setState(model_.model.get(), data_.get(), engine_state_.data(), kWholeState);
   StateBytes from = StateBytes::from(bytes);
   each_part(from);
+  forwarded_ = false;
   return true;
 }
 
