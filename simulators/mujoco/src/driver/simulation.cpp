@@ -29,6 +29,9 @@ Simulation::Simulation(const Config& config)
   now_.joints.resize(now_.targets.joints.size());
   const std::size_t moved = now_.joints.size() + (balls_ ? balls_->degrees_of_freedom() : 0);
   integrates_ = moved != static_cast<std::size_t>(model_.model->nv) || model_.model->na != 0;
+  const int* stages = model_.model->sensor_needstage;
+  needs_forces_ =
+      model_.face || std::count(stages, stages + model_.model->nsensor, mjSTAGE_ACC) > 0;
   data_.reset(mj_makeData(model_.model.get()));
   if (!data_) throw DriverError("there is not enough memory for the model");
   add_slots(config.slots);
@@ -145,7 +148,16 @@ void Simulation::impose_joints(std::uint32_t number) noexcept {
 /// Sensors show the state that is published; the next step begins with what was computed for them.
 void Simulation::update_sensors() noexcept {
   if (model_.sensors.empty()) return;
-  mj_forward(model_.model.get(), data_.get());
+  const mjModel* model = model_.model.get();
+  mjData* data = data_.get();
+  if (needs_forces_) {
+    mj_forward(model, data);
+  } else {
+    mj_fwdPosition(model, data);
+    mj_sensorPos(model, data);
+    mj_fwdVelocity(model, data);
+    mj_sensorVel(model, data);
+  }
   forwarded_ = true;
 }
 

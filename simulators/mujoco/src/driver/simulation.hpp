@@ -129,7 +129,8 @@ class Simulation {
   bool integrates_;
   DataPointer data_;
   State now_;
-  bool forwarded_ = false;  // mj_forward() was the last to compute
+  bool needs_forces_;       // rows show something that follows from forces
+  bool forwarded_ = false;  // sensors were computed, and nothing has changed since
   std::vector<Slot> slots_;
   std::vector<mjtNum> engine_state_;  // of a snapshot
 };

@@ -51,39 +51,40 @@ TEST(Simulation, LeavesTheEngineOutWhereItHasNothingToIntegrate) {
 
 // the pass that computes the sensors of a row is the first half of the next step
 TEST(Simulation, StepsWithSensorsAreThoseOfAPlainLoop) {
-  for (const std::string integrator : {"Euler", "implicit", "implicitfast", "RK4"}) {
-    const std::string file = testing::TempDir() + "/o80_sensors_" + integrator + ".xml";
-    std::ofstream(file) << "<mujoco><option integrator='" << integrator << "'/><worldbody>"
-                        << "<geom name='floor' type='plane' size='1 1 1'/>"
-                        << "<body pos='0 0 .4'><joint name='hinge' axis='0 1 0'/>"
-                        << "<geom name='link' type='capsule' size='.03' fromto='0 0 0 .4 0 0'/>"
-                        << "<site name='tip' pos='.4 0 0'/></body>"
-                        << "<body name='box' pos='.3 0 .1'><freejoint/>"
-                        << "<geom name='cube' type='box' size='.05 .05 .05'/></body></worldbody>"
-                        << "<actuator><motor joint='hinge'/></actuator>"
-                        << "<sensor><framepos objtype='body' objname='box'/>"
-                        << "<accelerometer site='tip'/></sensor></mujoco>";
-    Simulation simulation(config_of({{"model", file}, {"mode", "control"}}));
-    simulation.steps(2);
-    std::filesystem::remove(file);
-    const mjModel* model = simulation.model().model.get();
-    const DataPointer plain(mj_makeData(model));
-    mj_forward(model, plain.get());
-    for (int i = 0; i < 500; ++i) {
-      simulation.targets().controls[0] = plain->ctrl[0] = 3 * std::sin(0.05 * i);
-      simulation.advance();
-      for (int step = 0; step < 2; ++step) mj_step(model, plain.get());
+  for (const std::string integrator : {"Euler", "implicit", "implicitfast", "RK4"})
+    for (const std::string sensor : {"", "<accelerometer site='tip'/>"}) {
+      const std::string file = testing::TempDir() + "/o80_sensors_" + integrator + ".xml";
+      std::ofstream(file) << "<mujoco><option integrator='" << integrator << "'/><worldbody>"
+                          << "<geom name='floor' type='plane' size='1 1 1'/>"
+                          << "<body pos='0 0 .4'><joint name='hinge' axis='0 1 0'/>"
+                          << "<geom name='link' type='capsule' size='.03' fromto='0 0 0 .4 0 0'/>"
+                          << "<site name='tip' pos='.4 0 0'/></body>"
+                          << "<body name='box' pos='.3 0 .1'><freejoint/>"
+                          << "<geom name='cube' type='box' size='.05 .05 .05'/></body></worldbody>"
+                          << "<actuator><motor joint='hinge'/></actuator>"
+                          << "<sensor><framepos objtype='body' objname='box'/>" << sensor
+                          << "</sensor></mujoco>";
+      Simulation simulation(config_of({{"model", file}, {"mode", "control"}}));
+      simulation.steps(2);
+      std::filesystem::remove(file);
+      const mjModel* model = simulation.model().model.get();
+      const DataPointer plain(mj_makeData(model));
       mj_forward(model, plain.get());
-      const mjData& data = simulation.data();
-      const auto equal = [](const mjtNum* one, const mjtNum* other, mjtSize count) {
-        return std::equal(one, one + count, other);
-      };
-      ASSERT_TRUE(equal(data.qpos, plain->qpos, model->nq)) << integrator << " " << i;
-      ASSERT_TRUE(equal(data.qvel, plain->qvel, model->nv)) << integrator << " " << i;
-      ASSERT_TRUE(equal(data.sensordata, plain->sensordata, model->nsensordata)) << i;
+      for (int i = 0; i < 500; ++i) {
+        simulation.targets().controls[0] = plain->ctrl[0] = 3 * std::sin(0.05 * i);
+        simulation.advance();
+        for (int step = 0; step < 2; ++step) mj_step(model, plain.get());
+        mj_forward(model, plain.get());
+        const mjData& data = simulation.data();
+        const auto equal = [](const mjtNum* one, const mjtNum* other, mjtSize count) {
+          return std::equal(one, one + count, other);
+        };
+        ASSERT_TRUE(equal(data.qpos, plain->qpos, model->nq)) << integrator << " " << i;
+        ASSERT_TRUE(equal(data.qvel, plain->qvel, model->nv)) << integrator << " " << i;
+        ASSERT_TRUE(equal(data.sensordata, plain->sensordata, model->nsensordata)) << i;
+      }
+      EXPECT_GT(simulation.engine_contacts(), 0u);
     }
-    EXPECT_GT(simulation.engine_contacts(), 0u);
-  }
 }
 
 TEST(Simulation, SharesItsModelWithEqualOnesOnly) {
