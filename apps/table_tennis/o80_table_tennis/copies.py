@@ -36,7 +36,6 @@ from .rig.rows import RigRows
 from .settings import Pacing, RigSettings, TaskSettings
 from .task.actions import changed_pressures
 from .task.end import End, terminated, undecided
-from .task.observer import Observer
 from .task.state import State
 from .world.arm import MUSCLES
 from .world.timing import ITERATIONS
@@ -89,8 +88,9 @@ class TableTennisCopies(HybridTask):
         refuse_wrong_balls(rig, settings)
         rig = settings.start_of(rig)
         self.settings, self.rig_settings, self.task = settings, rig, settings.made()
+        self.title = settings.title
         count, each = copies or 1, rig.worlds or 1
-        self.observer = Observer(self.task, settings.observing(rig.step), count * each)
+        self.observer = settings.observer(self.task, rig.step, count * each)
         """Observer that makes observations of states."""
         self.observation_space = self.observer.space
         self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
@@ -183,7 +183,7 @@ class TableTennisCopies(HybridTask):
         refuse_wrong_options(options, period=self.rig_settings.period)
         extra = self.worlds - 1
         self.draws = draws = [
-            drawn_episode(self.task, self._balls, each, extra=extra, options=options)
+            drawn_episode(self.task, self._balls, each, extra=extra, **options)
             for each in generators
         ]
         if self._clocked and self.returns_at_reset:
@@ -213,7 +213,7 @@ class TableTennisCopies(HybridTask):
     ) -> None:
         """The balls fly from the next iteration on."""
         for copy, draw in zip(copies.tolist(), self.draws, strict=True):
-            for number, flight in enumerate(draw.balls.flights):
+            for number, flight in enumerate(draw.flights):
                 world, states = self.world_of(copy, number), flight.states.view(BALL_STATE)[:, 0]
                 if len(states) == 1:  # the usual case, ten times as fast
                     world.add_command(self.rows.ball, states[0], iterations=1)

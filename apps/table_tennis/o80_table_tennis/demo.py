@@ -10,7 +10,6 @@ from __future__ import annotations
 import shlex
 import sys
 import time
-from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -20,168 +19,84 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 import o80
+from o80.base.finite import json_text
 from o80.base.screen import keep_printing
 
 from .balls.sources import balls_from
-from .ending import raise_if_terminated, unwind_on_sigterm
+from .ending import ends_in_order, raise_if_ended
 from .environment import TableTennisEnvironment
+from .players.hitting_policy import HittingSettings
 from .players.learned_policy import shipped_policy
 from .players.policies import BASELINES, DEFAULT_FACTOR, Policy, default_policy
 from .playing import play
 from .report.episode_summary import EpisodeSummary
-from .report.recorded_episodes import RecordedEpisode, recorded_episodes
-from .report.report import Report, write_report
+from .report.recorded_episodes import recorded_episodes
+from .report.report import Figures, mode_figures, policy_figures, print_table
 from .report.statistics import Played
-from .rig.arm_numbers import ArmNumbers
 from .settings import Pacing, RigSettings, TaskSettings
+
+COLUMNS = (
+    TextColumn("{task.description:>16}"),
+    BarColumn(bar_width=30),
+    MofNCompleteColumn(),
+    TextColumn("{task.fields[returns]}"),
+    TimeElapsedColumn(),
+)
+"""Columns of the progress of a demo."""
 
 
 @dataclass(frozen=True)
-class DemoSettings:
-    """Settings of the demo: what it plays, and where it writes."""
+class Demo:
+    """Plays all modes and policies, with the first balls each."""
 
-    balls: Path | None = None
-    """Recordings; None: simulated shots."""
-    episodes: int = 20
-    """Episodes of each accelerated mode."""
-    real_time_episodes: int = 5
-    seed: int = 1
-    muscle: str = "linear"
-    output: Path = Path("build/demo")
+    task: TaskSettings
+    seed: int
+    progress: Progress
 
-    def task(self) -> TaskSettings:
-        """Task that every environment of the demo plays."""
-        balls = None if self.balls is None else str(self.balls)
-        return TaskSettings(balls=balls, factor=DEFAULT_FACTOR)
+    def play(
+        self, name: str, policy: Policy, rig: RigSettings, episodes: int, **settings: Any
+    ) -> Played:
+        """Episodes of a policy. settings: `record`, and a `task` instead of the demo's."""
+        bar = self.progress.add_task(name, total=episodes, returns="0 returned")
+        task, returns = settings.pop("task", self.task), 0
 
-    def rig(self, pacing: Pacing) -> RigSettings:
-        """The arm and its twin, running like this."""
-        return RigSettings(pacing=pacing, muscle=self.muscle)
+        def advance(summary: EpisodeSummary) -> None:
+            nonlocal returns
+            raise_if_ended()
+            returns += summary.returned
+            self.progress.update(bar, advance=1, returns=f"{returns} returned")
 
-    @property
-    def recording(self) -> Path:
-        """The file with every row of all modes."""
-        return self.output / "run.mcap"
+        balls = (number % len(balls_from(task.balls)) for number in range(episodes))
+        with TableTennisEnvironment(rig=rig, task=task, **settings) as environment:
+            played = play(environment, policy, balls, seed=self.seed, after_each=advance)
+        return played
 
-    @property
-    def learned_recording(self) -> Path:
-        """The file with every row of the learned policy's episodes."""
-        return self.output / "learned.mcap"
-
-    def episodes_of(self, pacing: Pacing) -> int:
-        """How many episodes are played like this."""
-        return self.real_time_episodes if pacing.real_time else self.episodes
-
-
-def run_demo(settings: DemoSettings, console: Console) -> Report:
-    """Plays all modes, writes all files, returns the report."""
-    begin = time.monotonic()
-    settings.output.mkdir(parents=True, exist_ok=True)
-    for recording in (settings.recording, settings.learned_recording):
-        recording.unlink(missing_ok=True)
-    modes: dict[Pacing, Played] = {}
-    with _progress(console) as progress:
+    def play_modes(
+        self, muscle: str, episodes: int, real_time_episodes: int, record: Path
+    ) -> dict[Pacing, Played]:
+        """The scripted policy in three ways, added to a recording."""
+        modes = {}
         for pacing in (Pacing.REAL_TIME, Pacing.PROCESSES, Pacing.INLINE):
-            if episodes := settings.episodes_of(pacing):
-                rig = settings.rig(pacing)
-                modes[pacing] = _play(
-                    settings,
-                    pacing.value,
-                    default_policy(ArmNumbers.of_rig(rig)),
-                    rig,
-                    settings.task(),
-                    progress,
-                    episodes=episodes,
-                    record=settings.recording,
-                )
-        policies = _compared(settings, modes, progress)
-    recorded = _recorded(settings, modes)
-    return write_report(settings.output, modes, policies, recorded, begin=begin)
+            if count := real_time_episodes if pacing.real_time else episodes:
+                rig = RigSettings(pacing=pacing, muscle=muscle)
+                policy = default_policy(HittingSettings.of_rig(rig))
+                modes[pacing] = self.play(pacing.value, policy, rig, count, record=record)
+        return modes
 
+    def play_policies(self, scripted: Played, muscle: str, record: Path) -> dict[str, Played]:
+        """All policies and the baselines on the same balls, as fast as they can.
 
-def _play(
-    settings: DemoSettings,
-    name: str,
-    policy: Policy,
-    rig: RigSettings,
-    task: TaskSettings,
-    progress: Progress,
-    *,
-    episodes: int,
-    record: Path | None = None,
-) -> Played:
-    """Episodes with the first balls, added to a recording."""
-    bar = progress.add_task(name, total=episodes, returns="0 returned")
-    available = len(balls_from(task.balls))
-    balls = (number % available for number in range(episodes))
-    with TableTennisEnvironment(rig=rig, task=task, record=record) as environment:
-        moved_on = _advance(progress, bar)
-        played = play(environment, policy, balls, seed=settings.seed, after_each=moved_on)
-    return played
-
-
-def _compared(
-    settings: DemoSettings, modes: Mapping[Pacing, Played], progress: Progress
-) -> dict[str, Played]:
-    """All policies and the baselines on the same balls, as fast as they can.
-
-    The learned policy plays on the arm and in the noise that it knows, in a recording of its own.
-    """
-    scripted = modes.get(Pacing.INLINE) or modes[Pacing.REAL_TIME]
-    learned, episodes = shipped_policy(), len(scripted.episodes)
-    task = replace(learned.conditions.task(fly_out=False), balls=settings.task().balls)
-    compared = {
-        "scripted": scripted,
-        "learned": _play(
-            settings,
-            "learned",
-            learned,
-            learned.conditions.rig(),
-            task,
-            progress,
-            episodes=episodes,
-            record=settings.learned_recording,
-        ),
-    }
-    for name, (make, factor) in BASELINES.items():
-        rig, task = settings.rig(Pacing.INLINE), replace(settings.task(), factor=factor)
-        compared[name] = _play(settings, name, make(), rig, task, progress, episodes=episodes)
-    return compared
-
-
-def _recorded(
-    settings: DemoSettings, modes: Iterable[Pacing]
-) -> dict[Pacing, list[RecordedEpisode]]:
-    """The recorded episodes of each mode."""
-    episodes = recorded_episodes(settings.recording)
-    return {
-        pacing: [episode for episode in episodes if episode.pacing == pacing.value]
-        for pacing in modes
-    }
-
-
-def _progress(console: Console) -> Progress:
-    return Progress(
-        TextColumn("{task.description:>16}"),
-        BarColumn(bar_width=30),
-        MofNCompleteColumn(),
-        TextColumn("{task.fields[returns]}"),
-        TimeElapsedColumn(),
-        console=console,
-    )
-
-
-def _advance(progress: Progress, bar: Any) -> Callable[[EpisodeSummary], None]:
-    """Moves a bar on by an episode."""
-    returns = 0
-
-    def advance(summary: EpisodeSummary) -> None:
-        nonlocal returns
-        raise_if_terminated()
-        returns += summary.returned
-        progress.update(bar, advance=1, returns=f"{returns} returned")
-
-    return advance
+        The learned policy plays on the arm and in the noise that it knows, in a recording.
+        """
+        learned, count = shipped_policy(), len(scripted.episodes)
+        rig = learned.conditions.rig()
+        task = replace(learned.conditions.task(fly_out=False), balls=self.task.balls)
+        played = self.play("learned", learned, rig, count, task=task, record=record)
+        compared = {"scripted": scripted, "learned": played}
+        for name, (make, factor) in BASELINES.items():
+            task = replace(self.task, factor=factor)
+            compared[name] = self.play(name, make(), RigSettings(muscle=muscle), count, task=task)
+        return compared
 
 
 def main(
@@ -195,32 +110,45 @@ def main(
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/demo"),
 ) -> None:
     """Plays table tennis in real time, then accelerated; reports rates, lateness and returns."""
-    unwind_on_sigterm()
-    console = Console()
-    settings = DemoSettings(
-        balls=balls,
-        episodes=episodes,
-        real_time_episodes=real_time_episodes,
-        seed=seed,
-        muscle=muscle,
-        output=output,
-    )
+    begin, console = time.monotonic(), Console()
     if episodes == 0 and real_time_episodes == 0:
         raise typer.BadParameter("nothing to play: ask for at least one episode")
+    task = TaskSettings(balls=None if balls is None else str(balls), factor=DEFAULT_FACTOR)
+    recording, of_learned = output / "run.mcap", output / "learned.mcap"
     try:
-        balls_from(settings.task().balls)
+        balls_from(task.balls)
     except (OSError, ValueError) as error:
         raise typer.BadParameter(str(error), param_hint="--balls") from error
     try:
         output.mkdir(parents=True, exist_ok=True)
+        for each in (recording, of_learned):
+            each.unlink(missing_ok=True)
     except OSError as error:
         raise typer.BadParameter(str(error), param_hint="--output") from error
     try:
-        run_demo(settings, console).print(console)
+        with Progress(*COLUMNS, console=console) as progress:
+            demo = Demo(task, seed, progress)
+            modes = demo.play_modes(muscle, episodes, real_time_episodes, recording)
+            scripted = modes.get(Pacing.INLINE) or modes[Pacing.REAL_TIME]
+            policies = demo.play_policies(scripted, muscle, of_learned)
     except o80.Error as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
-    _say_where(settings, console)
+    recorded = [episode.pacing for episode in recorded_episodes(recording)]
+    report: Figures = {
+        "modes": {
+            pacing.value: mode_figures(played, recorded.count(pacing.value))
+            for pacing, played in modes.items()
+        },
+        "policies": {name: policy_figures(played) for name, played in policies.items()},
+        "seconds": round(time.monotonic() - begin, 1),
+    }
+    (output / "report.json").write_text(json_text(report, indent=2) + "\n")
+    print_table(console, "table tennis", report["modes"])
+    print_table(console, "the same balls with other policies", report["policies"])
+    console.print(f"seconds: {report['seconds']:g}", highlight=False)
+    for line in _written(recording, of_learned):
+        console.print(line, soft_wrap=True, highlight=False)
 
 
 def command_of_o80() -> str:
@@ -233,26 +161,24 @@ def command_of_o80() -> str:
     return shlex.quote(str(program.relative_to(Path.cwd()) if inside else program))
 
 
-def _say_where(settings: DemoSettings, console: Console) -> None:
-    """Prints what was written, and how to look at it."""
-    recording = shlex.quote(str(settings.recording))
-    arm = next(iter(o80.open(settings.recording)))
-    command = command_of_o80()
-    lines = (
-        f"report: {settings.output}",
-        f"recording of every row: {recording}; of the learned policy: {settings.learned_recording}",
+def _written(path: Path, of_learned: Path) -> tuple[str, ...]:
+    """Lines that say what was written, and how to look at it."""
+    recording, command = shlex.quote(str(path)), command_of_o80()
+    arm = next(iter(o80.open(path)))
+    return (
+        f"report: {path.parent}",
+        f"recording of every row: {recording}; of the learned policy: {of_learned}",
         f"  {command} view {recording}      # arm, table, balls in the browser, back in time too",
         f"  {command} replay {recording}    # repeats all of it and compares bit for bit",
         f"  {command} plot {recording} --segment {arm} --fields agonist_1,extended.joint_positions",
     )
-    for line in lines:
-        console.print(line, soft_wrap=True, highlight=False)
 
 
 def run() -> None:
     """The program `o80-table-tennis`."""
     keep_printing()
-    typer.run(main)
+    with ends_in_order():
+        typer.run(main)
 
 
 if __name__ == "__main__":

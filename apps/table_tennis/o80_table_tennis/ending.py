@@ -11,22 +11,6 @@ from types import FrameType
 _came: list[int] = []
 
 
-def unwind_on_sigterm() -> None:
-    """From now on SIGTERM raises SystemExit."""
-    signal.signal(signal.SIGTERM, _unwind)
-
-
-def _unwind(number: int, _frame: FrameType | None) -> None:
-    _came.append(number)
-    sys.exit(128 + number)
-
-
-def raise_if_terminated() -> None:
-    """Raises SystemExit again: one that was raised while a destructor ran is lost."""
-    if _came:
-        sys.exit(128 + _came[0])
-
-
 @contextmanager
 def ends_in_order() -> Iterator[None]:
     """Within it Ctrl-C, SIGTERM and SIGHUP raise SystemExit, once: the second one is ignored."""
@@ -34,12 +18,21 @@ def ends_in_order() -> Iterator[None]:
     def end(number: int, _frame: FrameType | None) -> None:
         for each in before:
             signal.signal(each, signal.SIG_IGN)
+        _came.append(number)
         sys.exit(128 + number)
 
-    numbers = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+    numbers = [signal.SIGINT, signal.SIGTERM]
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
+        numbers.append(signal.SIGHUP)
     before = {number: signal.signal(number, end) for number in numbers}
     try:
         yield
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def raise_if_ended() -> None:
+    """Raises SystemExit again: one that was raised while a destructor ran is lost."""
+    if _came:
+        sys.exit(128 + _came[0])

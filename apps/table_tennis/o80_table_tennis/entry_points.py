@@ -14,22 +14,22 @@ from .environment import TableTennisEnvironment
 from .settings import Pacing, RigSettings, TaskSettings
 
 
-def _paced(rig: RigSettings | None, pacing: Pacing) -> RigSettings:
-    """The settings with this pacing. Raises TypeError for anything but settings."""
+def _made(rig: RigSettings | None, pacing: Pacing, rest: dict[str, Any]) -> TableTennisEnvironment:
+    """An environment with this pacing. Raises TypeError for anything but settings."""
     refuse_wrong_arguments(rig, None, None, [])
-    return (rig or RigSettings()).paced(pacing)
+    return TableTennisEnvironment(rig=(rig or RigSettings()).paced(pacing), **rest)
 
 
 def accelerated_environment(
-    *,
-    processes: bool = False,
-    rig: RigSettings | None = None,
-    task: TaskSettings | None = None,
-    **rest: Any,
+    *, processes: bool = False, rig: RigSettings | None = None, **rest: Any
 ) -> TableTennisEnvironment:
     """`o80/TableTennis-v0`: inline, or with arm and twins in processes of their own."""
-    pacing = Pacing.PROCESSES if processes else Pacing.INLINE
-    return TableTennisEnvironment(rig=_paced(rig, pacing), task=task, **rest)
+    return _made(rig, Pacing.PROCESSES if processes else Pacing.INLINE, rest)
+
+
+def real_time_environment(*, rig: RigSettings | None = None, **rest: Any) -> TableTennisEnvironment:
+    """`o80/TableTennisRealTime-v0`: the arm runs by the clock."""
+    return _made(rig, Pacing.REAL_TIME, rest)
 
 
 def vector_environment(
@@ -37,20 +37,14 @@ def vector_environment(
     num_envs: int,
     rig: RigSettings | None = None,
     task: TaskSettings | None = None,
-    threads: int | None = None,
     autoreset_mode: AutoresetMode | str = AutoresetMode.NEXT_STEP,
     render_mode: str | None = None,
-    camera: str = "side",
+    **rest: Any,
 ) -> VectorEnvironment:
-    """Copies of `o80/TableTennis-v0` in this process, stepped together by threads of C++."""
+    """Copies of `o80/TableTennis-v0` in this process, stepped together by threads of C++.
+
+    rest: `threads` and `camera` of `TableTennisCopies`.
+    """
     refuse_wrong_arguments(rig, task, render_mode, TableTennisCopies.metadata["render_modes"])
-    copies = TableTennisCopies(num_envs, rig=rig, task=task, threads=threads, camera=camera)
+    copies = TableTennisCopies(num_envs, rig=rig, task=task, **rest)
     return VectorEnvironment(copies, autoreset_mode=autoreset_mode, render_mode=render_mode)
-
-
-def real_time_environment(
-    *, rig: RigSettings | None = None, task: TaskSettings | None = None, **rest: Any
-) -> TableTennisEnvironment:
-    """`o80/TableTennisRealTime-v0`: the arm runs by the clock."""
-    settings = _paced(rig, Pacing.REAL_TIME)
-    return TableTennisEnvironment(rig=settings, task=task, **rest)

@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
+import math
 import time
-from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.learning import Environment
+from o80.hybrid.environment import HybridEnvironment
 
 from .arguments import refuse_wrong_arguments
 from .copies import TableTennisCopies
 from .report.display import RENDER_MODES, Page
-from .report.episode_recorder import EpisodeRecorder
 from .report.episode_summary import EpisodeSummary
+from .report.recorded_episodes import mark_episode, settings_mark
 from .report.statistics import EpisodeCounts, Statistics, statistics_of
 from .settings import RigSettings, TaskSettings
 from .task.end import End
@@ -27,7 +26,7 @@ Info = dict[str, Any]
 Outcome = tuple[NDArray[np.float32], float, bool, bool, Info]
 
 
-class TableTennisEnvironment(Environment):
+class TableTennisEnvironment(HybridEnvironment):
     """Real arm, simulated ball: 100 steps a second of eight pressure changes, or fewer longer ones.
 
     Actions: Box(-1, 1, (8,)), changes of the normalised pressures. The task (`TaskSettings.task`)
@@ -57,6 +56,8 @@ class TableTennisEnvironment(Environment):
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 100}  # noqa: RUF012
     task: TableTennisCopies
+    _page: Page | None
+    _summary: EpisodeSummary | None
 
     def __init__(
         self,
@@ -68,27 +69,21 @@ class TableTennisEnvironment(Environment):
         record: str | Path | None = None,
     ) -> None:
         refuse_wrong_arguments(rig, task, render_mode, self.metadata["render_modes"])
-        super().__init__(TableTennisCopies(None, rig=rig, task=task, camera=camera))
-        self.metadata, self.render_mode = type(self).metadata, render_mode
-        self.arm, *self.twins = self.task.single.frontends
+        made, self._page = TableTennisCopies(None, rig=rig, task=task, camera=camera), None
+        self.arm, *self.twins = frontends = made.single.frontends
         """Frontends of the arm, and of the worlds; the ball of the first one is played."""
         self._counts = EpisodeCounts()
-        self._number = -1
-        self._begun = False
-        self._summary: EpisodeSummary | None = None
-        self._page: Page | None = None
-        self._recorder: EpisodeRecorder | None = None
-        its_rig = self.task.rig_settings
+        self._number, self._summary = -1, None
+        its_rig = made.rig_settings
         try:
+            told = settings_mark(its_rig, made.settings, [each.epoch for each in frontends])
+            super().__init__(made, record=record, options=told)
+            self.metadata, self.render_mode = type(self).metadata, render_mode
             if render_mode == "human":
-                shown, by_clock = [*self.twins, self.arm], its_rig.pacing.real_time
-                self._page = Page(shown, 0.0 if by_clock else its_rig.step)
-            if record is not None:
-                recorded = [self.arm, *self.twins]
-                self._recorder = EpisodeRecorder(
-                    Path(record), recorded, its_rig, self.task.settings
-                )
+                step = 0.0 if its_rig.pacing.real_time else its_rig.step
+                self._page = Page([*self.twins, self.arm], step)
         except BaseException:
+            made.close()
             self.close()
             raise
 
@@ -97,60 +92,39 @@ class TableTennisEnvironment(Environment):
     ) -> tuple[NDArray[np.float32], Info]:
         """Arm and worlds to the start; the ball flies from the first step on."""
         observation, info = super().reset(seed=seed, options=options)
-        self._draw, self._twin_first = self.task.draws[0], self.task.twin_row
-        self._paid, self._number = 0.0, self._number + 1
-        self._begun, self._summary = False, None
-        self._first_observation = observation.copy()
+        self._twin_first, self._number = self.task.twin_row, self._number + 1
+        self._paid, self._begun_at = 0.0, math.nan
+        self._summary, self._observed = None, [observation.copy()]
         return observation, _plain(info)
 
     def step(self, action: Action) -> Outcome:
         """Five iterations of the arm and of every world, times `repeat`, times `action_steps`."""
-        if not self._ready:
-            state = "the episode is over" if self._number >= 0 else "no episode has begun"
-            raise gymnasium.error.ResetNeeded(f"{state}: call reset() before step()")
-        if not self._begun:
-            self._begin()
-        called = time.perf_counter()
+        called = time.monotonic()
         observation, reward, terminated, truncated, info = super().step(action)
+        if math.isnan(self._begun_at):  # an episode begins with its first step
+            self._begun_at = called
         end = End(info["end"])
-        info = _plain(info)
         self._paid += reward
-        if self._recorder is not None and end is not End.STALLED:
-            self._recorder.step(action, reward, observation)
-        self._counts.seconds_stepping += time.perf_counter() - called
+        if self.recording is not None and end is not End.STALLED:
+            self._observed.append(observation.copy())
+        self._counts.seconds_stepping += time.monotonic() - called
         if self._page is not None:
             self._page.after_step()
         if end is not End.RUNNING:
             self._finish(end)
-        return observation, reward, terminated, truncated, info
-
-    def _begin(self) -> None:
-        """The first step: an episode begins with it, however long the caller took to think."""
-        self._begun, draw = True, self._draw
-        if self._recorder is not None:
-            self._recorder.begin(
-                self._first_observation,
-                number=self._number,
-                ball=draw.balls.numbers[0],
-                extra_balls=draw.balls.numbers[1:],
-                goal=draw.goal,
-                seed=self.np_random_seed,
-                arm_seed=draw.arm_seed,
-                twin_seed=draw.twin_seed,
-            )
-        self._first_step_at = time.monotonic()
+        return observation, reward, terminated, truncated, _plain(info)
 
     def _finish(self, end: End) -> None:
         """The episode is over: its summary, its mark in the recording."""
         self._counts.episodes += 1
         self._counts.stalled_episodes += end is End.STALLED
-        self._counts.seconds += time.monotonic() - self._first_step_at
-        task = self.task
+        self._counts.seconds += time.monotonic() - self._begun_at
+        task, draw = self.task, self.task.draws[0]
         _, first, last = task.single.span
         self._summary = EpisodeSummary.of(
             task.state.record.at(0),
             number=self._number,
-            ball=self._draw.balls.numbers[0],
+            ball=draw.numbers[0],
             steps=int(task.steps[0]),
             reward=self._paid,
             terminated=end.terminated,
@@ -160,8 +134,16 @@ class TableTennisEnvironment(Environment):
             twin_first=self._twin_first,
             twin_last=task.twin_row,
         )
-        if self._recorder is not None:
-            self._recorder.end(self._summary)
+        if self.recording is not None:
+            mark_episode(
+                self.recording,
+                self._summary,
+                self._observed,
+                goal=draw.goal,
+                extra_balls=draw.numbers[1:],
+                arm_seed=draw.arm_seed,
+                twin_seed=draw.twin_seed,
+            )
 
     # ------------------------------------------------------------------ beside the episode
 
@@ -187,11 +169,11 @@ class TableTennisEnvironment(Environment):
 
     def close(self) -> None:
         """Ends everything that was started; may be called twice."""
-        with ExitStack() as stack:  # each is closed even if another one fails
-            stack.callback(super().close)
-            for part in (self._page, self._recorder):
-                if part is not None:
-                    stack.callback(part.close)
+        try:
+            if self._page is not None:
+                self._page.close()
+        finally:
+            super().close()
 
 
 def _plain(info: Info) -> Info:

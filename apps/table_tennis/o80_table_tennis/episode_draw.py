@@ -2,26 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from o80.base.arrays import FloatArray
 
-from .balls.draw import DrawnBalls, draw_balls
+from .balls.sampled_flight import SampledFlight
 from .balls.sources import Flights
-from .task.task import Task
+from .task.ball_play import ReturnTask
 
 SEEDS = 2**32
+USERS_OWN = -1
+"""Number of a ball that is in no source."""
 
 
 @dataclass(frozen=True)
 class EpisodeDraw:
     """All that is random in an episode."""
 
-    balls: DrawnBalls
+    numbers: list[int]
+    """Numbers of the balls in their source: the played one, then the extra ones."""
+    flights: list[SampledFlight]
+    """Flights of these balls."""
     goal: FloatArray
     """(G,) of the task."""
     arm_seed: int
@@ -29,14 +32,34 @@ class EpisodeDraw:
 
 
 def drawn_episode(
-    task: Task,
-    balls: Flights,
+    task: ReturnTask,
+    source: Flights,
     rng: np.random.Generator,
     *,
     extra: int = 0,
-    options: Mapping[str, Any],
+    ball: int | None = None,
+    flight: SampledFlight | None = None,
 ) -> EpisodeDraw:
-    """An episode drawn from `rng`, with `options` of `reset`."""
-    drawn = draw_balls(balls, rng, extra=extra, **options)
+    """One played ball and `extra` others, all different ones if the source has so many.
+
+    The played one is number `ball` of the source, or a `flight` of the caller's own, if given; the
+    generator draws as often all the same. Raises IndexError for a number that the source lacks.
+    """
+    numbers = _drawn(rng, len(source), 1 + extra)
+    if ball is not None and ball in numbers:  # then the ball that was drawn flies in its place
+        numbers[numbers.index(ball)] = numbers[0]
+    if ball is not None:
+        numbers[0] = int(ball)
+    if flight is not None:
+        numbers[0] = USERS_OWN
+    flights = [flight or source.flight(numbers[0]), *map(source.flight, numbers[1:])]
     goal = task.begin(rng)
-    return EpisodeDraw(drawn, goal, int(rng.integers(SEEDS)), int(rng.integers(SEEDS)))
+    return EpisodeDraw(numbers, flights, goal, int(rng.integers(SEEDS)), int(rng.integers(SEEDS)))
+
+
+def _drawn(rng: np.random.Generator, available: int, wanted: int) -> list[int]:
+    """So many numbers below `available`; with repetition only if there are too few."""
+    if wanted == 1:
+        return [int(rng.integers(available))]
+    drawn = rng.choice(available, wanted, replace=wanted > available)
+    return [int(number) for number in drawn]

@@ -6,7 +6,7 @@ Every policy plays the same balls. Prints a table and draws where the balls land
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,25 +14,21 @@ from typing import Annotated, Any
 import typer
 from rich.console import Console
 from rich.progress import Progress
-from rich.table import Table
 
 import o80
 from o80.base.finite import json_text
 from o80.base.screen import keep_printing
 
-from .ending import unwind_on_sigterm
+from .ending import ends_in_order
 from .learning.paired import Paired
 from .players.conditions import Conditions
+from .players.hitting_policy import HittingSettings
 from .players.learned_policy import LearnedPolicy, shipped_policy
 from .players.policies import DEFAULT_FACTOR, Policy, RandomPolicy, StillPolicy, default_policy
 from .playing import VERDICT_BALLS, VERDICT_SEED, evaluate
+from .report.report import print_table
 from .report.statistics import Played
-from .rig.arm_numbers import ArmNumbers
 from .settings import Pacing
-from .world.table import TARGET
-
-COLUMNS = ("policy", "balls", "touched", "returned", "95 %", "reward", "miss", "speed")
-"""miss: median distance of returned balls from the target; speed: the median after the touch."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +68,8 @@ def main(
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/evaluate"),
 ) -> None:
     """Plays the same balls with each policy, and compares."""
-    unwind_on_sigterm()
+    from .learning.landing_plot import plot_landings
+
     console = Console()
     given = {"balls": balls, "goal": goal, "preset": preset}
     match = Match({name: each for name, each in given.items() if each is not None}, count, seed)
@@ -87,11 +84,16 @@ def main(
     except (ValueError, OSError, o80.Error) as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
-    _print(played, console)
     paired = _paired(policies, [*played.values()]) if real_time else {}
+    figures: dict[str, Any] = {label: each.as_json() for label, each in played.items()}
+    print_table(console, "the same balls", figures)
     for name, pair in paired.items():
         console.print(f"{name}: {pair}", highlight=False)
-    _write(played, paired, output, console)
+    figures |= {f"{name}, paired": each.as_json() for name, each in paired.items()}
+    output.mkdir(parents=True, exist_ok=True)
+    plot_landings(output / "landings.png", played)
+    (output / "evaluation.json").write_text(json_text(figures, indent=2) + "\n")
+    console.print(f"landings.png, evaluation.json: {output}", soft_wrap=True)
 
 
 def named_policy(name: str, **changed: str) -> tuple[Policy, Conditions]:
@@ -108,7 +110,7 @@ def named_policy(name: str, **changed: str) -> tuple[Policy, Conditions]:
         policy, conditions = learned, learned.conditions
     conditions = replace(conditions, **changed)  # type: ignore[arg-type]
     if name == "scripted":
-        policy = default_policy(ArmNumbers.of_rig(conditions.rig()))
+        policy = default_policy(HittingSettings.of_rig(conditions.rig()))
     return policy, conditions
 
 
@@ -127,46 +129,13 @@ def _play(name: str, match: Match, pacing: Pacing, bars: Progress) -> Played:
     )
 
 
-def _print(played: Mapping[str, Played], console: Console) -> None:
-    """A row for each policy."""
-    table = Table()
-    for name in COLUMNS:
-        table.add_column(name, justify="left" if name == "policy" else "right")
-    for label, each in played.items():
-        low, high = (100 * share for share in each.interval)
-        any_returned = each.returns > 0
-        table.add_row(
-            label,
-            str(len(each.episodes)),
-            f"{100 * each.touched:.1f} %",
-            f"{100 * each.returned:.1f} %",
-            f"{low:.1f} to {high:.1f} %",
-            f"{each.reward:.3f}",
-            f"{each.distance(TARGET):.2f} m" if any_returned else "",
-            f"{each.speed:.1f} m/s" if any_returned else "",
-        )
-    console.print(table)
-
-
 def _paired(policies: list[str], played: Sequence[Played]) -> dict[str, Paired]:
     """By policy; each was played accelerated, then in real time."""
     ways = zip(played[::2], played[1::2], strict=True)
     return {name: Paired.of(*each) for name, each in zip(policies, ways, strict=True)}
 
 
-def _write(
-    played: Mapping[str, Played], paired: dict[str, Paired], output: Path, console: Console
-) -> None:
-    from .learning.landing_plot import plot_landings
-
-    output.mkdir(parents=True, exist_ok=True)
-    plot_landings(output / "landings.png", played)
-    figures: dict[str, Any] = {label: each.as_json() for label, each in played.items()}
-    figures |= {f"{name}, paired": each.as_json() for name, each in paired.items()}
-    (output / "evaluation.json").write_text(json_text(figures, indent=2) + "\n")
-    console.print(f"landings.png, evaluation.json: {output}", soft_wrap=True)
-
-
 if __name__ == "__main__":
     keep_printing()
-    typer.run(main)
+    with ends_in_order():
+        typer.run(main)

@@ -11,14 +11,13 @@ from numbers import Real
 from o80.base.argument_checks import whole
 
 from .task.actions import FINE, largest_change
-from .task.ball_play import ReturnTask, SmashTask, observes_as_published
+from .task.ball_play import ReturnTask, SmashTask, missing_members, observes_as_published
 from .task.end import EndRule
 from .task.full_observation import FullObservation, full_observation
 from .task.noise import NO_NOISE, NoiseSettings
 from .task.observations import ObservationBounds
-from .task.observer import Observing
+from .task.observer import Observer
 from .task.rewards import RewardRule, reward_rule
-from .task.task import Task, missing_members
 from .world.arm import MUSCLES
 from .world.timing import ITERATIONS, PERIOD
 
@@ -103,8 +102,8 @@ class RigSettings:
 class TaskSettings:
     """The task, its balls and its rules. Raises ValueError or TypeError."""
 
-    task: str | Task = "return"
-    """return or smash; or an object of your own, see `task.task.Task`."""
+    task: str | ReturnTask = "return"
+    """return or smash; or an object of your own, see `task.ball_play.ReturnTask`."""
     balls: str | None = None
     """Simulated shots: "narrow" (like those of the recorded ball gun), "wide", or "launcher" (those
     of the ball launcher, needs o80-devices). Or the path of a recording, or of a folder of them.
@@ -180,7 +179,8 @@ class TaskSettings:
         elif missing := missing_members(self.task):
             raise TypeError(
                 f"task must be one of {', '.join(TASKS)}, or an object with the members of "
-                f"o80_table_tennis.task.task.Task; {self.task!r} has no {', '.join(missing)}"
+                f"o80_table_tennis.task.ball_play.ReturnTask; {self.task!r} has no "
+                f"{', '.join(missing)}"
             )
         if self.observation != "published" and not observes_as_published(self.made()):
             raise ValueError(
@@ -206,9 +206,11 @@ class TaskSettings:
             return 0
         return self.delay + ITERATIONS * (self.chunk_size * self.repeat - self.steps)
 
-    def observing(self, step: float) -> Observing:
-        """How an environment observes whose steps without repetition take `step` [s]."""
-        return Observing(
+    def observer(self, task: ReturnTask, step: float, count: int) -> Observer:
+        """Observer of `count` episodes, whose steps without repetition take `step` [s]."""
+        return Observer(
+            task,
+            count,
             noise=self.noise,
             full=full_observation(self.observation),
             interval=self.steps * step,
@@ -220,12 +222,17 @@ class TaskSettings:
         posture = self.noise.start_posture
         return replace(rig, start_noise=posture) if posture > 0 else rig
 
-    def made(self) -> Task:
+    @property
+    def title(self) -> str:
+        """Name of the task."""
+        return self.task if isinstance(self.task, str) else type(self.task).__name__
+
+    def made(self) -> ReturnTask:
         """The task itself."""
         return TASKS[self.task](self) if isinstance(self.task, str) else self.task
 
 
-TASKS: Mapping[str, Callable[[TaskSettings], Task]] = {
+TASKS: Mapping[str, Callable[[TaskSettings], ReturnTask]] = {
     "return": lambda s: ReturnTask(s.bounds, s.end, reward_rule(s.reward)),
     "smash": lambda s: SmashTask(s.bounds, s.end, reward_rule(s.reward)),
 }

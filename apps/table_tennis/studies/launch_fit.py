@@ -16,10 +16,12 @@ from o80.base.arrays import FloatArray
 from o80_table_tennis.balls.flight_fit import FlightFit
 from o80_table_tennis.balls.launches import Launch
 from o80_table_tennis.balls.trajectories import BallTrajectory
-from o80_table_tennis.physics.prediction import predict, predict_crossing
+from o80_table_tennis.physics.prediction import predict
 
 PLANE = 0.3
 """y of the plane that the racket reaches [m]."""
+STEP = 0.001
+"""Between two rows of a flight [s]."""
 NAMES = (
     *("x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"),
     *("bounce time", "bounce x", "bounce y"),
@@ -66,7 +68,7 @@ def _recorded(fit: FlightFit) -> list[float] | None:
     if not len(fit.bounce_times):
         return None
     bounce = fit.bounce_times[:1]
-    times = np.arange(bounce[0], fit.end, 0.001)
+    times = np.arange(bounce[0], fit.end, STEP)
     positions, velocities = fit.at(times)
     if not (positions[:, 1] < PLANE).any():
         return None
@@ -82,16 +84,14 @@ def _recorded(fit: FlightFit) -> list[float] | None:
 
 
 def _predicted(launch: Launch) -> list[float]:
-    start = launch.position, launch.velocity
-    bounce = predict(*start, 1.5, spin=launch.spin)
-    crossing = predict_crossing(*start, axis=1, at=PLANE, spin=launch.spin)
-    assert crossing is not None, "a shot that can be played reaches the plane"
-    time = float(bounce.bounce_times[0])
-    place = predict(*start, time, spin=launch.spin, period=time).positions[-1]
+    flight = predict(launch.position, launch.velocity, 2.0, spin=launch.spin, period=STEP)
+    row = int(np.argmax(flight.positions[:, 1] < PLANE))
+    assert row, "a shot that can be played reaches the plane"
+    time = float(flight.bounce_times[0])
     return [
         *(*launch.position, *launch.velocity, *launch.spin),
-        *(time, *place[:2]),
-        *(crossing.time, *crossing.position[[0, 2]], *crossing.velocity),
+        *(time, *flight.positions[round(time / STEP), :2]),
+        *(flight.stamps[row], *flight.positions[row, [0, 2]], *flight.velocities[row]),
     ]
 
 

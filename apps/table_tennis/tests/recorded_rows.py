@@ -10,8 +10,9 @@ import numpy as np
 
 from o80_table_tennis.balls.frame_stamps import FRAME_PERIOD
 from o80_table_tennis.balls.recordings import BALL_GUN_FRAME, load_trajectories
-from o80_table_tennis.balls.simulated_shots import simulated_shot
+from o80_table_tennis.balls.simulated_shots import drawn_launch
 from o80_table_tennis.balls.trajectories import BallTrajectory
+from o80_table_tennis.physics.prediction import Numbers, predict
 
 ROOT = Path(__file__).resolve().parents[3]
 DATA = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data"))
@@ -21,6 +22,23 @@ DATA = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data"))
 def ball_gun_shots() -> list[BallTrajectory]:
     """All recorded shots of the ball gun; their fits are made once."""
     return load_trajectories(DATA / "ball_gun_2019")
+
+
+def simulated_shot(rng: np.random.Generator) -> BallTrajectory:
+    """A drawn shot, as cameras would see it."""
+    return drawn_launch(rng).seen()
+
+
+def crossing(
+    position: Numbers, velocity: Numbers, *, axis: int, at: float, spin: Numbers
+) -> tuple[float, np.ndarray, np.ndarray]:
+    """Time, position and velocity with which a ball first goes through a plane."""
+    flight = predict(position, velocity, 2.0, spin=spin, period=0.0005)
+    rows = np.column_stack([flight.stamps, flight.positions, flight.velocities])
+    off = rows[:, 1 + axis] - at
+    row = int(np.argmax(off[:-1] * off[1:] <= 0.0))
+    found = rows[row] + off[row] / (off[row] - off[row + 1]) * (rows[row + 1] - rows[row])
+    return float(found[0]), found[1:4], found[4:]
 
 
 def frames_of_a_reader(rng: np.random.Generator, duration: float) -> np.ndarray:

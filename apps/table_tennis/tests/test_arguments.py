@@ -9,7 +9,7 @@ from typing import Any
 
 import gymnasium
 import pytest
-from opened_environment import STILL, opened, played_out
+from opened_environment import opened
 
 import o80
 import o80_table_tennis
@@ -23,15 +23,6 @@ from o80_table_tennis.task.rewards import OrderedReward
 def inline() -> Iterator[TableTennisEnvironment]:
     with closing(opened()) as environment:
         yield environment
-
-
-def test_a_step_needs_an_episode(inline: TableTennisEnvironment) -> None:
-    with pytest.raises(gymnasium.error.ResetNeeded, match="no episode has begun: call reset"):
-        inline.step(STILL)
-    inline.reset(seed=1)
-    played_out(inline)
-    with pytest.raises(gymnasium.error.ResetNeeded, match="the episode is over: call reset"):
-        inline.step(STILL)
 
 
 @pytest.mark.parametrize(

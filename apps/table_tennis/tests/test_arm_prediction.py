@@ -9,7 +9,6 @@ from opened_environment import opened
 from o80_table_tennis.players.arm_dynamics import ArmModel
 from o80_table_tennis.players.arm_prediction import ArmPredictor, ArmState
 from o80_table_tennis.players.hitting_policy import HittingSettings
-from o80_table_tennis.rig.arm_numbers import ArmNumbers
 from o80_table_tennis.task.observations import JOINT_POSITIONS, JOINT_VELOCITIES, PRESSURES
 from o80_table_tennis.world.arm import JOINTS
 from o80_table_tennis.world.timing import STEP
@@ -31,8 +30,7 @@ def test_the_motion_of_the_dead_time_is_predicted_from_the_actions_in_flight() -
     """Nearer by far than the present state, or its speed continued."""
     rng, steps, dead_steps = np.random.default_rng(3), 60, [4, 4, 2, 1]
     with closing(opened(preset="identified")) as environment:
-        numbers = ArmNumbers.of(environment.arm)
-        settings = HittingSettings().for_arm(numbers)
+        settings = HittingSettings.of(environment.arm)
         predictor = ArmPredictor(
             settings.arm, settings.muscles, settings.lag, settings.dead_time, BEGIN
         )

@@ -2,16 +2,22 @@
 
 from contextlib import closing
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
-from recorded_rows import write_shots
+from recorded_rows import simulated_shot, write_shots
 
-from o80_table_tennis.balls.draw import USERS_OWN, draw_balls
-from o80_table_tennis.balls.simulated_shots import SimulatedShots, simulated_shot
+from o80_table_tennis.balls.simulated_shots import SimulatedShots
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.environment import TableTennisEnvironment
+from o80_table_tennis.episode_draw import USERS_OWN, EpisodeDraw, drawn_episode
 from o80_table_tennis.settings import TaskSettings
+from o80_table_tennis.task.ball_play import ReturnTask
+
+
+def drawn(shots: SimulatedShots, seed: int, **options: Any) -> EpisodeDraw:
+    return drawn_episode(ReturnTask(), shots, np.random.default_rng(seed), **options)
 
 
 def test_every_episode_draws_another_shot_and_the_seed_repeats_them() -> None:
@@ -30,9 +36,9 @@ def test_every_episode_draws_another_shot_and_the_seed_repeats_them() -> None:
 
 def test_a_shot_is_played_again_by_its_number() -> None:
     shots = SimulatedShots()
-    drawn = draw_balls(shots, np.random.default_rng(1), extra=3)
-    assert len(set(drawn.numbers)) == 4
-    for number, flight in zip(drawn.numbers, drawn.flights, strict=True):
+    found = drawn(shots, 1, extra=3)
+    assert len(set(found.numbers)) == 4
+    for number, flight in zip(found.numbers, found.flights, strict=True):
         np.testing.assert_array_equal(shots.flight(number).states, flight.states)
 
 
@@ -41,21 +47,20 @@ def test_no_ball_is_drawn_twice_where_there_are_enough(ball: int) -> None:
     shots = SimulatedShots(count=6)
     for seed in range(20):
         for played in (None, ball):
-            drawn = draw_balls(shots, np.random.default_rng(seed), extra=5, ball=played)
-            assert sorted(drawn.numbers) == list(range(6))
-            assert played in (None, drawn.numbers[0])
-    assert len(draw_balls(shots, np.random.default_rng(0), extra=9).flights) == 10
+            found = drawn(shots, seed, extra=5, ball=played)
+            assert sorted(found.numbers) == list(range(6))
+            assert played in (None, found.numbers[0])
+    assert len(drawn(shots, 0, extra=9).flights) == 10
 
 
 def test_what_the_caller_chooses_changes_no_other_draw() -> None:
     shots, flight = SimulatedShots(), SimulatedShots(seed=9).flight(0)
     states = []
     for chosen in ({}, {"ball": 3}, {"flight": flight}):
-        rng = np.random.default_rng(2)
-        drawn = draw_balls(shots, rng, extra=2, **chosen)
-        states.append((drawn.numbers[1:], rng.integers(2**62)))
+        found = drawn(shots, 2, extra=2, **chosen)
+        states.append((found.numbers[1:], found.arm_seed, found.twin_seed))
     assert states[0] == states[1] == states[2]
-    assert drawn.numbers[0] == USERS_OWN
+    assert found.numbers[0] == USERS_OWN
 
 
 def test_balls_are_named_or_read_from_a_path(tmp_path: Path) -> None:

@@ -120,7 +120,7 @@ def test_extra_balls_are_judged_as_if_each_were_played_alone() -> None:
     actions = np.random.default_rng(4).uniform(-1, 1, (300, MUSCLES)).astype(np.float32)
     with closing(opened(worlds=6)) as environment:
         environment.reset(seed=5)
-        balls, played = environment.task.draws[0].balls.numbers, 0
+        balls, played = environment.task.draws[0].numbers, 0
         paid, ended_after = np.zeros(6), np.zeros(6, dtype=int)
         over = False
         while not over:

@@ -5,13 +5,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recorded_rows import frames_of_a_reader, rows_seen, write_ball_gun, write_shots
+from recorded_rows import frames_of_a_reader, rows_seen, simulated_shot, write_ball_gun, write_shots
 
 import o80_table_tennis.balls.flight_cache
 from o80_table_tennis.balls.flight_cache import ARRAYS
 from o80_table_tennis.balls.recordings import load_trajectories
 from o80_table_tennis.balls.sampled_flight import SampledFlight
-from o80_table_tennis.balls.simulated_shots import simulated_shot
 from o80_table_tennis.balls.sources import recorded_balls
 from o80_table_tennis.balls.trajectories import BallTrajectory
 

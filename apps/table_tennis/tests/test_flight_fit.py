@@ -2,12 +2,11 @@
 
 import numpy as np
 import pytest
-from recorded_rows import DATA, ball_gun_shots
+from recorded_rows import DATA, ball_gun_shots, simulated_shot
 
 from o80_table_tennis.balls.flight_fit import bounce_rows, fit_flight
 from o80_table_tennis.balls.frame_stamps import FRAME_PERIOD
 from o80_table_tennis.balls.recordings import load_trajectories
-from o80_table_tennis.balls.simulated_shots import simulated_shot
 from o80_table_tennis.balls.trajectories import BallTrajectory
 from o80_table_tennis.physics.prediction import predict
 

@@ -17,7 +17,6 @@ from o80_table_tennis.players.arm_dynamics import ArmModel
 from o80_table_tennis.players.hitting_policy import HittingPolicy, HittingSettings
 from o80_table_tennis.players.policies import DEFAULT_FACTOR, default_policy
 from o80_table_tennis.playing import play
-from o80_table_tennis.rig.arm_numbers import ArmNumbers
 from o80_table_tennis.settings import RigSettings, TaskSettings
 from o80_table_tennis.task.observations import SIZE, ObservationBounds
 
@@ -92,7 +91,7 @@ def test_most_balls_are_hit_and_fly_back() -> None:
 @pytest.mark.parametrize("count", [6, pytest.param(80, marks=pytest.mark.check)])
 def test_an_arm_with_dead_time_returns_balls_too(count: int) -> None:
     rig = RigSettings(preset="identified")
-    policy = default_policy(ArmNumbers.of_rig(rig))
+    policy = default_policy(HittingSettings.of_rig(rig))
     task = TaskSettings(factor=DEFAULT_FACTOR, fly_out=True)
     with TableTennisEnvironment(rig=rig, task=task) as environment:
         played = play(environment, policy, range(count), seed=1)

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from recorded_rows import simulated_shot
 
-from o80_table_tennis.balls.simulated_shots import simulated_shot
 from o80_table_tennis.physics.impact import leaving
-from o80_table_tennis.physics.prediction import predict_crossing
+from o80_table_tennis.physics.prediction import predict
 from o80_table_tennis.players.interception import (
     TOUCH,
     InterceptionSettings,
@@ -14,7 +14,6 @@ from o80_table_tennis.players.interception import (
 )
 from o80_table_tennis.world.arm import racket_pose
 from o80_table_tennis.world.materials import RACKET_RESTITUTION
-from o80_table_tennis.world.table import TABLE
 
 NARROW = 0.074  # from the middle of the blade to its nearest rim [m]
 
@@ -38,11 +37,10 @@ def test_a_planned_strike_sends_the_ball_to_the_target(seed: int) -> None:
     assert np.linalg.norm(offset - TOUCH * normal) < NARROW
     racket = np.cross([0.0, 0.0, strike.speeds[0]], pose.position)
     outgoing = leaving(velocity, ball.spin, racket, normal, RACKET_RESTITUTION)
-    landing = predict_crossing(
-        position, outgoing.velocity, axis=2, at=TABLE.bounce_height, spin=outgoing.spin
-    )
-    assert landing is not None
-    assert landing.position[:2] == pytest.approx((0.0, 2.5), abs=0.1)
+    flight = position, outgoing.velocity
+    time = predict(*flight, 1.5, spin=outgoing.spin).bounce_times[0]
+    landing = predict(*flight, time, spin=outgoing.spin, period=time).positions[-1]
+    assert landing[:2] == pytest.approx((0.0, 2.5), abs=0.1)
 
 
 def test_a_ball_that_flies_away_is_left_alone() -> None:

@@ -13,7 +13,7 @@ from o80_table_tennis.task import observations
 from o80_table_tennis.task.ball_play import ReturnTask
 from o80_table_tennis.task.ball_record import BallRecord
 from o80_table_tennis.task.observations import ObservationBounds, observe_ball
-from o80_table_tennis.task.observer import Observer, Observing
+from o80_table_tennis.task.observer import Observer
 from o80_table_tennis.task.state import State
 
 
@@ -41,7 +41,7 @@ def test_many_episodes_are_observed_at_once() -> None:
 @settings(deadline=None)
 @given(arrays(np.float64, (3, 22), elements=st.floats(-1e6, 1e6)))
 def test_a_clipped_observation_lies_in_the_box(rows: np.ndarray) -> None:
-    observer, bounds = Observer(ReturnTask(), Observing(), 1), ObservationBounds()
+    observer, bounds = Observer(ReturnTask(), 1), ObservationBounds()
     clipped = observer.clip(rows)
 
     assert clipped.dtype == np.float32

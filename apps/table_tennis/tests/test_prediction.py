@@ -1,4 +1,4 @@
-"""Predicted flights: against closed forms, bounces, landings, crossings of planes."""
+"""Predicted flights: against closed forms, and bounces."""
 
 import math
 
@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from o80_table_tennis.physics.aerodynamics import Aerodynamics
-from o80_table_tennis.physics.prediction import predict, predict_crossing
+from o80_table_tennis.physics.prediction import predict
 from o80_table_tennis.world.table import Table
 
 VACUUM = Aerodynamics(drag_coefficient=0.0, lift_coefficient=0.0)
@@ -36,38 +36,15 @@ def test_without_air_and_table_the_flight_is_a_parabola(
 
 def test_a_bounce_without_spin_keeps_the_named_shares_of_the_velocity() -> None:
     table = Table(normal_restitution=0.9, tangential_restitution=0.6, friction=math.inf)
-    touch = predict_crossing(START, VELOCITY, axis=2, at=table.bounce_height, table=table)
-    assert touch is not None
-
-    after = predict(START, VELOCITY, touch.time + 1e-6, period=touch.time + 1e-6, table=table)
-
-    assert touch.position[2] == pytest.approx(0.795, abs=1e-6)
-    expected = touch.velocity * np.array([0.6, 0.6, -0.9])
-    np.testing.assert_allclose(after.velocities[-1], expected, atol=1e-4)
-
-
-def test_a_crossing_lies_on_the_plane_and_on_the_flight() -> None:
-    crossing = predict_crossing(START, VELOCITY, axis=1, at=0.4)
-    assert crossing is not None
-
-    flight = predict(START, VELOCITY, crossing.time, period=crossing.time)
-
-    assert crossing.position[1] == pytest.approx(0.4, abs=1e-9)
-    np.testing.assert_allclose(crossing.position, flight.positions[-1], atol=1e-6)
-    np.testing.assert_allclose(crossing.velocity, flight.velocities[-1], atol=1e-4)
-
-
-def test_a_ball_that_starts_on_a_plane_crosses_it_when_it_comes_back() -> None:
-    crossing = predict_crossing(
-        (0.0, 0.0, 2.0), (0.0, 0.0, 2.0), axis=2, at=2.0, aerodynamics=VACUUM, table=None
+    (time,) = predict(START, VELOCITY, 1.0, table=table).bounce_times
+    before, after = (
+        predict(START, VELOCITY, time + off, period=time + off, table=table)
+        for off in (-1e-6, 1e-6)
     )
 
-    assert crossing is not None
-    assert crossing.time == pytest.approx(4.0 / 9.81, abs=1e-6)
-
-
-def test_a_plane_out_of_reach_is_not_crossed() -> None:
-    assert predict_crossing(START, VELOCITY, axis=2, at=5.0) is None
+    assert before.positions[-1, 2] == pytest.approx(0.795, abs=1e-5)
+    expected = before.velocities[-1] * np.array([0.6, 0.6, -0.9])
+    np.testing.assert_allclose(after.velocities[-1], expected, atol=1e-4)
 
 
 @pytest.mark.parametrize("bad", [0.0, -1.0, math.nan, math.inf])

@@ -6,11 +6,10 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from recorded_rows import frames_of_a_reader, rows_seen, write_ball_gun, write_shots
+from recorded_rows import frames_of_a_reader, rows_seen, simulated_shot, write_ball_gun, write_shots
 
 from o80_table_tennis.balls.frame_stamps import FRAME_PERIOD
 from o80_table_tennis.balls.recordings import LAUNCHER_FRAME, load_trajectories
-from o80_table_tennis.balls.simulated_shots import simulated_shot
 
 
 def test_a_json_file_is_read_into_the_world_with_stamps(tmp_path: Path) -> None:

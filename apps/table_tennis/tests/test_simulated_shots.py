@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recorded_rows import simulated_shot
 
 from o80_table_tennis.balls.launches import (
     NARROW,
@@ -13,7 +14,7 @@ from o80_table_tennis.balls.launches import (
     UniformLaunches,
 )
 from o80_table_tennis.balls.playable import REACH, Verdict, verdict
-from o80_table_tennis.balls.simulated_shots import SimulatedShots, drawn_launch, simulated_shot
+from o80_table_tennis.balls.simulated_shots import SimulatedShots, drawn_launch
 from o80_table_tennis.physics.prediction import predict
 from o80_table_tennis.world.arm import SHOULDER
 from o80_table_tennis.world.ball import BALL_RADIUS

@@ -17,7 +17,6 @@ from o80_table_tennis.settings import TASKS, TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.ball_play import ReturnTask
 from o80_table_tennis.task.state import State
-from o80_table_tennis.task.task import Task
 from o80_table_tennis.world.arm import MUSCLES
 
 STILL = np.zeros(MUSCLES, dtype=np.float32)
@@ -38,7 +37,7 @@ class KeepStillTask(ReturnTask):
 
 
 def played(
-    task: str | Task, *, seed: int = 1, scripted: bool = True
+    task: str | ReturnTask, *, seed: int = 1, scripted: bool = True
 ) -> tuple[list[float], dict[str, Any]]:
     """Rewards and last info of an episode."""
     settings, rewards, policy = TaskSettings(task=task, factor=COARSE), [], default_policy()
@@ -55,13 +54,12 @@ def played(
 
 
 @pytest.mark.parametrize("task", [*TASKS, KeepStillTask()])
-def test_gymnasium_accepts_every_task(task: str | Task) -> None:
+def test_gymnasium_accepts_every_task(task: str | ReturnTask) -> None:
     settings = TaskSettings(task=task)
     environment = gymnasium.make(o80_table_tennis.ACCELERATED, task=settings)
     with closing(environment), warnings.catch_warnings():
         warnings.simplefilter("error", UserWarning)
         check_env(environment.unwrapped, skip_render_check=True)
-    assert isinstance(settings.made(), Task)
 
 
 def test_a_smash_is_the_return_times_the_speed_of_the_ball() -> None:

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from recorded_rows import simulated_shot
 
-from o80_table_tennis.balls.simulated_shots import simulated_shot
 from o80_table_tennis.balls.trajectories import BallTrajectory
 
 

@@ -10,12 +10,12 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
+from recorded_rows import simulated_shot
 from vector_equality import MODES, beside, both
 
 import o80_table_tennis
 from o80.groups.group_burst import GroupBurst
 from o80.learning import VectorEnvironment
-from o80_table_tennis.balls.simulated_shots import simulated_shot
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings

@@ -21,8 +21,8 @@ GAP = 3.0
 class Attached:
     """An observer of a segment that may end and come back."""
 
-    def __init__(self, segment: str) -> None:
-        self._segment = segment
+    def __init__(self, segment: str, *, read_only: bool = True) -> None:
+        self._segment, self._read_only = segment, read_only
         self._frontend: o80.Frontend | None = None
         self._next_try: int | None = None
 
@@ -36,7 +36,7 @@ class Attached:
             return None, True
         self._next_try = now + RETRY
         try:
-            self._frontend = o80.Frontend(self._segment, timeout=0.0, read_only=True)
+            self._frontend = o80.Frontend(self._segment, timeout=0.0, read_only=self._read_only)
         except o80.Error:
             self.close()
         return self._frontend, True

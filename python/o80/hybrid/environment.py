@@ -1,5 +1,6 @@
 """Gymnasium environments of hybrid tasks, and their recordings."""
 
+import math
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -33,6 +34,8 @@ class HybridEnvironment(Environment):
 
     task: Any
     """The HybridTask."""
+    recording: Recording | None = None
+    """The recording, for marks of one's own."""
 
     def __init__(
         self,
@@ -45,6 +48,7 @@ class HybridEnvironment(Environment):
         """record: a file; options: those of the task, for its mark. Raises RecordingError."""
         super().__init__(task, render_mode=render_mode)
         self._marks = None if record is None else _Marks(task, record, options or {})
+        self.recording = None if self._marks is None else self._marks.recording
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
@@ -69,9 +73,8 @@ class HybridEnvironment(Environment):
 
     def close(self) -> None:
         """Finishes the recording and closes the task; may be called twice."""
-        marks = self.__dict__.get("_marks")
-        if marks is not None:
-            marks.recording.close()
+        if self.recording is not None:
+            self.recording.close()
         super().close()
 
 
@@ -83,7 +86,7 @@ class _Marks:
             raise InvalidArgument("record is for one robot with frontends: leave out threads")
         self._engine = task.engine
         self._members: list[Frontend] = task.engine.frontends
-        self._task, self._number = type(task).__name__, 0
+        self._task, self._number = task.title or type(task).__name__, 0
         self._margin = 2 * task.engine.iterations
         self._actions: list[Any] = []
         self._rewards: list[float] = []
@@ -136,13 +139,13 @@ class _Marks:
 
 
 def _plain(value: Any) -> Any:
-    """Value as JSON can hold it; of anything else its text."""
+    """Value as JSON can hold it: of a number that is not finite None, of anything else its text."""
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):
         return [_plain(each) for each in value]
     if isinstance(value, (np.ndarray, np.generic)):
-        return value.tolist()
-    if value is None or isinstance(value, (bool, int, float, str)):
-        return value
-    return str(value)
+        return _plain(value.tolist())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    return value if value is None or isinstance(value, (bool, int, str)) else str(value)

@@ -50,6 +50,8 @@ class HybridTask(Task):
 
     rig: Rig
     """Robot and world that are stepped together."""
+    title: str = ""
+    """Name of the task in recordings and data sets, if it is not that of the class."""
     action_space: Space[Any]
     robot_numbers: Sequence[str] = ()
     """Paths in a row of the robot, which `observe` reads first."""

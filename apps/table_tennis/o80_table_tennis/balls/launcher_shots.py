@@ -19,33 +19,25 @@ SETTINGS = ((1200.0, 1200.0, 1200.0), (1800.0, 1800.0, 400.0))
 """Motor speeds [1/min] without and with top spin, as in the recorded shots."""
 
 
-def launcher_launch(
-    speeds: tuple[float, float, float], rng: np.random.Generator | None = None
-) -> Launch:
-    """A ball of the launcher at the far end of the table, which shoots at the arm.
-
-    speeds: of the motors top left, top right, bottom [1/min]. rng: of the scatter; None: the mean.
-    Raises o80.MissingExtra without the package o80-devices.
-    """
-    model: LaunchModel = needed(
-        "o80_devices.ball_launcher", None, "a shot of the launcher", package="o80-devices"
-    ).LAUNCH_MODEL
-    ball = model.launch(0.5, 0.5, speeds, rng)
-    ball = ball.placed(LAUNCHER_FRAME.offset, LAUNCHER_FRAME.yaw)
-    return Launch(ball.position, ball.velocity, ball.spin)
-
-
 @dataclass(frozen=True)
 class LauncherShots:
-    """Motor speeds drawn between the two recorded settings, with the scatter of the launcher."""
+    """Motor speeds drawn between the two recorded settings, with the scatter of the launcher.
+
+    It stands at the far end of the table and shoots at the arm.
+    """
 
     def draw(self, rng: np.random.Generator) -> Launch:
-        """Another launch."""
+        """Another launch. Raises o80.MissingExtra without the package o80-devices."""
+        model: LaunchModel = needed(
+            "o80_devices.ball_launcher", None, "a shot of the launcher", package="o80-devices"
+        ).LAUNCH_MODEL
         share = rng.uniform()
         left, right, bottom = (
             (1 - share) * plain + share * top for plain, top in zip(*SETTINGS, strict=True)
         )
-        return launcher_launch((left, right, bottom), rng)
+        ball = model.launch(0.5, 0.5, (left, right, bottom), rng)
+        ball = ball.placed(LAUNCHER_FRAME.offset, LAUNCHER_FRAME.yaw)
+        return Launch(ball.position, ball.velocity, ball.spin)
 
 
 LAUNCHER = LauncherShots()

@@ -11,7 +11,6 @@ from .launcher_shots import LAUNCHER
 from .launches import NARROW, WIDE, Launch, LaunchDistribution
 from .playable import Verdict, verdict
 from .sampled_flight import SampledFlight
-from .trajectories import BallTrajectory
 
 DISTRIBUTIONS: dict[str, LaunchDistribution] = {
     "narrow": NARROW,
@@ -37,13 +36,6 @@ def drawn_launch(rng: np.random.Generator, distribution: LaunchDistribution = NA
         f"none of {MAX_DRAWS} shots of {distribution} can be played (the last one: "
         f"{why_not.value}); choose other means"
     )
-
-
-def simulated_shot(
-    rng: np.random.Generator, *, distribution: LaunchDistribution = NARROW
-) -> BallTrajectory:
-    """A drawn shot, as cameras would see it."""
-    return drawn_launch(rng, distribution).seen()
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,8 @@ from .report import write_report
 
 STARTS_WITHIN = 60.0
 """All processes, on a busy machine [s]."""
-LOOK = 0.5
-"""Between two looks at the row of the environment [s]."""
+POLL = 0.5
+"""Between two readings of the row of the environment [s]."""
 CLASSES = {os.SCHED_OTHER: "other", os.SCHED_FIFO: "fifo", os.SCHED_RR: "rr"}
 
 
@@ -52,10 +52,7 @@ def main(
 
 
 def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str, str]:
-    """Plays all balls. Returns the scheduling class of each process.
-
-    A process that ends is started again with `restart`; else raises PartEndedError.
-    """
+    """Plays all balls. Returns the scheduling class of each process. Raises PartEndedError."""
     settings.recording.unlink(missing_ok=True)
     folder = settings.folder / "processes"
     console.print(f"starts nine processes; what they print is in {folder}")
@@ -65,14 +62,13 @@ def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str,
         console.print(f"see it at {processes.printed(VIEW).splitlines()[0]}")
         observer, shown = Watched(settings.segment(ENVIRONMENT)), ""
         while True:
-            for name in processes.ended(LOOK):
+            for name in processes.ended(POLL):
                 ended = processes.collected(name)
                 if not restart:
                     raise ended
                 console.print(f"{ended}\nIt is started again.", markup=False)
                 processes.start(name)
-            environment = observer.frontend()
-            if environment is None:
+            if (environment := observer.now) is None:
                 continue
             row = environment.latest().extended
             played, touched, returned, _ = (row[count] for count in COUNTS)
@@ -85,7 +81,7 @@ def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str,
 
 
 def scheduling(pid: int) -> str:
-    """Scheduling class of a process, and its priority if it is real time."""
+    """Scheduling class of a process, and its priority if it has one."""
     kind, priority = os.sched_getscheduler(pid), os.sched_getparam(pid).sched_priority
     return f"{CLASSES.get(kind, kind)} {priority or ''}".rstrip()
 

@@ -84,8 +84,7 @@ class Counterparts:
         if name != "racket":
             return (TABLE.centre if name == "table" else (0.0, 0.0, 0.0)), UNTURNED
         with self._lock:
-            arm = None if self._arm.missing else self._arm.frontend()
-            if arm is None:
+            if self._arm.missing or (arm := self._arm.now) is None:
                 return None
             row: Any = arm.latest()
         racket, since = row.extended, (when - row.time) * 1e-9
@@ -125,12 +124,12 @@ class Launching:
         """The next ball is wanted: the launcher is asked as soon as it is there and ready."""
         self._batch, self.failed = None, False
         self._aim = drawn_aim(self._random)
-        row = self._newest()
-        self.number = self.number if row is None else int(row.number)  # others are none of ours
+        if (row := self._newest()) is not None:
+            self.number = int(row.number)  # others are none of ours
 
     def came(self) -> launches.Launch | None:
         """The ball that has left the launcher since `ask`; None: none yet."""
-        launcher, row = self._launcher.frontend(), self._newest()
+        launcher, row = self._launcher.now, self._newest()
         if self._batch is not None:
             self.failed = launcher is None or (
                 self._batch.ended and self._batch.statuses[-1] is not o80.Status.COMPLETED
@@ -148,5 +147,4 @@ class Launching:
         return launches.Launch(np.array(row.position), np.array(row.velocity), np.array(row.spin))
 
     def _newest(self) -> Any:
-        frontend = self._launches.frontend()
-        return None if frontend is None else frontend.latest().extended
+        return None if (frontend := self._launches.now) is None else frontend.latest().extended

@@ -19,7 +19,6 @@ import typer
 import o80
 from o80.base.screen import keep_printing
 
-from ..balls.launches import Launch
 from ..ending import ends_in_order
 from ..environment import TableTennisEnvironment
 from ..evaluate import named_policy
@@ -51,8 +50,7 @@ class Phase(IntEnum):
     """All balls were played."""
 
 
-BALLS = ("played", "touched", "returned", "given_up")
-COUNTS = tuple(f"balls_{what}" for what in BALLS)
+COUNTS = tuple(f"balls_{what}" for what in ("played", "touched", "returned", "given_up"))
 TIMES = ("arm_time", "ball_time", "observed_at")
 PLACES = ("observed_ball", "true_ball")
 EXTENDED: dict[str, Any] = {
@@ -85,23 +83,14 @@ class EnvironmentProcess:
 
     def _publish(self) -> None:
         """A row, and the beginning of the next one. Exits if it is asked to."""
-        row, playing = self._row, self._row["phase"] is Phase.playing
+        row = self._row
         row["missing"] = {name: watched.missing for name, watched in self._watched.items()}
-        seen = self._perception if playing else None
+        seen = self._perception if row["phase"] is Phase.playing else None
         row["ball_time"], row["observed_at"] = (seen.ball_time, seen.at) if seen else (0, 0)
         row["observed_ball"] = seen.ball[:3] if seen else np.full(3, np.nan)
         self._backend.publish(extended=row)
         if self._backend.step() is None:
             sys.exit()
-
-    def _after_step(self) -> None:
-        """A step of 10 ms of arm and world."""
-        assert self._environment is not None
-        task, row = self._environment.task, self._row
-        row["arm_row"], row["world_row"] = task.single.span[2], task.twin_row
-        row["arm_time"], row["late"] = self._arm_time(), task.single.lateness
-        row["true_ball"] = task.rows.balls[0, :3]
-        self._publish()
 
     def _by_own_clock(self) -> None:
         """A row without arm and world, when it is due."""
@@ -110,43 +99,30 @@ class EnvironmentProcess:
         time.sleep(max(0.0, self._due - now))
         self._publish()
 
-    def _arm_time(self) -> int:
-        """Time of the row of the arm that was read last [ns]."""
-        assert self._environment is not None
-        return int(self._environment.task.robot.last["time"][0])
-
-    # ------------------------------------------------------------------ balls
-
     def run(self) -> None:
         """Until it is asked to end."""
+        row, balls = self._row, self._settings.balls
         try:
-            while not self._settings.balls or self._row["balls_played"] < self._settings.balls:
-                self._try_ball()
+            while not balls or row["balls_played"] < balls:
+                environment = self._environment = self._environment or self._opened()
+                try:
+                    if environment is not None:
+                        self._try_ball(environment)
+                except OPENING:
+                    row["balls_given_up"] += row["phase"] is Phase.playing
+                    self._close_environment()
             self._close_environment()
-            self._row |= {"phase": Phase.over, "late": 0}
+            row |= {"phase": Phase.over, "late": 0}
             while True:
                 self._by_own_clock()
         finally:
-            self._close_environment()
-
-    def _try_ball(self) -> None:
-        environment = self._environment = self._environment or self._opened()
-        if environment is None:
-            return
-        try:
-            self._return(environment)
-            launch = self._launch(environment)
-            if launch is not None:
-                self._play(environment, launch)
-        except OPENING:
-            self._row["balls_given_up"] += self._row["phase"] is Phase.playing
             self._close_environment()
 
     def _opened(self) -> TableTennisEnvironment | None:
         """The environment if arm and world are there; else a row says so."""
         self._row["phase"] = Phase.waiting
         self._by_own_clock()
-        if any(self._watched[name].frontend() is None for name in (ARM, WORLD)):
+        if any(self._watched[name].now is None for name in (ARM, WORLD)):
             return None
         arm, world = map(self._settings.segment, (ARM, WORLD))
         rig = RIG.paced(Pacing.REAL_TIME)
@@ -155,12 +131,21 @@ class EnvironmentProcess:
             environment = TableTennisEnvironment(rig=rig, task=self._task)
         except OPENING:
             return None
-        task, home = environment.task, self._home
-        # the arm may stand anywhere now
-        task.home_of_arm.pressures, task.home_of_arm.angles = home.pressures, home.angles
-        self._perception = TrackedPerception(self._watched[TRACKER].frontend, self._arm_time)
+        task, row, tracker = environment.task, self._row, self._watched[TRACKER]
+
+        def arm_time() -> int:
+            return int(task.robot.last["time"][0])
+
+        def after_step() -> None:
+            row["arm_row"], row["world_row"] = task.single.span[2], task.twin_row
+            row["arm_time"], row["late"] = arm_time(), task.single.lateness
+            row["true_ball"] = task.rows.balls[0, :3]
+            self._publish()
+
+        task.home_of_arm = self._home.of(environment.arm)  # the arm may stand anywhere now
+        self._perception = TrackedPerception(lambda: tracker.now, arm_time)
         task.observer.look_through(self._perception)
-        task.after_step, task.returns_at_reset = self._after_step, False
+        task.after_step, task.returns_at_reset = after_step, False
         return environment
 
     def _close_environment(self) -> None:
@@ -168,44 +153,39 @@ class EnvironmentProcess:
             self._environment.close()
         self._environment = None
 
-    def _return(self, environment: TableTennisEnvironment) -> None:
-        """The arm goes back while the world goes on."""
-        self._row["phase"] = Phase.returning
-        task, home = environment.task, environment.task.home_of_arm
+    def _try_ball(self, environment: TableTennisEnvironment) -> None:
+        """The arm goes back, a ball is asked for and played, unless the launcher fails."""
+        row, task, launching = self._row, environment.task, self._launching
+        row["phase"] = Phase.returning
         task.single.begin()
-        home.begin()
+        task.home_of_arm.begin()
         end = time.monotonic() + LONGEST_RETURN
         task.idle()
-        while not home.reached and time.monotonic() < end:
+        while not task.home_of_arm.reached and time.monotonic() < end:
             task.idle()
 
-    def _launch(self, environment: TableTennisEnvironment) -> Launch | None:
-        """Asks for a ball until one has left the launcher; None: the launcher failed."""
-        self._row["phase"] = Phase.launching
-        self._launching.ask()
-        launch = None
-        while launch is None and not self._launching.failed:
-            environment.task.idle()
-            launch = self._launching.came()
-        return launch
+        row["phase"], launch = Phase.launching, None
+        launching.ask()
+        while launch is None and not launching.failed:
+            task.idle()
+            launch = launching.came()
+        if launch is None:
+            return
 
-    def _play(self, environment: TableTennisEnvironment, launch: Launch) -> None:
-        """One ball, from the launch on."""
-        row, flight = self._row, launch.flight(RIG.period)
         seed = self._settings.seed if row["balls_played"] == 0 else None
+        flight = launch.flight(RIG.period)
         observation, _ = environment.reset(seed=seed, options={"flight": flight})
         self._policy.reset()
-        row["phase"] = Phase.playing
+        row["phase"], over = Phase.playing, False
         for robot in (environment.arm, *environment.twins):  # one moment of both clocks
-            robot.mark(f"launch {self._launching.number}")
-        over = False
+            robot.mark(f"launch {launching.number}")
         while not over:
             action = self._policy.act(observation)
             observation, _, terminated, truncated, info = environment.step(action)
             over = terminated or truncated
-        row["balls_played"] += 1
         for count, what in zip(COUNTS[1:], ("touched", "returned", "stalled"), strict=True):
             row[count] += bool(info[what])
+        row["balls_played"] += 1
 
 
 def main(prefix: str = "lab", balls: int = 5, seed: int = 1, policy: str = "learned") -> None:

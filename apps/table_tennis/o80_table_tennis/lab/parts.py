@@ -10,7 +10,7 @@ import socket
 import sys
 import sysconfig
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -77,7 +77,7 @@ class Part:
     """Name of its backend's segment; the part counts as running while the segment does."""
     says: str = ""
     """Text of a process without a segment: it runs when it has printed this."""
-    missed: Mapping[str, str] | None = None
+    missed: Mapping[str, str] = field(default_factory=dict)
     """How others say that it is missing, by part; the supervisor always does."""
     halts: tuple[str, ...] = ()
     """Parts that stand still until it is back."""
@@ -91,21 +91,18 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
     launcher, qualisys = f"tcp://127.0.0.1:{_free_port()}", _free_port()
     fifo = ("--policy=fifo", "--lock-memory") if settings.fifo else ()
     recorded = [of(part) for part in (*WATCHED, ENVIRONMENT) if part != CAMERAS]
+    words = [f"--{key}={getattr(settings, key)}" for key in OPTIONS]
+    play = (sys.executable, "-u", "-m", "o80_table_tennis.lab.environment_process", *words)
+    record = (COMMAND, "record", *recorded, "-o", str(settings.recording), "--continue")
 
     def robot(
-        name: str,
-        driver: str,
-        options: Mapping[str, Any],
-        *words: str,
-        missed: Mapping[str, str] | None = None,
-        **death: Any,
+        name: str, driver: str, options: Mapping[str, Any], *words: str, **death: Any
     ) -> Part:
-        rate: dict[str, Any] = {"frequency": RATES[name]} if name in RATES else {}
-        given = {"segment": of(name), **rate, **options}.items()
+        given = {"segment": of(name), "frequency": RATES.get(name), **options}.items()
         flags = [f"--{key}={text_of(value)}" for key, value in given if value is not None]
-        if name != COUNTERPARTS:
-            missed = {ENVIRONMENT: f"`missing.{name}`", **(missed or {})}
-        return Part(name, (COMMAND, "run", driver, *flags, *words), of(name), "", missed, **death)
+        if name in WATCHED:
+            death["missed"] = {ENVIRONMENT: f"`missing.{name}`"} | death.get("missed", {})
+        return Part(name, (COMMAND, "run", driver, *flags, *words), of(name), **death)
 
     blind = {TRACKER: NO_IMAGE}
     parts = (
@@ -117,7 +114,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
         robot(
             ARM,
             "pam",
-            {"stale": "purge"} | ({"priority": 80} if fifo else {}) | arm_options(RIG),
+            {"stale": "purge", "priority": 80 if fifo else None, **arm_options(RIG)},
             "--resume",  # it is simulated: one that was killed goes on at once
             *fifo,
             missed=blind | {MOTION_CAPTURE: NO_RACKET},
@@ -154,15 +151,12 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
         robot(
             MOTION_CAPTURE,
             "o80_devices.motion_capture:Qualisys",
-            {"port": qualisys, "subjects": SUBJECTS} | ({"priority": 40} if fifo else {}),
+            {"port": qualisys, "subjects": SUBJECTS, "priority": 40 if fifo else None},
             *fifo[:1],
         ),
         Part(
             ENVIRONMENT,
-            (
-                *(sys.executable, "-u", "-m", "o80_table_tennis.lab.environment_process"),
-                *(f"--{key}={getattr(settings, key)}" for key in OPTIONS),
-            ),
+            play,
             of(ENVIRONMENT),
             missed={ARM: DIED, TRACKER: NO_IMAGE},
             halts=(WORLD,),
@@ -170,7 +164,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
         ),
         Part(
             RECORDER,
-            (COMMAND, "record", *recorded, "-o", str(settings.recording), "--continue"),
+            record,
             says=f"'{of(ENVIRONMENT)}' ",  # what becomes of its rows
             besides="started again, it goes on in the same file, without a gap",
         ),

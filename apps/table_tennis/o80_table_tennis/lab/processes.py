@@ -19,15 +19,14 @@ from pathlib import Path
 import o80
 from o80.base.child_process import end_child
 from o80.base.lifecycle import Closeable
+from o80_devices.cameras.ball_of_segment import Attached
 
 from .parts import Part
 
-LOOK = 0.05
-"""Between two looks whether a process has ended, or runs [s]."""
+POLL = 0.05
+"""Between two checks whether a process has ended, or runs [s]."""
 GRACE = 5.0
 """For a process to end in order; then it is killed [s]."""
-RETRY = 0.05
-"""Between two attempts to attach [s]."""
 SILENT = 0.1
 """Without a row for so long a segment that does not burst counts as missing [s]."""
 LAST_LINES = 8
@@ -65,10 +64,7 @@ class Processes(Closeable):
         folder.mkdir(parents=True, exist_ok=True)
 
     def start(self, *names: str) -> None:
-        """Starts processes, in this order, without waiting; none named: all.
-
-        See `wait_until_running`.
-        """
+        """Starts processes, in this order, without waiting; none named: all."""
         supervisor = os.getpid()
 
         def end_with_it() -> None:
@@ -89,7 +85,7 @@ class Processes(Closeable):
                 )
 
     def wait_until_running(self, timeout: float) -> None:
-        """Waits for the segments, or the words, of all processes that were started.
+        """Waits until all processes that were started run.
 
         Raises PartEndedError if one ends meanwhile, o80.TimeoutError with those that do not run.
         """
@@ -100,7 +96,7 @@ class Processes(Closeable):
                 raise o80.TimeoutError(
                     f"after {timeout:g} s these processes do not run yet:\n" + "\n".join(lines)
                 )
-            for name in self.ended(LOOK):
+            for name in self.ended(POLL):
                 raise self.collected(name)
 
     def runs(self, name: str) -> bool:
@@ -120,7 +116,7 @@ class Processes(Closeable):
             found = [name for name, popen in self.running.items() if popen.poll() is not None]
             if found or time.monotonic() >= end:
                 return found
-            time.sleep(LOOK)
+            time.sleep(POLL)
 
     def collected(self, name: str) -> PartEndedError:
         """Takes a process that has ended off the list, and tells how; it may be started again."""
@@ -150,38 +146,16 @@ class Processes(Closeable):
                         o80.clean(part.segment)
 
 
-class Watched:
+class Watched(Attached):
     """An observer of a segment that may end and come back."""
 
-    def __init__(self, segment: str, *, read_only: bool = True) -> None:
-        self.segment = segment
-        self._read_only = read_only
-        self._frontend: o80.Frontend | None = None
-        self._next_try = 0.0
-
-    def frontend(self) -> o80.Frontend | None:
+    @property
+    def now(self) -> o80.Frontend | None:
         """Attached to the living backend; None: there is none."""
-        if self._frontend is not None and not self._frontend.alive:
-            self.close()
-        if self._frontend is None and time.monotonic() >= self._next_try:
-            self._next_try = time.monotonic() + RETRY
-            try:
-                self._frontend = o80.Frontend(self.segment, timeout=0.0, read_only=self._read_only)
-            except o80.Error:
-                return None
-        return self._frontend
+        return self.frontend(time.monotonic_ns())[0]
 
     @property
     def missing(self) -> bool:
         """There is no backend, or it has published nothing for a while."""
-        frontend = self.frontend()
-        if frontend is None:
-            return True
-        age = frontend.row_age
-        return age is not None and age > SILENT
-
-    def close(self) -> None:
-        """Detaches; the next look attaches again."""
-        if self._frontend is not None:
-            self._frontend.close()
-        self._frontend = None
+        age = None if (frontend := self.now) is None else frontend.row_age
+        return self._frontend is None or (age is not None and age > SILENT)

@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80
-from o80.base.arrays import IntArray
 from o80.base.finite import json_text
 
 from ..world.timing import ITERATIONS
@@ -17,10 +16,18 @@ from .environment_process import COUNTS, Phase
 from .parts import ARM, ENVIRONMENT, LAUNCHER, MOTION_CAPTURE, RATES, TRACKER, LabSettings
 
 Figures = dict[str, Any]
+Rows = Mapping[str, Any]
 MAX_MISSED = {ARM: 0.1, TRACKER: 1.0, MOTION_CAPTURE: 1.0, ENVIRONMENT: 1.0}
 """Periods that may be missed on a quiet machine [%]."""
 SETTLING = 1.0
 """Left out at the beginning, while processes still start [s]."""
+CAPTURES = (
+    ("image to row of the tracker", TRACKER, "image_time"),
+    ("frame to row of the motion capture", MOTION_CAPTURE, "capture_time"),
+    ("row of the arm to row of the environment", ENVIRONMENT, "arm_time"),
+    ("image to row of the environment", ENVIRONMENT, "ball_time"),
+)
+"""Latencies from capture to the row that shows it, and where the time of the capture is."""
 
 
 def write_report(settings: LabSettings, scheduling: Mapping[str, str]) -> Figures:
@@ -37,14 +44,16 @@ def write_report(settings: LabSettings, scheduling: Mapping[str, str]) -> Figure
         name: _regularity(name, history) | {"scheduling": scheduling.get(name, "ended")}
         for name, history in rows.items()
     }
-    played = _last(rows.get(ENVIRONMENT), *COUNTS)
+    played = _last(rows, ENVIRONMENT, *COUNTS)
     report = {
         "balls": {name.removeprefix("balls_"): number for name, number in played.items()},
         "processes": processes,
-        "latency_ms": _latencies(rows),
-        "tracking_error_mm": _tracking_error(rows.get(TRACKER), rows.get(ENVIRONMENT)),
-        "motion_capture_error_mm": _motion_capture_error(rows.get(MOTION_CAPTURE), rows.get(ARM)),
-        "launcher": _last(rows.get(LAUNCHER), "completed", "rejected", "not_sent", "timed_out"),
+        "latency_ms": {
+            what: _latency(rows[part], field) for what, part, field in CAPTURES if part in rows
+        },
+        "tracking_error_mm": _tracking_error(rows),
+        "motion_capture_error_mm": _motion_capture_error(rows),
+        "launcher": _last(rows, LAUNCHER, "completed", "rejected", "not_sent", "timed_out"),
         "settings": {"policy": settings.policy, "seed": settings.seed, "balls": settings.balls},
         "wanted": _wanted(processes),
     }
@@ -62,8 +71,8 @@ def spread(values: NDArray[np.floating[Any]]) -> dict[str, float] | None:
     return {name: round(float(value), 4) for name, value in named.items()}
 
 
-def _last(rows: o80.History | None, *names: str) -> dict[str, int]:
-    return {} if rows is None else {name: int(rows.extended[name][-1]) for name in names}
+def _last(rows: Rows, part: str, *names: str) -> dict[str, int]:
+    return {name: int(rows[part].extended[name][-1]) for name in names if part in rows}
 
 
 def _regularity(name: str, rows: o80.History) -> Figures:
@@ -81,74 +90,58 @@ def _regularity(name: str, rows: o80.History) -> Figures:
     }
 
 
-def _latencies(rows: Mapping[str, o80.History]) -> Figures:
-    """From capture to the row that shows it [ms]."""
-    captures = (
-        ("image to row of the tracker", TRACKER, "image_time"),
-        ("frame to row of the motion capture", MOTION_CAPTURE, "capture_time"),
-        ("row of the arm to row of the environment", ENVIRONMENT, "arm_time"),
-        ("image to row of the environment", ENVIRONMENT, "ball_time"),
-    )
-    found = {}
-    for what, part, field in captures:
-        if part in rows:
-            now, then = rows[part].time, np.asarray(rows[part].extended[field])
-            found[what] = spread((now - then)[then > 0] * 1e-6)
-    return found
+def _latency(rows: o80.History, field: str) -> Figures | None:
+    then = np.asarray(rows.extended[field])
+    return spread((rows.time - then)[then > 0] * 1e-6)
 
 
-def _between(at: IntArray, times: IntArray, places: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Places (n, 3) at other times, NaN outside."""
-    axes = (np.interp(at, times, axis, left=np.nan, right=np.nan) for axis in places.T)
-    return np.stack(list(axes), axis=1)
+def _off(places: Any, at: Any, times: Any, true: Any, which: Any) -> Figures | None:
+    """Distances [mm] of some places (n, 3) from the true ones, between the times of these."""
+    axes = [np.interp(at, times, axis, left=np.nan, right=np.nan) for axis in np.asarray(true).T]
+    off = np.linalg.norm(np.asarray(places) - np.stack(axes, axis=1), axis=1)
+    return spread(1e3 * off[which])
 
 
-def _tracking_error(tracker: o80.History | None, environment: o80.History | None) -> Figures | None:
+def _tracking_error(rows: Rows) -> Figures | None:
     """Errors [mm] of the tracker, at the times of its images against the ball of the world between
     rows of the environment, and of the ball that the policy observed."""
-    if tracker is None or environment is None:
+    if TRACKER not in rows or ENVIRONMENT not in rows:
         return None
-    rows: Any = environment.extended
-    playing = rows.phase == Phase.playing
+    tracker, environment = rows[TRACKER].extended, rows[ENVIRONMENT].extended
+    playing, seen = environment.phase == Phase.playing, np.asarray(environment.ball_time) > 0
     if not playing.any():
         return None
-    times, seen = np.asarray(rows.arm_time), np.asarray(rows.ball_time) > 0
-    true = np.where(playing[:, None], rows.true_ball, np.nan)
-    images = np.asarray(tracker.extended.capture_time)
-    away = np.asarray(tracker.extended.position) - _between(images, times, true)
+    true = environment.arm_time, np.where(playing[:, None], environment.true_ball, np.nan)
+    images = np.asarray(tracker.capture_time)
     # an observation is published with the next row of the environment
-    observed = np.asarray(rows.observed_ball) - _between(np.asarray(rows.observed_at), times, true)
+    observed = environment.observed_ball, environment.observed_at
     return {
-        "at the time of the images": spread(1e3 * np.linalg.norm(away[images > 0], axis=1)),
-        "as observed, flown on to the row of the arm": spread(
-            1e3 * np.linalg.norm(observed[seen], axis=1)
-        ),
+        "at the time of the images": _off(tracker.position, images, *true, images > 0),
+        "as observed, flown on to the row of the arm": _off(*observed, *true, seen),
         "share of the rows with a ball that was seen": round(float(seen[playing].mean()), 4),
     }
 
 
-def _motion_capture_error(system: o80.History | None, arm: o80.History | None) -> Figures | None:
+def _motion_capture_error(rows: Rows) -> Figures | None:
     """Error of the racket against the rows of the arm at the same times [mm]."""
-    if system is None or arm is None:
+    if MOTION_CAPTURE not in rows or ARM not in rows:
         return None
-    racket: Any = system.extended.racket
-    true = _between(system.extended.capture_time, arm.time, arm.extended.racket_position)
-    good = np.asarray(racket.visible)
-    return spread(1e3 * np.linalg.norm((np.asarray(racket.position) - true)[good], axis=1))
+    system, arm = rows[MOTION_CAPTURE].extended, rows[ARM]
+    true = arm.time, arm.extended.racket_position
+    racket = system.racket
+    return _off(racket.position, system.capture_time, *true, np.asarray(racket.visible))
 
 
 def _wanted(processes: Mapping[str, Figures]) -> Figures:
     """Targets of a quiet machine, and whether this run has reached them."""
     wanted: Figures = {}
-
-    def want(what: str, target: str, measured: object, *, reached: bool) -> None:
-        wanted[what] = {"wanted": target, "measured": measured, "reached": reached}
-
     for name, most in MAX_MISSED.items():
         if name in processes:
             missed = round(processes[name]["missed_percent"], 3)
-            want(f"{name}: missed periods [%]", f"less than {most}", missed, reached=missed < most)
+            target = {"wanted": f"less than {most}", "measured": missed, "reached": missed < most}
+            wanted[f"{name}: missed periods [%]"] = target
     if ARM in processes:
         kind = processes[ARM]["scheduling"]
-        want("arm: scheduling", "fifo", kind, reached=kind.startswith("fifo"))
+        reached = kind.startswith("fifo")
+        wanted["arm: scheduling"] = {"wanted": "fifo", "measured": kind, "reached": reached}
     return wanted

@@ -8,10 +8,10 @@ an episode, the mean launch is a guess in its place.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80
 from o80.base.arrays import FloatArray
@@ -19,7 +19,7 @@ from o80_devices.ball_tracking.ball_row import Reason
 
 from ..balls.launches import WIDE
 from ..physics.prediction import STATE, flight_nodes
-from ..task.perception import EVERY, Perceived
+from ..task.perception import Perceived
 from ..task.state import State
 
 STEP = 0.005
@@ -48,49 +48,31 @@ class TrackedPerception:
         self.ball_time = 0
         """Time of the images of the ball that was perceived last [ns]; 0: it was not seen."""
 
-    def begin(
-        self,
-        state: State,
-        _generators: Sequence[np.random.Generator],
-        _which: NDArray[np.int64],
-    ) -> Perceived:
+    def begin(self, state: State, _generators: object, _which: object) -> Perceived:
         """The ball has just begun to fly: no image shows it yet."""
-        self.at = self._now()
-        self._used, self._seen_yet = self.at, False
-        self.ball, self.ball_time = np.array([*WIDE.position, *WIDE.velocity]), 0
-        return self._perceived(state, seen=False)
+        self._used, self._seen_yet = self._now(), False
+        self.ball = np.array([*WIDE.position, *WIDE.velocity])
+        return self._perceived(state, None)
 
-    def perceive(self, state: State, _which: object = EVERY) -> Perceived:
+    def perceive(self, state: State, _which: object = None) -> Perceived:
         """The ball at the time of the arm's last row, if there is a new image of it."""
-        self.at, found = self._now(), self._newest()
-        if found is None:
-            self.ball_time = 0
-            return self._perceived(state, seen=False)
-        self._used, ball = found
-        self.ball_time = self._used
-        self.ball = flown(ball, (self.at - self.ball_time) * 1e-9)
-        first, self._seen_yet = not self._seen_yet, True
-        return self._perceived(state, seen=True, first=first)
-
-    def _perceived(self, state: State, *, seen: bool, first: bool = False) -> Perceived:
-        return Perceived(self.ball[np.newaxis], np.array([not seen]), state.pressures, first)
-
-    def _newest(self) -> tuple[int, FloatArray] | None:
-        """Time and numbers of a ball that was not used yet."""
         tracker = self._tracker()
-        if tracker is None:
-            return None
-        row = tracker.latest().extended
-        time = int(row.capture_time)
-        old = time <= max(self._used, self.at - round(OLDEST * 1e9))
+        row = None if tracker is None else tracker.latest().extended
+        return self._perceived(state, row)
+
+    def _perceived(self, state: State, row: Any) -> Perceived:
+        """By a row of the tracker."""
+        self.at, self.ball_time = self._now(), 0
+        if row is None or not self._is_new(row):
+            return Perceived(self.ball[np.newaxis], np.array([True]), state.pressures)
+        self._used = self.ball_time = int(row.capture_time)
+        late = max(0.0, (self.at - self.ball_time) * 1e-9)
+        self.ball = flight_nodes(row.position, row.velocity, row.spin, late, step=STEP)[-1, STATE]
+        first, self._seen_yet = not self._seen_yet, True
+        return Perceived(self.ball[np.newaxis], np.array([False]), state.pressures, first)
+
+    def _is_new(self, row: Any) -> bool:
+        """Whether it shows a ball that was not used yet."""
+        old = int(row.capture_time) <= max(self._used, self.at - round(OLDEST * 1e9))
         unknown = np.max(np.diag(row.covariance)[3:6]) > KNOWN_VELOCITY**2
-        if row.reason != Reason.seen or old or unknown:
-            return None
-        return time, np.concatenate([row.position, row.velocity, row.spin])
-
-
-def flown(ball: FloatArray, seconds: float) -> FloatArray:
-    """Position and velocity (6,) of a ball (9,) after a short time, also past the table."""
-    nodes = flight_nodes(ball[:3], ball[3:6], ball[6:], max(0.0, seconds), step=STEP)
-    state: FloatArray = nodes[-1, STATE]
-    return state
+        return bool(row.reason == Reason.seen and not old and not unknown)

@@ -41,18 +41,6 @@ class PredictedFlight:
     """(N, 3), in the axes of the world [rad/s]"""
 
 
-@dataclass(frozen=True)
-class Crossing:
-    """When and how a ball goes through a plane."""
-
-    time: float
-    """Since the start of the prediction [s]."""
-    position: FloatArray
-    """(3,) [m]"""
-    velocity: FloatArray
-    """(3,) [m/s]"""
-
-
 def predict(
     position: Numbers,
     velocity: Numbers,
@@ -78,30 +66,6 @@ def predict(
     return PredictedFlight(times, positions, velocities, starts[nodes[:, BOUNCED] == 1.0], spins)
 
 
-def predict_crossing(
-    position: Numbers,
-    velocity: Numbers,
-    *,
-    axis: int,
-    at: float,
-    duration: float = 2.0,
-    spin: Numbers = NO_SPIN,
-    aerodynamics: Aerodynamics = AERODYNAMICS,
-    table: Table | None = TABLE,
-) -> Crossing | None:
-    """When the coordinate `axis` (0 x, 1 y, 2 z) first becomes `at` [m]; None if not in time.
-
-    A ball that starts on the plane crosses it when it comes back.
-    """
-    nodes = flight_nodes(position, velocity, spin, duration, aerodynamics, table)
-    off = nodes[:, STATE][:, axis] - at
-    crossed = (off[:-1] * off[1:] < 0) | ((off[1:] == 0) & (off[:-1] != 0))
-    if not crossed.any():
-        return None
-    first = int(np.argmax(crossed))
-    return _crossing(nodes[first : first + 2], axis, at)
-
-
 def flight_nodes(
     position: Numbers,
     velocity: Numbers,
@@ -121,20 +85,6 @@ def flight_nodes(
         raise ValueError(f"position {position} and velocity {velocity} must be finite")
     on = None if table is None else platform(table)
     return predicted_flight(ball, aerodynamics.air, on, duration, step)
-
-
-def _crossing(nodes: FloatArray, axis: int, at: float) -> Crossing:
-    """Between two nodes."""
-    states, times = nodes[:, STATE], nodes[:, TIME]
-    low, high = times.tolist()
-    rising = states[1, axis] > states[0, axis]
-    for _ in range(40):
-        middle = (low + high) / 2
-        position, _velocity = along_path(np.array([middle]), states, times)
-        beyond = (position[0, axis] > at) == rising
-        low, high = (low, middle) if beyond else (middle, high)
-    position, velocity = along_path(np.array([high]), states, times)
-    return Crossing(time=high, position=position[0], velocity=velocity[0])
 
 
 def _require_positive(**values: float) -> None:

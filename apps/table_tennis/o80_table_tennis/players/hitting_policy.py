@@ -8,15 +8,20 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 from numpy.typing import NDArray
 
+import o80
 from o80.base.arrays import Float32Array, FloatArray
 
 from ..physics.impact import bounced
-from ..rig.arm_numbers import ArmNumbers
+from ..rig.pressure_range import PressureRange
+from ..rig.rig import arm_options
+from ..settings import RigSettings
 from ..task.actions import COARSE
 from ..task.observations import (
     BALL_POSITION,
@@ -25,7 +30,7 @@ from ..task.observations import (
     JOINT_VELOCITIES,
     PRESSURES,
 )
-from ..world.arm import JOINT_LIMIT, JOINTS
+from ..world.arm import JOINT_LIMIT, JOINTS, MUSCLES
 from ..world.scene import Vector
 from ..world.table import TABLE
 from ..world.timing import STEP
@@ -75,7 +80,7 @@ class ControlSettings:
 
 @dataclass(frozen=True)
 class HittingSettings:
-    """Everything the policy can be told."""
+    """Everything the policy can be told: of the arm, of which the standard one is assumed."""
 
     interception: InterceptionSettings = field(default_factory=InterceptionSettings)
     control: ControlSettings = field(default_factory=ControlSettings)
@@ -87,24 +92,57 @@ class HittingSettings:
     factor: float = COARSE
     """Factor of the environment's actions."""
 
-    def for_arm(self, arm: ArmNumbers) -> HittingSettings:
-        """The same for another arm than the standard one."""
-        muscles = MusclePair(
-            pulley=arm.pulley,
-            maximum_force=arm.maximum_force,
-            stroke=arm.stroke,
-            contracted=arm.contraction,
-            neutral=arm.neutral,
-            directions=arm.directions,
-            least=arm.least,
-            most=arm.most,
+    @classmethod
+    def of_rig(cls, rig: RigSettings) -> HittingSettings:
+        """Settings for the arm that a rig will have: one is made and asked."""
+        if rig.attach:
+            with o80.Frontend(str(rig.arm_segment)) as arm:
+                return cls.of(arm)
+        with o80.robots.load("pam").inline(**arm_options(rig)) as arm:
+            return cls.of(arm)
+
+    @classmethod
+    def of(cls, arm: o80.Frontend) -> HittingSettings:
+        """Settings for an arm that runs. Raises ValueError if its description lacks numbers."""
+        custom = ElementTree.fromstring(arm.model).find("custom") if arm.model else None
+        if custom is None:
+            raise ValueError(
+                f"the arm '{arm.segment}' does not describe its muscles: attach to a robot `pam` "
+                "of this version, or give the player HittingSettings of your own"
+            )
+        told = {each.get("name"): each.get("data") or "" for each in custom.iter("numeric")}
+
+        def numbers(name: str, count: int = JOINTS) -> Any:
+            values = tuple(float(each) for each in told.get(name, "").split())
+            if len(values) != count:
+                raise ValueError(
+                    f"the arm '{arm.segment}' has {len(values)} numbers of {name}, not {count}"
+                )
+            return values
+
+        idle, full = (
+            np.array(numbers(name, MUSCLES)) for name in ("idle_pressure", "full_pressure")
         )
-        return replace(
-            self,
+        limits = PressureRange.of(arm)
+        least, most = (
+            tuple(map(tuple, ((each - idle) / (full - idle)).reshape(JOINTS, 2).tolist()))
+            for each in (limits.least, limits.most)
+        )
+        muscles = MusclePair(
+            pulley=numbers("pulley_radius", 1)[0],
+            maximum_force=numbers("maximum_force"),
+            stroke=numbers("stroke"),
+            contracted=numbers("contraction", 1)[0],
+            neutral=numbers("neutral"),
+            directions=numbers("directions"),
+            least=least,
+            most=most,
+        )
+        return cls(
             muscles=muscles,
-            lag=PressureLag(tuple(np.repeat(arm.lag, 2).tolist())),
-            dead_time=arm.dead_time,
-            arm=replace(self.arm, damping=arm.damping),
+            lag=PressureLag(tuple(np.repeat(numbers("lag"), 2).tolist())),
+            dead_time=numbers("dead_time"),
+            arm=ArmModel(damping=numbers("damping")),
         )
 
 

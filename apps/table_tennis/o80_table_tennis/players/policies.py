@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from o80.base.arrays import Float32Array
 
-from ..rig.arm_numbers import ArmNumbers
 from ..task.actions import COARSE, FINE
 from ..world.arm import MUSCLES
 from .hitting_policy import HittingPolicy, HittingSettings
@@ -70,11 +69,10 @@ BASELINES: Mapping[str, tuple[Callable[[], Policy], float]] = {
 run."""
 
 
-def default_policy(arm: ArmNumbers | None = None) -> Policy:
-    """The scripted policy for an arm; None: the standard one.
+def default_policy(settings: HittingSettings | None = None) -> Policy:
+    """The scripted policy; None: for the standard arm.
 
-    `ArmNumbers.of(frontend)` reads those of an arm that runs, `ArmNumbers.of_rig(settings)` those
-    of an arm to come.
+    `HittingSettings.of(frontend)` are those for an arm that runs, `HittingSettings.of_rig(rig)`
+    for an arm to come.
     """
-    settings = HittingSettings()
-    return HittingPolicy(settings if arm is None else settings.for_arm(arm))
+    return HittingPolicy(settings)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -14,6 +15,7 @@ from o80.base.arrays import FloatArray
 from o80.hybrid.worlds import Counts
 from o80.learning.training import wilson
 
+from ..world.table import TARGET
 from .episode_summary import EpisodeSummary
 
 
@@ -144,16 +146,14 @@ class Played:
     def speed(self) -> float:
         """Median of the largest speeds of the returned balls after the touch [m/s]; NaN without."""
         speeds = [episode.speed for episode in self.episodes if episode.returned]
-        return float(np.median(speeds)) if speeds else float("nan")
+        return float(np.median(speeds)) if speeds else math.nan
 
-    def distance(self, target: Sequence[float]) -> float:
-        """Median distance of the returned balls' landings from a target [m]; NaN without any."""
-        apart = [
-            float(np.hypot(episode.landing[0] - target[0], episode.landing[1] - target[1]))
-            for episode in self.episodes
-            if episode.returned and episode.landing is not None
-        ]
-        return float(np.median(apart)) if apart else float("nan")
+    @property
+    def miss(self) -> float:
+        """Median distance of the returned balls' landings from the target [m]; NaN without any."""
+        landings = [each.landing for each in self.episodes if each.returned and each.landing]
+        apart = [math.hypot(x - TARGET[0], y - TARGET[1]) for x, y, _ in landings]
+        return float(np.median(apart)) if apart else math.nan
 
     def as_json(self) -> dict[str, Any]:
         """The figures."""
@@ -162,6 +162,7 @@ class Played:
             "touched": round(self.touched, 4),
             "returned": round(self.returned, 4),
             "returned_95_percent": [round(each, 4) for each in self.interval],
+            "miss": round(self.miss, 3) if self.returns else None,
             "speed": round(self.speed, 2) if self.returns else None,
             "reward": round(self.reward, 4),
             "ends": dict(Counter(episode.end for episode in self.episodes).most_common()),

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from copy import copy
 
 import numpy as np
 
@@ -36,6 +37,12 @@ class Home:
         """(8,) raw"""
         self.angles: FloatArray = field_view(row, *MOTION)[0, :JOINTS].copy()
         """(4,) [rad]"""
+
+    def of(self, arm: o80.Frontend) -> Home:
+        """The same place for another arm."""
+        other = copy(self)
+        other._arm = arm
+        return other
 
     def go(self) -> None:
         """To the start by commands, as a real arm must."""

@@ -24,7 +24,13 @@ from .state import State
 
 @dataclass(frozen=True)
 class ReturnTask:
-    """The ball should land on the target."""
+    """The ball should land on the target.
+
+    A task of your own is an object with the same members (`MEMBERS`), derived from this class or
+    not, for `TaskSettings(task=...)`. The environment moves arm and ball; the task defines
+    observation, reward and end. Each method takes the `State` of N episodes, and returns as many
+    results: a single environment has one episode, a vector environment many.
+    """
 
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
     rule: EndRule = field(default_factory=EndRule)
@@ -41,19 +47,25 @@ class ReturnTask:
         return self.bounds.high
 
     def begin(self, rng: np.random.Generator) -> FloatArray:
-        """The target (3,) on the table [m]; always the same one."""
+        """Goal (G,) of a new episode: the target (3,) on the table [m], always the same one.
+
+        A task that draws its goal draws from `rng` only.
+        """
         return np.array(self.pay.target)
 
     def observe(self, state: State) -> FloatArray:
-        """(..., 22) see `observations`."""
+        """(..., 22) fresh, see `observations`; the environment clips them into the bounds."""
         return observe_ball(state)
 
     def eventful(self, state: State) -> Any:
-        """(...) whether the episode has ended."""
+        """(...) whether the episode has ended; of other tasks also whether the step is paid.
+
+        Cheap: it is called after every step, `end` and `reward` only where it is true.
+        """
         return self.rule.ended(state.record, state.ball_y, state.steps)
 
     def end(self, state: State) -> NDArray[np.int64]:
-        """(...) why it has."""
+        """(...) numbers of `End`: RUNNING, or why the episode has ended."""
         return self.rule.judge(state.record, state.ball_y, state.steps)
 
     def reward(self, state: State) -> FloatArray:
@@ -73,6 +85,14 @@ class ReturnTask:
         info["speed"] = state.record.largest_speed
         info["smallest_distance"] = state.record.smallest_distance
         return info
+
+
+MEMBERS = ("low", "high", "begin", "observe", "eventful", "end", "reward", "info")
+
+
+def missing_members(task: object) -> list[str]:
+    """Members that an object lacks to be a task."""
+    return [name for name in MEMBERS if not hasattr(task, name)]
 
 
 def observes_as_published(task: object) -> bool:

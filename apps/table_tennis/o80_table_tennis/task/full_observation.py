@@ -7,7 +7,7 @@ numbers are scaled to about -1 to 1.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -92,24 +92,21 @@ class FullObservation:
         return places
 
 
-OBSERVATIONS: Mapping[str, FullObservation | None] = {
-    "published": None,
-    "full": FullObservation(),
-}
-"""By the names that settings take; None: what the task itself observes."""
-
-
 def full_observation(observation: str | FullObservation) -> FullObservation | None:
-    """The observation of a name, or the object itself. Raises ValueError or TypeError."""
+    """The observation of a name, or the object itself; None: what the task itself observes.
+
+    Raises ValueError or TypeError.
+    """
     if isinstance(observation, FullObservation):
         return observation
-    names = ", ".join(OBSERVATIONS)
     unknown: object = observation
     if not isinstance(unknown, str):
-        raise TypeError(f"observation must be one of {names}, or a FullObservation: {unknown!r}")
-    if observation not in OBSERVATIONS:
-        raise ValueError(f"unknown observation '{observation}'; there are: {names}")
-    return OBSERVATIONS[observation]
+        raise TypeError(
+            f"observation must be one of published, full, or a FullObservation: {unknown!r}"
+        )
+    if observation not in ("published", "full"):
+        raise ValueError(f"unknown observation '{observation}'; there are: published, full")
+    return FullObservation() if observation == "full" else None
 
 
 def _alike(name: str, count: int, scale: float, bound: float) -> Part:

@@ -7,45 +7,42 @@ called for each new episode, `observe` exactly once after each step.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from gymnasium import spaces
 
 from o80.base.arrays import Float32Array, FloatArray, IntArray
 
-from .ball_play import observes_as_published
+from .ball_play import ReturnTask, observes_as_published
 from .full_observation import FullObservation
 from .full_observer import FullObserver
 from .noise import NO_NOISE, NoiseSettings
 from .perception import Perceived, Perceiving, Perception
 from .state import State
-from .task import Task
 
 EVERY = slice(None)
-
-
-@dataclass(frozen=True)
-class Observing:
-    """How an environment observes."""
-
-    noise: NoiseSettings = NO_NOISE
-    full: FullObservation | None = None
-    """None: what the task itself observes."""
-    interval: float = 0.01
-    """From one observation to the next [s]."""
-    largest_change: float = 1.0
-    """Largest change of an asked pressure in that time, normalised."""
 
 
 class Observer:
     """The observations of N episodes (`count`)."""
 
-    def __init__(self, task: Task, observing: Observing, count: int) -> None:
+    def __init__(
+        self,
+        task: ReturnTask,
+        count: int,
+        *,
+        noise: NoiseSettings = NO_NOISE,
+        full: FullObservation | None = None,
+        interval: float = 0.01,
+        largest_change: float = 1.0,
+    ) -> None:
+        """full: None is what the task itself observes. interval: between observations [s].
+
+        largest_change: of an asked pressure in that time, normalised.
+        """
         self._task = task
-        noise, full = observing.noise, observing.full
         self._perception: Perceiving | None = (
-            Perception(noise, observing.interval, count) if noise.of_observations else None
+            Perception(noise, interval, count) if noise.of_observations else None
         )
         observed = task if full is None else full
         self.low, self.high = observed.low, observed.high
@@ -66,8 +63,7 @@ class Observer:
         then `begin` and `observe` need not be called."""
         self._full: FullObserver | None = None
         if full is not None:
-            change = observing.largest_change
-            self._full = FullObserver(full, noise, observing.interval, change, count)
+            self._full = FullObserver(full, noise, interval, largest_change, count)
 
     def look_through(self, perception: Perceiving) -> None:
         """From the next episode on, ball and pressures are what this one perceives."""

@@ -11,7 +11,6 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 
@@ -25,23 +24,6 @@ from .state import State
 
 # of math, not of NumPy, which differ in the last bit: one episode and many get the same rewards
 _power = np.frompyfunc(math.pow, 2, 1)
-
-
-class RewardRule(Protocol):
-    """Reward of an episode that has ended in a state, or of N in theirs."""
-
-    @property
-    def target(self) -> Vector:
-        """Where the ball should land [m]."""
-        ...
-
-    def returned(self, state: State) -> FloatArray:
-        """(...) of balls that should land on the target."""
-        ...
-
-    def smashed(self, state: State) -> FloatArray:
-        """(...) of balls that should land there and be fast."""
-        ...
 
 
 def falling(distance: Numbers, reach: float, exponent: float) -> FloatArray:
@@ -138,22 +120,22 @@ class PublishedReward:
         return np.where(record.touched, touched, -np.asarray(record.smallest_distance))
 
 
+RewardRule = OrderedReward | PublishedReward
+"""Or any object with their `target`, `returned` and `smashed`."""
 REWARDS: Mapping[str, RewardRule] = {"ordered": OrderedReward(), "published": PublishedReward()}
 """The rules with a name."""
 
 
 def reward_rule(reward: str | RewardRule) -> RewardRule:
     """A rule by its name, or the rule itself. Raises ValueError or TypeError."""
-    named: Any = reward
-    if isinstance(named, str):
-        if named not in REWARDS:
-            raise ValueError(f"unknown reward '{named}'; there are: {', '.join(REWARDS)}")
-        return REWARDS[named]
-    missing = [name for name in ("target", "returned", "smashed") if not hasattr(named, name)]
-    if missing or isinstance(named, type):
+    if isinstance(reward, str):
+        if reward not in REWARDS:
+            raise ValueError(f"unknown reward '{reward}'; there are: {', '.join(REWARDS)}")
+        return REWARDS[reward]
+    missing = [name for name in ("target", "returned", "smashed") if not hasattr(reward, name)]
+    if missing or isinstance(reward, type):
         raise TypeError(
             f"reward must be one of {', '.join(REWARDS)}, or an object like "
-            f"o80_table_tennis.task.rewards.OrderedReward(), got {named!r}"
+            f"o80_table_tennis.task.rewards.OrderedReward(), got {reward!r}"
         )
-    rule: RewardRule = named
-    return rule
+    return reward
