@@ -33,7 +33,7 @@ from .rig.ball_records import fly_out_fields
 from .rig.home import Home
 from .rig.rig import rig_of
 from .rig.rows import RigRows
-from .settings import Pacing, RigSettings, TaskSettings
+from .settings import RigSettings, TaskSettings
 from .task.actions import changed_pressures
 from .task.end import End, terminated, undecided
 from .task.state import State
@@ -42,8 +42,6 @@ from .world.timing import ITERATIONS
 
 Numbers = NDArray[np.intp]
 
-PACINGS: Mapping[Pacing, Any] = {each: each.name.lower() for each in Pacing}
-"""Words of o80.hybrid."""
 PICTURE = (640, 480)
 """Width and height of pictures [pixels]."""
 TEXTS = np.array([end.text for end in End], object)
@@ -96,6 +94,7 @@ class TableTennisCopies(HybridTask):
         self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
         self.rig = rig_of(rig, delay=settings.delay, group=copies is not None or each > 1)
         self.max_late = settings.max_late + settings.planned
+        self.action_steps = settings.action_steps
         if settings.chunk_size is not None:
             self.chunk_size = settings.chunk_size * settings.repeat
             self.action_steps = settings.steps
@@ -104,9 +103,10 @@ class TableTennisCopies(HybridTask):
         )
         self._camera = camera
         self._pictures: Pictures | None = None
+        pacing: Any = rig.pacing.name.lower()  # as o80.hybrid names it
         super().__init__(
             count,
-            pacing=PACINGS[rig.pacing],
+            pacing=pacing,
             attach=rig.arm_segment if rig.attach else None,
             threads=1 if copies == 1 else threads,
         )
@@ -187,7 +187,7 @@ class TableTennisCopies(HybridTask):
             for each in generators
         ]
         if self._clocked and self.returns_at_reset:
-            self.go_home(self.arm)
+            self.home_of_arm.go()
         self.engine.reset(copies, [(draw.arm_seed, draw.twin_seed) for draw in draws])
         if self._endings is not None:
             self._endings.begin(copies)
@@ -224,10 +224,6 @@ class TableTennisCopies(HybridTask):
     def commanded(self, copies: Index = EVERY) -> FloatArray:
         """Normalised pressures (n, 8) asked for in the last rows, a fresh array."""
         return self.range.normalised(self.rows.desired[copies])
-
-    def go_home(self, robot: o80.Frontend) -> None:
-        """To the start by commands, as a real arm must."""
-        self.home_of_arm.go()
 
     # ------------------------------------------------------------------ steps
 

@@ -29,29 +29,16 @@ Outcome = tuple[NDArray[np.float32], float, bool, bool, Info]
 class TableTennisEnvironment(HybridEnvironment):
     """Real arm, simulated ball: 100 steps a second of eight pressure changes, or fewer longer ones.
 
-    Actions: Box(-1, 1, (8,)), changes of the normalised pressures. The task (`TaskSettings.task`)
-    defines observation and reward. By default observations are a Box of 22 numbers (see
-    `task.observations`), clipped into named bounds, and the reward is paid in the last step.
-
-    With `TaskSettings(chunk_size=n, action_steps=m, delay=d)` an action is a chunk, Box(-1, 1,
-    (n, 8)), of a policy that thinks for up to d iterations of 2 ms. Row j changes the pressures of
-    the row before it. It acts in the five iterations (with `repeat` in as many times five) from
-    k + 1 + d + 5 j on, k that of the observation, in no other ones. A step takes m rows; the next
-    chunk goes on from row m - 1, the other rows act only while it is late.
-
-    `info` holds the entries of the task (with a ball `touched`, `returned`, `landing`, `distance`,
-    see `task.outcome`, and `smallest_distance` of the surfaces of ball and racket so far [m]),
-    `stalled` (real time: the caller paused for so long that the episode was given up), `end` (why
-    the episode ended, a number of `End`) and its `end_text`, and with `RigSettings(worlds=n)` what
-    is shown of each ball: `worlds`.
+    Actions: Box(-1, 1, (8,)), changes of the normalised pressures; with `chunk_size=n` chunks of
+    them, Box(-1, 1, (n, 8)). The task (`TaskSettings.task`) defines observation, reward and its
+    part of `info`, to which come `stalled`, `end` (a number of `End`), `end_text`, and with
+    `RigSettings(worlds=n)` what is shown of each ball: `worlds`. The README says more.
 
     `options` of `reset`: `ball`, the number of the ball to be played (else drawn from the seed), or
-    `flight`, a SampledFlight of the caller's own. `statistics()` tells rates and lateness.
+    `flight`, a SampledFlight of the caller's own.
 
     `record="run.mcap"` records every row of arm and worlds, and marks the episodes; a file that
     exists is continued. `report.recorded_episodes` reads it, see also `o80.open`.
-
-    Closing it, or leaving its `with` block, ends the arm and the worlds that it started.
     """
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 100}  # noqa: RUF012
@@ -157,11 +144,8 @@ class TableTennisEnvironment(HybridEnvironment):
     def statistics(self) -> Statistics:
         """Rates and lateness since the environment was made."""
         task = self.task
-        rows = 1 if task.chunk_size is None else task.action_steps
-        step = task.rig_settings.step
-        return statistics_of(
-            self._counts, task.statistics(), self.arm, step_seconds=step, rows=rows
-        )
+        step, rows, of_rig = task.rig_settings.step, task.action_steps, task.statistics()
+        return statistics_of(self._counts, of_rig, self.arm, step_seconds=step, rows=rows)
 
     def render(self) -> Any:
         """`rgb_array`: a picture (480, 640, 3) of the newest rows; `human`: None, see `Page`."""

@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import asdict, replace
+from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -19,6 +20,7 @@ import o80
 from o80.base.finite import json_text
 from o80.base.screen import keep_printing
 
+from .balls.simulated_shots import DISTRIBUTIONS
 from .ending import ends_in_order
 from .learning.paired import Paired
 from .players.conditions import Conditions
@@ -29,15 +31,6 @@ from .playing import VERDICT_BALLS, VERDICT_SEED, evaluate
 from .report.report import print_table
 from .report.statistics import Played
 from .settings import Pacing
-
-
-@dataclass(frozen=True)
-class Match:
-    """Number of episodes that all compared policies share, and what replaces their conditions."""
-
-    changed: dict[str, str]
-    count: int | None
-    seed: int
 
 
 def main(
@@ -72,15 +65,24 @@ def main(
 
     console = Console()
     given = {"balls": balls, "goal": goal, "preset": preset}
-    match = Match({name: each for name, each in given.items() if each is not None}, count, seed)
+    changed = {name: each for name, each in given.items() if each is not None}
     pacings = [Pacing.INLINE, Pacing.REAL_TIME] if real_time else [Pacing.INLINE]
+    played: dict[str, Played] = {}
     try:
         with Progress(console=console, transient=True) as bars:
-            played = {
-                f"{name}, {pacing.value}" if real_time else name: _play(name, match, pacing, bars)
-                for name in policies
-                for pacing in pacings
-            }
+            for name, pacing in product(policies, pacings):
+                policy, conditions = named_policy(name, **changed)
+                simulated = conditions.balls in DISTRIBUTIONS
+                total = VERDICT_BALLS if count is None and simulated else count
+                bars.add_task(f"{name}, {pacing.value}", total=total)
+                played[f"{name}, {pacing.value}" if real_time else name] = evaluate(
+                    policy,
+                    conditions,
+                    balls=total,
+                    seed=seed,
+                    pacing=pacing,
+                    after_each=lambda _: bars.advance(bars.tasks[-1].id),
+                )
     except (ValueError, OSError, o80.Error) as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
@@ -89,7 +91,7 @@ def main(
     print_table(console, "the same balls", figures)
     for name, pair in paired.items():
         console.print(f"{name}: {pair}", highlight=False)
-    figures |= {f"{name}, paired": each.as_json() for name, each in paired.items()}
+    figures |= {f"{name}, paired": asdict(each) for name, each in paired.items()}
     output.mkdir(parents=True, exist_ok=True)
     plot_landings(output / "landings.png", played)
     (output / "evaluation.json").write_text(json_text(figures, indent=2) + "\n")
@@ -112,21 +114,6 @@ def named_policy(name: str, **changed: str) -> tuple[Policy, Conditions]:
     if name == "scripted":
         policy = default_policy(HittingSettings.of_rig(conditions.rig()))
     return policy, conditions
-
-
-def _play(name: str, match: Match, pacing: Pacing, bars: Progress) -> Played:
-    policy, conditions = named_policy(name, **match.changed)
-    simulated = conditions.balls in ("wide", "narrow", "launcher")
-    count = VERDICT_BALLS if match.count is None and simulated else match.count
-    bar = bars.add_task(f"{name}, {pacing.value}", total=count)
-    return evaluate(
-        policy,
-        conditions,
-        balls=count,
-        seed=match.seed,
-        pacing=pacing,
-        after_each=lambda _: bars.advance(bar),
-    )
 
 
 def _paired(policies: list[str], played: Sequence[Played]) -> dict[str, Paired]:

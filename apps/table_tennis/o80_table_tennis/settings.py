@@ -78,10 +78,6 @@ class RigSettings:
             raise ValueError(f"frequency must be a positive number [1/s], got {self.frequency}")
         if self.attach and self.arm_segment is None:
             raise ValueError("to attach to an arm, give the name of its segment: arm_segment")
-        if self.attach and self.pacing is Pacing.INLINE:
-            raise ValueError("an arm in another process cannot be inline; choose another pacing")
-        if self.twin_segment is not None and self.pacing is Pacing.INLINE:
-            raise ValueError("a twin in another process cannot be inline; choose another pacing")
 
     @property
     def period(self) -> float:
@@ -100,7 +96,10 @@ class RigSettings:
 
 @dataclass(frozen=True)
 class TaskSettings:
-    """The task, its balls and its rules. Raises ValueError or TypeError."""
+    """The task, its balls and its rules. Raises ValueError or TypeError.
+
+    A delay or a chunk that o80.hybrid cannot have is refused when an environment is made.
+    """
 
     task: str | ReturnTask = "return"
     """return or smash; or an object of your own, see `task.ball_play.ReturnTask`."""
@@ -148,23 +147,11 @@ class TaskSettings:
         whole(self.action_steps, "action_steps", 1)
         if self.chunk_size is not None:
             whole(self.chunk_size, "chunk_size", 1)
-        rows = self.chunk_size or 1
-        if self.action_steps > rows:
-            raise ValueError(
-                f"action_steps must be at most {rows}, the rows of an action (chunk_size), "
-                f"got {self.action_steps}"
-            )
         if self.ball_count is not None:
             whole(self.ball_count, "ball_count", 1)
         factor: object = self.factor
         if not isinstance(factor, Real) or not 0 < float(factor) < math.inf:
             raise ValueError(f"factor must be a positive number, got {factor!r}")
-        longest = ITERATIONS * (1 if self.chunk_size is None else self.steps) - 1
-        if self.delay > longest:
-            raise ValueError(
-                f"delay must lie between 0 and {longest} iterations, so that an action acts "
-                f"within its step, got {self.delay}"
-            )
         reward_rule(self.reward)
         full_observation(self.observation)
         noise: object = self.noise

@@ -1,4 +1,4 @@
-"""Kills each process of a running lab, and looks what the others say: see the table of parts."""
+"""Kills each process of a running lab, and checks what the others say: see the table of parts."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from pathlib import Path
+from contextlib import ExitStack
 from typing import Any
 
 import numpy as np
@@ -38,11 +37,10 @@ SAYS_WITHIN = 0.2
 """From the last row of the killed process to the first one that says that it is missing [s]."""
 ROWS_ON = 20
 """Rows that every surviving process must still publish."""
-LOOK = 0.005
-"""[s]"""
+Rows = Callable[[o80.History], NDArray[np.bool_]]
 
 
-def _missing(part: str) -> Callable[[o80.History], NDArray[np.bool_]]:
+def _missing(part: str) -> Rows:
     return lambda rows: np.asarray(rows.extended.missing[part], np.bool_)
 
 
@@ -52,7 +50,7 @@ def _no_racket(rows: o80.History) -> NDArray[np.bool_]:
 
 
 # the cameras mark images of a world that stands still, or is gone, by a capture time of 0
-SAID: dict[str, Callable[[o80.History], NDArray[np.bool_]]] = {
+SAID: dict[str, Rows] = {
     NO_IMAGE: lambda rows: np.asarray(rows.extended.reason == TrackerReason.no_image),
     NO_RACKET: _no_racket,
     **{f"`missing.{part}`": _missing(part) for part in RATES | {WORLD: 0.0}},
@@ -60,141 +58,95 @@ SAID: dict[str, Callable[[o80.History], NDArray[np.bool_]]] = {
 """Selects the rows that say so, by the words of the table."""
 
 
-@dataclass
-class Said:
-    """How a part said that another one was missing."""
-
-    part: str
-    rows: int
-    """Rows of that part from the end of the killed process on; a busy machine may need long."""
-
-    @property
-    def in_time(self) -> bool:
-        """Within 200 ms by its own rows: on a machine that is too slow fewer of them come."""
-        return self.rows <= SAYS_WITHIN * RATES.get(self.part, np.inf)
-
-
-@dataclass
-class Outcome:
-    """Observations after a kill."""
-
-    killed: str
-    ended_at: int = 0
-    """When the killed process had ended [ns]."""
-    said: list[Said] = field(default_factory=list)
-    stood_still: list[str] = field(default_factory=list)
-    went_on: list[str] = field(default_factory=list)
-    joined: bool = False
-    """Started again, nobody misses it any more."""
-
-
 class Killer:
     """Kills processes of a lab, one after the other."""
 
-    def __init__(self, processes: Processes, recording: Path) -> None:
-        self._processes, self._recording = processes, recording
+    def __init__(self, lab: Processes, settings: LabSettings) -> None:
+        self._lab, self._recording = lab, settings.recording
         self._segments = {
             name: part.segment
-            for name, part in processes.parts.items()
+            for name, part in lab.parts.items()
             if part.segment is not None and name != COUNTERPARTS
         }
 
-    def kill(self, name: str) -> Outcome:
-        """Kills a process, looks, starts it again and waits until it has joined.
+    def kill(self, name: str) -> list[str]:
+        """Kills a process, checks the others, starts it again and waits until nobody misses it.
 
-        Raises AssertionError, with what did not happen.
+        Returns the parts that said too late that it was missing. Raises AssertionError.
         """
-        kill, outcome = self._processes.parts[name], Outcome(name)
-        wait_until(lambda: self._nobody_misses(kill), f"{name} is there before it is killed")
-        observers = {
-            part: o80.Frontend(segment, timeout=WITHIN, read_only=True)
-            for part, segment in self._segments.items()
-        }
-        try:
-            last = self._kill(name, observers, outcome)
-            for part, says in (kill.missed or {}).items():
-                outcome.said.append(said(part, says, observers[part], last, outcome.ended_at))
-            self._look_at_others(kill, observers, outcome)
-        finally:
-            for each in observers.values():
-                each.close()
-        self._start_again(kill, outcome)
-        return outcome
-
-    def _kill(self, name: str, observers: dict[str, o80.Frontend], outcome: Outcome) -> int:
-        """Time of the last row of the process, or of the kill if it has no rows by the clock."""
-        before, processes = time.monotonic_ns(), self._processes
-        os.kill(processes.running[name].pid, signal.SIGKILL)
-        assert name in processes.ended(WITHIN)
-        ended = processes.collected(name)
-        outcome.ended_at = time.monotonic_ns()
-        assert ended.code == -9, f"{name} ended before it was killed: {ended}"
-        outcome.said.append(Said(SUPERVISOR, 0))
-        observer = observers.get(name)
-        if observer is None or observer.bursting:
-            return before
-        return int(observer.latest().time)
-
-    def _look_at_others(
-        self, kill: Part, observers: dict[str, o80.Frontend], outcome: Outcome
-    ) -> None:
-        """Rows of those that go on come; none of those that stand still."""
-        still = {name: observers[name].published for name in kill.halts}
-        on = [name for name in self._processes.running if name not in (COUNTERPARTS, *kill.halts)]
-        for name in on:
-            observer = observers.get(name)
-            if observer is None:
-                assert self._processes.runs(name), f"{name} has ended with {kill.name}"
-            elif not observer.bursting or ENVIRONMENT in on:
-                wait_for_rows(observer, name)
-        for name, rows in still.items():
-            assert observers[name].published == rows, f"{name} goes on without {kill.name}"
-        outcome.went_on, outcome.stood_still = on, list(still)
-
-    def _start_again(self, kill: Part, outcome: Outcome) -> None:
-        name, recording = kill.name, self._recording
-        size = recording.stat().st_size
-        self._processes.start(name)
-        self._processes.wait_until_running(WITHIN)
+        lab, part = self._lab, self._lab.parts[name]
+        wait_until(lambda: self._nobody_misses(part), f"{name} is there before it is killed")
+        with ExitStack() as stack:
+            seen = {each: stack.enter_context(self._observer(each)) for each in self._segments}
+            before = time.monotonic_ns()
+            os.kill(lab.running[name].pid, signal.SIGKILL)
+            assert name in lab.ended(WITHIN)
+            ended, ended_at = lab.collected(name), time.monotonic_ns()
+            assert ended.code == -9, f"{name} ended before it was killed: {ended}"
+            has_rows = name in seen and not seen[name].bursting
+            last = int(seen[name].latest().time) if has_rows else before
+            late = [
+                by
+                for by, says in part.missed.items()
+                # by its own rows: on a machine that is too slow fewer of them come
+                if rows_until_said(by, says, seen[by], last, ended_at)
+                > SAYS_WITHIN * RATES.get(by, np.inf)
+            ]
+            self._check_others(part, seen)
+        size = self._recording.stat().st_size
+        lab.start(name)
+        lab.wait_until_running(WITHIN)
         if name == RECORDER:  # a lab that ends before would end it, too
-            wait_until(lambda: recording.stat().st_size > size, "the recorder goes on")
-        wait_until(lambda: self._nobody_misses(kill), f"{name} is missed no more")
-        outcome.joined = True
+            wait_until(lambda: self._recording.stat().st_size > size, "the recorder goes on")
+        wait_until(lambda: self._nobody_misses(part), f"{name} is missed no more")
+        return late
 
-    def _nobody_misses(self, kill: Part) -> bool:
+    def _check_others(self, part: Part, seen: dict[str, o80.Frontend]) -> None:
+        """Rows of those that go on come; none of those that stand still."""
+        still = {name: seen[name].published for name in part.halts}
+        on = [name for name in self._lab.running if name not in (COUNTERPARTS, *part.halts)]
+        assert len(on) == 8 - len(still)
+        for name in on:
+            assert self._lab.runs(name), f"{name} has ended with {part.name}"
+            if name in seen and (not seen[name].bursting or ENVIRONMENT in on):
+                rows, enough = seen[name], seen[name].published + ROWS_ON
+                wait_until(lambda: rows.published >= enough, f"{name} goes on")  # noqa: B023
+        for name, published in still.items():
+            assert seen[name].published == published, f"{name} goes on without {part.name}"
+
+    def _observer(self, name: str) -> o80.Frontend:
+        return o80.Frontend(self._segments[name], timeout=WITHIN, read_only=True)
+
+    def _nobody_misses(self, part: Part) -> bool:
         """The newest rows of those that would say so do not."""
-        for part, says in (kill.missed or {}).items():
-            if says not in SAID:
-                continue
-            with o80.Frontend(self._segments[part], timeout=WITHIN, read_only=True) as observer:
-                if bool(SAID[says](observer.history(1))[0]):
-                    return False
-        return all(self._processes.runs(name) for name in (kill.name, ENVIRONMENT))
+        for by, says in part.missed.items():
+            if says in SAID:
+                with self._observer(by) as observer:
+                    if bool(SAID[says](observer.history(1))[0]):
+                        return False
+        return all(self._lab.runs(name) for name in (part.name, ENVIRONMENT))
 
     def wait_for_a_ball(self) -> None:
         """Until the environment has played another ball, from its launch to its end."""
-        segment = self._segments[ENVIRONMENT]
-        with o80.Frontend(segment, timeout=WITHIN, read_only=True) as environment:
+        with self._observer(ENVIRONMENT) as environment:
             played = environment.latest().extended.balls_played
+            wait_until(
+                lambda: bool(environment.latest().extended.balls_played > played),
+                "a ball is played",
+            )
 
-            def another() -> bool:
-                return bool(environment.latest().extended.balls_played > played)
 
-            wait_until(another, "a ball is played")
-
-
-def said(part: str, says: str, observer: o80.Frontend, last: int, ended_at: int) -> Said:
-    """The first row, or entry, after the time `last` [ns] that says so, after the end [ns]."""
+def rows_until_said(by: str, says: str, observer: o80.Frontend, last: int, ended_at: int) -> int:
+    """Rows of a part from the end [ns] on until one, or an entry, after `last` [ns] says so."""
     found: list[int] = []
 
-    def look() -> bool:
+    def is_said() -> bool:
         found[:] = _first(says, observer, last)
         return bool(found)
 
-    wait_until(look, f"{part} says: {says}")
+    wait_until(is_said, f"{by} says: {says}")
     begin = min(max(last, ended_at), found[0])
-    rows = observer.history().select(from_time=begin, to_time=found[0])
-    return Said(part, len(rows))
+    return len(observer.history().select(from_time=begin, to_time=found[0]))
 
 
 def _first(says: str, observer: o80.Frontend, last: int) -> list[int]:
@@ -203,27 +155,20 @@ def _first(says: str, observer: o80.Frontend, last: int) -> list[int]:
     if says != DIED:
         saying = SAID[says](rows) & (rows.time > last)
         return [int(rows.time[saying.argmax()])] if saying.any() else []
-    for entry in observer.journal():
-        if entry.kind == "died" and entry.iteration in rows.iteration:
-            when = int(rows.at_iteration(entry.iteration).time)
-            if when > last:
-                return [when]
-    return []
+    times = [
+        int(rows.at_iteration(entry.iteration).time)
+        for entry in observer.journal()
+        if entry.kind == "died" and entry.iteration in rows.iteration
+    ]
+    return [when for when in times if when > last][:1]
 
 
-def wait_for_rows(observer: o80.Frontend, name: str) -> None:
-    """Waits until so many rows are published; a short history may have lost any one of them."""
-    enough = observer.published + ROWS_ON
-    wait_until(lambda: observer.published >= enough, f"{name} goes on")
-
-
-def wait_until(holds: object, what: str) -> None:
-    """Looks again and again. Raises AssertionError after a long time."""
-    assert callable(holds)
+def wait_until(holds: Callable[[], bool], what: str) -> None:
+    """Polls. Raises AssertionError after a long time."""
     end = time.monotonic() + WITHIN
     while not holds():
         assert time.monotonic() < end, f"after {WITHIN:g} s this has not happened: {what}"
-        time.sleep(LOOK)
+        time.sleep(0.005)
 
 
 def started(settings: LabSettings) -> Processes:

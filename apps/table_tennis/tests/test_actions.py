@@ -45,15 +45,3 @@ def test_a_change_is_the_sigmoid_of_the_action_less_a_half() -> None:
     change = changed_pressures(MIDDLE, action, factor=COARSE) - MIDDLE
 
     np.testing.assert_allclose(change, 1 / (1 + np.exp(-COARSE * action)) - 0.5, atol=1e-12)
-
-
-def test_many_actions_change_as_each_alone() -> None:
-    rng = np.random.default_rng(2)
-    pressures, actions = rng.uniform(0, 1, (5, MUSCLES)), rng.uniform(-1, 1, (5, MUSCLES))
-    together = changed_pressures(pressures, actions, factor=COARSE)
-    for row in range(5):
-        alone = changed_pressures(pressures[row], actions[row], factor=COARSE)
-        np.testing.assert_array_equal(together[row], alone)
-    actions[3, 2] = np.nan
-    with pytest.raises(ValueError, match="must be finite"):
-        changed_pressures(pressures, actions)

@@ -1,6 +1,5 @@
 """Wrong arguments are refused with what to give instead."""
 
-import sys
 import time
 import warnings
 from collections.abc import Iterator
@@ -46,14 +45,6 @@ def test_what_gymnasium_passes_on_is_checked(
             gymnasium.make(o80_table_tennis.ACCELERATED, **arguments)
 
 
-def test_without_a_renderer_the_error_names_the_extra(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setitem(sys.modules, "OpenGL", None)
-    with closing(gymnasium.make(o80_table_tennis.ACCELERATED, render_mode="rgb_array")) as made:
-        made.reset(seed=1)
-        with pytest.raises(o80.MissingExtra, match=r'pip install "o80\[rendering\]"'):
-            made.render()
-
-
 def test_wrong_options_are_refused_with_what_there_is(inline: TableTennisEnvironment) -> None:
     with pytest.raises(ValueError, match="unknown options: bal; reset knows ball, flight"):
         inline.reset(options={"bal": 3})
@@ -62,6 +53,12 @@ def test_wrong_options_are_refused_with_what_there_is(inline: TableTennisEnviron
         counted.reset(options={"ball": 80})
     with pytest.raises(ValueError, match="simulated, real"):
         opened(ranges="imagined")
+    with pytest.raises(ValueError, match="delay must be less than the 5 iterations"):
+        opened(task=TaskSettings(delay=5))
+    with pytest.raises(ValueError, match="delay must be less than the 10 iterations"):
+        opened(task=TaskSettings(delay=10, repeat=2, chunk_size=3))
+    with pytest.raises(ValueError, match="action_steps must be at most chunk_size, got 2"):
+        opened(task=TaskSettings(action_steps=2))
 
 
 def test_another_robot_than_an_arm_is_refused() -> None:
@@ -91,9 +88,6 @@ def test_an_arm_of_another_frequency_is_refused() -> None:
         ({"task": ReturnTask}, TypeError, r"task must be an object: write ReturnTask\(\)"),
         ({"task": "retrun"}, ValueError, "there are: return, smash"),
         ({"task": 3}, TypeError, "an object with .* no low, high, begin"),
-        ({"delay": 5}, ValueError, "within its step"),
-        ({"delay": 10, "repeat": 2, "chunk_size": 3}, ValueError, "between 0 and 9 iterations"),
-        ({"chunk_size": 3, "action_steps": 4}, ValueError, "action_steps must be at most 3"),
         ({"reward": "publshed"}, ValueError, "there are: ordered, publish"),
         ({"reward": 3}, TypeError, r"an object like .*OrderedReward\(\), got 3"),
         ({"reward": OrderedReward}, TypeError, "or an object like"),

@@ -46,25 +46,6 @@ def seen(flights: Flights) -> FloatArray:
     return seen
 
 
-def test_one_ball_and_many_get_the_same_bits(seen: FloatArray) -> None:
-    missed = np.random.default_rng(2).random((SHOTS, STEPS)) < 0.1
-    seen = seen.copy()
-    seen[:5, 40:, 4] *= -1  # the racket meets some balls
-    many = ball_filter(SETTINGS, SHOTS)
-    many.begin(seen[:, 0])
-    ones = [ball_filter(SETTINGS, 1) for _ in range(SHOTS)]
-    for one, rows in zip(ones, seen, strict=True):
-        one.begin(rows[:1])
-    for step in range(1, STEPS):
-        many.step(seen[:, step], missed[:, step])
-        for number, one in enumerate(ones):
-            one.step(seen[[number], step], missed[[number], step])
-        found = many.estimates(PLANE)
-        assert found.tobytes() == np.vstack([one.estimates(PLANE) for one in ones]).tobytes()
-        some = np.array([3, 17])
-        np.testing.assert_array_equal(many.estimates(PLANE, some), found[some])
-
-
 def test_the_estimate_is_much_nearer_than_what_is_measured(
     flights: Flights, seen: FloatArray
 ) -> None:

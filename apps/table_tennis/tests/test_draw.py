@@ -34,14 +34,6 @@ def test_every_episode_draws_another_shot_and_the_seed_repeats_them() -> None:
     assert len({tuple(ball) for ball in counted}) == 2
 
 
-def test_a_shot_is_played_again_by_its_number() -> None:
-    shots = SimulatedShots()
-    found = drawn(shots, 1, extra=3)
-    assert len(set(found.numbers)) == 4
-    for number, flight in zip(found.numbers, found.flights, strict=True):
-        np.testing.assert_array_equal(shots.flight(number).states, flight.states)
-
-
 @pytest.mark.parametrize("ball", range(6))
 def test_no_ball_is_drawn_twice_where_there_are_enough(ball: int) -> None:
     shots = SimulatedShots(count=6)

@@ -5,7 +5,7 @@ import pytest
 from ball_records import landing_at, stacked_records
 from opened_environment import opened
 
-from o80_table_tennis.rig.ball_records import ball_records
+from o80_table_tennis.rig.ball_records import BallRecords
 from o80_table_tennis.task.ball_record import BallRecord
 from o80_table_tennis.task.end import End, EndRule, terminated
 from o80_table_tennis.task.outcome import returned
@@ -59,7 +59,7 @@ def test_a_net_ball_is_one_that_touched_the_net_before_it_landed(
     records["net"]["iteration"], records["table"]["iteration"] = net_at, landed_at
     records["net"]["position"], records["floor"]["position"] = (1, 2, 3), (4, 5, 6)
 
-    record = ball_records(records).at(0)
+    record = BallRecords(records).read().at(0)
     assert (record.touched, record.touched_net) == (True, touched_net)
     assert record.landed == (landed_at >= 0)
     assert tuple(record.net_position) == (1, 2, 3)

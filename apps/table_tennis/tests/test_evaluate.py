@@ -96,7 +96,7 @@ def test_pairs_are_of_the_same_balls() -> None:
         for other in (first, second)
     )
     pair = Paired.of(accelerated, real_time)
-    assert (pair.both, pair.only_accelerated, pair.only_real_time, pair.neither) == (1, 1, 0, 0)
+    assert (pair.returned_both, pair.returned_only_accelerated, pair.balls) == (1, 1, 2)
     assert "difference -50.0 points" in str(pair)
     with pytest.raises(ValueError, match="the same balls"):
         Paired.of(accelerated, replace(real_time, episodes=real_time.episodes[::-1]))

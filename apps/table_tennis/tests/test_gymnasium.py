@@ -5,13 +5,11 @@ from contextlib import closing
 from typing import Any
 
 import gymnasium
-import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
-from opened_environment import PATIENT, PUSH
+from opened_environment import PATIENT
 
 import o80_table_tennis
-from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.settings import RigSettings
 
 
@@ -37,18 +35,3 @@ def test_gymnasium_finds_nothing_to_complain_of(
 def test_only_the_environment_by_the_clock_is_nondeterministic() -> None:
     assert not gymnasium.spec(o80_table_tennis.ACCELERATED).nondeterministic
     assert gymnasium.spec(o80_table_tennis.REAL_TIME).nondeterministic
-
-
-@pytest.mark.check
-def test_pictures_show_what_moves() -> None:
-    environment = TableTennisEnvironment(render_mode="rgb_array")
-    with closing(environment):
-        environment.reset(seed=1)
-        first = environment.render()
-        for _ in range(30):
-            environment.step(PUSH)
-        second = environment.render()
-
-    assert first.shape == second.shape == (480, 640, 3)
-    assert first.dtype == np.uint8
-    assert (first != second).any()

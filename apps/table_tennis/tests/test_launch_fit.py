@@ -63,18 +63,6 @@ def test_simulated_shots_are_like_those_that_were_not_fitted(
     assert abs(means["crossing vy"]) < 0.13
 
 
-@pytest.mark.recordings("ball_gun_2019")
-def test_position_and_velocity_of_launches_belong_together(
-    recorded: FloatArray, simulated: FloatArray
-) -> None:
-    for rows in (recorded, simulated):
-        launches = fitted(rows[:, LAUNCH]).covariance
-        deviations = np.sqrt(np.diag(launches))
-        correlation = launches / np.outer(deviations, deviations)
-        assert correlation[0, 3] > 0.9  # the gun turns about the vertical
-        assert correlation[2, 5] > 0.6
-
-
 def test_samples_of_one_distribution_are_told_from_those_of_two() -> None:
     rng = np.random.default_rng(2)
     one, other = rng.normal(size=(2, 200))

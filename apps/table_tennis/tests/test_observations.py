@@ -29,15 +29,6 @@ def test_each_part_of_an_observation_has_its_place() -> None:
     np.testing.assert_array_equal(row[observations.BALL_POSITION], [16, 17, 18])
 
 
-def test_many_episodes_are_observed_at_once() -> None:
-    balls = np.arange(30.0).reshape(5, 6)
-    rows = observe_ball(state_of(np.ones((5, 8)), np.full((5, 8), 0.5), balls))
-
-    assert rows.shape == (5, 22)
-    np.testing.assert_array_equal(rows[:, 16:], balls)
-    np.testing.assert_array_equal(rows[:, observations.PRESSURES], np.full((5, 8), 0.5))
-
-
 @settings(deadline=None)
 @given(arrays(np.float64, (3, 22), elements=st.floats(-1e6, 1e6)))
 def test_a_clipped_observation_lies_in_the_box(rows: np.ndarray) -> None:

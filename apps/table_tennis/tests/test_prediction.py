@@ -1,37 +1,15 @@
-"""Predicted flights: against closed forms, and bounces."""
+"""Predicted flights bounce as the table does."""
 
 import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
-from o80_table_tennis.physics.aerodynamics import Aerodynamics
 from o80_table_tennis.physics.prediction import predict
 from o80_table_tennis.world.table import Table
 
-VACUUM = Aerodynamics(drag_coefficient=0.0, lift_coefficient=0.0)
 START = (0.46, 2.95, 1.37)
 VELOCITY = (0.24, -4.14, 2.28)
-coordinate = st.floats(-3, 3)
-speed = st.floats(-6, 6)
-
-
-@settings(deadline=None)
-@given(
-    position=st.tuples(coordinate, coordinate, coordinate), velocity=st.tuples(speed, speed, speed)
-)
-def test_without_air_and_table_the_flight_is_a_parabola(
-    position: tuple[float, float, float], velocity: tuple[float, float, float]
-) -> None:
-    flight = predict(position, velocity, 0.7, aerodynamics=VACUUM, table=None)
-
-    t = flight.stamps[:, None]
-    gravity = np.array([0.0, 0.0, -9.81])
-    expected = np.array(position) + t * np.array(velocity) + 0.5 * gravity * t**2
-    np.testing.assert_allclose(flight.positions, expected, atol=1e-9)
-    np.testing.assert_allclose(flight.velocities, velocity + gravity * t, atol=1e-9)
 
 
 def test_a_bounce_without_spin_keeps_the_named_shares_of_the_velocity() -> None:

@@ -111,7 +111,9 @@ def test_a_stalled_episode_is_recorded_as_such(tmp_path: Path) -> None:
         environment.step(STILL)
         arm = environment.arm
         arm.wait_for(arm.published + 250, timeout=WAITING)
-        environment.step(STILL)
+        _, reward, terminated, truncated, info = environment.step(STILL)
+        assert (reward, terminated, truncated, info["stalled"]) == (0.0, False, True, True)
+        assert environment.statistics().stalled_episodes == 1
 
     (episode,) = recorded_episodes(path)
     assert (episode.summary.end, episode.summary.terminated) == ("stalled", False)

@@ -27,8 +27,3 @@ def test_speeds_and_accelerations_are_derivatives() -> None:
 def test_it_goes_on_with_its_last_speed() -> None:
     swing = Swing.between(START, END, 0.3)
     assert swing.at(0.35).q == pytest.approx(END.q + 0.05 * END.dq)
-
-
-def test_later_it_is_the_same() -> None:
-    swing = Swing.between(START, END, 0.3)
-    assert swing.later(0.1).at(0.05).q == pytest.approx(swing.at(0.15).q)

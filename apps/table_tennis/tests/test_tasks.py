@@ -1,19 +1,15 @@
 """Tasks are exchanged without touching the environment: the named ones, and a user's own."""
 
-import warnings
 from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 
-import o80_table_tennis
 from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.players.policies import default_policy
-from o80_table_tennis.settings import TASKS, TaskSettings
+from o80_table_tennis.settings import TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.ball_play import ReturnTask
 from o80_table_tennis.task.state import State
@@ -51,15 +47,6 @@ def played(
             over = terminated or truncated
         assert environment.summary.reward == pytest.approx(sum(rewards))
     return rewards, info
-
-
-@pytest.mark.parametrize("task", [*TASKS, KeepStillTask()])
-def test_gymnasium_accepts_every_task(task: str | ReturnTask) -> None:
-    settings = TaskSettings(task=task)
-    environment = gymnasium.make(o80_table_tennis.ACCELERATED, task=settings)
-    with closing(environment), warnings.catch_warnings():
-        warnings.simplefilter("error", UserWarning)
-        check_env(environment.unwrapped, skip_render_check=True)
 
 
 def test_a_smash_is_the_return_times_the_speed_of_the_ball() -> None:

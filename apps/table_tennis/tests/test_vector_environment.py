@@ -14,10 +14,8 @@ from recorded_rows import simulated_shot
 from vector_equality import MODES, beside, both
 
 import o80_table_tennis
-from o80.groups.group_burst import GroupBurst
 from o80.learning import VectorEnvironment
 from o80_table_tennis.balls.sources import balls_from
-from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
 from o80_table_tennis.task.actions import COARSE
 from o80_table_tennis.task.end import EndRule
@@ -82,33 +80,6 @@ def test_equals_single_environments_of_every_rig(rig: str) -> None:
     assert ends >= 2 * COPIES
 
 
-class Scripted:
-    """The scripted policy on each copy."""
-
-    def __init__(self) -> None:
-        self._policies = [default_policy() for _ in range(COPIES)]
-        self._ball_y = np.full(COPIES, -np.inf)
-
-    def __call__(self, seen: Any, number: int) -> Any:
-        ball_y = seen[:, BALL_POSITION][:, 1]
-        begun = ball_y - self._ball_y > 0.5  # [m]: no ball flies so far in a step
-        self._ball_y = ball_y
-        actions = np.zeros((COPIES, MUSCLES), np.float32)
-        for copy, policy in enumerate(self._policies):
-            if begun[copy]:
-                policy.reset()
-            actions[copy] = policy.act(seen[copy])
-        return actions
-
-
-@pytest.mark.parametrize(("mode", "fly_out"), [*zip(MODES, cycle((False, True)))])
-def test_equals_single_environments_when_balls_are_returned(
-    mode: AutoresetMode, fly_out: bool
-) -> None:
-    task = TaskSettings(factor=COARSE, fly_out=fly_out)
-    assert assert_equals_single_ones(mode, Scripted(), steps=200, task=task) >= COPIES
-
-
 def test_resets_some_copies_with_a_ball_of_the_callers() -> None:
     mode = AutoresetMode.DISABLED
     make = partial(gymnasium.make, o80_table_tennis.ACCELERATED)
@@ -152,24 +123,3 @@ def test_plays_long_recorded_flights() -> None:
 def test_a_rig_that_copies_cannot_have_is_refused(rig: RigSettings, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         made(2, rig=rig)
-
-
-def test_waits_for_its_copies_however_long_the_process_stands_still(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """A training that somebody stops (Ctrl-Z, a debugger) must go on when it is continued."""
-    timeouts = []
-
-    def noted(run: Any) -> Any:
-        def running(burst: Any, *arguments: Any, timeout: float | None = None) -> None:
-            timeouts.append(timeout)
-            run(burst, *arguments, timeout=timeout)
-
-        return running
-
-    monkeypatch.setattr(GroupBurst, "run", noted(GroupBurst.run))
-    with made(2) as vector:
-        vector.reset(seed=1)
-        vector.step(np.zeros(vector.action_space.shape, np.float32))
-    assert timeouts
-    assert set(timeouts) == {None}

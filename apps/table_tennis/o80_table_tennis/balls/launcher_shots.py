@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from o80.base.extras import needed
 
-from .launches import Launch
+from .launches import WIDE, Launch
 from .recordings import LAUNCHER_FRAME
 
 if TYPE_CHECKING:
@@ -17,6 +18,10 @@ if TYPE_CHECKING:
 
 SETTINGS = ((1200.0, 1200.0, 1200.0), (1800.0, 1800.0, 400.0))
 """Motor speeds [1/min] without and with top spin, as in the recorded shots."""
+TOP_SPINS = (0.0, 60.0)
+"""Least and most of an aim [rad/s]: with the scatter of the launcher, within those of `WIDE`."""
+SPREAD = 0.2
+"""Spread of each component of its velocity, either way [m/s]; the launcher adds its scatter."""
 
 
 @dataclass(frozen=True)
@@ -28,10 +33,7 @@ class LauncherShots:
 
     def draw(self, rng: np.random.Generator) -> Launch:
         """Another launch. Raises o80.MissingExtra without the package o80-devices."""
-        model: LaunchModel = needed(
-            "o80_devices.ball_launcher", None, "a shot of the launcher", package="o80-devices"
-        ).LAUNCH_MODEL
-        share = rng.uniform()
+        model, share = _model(), rng.uniform()
         left, right, bottom = (
             (1 - share) * plain + share * top for plain, top in zip(*SETTINGS, strict=True)
         )
@@ -40,5 +42,30 @@ class LauncherShots:
         return Launch(ball.position, ball.velocity, ball.spin)
 
 
+def _model() -> LaunchModel:
+    devices: Any = needed(
+        "o80_devices.ball_launcher", None, "a shot of the launcher", package="o80-devices"
+    )
+    model: LaunchModel = devices.LAUNCH_MODEL
+    return model
+
+
 LAUNCHER = LauncherShots()
 """Like the shots of the recorded launcher, and between its two settings."""
+
+
+def drawn_aim(rng: np.random.Generator) -> list[float]:
+    """Angles and motors (5,) of the launcher for a ball of `WIDE`: the launch model, inverted."""
+    from o80_devices.ball_launcher.wheel_speeds import actuation_of
+
+    model = _model()
+    velocity = np.array(WIDE.velocity) + SPREAD * rng.uniform(-1.0, 1.0, 3)
+    difference = (rng.uniform(*TOP_SPINS) - model.spin) / model.spin_gain  # of upper and lower
+    speed = float(np.linalg.norm(velocity))
+    bottom = (speed - 2 * model.top_gain * difference) / (2 * model.top_gain + model.bottom_gain)
+    aside, ahead, up = velocity[0], -velocity[1], velocity[2]
+    azimuth, altitude = math.atan2(aside, ahead), math.atan2(up, math.hypot(aside, ahead))
+    phi = 0.5 + (azimuth - model.azimuth) / model.azimuth_range
+    theta = 0.5 + (altitude - model.altitude - model.lift * difference) / model.altitude_range
+    upper = actuation_of(bottom + difference)
+    return [phi, theta, upper, upper, actuation_of(bottom)]

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 from enum import Enum
 from itertools import pairwise
 
-from o80.base.arrays import FloatArray
-
-from ..physics.prediction import BOUNCED, STATE, STEP, TIME, flight_nodes
+from ..physics.prediction import BOUNCED, STATE, TIME, flight_nodes
 from ..world.arm import FOREARM, SHOULDER, UPPER_ARM
 from ..world.ball import BALL_RADIUS
 from ..world.table import NET_HEIGHT, TABLE
@@ -19,8 +17,6 @@ REACH = UPPER_ARM + FOREARM + 0.063
 be returned, come to 0.51 to 0.79 m; the blade reaches 0.094 m beyond its centre."""
 DURATION = 2.0
 """A flight that has not come within reach after this time does not [s]."""
-USUAL = 1.0
-"""Most flights are decided by then [s]: the rest is computed for the others only."""
 PASSED = -0.8
 """A ball that is nearer to the wall behind the arm than this has passed it [m]."""
 
@@ -42,17 +38,7 @@ class Verdict(Enum):
 
 def verdict(launch: Launch) -> Verdict:
     """Judges a shot by its predicted flight until it comes within reach."""
-    usual = flight_nodes(launch.position, launch.velocity, launch.spin, USUAL)
-    # but for its last step, which may be shorter, this is how the whole flight begins
-    decided = _decided(usual[usual[:, TIME] <= USUAL - STEP])
-    if decided is not None:
-        return decided
-    whole = flight_nodes(launch.position, launch.velocity, launch.spin, DURATION)
-    return _decided(whole) or _out_of_reach(bool(whole[:, BOUNCED].any()))
-
-
-def _decided(nodes: FloatArray) -> Verdict | None:
-    """By the beginning of a flight, unless it has to be seen further."""
+    nodes = flight_nodes(launch.position, launch.velocity, launch.spin, DURATION)
     bounced = False
     for before, after in pairwise(nodes.tolist()):
         if after[BOUNCED]:
@@ -69,11 +55,7 @@ def _decided(nodes: FloatArray) -> Verdict | None:
         if not bounced and after[_Z] < _LOWEST:
             return Verdict.NO_BOUNCE
         if after[_Y] < PASSED:
-            return _out_of_reach(bounced)
-    return None
-
-
-def _out_of_reach(bounced: bool) -> Verdict:
+            break
     return Verdict.OUT_OF_REACH if bounced else Verdict.NO_BOUNCE
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import cache, partial
 from pathlib import Path
-from typing import Protocol
 
 from ..world.timing import PERIOD
 from .flight_cache import cached_flight
@@ -16,18 +15,6 @@ from .trajectories import BallTrajectory
 
 DEFAULT_BALLS = "narrow"
 """Balls that are played where none are named."""
-
-
-class Flights(Protocol):
-    """Balls by their numbers, from 0."""
-
-    def __len__(self) -> int:
-        """How many there are."""
-        ...
-
-    def flight(self, index: int) -> SampledFlight:
-        """Flight `index`. Raises IndexError beyond the last."""
-        ...
 
 
 class KeptFlights:
@@ -51,6 +38,10 @@ class KeptFlights:
         return self._kept[index]
 
 
+Flights = KeptFlights | SimulatedShots
+"""Balls by their numbers, from 0."""
+
+
 def recorded_balls(path: str | Path, *, period: float = PERIOD) -> KeptFlights:
     """The shots of a file, or of all recordings of a folder in the order of their names.
 
@@ -68,11 +59,9 @@ def recorded_balls(path: str | Path, *, period: float = PERIOD) -> KeptFlights:
 
 def _of_file(file: Path, period: float) -> SampledFlight:
     """Flight in a file of one shot, cached because the time stamps take most of the time."""
+    content = file.read_bytes()
     return cached_flight(
-        file.read_bytes(),
-        file.stem,
-        period,
-        lambda: load_trajectories(file)[0].resample(period),
+        content, file.stem, period, lambda: load_trajectories(file)[0].resample(period)
     )
 
 

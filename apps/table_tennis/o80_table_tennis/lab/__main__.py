@@ -29,7 +29,7 @@ CLASSES = {os.SCHED_OTHER: "other", os.SCHED_FIFO: "fifo", os.SCHED_RR: "rr"}
 def main(
     count: Annotated[int, typer.Option(min=0, help="Balls to play; 0: until Ctrl-C.")] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Of launches and noise.")] = 1,
-    policy: Annotated[str, typer.Option(help="learned or scripted.")] = "learned",
+    policy: Annotated[str, typer.Option(help="learned, scripted, or a training.")] = "learned",
     output: Annotated[Path, typer.Option(help="Folder that is written.")] = Path("build/lab"),
     prefix: Annotated[str, typer.Option(help="Of the names of all segments.")] = "lab",
     fifo: Annotated[bool, typer.Option(help="Real time for arm and motion capture.")] = True,
@@ -59,7 +59,7 @@ def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str,
     with ends_in_order(), Processes(lab_parts(settings).values(), folder) as processes:
         processes.start()
         processes.wait_until_running(STARTS_WITHIN)
-        console.print(f"see it at {processes.printed(VIEW).splitlines()[0]}")
+        console.print(f"see it at {processes.printed(VIEW)[0]}")
         observer, shown = Watched(settings.segment(ENVIRONMENT)), ""
         while True:
             for name in processes.ended(POLL):

@@ -1,7 +1,6 @@
 """The hardware behind the drivers: what plays it, and how the environment asks it for a ball.
 
-The recorded launcher stands on the floor and shoots faster than the policies know. Here it is
-raised so far that its balls leave it where those of the simulated shots `wide` begin.
+The launcher is raised so far that its balls leave it where those of the shots `wide` begin.
 """
 
 from __future__ import annotations
@@ -16,11 +15,11 @@ import numpy as np
 import o80
 from o80.drivers import Reading, Seed, option
 from o80_devices.ball_launcher.launch_model import LAUNCH_MODEL, Launch
-from o80_devices.ball_launcher.wheel_speeds import actuation_of
 from o80_devices.fakes.ball_launcher import Behaviour, FakeLauncher
 from o80_devices.fakes.qualisys import FakeQualisys, Pose
 
 from ..balls import launches
+from ..balls.launcher_shots import drawn_aim
 from ..balls.launches import WIDE
 from ..world.table import TABLE
 from .parts import COUNTERPARTS, LAUNCHER, SUBJECTS, LabSettings
@@ -29,11 +28,7 @@ from .processes import Watched
 _X, _Y, _Z = WIDE.position
 PLACE = ((_X, _Y, _Z - LAUNCH_MODEL.muzzle[2]), -math.pi / 2)
 """Position [m] and yaw [rad] of the launcher in the world: it shoots along -y."""
-TOP_SPINS = (0.0, 60.0)
-"""Least and most [rad/s]: with the scatter of the launcher, within those of `wide`."""
-SPREAD = 0.2
-"""Spread of each component of the velocity, either way [m/s]; the launcher adds its scatter."""
-STATE = ("position", "velocity", "spin")
+BALL = dict.fromkeys(("position", "velocity", "spin"), (np.float64, (3,)))
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
@@ -42,7 +37,7 @@ class Counterparts:
 
     simulated = True
     frequency = 200.0
-    extended: ClassVar = {"number": np.int64, **dict.fromkeys(STATE, (np.float64, (3,)))}
+    extended: ClassVar = {"number": np.int64, **BALL}
     units: ClassVar = {"position": "m", "velocity": "m/s", "spin": "rad/s"}
 
     @dataclass
@@ -75,9 +70,7 @@ class Counterparts:
         self._arm.close()
 
     def _on_launch(self, ball: Launch) -> None:
-        placed = ball.placed(*PLACE)
-        state = {name: getattr(placed, name) for name in STATE}
-        self._row = {"number": self._row["number"] + 1} | state
+        self._row = {"number": self._row["number"] + 1} | vars(ball.placed(*PLACE))
 
     def _pose(self, name: str, when: int) -> Pose | None:
         """Pose of a body at a time [ns]; None: it is not there. Each connection is a thread."""
@@ -92,21 +85,6 @@ class Counterparts:
         return position.tolist(), racket.racket_rotation.tolist()
 
 
-def drawn_aim(rng: np.random.Generator) -> list[float]:
-    """Angles and motors (5,) of the launcher for another ball: the launch model, inverted."""
-    model = LAUNCH_MODEL
-    velocity = np.array(WIDE.velocity) + SPREAD * rng.uniform(-1.0, 1.0, 3)
-    difference = (rng.uniform(*TOP_SPINS) - model.spin) / model.spin_gain  # of upper and lower
-    speed = float(np.linalg.norm(velocity))
-    bottom = (speed - 2 * model.top_gain * difference) / (2 * model.top_gain + model.bottom_gain)
-    aside, ahead, up = velocity[0], -velocity[1], velocity[2]
-    azimuth, altitude = math.atan2(aside, ahead), math.atan2(up, math.hypot(aside, ahead))
-    phi = 0.5 + (azimuth - model.azimuth) / model.azimuth_range
-    theta = 0.5 + (altitude - model.altitude - model.lift * difference) / model.altitude_range
-    upper = actuation_of(bottom + difference)
-    return [phi, theta, upper, upper, actuation_of(bottom)]
-
-
 class Launching:
     """Sets the motors, asks for a launch, and finds the ball; never blocks."""
 
@@ -114,15 +92,14 @@ class Launching:
         self._launcher = Watched(settings.segment(LAUNCHER), read_only=False)
         self._launches = Watched(settings.segment(COUNTERPARTS))
         self._random = np.random.default_rng(settings.seed)
-        self._batch: o80.Batch | None = None
         self.number = 0
         """Number of the last launch that was found."""
-        self.failed = False
-        """The launcher has refused the last launch, or has lost it."""
 
     def ask(self) -> None:
         """The next ball is wanted: the launcher is asked as soon as it is there and ready."""
-        self._batch, self.failed = None, False
+        self._batch: o80.Batch | None = None
+        self.failed = False
+        """The launcher has refused the last launch, or has lost it."""
         self._aim = drawn_aim(self._random)
         if (row := self._newest()) is not None:
             self.number = int(row.number)  # others are none of ours

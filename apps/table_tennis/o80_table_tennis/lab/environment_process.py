@@ -25,10 +25,10 @@ from ..evaluate import named_policy
 from ..rig.home import LONGEST_RETURN, Home
 from ..rig.rig import arm_options
 from ..settings import Pacing
+from ..task.tracked_perception import TrackedPerception
 from .counterparts import Launching
 from .parts import ARM, ENVIRONMENT, RATES, RIG, TRACKER, WATCHED, WORLD, LabSettings
 from .processes import Watched
-from .tracked_perception import TrackedPerception
 
 STEP = 1.0 / RATES[ENVIRONMENT]
 """[s]"""
@@ -37,17 +37,15 @@ OPENING = (o80.BackendGone, o80.TimeoutError, o80.SegmentError)
 
 
 class Phase(IntEnum):
-    """Phase in which the environment is."""
+    """Phase of the environment: arm or world is missing; the arm returns to its start; no ball has
+    left the launcher yet; a ball is played; all were played.
+    """
 
     waiting = 0
-    """Arm or world is missing."""
     returning = 1
-    """The arm goes back to its start."""
     launching = 2
-    """The launcher was asked, or could not be asked yet; no ball has left it."""
     playing = 3
     over = 4
-    """All balls were played."""
 
 
 COUNTS = tuple(f"balls_{what}" for what in ("played", "touched", "returned", "given_up"))
@@ -124,9 +122,9 @@ class EnvironmentProcess:
         self._by_own_clock()
         if any(self._watched[name].now is None for name in (ARM, WORLD)):
             return None
-        arm, world = map(self._settings.segment, (ARM, WORLD))
-        rig = RIG.paced(Pacing.REAL_TIME)
-        rig = replace(rig, attach=True, arm_segment=arm, twin_segment=world)
+        arm, twin = map(self._settings.segment, (ARM, WORLD))
+        paced = RIG.paced(Pacing.REAL_TIME)
+        rig = replace(paced, attach=True, arm_segment=arm, twin_segment=twin)
         try:
             environment = TableTennisEnvironment(rig=rig, task=self._task)
         except OPENING:
@@ -173,8 +171,8 @@ class EnvironmentProcess:
             return
 
         seed = self._settings.seed if row["balls_played"] == 0 else None
-        flight = launch.flight(RIG.period)
-        observation, _ = environment.reset(seed=seed, options={"flight": flight})
+        options = {"flight": launch.flight(RIG.period)}
+        observation, _ = environment.reset(seed=seed, options=options)
         self._policy.reset()
         row["phase"], over = Phase.playing, False
         for robot in (environment.arm, *environment.twins):  # one moment of both clocks

@@ -25,37 +25,28 @@ TRACKER, MOTION_CAPTURE, ENVIRONMENT = "tracker", "motion_capture", "environment
 RECORDER, VIEW, COUNTERPARTS = "recorder", "view", "counterparts"
 WATCHED = (ARM, WORLD, LAUNCHER, CAMERAS, TRACKER, MOTION_CAPTURE)
 """Parts of which a row of the environment says whether they are missing."""
-NINE = (*WATCHED, ENVIRONMENT, RECORDER, VIEW)
-"""The processes of the lab; the four cameras are one."""
-RATES = {ARM: 500.0, LAUNCHER: 50.0, CAMERAS: 180.0, TRACKER: 180.0, MOTION_CAPTURE: 300.0} | {
-    ENVIRONMENT: 100.0
-}
+RATES = {ARM: 500.0, LAUNCHER: 50.0, CAMERAS: 180.0, TRACKER: 180.0, MOTION_CAPTURE: 300.0}
+RATES[ENVIRONMENT] = 100.0
 """Rows a second."""
 RIG = RigSettings(preset="identified")
 SUBJECTS = ("racket", "base", "table")
 """Subjects that the motion capture sees."""
-NO_IMAGE, NO_RACKET = "`reason` is `no_image`", "`racket.visible` is false"
-DIED = "journal: `died`"
-OPTIONS = ("prefix", "balls", "seed", "policy")
-"""Settings of the process of the environment."""
+NO_IMAGE, DIED = "`reason` is `no_image`", "journal: `died`"
+NO_RACKET = "`racket.visible` is false"
 COMMAND = str(Path(sysconfig.get_path("scripts")) / "o80")
 """The command `o80` of this installation."""
 
 
 @dataclass(frozen=True)
 class LabSettings:
-    """Settings of the lab: what is played, and where it is written."""
+    """Settings of the lab, see the options of its command."""
 
     balls: int = 5
-    """To play; 0: until Ctrl-C."""
     seed: int = 1
     policy: str = "learned"
-    """learned, scripted, or the folder of a training."""
     prefix: str = "lab"
-    """Prefix of the names of all segments."""
     folder: Path = Path("build/lab")
     fifo: bool = True
-    """Ask for real-time scheduling of the arm and of the motion capture."""
 
     def segment(self, part: str) -> str:
         """Name of the segment of a part."""
@@ -91,7 +82,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
     launcher, qualisys = f"tcp://127.0.0.1:{_free_port()}", _free_port()
     fifo = ("--policy=fifo", "--lock-memory") if settings.fifo else ()
     recorded = [of(part) for part in (*WATCHED, ENVIRONMENT) if part != CAMERAS]
-    words = [f"--{key}={getattr(settings, key)}" for key in OPTIONS]
+    words = [f"--{key}={getattr(settings, key)}" for key in ("prefix", "balls", "seed", "policy")]
     play = (sys.executable, "-u", "-m", "o80_table_tennis.lab.environment_process", *words)
     record = (COMMAND, "record", *recorded, "-o", str(settings.recording), "--continue")
 

@@ -1,7 +1,6 @@
 """Starts and ends the processes of the lab, and says which of them has ended and why.
 
-The processes know nothing of each other's start: each waits by itself for what it needs. They end
-in order when the supervisor does, in whatever way: a signal of the kernel tells them
+They end in order when the supervisor does, in whatever way: a signal of the kernel tells them
 (PR_SET_PDEATHSIG), so that a supervisor that is killed leaves nothing.
 """
 
@@ -50,13 +49,11 @@ class PartEndedError(RuntimeError):
 class Processes(Closeable):
     """The processes of the lab. Leaving a `with` block ends all.
 
-    Start processes from the main thread: the kernel takes the end of the thread that started a
-    process for that of the whole supervisor.
-
-    folder: where each process has a file of what it prints.
+    Start them from the main thread: the kernel takes its end for that of the whole supervisor.
     """
 
     def __init__(self, parts: Iterable[Part], folder: Path) -> None:
+        """folder: where each process has a file of what it prints."""
         self.parts: dict[str, Part] = {part.name: part for part in parts}
         self.running: dict[str, subprocess.Popen[bytes]] = {}
         """Processes that were started and have not been collected."""
@@ -92,7 +89,9 @@ class Processes(Closeable):
         end = time.monotonic() + timeout
         while missing := [name for name in self.running if not self.runs(name)]:
             if time.monotonic() > end:
-                lines = [f"'{name}': {' / '.join(self._last_lines(name))}" for name in missing]
+                lines = [
+                    f"'{name}': {' / '.join(self.printed(name)[-LAST_LINES:])}" for name in missing
+                ]
                 raise o80.TimeoutError(
                     f"after {timeout:g} s these processes do not run yet:\n" + "\n".join(lines)
                 )
@@ -105,7 +104,7 @@ class Processes(Closeable):
         if popen is None or popen.poll() is not None:
             return False
         if part.segment is None:
-            return part.says in self.printed(name)
+            return any(part.says in line for line in self.printed(name))
         found = {(each.name, each.pid, each.life) for each in o80.segments()}
         return (part.segment, popen.pid, "running") in found
 
@@ -120,14 +119,12 @@ class Processes(Closeable):
 
     def collected(self, name: str) -> PartEndedError:
         """Takes a process that has ended off the list, and tells how; it may be started again."""
-        return PartEndedError(name, self.running.pop(name).wait(), self._last_lines(name))
+        code = self.running.pop(name).wait()
+        return PartEndedError(name, code, self.printed(name)[-LAST_LINES:])
 
-    def printed(self, name: str) -> str:
-        """Output of a process, over all its starts."""
-        return (self._folder / f"{name}.txt").read_text(errors="replace")
-
-    def _last_lines(self, name: str) -> list[str]:
-        return self.printed(name).rstrip().splitlines()[-LAST_LINES:]
+    def printed(self, name: str) -> list[str]:
+        """Lines that a process has printed, over all its starts."""
+        return (self._folder / f"{name}.txt").read_text(errors="replace").rstrip().splitlines()
 
     def close(self) -> None:
         """Ends all, the last of the table first, and removes the segments of those killed."""

@@ -134,14 +134,12 @@ def _motion_capture_error(rows: Rows) -> Figures | None:
 
 def _wanted(processes: Mapping[str, Figures]) -> Figures:
     """Targets of a quiet machine, and whether this run has reached them."""
-    wanted: Figures = {}
-    for name, most in MAX_MISSED.items():
-        if name in processes:
-            missed = round(processes[name]["missed_percent"], 3)
-            target = {"wanted": f"less than {most}", "measured": missed, "reached": missed < most}
-            wanted[f"{name}: missed periods [%]"] = target
+    wanted: dict[str, tuple[Any, ...]] = {}
+    for name in (name for name in MAX_MISSED if name in processes):
+        most, missed = MAX_MISSED[name], round(processes[name]["missed_percent"], 3)
+        wanted[f"{name}: missed periods [%]"] = f"less than {most}", missed, missed < most
     if ARM in processes:
         kind = processes[ARM]["scheduling"]
-        reached = kind.startswith("fifo")
-        wanted["arm: scheduling"] = {"wanted": "fifo", "measured": kind, "reached": reached}
-    return wanted
+        wanted["arm: scheduling"] = "fifo", kind, kind.startswith("fifo")
+    names = "wanted", "measured", "reached"
+    return {what: dict(zip(names, each, strict=True)) for what, each in wanted.items()}

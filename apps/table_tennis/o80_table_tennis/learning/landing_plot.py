@@ -30,31 +30,12 @@ def plot_landings(path: Path, evaluations: Mapping[str, Played]) -> None:
             (True, "tab:green", "returned"),
             (False, "tab:red", "landed elsewhere"),
         ):
-            places = np.array(
-                [
-                    episode.landing
-                    for episode in played.episodes
-                    if episode.landing is not None and episode.returned is returned
-                ]
-            ).reshape(-1, 3)
-            axes.plot(
-                places[:, 1],
-                places[:, 0],
-                "o",
-                markersize=3.5,
-                alpha=0.7,
-                color=colour,
-                label=f"{label}: {len(places)}",
-            )
-        axes.plot(
-            TARGET[1],
-            TARGET[0],
-            "*",
-            markersize=13,
-            color="gold",
-            markeredgecolor="black",
-            label="target",
-        )
+            landings = [each.landing for each in played.episodes if each.returned is returned]
+            places = np.array([each for each in landings if each]).reshape(-1, 3)
+            text, at = f"{label}: {len(places)}", (places[:, 1], places[:, 0])
+            axes.plot(*at, "o", markersize=3.5, alpha=0.7, color=colour, label=text)
+        star = {"markersize": 13, "color": "gold", "markeredgecolor": "black"}
+        axes.plot(TARGET[1], TARGET[0], "*", label="target", **star)
         count = len(played.episodes)
         axes.set_title(
             f"{name}: {100 * played.returned:.1f} % of {count} balls returned, "

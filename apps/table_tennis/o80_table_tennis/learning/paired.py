@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 from ..report.statistics import Played
 
@@ -12,10 +11,10 @@ from ..report.statistics import Played
 class Paired:
     """How many balls were returned in which way, and how many actions were late in real time."""
 
-    both: int
-    only_accelerated: int
-    only_real_time: int
-    neither: int
+    balls: int
+    returned_both: int
+    returned_only_accelerated: int
+    returned_only_real_time: int
     actions: int
     """In real time."""
     late_actions: int
@@ -26,48 +25,21 @@ class Paired:
     @classmethod
     def of(cls, accelerated: Played, real_time: Played) -> Paired:
         """Pairs two evaluations of the same balls. Raises ValueError if the balls differ."""
-        if [each.ball for each in accelerated.episodes] != [
-            each.ball for each in real_time.episodes
-        ]:
+        pairs = [*zip(accelerated.episodes, real_time.episodes, strict=True)]
+        if any(one.ball != other.ball for one, other in pairs):
             raise ValueError("both evaluations must play the same balls in the same order")
-        pairs = [
-            (one.returned, other.returned)
-            for one, other in zip(accelerated.episodes, real_time.episodes, strict=True)
-        ]
+        returned = [(one.returned, other.returned) for one, other in pairs]
+        both, one, other = map(returned.count, ((True, True), (True, False), (False, True)))
         played = real_time.statistics
-        return cls(
-            both=pairs.count((True, True)),
-            only_accelerated=pairs.count((True, False)),
-            only_real_time=pairs.count((False, True)),
-            neither=pairs.count((False, False)),
-            actions=played.steps,
-            late_actions=played.late_actions,
-            stalled_episodes=played.stalled_episodes,
-        )
-
-    @property
-    def balls(self) -> int:
-        """How many were played."""
-        return self.both + self.only_accelerated + self.only_real_time + self.neither
-
-    def as_json(self) -> dict[str, Any]:
-        """The figures."""
-        return {
-            "balls": self.balls,
-            "returned_both": self.both,
-            "returned_only_accelerated": self.only_accelerated,
-            "returned_only_real_time": self.only_real_time,
-            "actions": self.actions,
-            "late_actions": self.late_actions,
-            "stalled_episodes": self.stalled_episodes,
-        }
+        late, stalled = played.late_actions, played.stalled_episodes
+        return cls(len(pairs), both, one, other, played.steps, late, stalled)
 
     def __str__(self) -> str:
-        more = self.only_real_time - self.only_accelerated
+        more = self.returned_only_real_time - self.returned_only_accelerated
         return (
-            f"of {self.balls} balls, {self.both} were returned both ways, "
-            f"{self.only_accelerated} only accelerated, {self.only_real_time} only in real time "
-            f"(difference {100 * more / max(1, self.balls):+.1f} points); in real time "
-            f"{self.late_actions} of {self.actions} actions were late, and "
+            f"of {self.balls} balls, {self.returned_both} were returned both ways, "
+            f"{self.returned_only_accelerated} only accelerated, {self.returned_only_real_time} "
+            f"only in real time (difference {100 * more / max(1, self.balls):+.1f} points); in "
+            f"real time {self.late_actions} of {self.actions} actions were late, and "
             f"{self.stalled_episodes} episodes were lost to that"
         )

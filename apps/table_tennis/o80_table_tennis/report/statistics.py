@@ -73,21 +73,14 @@ def statistics_of(
 
     rows: of a chunk in a step of the rig.
     """
-    steps = of_rig.steps * rows
-    history = arm.history()
+    steps, history = of_rig.steps * rows, arm.history()
     seconds = float(history.time[-1] - history.time[0]) * 1e-9
-    lateness: FloatArray = np.empty(0)
-    periods: FloatArray = np.empty(0)
-    if not arm.bursting:
-        lateness = np.asarray(history.lateness, np.float64) * 1e-3
-        periods = np.asarray(np.diff(history.time), np.float64) * 1e-3
+    clocked = slice(0, 0) if arm.bursting else slice(None)
     return Statistics(
         episodes=counts.episodes,
         steps=steps,
-        steps_per_second=steps / counts.seconds if counts.seconds > 0 else 0.0,
-        bare_steps_per_second=(
-            steps / counts.seconds_stepping if counts.seconds_stepping > 0 else 0.0
-        ),
+        steps_per_second=steps / counts.seconds if counts.seconds else 0.0,
+        bare_steps_per_second=steps / counts.seconds_stepping if counts.seconds_stepping else 0.0,
         step_seconds=step_seconds,
         late_actions=of_rig.late_actions,
         starved_iterations=of_rig.starved,
@@ -98,8 +91,8 @@ def statistics_of(
         arm_rate=(len(history) - 1) / seconds if seconds > 0 else 0.0,
         arm_overruns=int(history.overruns[-1]),
         arm_skipped=int(history.skipped[-1]),
-        arm_lateness_us=lateness,
-        arm_periods_us=periods,
+        arm_lateness_us=np.asarray(history.lateness[clocked], np.float64) * 1e-3,
+        arm_periods_us=np.asarray(np.diff(history.time)[clocked], np.float64) * 1e-3,
     )
 
 

@@ -75,19 +75,19 @@ def event_flags() -> dict[str, Any]:
     }
 
 
-def records_of(rows: NDArray[Any]) -> NDArray[Any]:
-    """View (..., balls) of the records of the balls in rows (...) of a twin."""
-    records: NDArray[Any] = rows["extended"]["contacts"]
-    return records
-
-
 class BallRecords:
-    """The records (N,) of N balls, an array that is filled anew for each reading.
+    """The records (N,) of N balls, an array that is filled anew for each reading."""
 
-    `flags` are those of `event_flags`, which are filled anew at the same time.
-    """
-
-    def __init__(self, records: NDArray[Any], flags: Mapping[str, NDArray[np.bool_]]) -> None:
+    def __init__(
+        self, records: NDArray[Any], flags: Mapping[str, NDArray[np.bool_]] | None = None
+    ) -> None:
+        """flags: those of `event_flags`, filled anew at the same time; None: `read` does so."""
+        self._compared: list[Any] = []
+        if flags is None:
+            flags = {name: np.zeros(len(records), np.bool_) for name in FLAGS}
+            for name, (surface, number, compare, value) in FLAGS.items():
+                each = COMPARE[compare], records[surface][number], value, flags[name]
+                self._compared.append(each)
         racket, table, net = records["racket"], records["table"], records["net"]
         self._landed_at, self._net_at = table["iteration"], net["iteration"]
         self._landed, self._met_net = flags["landed"], flags["met_net"]
@@ -109,18 +109,11 @@ class BallRecords:
     def read(self) -> BallRecord:
         """Reads what has happened to the balls; all arrays but `touched_net` are views."""
         record = self._record
+        for compare, numbers, value, flag in self._compared:
+            compare(numbers, value, out=flag)
         if np.count_nonzero(self._met_net):
             late = self._landed & (self._landed_at < self._net_at)
             record.touched_net = self._met_net & ~late
         else:
             record.touched_net = self._nobody
         return record
-
-
-def ball_records(records: NDArray[Any]) -> BallRecord:
-    """Events of N balls, from their records (N,)."""
-    flags = {
-        name: COMPARE[compare](records[surface][number], value)
-        for name, (surface, number, compare, value) in FLAGS.items()
-    }
-    return BallRecords(records, flags).read()

@@ -15,7 +15,7 @@ from o80.rows.layout import field_view
 from ..task.ball_record import BallRecord
 from ..task.observations import BALL_POSITION, PRESSURES, SIZE
 from ..world.arm import JOINTS
-from .ball_records import BallRecords, ball_records, event_flags, records_of
+from .ball_records import BallRecords, event_flags
 from .pressure_range import PressureRange
 from .rig import MOTION
 
@@ -48,9 +48,9 @@ class RigRows:
         self.balls: FloatArray = field_view(flat, "observed.balls")[:, :SEEN_NUMBERS]
         """(N * worlds, 6) position [m] and velocity [m/s]"""
         assert np.shares_memory(self.balls, worlds)
-        self.records = records_of(flat)[:, 0]
+        self.records: NDArray[Any] = flat["extended"]["contacts"][:, 0]
         """(N * worlds,) what has happened to each ball, as the simulator has it."""
-        self.read_records: Callable[[], BallRecord] = lambda: ball_records(self.records)
+        self.read_records: Callable[[], BallRecord] = BallRecords(self.records).read
         """Record of what has happened to each ball."""
         self._muscles = [actuator.name for actuator in arm.actuators]
 

@@ -20,15 +20,6 @@ MIN_VELOCITY_NOISE = 0.02
 """[m/s]"""
 
 
-def filter_settings(noise: NoiseSettings, interval: float) -> FilterSettings:
-    """Filter settings for a ball that is seen with this noise, every `interval` [s]."""
-    return FilterSettings(
-        step=interval,
-        position=max(noise.ball_position, MIN_POSITION_NOISE),
-        velocity=max(noise.ball_velocity, MIN_VELOCITY_NOISE),
-    )
-
-
 class FullObserver:
     """Observer of N episodes (`count`): beyond the state, the latest requests and a filtered ball.
 
@@ -55,7 +46,9 @@ class FullObserver:
         self._changes, self._newest = slice(begin, end), slice(begin, begin + MUSCLES)
         self._earlier = slice(begin + MUSCLES, end)
         self._later = slice(begin, end - MUSCLES)
-        self._filter = ball_filter(filter_settings(noise, interval), count)
+        position = max(noise.ball_position, MIN_POSITION_NOISE)
+        velocity = max(noise.ball_velocity, MIN_VELOCITY_NOISE)
+        self._filter = ball_filter(FilterSettings(interval, position, velocity), count)
         self._every = np.arange(count)
         self._rows = np.zeros((count, len(self._centres)))
         self._last = np.zeros((count, MUSCLES))

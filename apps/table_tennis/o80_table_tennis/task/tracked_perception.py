@@ -19,8 +19,8 @@ from o80_devices.ball_tracking.ball_row import Reason
 
 from ..balls.launches import WIDE
 from ..physics.prediction import STATE, flight_nodes
-from ..task.perception import Perceived
-from ..task.state import State
+from .perception import Perceived
+from .state import State
 
 STEP = 0.005
 """Time step of the predicted flight from image to row [s]."""
