@@ -1,6 +1,5 @@
 """Recorded bounces: what the law of the bounce predicts."""
 
-from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -13,10 +12,8 @@ from fit_bounces import SPINLESS, BounceSet, app, bounce_set, rms
 from o80_table_tennis.balls.recordings import load_trajectories
 from o80_table_tennis.balls.trajectories import BallTrajectory
 from o80_table_tennis.physics.aerodynamics import AERODYNAMICS
-from o80_table_tennis.physics.impact import bounced, leaving
 from o80_table_tennis.world.ball import BALL_GUN_SPIN
-from o80_table_tennis.world.materials import TABLE_RESTITUTION, Restitution
-from o80_table_tennis.world.table import TABLE
+from o80_table_tennis.world.materials import TABLE_RESTITUTION
 
 SETS = ("ball_gun_2019", "spin_2022/mn5008_no_spin.hdf5", "spin_2022/mn5008_topspin.hdf5")
 
@@ -66,21 +63,6 @@ def test_the_command_prints_a_row_for_each_set() -> None:
     assert result.exit_code == 0, result.output
     assert "mn5008_no_spin          10" in result.output
     assert "mn5008_topspin          15" in result.output
-
-
-def test_a_racket_and_the_table_follow_the_same_law() -> None:
-    table = replace(TABLE, friction=np.inf)
-    velocity, spin = np.array([0.5, -4.0, -3.0]), np.array([60.0, 20.0, 10.0])
-    expected = bounced(velocity, spin, table)
-    after = leaving(
-        velocity,
-        spin,
-        np.zeros(3),
-        np.array([0.0, 0.0, 1.0]),
-        Restitution(table.tangential_restitution, table.normal_restitution),
-    )
-    np.testing.assert_allclose(after.velocity, expected.velocity, rtol=1e-12)
-    np.testing.assert_allclose(after.spin, expected.spin, rtol=1e-12)
 
 
 def test_spins_are_found_from_turns_and_never_run_away() -> None:
