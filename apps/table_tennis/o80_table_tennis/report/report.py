@@ -20,6 +20,7 @@ LABELS = {
     "episodes": "episodes",
     "balls": "balls",
     "returned": "returned to the opponent's half",
+    "returned_95_percent": "share returned (95 % sure)",
     "touched": "touched by the racket",
     "reward": "mean reward",
     "miss": "miss of the target, median [m]",
@@ -63,6 +64,8 @@ def print_table(console: Console, title: str, columns: Mapping[str, Mapping[str,
 def _text(value: Any) -> str:
     if value is None:
         return ""
+    if isinstance(value, list):
+        return " to ".join(map(_text, value))
     return f"{value:g}" if isinstance(value, float) else str(value)
 
 
