@@ -233,7 +233,7 @@ case $purpose in
     [ "$purpose" != setup ] || has_renderer || packages+=(libosmesa6)
     need_packages "${packages[@]}"
     ;;
-  bench) need_packages g++ rt-tests libaravis-0.8-0 aravis-tools ;;
+  bench) need_packages g++ rt-tests ;;
   systemd) need_packages systemd ;; # beside what `check` brings
   debian13) need_packages debootstrap ;;
   *) say "unknown purpose '$purpose'"; exit 2 ;;

@@ -65,8 +65,11 @@ class Push(HybridTask):
         joints = [np.interp(reach, REACH, joint) for joint in ARM]
         return np.column_stack([-turn, *joints, *(np.full(len(turn), each) for each in FORK)])
 
+    def measured(self, copies: Index) -> Any:
+        return super().observe(copies)
+
     def seen(self, copies: Index) -> tuple[Any, ...]:
-        x, y, _, puck_x, puck_y, _, speed_x, speed_y, _ = super().observe(copies).T
+        x, y, _, puck_x, puck_y, _, speed_x, speed_y, _ = self.measured(copies).T
         fingers, puck = x + 1j * y, puck_x + 1j * puck_y
         fingers += 0.016j * np.exp(1j * np.angle(fingers))  # from the site to between them
         return fingers, puck, speed_x + 1j * speed_y, self.goal[copies] - puck

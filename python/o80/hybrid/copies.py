@@ -34,9 +34,9 @@ class Copies:
         rig = plan.rig
         robot = robot_of(rig.robot)
         with ExitStack() as stack:
-            history, slots = max(64, 2 * plan.iterations), int(home.place is not None)
+            history = max(64, 2 * plan.iterations)
             self._robots = self._group(
-                stack, robot, rig.frequency, history, threads, copies, rig.robot_options, slots
+                stack, robot, rig.frequency, history, threads, copies, rig.robot_options
             )
             period = self._robots[0].period
             world = World(rig, plan.folder, self._robots[0].schema, robot.name)
@@ -84,12 +84,8 @@ class Copies:
         threads: Any,
         copies: int,
         options: Any,
-        slots: int = 0,
     ) -> InlineGroup:
-        # a snapshot takes most of the memory of a copy: the only one is that of its home
         own: dict[str, Any] = {"history": history} | dict(options)
-        if any(each.name == "slots" for each in robot.options):
-            own.setdefault("slots", slots)
         group = robot.inline(copies=copies, threads=threads, frequency=frequency, **own)
         return stack.enter_context(group)
 
