@@ -3,7 +3,9 @@
 #include <nanobind/nanobind.h>
 
 #include <cstddef>
+#include <cstring>
 #include <span>
+#include <vector>
 
 /// The memory of a Python object.
 struct Bytes {
@@ -22,3 +24,22 @@ struct Bytes {
   }
   Py_buffer view{};
 };
+
+/// The numbers in the memory of a Python object.
+template <class T>
+std::vector<T> numbers_in(nanobind::handle owner) {
+  const Bytes bytes(owner);
+  std::vector<T> numbers(bytes.span().size() / sizeof(T));
+  if (!numbers.empty())
+    std::memcpy(numbers.data(), bytes.span().data(), numbers.size() * sizeof(T));
+  return numbers;
+}
+
+inline std::span<const std::byte> span_of(const nanobind::bytes& bytes) {
+  return std::as_bytes(std::span(bytes.c_str(), bytes.size()));
+}
+
+template <class T>
+nanobind::bytes bytes_of(const std::vector<T>& values) {
+  return nanobind::bytes(values.data(), values.size() * sizeof(T));
+}

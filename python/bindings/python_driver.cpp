@@ -66,6 +66,15 @@ Result guarded(FaultText* fault, Result failed, Call&& call) noexcept {
   return failed;
 }
 
+/// The same for a function without an answer; 1 if it has failed.
+template <class Call>
+int done(FaultText* fault, Call&& call) noexcept {
+  return guarded<int>(fault, 1, [&] {
+    call();
+    return 0;
+  });
+}
+
 /// One class: python/o80/drivers/driver_class.py. It is never deleted, because its table lasts as
 /// long as the process.
 struct PythonClass {
@@ -127,10 +136,7 @@ void options(void* self, void* context, void (*each)(void*, const o80::OptionRow
 }
 
 int accepts(void* self, const OptionValue* values, std::uint32_t count, FaultText* fault) {
-  return guarded<int>(fault, 1, [&] {
-    class_of(self).attr("config")(pairs(values, count));
-    return 0;
-  });
+  return done(fault, [&] { class_of(self).attr("config")(pairs(values, count)); });
 }
 
 void* create(void* self, const OptionValue* values, std::uint32_t count, FaultText* fault) {
@@ -139,9 +145,9 @@ void* create(void* self, const OptionValue* values, std::uint32_t count, FaultTe
   });
 }
 
-int describe(void* robot, std::int64_t period, void* context,
-             void (*rows)(void*, const o80::SchemaRows*), FaultText* fault) {
-  return guarded<int>(fault, 1, [&] {
+int describe(void* robot, std::int64_t period, void* context, o80::SchemaTaker* take,
+             FaultText* fault) {
+  return done(fault, [&] {
     PythonDriver& self = driver(robot);
     const nb::object builder = self.adapter.attr("describe")(period);
     o80::Schema schema = nb::cast<SchemaBuilder&>(builder).schema;
@@ -149,24 +155,17 @@ int describe(void* robot, std::int64_t period, void* context,
     schema.head.block = o80::round_up(schema.head.block, 8);
     self.requests = schema.requests.size();
     self.take_buffers();
-    const o80::SchemaRows all = o80::driving::rows_of(schema);
-    rows(context, &all);
-    return 0;
+    const std::vector<std::byte> bytes = to_bytes(schema);
+    take(context, bytes.data(), bytes.size(), schema.hooks.data());
   });
 }
 
 int start(void* robot, FaultText* fault) {
-  return guarded<int>(fault, 1, [&] {
-    driver(robot).adapter.attr("start")();
-    return 0;
-  });
+  return done(fault, [&] { driver(robot).adapter.attr("start")(); });
 }
 
 int wait(void* robot, std::int64_t due, FaultText* fault) {
-  return guarded<int>(fault, 1, [&] {
-    driver(robot).adapter.attr("wait")(due);
-    return 0;
-  });
+  return done(fault, [&] { driver(robot).adapter.attr("wait")(due); });
 }
 
 void copy(Bytes& to, const void* from) {
@@ -177,11 +176,10 @@ void copy(Bytes& to, const void* from) {
 int write(void* robot, const o80::DesiredView* desired, FaultText* fault) {
   PythonDriver& self = driver(robot);
   self.now = desired;
-  const int failed = guarded<int>(fault, 1, [&] {
+  const int failed = done(fault, [&] {
     copy(*self.desired, desired->states);
     copy(*self.active, desired->active);
     self.adapter.attr("write")(desired->iteration, desired->time, desired->period);
-    return 0;
   });
   self.now = nullptr;
   return failed;
@@ -218,7 +216,7 @@ void take_report(PythonDriver& self, nb::handle told, o80::ReadingView* reading)
 }
 
 int read(void* robot, o80::ReadingView* reading, FaultText* fault) {
-  return guarded<int>(fault, 1, [&] {
+  return done(fault, [&] {
     PythonDriver& self = driver(robot);
     copy(*self.observed, reading->observed);
     copy(*self.extended, reading->extended);
@@ -231,7 +229,6 @@ int read(void* robot, o80::ReadingView* reading, FaultText* fault) {
     if (!observed.empty()) std::memcpy(reading->observed, observed.data(), observed.size());
     if (!extended.empty()) std::memcpy(reading->extended, extended.data(), extended.size());
     if (!told.is_none()) take_report(self, told, reading);
-    return 0;
   });
 }
 
@@ -251,10 +248,7 @@ RequestAnswer request(void* robot, std::uint32_t index, const std::byte* payload
 }
 
 int halt(void* robot, FaultText* fault) {
-  return guarded<int>(fault, 1, [&] {
-    driver(robot).adapter.attr("halt")();
-    return 0;
-  });
+  return done(fault, [&] { driver(robot).adapter.attr("halt")(); });
 }
 
 RequestAnswer resume(void* robot, FaultText* text) {
@@ -265,10 +259,7 @@ RequestAnswer resume(void* robot, FaultText* text) {
 
 void stop(void* robot) {
   FaultText ignored{};
-  guarded<int>(&ignored, 1, [&] {
-    driver(robot).adapter.attr("stop")();
-    return 0;
-  });
+  done(&ignored, [&] { driver(robot).adapter.attr("stop")(); });
 }
 
 void destroy(void* robot) {

@@ -16,10 +16,6 @@ namespace nb = nanobind;
 namespace o80 {
 namespace {
 
-constexpr const char* kKinds[] = {"bool",    "int8",   "int16",  "int32",  "int64",
-                                  "uint8",   "uint16", "uint32", "uint64", "float32",
-                                  "float64", "enum",   "struct", "text"};
-
 nb::str text(std::string_view words) {
   const std::string clean = printable(words);  // another process has written them
   return nb::str(clean.data(), clean.size());
@@ -111,7 +107,7 @@ nb::dict of_type(const Schema& schema, std::uint32_t index);
 nb::dict of_field(const Schema& schema, const TypeRow& type, const FieldRow& field) {
   nb::dict found;
   found["name"] = text(field.name.view());
-  found["kind"] = kKinds[static_cast<int>(field.kind)];
+  found["kind"] = kKindNames[static_cast<int>(field.kind)];
   found["offset"] = field.offset;
   found["size"] = field.size;
   nb::list shape;
@@ -122,8 +118,7 @@ nb::dict of_field(const Schema& schema, const TypeRow& type, const FieldRow& fie
   found["help"] = text(field.help.view());
   if (field.resting != 0) found["rest"] = number(field.rest);
   if (field.origin != Origin::robot) {
-    constexpr const char* kOrigins[] = {"robot", "clock", "world", "absent"};
-    found["origin"] = kOrigins[static_cast<int>(field.origin)];
+    found["origin"] = kOriginNames[static_cast<int>(field.origin)];
   }
   if (field.has_default != 0) {
     found["default"] =

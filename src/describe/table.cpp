@@ -12,48 +12,11 @@ namespace o80 {
 
 namespace {
 
-constexpr std::uint64_t kMagic = 0x616D656863533038;  // "80Schema"
 constexpr std::uint32_t kMaxRows = 1U << 20;
 constexpr std::uint32_t kMaxActuators =
     0xFFFF;  // a record has 16 bits for an actuator; one value means all
 constexpr std::uint32_t kLargestType = 1U << 28;
 constexpr std::uint32_t kMaxNested = 16;
-
-struct TableHead {
-  std::uint64_t magic = kMagic;
-  std::uint32_t counts[8] = {};
-  std::uint32_t sizes[8] = {};
-};
-
-/// Calls `visit` for every table of a schema, in the order of to_bytes().
-template <class SchemaLike, class Visit>
-void each_table(SchemaLike& schema, Visit&& visit) {
-  visit(0, schema.types);
-  visit(1, schema.fields);
-  visit(2, schema.labels);
-  visit(3, schema.groups);
-  visit(4, schema.actuators);
-  visit(5, schema.limits);
-  visit(6, schema.requests);
-  visit(7, schema.defaults);
-}
-
-/// Follows the tables if the robot names a model, then the rows, the file and the text.
-/// Descriptions without a model are as they were before models were described.
-struct ShownHead {
-  std::uint64_t magic = 0x6E776F6853303880;  // "80Shown" behind a byte that is no text
-  std::uint32_t rows = 0;
-  std::uint32_t row_size = sizeof(ShownRow);
-  std::uint32_t file = 0;  // [bytes]
-  std::uint32_t mjcf = 0;  // [bytes]
-};
-
-/// Follows them if a number has bounds of its integral, then the rows.
-struct IntegralsHead {
-  std::uint64_t magic = 0x6C6172676E4980;  // "80Ingral" behind a byte that is no text
-  std::uint32_t rows = 0;
-  std::uint32_t row_size = sizeof(IntegralRow);
-};
 
 [[noreturn]] void refuse(const std::string& why) {
   throw InvalidArgument("invalid description: " + why);
@@ -353,53 +316,6 @@ void check_shown(const Schema& schema) {
   }
 }
 
-std::size_t size_of(const ShownModel& shown) {
-  if (shown.empty()) return 0;
-  return sizeof(ShownHead) + shown.values.size() * sizeof(ShownRow) + shown.file.size() +
-         shown.mjcf.size();
-}
-
-std::size_t size_of(const std::vector<IntegralRow>& rows) {
-  return rows.empty() ? 0 : sizeof(IntegralsHead) + rows.size() * sizeof(IntegralRow);
-}
-
-std::vector<IntegralRow> integrals_from(std::span<const std::byte> bytes) {
-  std::vector<IntegralRow> rows;
-  IntegralsHead head;
-  const IntegralsHead known;
-  if (bytes.size() < sizeof head) return rows;
-  std::memcpy(&head, bytes.data(), sizeof head);
-  if (head.magic != known.magic) return rows;
-  bytes = bytes.subspan(sizeof head);
-  if (head.row_size != known.row_size || head.rows > kMaxRows ||
-      bytes.size() < head.rows * sizeof(IntegralRow)) {
-    refuse("integral bounds of another size");
-  }
-  rows.resize(head.rows);
-  if (head.rows > 0) std::memcpy(rows.data(), bytes.data(), head.rows * sizeof(IntegralRow));
-  return rows;
-}
-
-/// Reads the part behind the tables; nothing there, or something else, is no model.
-ShownModel shown_from(std::span<const std::byte> bytes) {
-  ShownModel shown;
-  ShownHead head;
-  const ShownHead known;
-  if (bytes.size() < sizeof head) return shown;
-  std::memcpy(&head, bytes.data(), sizeof head);
-  if (head.magic != known.magic) return shown;
-  if (head.row_size != known.row_size || head.rows > kMaxRows) refuse("a model of another size");
-  bytes = bytes.subspan(sizeof head);
-  const std::size_t rows = head.rows * sizeof(ShownRow);
-  if (bytes.size() < rows + head.file + head.mjcf) refuse("the model is cut off");
-  shown.values.resize(head.rows);
-  if (rows > 0) std::memcpy(shown.values.data(), bytes.data(), rows);
-  const char* texts = reinterpret_cast<const char*>(bytes.data() + rows);
-  shown.file.assign(texts, head.file);
-  shown.mjcf.assign(texts + head.file, head.mjcf);
-  return shown;
-}
-
 }  // namespace
 
 void check(const Schema& schema) {
@@ -442,83 +358,32 @@ void check(const Schema& schema) {
   }
 }
 
-std::vector<std::byte> to_bytes(const Schema& schema) {
-  TableHead head;
-  std::size_t size = sizeof head + sizeof schema.head;
-  each_table(schema, [&]<class Row>(int i, const std::vector<Row>& rows) {
-    head.counts[i] = static_cast<std::uint32_t>(rows.size());
-    head.sizes[i] = sizeof(Row);
-    size += rows.size() * sizeof(Row);
-  });
-  std::vector<std::byte> bytes(size + size_of(schema.shown) + size_of(schema.integrals));
-  std::byte* out = bytes.data();
-  const auto put = [&](const void* from, std::size_t count) {
-    if (count > 0) std::memcpy(out, from, count);
-    out += count;
-  };
-  put(&head, sizeof head);
-  put(&schema.head, sizeof schema.head);
-  each_table(schema, [&]<class Row>(int, const std::vector<Row>& rows) {
-    put(rows.data(), rows.size() * sizeof(Row));
-  });
-  if (const ShownModel& shown = schema.shown; !shown.empty()) {
-    const ShownHead shown_head{.rows = static_cast<std::uint32_t>(shown.values.size()),
-                               .file = static_cast<std::uint32_t>(shown.file.size()),
-                               .mjcf = static_cast<std::uint32_t>(shown.mjcf.size())};
-    put(&shown_head, sizeof shown_head);
-    put(shown.values.data(), shown.values.size() * sizeof(ShownRow));
-    put(shown.file.data(), shown.file.size());
-    put(shown.mjcf.data(), shown.mjcf.size());
+void check_face(const Schema& face) {
+  const std::int64_t period = face.head.period;
+  if (period != 0 && (period < 1'000 || period > 1'000'000'000'000)) {
+    throw InvalidArgument("the period of the face must be from 1000 to 1e12 ns, or 0, got " +
+                          std::to_string(period));
   }
-  if (!schema.integrals.empty()) {
-    const IntegralsHead integrals{.rows = static_cast<std::uint32_t>(schema.integrals.size())};
-    put(&integrals, sizeof integrals);
-    put(schema.integrals.data(), schema.integrals.size() * sizeof(IntegralRow));
+  check(face);
+  for (const TypeRow& type : face.types) {
+    if (type.blends == 0) continue;
+    throw InvalidArgument("the state '" + type.name.str() +
+                          "' has an interpolation that only its robot knows");
   }
-  return bytes;
 }
 
 Schema schema_from_bytes(std::span<const std::byte> bytes) {
-  const auto foreign = [](const std::string& why) {
-    return SegmentError("the segment's schema cannot be read (" + why +
-                        "): the file is damaged or comes from another version of o80; remove it "
-                        "with `o80 clean` or start its backend again");
-  };
-  TableHead head;
-  Schema schema;
-  if (bytes.size() < sizeof head + sizeof schema.head) throw foreign("too short");
-  std::memcpy(&head, bytes.data(), sizeof head);
-  if (head.magic != kMagic) throw foreign("it has no schema");
-  std::memcpy(&schema.head, bytes.data() + sizeof head, sizeof schema.head);
-  std::size_t at = sizeof head + sizeof schema.head;
-  each_table(schema, [&]<class Row>(int i, std::vector<Row>& rows) {
-    if (head.sizes[i] != sizeof(Row)) throw foreign("entries of another size");
-    if (head.counts[i] > kMaxRows) throw foreign("too many entries");
-    const std::size_t count = head.counts[i] * sizeof(Row);
-    if (count > bytes.size() - at) throw foreign("too short");
-    rows.resize(head.counts[i]);
-    if (count > 0) std::memcpy(rows.data(), bytes.data() + at, count);
-    at += count;
-  });
-  schema.hooks.resize(schema.types.size());
-  schema.keys.resize(schema.types.size());
   try {
-    schema.shown = shown_from(bytes.subspan(at));
-    schema.integrals = integrals_from(bytes.subspan(at + size_of(schema.shown)));
+    Schema schema = describing::schema_in(bytes);
     check(schema);
+    return schema;
   } catch (const InvalidArgument& error) {
-    throw foreign(error.what());
+    throw SegmentError("the segment's schema cannot be read (" + std::string(error.what()) +
+                       "): the file is damaged or comes from another version of o80; remove it "
+                       "with `o80 clean` or start its backend again");
   }
-  return schema;
 }
 
-std::uint64_t hash(const Schema& schema) {
-  // FNV-1a, 64 bits
-  std::uint64_t value = 0xCBF29CE484222325;
-  for (const std::byte byte : to_bytes(schema)) {
-    value = (value ^ static_cast<std::uint64_t>(byte)) * 0x100000001B3;
-  }
-  return value;
-}
+std::uint64_t hash(const Schema& schema) { return describing::hash_of(to_bytes(schema)); }
 
 }  // namespace o80

@@ -4,14 +4,10 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <vector>
 
-#include "o80/describe/schema.hpp"
+#include "o80/describe/schema_bytes.hpp"
 
 namespace o80 {
-
-/// The bytes of a schema, as stored in a segment.
-std::vector<std::byte> to_bytes(const Schema& schema);
 
 /// The schema of a segment; throws SegmentError for any invalid bytes.
 Schema schema_from_bytes(std::span<const std::byte> bytes);
@@ -19,6 +15,9 @@ Schema schema_from_bytes(std::span<const std::byte> bytes);
 /// Throws InvalidArgument if a schema is inconsistent (for example two actuators of one name, a
 /// field outside its struct, a minimum above its maximum).
 void check(const Schema& schema);
+
+/// Throws InvalidArgument if a simulation cannot take this schema as its Face.
+void check_face(const Schema& face);
 
 /// Hash of layout, names, limits and requests.
 std::uint64_t hash(const Schema& schema);

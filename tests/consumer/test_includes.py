@@ -16,7 +16,8 @@ ROBOT = Path(__file__).parent / "headers_only.cpp"
 NEEDED = """
 base/error base/nearest_name base/time base/version
 describe/defaults describe/describe describe/described describe/face describe/for_each
-describe/hooks describe/options describe/rows describe/schema describe/shown_model
+describe/hooks describe/options describe/rows describe/schema describe/schema_bytes
+describe/shown_model
 robot robot/driver robot/driver_checks robot/make_table robot/plant_requests robot/table
 runtime/request_server runtime/robot_types
 """

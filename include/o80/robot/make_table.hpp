@@ -54,35 +54,6 @@ void describe_driver(const D& driver, const char* name, std::int64_t period, Sch
   schema.head.block = round_up(schema.head.block, 8);
 }
 
-/// The rows of a schema, valid as long as it does not change.
-inline SchemaRows rows_of(const Schema& schema) {
-  const auto count = [](const auto& rows) { return static_cast<std::uint32_t>(rows.size()); };
-  return {&schema.head,
-          schema.types.data(),
-          schema.hooks.data(),
-          schema.fields.data(),
-          schema.labels.data(),
-          schema.groups.data(),
-          schema.actuators.data(),
-          schema.limits.data(),
-          schema.integrals.data(),
-          schema.requests.data(),
-          schema.defaults.data(),
-          schema.shown.values.data(),
-          schema.shown.mjcf.c_str(),
-          schema.shown.file.c_str(),
-          count(schema.types),
-          count(schema.fields),
-          count(schema.labels),
-          count(schema.groups),
-          count(schema.actuators),
-          count(schema.limits),
-          count(schema.integrals),
-          count(schema.requests),
-          count(schema.defaults),
-          count(schema.shown.values)};
-}
-
 template <Driver D>
 typename D::Config config_of(const OptionValue* values, std::uint32_t count) {
   typename D::Config config;
@@ -148,13 +119,13 @@ const RobotTable* robot_table(const char* name, const char* versions = "") {
       return driving::guarded<void*>(
           fault, nullptr, [&]() -> void* { return new D(driving::config_of<D>(values, count)); });
     };
-    t.describe = [](void* robot, std::int64_t period, void* context,
-                    void (*rows)(void*, const SchemaRows*), FaultText* fault) {
+    t.describe = [](void* robot, std::int64_t period, void* context, SchemaTaker* take,
+                    FaultText* fault) {
       return driving::guarded<int>(fault, 1, [&] {
         Schema schema;
         driving::describe_driver(*static_cast<const D*>(robot), robot_name, period, schema);
-        const SchemaRows all = driving::rows_of(schema);
-        rows(context, &all);
+        const std::vector<std::byte> bytes = to_bytes(schema);
+        take(context, bytes.data(), bytes.size(), schema.hooks.data());
         return 0;
       });
     };

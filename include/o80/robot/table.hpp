@@ -13,7 +13,7 @@
 
 namespace o80 {
 
-inline constexpr std::uint32_t kRobotTableVersion = 8;
+inline constexpr std::uint32_t kRobotTableVersion = 9;
 
 /// Reason for the failure of a call.
 struct FaultText {
@@ -34,25 +34,9 @@ struct OptionValue {
   const char* text;
 };
 
-/// All rows of a schema.
-struct SchemaRows {
-  const SchemaHead* head;
-  const TypeRow* types;
-  const TypeHooks* hooks;  // one for each type
-  const FieldRow* fields;
-  const LabelRow* labels;
-  const GroupRow* groups;
-  const ActuatorRow* actuators;
-  const LimitRow* limits;
-  const IntegralRow* integrals;
-  const RequestRow* requests;
-  const std::byte* defaults;
-  const ShownRow* shown;
-  const char* mjcf;       // of the model that viewers draw, with its terminating 0
-  const char* mjcf_file;  // likewise
-  std::uint32_t type_count, field_count, label_count, group_count, actuator_count, limit_count,
-      integral_count, request_count, default_count, shown_count;
-};
+/// Takes the bytes of a schema (o80/describe/schema_bytes.hpp), and the hooks of its types.
+using SchemaTaker = void(void* context, const std::byte* bytes, std::uint64_t size,
+                         const TypeHooks* hooks);
 
 /// The desired states that a driver writes.
 struct DesiredView {
@@ -117,8 +101,8 @@ struct RobotTable {
   int (*accepts)(void* self, const OptionValue* values, std::uint32_t count, FaultText* fault);
   void* (*create)(void* self, const OptionValue* values, std::uint32_t count, FaultText* fault);
   /// `period`: the period that the user requested [ns]; 0: none.
-  int (*describe)(void* robot, std::int64_t period, void* context,
-                  void (*rows)(void* context, const SchemaRows* rows), FaultText* fault);
+  int (*describe)(void* robot, std::int64_t period, void* context, SchemaTaker* take,
+                  FaultText* fault);
   int (*start)(void* robot, FaultText* fault);
   int (*wait)(void* robot, std::int64_t due, FaultText* fault);
   int (*write)(void* robot, const DesiredView* desired, FaultText* fault);

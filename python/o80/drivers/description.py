@@ -16,7 +16,6 @@ from o80.rows.actuators import Limits
 # a dtype, a number type, an IntEnum, or a mapping from field names to any of these
 Described = Any
 Limit = Limits | Sequence[float | None]
-FieldRow = tuple[str, str, list[int], str, dict[str, int] | None, int]
 
 
 class SchemaWriter:
@@ -153,7 +152,7 @@ class SchemaWriter:
         fields = list(self._fields(name, described))
         return self.builder.add_type(name, fields)
 
-    def _fields(self, owner: str, described: Described) -> Iterator[FieldRow]:
+    def _fields(self, owner: str, described: Described) -> Iterator[dict[str, Any]]:
         if isinstance(described, Mapping):
             for name, inner in described.items():
                 yield self._field(owner, name, inner)
@@ -166,24 +165,25 @@ class SchemaWriter:
         for name in dtype.names:
             yield self._field(owner, name, dtype.fields[name][0])
 
-    def _field(self, owner: str, name: str, described: Described) -> FieldRow:
+    def _field(self, owner: str, name: str, described: Described) -> dict[str, Any]:
         unit = self._units.get(f"{owner}.{name}", self._units.get(name, ""))
-        text = f"[{unit}]" if unit else ""
+        field = {"name": name, "unit": unit, "shape": []}
         if _is_enum(described):
             labels = {label: int(value) for label, value in described.__members__.items()}
-            return name, "enum", [], text, labels, 0
+            return {**field, "kind": "enum", "size": 8, "signed": True, "labels": labels}
         if isinstance(described, Mapping):
-            return name, "struct", [], text, None, self._type(name, described)
+            return {**field, "kind": "struct", "index": self._type(name, described)}
         dtype = np.dtype(described)
         element, shape = dtype.subdtype or (dtype, ())
+        field["shape"] = list(shape)
         if element.names is not None:
-            return name, "struct", list(shape), text, None, self._type(name, element)
+            return {**field, "kind": "struct", "index": self._type(name, element)}
         if element.kind not in "biuf" or element.itemsize > 8 or element == np.dtype(np.float16):
             raise InvalidArgument(
                 f"'{name or owner}' must be a number of 1 to 8 bytes, a boolean or an enum, "
                 f"got dtype {element}"
             )
-        return name, element.name, list(shape), text, None, 0
+        return {**field, "kind": element.name}
 
 
 def _text_of(model: Path) -> str:

@@ -1,5 +1,6 @@
 """The face of a robot: groups, states, units, limits, sensor values and requests, as plain data."""
 
+import base64
 import contextlib
 import itertools
 import json
@@ -9,12 +10,10 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
+import o80._core as _core
 from o80.base.errors import InvalidArgument, TimeoutError, exception_text
 from o80.frontend.frontend import Frontend
 from o80.frontend.segments import segments
-from o80.rows.layout import dtype_of_type
 
 OF_SIMULATIONS = ("reset", "snapshot", "restore")
 """Requests that every simulation adds to its own."""
@@ -23,12 +22,8 @@ _LIMITS = {
     **dict.fromkeys(("maximum", "speed", "acceleration", "jerk", "error"), math.inf),
     "rest": 0.0,
 }
-_INTEGERS = [f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64)]
-_KINDS = ["bool", *_INTEGERS, "float32", "float64", "enum", "struct"]
-_ORIGINS = ("robot", "clock", "world", "absent")
-_NO_TYPE = 2**32 - 1
 _MOST_OF_A_REASON = 200  # characters
-_BEGIN = "face\t1\t"
+_BEGIN = "face:"
 
 
 def described(of: Any, load: Callable[[Any], Any]) -> Mapping[str, Any]:
@@ -101,14 +96,15 @@ def compared(schema: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def text_of_face(schema: Mapping[str, Any]) -> str:
-    """The text that include/o80/describe/face.hpp reads."""
+    """The text of a description that include/o80/describe/face.hpp reads."""
     try:
-        return "\n".join(_Writer(schema).lines())
+        builder, period = _built(schema), int(schema.get("period", 0))
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         why = exception_text(error)[:_MOST_OF_A_REASON]
         raise InvalidArgument(f"the description is not complete: {why}") from None
     except RecursionError:
         raise InvalidArgument("the description is nested too deeply") from None
+    return _BEGIN + base64.b64encode(builder.face(period)).decode()
 
 
 def is_text_of_face(text: object) -> bool:
@@ -116,89 +112,45 @@ def is_text_of_face(text: object) -> bool:
     return isinstance(text, str) and text.startswith(_BEGIN)
 
 
-class _Writer:
-    """Writes tables line by line. Offsets that are not given are those of a C++ struct."""
-
-    def __init__(self, schema: Mapping[str, Any]) -> None:
-        self._schema = schema
-        self._lines: list[str] = []
-        self._types = itertools.count()
-
-    def lines(self) -> list[str]:
-        schema, block = self._schema, 0
-        for group in schema["groups"]:
-            index, size, alignment = self._type(group["type"])
-            offset = group.get("offset", _up(block, alignment))
-            block = offset + group["count"] * size
-            self._add("group", group["name"], index, offset, group["count"], int(group["array"]))
-        numbers = itertools.count()
-        for i, actuator in enumerate(schema["actuators"]):
-            self._add("actuator", i, actuator["name"], int(actuator["when_idle"] == "follow"))
-            for limit in actuator["limits"]:
-                self._limit(next(numbers), limit)
-        if "extended" in schema:
-            self._add("extended", self._type(schema["extended"])[0])
-        for request in schema["requests"]:
-            index, *_ = self._type(request["type"])
-            halted, told = int(request["while_halted"]), request.get("help", "")
-            self._add("request", request["name"], index, halted, told)
-        head = schema.get("robot", ""), str(schema.get("period", 0)), str(_up(block, 8))
-        return [_BEGIN + "\t".join(head), *self._lines]
-
-    def _add(self, *fields: Any) -> None:
-        self._lines.append("\t".join(map(str, fields)))
-
-    def _limit(self, index: int, limit: Mapping[str, Any]) -> None:
-        given = {key: value for key, value in limit.items() if value is not None}
-        numbers = [float(given.get(name, none)) for name, none in _LIMITS.items()]
-        self._add("limit", index, *numbers, int("rest" in given), float(given.get("noise", 0)))
-        if integral := given.get("integral"):
-            low, high = integral["minimum"], integral["maximum"]
-            bounds = -math.inf if low is None else low, math.inf if high is None else high
-            self._add("integral", index, integral["number"], *bounds, integral["reaction"])
-
-    def _type(self, described: Mapping[str, Any]) -> tuple[int, int, int]:
-        """Adds a type, after those in it: its index, size and alignment."""
-        if described.get("blends"):
-            raise InvalidArgument(
-                f"the state '{described['name']}' has an interpolation that only its robot knows"
-            )
-        fields, lines = [], []
-        end, alignment = 0, 1
-        for field in described["fields"]:
-            kind, inner = field["kind"], _NO_TYPE
-            if kind == "struct":
-                inner, size, aligned = self._type(field["type"])
-            else:
-                size = aligned = field["size"] if kind == "enum" else np.dtype(kind).itemsize
-            offset = field.get("offset", _up(end, aligned))
-            end, alignment = offset + math.prod(field["shape"]) * size, max(alignment, aligned)
-            fields.append({**field, "offset": offset})
-            place = (_KINDS.index(kind), offset, size, *(*field["shape"], 0, 0)[:2], inner)
-            marks = (int(field.get("signed", False)), int("default" in field))
-            origin = _ORIGINS.index(field.get("origin", "robot"))
-            rest = (int("rest" in field), float(field.get("rest", 0)))
-            texts = (field.get("unit", ""), field.get("help", ""))
-            lines.append(("field", field["name"], *place, *marks, origin, *rest, *texts))
-            lines += [("label", *label) for label in field.get("labels", {}).items()]
-        lines.append(("type", described["name"], described["size"], alignment, len(fields)))
-        lines += [("default", byte) for byte in _defaults({**described, "fields": fields})]
-        for line in lines:
-            self._add(*line)
-        return next(self._types), described["size"], alignment
+def _built(schema: Mapping[str, Any]) -> _core.SchemaBuilder:
+    """The description as the tables that segments hold."""
+    builder = _core.SchemaBuilder(schema.get("robot", ""))
+    for group in schema["groups"]:
+        index = _add_type(builder, group["type"])
+        if "offset" in group:
+            builder.set_block(group["offset"])
+        builder.add_actuators(group["name"], index, group["count"], bool(group["array"]))
+    numbers = itertools.count()
+    for i, actuator in enumerate(schema["actuators"]):
+        builder.name_actuator(i, actuator["name"])
+        if actuator["when_idle"] == "follow":
+            builder.set_follow(i)
+        for limit in actuator["limits"]:
+            _set_limit(builder, next(numbers), limit)
+    if "extended" in schema:
+        builder.set_extended(_add_type(builder, schema["extended"]))
+    for request in schema["requests"]:
+        index = _add_type(builder, request["type"])
+        help_text, halted = request.get("help", ""), bool(request["while_halted"])
+        builder.add_request(request["name"], index, help_text, halted)
+    return builder
 
 
-def _up(value: int, step: int) -> int:
-    return -(-value // step) * step
+def _set_limit(builder: _core.SchemaBuilder, index: int, limit: Mapping[str, Any]) -> None:
+    given = {key: value for key, value in limit.items() if value is not None}
+    numbers = [float(given.get(name, none)) for name, none in _LIMITS.items()]
+    builder.set_limit_row(index, numbers, "rest" in given, given.get("noise", 0))
+    if integral := given.get("integral"):
+        low, high = integral["minimum"], integral["maximum"]
+        bounds = -math.inf if low is None else low, math.inf if high is None else high
+        builder.add_integral(index, integral["number"], [*bounds, integral["reaction"]])
 
 
-def _defaults(described: dict[str, Any]) -> bytes:
-    """The bytes of the default values of a request; empty without any."""
-    given = {field["name"]: field["default"] for field in described["fields"] if "default" in field}
-    if not given:
-        return b""
-    values = np.zeros((), dtype_of_type(described))
-    for name, value in given.items():
-        if value is not None:
-            values[name] = tuple(value.values()) if isinstance(value, Mapping) else value
-    return values.tobytes()
+def _add_type(builder: _core.SchemaBuilder, described: Mapping[str, Any]) -> int:
+    """Adds a type, after those in it; returns its index."""
+    fields = [
+        {**field, "index": _add_type(builder, field["type"])} if "type" in field else {**field}
+        for field in described["fields"]
+    ]
+    size, blends = described["size"], described.get("blends", False)
+    return builder.add_type(described["name"], fields, size, blends)

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "describe/table.hpp"
 #include "memory/os/fork.hpp"
 #include "memory/os/random_bits.hpp"
 #include "o80/base/version.hpp"
@@ -48,6 +49,12 @@ void check_options(const RobotTable& table, const OptionValues& options) {
       0) {
     throw InvalidArgument("robot '" + std::string(table.name) + "': " + fault.text);
   }
+  for (const Option& option : options_of(table)) {
+    for (const auto& [name, text] : options) {
+      if (option.kind != kFaceKind || name != option.name || text.empty()) continue;
+      check_face(describing::face_from(text));
+    }
+  }
 }
 
 OptionValues effective_options(const RobotTable& table, const OptionValues& given) {
@@ -86,25 +93,13 @@ Schema DriverInstance::describe(std::int64_t period) const {
   const ForkGuard guard;
   Schema schema;
   FaultText fault{};
-  const auto copy = [](void* context, const SchemaRows* rows) {
+  const auto take = [](void* context, const std::byte* bytes, std::uint64_t size,
+                       const TypeHooks* hooks) {
     auto& out = *static_cast<Schema*>(context);
-    out.head = *rows->head;
-    out.types.assign(rows->types, rows->types + rows->type_count);
-    out.hooks.assign(rows->hooks, rows->hooks + rows->type_count);
-    out.keys.resize(rows->type_count);
-    out.fields.assign(rows->fields, rows->fields + rows->field_count);
-    out.labels.assign(rows->labels, rows->labels + rows->label_count);
-    out.groups.assign(rows->groups, rows->groups + rows->group_count);
-    out.actuators.assign(rows->actuators, rows->actuators + rows->actuator_count);
-    out.limits.assign(rows->limits, rows->limits + rows->limit_count);
-    out.integrals.assign(rows->integrals, rows->integrals + rows->integral_count);
-    out.requests.assign(rows->requests, rows->requests + rows->request_count);
-    out.defaults.assign(rows->defaults, rows->defaults + rows->default_count);
-    out.shown = {.mjcf = rows->mjcf,
-                 .file = rows->mjcf_file,
-                 .values = {rows->shown, rows->shown + rows->shown_count}};
+    out = describing::schema_in({bytes, size});
+    out.hooks.assign(hooks, hooks + out.types.size());
   };
-  const int failed = table_.describe(driver_, period, &schema, copy, &fault);
+  const int failed = table_.describe(driver_, period, &schema, take, &fault);
   if (guard.forked()) end_forked_child(table_.name, "describe");
   if (failed != 0) {
     throw DriverError("robot '" + std::string(table_.name) + "' cannot be started: " + fault.text);
@@ -126,25 +121,8 @@ bool DriverInstance::read(ReadingView& reading) noexcept {
   return table_.read(driver_, &reading, &fault_) == 0;
 }
 
-Served DriverInstance::served(RequestAnswer answer, const FaultText& text) noexcept {
+Served DriverInstance::served(RequestAnswer answer, std::string_view text) noexcept {
   switch (answer) {
-    case RequestAnswer::done:
-      return Served::done();
-    case RequestAnswer::rejected:
-      return Served::rejected(text.text);
-    case RequestAnswer::start_afresh:
-      return Served::start_afresh();
-    case RequestAnswer::running:
-      return Served::running(text.text);
-    default:
-      std::copy_n(text.text, sizeof text.text, fault_.text);
-      return Served::failed(text.text);
-  }
-}
-
-Served DriverInstance::served(const RequestReport& report) noexcept {
-  const std::string_view text(report.text, strnlen(report.text, sizeof report.text));
-  switch (report.answer) {
     case RequestAnswer::done:
       return Served::done();
     case RequestAnswer::rejected:
@@ -158,9 +136,20 @@ Served DriverInstance::served(const RequestReport& report) noexcept {
   }
 }
 
+Served DriverInstance::served(const RequestReport& report) noexcept {
+  return served(report.answer, {report.text, strnlen(report.text, sizeof report.text)});
+}
+
+/// The same for an answer that is no report: a failure is the driver's fault.
+Served DriverInstance::answered(RequestAnswer answer, const FaultText& text) noexcept {
+  const Served how = served(answer, {text.text, strnlen(text.text, sizeof text.text)});
+  if (how.kind == Served::Kind::failed) fault_ = text;
+  return how;
+}
+
 Served DriverInstance::request(std::uint32_t index, const std::byte* payload) noexcept {
   FaultText text{};
-  return served(table_.request(driver_, index, payload, &text), text);
+  return answered(table_.request(driver_, index, payload, &text), text);
 }
 
 bool DriverInstance::halt() noexcept {
@@ -170,7 +159,7 @@ bool DriverInstance::halt() noexcept {
 Served DriverInstance::resume() noexcept {
   if (table_.resume == nullptr) return Served::done();
   FaultText text{};
-  return served(table_.resume(driver_, &text), text);
+  return answered(table_.resume(driver_, &text), text);
 }
 
 std::span<const std::byte> DriverInstance::snapshot_bytes(std::uint32_t slot) noexcept {

@@ -2,6 +2,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -63,7 +64,8 @@ class DriverInstance {
   const char* fault() const noexcept { return fault_.text; }
 
  private:
-  Served served(RequestAnswer answer, const FaultText& text) noexcept;
+  static Served served(RequestAnswer answer, std::string_view text) noexcept;
+  Served answered(RequestAnswer answer, const FaultText& text) noexcept;
 
   const RobotTable& table_;
   OptionValues options_;
