@@ -195,45 +195,32 @@ class Backend final : public o80::RequestServer {
   }
 
   o80::Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept override {
+    return answered([&] { return serve_with(request, nb::bytes(payload.data(), payload.size())); });
+  }
+
+  bool halt() noexcept override {
+    const o80::Served how = answered([&] { return serve_with.attr("halt")(); });
+    return how.kind == o80::Served::Kind::done;
+  }
+
+  o80::Served resume() noexcept override {
+    return answered([&] { return serve_with.attr("resume")(); });
+  }
+
+  /// What a function of Python answers, as `serve_with`; its exception is raised by `step`.
+  template <class Call>
+  o80::Served answered(Call&& call) noexcept {
     const WithGil locked;
     try {
-      const nb::object answer = call_python(
-          [&] { return serve_with(request, nb::bytes(payload.data(), payload.size())); });
+      const nb::object answer = call_python(call);
       if (answer.is_none()) return o80::Served::done();
-      if (nb::isinstance<nb::str>(answer)) {
-        return o80::Served::rejected(shown_text(answer));
-      }
-      if (nb::isinstance<nb::tuple>(answer)) {
-        return o80::Served::running(shown_text(answer[0]));
-      }
+      if (nb::isinstance<nb::str>(answer)) return o80::Served::rejected(shown_text(answer));
+      if (nb::isinstance<nb::tuple>(answer)) return o80::Served::running(shown_text(answer[0]));
       return o80::Served::start_afresh();
     } catch (nb::python_error& error) {
       raised_ = std::current_exception();
       const std::string type = shown_text(error.type().attr("__name__"));
       return o80::Served::failed(type + ": " + shown_text(error.value()));
-    } catch (std::exception& error) {
-      raised_ = std::current_exception();
-      return o80::Served::failed(error.what());
-    }
-  }
-
-  bool halt() noexcept override {
-    const WithGil locked;
-    try {
-      call_python([&] { return serve_with.attr("halt")(); });
-      return true;
-    } catch (std::exception&) {
-      raised_ = std::current_exception();
-      return false;
-    }
-  }
-
-  o80::Served resume() noexcept override {
-    const WithGil locked;
-    try {
-      const nb::object answer = call_python([&] { return serve_with.attr("resume")(); });
-      if (answer.is_none()) return o80::Served::done();
-      return o80::Served::rejected(shown_text(answer));
     } catch (std::exception& error) {
       raised_ = std::current_exception();
       return o80::Served::failed(error.what());

@@ -226,10 +226,7 @@ from the history, so ask while that holds the row.)")
           [](const Batch& self, nb::handle timeout, nb::handle check) {
             const o80::Timeout patience = timeout_of(timeout);
             const o80::WaitOptions options{.check = truth_of(check, "check")};
-            carrying(self, [&] {
-              const Waiting waiting;
-              self.wait(patience, Waiting::keep_waiting, options);
-            });
+            carrying(self, [&] { self.wait(patience, Waiting::keep_waiting, options); });
           },
           "timeout"_a = nb::none(), nb::kw_only(), "check"_a.none() = true,
           nb::sig("def wait(self, timeout: float | None = None, *, check: bool = True) -> None"),
@@ -271,13 +268,9 @@ the last row that it published.)")
           "wait",
           [](const PendingBurst& self, nb::handle timeout) {
             const o80::Timeout patience = timeout_of(timeout);
-            return carrying(self.burst.batch(), [&] {
-              o80::UntypedObservation row = [&] {
-                const Waiting waiting;
-                return self.burst.wait(patience, Waiting::keep_waiting);
-              }();
-              return Observation(self.decoder, std::move(row));
-            });
+            return Observation(self.decoder, carrying(self.burst.batch(), [&] {
+                                 return self.burst.wait(patience, Waiting::keep_waiting);
+                               }));
           },
           "timeout"_a = nb::none(),
           R"(Waits for its last iteration and returns that observation.

@@ -9,6 +9,7 @@
 #include "o80/runtime/batch.hpp"
 #include "o80/runtime/move.hpp"
 #include "observation.hpp"
+#include "waiting.hpp"
 
 /// A requested burst, and the decoder of its row.
 struct PendingBurst {
@@ -16,11 +17,12 @@ struct PendingBurst {
   std::shared_ptr<const Decoder> decoder;
 };
 
-/// Calls `wait`; an o80.TimeoutError gets the batch as its member (a NotReached has it already).
+/// Calls `wait` without the GIL; an o80.TimeoutError gets the batch as its member (a NotReached has
+/// it already).
 template <class Wait>
 auto carrying(const o80::Batch& batch, Wait&& wait) {
   try {
-    return wait();
+    return without_gil(wait);
   } catch (const o80::NotReached&) {
     throw;
   } catch (const o80::TimeoutError& error) {

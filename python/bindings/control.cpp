@@ -59,10 +59,7 @@ class Control {
     const std::shared_ptr<o80::ControlBlock> block = block_;
     if (!block || nb::cast<Frontend&>(frontend_).untyped().link()->segment.forked()) return;
     try {
-      const o80::Batch released = [&] {
-        const Waiting waiting;
-        return block->leave();
-      }();
+      const o80::Batch released = without_gil([&] { return block->leave(); });
       if (!released.empty()) wait_for(released);
     } catch (const o80::BackendGone&) {
     } catch (const o80::Closed&) {
@@ -84,10 +81,7 @@ class Control {
 
  private:
   void wait_for(const o80::Batch& batch) const {
-    carrying(batch, [&] {
-      const Waiting waiting;
-      batch.wait(timeout_, Waiting::keep_waiting, {.check = false});
-    });
+    carrying(batch, [&] { batch.wait(timeout_, Waiting::keep_waiting, {.check = false}); });
   }
 
   /// May be called while an exception of Python is under way.

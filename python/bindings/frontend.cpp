@@ -32,12 +32,6 @@ Py_ssize_t length_of(nb::handle targets) {
   return length;
 }
 
-/// Appends `size` bytes; returns the first of them.
-std::byte* grown(std::vector<std::byte>& bytes, std::size_t size) {
-  bytes.resize(bytes.size() + size);
-  return bytes.data() + bytes.size() - size;
-}
-
 }  // namespace
 
 Frontend::Frontend(const Attachment& attachment, std::shared_ptr<Decoder> decoder)
@@ -81,6 +75,17 @@ std::uint32_t Frontend::actuator(nb::handle named) const {
   return frontend->command_check().actuator(number);
 }
 
+/// Writes the target of an actuator whose state is a number.
+void Frontend::write(std::uint32_t index, const o80::FieldRow& number, nb::handle target,
+                     std::byte* to) const {
+  if (number.kind == o80::Kind::float64 && PyFloat_Check(target.ptr())) {
+    const double value = PyFloat_AS_DOUBLE(target.ptr());
+    std::memcpy(to, &value, sizeof value);
+  } else {
+    write_number(decoder_->description->schema, number, target, to, name_of(index));
+  }
+}
+
 std::uint32_t Frontend::add_command(nb::handle named, nb::handle target,
                                     const o80::CommandOptions& options) const {
   const std::shared_ptr<UntypedFrontend> frontend = untyped_;
@@ -88,12 +93,7 @@ std::uint32_t Frontend::add_command(nb::handle named, nb::handle target,
   const o80::Schema& schema = decoder_->description->schema;
   if (const o80::FieldRow* number = plain_[index]) {
     alignas(8) std::array<std::byte, 8> state;
-    if (number->kind == o80::Kind::float64 && PyFloat_Check(target.ptr())) {
-      const double value = PyFloat_AS_DOUBLE(target.ptr());
-      std::memcpy(state.data(), &value, sizeof value);
-    } else {
-      write_number(schema, *number, target, state.data(), name_of(index));
-    }
+    write(index, *number, target, state.data());
     return frontend->add_command(index, {state.data(), number->size}, options);
   }
   const StateBytes state(schema, schema.actuators[index].type, target, name_of(index));
@@ -161,13 +161,8 @@ Targets Frontend::of_each(nb::handle named, nb::handle targets) const {
   for (const nb::handle target : targets) {
     const std::uint32_t index = chosen.at(i++);
     if (const o80::FieldRow* number = plain_[index]) {
-      std::byte* const at = grown(states, number->size);
-      if (number->kind == o80::Kind::float64 && PyFloat_Check(target.ptr())) {
-        const double value = PyFloat_AS_DOUBLE(target.ptr());
-        std::memcpy(at, &value, sizeof value);
-      } else {
-        write_number(schema, *number, target, at, name_of(index));
-      }
+      states.resize(states.size() + number->size);
+      write(index, *number, target, states.data() + states.size() - number->size);
       masks.push_back(1);
       continue;
     }
@@ -209,12 +204,13 @@ std::string Frontend::name_of(std::uint32_t index) const {
 
 namespace {
 
-Attachment attach(const std::string& segment, nb::handle timeout, bool read_only, bool dead) {
-  o80::FrontendOptions options;
-  options.timeout = timeout_of(timeout);
-  options.access = read_only ? o80::Access::read_only : o80::Access::read_write;
-  options.dead = dead;
-  options.keep_waiting = Waiting::keep_waiting;
+Attachment attach(const std::string& segment, nb::handle timeout, bool read_only, bool dead,
+                  const o80::KeepWaiting& keep_waiting = Waiting::keep_waiting) {
+  const o80::FrontendOptions options{
+      .timeout = timeout_of(timeout),
+      .access = read_only ? o80::Access::read_only : o80::Access::read_write,
+      .dead = dead,
+      .keep_waiting = keep_waiting};
   const Waiting waiting;
   return {std::make_shared<UntypedFrontend>(segment, options), nullptr};
 }
@@ -223,13 +219,9 @@ Attachment attach(const std::string& segment, nb::handle timeout, bool read_only
 Attachment attach_again(const Frontend& self, nb::handle timeout, bool read_only) {
   const std::shared_ptr<UntypedFrontend> former = self.shared();
   former->link()->check_usable();
-  o80::FrontendOptions options;
-  options.timeout = timeout_of(timeout);
-  options.access = read_only ? o80::Access::read_only : o80::Access::read_write;
   const o80::KeepWaiting keep_waiting = Waiting::keep_waiting;
-  options.keep_waiting = former->link()->guarded(keep_waiting);
-  const Waiting waiting;
-  return {std::make_shared<UntypedFrontend>(former->segment(), options), nullptr};
+  return attach(former->segment(), timeout, read_only, false,
+                former->link()->guarded(keep_waiting));
 }
 
 std::shared_ptr<o80::Description> description_of(const Attachment& attachment) {
@@ -243,7 +235,12 @@ void bind_frontend(nb::module_& m) {
       .def_prop_ro("description", &description_of)
       .def_prop_ro("robot",
                    [](const Attachment& self) { return self.frontend->schema().head.robot.str(); });
-  m.def("attach", &attach, "segment"_a, "timeout"_a.none(), "read_only"_a, "dead"_a);
+  m.def(
+      "attach",
+      [](const std::string& segment, nb::handle timeout, bool read_only, bool dead) {
+        return attach(segment, timeout, read_only, dead);
+      },
+      "segment"_a, "timeout"_a.none(), "read_only"_a, "dead"_a);
   m.def("difference", [](const o80::Description& expected, const o80::Description& found) {
     return o80::difference(expected.schema, found.schema);
   });

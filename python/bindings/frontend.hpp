@@ -67,6 +67,8 @@ class Frontend {
 
  private:
   std::string name_of(std::uint32_t index) const;
+  void write(std::uint32_t index, const o80::FieldRow& number, nanobind::handle target,
+             std::byte* to) const;
   std::vector<std::uint32_t> actuators(nanobind::handle named) const;
   /// From a sequence of actuators, or None, and a sequence of targets.
   Targets of_each(nanobind::handle named, nanobind::handle targets) const;
@@ -82,6 +84,9 @@ class Frontend {
 /// Number, cause, iteration, who, text of a halt.
 using HaltFields = std::tuple<std::uint64_t, std::string, std::int64_t, std::string, std::string>;
 std::optional<HaltFields> halt_fields(const std::optional<o80::Halt>& halt);
+/// Name, iteration, who, progress of a running request.
+using RunningFields = std::tuple<std::string, std::int64_t, std::string, std::string>;
+std::vector<RunningFields> running_fields(const o80::UntypedFrontend& frontend);
 
 // what each file adds to the class
 void bind_moving(nanobind::module_& m, nanobind::class_<Frontend>& frontend);

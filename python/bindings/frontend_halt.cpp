@@ -1,6 +1,7 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
+#include <nanobind/stl/vector.h>
 
 #include <string>
 #include <tuple>
@@ -63,15 +64,6 @@ bool resume(const Frontend& self, std::uint64_t number, nb::handle timeout, bool
   return frontend->resume(number, patience, Waiting::keep_waiting, accept_reading);
 }
 
-/// Name, iteration, who, progress.
-nb::list running_requests(const Frontend& self) {
-  nb::list all;
-  for (const o80::RequestUnderWay& each : self.untyped().running_requests()) {
-    all.append(nb::make_tuple(each.name, each.since, each.who, each.progress));
-  }
-  return all;
-}
-
 std::uint64_t halt_segment(nb::handle segment, nb::handle reason, nb::handle timeout) {
   const std::string name = string_of(segment, "the name of a segment");
   o80::Timeout patience = std::chrono::nanoseconds(0);
@@ -102,6 +94,14 @@ std::optional<HaltFields> halt_fields(const std::optional<o80::Halt>& halt) {
                     o80::printable(halt->who_text()), o80::printable(halt->reason())};
 }
 
+std::vector<RunningFields> running_fields(const o80::UntypedFrontend& frontend) {
+  std::vector<RunningFields> all;
+  for (const o80::RequestUnderWay& each : frontend.running_requests()) {
+    all.emplace_back(each.name, each.since, each.who, each.progress);
+  }
+  return all;
+}
+
 void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend) {
   m.def("halt", &halt_segment, "segment"_a.none(), "reason"_a.none(), "timeout"_a.none(),
         nb::sig("def halt(segment: object, reason: object, timeout: object) -> int"));
@@ -114,7 +114,7 @@ void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend) {
   frontend
       .def_prop_ro("_halted",
                    [](const Frontend& self) { return halt_fields(self.untyped().halted()); })
-      .def_prop_ro("_running_requests", &running_requests,
-                   nb::sig("def _running_requests(self) -> list[tuple[str, int, str, str]]"))
+      .def_prop_ro("_running_requests",
+                   [](const Frontend& self) { return running_fields(self.untyped()); })
       .def("_resume", &resume, "number"_a, "timeout"_a.none(), "accept_reading"_a);
 }

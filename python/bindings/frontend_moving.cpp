@@ -89,13 +89,9 @@ Observation wait_for_move(const Frontend& self, const Move& move, nb::handle tim
   const o80::Timeout patience = timeout_of(timeout);
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
-  return carrying(move.batch(), [&] {
-    o80::UntypedObservation row = [&] {
-      const Waiting waiting;
-      return frontend->wait_for_move(move, patience, Waiting::keep_waiting);
-    }();
-    return Observation(decoder, std::move(row));
-  });
+  return Observation(decoder, carrying(move.batch(), [&] {
+                       return frontend->wait_for_move(move, patience, Waiting::keep_waiting);
+                     }));
 }
 
 }  // namespace

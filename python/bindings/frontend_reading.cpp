@@ -89,10 +89,8 @@ std::vector<std::pair<Frontend*, Observation>> wait_for_first(
     alive.push_back(frontend->shared());
     wishes.push_back({.frontend = alive.back().get(), .row = row});
   }
-  const std::vector<std::size_t> there = [&] {
-    const Waiting waiting;
-    return o80::wait_for_first(wishes, patience, Waiting::keep_waiting);
-  }();
+  const std::vector<std::size_t> there =
+      without_gil([&] { return o80::wait_for_first(wishes, patience, Waiting::keep_waiting); });
   std::vector<std::pair<Frontend*, Observation>> rows;
   for (const std::size_t i : there) {
     Frontend& frontend = *wanted[i].first;

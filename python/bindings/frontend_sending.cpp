@@ -83,13 +83,11 @@ nb::tuple preview(const Frontend& self, nb::handle actuators, nb::handle target,
   const Targets to = self.targets_of(actuators, target);
   std::optional<o80::UntypedObservation> row;
   if (!initial.is_none()) row = row_with(self, actuators, initial);
-  const o80::Preview preview = [&] {
-    const Waiting waiting;
+  const o80::Preview preview = without_gil([&] {
     return row ? frontend->preview_from(*row, to.actuators, to.states, options, to.masks)
                : frontend->preview(to.actuators, to.states, options, to.masks);
-  }();
-  const std::vector<std::byte>& rows = preview.rows.bytes;
-  return nb::make_tuple(preview.late, preview.text, nb::bytes(rows.data(), rows.size()));
+  });
+  return nb::make_tuple(preview.late, preview.text, bytes_of(preview.rows.bytes));
 }
 
 /// Rows of targets for several actuators: all rows of the first, then all rows of the second, and
@@ -111,11 +109,7 @@ std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint
                                const o80::CommandOptions& options, nb::handle clip) {
   const auto frontend = self.shared();
   std::vector<std::int64_t> ends;
-  if (!times.is_none()) {
-    const Bytes bytes(times);
-    ends.resize(bytes.span().size() / sizeof(std::int64_t));
-    std::memcpy(ends.data(), bytes.span().data(), ends.size() * sizeof(std::int64_t));
-  }
+  if (!times.is_none()) ends = numbers_in<std::int64_t>(times);
   const Targets targets = rows_of(self, actuators, rows, states, masks, clip);
   const std::uint32_t place =
       frontend->add_trajectories(actuators, rows, targets.states, options, ends, masks);
@@ -144,13 +138,10 @@ Observation wait_for_end(const Frontend& self, const Batch& batch, nb::handle ti
   const o80::WaitOptions options{.check = truth_of(check, "check")};
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
-  return carrying(batch, [&] {
-    o80::UntypedObservation row = [&] {
-      const Waiting waiting;
-      return frontend->wait_for_end(batch, patience, Waiting::keep_waiting, options);
-    }();
-    return Observation(decoder, std::move(row));
-  });
+  return Observation(decoder, carrying(batch, [&] {
+                       return frontend->wait_for_end(batch, patience, Waiting::keep_waiting,
+                                                     options);
+                     }));
 }
 
 Observation pulse_and_wait(const Frontend& self, nb::handle timeout, nb::handle at, nb::handle late,
@@ -183,11 +174,9 @@ Observation burst(const Frontend& self, nb::handle iterations, nb::handle timeou
   const o80::PulseOptions options = pulse_options(at, late, seen);
   const auto frontend = self.shared();
   const auto decoder = self.decoder();
-  o80::UntypedObservation row = [&] {
-    const Waiting waiting;
-    return frontend->burst(count, patience, Waiting::keep_waiting, options);
-  }();
-  return Observation(decoder, std::move(row));
+  return Observation(decoder, without_gil([&] {
+                       return frontend->burst(count, patience, Waiting::keep_waiting, options);
+                     }));
 }
 
 /// Starts the bursts of a group, each with the decoder of its row.
@@ -200,10 +189,8 @@ std::vector<PendingBurst> start_bursts(const std::vector<std::pair<Frontend*, nb
     group.emplace_back(alive.back().get(), burst_length(iterations));
   }
   const std::optional<o80::Seen> decided = seen_of(seen);
-  const std::vector<o80::Burst> bursts = [&] {
-    const Waiting waiting;
-    return o80::start_bursts(group, decided);
-  }();
+  const std::vector<o80::Burst> bursts =
+      without_gil([&] { return o80::start_bursts(group, decided); });
   std::vector<PendingBurst> pending;
   for (std::size_t i = 0; i < bursts.size(); ++i) {
     pending.push_back({bursts[i], members[i].first->decoder()});
@@ -216,10 +203,8 @@ std::vector<Observation> wait_for_bursts(const std::vector<PendingBurst>& pendin
   const o80::Timeout patience = timeout_of(timeout);
   std::vector<o80::Burst> bursts;
   for (const PendingBurst& one : pending) bursts.push_back(one.burst);
-  std::vector<o80::UntypedObservation> rows = [&] {
-    const Waiting waiting;
-    return o80::wait_for(bursts, patience, Waiting::keep_waiting);
-  }();
+  std::vector<o80::UntypedObservation> rows =
+      without_gil([&] { return o80::wait_for(bursts, patience, Waiting::keep_waiting); });
   std::vector<Observation> observations;
   for (std::size_t i = 0; i < rows.size(); ++i) {
     observations.emplace_back(pending[i].decoder, std::move(rows[i]));
@@ -243,9 +228,7 @@ Batch send_chunk(const Frontend& self, const std::vector<std::uint32_t>& actuato
                  std::uint64_t plan, std::uint32_t ease, std::uint32_t first, bool fixed,
                  bool reject_late, bool final, nb::handle profile, nb::handle seen,
                  std::size_t clipped) {
-  const Bytes iterations(due);
-  std::vector<std::uint32_t> ends(iterations.span().size() / sizeof(std::uint32_t));
-  if (!ends.empty()) std::memcpy(ends.data(), iterations.span().data(), iterations.span().size());
+  const std::vector<std::uint32_t> ends = numbers_in<std::uint32_t>(due);
   const o80::ChunkOptions options{.anchor = anchor,
                                   .plan = plan,
                                   .ease = ease,
@@ -296,10 +279,7 @@ std::array<nb::bytes, 3> plan_of_rows(const std::array<double, 3>& start,
       plan[2].push_back(now.acceleration);
     }
   }
-  const auto bytes = [](const std::vector<double>& values) {
-    return nb::bytes(values.data(), values.size() * sizeof(double));
-  };
-  return {bytes(plan[0]), bytes(plan[1]), bytes(plan[2])};
+  return {bytes_of(plan[0]), bytes_of(plan[1]), bytes_of(plan[2])};
 }
 
 /// Due iterations, as first_row() takes them.
@@ -356,10 +336,7 @@ Batch send_request(const Frontend& self, nb::handle name, nb::handle fields, nb:
 void wait_until_ended(const Frontend& self, const Batch& batch, nb::handle timeout) {
   const o80::Timeout patience = timeout_of(timeout);
   const auto frontend = self.shared();
-  carrying(batch, [&] {
-    const Waiting waiting;
-    frontend->wait_until_ended(batch, patience, Waiting::keep_waiting);
-  });
+  carrying(batch, [&] { frontend->wait_until_ended(batch, patience, Waiting::keep_waiting); });
 }
 
 std::uint32_t add_request(const Frontend& self, nb::handle name, const nb::kwargs& fields) {
@@ -433,7 +410,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
           [](const Frontend& self, const std::vector<std::uint32_t>& actuators, std::uint32_t rows,
              nb::handle states, const std::vector<std::uint64_t>& masks) {
             const Targets inside = rows_of(self, actuators, rows, states, masks, nb::bool_(true));
-            return std::pair(nb::bytes(inside.states.data(), inside.states.size()), inside.clipped);
+            return std::pair(bytes_of(inside.states), inside.clipped);
           },
           "actuators"_a, "rows"_a, "states"_a, "masks"_a)
       .def("_send_chunk", &send_chunk, "actuators"_a, "due"_a, "states"_a, "masks"_a, "anchor"_a,

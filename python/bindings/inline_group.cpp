@@ -145,7 +145,7 @@ class Group {
       const StateBytes payload(schema, row.type, fields, what, Missing::by_default);
       all.insert(all.end(), payload.bytes.begin(), payload.bytes.end());
     }
-    return nb::bytes(all.data(), all.size());
+    return bytes_of(all);
   }
   std::uint32_t request_index(const std::string& name) const { return group_->request_index(name); }
   /// `payloads`: one for each of the copies; `rows`: none, or one for each copy of the group.

@@ -14,6 +14,7 @@
 
 #include "base/printable.hpp"
 #include "bindings.hpp"
+#include "buffer.hpp"
 #include "enums.hpp"
 #include "frontend.hpp"
 #include "runtime/frontend/raw_journal.hpp"
@@ -25,33 +26,11 @@ using namespace nb::literals;
 
 namespace {
 
-std::string word_of(o80::JournalRecord::Kind kind) {
-  using enum o80::JournalRecord::Kind;
-  switch (kind) {
-    case command:
-      return "command";
-    case purge:
-      return "purge";
-    case request:
-      return "request";
-    case take_control:
-      return "take_control";
-    case release_control:
-      return "release_control";
-    case resume:
-      return "resume";
-    case mark:
-      return "mark";
-    case close_plan:
-      return "close_plan";
-    case unknown:
-      return "unknown";
-  }
-  return "command";
-}
-
-nb::bytes bytes_of(const std::vector<std::byte>& bytes) {
-  return nb::bytes(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+const char* word_of(o80::JournalRecord::Kind kind) {
+  constexpr const char* kWords[] = {"command",      "purge",           "request",
+                                    "take_control", "release_control", "resume",
+                                    "mark",         "close_plan",      "unknown"};
+  return kWords[static_cast<std::size_t>(kind)];
 }
 
 /// A getter of a member that is a word: a string.
@@ -109,7 +88,7 @@ nb::tuple read_raw(o80::RawJournal& journal, std::size_t most) {
 std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal, const nb::bytes& bytes,
                                        std::int64_t codec) {
   std::vector<o80::JournalEntry> entries;
-  journal.decode({reinterpret_cast<const std::byte*>(bytes.c_str()), bytes.size()}, entries, codec);
+  journal.decode(span_of(bytes), entries, codec);
   return entries;
 }
 

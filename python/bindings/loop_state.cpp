@@ -22,9 +22,6 @@ using namespace nb::literals;
 
 namespace {
 
-/// Name, iteration, who, progress.
-using RunningFields = std::tuple<std::string, std::int64_t, std::string, std::string>;
-
 /// The data of a backend for `o80 list`, which does not need NumPy to decode a row.
 struct BackendState {
   std::string robot;
@@ -56,12 +53,8 @@ BackendState backend_state(const std::string& segment) {
                                                 .dead = true,
                                                 .starting = true,
                                                 .keep_waiting = Waiting::keep_waiting});
-  std::vector<RunningFields> running;
-  for (const o80::RequestUnderWay& each : frontend.running_requests()) {
-    running.emplace_back(each.name, each.since, each.who, each.progress);
-  }
   return {frontend.schema().head.robot.str(), o80::loop_state(frontend),
-          halt_fields(frontend.halted()), running, decision_latencies(frontend)};
+          halt_fields(frontend.halted()), running_fields(frontend), decision_latencies(frontend)};
 }
 
 std::optional<double> seconds(std::optional<std::int64_t> nanoseconds) {

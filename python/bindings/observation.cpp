@@ -7,6 +7,7 @@
 #include <span>
 
 #include "bindings.hpp"
+#include "buffer.hpp"
 #include "describe/table.hpp"
 #include "interpreter.hpp"
 #include "o80/base/error.hpp"
@@ -43,15 +44,12 @@ PyType_Slot buffer_slots[] = {{Py_bf_getbuffer, reinterpret_cast<void*>(&fill_bu
 /// A row copied out of an array of rows.
 Observation* from_bytes(std::shared_ptr<Decoder> decoder, nb::handle bytes, std::int64_t missed) {
   auto observation = std::make_unique<Observation>(std::move(decoder));
-  Py_buffer view;
-  if (PyObject_GetBuffer(bytes.ptr(), &view, PyBUF_SIMPLE) != 0) throw nb::python_error();
-  const bool fits = static_cast<std::size_t>(view.len) == observation->row.size();
-  if (fits) std::memcpy(observation->row.bytes(), view.buf, view.len);
-  PyBuffer_Release(&view);
-  if (!fits) {
+  const Bytes row(bytes);
+  if (row.span().size() != observation->row.size()) {
     throw o80::InvalidArgument("a row of this robot has " +
                                std::to_string(observation->row.size()) + " bytes");
   }
+  std::memcpy(observation->row.bytes(), row.span().data(), row.span().size());
   observation->missed = missed;
   return observation.release();
 }
@@ -62,8 +60,7 @@ nb::object decoded(nb::handle self, nb::object Decoder::* how) {
 }
 
 nb::bytes table_of(const o80::Description& description) {
-  const auto bytes = o80::to_bytes(description.schema);
-  return nb::bytes(bytes.data(), bytes.size());
+  return bytes_of(o80::to_bytes(description.schema));
 }
 
 /// Its decoder, bytes and number of missed rows, for pickle.
@@ -77,12 +74,36 @@ nb::tuple reduce(nb::handle self) {
 
 std::shared_ptr<o80::Description> description_from(nb::bytes schema, std::uint64_t epoch) {
   auto description = std::make_shared<o80::Description>();
-  description->schema =
-      o80::schema_from_bytes(std::as_bytes(std::span(schema.c_str(), schema.size())));
+  description->schema = o80::schema_from_bytes(span_of(schema));
   description->layout = o80::row_layout(description->schema);
   description->epoch = epoch;
   return description;
 }
+
+struct Part {
+  const char* name;
+  nb::object Decoder::* how;
+  const char* signature;
+  const char* help;
+};
+constexpr Part kParts[] = {
+    {"desired", &Decoder::desired, "def desired(self) -> States",
+     "The desired states: an array (actuators,), or a record of groups."},
+    {"observed", &Decoder::observed, "def observed(self) -> States",
+     "The observed states: an array (actuators,), or a record of groups."},
+    {"extended", &Decoder::extended, "def extended(self) -> Record",
+     "Further sensor values: a record with a value for each field."},
+    {"active", &Decoder::active, "def active(self) -> numpy.typing.NDArray[numpy.bool_]",
+     "True where a command or braking gave the desired state: bool (actuators,)."},
+    {"clamped", &Decoder::clamped, "def clamped(self) -> numpy.typing.NDArray[numpy.bool_]",
+     "True where the limits changed the desired state: bool (actuators,)."},
+    {"braking", &Decoder::braking, "def braking(self) -> numpy.typing.NDArray[numpy.bool_]",
+     "True where the actuator comes to rest without a command: bool (actuators,)."},
+    {"starved", &Decoder::starved, "def starved(self) -> numpy.typing.NDArray[numpy.bool_]",
+     "True where a plan of chunks has no row left and is not closed: bool (actuators,)."},
+    {"off_plan", &Decoder::off_plan, "def off_plan(self) -> numpy.typing.NDArray[numpy.float32]",
+     "How far the desired states are from what commands ask for, where limits change them: "
+     "(actuators,), the most of the numbers of each, in their units."}};
 
 }  // namespace
 
@@ -160,39 +181,6 @@ The arrays are views of this observation's own copy of the row, which does not c
       .def_ro("missed", &Observation::missed,
               "Number of rows between the row read before and this one that were overwritten; set "
               "by wait_for_next and stream.")
-      .def_prop_ro(
-          "desired", [](nb::handle self) { return decoded(self, &Decoder::desired); },
-          nb::sig("def desired(self) -> States"),
-          "The desired states: an array (actuators,), or a record of groups.")
-      .def_prop_ro(
-          "observed", [](nb::handle self) { return decoded(self, &Decoder::observed); },
-          nb::sig("def observed(self) -> States"),
-          "The observed states: an array (actuators,), or a record of groups.")
-      .def_prop_ro(
-          "extended", [](nb::handle self) { return decoded(self, &Decoder::extended); },
-          nb::sig("def extended(self) -> Record"),
-          "Further sensor values: a record with a value for each field.")
-      .def_prop_ro(
-          "active", [](nb::handle self) { return decoded(self, &Decoder::active); },
-          nb::sig("def active(self) -> numpy.typing.NDArray[numpy.bool_]"),
-          "True where a command or braking gave the desired state: bool (actuators,).")
-      .def_prop_ro(
-          "clamped", [](nb::handle self) { return decoded(self, &Decoder::clamped); },
-          nb::sig("def clamped(self) -> numpy.typing.NDArray[numpy.bool_]"),
-          "True where the limits changed the desired state: bool (actuators,).")
-      .def_prop_ro(
-          "braking", [](nb::handle self) { return decoded(self, &Decoder::braking); },
-          nb::sig("def braking(self) -> numpy.typing.NDArray[numpy.bool_]"),
-          "True where the actuator comes to rest without a command: bool (actuators,).")
-      .def_prop_ro(
-          "starved", [](nb::handle self) { return decoded(self, &Decoder::starved); },
-          nb::sig("def starved(self) -> numpy.typing.NDArray[numpy.bool_]"),
-          "True where a plan of chunks has no row left and is not closed: bool (actuators,).")
-      .def_prop_ro(
-          "off_plan", [](nb::handle self) { return decoded(self, &Decoder::off_plan); },
-          nb::sig("def off_plan(self) -> numpy.typing.NDArray[numpy.float32]"),
-          "How far the desired states are from what commands ask for, where limits change them: "
-          "(actuators,), the most of the numbers of each, in their units.")
       .def(
           "flat",
           [](nb::handle self, nb::handle dtype) {
@@ -206,4 +194,9 @@ The arrays are views of this observation's own copy of the row, which does not c
       .def(
           "__repr__", [](nb::handle self) { return decoded(self, &Decoder::text); },
           nb::sig("def __repr__(self) -> str"));
+  for (const Part& part : kParts) {
+    observation.def_prop_ro(
+        part.name, [how = part.how](nb::handle self) { return decoded(self, how); },
+        nb::sig(part.signature), part.help);
+  }
 }

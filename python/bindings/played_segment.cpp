@@ -58,8 +58,7 @@ PlayedSegment* make_played(const std::string& segment, nb::bytes description, nb
                            std::uint32_t permission) {
   o80::PlayedOptions options;
   options.segment = segment;
-  options.description = {reinterpret_cast<const std::byte*>(description.c_str()),
-                         description.size()};
+  options.description = span_of(description);
   options.provenance = provenance_in(provenance);
   options.bursting = bursting;
   options.clock = simulated ? o80::Clock::simulated : o80::Clock::monotonic;
@@ -71,9 +70,7 @@ PlayedSegment* make_played(const std::string& segment, nb::bytes description, nb
 
 std::size_t publish(PlayedSegment& self, nb::handle rows, nb::handle due) {
   const Bytes bytes(rows);
-  const Bytes due_bytes(due);
-  std::vector<std::int64_t> times(due_bytes.span().size() / sizeof(std::int64_t));
-  if (!times.empty()) std::memcpy(times.data(), due_bytes.span().data(), times.size() * 8);
+  const std::vector<std::int64_t> times = numbers_in<std::int64_t>(due);
   const Waiting waiting;
   return self.publish(bytes.span(), times, Waiting::keep_waiting);
 }
@@ -107,8 +104,7 @@ void bind_played_segment(nb::module_& m) {
       .def(
           "add_journal",
           [](PlayedSegment& self, nb::bytes entries, std::int64_t codec) {
-            return self.add_journal(
-                {reinterpret_cast<const std::byte*>(entries.c_str()), entries.size()}, codec);
+            return self.add_journal(span_of(entries), codec);
           },
           "entries"_a, "codec"_a, "Returns the iteration of the last entry.")
       .def("end", &PlayedSegment::end)

@@ -73,15 +73,13 @@ void bind_replay(nb::module_& m) {
       .def(
           "begin_at_rest",
           [](WithDriver& self, std::int64_t first, const nb::bytes& before, std::uint32_t slot) {
-            const auto* row = reinterpret_cast<const std::byte*>(before.c_str());
-            self.open().begin_at_rest(first, {row, before.size()}, slot);
+            self.open().begin_at_rest(first, span_of(before), slot);
           },
           "first"_a, "before"_a, "slot"_a)
       .def(
           "load_snapshot",
           [](WithDriver& self, std::uint32_t slot, const nb::bytes& bytes) {
-            const auto* state = reinterpret_cast<const std::byte*>(bytes.c_str());
-            self.open().load_snapshot(slot, {state, bytes.size()});
+            self.open().load_snapshot(slot, span_of(bytes));
           },
           "slot"_a, "state"_a);
   WithoutDriver::bind(m, "DriverlessReplay",

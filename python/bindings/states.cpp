@@ -2,9 +2,11 @@
 
 #include <nanobind/stl/string.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <limits>
+#include <span>
 #include <string_view>
 #include <type_traits>
 
@@ -96,28 +98,17 @@ std::string labels_of(const Schema& schema, const FieldRow& field) {
 
 void write_label(const Schema& schema, const FieldRow& field, nb::handle value, std::byte* to,
                  const std::string& what) {
+  const auto labels = std::span(schema.labels).subspan(field.first_label, field.labels);
+  const bool is_text = PyUnicode_Check(value.ptr()) != 0;
+  const std::string text = is_text ? string_of(value, "a label") : "";
+  const nb::object whole = is_text ? nb::object() : whole_number(value);
   std::int64_t number = 0;
-  bool known = false;
-  if (PyUnicode_Check(value.ptr())) {
-    const std::string text = string_of(value, "a label");
-    for (std::uint32_t i = 0; i < field.labels; ++i) {
-      const o80::LabelRow& label = schema.labels[field.first_label + i];
-      if (label.name.view() != text) continue;
-      number = label.value;
-      known = true;
-    }
-  } else {
-    const nb::object whole = whole_number(value);
-    known = whole.is_valid() && nb::try_cast<std::int64_t>(whole, number);
-    if (known) {
-      known = false;
-      for (std::uint32_t i = 0; i < field.labels; ++i) {
-        known = known || schema.labels[field.first_label + i].value == number;
-      }
-    }
-  }
-  if (!known) refuse(what, "one of " + labels_of(schema, field), value);
-  std::memcpy(to, &number, field.size);  // little-endian
+  const bool is_number = whole.is_valid() && nb::try_cast<std::int64_t>(whole, number);
+  const auto found = std::ranges::find_if(labels, [&](const o80::LabelRow& label) {
+    return is_text ? label.name.view() == text : is_number && label.value == number;
+  });
+  if (found == labels.end()) refuse(what, "one of " + labels_of(schema, field), value);
+  std::memcpy(to, &found->value, field.size);  // little-endian
 }
 
 std::string fields_of(const Schema& schema, const o80::TypeRow& row) {

@@ -40,5 +40,12 @@ class Waiting {
   WithoutGil released_;
 };
 
+/// Calls `work` without the GIL.
+template <class Work>
+auto without_gil(Work&& work) {
+  const Waiting waiting;
+  return work();
+}
+
 /// Converts seconds; None is for ever. Throws InvalidArgument.
 o80::Timeout timeout_of(nanobind::handle seconds);
