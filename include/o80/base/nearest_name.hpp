@@ -77,14 +77,15 @@ inline std::string nearest_name(std::string_view given, const std::vector<std::s
   return best.empty() && begun.size() == 1 ? begun.front() : best;
 }
 
-/// The first five names, and how many more there are.
-inline std::string first_names(const std::vector<std::string>& names) {
+/// The first five names or clauses, and how many more there are.
+inline std::string first_names(const std::vector<std::string>& names, const char* between = ", ",
+                               const char* before_rest = " and ") {
   std::string text;
   for (std::size_t i = 0; i < names.size() && i < nearest::kListed; ++i) {
-    text += (i == 0 ? "" : ", ") + names[i];
+    text += (i == 0 ? "" : between) + names[i];
   }
   if (names.size() <= nearest::kListed) return text;
-  return text + " and " + std::to_string(names.size() - nearest::kListed) + " more";
+  return text + before_rest + std::to_string(names.size() - nearest::kListed) + " more";
 }
 
 /// Ends an error such as "there is no actuator 'elbw'": what there is, and what may be meant.

@@ -276,12 +276,12 @@ class UntypedFrontend {
   RecordHead checked_command(std::uint32_t actuator, std::span<const std::byte> state,
                              const CommandOptions& options,
                              std::span<const std::uint64_t> mask) const;
-  std::size_t size_of_state(std::uint32_t actuator) const;
-  void refuse_twice(std::span<const std::uint32_t> actuators) const;
-  void check_masks(std::span<const std::uint32_t> actuators,
-                   std::span<const std::uint64_t> masks) const;
-  std::size_t size_of_rows(std::uint32_t actuator, std::uint32_t rows, std::size_t left,
-                           std::span<const std::uint32_t> actuators) const;
+  void check_actuators(std::span<const std::uint32_t> actuators,
+                       std::span<const std::uint64_t> masks) const;
+  template <class Visit>
+  void each_share(std::span<const std::uint32_t> actuators, std::uint32_t rows,
+                  std::span<const std::byte> states, std::span<const std::uint64_t> masks,
+                  Visit&& visit) const;
   CommandOptions checked_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                     std::span<const std::byte> states,
                                     const CommandOptions& options,

@@ -90,21 +90,16 @@ class Frontend : public UntypedFrontend {
   template <Shareable State>
   std::uint32_t add_trajectory(std::string_view name, std::span<const State> rows,
                                const CommandOptions& options = {.pace = iterations(1)}) {
-    std::vector<std::byte> bytes(rows.size() * sizeof(State));
-    for (std::size_t i = 0; i < rows.size(); ++i) pack(rows[i], bytes.data() + i * sizeof(State));
-    check_state<State>(actuator(name));
-    return UntypedFrontend::add_trajectory(actuator(name), static_cast<std::uint32_t>(rows.size()),
+    const auto [indices, bytes] = packed(std::span(&name, 1), rows);
+    return UntypedFrontend::add_trajectory(indices.front(), static_cast<std::uint32_t>(rows.size()),
                                            bytes, options);
   }
   /// Adds a chunk of one actuator; see UntypedFrontend::add_chunk.
   template <Shareable State>
   std::uint32_t add_chunk(std::string_view name, std::span<const std::uint32_t> due,
                           std::span<const State> rows, const ChunkOptions& options) {
-    check_state<State>(actuator(name));
-    const std::uint32_t index = actuator(name);
-    std::vector<std::byte> bytes(rows.size() * sizeof(State));
-    for (std::size_t i = 0; i < rows.size(); ++i) pack(rows[i], bytes.data() + i * sizeof(State));
-    return UntypedFrontend::add_chunk({&index, 1}, due, bytes, options);
+    const auto [indices, bytes] = packed(std::span(&name, 1), rows);
+    return UntypedFrontend::add_chunk(indices, due, bytes, options);
   }
   using UntypedFrontend::move_to;
   /// Sends one actuator to a target and waits until it is observed there.
@@ -156,7 +151,7 @@ class Frontend : public UntypedFrontend {
       for (const ActuatorRow& row : expected.actuators) states_.push_back(expected.keys[row.type]);
     }
   }
-  /// Indices of the actuators, and the bytes of their targets.
+  /// Indices of the actuators, and the bytes of these targets.
   template <class State>
   std::pair<std::vector<std::uint32_t>, std::vector<std::byte>> packed(
       std::span<const std::string_view> names, std::span<const State> targets) const {

@@ -51,6 +51,16 @@ void watch_forks() noexcept {
   static_cast<void>(watching);
 }
 
+/// Opens a file, which a forked child closes.
+template <class Open>
+int noted(Open&& open) {
+  const std::lock_guard lock(fork_mutex());
+  lock_files().reserve(lock_files().size() + 1);
+  const int descriptor = above_standard(open());
+  if (descriptor >= 0) lock_files().push_back(descriptor);
+  return descriptor;
+}
+
 }  // namespace
 
 std::uint64_t process_generation() noexcept { return generation.load(std::memory_order_relaxed); }
@@ -81,19 +91,11 @@ void end_forked_child(std::string_view robot, std::string_view function) noexcep
 }
 
 int open_for_this_process(const char* path, int flags, mode_t permission) {
-  const std::lock_guard lock(fork_mutex());
-  lock_files().reserve(lock_files().size() + 1);
-  const int descriptor = above_standard(::open(path, flags, permission));
-  if (descriptor >= 0) lock_files().push_back(descriptor);
-  return descriptor;
+  return noted([&] { return ::open(path, flags, permission); });
 }
 
 int socket_for_this_process(int domain, int type) {
-  const std::lock_guard lock(fork_mutex());
-  lock_files().reserve(lock_files().size() + 1);
-  const int descriptor = above_standard(::socket(domain, type, 0));
-  if (descriptor >= 0) lock_files().push_back(descriptor);
-  return descriptor;
+  return noted([&] { return ::socket(domain, type, 0); });
 }
 
 void close_in_this_process(int descriptor) noexcept {

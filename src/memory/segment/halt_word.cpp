@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/crash_point.hpp"
+#include "base/printable.hpp"
 #include "memory/os/atomic_words.hpp"
 #include "memory/segment/signal.hpp"
 
@@ -49,6 +50,13 @@ std::string_view to_text(HaltCause cause) noexcept {
                                          "overruns", "predecessor",   "unreachable"};
   const auto index = static_cast<std::size_t>(cause);
   return index < std::size(kTexts) ? kTexts[index] : "unknown";
+}
+
+std::string halt_text(const Halt& halt) {
+  std::string text = "iteration " + std::to_string(halt.iteration) + " (halt " +
+                     std::to_string(halt.number) + ", cause " + std::string(to_text(halt.cause));
+  if (!halt.who_text().empty()) text += ", requested by " + printable(halt.who_text());
+  return text + ")" + (halt.reason().empty() ? "" : ": " + printable(halt.reason()));
 }
 
 std::uint64_t request_halt(const SegmentView& view, HaltCause cause, std::string_view who,

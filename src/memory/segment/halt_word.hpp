@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <optional>
+#include <string>
 #include <string_view>
 
 #include "memory/segment/segment_layout.hpp"
@@ -26,6 +27,9 @@ std::uint64_t request_halt(const SegmentView& view, HaltCause cause, std::string
 /// gets halts from nowhere else.
 void put_halt(const SegmentView& view, std::uint64_t number, HaltCause cause, std::string_view who,
               std::string_view text) noexcept;
+
+/// "iteration 7 (halt 3, cause frontend, requested by pid 5 (python)): why", of a halt in force.
+std::string halt_text(const Halt& halt);
 
 /// The backend's side: finds requested halts, and shows the halt in force to all processes.
 ///

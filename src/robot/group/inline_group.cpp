@@ -14,6 +14,7 @@
 #include "memory/segment/signal.hpp"
 #include "robot/group/descriptor_limit.hpp"
 #include "runtime/frontend/link.hpp"
+#include "runtime/frontend/sent.hpp"
 
 namespace o80 {
 
@@ -480,10 +481,7 @@ bool InlineGroup::burst_directly(Copy& copy, const BurstPlan& plan,
   if (!done) return false;
   if (static_cast<std::int64_t>(*done) == plan.iterations) return true;
   link.segment.throw_if_gone();
-  const Iteration last = copy.frontend.published();
-  const std::string halt = link.halt_text(last + 1);
-  throw BackendHalted("the burst of '" + copy.frontend.segment() + "' ended in iteration " +
-                      std::to_string(last) + ": " + (halt.empty() ? "it was cut" : halt));
+  throw_cut(link, copy.frontend.published());
 }
 
 void InlineGroup::request(std::uint32_t request, std::span<const std::uint32_t> chosen,

@@ -8,7 +8,6 @@
 #include <exception>
 #include <utility>
 
-#include "base/printable.hpp"
 #include "memory/os/futex.hpp"
 #include "o80/base/time.hpp"
 #include "o80/runtime/frontend.hpp"
@@ -27,15 +26,6 @@ void say(const std::string& text) { std::fprintf(stderr, "o80: %s\n", text.c_str
 void say_state(const std::string& text) {
   say(text);
   notify_service_manager("STATUS=" + text);
-}
-
-std::string words_for(const Halt& halt) {
-  std::string text = "halted in iteration " + std::to_string(halt.iteration) + " (halt " +
-                     std::to_string(halt.number) + ", cause " + std::string(to_text(halt.cause));
-  if (!halt.who_text().empty()) text += ", asked for by " + printable(halt.who_text());
-  text += ")";
-  if (!halt.reason().empty()) text += ": " + printable(halt.reason());
-  return text;
 }
 }  // namespace
 
@@ -113,7 +103,7 @@ void LoopReport::run() noexcept {
       }
       const std::optional<Halt> halt = watcher.halted();
       const std::uint64_t now = halt ? halt->number : 0;
-      if (now != halted && halt) say_state(words_for(*halt));
+      if (now != halted && halt) say_state("halted in " + halt_text(*halt));
       if (now != halted && !halt) say_state("resumed");
       halted = now;
       futex_wait(stop_, 0, kReportPeriod);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cstring>
 #include <limits>
+#include <type_traits>
 
 #include "base/crash_point.hpp"
 #include "runtime/backend/backend_body.hpp"
@@ -217,16 +218,16 @@ void UntypedBackend::Body::fill_row(bool fresh) noexcept {
   head.starvations = controller.starvations();
   std::memcpy(row(), &head, sizeof head);
   if (layout.block > 0) std::memcpy(row() + layout.desired, controller.desired(), layout.block);
+  const auto put_masks = [&](auto bytes) {
+    std::memcpy(row() + layout.active, controller.active_mask(), bytes);
+    std::memcpy(row() + layout.clamped, controller.clamped_mask(), bytes);
+    std::memcpy(row() + layout.braking, controller.braking_mask(), bytes);
+    std::memcpy(row() + layout.starved, controller.starved_mask(), bytes);
+  };
   if (layout.mask_words == 1) {  // mostly: no calls
-    std::memcpy(row() + layout.active, controller.active_mask(), 8);
-    std::memcpy(row() + layout.clamped, controller.clamped_mask(), 8);
-    std::memcpy(row() + layout.braking, controller.braking_mask(), 8);
-    std::memcpy(row() + layout.starved, controller.starved_mask(), 8);
+    put_masks(std::integral_constant<std::size_t, 8>());
   } else if (layout.mask_words > 1) {
-    std::memcpy(row() + layout.active, controller.active_mask(), layout.mask_words * 8);
-    std::memcpy(row() + layout.clamped, controller.clamped_mask(), layout.mask_words * 8);
-    std::memcpy(row() + layout.braking, controller.braking_mask(), layout.mask_words * 8);
-    std::memcpy(row() + layout.starved, controller.starved_mask(), layout.mask_words * 8);
+    put_masks(layout.mask_words * std::size_t{8});
   }
   if (layout.off_plan < layout.size)
     std::memcpy(row() + layout.off_plan, controller.off_plan(), layout.size - layout.off_plan);

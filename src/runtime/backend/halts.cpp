@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "base/short_text.hpp"
+#include "o80/describe/schema_bytes.hpp"
 #include "runtime/backend/backend_options.hpp"
 #include "runtime/journal/recorded_decisions.hpp"
 
@@ -10,13 +11,6 @@ namespace o80 {
 
 namespace {
 constexpr std::uint32_t kScheduledPerIteration = 256;  // scheduled batches that a halt ends
-
-/// Hash of a text (FNV-1a); never 0.
-std::uint64_t fingerprint(std::string_view text) noexcept {
-  std::uint64_t print = 0xCBF29CE484222325;
-  for (const char c : text) print = (print ^ static_cast<unsigned char>(c)) * 0x100000001B3;
-  return print | 1;
-}
 }  // namespace
 
 Halts::Halts(BackendCore& core, Bursts& bursts, Readings& readings, const BackendOptions& options)
@@ -30,7 +24,7 @@ Halts::Halts(BackendCore& core, Bursts& bursts, Readings& readings, const Backen
 
 void Halts::request(HaltCause cause, std::string_view text) noexcept {
   std::atomic<std::uint64_t>& last = requested_[static_cast<std::size_t>(cause)];
-  const std::uint64_t print = fingerprint(text);
+  const std::uint64_t print = describing::hash_of(std::as_bytes(std::span(text))) | 1;  // not 0
   if (last.exchange(print, std::memory_order_relaxed) == print) return;
   if (core_.recorded != nullptr) return core_.recorded->ask_to_halt(cause, text);
   request_halt(core_.segment.view(), cause, {}, text);

@@ -265,6 +265,13 @@ void Burst::cancel() const {
   lane().cancel_burst(batch_.id());
 }
 
+void throw_cut(const Link& link, Iteration last) {
+  // the halt began in the iteration after its last row
+  const std::string halt = link.halt_text(last + 1);
+  throw BackendHalted("the burst of '" + link.segment.name() + "' ended in iteration " +
+                      std::to_string(last) + ": " + (halt.empty() ? "it was cut" : halt));
+}
+
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
                          const KeepWaiting& keep_waiting,
                          std::optional<std::uint32_t> events_before_send) {
@@ -287,12 +294,7 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
                          "' was overwritten by later bursts: wait for it before sending many more");
   }
   if (answer.known != LaneSender::Known::yes) return -1;
-  if (answer.end == BurstEnd::cut) {
-    // the halt began in the iteration after its last row
-    const std::string halt = link.halt_text(answer.row + 1);
-    throw BackendHalted("the burst of '" + link.segment.name() + "' ended in iteration " +
-                        std::to_string(answer.row) + ": " + (halt.empty() ? "it was cut" : halt));
-  }
+  if (answer.end == BurstEnd::cut) throw_cut(link, answer.row);
   return answer.row;
 }
 

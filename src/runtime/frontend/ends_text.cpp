@@ -74,15 +74,11 @@ std::string late_text(std::uint8_t packed, std::int64_t late) {
 
 std::string not_completed_text(const std::string& segment, const std::vector<std::string>& ends,
                                std::size_t records) {
-  std::string text = records == 1 ? "the command sent to '" + segment + "' did not complete: "
-                                  : std::to_string(ends.size()) + " of " + std::to_string(records) +
-                                        " commands sent to '" + segment + "' did not complete: ";
-  for (std::size_t i = 0; i < ends.size() && i < nearest::kListed; ++i) {
-    text += (i == 0 ? "" : "; ") + ends[i];
-  }
-  if (ends.size() > nearest::kListed) {
-    text += "; and " + std::to_string(ends.size() - nearest::kListed) + " more";
-  }
+  const std::string which =
+      records == 1 ? "the command"
+                   : std::to_string(ends.size()) + " of " + std::to_string(records) + " commands";
+  const std::string text =
+      which + " sent to '" + segment + "' did not complete: " + first_names(ends, "; ", "; and ");
   return sentence(text) +
          " See where the robot is (`observation` of this error) before you send more; if " +
          "such an end is expected, wait with check=False";

@@ -63,6 +63,14 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
   }
 }
 
+void refuse_size(const char* what, std::size_t actuators, std::size_t given, std::size_t wanted,
+                 const char* unit) {
+  if (given == wanted) return;
+  throw InvalidArgument(std::string("the ") + what + " of " + std::to_string(actuators) +
+                        " actuators take " + std::to_string(wanted) + ' ' + unit + ", " +
+                        std::to_string(given) + " were given");
+}
+
 /// Refuses options that contradict each other.
 void check_options(const CommandOptions& options) {
   if (options.profile && options.pace.pace == Pace::fastest) {
@@ -153,19 +161,6 @@ std::uint32_t UntypedFrontend::add_command(std::uint32_t actuator, std::span<con
   return link_->builder.command(head, mask, {}, 1, state);
 }
 
-std::size_t UntypedFrontend::size_of_state(std::uint32_t actuator) const {
-  return schema().types[schema().actuators[actuator].type].size;
-}
-
-void UntypedFrontend::refuse_twice(std::span<const std::uint32_t> actuators) const {
-  if (actuators.empty()) throw InvalidArgument("a command needs at least one actuator");
-  for (std::size_t i = 0; i < actuators.size(); ++i) {
-    if (std::ranges::count(actuators.subspan(0, i), actuators[i]) == 0) continue;
-    throw InvalidArgument("actuator '" + schema().actuators[actuators[i]].name.str() +
-                          "' is named twice: one command gives it one target");
-  }
-}
-
 std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actuators,
                                             std::span<const std::byte> states,
                                             const CommandOptions& options,
@@ -174,39 +169,57 @@ std::uint32_t UntypedFrontend::add_commands(std::span<const std::uint32_t> actua
   return add_commands_to(link_->builder, actuators, states, options, masks);
 }
 
+/// Throws InvalidArgument unless the actuators are there, each once, with a mask for each or none.
+void UntypedFrontend::check_actuators(std::span<const std::uint32_t> actuators,
+                                      std::span<const std::uint64_t> masks) const {
+  if (actuators.empty()) throw InvalidArgument("a command needs at least one actuator");
+  std::size_t words = 0;
+  for (std::size_t i = 0; i < actuators.size(); ++i) {
+    const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuators[i]});
+    words += link_->command_check.words_of_mask(index);
+    if (std::ranges::count(actuators.first(i), index) == 0) continue;
+    throw InvalidArgument("actuator '" + schema().actuators[index].name.str() +
+                          "' is named twice: one command gives it one target");
+  }
+  if (!masks.empty()) refuse_size("masks", actuators.size(), masks.size(), words, "words");
+}
+
+/// Calls `visit` with each actuator, the states of its rows and its mask. The last one gets all
+/// states that are left: the check of its targets says what is wrong with them.
+template <class Visit>
+void UntypedFrontend::each_share(std::span<const std::uint32_t> actuators, std::uint32_t rows,
+                                 std::span<const std::byte> states,
+                                 std::span<const std::uint64_t> masks, Visit&& visit) const {
+  for (const std::uint32_t& actuator : actuators) {
+    const std::size_t size = std::size_t{rows} * link_->command_check.layout(actuator).size();
+    const bool is_last = &actuator == &actuators.back();
+    const auto own = states.first(is_last ? states.size() : std::min(size, states.size()));
+    const auto mask = masks.first(masks.empty() ? 0 : link_->command_check.words_of_mask(actuator));
+    visit(actuator, own, mask);
+    states = states.subspan(own.size());
+    masks = masks.subspan(mask.size());
+  }
+}
+
 std::uint32_t UntypedFrontend::add_commands_to(BatchBuilder& builder,
                                                std::span<const std::uint32_t> actuators,
                                                std::span<const std::byte> states,
                                                const CommandOptions& options,
                                                std::span<const std::uint64_t> masks) const {
+  check_actuators(actuators, masks);
   std::size_t bytes = 0;
-  std::size_t words = 0;
   for (const std::uint32_t actuator : actuators) {
-    bytes += size_of_state(link_->command_check.actuator(std::int64_t{actuator}));
-    words += link_->command_check.words_of_mask(actuator);
+    bytes += link_->command_check.layout(actuator).size();
   }
-  refuse_twice(actuators);
-  const auto refuse_size = [&](const char* what, std::size_t given, std::size_t wanted,
-                               const char* unit) {
-    if (given == wanted) return;
-    throw InvalidArgument(std::string("the ") + what + " of " + std::to_string(actuators.size()) +
-                          " actuators take " + std::to_string(wanted) + ' ' + unit + ", " +
-                          std::to_string(given) + " were given");
-  };
-  refuse_size("states", states.size(), bytes, "bytes");
-  if (!masks.empty()) refuse_size("masks", masks.size(), words, "words");
+  refuse_size("states", actuators.size(), states.size(), bytes, "bytes");
 
   link_->members.clear();
   Profile profile = Profile::linear;
-  for (const std::uint32_t actuator : actuators) {
-    const auto state = states.first(size_of_state(actuator));
-    const auto mask = masks.first(masks.empty() ? 0 : link_->command_check.words_of_mask(actuator));
-    link_->members.push_back({checked_command(actuator, state, options, mask), mask, state});
-    if (link_->members.back().head.profile == Profile::minimum_jerk)
-      profile = Profile::minimum_jerk;
-    states = states.subspan(state.size());
-    masks = masks.subspan(mask.size());
-  }
+  each_share(actuators, 1, states, masks, [&](std::uint32_t actuator, auto state, auto mask) {
+    const RecordHead head = checked_command(actuator, state, options, mask);
+    if (head.profile == Profile::minimum_jerk) profile = Profile::minimum_jerk;
+    link_->members.push_back({head, mask, state});
+  });
   // all members use one profile: minimum_jerk if one of them needs it
   for (BatchBuilder::Member& member : link_->members) member.head.profile = profile;
   if (link_->members.size() == 1) {
@@ -255,38 +268,16 @@ std::uint32_t UntypedFrontend::add_trajectory(std::uint32_t actuator, std::uint3
   return add_trajectories({&actuator, 1}, rows, states, options, times);
 }
 
-/// Bytes of the rows of one of several actuators, of the `left` ones; for the last one, all of
-/// these: the check of its targets says what is wrong with them.
-std::size_t UntypedFrontend::size_of_rows(std::uint32_t actuator, std::uint32_t rows,
-                                          std::size_t left,
-                                          std::span<const std::uint32_t> actuators) const {
-  if (actuator == actuators.back()) return left;
-  const Schema& schema = link_->description->schema;
-  const std::uint32_t index = link_->command_check.actuator(std::int64_t{actuator});
-  return std::min(left, std::size_t{rows} * schema.types[schema.actuators[index].type].size);
-}
-
 std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> actuators,
                                                 std::uint32_t rows,
                                                 std::span<const std::byte> states,
                                                 const CommandOptions& options,
                                                 std::span<const std::int64_t> times,
                                                 std::span<const std::uint64_t> masks) {
-  check_masks(actuators, masks);
+  check_actuators(actuators, masks);
   CommandOptions paced = options;
-  const auto each = [&](auto&& visit) {
-    std::size_t at = 0;
-    std::span<const std::uint64_t> left = masks;
-    for (const std::uint32_t actuator : actuators) {
-      const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
-      const auto mask = left.first(left.empty() ? 0 : link_->command_check.words_of_mask(actuator));
-      visit(actuator, states.subspan(at, size), mask);
-      at += size;
-      left = left.subspan(mask.size());
-    }
-  };
-  each([&](std::uint32_t actuator, auto of_one, auto mask) {
-    paced = checked_trajectory(actuator, rows, of_one, options, times, mask);
+  each_share(actuators, rows, states, masks, [&](std::uint32_t actuator, auto own, auto mask) {
+    paced = checked_trajectory(actuator, rows, own, options, times, mask);
   });
   const std::span<const std::int64_t> ends = rows > 1 ? times : std::span<const std::int64_t>{};
   const auto lock = link_->lock_to_add();
@@ -295,25 +286,10 @@ std::uint32_t UntypedFrontend::add_trajectories(std::span<const std::uint32_t> a
                                   states);
   }
   link_->members.clear();
-  each([&](std::uint32_t actuator, auto of_one, auto mask) {
-    link_->members.push_back({head_of(actuator, paced, Profile::linear), mask, of_one});
+  each_share(actuators, rows, states, masks, [&](std::uint32_t actuator, auto own, auto mask) {
+    link_->members.push_back({head_of(actuator, paced, Profile::linear), mask, own});
   });
   return link_->builder.group(link_->members, ends, rows);
-}
-
-/// Throws InvalidArgument unless there is a mask for each of these actuators, or none.
-void UntypedFrontend::check_masks(std::span<const std::uint32_t> actuators,
-                                  std::span<const std::uint64_t> masks) const {
-  std::size_t words = 0;
-  for (const std::uint32_t actuator : actuators) {
-    words +=
-        link_->command_check.words_of_mask(link_->command_check.actuator(std::int64_t{actuator}));
-  }
-  refuse_twice(actuators);
-  if (masks.empty() || masks.size() == words) return;
-  throw InvalidArgument("the masks of " + std::to_string(actuators.size()) + " actuators take " +
-                        std::to_string(words) + " words, " + std::to_string(masks.size()) +
-                        " were given");
 }
 
 BatchBuilder& UntypedFrontend::own_builder() { return link_->builder; }
@@ -324,7 +300,7 @@ std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
                                          std::span<const std::byte> states,
                                          const ChunkOptions& options,
                                          std::span<const std::uint64_t> masks) {
-  check_masks(actuators, masks);
+  check_actuators(actuators, masks);
   check_chunk(due, options);
   const auto rows = static_cast<std::uint32_t>(due.size());
   const ChunkHead chunk{.epoch = epoch(),
@@ -339,42 +315,28 @@ std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
   std::vector<const StateLayout*> layouts;
   const auto lock = link_->lock_to_add();
   link_->members.clear();
-  std::size_t at = 0;
-  for (const std::uint32_t actuator : actuators) {
-    const auto of_one =
-        states.subspan(at, size_of_rows(actuator, rows, states.size() - at, actuators));
-    const auto mask = masks.first(masks.empty() ? 0 : link_->command_check.words_of_mask(actuator));
-    masks = masks.subspan(mask.size());
-    link_->command_check.targets(actuator, of_one, mask);
-    at += of_one.size();
+  each_share(actuators, rows, states, masks, [&](std::uint32_t actuator, auto own, auto mask) {
+    link_->command_check.targets(actuator, own, mask);
     RecordHead head;
     head.actuator = static_cast<std::uint16_t>(actuator);
     head.profile = options.profile;
     layouts.push_back(&link_->command_check.layout(actuator));
-    if (of_one.size() != due.size() * layouts.back()->size()) {
+    if (own.size() != due.size() * layouts.back()->size()) {
       throw InvalidArgument("a chunk of " + std::to_string(rows) + " rows needs as many states");
     }
-    link_->members.push_back({head, mask, of_one});
-  }
+    link_->members.push_back({head, mask, own});
+  });
   return batch.chunk(link_->members, chunk, due, layouts);
 }
 
 void UntypedFrontend::add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                                      std::span<const std::byte> states, Mode mode) {
-  refuse_twice(actuators);
-  const auto each = [&](auto&& visit) {
-    std::size_t at = 0;
-    for (const std::uint32_t actuator : actuators) {
-      const std::size_t size = size_of_rows(actuator, rows, states.size() - at, actuators);
-      visit(link_->command_check.actuator(std::int64_t{actuator}), states.subspan(at, size));
-      at += size;
-    }
-  };
-  each([&](std::uint32_t actuator, std::span<const std::byte> targets) {
+  check_actuators(actuators, {});
+  each_share(actuators, rows, states, {}, [&](std::uint32_t actuator, auto targets, auto) {
     link_->command_check.targets(actuator, targets);
   });
   const auto lock = link_->lock_to_add();
-  each([&](std::uint32_t actuator, std::span<const std::byte> targets) {
+  each_share(actuators, rows, states, {}, [&](std::uint32_t actuator, auto targets, auto) {
     RecordHead head;
     head.actuator = static_cast<std::uint16_t>(actuator);
     head.mode = mode;

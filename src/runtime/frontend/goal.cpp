@@ -98,18 +98,15 @@ std::string not_reached_text(const std::string& segment, const std::vector<Miss>
   if (timeout) {
     text += " within " + text_of(std::chrono::duration<double>(*timeout).count(), "s");
   }
-  text += ": ";
-  for (std::size_t i = 0; i < misses.size() && i < nearest::kListed; ++i) {
-    const Miss& miss = misses[i];
-    text += (i == 0 ? "" : "; ") + (miss.field.empty() ? "" : miss.field + " of ") + "'" +
-            miss.actuator + "' is observed at " + text_of(miss.observed, miss.unit) + ", " +
-            text_of(miss.distance, miss.unit) + " from its target of " +
-            text_of(miss.target, miss.unit) + " (tolerance " + text_of(miss.tolerance, miss.unit) +
-            ")";
+  std::vector<std::string> each;
+  for (const Miss& miss : misses) {
+    each.push_back((miss.field.empty() ? "" : miss.field + " of ") + "'" + miss.actuator +
+                   "' is observed at " + text_of(miss.observed, miss.unit) + ", " +
+                   text_of(miss.distance, miss.unit) + " from its target of " +
+                   text_of(miss.target, miss.unit) + " (tolerance " +
+                   text_of(miss.tolerance, miss.unit) + ")");
   }
-  if (misses.size() > nearest::kListed) {
-    text += "; and " + std::to_string(misses.size() - nearest::kListed) + " more";
-  }
+  text += ": " + first_names(each, "; ", "; and ");
   const bool ended = batch.ended();
   if (!misses.empty()) text += ". ";
   text += ended ? "Its command has completed" : "Its command has not ended and continues";

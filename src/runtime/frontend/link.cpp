@@ -3,7 +3,6 @@
 #include <chrono>
 #include <iterator>
 
-#include "base/printable.hpp"
 #include "describe/table.hpp"
 #include "memory/os/atomic_words.hpp"
 #include "memory/segment/queue_word.hpp"
@@ -101,13 +100,7 @@ std::string Link::halt_text(Iteration iteration) const {
   // `iteration` exactly if it began at or before that iteration.
   const std::optional<Halt> acting = shown_halt(segment.view());
   if (!acting || acting->iteration < 0 || acting->iteration > iteration) return "";
-  std::string text = "it is halted since iteration " + std::to_string(acting->iteration) +
-                     " (halt " + std::to_string(acting->number) + ", cause " +
-                     std::string(to_text(acting->cause));
-  if (!acting->who_text().empty()) text += ", requested by " + printable(acting->who_text());
-  text += ")";
-  if (!acting->reason().empty()) text += ": " + printable(acting->reason());
-  return text;
+  return "it is halted since " + o80::halt_text(*acting);
 }
 
 std::string Link::owner_of(std::uint32_t lane) const {

@@ -29,6 +29,8 @@ struct Sent {
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
                          const KeepWaiting& keep_waiting,
                          std::optional<std::uint32_t> events_before_send = {});
+/// Throws BackendHalted for a burst whose last row this is.
+[[noreturn]] void throw_cut(const Link& link, Iteration last);
 /// Throws Error, BackendHalted or BackendGone, with the reason why a batch was rejected.
 [[noreturn]] void throw_rejected(Link& link, const char* what, const Batch& batch);
 /// Copies the row that wait_for_burst returned. Throws RowOverwritten.
