@@ -26,6 +26,14 @@ O80_DESCRIBE(Refuse);
 /// A request that breaks the robot.
 struct Break {};
 O80_DESCRIBE(Break);
+/// A request that runs until the test ends it.
+struct Home {};
+O80_DESCRIBE(Home);
+/// The same, for one that moves nothing: it continues in a halt.
+struct Calibrate {
+  static constexpr bool kWhileHalted = true;
+};
+O80_DESCRIBE(Calibrate);
 
 /// Two joints that are where they are asked to be; the extended value counts what they did.
 struct Pair {
@@ -34,7 +42,7 @@ struct Pair {
   };
   using Actuators = std::array<double, 2>;
   using Extended = Effort;
-  using Requests = o80::Requests<Reset, Snapshot, Restore, Refuse, Break>;
+  using Requests = o80::Requests<Reset, Snapshot, Restore, Refuse, Break, Home, Calibrate>;
 };
 O80_DESCRIBE(Pair::Effort, total);
 
@@ -90,6 +98,8 @@ class Station : private RequestServer {
   double total = 0;
   std::function<void()> before_publish;
   std::function<void()> on_refuse;  // while a request `refuse` is served
+  int homed = 0;                    // requests `home` that were served
+  int fresh_starts = 0;
   UntypedBackend backend;
   // what a request `snapshot` gives to the journal
   std::uint32_t kept_slot = 0;
@@ -142,6 +152,11 @@ class Station : private RequestServer {
       case 3:
         if (on_refuse) on_refuse();
         return Served::rejected("it does not want to");
+      case 5:
+        ++homed;
+        return Served::running("looks for the index of joint 1");
+      case 6:
+        return Served::running();
       default:
         return Served::failed("the arm fell off");
     }
@@ -149,6 +164,7 @@ class Station : private RequestServer {
   bool read_fresh(FreshReading& reading) noexcept override {
     pack(now, reading.observed);
     pack(total, reading.extended);
+    ++fresh_starts;
     return true;
   }
 

@@ -6,11 +6,11 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
-#include <random>
 #include <utility>
 #include <vector>
 
 #include "control/motion/number_plan.hpp"
+#include "dice.hpp"
 
 namespace o80::test {
 namespace {
@@ -59,29 +59,17 @@ class Played {
   int held = 0;
 };
 
-class Dice {
- public:
-  explicit Dice(unsigned seed) : dice_(seed) {}
-  std::int64_t pick(std::int64_t low, std::int64_t high) {
-    return std::uniform_int_distribution<std::int64_t>(low, high)(dice_);
-  }
-  double place() { return std::uniform_real_distribution<double>(-1.0, 1.0)(dice_); }
-
- private:
-  std::mt19937 dice_;
-};
-
 /// Rows that jump, that drift, and that stay; due evenly, within a factor of two, or anyhow.
 std::vector<Row> random_rows(Dice& dice, int unevenness) {
-  const std::int64_t step = dice.pick(2, 25);
-  const std::int64_t style = dice.pick(0, 2);
+  const std::int64_t step = dice.whole(2, 25);
+  const std::int64_t style = dice.whole(0, 2);
   std::vector<Row> rows;
-  for (std::int64_t i = dice.pick(1, 12); i > 0; --i) {
+  for (std::int64_t i = dice.whole(1, 12); i > 0; --i) {
     const double last = rows.empty() ? 0.0 : rows.back().place;
-    double place = dice.place();
+    double place = dice.real(-1, 1);
     if (style == 1) place = last + 0.1 * place;
-    if (style == 2 && dice.pick(0, 1) == 0) place = last;
-    const std::array ways{step, dice.pick(step, 2 * step), dice.pick(1, 50)};
+    if (style == 2 && dice.whole(0, 1) == 0) place = last;
+    const std::array ways{step, dice.whole(step, 2 * step), dice.whole(1, 50)};
     rows.push_back({place, ways[static_cast<std::size_t>(unevenness)]});
   }
   return rows;
@@ -98,7 +86,7 @@ TEST(RowsCurve, LeavesItsRowsByAPartOfTheStepsAroundThem) {
     Dice dice(seed);
     const int unevenness = static_cast<int>(seed % 3);
     const std::vector<Row> rows = random_rows(dice, unevenness);
-    const Moment start{dice.place(), 0.1 * dice.place(), 0.02 * dice.place()};
+    const Moment start{dice.real(-1, 1), 0.1 * dice.real(-1, 1), 0.02 * dice.real(-1, 1)};
     const Played played(start, rows);
     for (std::size_t i = 0; i < rows.size(); ++i) {
       ASSERT_EQ(played.at_rows[i].position, rows[i].place) << seed;
@@ -201,7 +189,7 @@ TEST(RowsCurve, OfSaturatedRowsIsHeldAtTheBounds) {
     Dice dice(seed);
     std::vector<Row> rows = random_rows(dice, static_cast<int>(seed % 3));
     for (Row& row : rows) row.place = row.place < 0.0 ? -1.0 : 1.0;
-    const Played played({dice.place(), 0.1 * dice.place()}, rows, {-1.0, 1.0});
+    const Played played({dice.real(-1, 1), 0.1 * dice.real(-1, 1)}, rows, {-1.0, 1.0});
     for (const double place : played.places) ASSERT_LE(std::abs(place), 1.0) << seed;
     held += played.held;
   }

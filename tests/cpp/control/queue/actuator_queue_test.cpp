@@ -30,24 +30,6 @@ TEST(ActuatorQueue, ThousandsOfCommandsFollowEachOtherWithoutAnIdleIteration) {
   EXPECT_FALSE(rig.active());
 }
 
-// rule C10
-TEST(ActuatorQueue, APastUntilIsRejectedAsLateAndTheNextStartsInItsPlace) {
-  Rig rig(plain_robot(1));
-  rig.add(0, over(3), {3.0});
-  rig.add(0, until(2), {9.0});
-  rig.add(0, until(3), {9.0});
-  rig.add(0, over(2), {5.0});
-  const CommandId batch = rig.pulse();
-  EXPECT_THAT(rig.run(5), ElementsAre(1.0, 2.0, 3.0, 4.0, 5.0));
-  for (const CommandId late : {batch + 3, batch + 4}) {
-    EXPECT_EQ(rig.witness.last(late).status, Status::rejected);
-    EXPECT_EQ(rig.witness.last(late).reason, Reason::late);
-    EXPECT_EQ(rig.witness.last(late).iteration, 4);
-    EXPECT_EQ(rig.witness.of(late).size(), 1U);
-  }
-  EXPECT_EQ(rig.witness.of(batch + 5)[0].iteration, 4);
-}
-
 TEST(ActuatorQueue, LateCommandsInARowAreToldAThousandAnIteration) {
   Rig rig(plain_robot(2));
   rig.run(5);
@@ -65,34 +47,6 @@ TEST(ActuatorQueue, LateCommandsInARowAreToldAThousandAnIteration) {
   EXPECT_FALSE(rig.active());
   EXPECT_EQ(rig.desired(), 0.0);
   EXPECT_THAT(rig.run(2), ElementsAre(0.0, 1.0));
-}
-
-TEST(ActuatorQueue, UntilAndIdlenessAndOverwritingAndTheMinimumResetTheCarry) {
-  const auto second_of = [](auto between) {
-    Rig rig(plain_robot(1));
-    rig.add(0, during(1'400'000), {1.0});
-    between(rig);
-    const Iteration begin = rig.next;
-    CommandId batch = 0;
-    if (rig.batch.empty()) {  // the first command has run
-      rig.add(0, during(1'400'000), {1.0});
-      batch = rig.pulse();
-      rig.run(12);
-      return rig.witness.last(batch + 2).iteration - begin + 1;
-    }
-    rig.add(0, during(1'400'000), {1.0});
-    const CommandId last = rig.batch.records();
-    batch = rig.pulse();
-    rig.run(12);
-    const auto changes = rig.witness.of(batch + 1 + last);
-    return changes[1].iteration - changes[0].iteration + 1;
-  };
-  EXPECT_EQ(second_of([](Rig&) {}), 2) << "0.4 + 1.4 is nearly 2";
-  EXPECT_EQ(second_of([](Rig& rig) { rig.add(0, until(3), {2.0}); }), 1);
-  EXPECT_EQ(second_of([](Rig& rig) { rig.pulse(), rig.run(2); }), 1);
-  EXPECT_EQ(second_of([](Rig& rig) { rig.pulse(), rig.run(1); }), 2) << "the queue is unbroken";
-  EXPECT_EQ(second_of([](Rig& rig) { rig.add(0, overwriting(over(1)), {2.0}); }), 1);
-  EXPECT_EQ(second_of([](Rig& rig) { rig.add(0, during(0), {2.0}); }), 1);
 }
 
 TEST(ActuatorQueue, ASpeedIsThePeakOfTheProfileChosen) {

@@ -5,6 +5,9 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <sstream>
+#include <string>
+#include <utility>
 
 #include "cases.hpp"
 #include "control/chunk_rig.hpp"
@@ -12,33 +15,12 @@
 namespace o80::test {
 namespace {
 
-/// Places of a curve in some iterations.
-struct OfProfile {
-  Profile profile;
-  std::vector<std::pair<Iteration, double>> wanted;
-
-  void expect(const ChunkRig& rig, double digits = kDigits) const {
-    for (const auto& [iteration, value] : wanted)
-      EXPECT_NEAR(rig.at(iteration), value, digits) << iteration << ' ' << to_text(profile);
-  }
-};
-
 TEST(Chunk, FromRestItReachesEachRowInItsIteration) {
-  for (const OfProfile& of :
-       {OfProfile{Profile::smooth,
-                  {{105, -0.00625},
-                   {115, 0.0375},
-                   {125, 0.20625},
-                   {135, 0.31875},
-                   {145, 0.240625},
-                   {155, 0.2}}},
-        OfProfile{Profile::monotone,
-                  {{115, 0.03125}, {125, 0.21875}, {135, 0.3}, {145, 0.25}, {155, 0.2}}}}) {
+  for (const Profile profile : {Profile::smooth, Profile::monotone}) {
     ChunkRig rig;
     rig.run_to(101);
-    const CommandId id = rig.example({.ease = 10}, of.profile);
+    const CommandId id = rig.example({.ease = 10}, profile);
     rig.run_to(160);
-    of.expect(rig, 1e-12);
     for (std::size_t i = 0; i < kRows.size(); ++i) {
       EXPECT_EQ(rig.at(110 + 10 * static_cast<Iteration>(i)), kRows[i]) << "bit for bit";
     }
@@ -49,62 +31,58 @@ TEST(Chunk, FromRestItReachesEachRowInItsIteration) {
   }
 }
 
-TEST(Chunk, LateRowsAreSkippedAndTheMotionGoesOn) {
-  for (const OfProfile& of :
-       {OfProfile{Profile::smooth,
-                  {{117, 0.060403}, {118, 0.072366}, {119, 0.085763}, {120, 0.1}, {125, 0.205804}}},
-        OfProfile{
-            Profile::monotone,
-            {{117, 0.060692}, {118, 0.072679}, {119, 0.085826}, {120, 0.1}, {125, 0.218304}}}}) {
-    ChunkRig rig;
-    rig.reach(117, 0.05, 0.01);
-    rig.example({.ease = 1}, of.profile);
-    rig.run_to(130);
-    EXPECT_NEAR(rig.at(116), 0.05, 1e-12);
-    of.expect(rig);
-  }
-}
+/// The worked examples, each in a line: the first iteration, place and speed before it, the ease,
+/// the profile; then iterations and where the motion is in them.
+constexpr auto kExamples = R"(
+  101 0    0     10 smooth    105 -0.00625  115 0.0375  125 0.20625  135 0.31875  145 0.240625
+  101 0    0     10 monotone  115 0.03125  125 0.21875  135 0.3  145 0.25  155 0.2
+  117 0.05 0.01  1  smooth    117 0.060403  118 0.072366  119 0.085763  120 0.1  125 0.205804
+  117 0.05 0.01  1  monotone  117 0.060692  118 0.072679  119 0.085826  120 0.1  125 0.218304
+  120 0.05 0.01  1  smooth    120 0.1  121 0.137218
+  120 0.05 0.01  1  monotone  120 0.1  121 0.138
+  117 0.05 0.01  10 smooth    117 0.060359  120 0.106058  125 0.225001  130 0.3
+  117 0.05 0.01  10 monotone  117 0.062267  120 0.119971  125 0.238593  130 0.3
+  147 0.25 -0.01 10 smooth    147 0.240095  150 0.21512  156 0.2
+  147 0.25 -0.01 10 monotone  147 0.2405  150 0.218  156 0.2
+  117 0.05 0.01  10 linear    117 0.067857  124 0.192857  130 0.3
+  117 0.05 0.01  10 hold      117 0.1  120 0.1  121 0.3  140 0.3  141 0.2  154 0.2)";
 
-TEST(Chunk, ARowThatIsDueInTheFirstIterationIsInTime) {
-  // from slope 0.04, which is the highest there
-  for (const OfProfile& of : {OfProfile{Profile::smooth, {{121, 0.137218}}},
-                              OfProfile{Profile::monotone, {{121, 0.138}}}}) {
+// rules K7, K9
+TEST(Chunk, TakesOverAsInTheWorkedExamples) {
+  const std::array profiles{Profile::smooth, Profile::monotone, Profile::linear, Profile::hold};
+  std::istringstream lines(kExamples);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.empty()) continue;
+    SCOPED_TRACE(line);
+    std::istringstream in(line);
+    Iteration now = 0;
+    double place = 0.0;
+    double speed = 0.0;
+    ChunkHead head;
+    std::string name;
+    in >> now >> place >> speed >> head.ease >> name;
     ChunkRig rig;
-    rig.reach(120, 0.05, 0.01);
-    rig.example({.ease = 1}, of.profile);
-    rig.run_to(123);
-    EXPECT_EQ(rig.at(120), 0.1);
-    of.expect(rig);
-  }
-}
-
-// rule K7
-TEST(Chunk, TheTakeOverPassesRowsThatAreDueTooSoon) {
-  for (const OfProfile& of :
-       {OfProfile{Profile::smooth, {{117, 0.060359}, {120, 0.106058}, {125, 0.225001}, {130, 0.3}}},
-        OfProfile{Profile::monotone,
-                  {{117, 0.062267}, {120, 0.119971}, {125, 0.238593}, {130, 0.3}}}}) {
-    ChunkRig rig;
-    rig.reach(117, 0.05, 0.01);
-    const CommandId id = rig.example({.ease = 10}, of.profile);
-    rig.run_to(131);
-    of.expect(rig);
-    const StatusChange told = rig.witness.last(id - 1);
-    EXPECT_EQ(BegunChunk::of(told.detail, told.late).value().row, 2U);
-  }
-}
-
-TEST(Chunk, WhereNoRowIsDueAfterTheTakeOverItGoesToTheLast) {
-  for (const OfProfile& of :
-       {OfProfile{Profile::smooth, {{147, 0.240095}, {150, 0.21512}, {156, 0.2}}},
-        OfProfile{Profile::monotone, {{147, 0.2405}, {150, 0.218}, {156, 0.2}}}}) {
-    ChunkRig rig;
-    rig.reach(147, 0.25, -0.01);
-    const CommandId id = rig.example({.ease = 10}, of.profile);
+    rig.reach(now, place, speed);
+    rig.example(head, *std::ranges::find(profiles, name, [](Profile p) { return to_text(p); }));
     rig.run_to(160);
-    of.expect(rig, 1e-9);
-    EXPECT_EQ(rig.witness.last(id).iteration, 156);
+    EXPECT_NEAR(rig.at(now - 1), place, 1e-12);
+    for (double wanted = 0.0; in >> now >> wanted;)
+      EXPECT_NEAR(rig.at(now), wanted, kDigits) << now;
   }
+}
+
+TEST(Chunk, TheTakeOverPassesRowsThatAreDueTooSoonAndEndsAtTheLastIfNoneIsLeft) {
+  ChunkRig rig;
+  rig.reach(117, 0.05, 0.01);
+  const CommandId id = rig.example({.ease = 10});
+  rig.run_to(131);
+  const StatusChange told = rig.witness.last(id - 1);
+  EXPECT_EQ(BegunChunk::of(told.detail, told.late).value().row, 2U);
+  ChunkRig late;
+  late.reach(147, 0.25, -0.01);
+  const CommandId last = late.example({.ease = 10});
+  late.run_to(160);
+  EXPECT_EQ(late.witness.last(last).iteration, 156);
 }
 
 // rule K6
@@ -192,38 +170,17 @@ TEST(Chunk, AnAnchorAheadWaits) {
 }
 
 TEST(Chunk, ATakeOverMayPassWhereItWasByAThirdOfItsSpeed) {
-  for (const OfProfile& of :
-       {OfProfile{
-            Profile::smooth,
-            {{101, 0.508954}, {102, 0.512768}, {103, 0.509102}, {104, 0.498016}, {105, 0.48125}}},
-        OfProfile{Profile::monotone,
-                  {{101, 0.5062}, {102, 0.5056}, {103, 0.4994}, {104, 0.4888}, {105, 0.475}}}}) {
+  for (const auto& [profile, wanted] :
+       {std::pair(Profile::smooth, std::array{0.508954, 0.512768, 0.509102, 0.498016, 0.48125}),
+        std::pair(Profile::monotone, std::array{0.5062, 0.5056, 0.4994, 0.4888, 0.475})}) {
     ChunkRig rig;
     rig.reach(101, 0.5, 0.01);
-    rig.chunk({0.4, 0.3}, every(10, 2), {.anchor = 100, .ease = 10}, of.profile);
+    rig.chunk({0.4, 0.3}, every(10, 2), {.anchor = 100, .ease = 10}, profile);
     rig.run_to(121);
-    of.expect(rig, 1e-9);
+    for (std::size_t i = 0; i < 5; ++i)
+      EXPECT_NEAR(rig.at(101 + static_cast<Iteration>(i)), wanted[i], kDigits);
     EXPECT_EQ(rig.at(110), 0.4);
   }
-}
-
-// rule K9
-TEST(Chunk, RowsMayBeHeldOrJoinedByLines) {
-  ChunkRig held;
-  held.reach(117, 0.05, 0.01);
-  held.example({.ease = 10}, Profile::hold);
-  held.run_to(155);
-  for (Iteration i = 117; i <= 120; ++i) EXPECT_EQ(held.at(i), 0.1);
-  for (Iteration i = 121; i <= 140; ++i) EXPECT_EQ(held.at(i), 0.3);
-  for (Iteration i = 141; i < 155; ++i) EXPECT_EQ(held.at(i), 0.2);
-
-  ChunkRig lines;
-  lines.reach(117, 0.05, 0.01);
-  lines.example({.ease = 10}, Profile::linear);
-  lines.run_to(131);
-  EXPECT_NEAR(lines.at(117), 0.067857, kDigits);
-  EXPECT_NEAR(lines.at(124), 0.192857, kDigits);
-  EXPECT_EQ(lines.at(130), 0.3);
 }
 
 // rule K2

@@ -21,75 +21,6 @@ Schema robot_with_requests() {
   return schema;
 }
 
-// rule C2
-TEST(Controller, OverwritingDropsEarlierCommandsOfItsOwnBatchToo) {
-  Rig rig(plain_robot(1));
-  rig.add(0, over(4), {4.0});
-  rig.add(0, overwriting(over(2)), {2.0});
-  rig.add(0, over(1), {5.0});
-  const CommandId batch = rig.pulse();
-  EXPECT_THAT(rig.run(3), ElementsAre(1.0, 2.0, 5.0));
-  EXPECT_EQ(rig.witness.status(batch + 2), Status::overwritten);
-  EXPECT_EQ(rig.witness.of(batch + 2).size(), 1U) << "it never was active";
-}
-
-// rule C2
-TEST(Controller, APurgeDropsWithoutASuccessor) {
-  Rig rig(plain_robot(2));
-  for (std::uint32_t actuator : {0, 1}) {
-    rig.add(actuator, over(4), {4.0});
-    rig.add(actuator, over(4), {8.0});
-  }
-  const CommandId first = rig.pulse();
-  rig.run(2);
-  rig.batch.purge(0);
-  const CommandId second = rig.pulse();
-  EXPECT_THAT(rig.run(2), ElementsAre(2.0, 2.0));
-  EXPECT_EQ(rig.desired(1), 4.0);
-  EXPECT_EQ(rig.witness.status(first + 2), Status::purged);
-  EXPECT_EQ(rig.witness.last(first + 3).iteration, 3);
-  EXPECT_EQ(rig.witness.status(second + 2), Status::completed);
-  rig.batch.purge(kEveryActuator);
-  rig.pulse();
-  rig.run(1, 1);
-  EXPECT_FALSE(rig.controller.active());
-  EXPECT_EQ(rig.witness.status(first + 1), Status::completed);
-  EXPECT_TRUE(rig.all_blocks_back());
-}
-
-TEST(Controller, APurgeActsInTheOrderOfItsBatch) {
-  Rig rig(plain_robot(2));
-  rig.add(0, over(4), {4.0});
-  rig.add(1, over(4), {4.0});
-  rig.batch.purge(0);
-  rig.add(0, over(2), {1.0});
-  rig.add(1, over(4), {0.0});
-  const CommandId batch = rig.pulse();
-  EXPECT_THAT(rig.run(3), ElementsAre(0.5, 1.0, 1.0));
-  EXPECT_EQ(rig.desired(1), 3.0);
-  EXPECT_EQ(rig.witness.status(batch + 2), Status::purged);
-  EXPECT_EQ(rig.witness.status(batch + 5), Status::completed);
-}
-
-TEST(Controller, AFrontendMayPurgeOnlyWhatItSent) {
-  Rig rig(plain_robot(2));
-  rig.add(0, over(2), {2.0});
-  const CommandId mine = rig.pulse(0);
-  rig.add(0, over(2), {4.0});
-  rig.add(1, over(2), {4.0});
-  const CommandId theirs = rig.pulse(1);
-  rig.add(0, over(2), {9.0});
-  const CommandId mine_too = rig.pulse(0);
-  rig.batch.purge_own(kEveryActuator);
-  rig.pulse(0);
-  EXPECT_THAT(rig.run(3), ElementsAre(2.0, 4.0, 4.0));
-  EXPECT_EQ(rig.desired(1), 4.0);
-  EXPECT_EQ(rig.witness.status(mine + 2, 0), Status::purged);
-  EXPECT_EQ(rig.witness.status(mine_too + 2, 0), Status::purged);
-  EXPECT_EQ(rig.witness.status(theirs + 2, 1), Status::completed);
-  EXPECT_EQ(rig.witness.status(theirs + 3, 1), Status::completed);
-}
-
 TEST(Controller, ADeadFrontendIsPurgedWhateverItShares) {
   Rig rig(plain_robot(1));
   for (std::uint32_t lane : {0, 1, 0, 2, 0}) {
@@ -104,39 +35,6 @@ TEST(Controller, ADeadFrontendIsPurgedWhateverItShares) {
   EXPECT_TRUE(rig.all_blocks_back());
   EXPECT_EQ(rig.witness.freed_blocks[0], 6U);
   EXPECT_EQ(rig.witness.freed_blocks[1], 2U);
-}
-
-// rule C23
-TEST(Controller, AnInterruptEndsEverythingInItsIteration) {
-  Rig rig(plain_robot(2));
-  rig.add(0, over(8), {8.0});
-  rig.add(0, over(8), {0.0});
-  rig.add(1, over(8), {8.0});
-  const CommandId batch = rig.pulse();
-  rig.run(3);
-  rig.controller.interrupt(0, 3);
-  EXPECT_THAT(rig.run(2), ElementsAre(3.0, 3.0));
-  EXPECT_FALSE(rig.active(0));
-  EXPECT_TRUE(rig.active(1));
-  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::interrupted);
-  EXPECT_EQ(rig.witness.last(batch + 2).iteration, 3);
-  EXPECT_EQ(rig.witness.last(batch + 3).status, Status::interrupted);
-  rig.controller.interrupt(77, 3);  // there is none: nothing happens
-}
-
-TEST(Controller, ABatchIsActiveWhenTakenAndCompletedWhenItsLastCommandHasEnded) {
-  Rig rig(plain_robot(2));
-  rig.add(0, over(5), {1.0});
-  rig.add(1, over(2), {1.0});
-  rig.run(3);
-  const CommandId batch = rig.pulse();
-  rig.run(10);
-  ASSERT_EQ(rig.witness.of(batch).size(), 1U);
-  EXPECT_EQ(rig.witness.last(batch).status, Status::active);
-  EXPECT_EQ(rig.witness.last(batch).iteration, 4);
-  ASSERT_EQ(rig.witness.of(batch + 1).size(), 1U);
-  EXPECT_EQ(rig.witness.last(batch + 1).status, Status::completed);
-  EXPECT_EQ(rig.witness.last(batch + 1).iteration, 8);
 }
 
 TEST(Controller, AnEmptyBatchIsCompletedAtOnce) {
@@ -244,39 +142,6 @@ TEST(Controller, RequestsAreServedInOrderWithTheBatch) {
   EXPECT_EQ(rig.witness.status(batch + 1, 2), Status::completed);
 }
 
-TEST(Controller, ARequestMayBeRejectedByTheDriver) {
-  Rig rig(robot_with_requests());
-  rig.outcome = {Status::rejected, Reason::driver, 0};
-  rig.batch.request(1, {});
-  const CommandId batch = rig.pulse();
-  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::rejected);
-  EXPECT_EQ(rig.witness.last(batch + 2).reason, Reason::driver);
-}
-
-TEST(Controller, AFreshStartPurgesWhatCameBeforeItAndKeepsWhatComesAfter) {
-  Rig rig(robot_with_requests());
-  rig.add(0, over(8), {8.0});
-  const CommandId before = rig.pulse(1);
-  rig.run(2);
-  rig.observe(0, 5.0);
-  rig.fresh_start = true;
-  rig.add(0, over(8), {8.0});
-  rig.batch.request(1, {});
-  rig.add(0, over(2), {7.0});
-  const CommandId batch = rig.pulse(0);
-  EXPECT_EQ(rig.next, 4) << "row 3 is the fresh start";
-  EXPECT_EQ(rig.desired(), 5.0);
-  EXPECT_THAT(rig.run(2), ElementsAre(6.0, 7.0));
-  EXPECT_EQ(rig.witness.last(before + 2, 1).status, Status::purged);
-  EXPECT_EQ(rig.witness.last(before + 2, 1).reason, Reason::fresh_start);
-  EXPECT_EQ(rig.witness.last(before + 2, 1).iteration, 3);
-  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::purged);
-  EXPECT_EQ(rig.witness.last(batch + 3).status, Status::completed);
-  EXPECT_EQ(rig.witness.last(batch + 3).iteration, 3) << "the request bears that of its row";
-  EXPECT_EQ(rig.witness.last(batch + 4).status, Status::completed);
-  EXPECT_EQ(rig.witness.last(batch + 1).iteration, 5);
-}
-
 TEST(Controller, ARestoredStartTakesTheDesiredStateItIsGiven) {
   Rig rig(plain_robot(1));
   rig.observe(0, 1.0);
@@ -305,18 +170,6 @@ TEST(Controller, DroppingALongQueueTellsAThousandStatusesAnIterationEachOfTheDro
   for (const StatusChange& change : rig.witness.changes) EXPECT_EQ(change.iteration, 2);
   EXPECT_EQ(rig.witness.changes.back().id, batch + 1);
   EXPECT_TRUE(rig.all_blocks_back());
-}
-
-TEST(Controller, SeveralFrontendsCommandAtOnceAndTheirIdsNeverClash) {
-  Rig rig(plain_robot(1));
-  rig.add(0, direct(), {1.0});
-  const CommandId mine = rig.pulse(0);
-  rig.add(0, direct(), {2.0});
-  const CommandId theirs = rig.pulse(1);
-  EXPECT_EQ(mine, theirs) << "ids are a lane's own";
-  EXPECT_THAT(rig.run(2), ElementsAre(1.0, 2.0));
-  EXPECT_EQ(rig.witness.last(mine + 2, 0).iteration, 1);
-  EXPECT_EQ(rig.witness.last(theirs + 2, 1).iteration, 2);
 }
 
 TEST(Controller, BlocksAreGivenBackAsSoonAsTheirRecordEnds) {

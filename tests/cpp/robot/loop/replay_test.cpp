@@ -19,10 +19,10 @@ namespace o80::test {
 namespace {
 
 /// A request that runs until the joints are near 0.
-struct Home {
+struct GoHome {
   double speed = 0.05;
 };
-O80_DESCRIBE(Home, speed);
+O80_DESCRIBE(GoHome, speed);
 
 /// Two joints that follow with a lag. The driver halts, interrupts, refuses to resume now and then,
 /// and serves requests of all kinds.
@@ -37,7 +37,7 @@ class Rig {
   };
   using Actuators = std::array<double, 2>;
   using Extended = Sensors;
-  using Requests = o80::Requests<Reset, Snapshot, Restore, Home>;
+  using Requests = o80::Requests<Reset, Snapshot, Restore, GoHome>;
 
   explicit Rig(const Config& config) : config_(config) {}
   void describe(Schema& schema) const {
@@ -91,7 +91,7 @@ class Rig {
     kept_ = unpack<State>(bytes.data());
     return bytes.size() == sizeof(State);
   }
-  Served on(const Home& home) {
+  Served on(const GoHome& home) {
     now_.homes = true;
     now_.speed = home.speed;
     return Served::running();
@@ -113,7 +113,7 @@ class Rig {
   };
 
   void home(Reading<Rig>& reading) {
-    if (!reading.runs<Home>()) {  // a halt has ended it
+    if (!reading.runs<GoHome>()) {  // a halt has ended it
       now_.homes = false;
       return;
     }
@@ -122,7 +122,7 @@ class Rig {
       position -= std::clamp(position, -now_.speed, now_.speed);
       left = std::max(left, std::abs(position));
     }
-    if (left < 0.2) reading.ended<Home>(Served::start_afresh());
+    if (left < 0.2) reading.ended<GoHome>(Served::start_afresh());
   }
 
   Config config_;
@@ -229,7 +229,7 @@ class RandomCommanders {
     if (below(30) == 0) add_request(one, Reset{.seed = below(3)});
     if (below(20) == 0) add_request(one, Snapshot{.slot = 0});
     if (below(20) == 0) add_request(one, Restore{.slot = below(3)});
-    if (below(20) == 0) add_request(one, Home{});
+    if (below(20) == 0) add_request(one, GoHome{});
     PulseOptions options;
     if (below(4) == 0) options.at = one.published() + below(6);
     one.pulse(options);

@@ -56,23 +56,10 @@ TEST_F(BackendTest, TakesABatchWholeForAllActuators) {
 
 // rule B2
 TEST_F(BackendTest, TakesBatchesInTheOrderOfTheirPulsesAcrossFrontends) {
-  StartedStation station;
-  UntypedFrontend one("pair");
-  UntypedFrontend two("pair");
-  std::vector<double> expected;
-  for (int i = 1; i <= 20; ++i) {
-    send(i % 3 == 0 ? one : two, 0, i);
-    expected.push_back(i);
-  }
-  station.run(20);
-  EXPECT_EQ(desired(one, 1, 20), expected) << "direct commands, one an iteration";
-
-  const Batch first = send(two, 0, 100, {.mode = Mode::overwrite});
-  const Batch second = send(one, 0, 200, {.mode = Mode::overwrite});
-  station.run(1);
-  EXPECT_EQ(desired(one.latest()), 200);
-  EXPECT_EQ(first.handle(0).status, Status::overwritten);
-  EXPECT_EQ(second.handle(0).status, Status::completed);
+  play(R"(a = 0 to 1; B: b = 0 to 2; B: b = 0 to 3; a = 0 to 4; B: b = 0 to 5; a = 0 to 6; run 6
+    0 rows 1: 1 2 3 4 5 6  # direct commands, one an iteration
+    B: b = 0 to 100 overwrite; a = 0 to 200 overwrite; run 1; 0 is 200; b overwritten
+    a completed)");
 }
 
 // rule B3
@@ -89,16 +76,7 @@ TEST_F(BackendTest, RejectsABatchWhoseIterationHasBegunUnlessItMayBeLate) {
 
 // rule S2
 TEST_F(BackendTest, NothingIsCompletedBeforeItsRowIsOut) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 1.0);
-  station.before_publish = [&] {
-    EXPECT_FALSE(is_end(batch.handle(0).status)) << "the robot was not even asked";
-    EXPECT_FALSE(batch.ended());
-  };
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
-  EXPECT_TRUE(batch.ended());
+  play("a = 0 to 1; in 1 a queued; in 1 a open; run 1; a completed; a ended 1");
 }
 
 TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
@@ -149,24 +127,48 @@ TEST_F(BackendTest, GivesTheMemoryOfALaneBackForEver) {
   }
 }
 
+// rule C23
 TEST_F(BackendTest, InterruptsAnActuatorInTheIterationUnderWay) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 10.0, {.pace = iterations(10)});
-  add(frontend, 0, 20.0, {.pace = iterations(10)});
-  add(frontend, 1, 10.0, {.pace = iterations(10)});
-  const Batch batch = frontend.pulse();
-  station.run(2);
-  station.before_publish = [&] { station.backend.interrupt(0); };
-  station.run(1);
-  station.before_publish = {};
-  EXPECT_EQ(batch.handle(0).status, Status::interrupted);
-  EXPECT_EQ(batch.handle(0).iteration, 3);
-  EXPECT_EQ(batch.handle(1).status, Status::interrupted);
-  EXPECT_EQ(batch.handle(2).status, Status::active);
-  station.run(2);
-  EXPECT_THAT(desired(frontend, 3, 5), ElementsAre(3, 3, 3)) << "held where it was";
-  EXPECT_THAT(desired(frontend, 3, 5, 1), ElementsAre(3, 4, 5));
+  play(R"(0 to 10 over 10; 0 to 20 over 10; 1 to 10 over 10; a = pulse; in 3 interrupt 0
+    in 3 interrupt 77; run 3  # there is no such actuator
+    a interrupted @3; a.1 interrupted; a.2 active; run 2
+    0 rows 3: 3 3 3; 1 rows 3: 3 4 5  # held where it was)");
+}
+
+// ------------------------------------------------------------------------------ queues
+
+// rule C2
+TEST_F(BackendTest, OverwritingAndPurgesDropWhatIsQueued) {
+  play(R"(0 to 4 over 4; 0 to 2 over 2 overwrite; 0 to 5 over 1; a = pulse; run 3; 0 rows 1: 1 2 5
+    a overwritten @1; a.1 completed @2  # of its own batch too)");
+  play(R"(0 to 4 over 4; 0 to 8 over 4; 1 to 4 over 4; a = pulse; run 2; b = purge 0; run 2
+    0 rows 3: 2 2; 1 is 4; a purged @3; a.1 purged @3; b completed @3; a.2 completed @4; a ended 4
+    c = 1 to 13 over 9; run 1; d = purge; run 1; c purged @6; 1 rows 5: 5 5)");
+  play(R"(0 to 4 over 4; 1 to 4 over 4; purge 0; 0 to 1 over 2; 1 to 0 over 4; a = pulse; run 3
+    0 rows 1: 0.5 1 1; 1 rows 1: 1 2 3; a purged; a.3 completed  # in the order of its batch)");
+}
+
+TEST_F(BackendTest, AFrontendMayPurgeOnlyWhatItSent) {
+  play(R"(a = 0 to 2 over 2; B: 0 to 4 over 2; B: 1 to 4 over 2; B: b = pulse; c = 0 to 9 over 2
+    d = purge own; run 3; 0 rows 1: 2 4 4; 1 rows 1: 2 4; a purged; c purged; b completed
+    b.1 completed)");
+}
+
+/// What a duration leaves of an iteration is owed to the next one of an unbroken queue.
+TEST_F(BackendTest, UntilAndIdlenessAndOverwritingAndTheMinimumResetTheCarry) {
+  play("0 to 1 for 1.4; 0 to 2 for 1.4; a = pulse; run 3; a completed @1; a.1 completed @3");
+  play("a = 0 to 1 for 1.4; run 1; b = 0 to 2 for 1.4; run 2; b completed @3");
+  play("a = 0 to 1 for 1.4; run 2; b = 0 to 2 for 1.4; run 1; b completed @3");
+  play("0 to 1 for 1.4; 0 to 2 until 3; 0 to 1 for 1.4; a = pulse; run 4; a.2 completed @4");
+  play(R"(0 to 1 for 1.4; 0 to 2 over 1 overwrite; 0 to 1 for 1.4; a = pulse; run 2
+    a.2 completed @2)");
+  play("0 to 1 for 1.4; 0 to 2 for 0; 0 to 1 for 1.4; a = pulse; run 3; a.2 completed @3");
+}
+
+// rule C10
+TEST_F(BackendTest, APastUntilIsRejectedAsLateAndTheNextStartsInItsPlace) {
+  play(R"(0 to 3 over 3; 0 to 9 until 2; 0 to 9 until 3; 0 to 5 over 2; a = pulse; run 5
+    0 rows 1: 1 2 3 4 5; a.1 rejected late @4; a.2 rejected late @4; a.3 completed @5)");
 }
 
 // rule O8
@@ -209,36 +211,11 @@ TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
 
 // rule O12
 TEST_F(BackendTest, StartsAfreshInARowOfItsOwn) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  const Batch moving = send(frontend, 1, 9.0, {.pace = iterations(9)});
-  station.run(3);
-  add_request(frontend, Reset{.seed = 5});
-  add(frontend, 1, 1.0);
-  const Batch batch = frontend.pulse();
-  station.run(1);
-  const UntypedObservation fresh = frontend.wait_for(4, kAtOnce);
-  EXPECT_EQ(fresh.head().fresh, 1U);
-  EXPECT_EQ(observed(fresh), 5.0);
-  EXPECT_EQ(desired(fresh), 5.0);
-  EXPECT_EQ(desired(fresh, 1), 0.0);
-  EXPECT_FALSE(fresh.active(1));
-  EXPECT_EQ(moving.handle(0).status, Status::purged);
-  EXPECT_EQ(moving.handle(0).reason, Reason::fresh_start);
-  EXPECT_EQ(moving.handle(0).iteration, 4);
-
-  const UntypedObservation after = frontend.latest();
-  EXPECT_EQ(after.iteration(), 5) << "the count goes on";
-  EXPECT_EQ(after.head().fresh, 0U);
-  EXPECT_EQ(desired(after, 1), 1.0) << "what came with the request acts after it";
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
-  EXPECT_EQ(batch.handle(0).iteration, 4) << "that of the fresh row";
-  EXPECT_EQ(batch.first_iteration(), 4);
-  EXPECT_EQ(batch.last_iteration(), 5);
-}
-
-TEST_F(BackendTest, AloneAFreshStartEndsItsBatchInItsOwnRow) {
-  play("a = reset 5; run 1; a ended 1; 0 rows 1: 5");
+  play(R"(moving = 1 to 9 over 9; run 3; 0 to 8 over 8; reset 5; 1 to 1; a = pulse; run 1
+    row 4 fresh; 0 rows 4: 5; 1 rows 4: 0; moving purged fresh_start @4
+    last 5; row 5 free  # the count goes on
+    1 is 1; a purged; a.1 completed @4; a.2 completed; a taken 4; a ended 5  # it acts afterwards
+    b = reset 5; run 1; b ended 6)");
 }
 
 TEST_F(BackendTest, ItsPhaseFollowsStepPublishBrakeAndEnd) {
@@ -264,16 +241,10 @@ TEST_F(BackendTest, ItsPhaseFollowsStepPublishBrakeAndEnd) {
 }
 
 TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {
-  std::optional<Station> station(std::in_place);
-  station->start();
+  std::optional<Trace> trace(std::in_place, BackendOptions{.segment = "pair"});
+  trace->play("a = break; ends; fails the arm fell off; a rejected; a says the arm fell off");
   UntypedFrontend frontend("pair");
-  add_request<Break>(frontend);
-  const Batch batch = frontend.pulse();
-  EXPECT_EQ(station->iterate(), Step::ended);
-  EXPECT_EQ(station->backend.failure(), "the arm fell off");
-  station.reset();
-  EXPECT_EQ(batch.handle(0).status, Status::rejected);
-  EXPECT_EQ(batch.handle(0).text, "the arm fell off");
+  trace.reset();
   EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(9, kPatience); }),
               HasSubstr("the arm fell off"));
 }
@@ -282,23 +253,9 @@ TEST_F(BackendTest, EndsAsFailedWhenARequestBreaksIt) {
 
 // rule S6
 TEST_F(BackendTest, EndsEveryCommandWhenItStops) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 1.0, {.pace = iterations(50)});
-  add(frontend, 0, 2.0, {.pace = iterations(50)});
-  const Batch running = frontend.pulse();
-  add(frontend, 1, 1.0);
-  const Batch scheduled = frontend.pulse({.at = 90});
-  station.run(2);
-  station.backend.end(BackendState::stopped);
-  EXPECT_EQ(running.handle(0).status, Status::purged);
-  EXPECT_EQ(running.handle(0).reason, Reason::stopped);
-  EXPECT_EQ(running.handle(1).status, Status::purged);
-  EXPECT_EQ(scheduled.handle(0).status, Status::rejected);
-  EXPECT_EQ(scheduled.handle(0).reason, Reason::stopped);
-  EXPECT_THROW(running.wait(kPatience), BackendStopped);
-  EXPECT_THROW(scheduled.wait(kPatience), BackendStopped);
-  EXPECT_THROW(send(frontend, 0, 1.0), BackendStopped);
+  play(R"(0 to 1 over 50; 0 to 2 over 50; a = pulse; b = 1 to 1 at 90; run 2; end stopped
+    a purged stopped; a.1 purged; b rejected stopped; a raises BackendStopped
+    b raises BackendStopped)");
 }
 
 }  // namespace

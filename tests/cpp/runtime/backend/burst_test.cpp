@@ -1,7 +1,7 @@
 #include <atomic>
 
 #include "memory/child_process.hpp"
-#include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
@@ -10,7 +10,13 @@ using ::testing::ElementsAre;
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 
-class BurstTest : public StationTest {};
+class BurstTest : public StationTest {
+ protected:
+  /// Plays a trace of a bursting backend.
+  static void play(const std::string& script) {
+    test::play({.segment = "pair", .bursting = true}, script);
+  }
+};
 
 /// A burst of thousands of millions is under way.
 void wait_until_it_runs(const UntypedFrontend& frontend) {
@@ -26,29 +32,15 @@ TEST_F(BurstTest, RunsExactlyAsManyIterationsAndReturnsTheLastRow) {
   EXPECT_EQ(frontend.published(), 8);
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.wait_for(9, kAtOnce); }),
               HasSubstr("waits for a burst"));
+  EXPECT_THROW(frontend.burst(0, std::nullopt), InvalidArgument);
+  EXPECT_THROW(frontend.burst(-3, std::nullopt), InvalidArgument);
 }
 
 // rule G2
 TEST_F(BurstTest, WhatIsSentWithItActsFromItsFirstIteration) {
-  BurstingStation bursting;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 3.0, {.pace = iterations(3)});
-  const UntypedObservation row = frontend.burst(2, kPatience);
-  EXPECT_EQ(desired(row), 2.0);
-  EXPECT_EQ(observed(row), 2.0) << "the state after the action";
-  EXPECT_EQ(desired(frontend.burst(5, kPatience)), 3.0);
-}
-
-TEST_F(BurstTest, WhatIsSentWithItMayActFromALaterIterationOfIt) {
-  BurstingStation bursting;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 3.0);
-  frontend.burst(4, kPatience, {}, {.at = 3});
-  EXPECT_THAT(desired(frontend, 1, 4), ElementsAre(0, 0, 3, 3));
-  add(frontend, 0, 5.0);
-  EXPECT_THAT(message_of<Error>([&] { frontend.burst(4, kPatience, {}, {.at = 3}); }),
-              HasSubstr("after the iteration for which it was sent"));
-  EXPECT_EQ(frontend.published(), 4) << "what is rejected does not burst";
+  play("0 to 3 over 3; a = burst 2; drive; 0 rows 1: 1 2; b = burst 5; drive; 0 is 3");
+  play(R"(0 to 3; a = burst 4 at 3; drive; 0 rows 1: 0 0 3 3
+    0 to 5; b = burst 4 at 3; drive; b rejected late; last 4  # what is rejected does not burst)");
 }
 
 TEST_F(BurstTest, GivesAllItsRowsIfAsked) {
@@ -75,33 +67,14 @@ TEST_F(BurstTest, OfMoreRowsThanTheHistoryKeepsIsAnErrorAtOnce) {
 
 // rule G2
 TEST_F(BurstTest, NothingSentLaterActsInIt) {
-  StartedStation station({.segment = "pair", .bursting = true});
-  UntypedFrontend one("pair");
-  UntypedFrontend two("pair");
-  const Burst burst = one.start_burst(3);
-  const Batch later = send(two, 0, 1.0);
-  EXPECT_EQ(station.drive(), Step::standing);
-  EXPECT_THAT(desired(one, 1, 3), ElementsAre(0, 0, 0));
-  EXPECT_EQ(burst.wait_done(kAtOnce), 3);
-  EXPECT_EQ(later.first_iteration(), 4) << "taken while it stands still";
-  one.start_burst(1);
-  station.drive();
-  EXPECT_EQ(desired(one.latest()), 1.0);
+  play(R"(a = burst 3; B: b = 0 to 1; drive; 0 rows 1: 0 0 0; a done 3
+    b taken 4  # while it stands still
+    burst 1; 0 is 1)");
 }
 
 TEST_F(BurstTest, TwoFrontendsBurstOneAfterTheOther) {
-  StartedStation station({.segment = "pair", .bursting = true});
-  UntypedFrontend one("pair");
-  UntypedFrontend two("pair");
-  add(one, 0, 1.0);
-  const Burst first = one.start_burst(2);
-  add(two, 0, 2.0);
-  const Burst second = two.start_burst(3);
-  station.drive();
-  EXPECT_EQ(first.wait_done(kAtOnce), 2);
-  EXPECT_EQ(second.wait_done(kAtOnce), 5);
-  EXPECT_THAT(desired(one, 1, 5), ElementsAre(1, 1, 2, 2, 2));
-  EXPECT_TRUE(first.done());
+  play(R"(0 to 1; a = burst 2; B: 0 to 2; B: b = burst 3; drive; a done 2; b done 5
+    0 rows 1: 1 1 2 2 2)");
 }
 
 TEST_F(BurstTest, StagesAllThatWasSentBeforeIt) {
@@ -119,28 +92,13 @@ TEST_F(BurstTest, StagesAllThatWasSentBeforeIt) {
 
 // rule G4
 TEST_F(BurstTest, AMovementIsBurstToItsEnd) {
-  BurstingStation bursting;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 1.0, {.pace = iterations(500)});
-  add(frontend, 1, 1.0, {.pace = duration(std::chrono::milliseconds(700))});
-  const UntypedObservation row = frontend.pulse_and_wait(kPatience);
-  EXPECT_EQ(row.iteration(), 700);
-  EXPECT_EQ(desired(row, 1), 1.0);
-  EXPECT_EQ(frontend.published(), 700) << "and no further";
+  play("0 to 1 over 500; 1 to 1 over 700; a = to end; drive; a ended 700; 1 is 1; last 700");
 }
 
 TEST_F(BurstTest, ABatchThatEndsWithoutMotionNeedsNoIteration) {
-  BurstingStation bursting;
-  UntypedFrontend frontend("pair");
-  frontend.burst(3, kPatience);
-  frontend.add_purge();
-  EXPECT_EQ(frontend.pulse_and_wait(kPatience).iteration(), 3);
-  add_request(frontend, Reset{.seed = 4});
-  const UntypedObservation fresh = frontend.pulse_and_wait(kPatience);
-  EXPECT_EQ(fresh.iteration(), 4);
-  EXPECT_EQ(fresh.head().fresh, 1U);
-  EXPECT_EQ(observed(fresh), 4.0);
-  EXPECT_EQ(frontend.burst(2, kPatience).iteration(), 6) << "the fresh row was none of them";
+  play(R"(burst 3; purge; a = to end; drive; a completed; last 3
+    reset 4; b = to end; drive; b ended 4; row 4 fresh; 0 is 4
+    c = burst 2; drive; c done 6  # the fresh row was none of them)");
 }
 
 TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
@@ -174,25 +132,9 @@ TEST_F(BurstTest, OfABackendWithAClockOfItsOwnIsAnErrorAtOnce) {
   EXPECT_THROW(burst(group, std::nullopt), NotBursting);
 }
 
-TEST_F(BurstTest, OfNoIterationIsAnErrorAtOnce) {
-  BurstingStation bursting;
-  UntypedFrontend frontend("pair");
-  EXPECT_THROW(frontend.burst(0, std::nullopt), InvalidArgument);
-  EXPECT_THROW(frontend.burst(-3, std::nullopt), InvalidArgument);
-}
-
 TEST_F(BurstTest, OfAFrontendWithoutControlIsRejected) {
-  BurstingStation bursting;
-  UntypedFrontend holder("pair");
-  UntypedFrontend other("pair");
-  holder.add_take_control();
-  holder.pulse_and_wait(kPatience);
-  EXPECT_THAT(message_of<Error>([&] { other.burst(1, kPatience); }),
-              HasSubstr("has exclusive control"));
-  const Burst rejected = other.start_burst(1);
-  EXPECT_EQ(rejected.wait_done(kPatience), -1);
-  EXPECT_TRUE(rejected.done());
-  EXPECT_EQ(holder.burst(1, kPatience).iteration(), 1);
+  play(R"(take; a = to end; drive; B: b = burst 1; drive; b done -1; B: 0 to 1; B: c = burst 1
+    drive; c rejected exclusive; c says has exclusive control; d = burst 1; drive; d done 1)");
 }
 
 TEST_F(BurstTest, OfAGroupLetsAllRunBeforeItWaits) {
@@ -285,7 +227,7 @@ TEST_F(BurstTest, AFrontendThatDiesInABurstLeavesTheBackendUsable) {
 
 // rule G6
 TEST_F(BurstTest, TwoRunsOfTheSameScriptGiveHistoriesIdenticalBitForBit) {
-  const auto play = [] {
+  const auto history = [] {
     BurstingStation bursting;
     UntypedFrontend frontend("pair");
     for (int i = 0; i < 20; ++i) {
@@ -295,8 +237,8 @@ TEST_F(BurstTest, TwoRunsOfTheSameScriptGiveHistoriesIdenticalBitForBit) {
     }
     return frontend.history(1'000'000).bytes;
   };
-  const std::vector<std::byte> once = play();
-  const std::vector<std::byte> again = play();
+  const std::vector<std::byte> once = history();
+  const std::vector<std::byte> again = history();
   ASSERT_GT(once.size(), 0U);
   EXPECT_EQ(once, again);
 }
@@ -311,15 +253,7 @@ TEST_F(BurstTest, AStepWithinATimeGivesUpStanding) {
 }
 
 TEST_F(BurstTest, ThatIsCutIsDoneAndTheNextOneBegins) {
-  StartedStation station({.segment = "pair", .bursting = true});
-  UntypedFrontend frontend("pair");
-  const Burst first = frontend.start_burst(100);
-  const Burst second = frontend.start_burst(2);
-  station.run(3);
-  station.backend.cut_burst();
-  EXPECT_EQ(first.wait(kAtOnce).iteration(), 3);
-  EXPECT_EQ(station.drive(), Step::standing);
-  EXPECT_EQ(second.wait(kAtOnce).iteration(), 5);
+  play("a = burst 100; b = burst 2; run 3; cut; a done 3; drive; b done 5");
 }
 
 }  // namespace

@@ -17,12 +17,14 @@
 #include "runtime/frontend/link.hpp"
 #include "runtime/frontend/loop_state.hpp"
 #include "runtime/liar.hpp"
-#include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::HasSubstr;
+
+using ExpressTraces = StationTest;
 
 class ExpressTest : public StationTest {
  protected:
@@ -170,41 +172,15 @@ TEST_F(ExpressTest, AResumeWaitsForWhatWasSentBeforeIt) {
   }
 }
 
-TEST_F(ExpressTest, APurgeEndsWhatWaitsForALaterIterationIfItWasSentBefore) {
-  UntypedFrontend one("pair");
-  UntypedFrontend two("pair");
-  add(one, 0, 1.0);
-  add(one, 1, 1.0);
-  const Batch before = one.pulse({.at = 5});
-  two.add_purge(0);
-  two.pulse();
-  add(one, 0, 2.0);
-  const Batch after = one.pulse({.at = 6});
-  station.run(8);
-  EXPECT_EQ(before.handle(0).status, Status::purged);
-  EXPECT_EQ(before.handle(0).iteration, 5) << "when it would have acted";
-  EXPECT_EQ(before.handle(1).status, Status::completed);
-  EXPECT_EQ(after.handle(0).status, Status::completed);
+TEST_F(ExpressTraces, APurgeEndsWhatWaitsForALaterIterationIfItWasSentBefore) {
+  play(R"(0 to 1; 1 to 1; a = pulse at 5; B: b = purge 0; c = 0 to 2 at 6; run 8
+    a purged @5; a.1 completed; c completed  # when it would have acted)");
 }
 
 // rule B4
-TEST_F(ExpressTest, WhoMayCommandIsDecidedWhenABatchActs) {
-  UntypedFrontend one("pair");
-  UntypedFrontend two("pair");
-  one.add_take_control();
-  one.pulse();
-  station.run(1);
-  add(two, 0, 1.0);
-  const Batch later = two.pulse({.at = 6});
-  add(two, 1, 1.0);
-  const Batch sooner = two.pulse({.at = 3});
-  station.run(3);
-  EXPECT_EQ(sooner.handle(0).reason, Reason::exclusive);
-  EXPECT_EQ(sooner.handle(0).iteration, 3);
-  one.add_release_control();
-  one.pulse();
-  station.run(4);
-  EXPECT_EQ(later.handle(0).status, Status::completed);
+TEST_F(ExpressTraces, WhoMayCommandIsDecidedWhenABatchActs) {
+  play(R"(take; a = pulse; run 1; B: later = 0 to 1 at 6; B: sooner = 1 to 1 at 3; run 3
+    sooner rejected exclusive @3; a = release; run 4; later completed)");
 }
 
 // ------------------------------------------------------------------------------ refused in pulse
@@ -260,36 +236,17 @@ TEST_F(ExpressTest, ABackendRejectsWhatASenderPutsIntoItsScheduleBeyondThat) {
   EXPECT_EQ(static_cast<Reason>(word(ids.back()).reason), Reason::full);
 }
 
-TEST_F(ExpressTest, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayBe) {
-  UntypedFrontend one("pair");
-  const auto flood_at = [&](UntypedFrontend& frontend, PulseOptions::Late late) {
-    std::vector<Batch> batches;
-    for (std::uint32_t i = 0; i < kMaxScheduledAt; ++i) {
-      for (std::uint32_t request = 0; request < 4; ++request) add_request<Snapshot>(frontend);
-      batches.push_back(frontend.pulse({.at = 20, .late = late}));
-    }
-    return batches;
-  };
+TEST_F(ExpressTraces, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayActInALaterOne) {
   // eight requests an iteration: two of these batches
-  const std::vector<Batch> strict = flood_at(one, PulseOptions::Late::reject);
-  station.run(30);
-  EXPECT_EQ(strict[1].first_iteration(), 20);
-  EXPECT_EQ(strict[1].handle(0).status, Status::completed);
-  EXPECT_EQ(strict[2].handle(0).reason, Reason::late);
-}
-
-TEST_F(ExpressTest, WhatMayBeLateActsInOrderInTheIterationsThatFollow) {
-  UntypedFrontend one("pair");
-  std::vector<Batch> batches;
-  for (std::uint32_t i = 0; i < 6; ++i) {
-    for (std::uint32_t request = 0; request < 4; ++request) add_request<Snapshot>(one);
-    batches.push_back(one.pulse({.at = 20, .late = PulseOptions::Late::now}));
+  const std::string four = "snapshot; snapshot; snapshot; snapshot;";
+  play(four + "a = pulse at 20;" + four + "b = pulse at 20;" + four + R"(c = pulse at 20; run 30
+    b taken 20; b completed; c rejected late)");
+  std::string late, taken;
+  for (int i = 0; i < 6; ++i) {
+    late += four + "b" + std::to_string(i) + " = pulse at 20 late;";
+    taken += "; b" + std::to_string(i) + " taken " + std::to_string(20 + i / 2);
   }
-  station.run(30);
-  for (std::size_t i = 0; i < batches.size(); ++i) {
-    EXPECT_EQ(batches[i].first_iteration(), 20 + static_cast<Iteration>(i / 2));
-    EXPECT_EQ(batches[i].handle(0).status, Status::completed);
-  }
+  play(late + "run 30" + taken + "; b5 completed");
 }
 
 // ------------------------------------------------------------------------------ ids

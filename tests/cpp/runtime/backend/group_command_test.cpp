@@ -25,8 +25,9 @@ std::uint32_t add_both(UntypedFrontend& frontend, double shoulder, double elbow,
 
 class GroupCommandTest : public StationTest {};
 
+// rule C21
 TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
-  play(R"(a = 0,1 to 2 4 over 2; run 1; a active; run 1; a completed @2; a ended 2
+  play(R"(a = 0,1 to 2 4 over 2; run 1; a active @1; run 1; a completed @2; a ended 2
     0 rows 1: 1 2; 1 rows 1: 2 4)");
 }
 
@@ -129,6 +130,35 @@ TEST_F(GroupCommandTest, EndsAtOnceWhenAllItsMembersDo) {
   }
 }
 
+// rule C22
+TEST_F(GroupCommandTest, ContinuesWithoutADroppedMember) {
+  for (const std::string end : {"in 2 interrupt 1; run 1; a active; run 3; a interrupted @5",
+                                "run 1; b = purge 1; run 1; a active; run 2; a purged @5",
+                                "run 1; b = 1 to 1 over 1 overwrite; run 3; a overwritten @5"}) {
+    play("a = 0,1 to 5 5 over 5; run 1;" + end + "; 0 is 5; run 1; a ended 5");
+  }
+}
+
+TEST_F(GroupCommandTest, BeginsWithAllItsMembersOrWithoutOneThatWasDropped) {
+  play(R"(1 to 9 over 100; 0,1 to 2 2 over 2; a = pulse; run 3; 0 is 0; b = purge 1; run 2; 0 is 2
+    a.1 purged)");
+}
+
+TEST_F(GroupCommandTest, TakesAsLongAsTheLimitsOfItsSlowestMember) {
+  play({.segment = "pair"}, R"(a = 0,1 to 1 1 over 2; run 5; 0 is 0.5; 1 is 0.5; run 5; 0 is 1
+    1 is 1; a completed limits @10)",
+       [](Schema& schema) { schema.actuator(1).limits({.speed = 100.0}); });
+}
+
+TEST_F(GroupCommandTest, DurationsOfItsMembersOweTheSameRounding) {
+  play(R"(0 to 1 for 1.4; 1 to 1 over 1  # an iteration, 0.4 owed
+    0,1 to 2 2 for 2.2; a = pulse; run 4; a.2 completed @4; 0 is 2; 1 is 2)");
+}
+
+TEST_F(GroupCommandTest, IsLateWhenItsMembersAre) {
+  play("0 to 5 over 5; 0,1 to 9 9 until 3; a = pulse; run 8; 0 is 5; 1 is 0; a.1 rejected late");
+}
+
 TEST_F(GroupCommandTest, EndsWithItsFrontendIfToldSo) {
   play({.segment = "pair", .stale = Stale::purge, .silence = 5},
        "a = 0,1 to 100 100 over 100; run 20; a purged silence");
@@ -137,14 +167,8 @@ TEST_F(GroupCommandTest, EndsWithItsFrontendIfToldSo) {
 // ------------------------------------------------------------------------------ bursting
 
 TEST_F(GroupCommandTest, ABurstUntilItsEndRunsUntilItsLastMemberHasEnded) {
-  StartedStation station({.segment = "pair", .bursting = true});
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 3.0, {.pace = iterations(3)});
-  add_both(frontend, 4.0, 2.0, {.pace = iterations(2)});
-  const Batch batch = frontend.pulse_to_end();
-  EXPECT_EQ(station.drive(), Step::standing);
-  EXPECT_TRUE(batch.ended());
-  EXPECT_EQ(frontend.published(), 5);
+  play({.segment = "pair", .bursting = true},
+       "0 to 3 over 3; 0,1 to 4 2 over 2; a = to end; drive; a ended 5; last 5");
 }
 
 TEST_F(GroupCommandTest, BeginsAtTheSameIterationHoweverLongTheBackendStoodBefore) {

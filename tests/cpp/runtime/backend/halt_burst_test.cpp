@@ -1,65 +1,39 @@
 // Halts of a backend that bursts.
 
-#include <gmock/gmock.h>
-
-#include "o80/base/error.hpp"
-#include "runtime/station.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
 
-using ::testing::AllOf;
-using ::testing::HasSubstr;
 using HaltBurstTest = StationTest;
+
+void play_bursts(const std::string& script) { play({.segment = "pair", .bursting = true}, script); }
 
 // rule H5
 TEST_F(HaltBurstTest, AHaltEndsABurstAfterTheIterationUnderWay) {
-  for (const bool to_end : {false, true}) {
-    BurstingStation bursting("pair", [](Station& station) {
-      station.before_publish = [&station] {
-        if (station.backend.iteration() == 5) station.backend.halt(HaltCause::driver, "five");
-      };
-    });
-    UntypedFrontend frontend("pair");
-    add(frontend, 0, 100.0, {.pace = iterations(100)});
-    const auto burst = [&] {
-      to_end ? frontend.pulse_and_wait(kPatience) : frontend.burst(100, kPatience);
-    };
-    EXPECT_THAT(message_of<BackendHalted>(burst),
-                AllOf(HasSubstr(to_end ? "" : "ended in iteration 5"), HasSubstr("five")));
-    EXPECT_EQ(frontend.published(), 5);
-    ASSERT_TRUE(frontend.halted());
-    EXPECT_EQ(frontend.halted()->iteration, 6) << "the next one, that has not begun";
+  for (const std::string sent : {"a = to end", "a = burst 100"}) {
+    play_bursts("0 to 100 over 100;" + sent + R"(; in 5 driver halts five; drive
+      last 5; halted driver @6 why five; a halted  # in the next one, that has not begun)");
   }
+  BurstingStation bursting("pair", [](Station& station) {
+    station.before_publish = [&station] {
+      if (station.backend.iteration() == 5) station.backend.halt(HaltCause::driver, "five");
+    };
+  });
+  EXPECT_THAT(
+      message_of<BackendHalted>([] { UntypedFrontend("pair").burst(100, kPatience); }),
+      ::testing::AllOf(::testing::HasSubstr("ended in iteration 5"), ::testing::HasSubstr("five")));
 }
 
 // rule H7
 TEST_F(HaltBurstTest, BurstsAreServedWhileHalted) {
-  BurstingStation bursting;
-  UntypedFrontend frontend("pair");
-  frontend.halt("");
-  const auto row = frontend.burst(3, kPatience);
-  EXPECT_EQ(row.iteration(), 3);
-  EXPECT_EQ(row.head().halted, 1U);
-  add(frontend, 0, 1.0);
-  EXPECT_THAT(message_of<BackendHalted>([&] { frontend.burst(1, kPatience); }),
-              HasSubstr("rejected"));
-  EXPECT_EQ(frontend.published(), 3);
-  frontend.resume(frontend.halted()->number, kPatience);
-  EXPECT_FALSE(frontend.halted());
-  add(frontend, 0, 1.0);
-  EXPECT_EQ(desired(frontend.burst(1, kPatience)), 1.0);
+  play_bursts(R"(halt; a = burst 3; drive; a done 3; row 3 halted; 0 to 1; b = burst 1; drive
+    b rejected halted; last 3; r = resume 1; drive; r completed; running
+    0 to 1; c = burst 1; drive; c done 5; 0 is 1)");
 }
 
 TEST_F(HaltBurstTest, AHaltIsSeenByABackendThatStandsStill) {
-  BurstingStation bursting;
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 9.0, {.pace = iterations(9)});
-  frontend.burst(2, kPatience);
-  const Batch waiting = send(frontend, 0, 3.0);
-  frontend.halt("");
-  EXPECT_THROW(waiting.wait(kPatience), BackendHalted);
-  EXPECT_EQ(waiting.handle(0).status, Status::halted);
+  play_bursts("0 to 9 over 9; burst 2; a = 0 to 3; halt; drive; a halted; a raises BackendHalted");
 }
 
 }  // namespace

@@ -20,35 +20,17 @@ std::uint32_t halted_in_row(const UntypedFrontend& frontend, Iteration k) {
 
 // rules H3, H6
 TEST_F(HaltTest, ActsInTheFirstStepBegunAfterIt) {
-  StartedStation station;
-  UntypedFrontend commander("pair");
-  UntypedFrontend other("pair");
-  add(commander, 0, 10.0, {.pace = iterations(10)});
-  add(commander, 0, 20.0);
-  const Batch batch = commander.pulse();
-  station.run(3);
-  const std::uint64_t number = other.halt("the ball is on the floor");
-  EXPECT_EQ(number, 1U);
-  ASSERT_TRUE(other.halted());
-  EXPECT_EQ(other.halted()->iteration, -1) << "asked for, not acting yet";
-  station.run(2);
-  EXPECT_EQ(batch.handle(0).status, Status::halted);
-  EXPECT_EQ(batch.handle(0).iteration, 4);
-  EXPECT_EQ(batch.handle(1).status, Status::halted);
-  EXPECT_THAT(desired(commander, 3, 5), ::testing::Each(desired(commander.wait_for(3, kAtOnce))))
-      << "a position without limits stops in one iteration";
-  EXPECT_EQ(halted_in_row(other, 3), 0U);
-  EXPECT_EQ(halted_in_row(other, 4), 1U);
-  EXPECT_EQ(halted_in_row(other, 5), 1U);
+  Trace trace({.segment = "pair"});
+  trace.play(R"(0 to 10 over 10; 0 to 20; a = pulse; run 3; B: halt the ball is on the floor
+    halted @-1; run 2; a halted @4; a.1 halted  # requested, not acting yet; then in force
+    0 rows 3: 3 3 3  # a position without limits stops in one iteration
+    row 3 free; row 4 halted; row 5 halted; halted frontend @4 why the ball is on the floor)");
   for (const FrontendOptions& options : {FrontendOptions{}, {.access = Access::read_only}}) {
-    const UntypedFrontend reader("pair", options);
-    const auto halt = reader.halted();
+    const auto halt = UntypedFrontend("pair", options).halted();
     ASSERT_TRUE(halt);
-    EXPECT_EQ(halt->number, number);
-    EXPECT_EQ(halt->cause, HaltCause::frontend);
+    EXPECT_EQ(halt->number, 1U);
     EXPECT_EQ(halt->iteration, 4);
     EXPECT_THAT(std::string(halt->who_text()), HasSubstr("pid " + std::to_string(getpid())));
-    EXPECT_EQ(halt->reason(), "the ball is on the floor");
   }
 }
 
@@ -61,58 +43,26 @@ TEST_F(HaltTest, AReadOnlyFrontendMayNotHalt) {
 
 // rule H7
 TEST_F(HaltTest, CommandsAreRejectedWithCauseIterationAndWho) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  frontend.halt("enough");
-  station.run(1);
-  const Batch batch = send(frontend, 0, 5.0);
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::rejected);
-  EXPECT_EQ(batch.handle(0).reason, Reason::halted);
-  EXPECT_THAT(batch.handle(0).text,
-              AllOf(HasSubstr("since iteration 1"), HasSubstr("cause frontend"),
-                    HasSubstr("pid " + std::to_string(getpid())), HasSubstr("enough")));
-  EXPECT_THROW(frontend.wait_for_end(batch, kPatience), BackendHalted);
-  EXPECT_EQ(desired(frontend.latest()), 0.0);
+  play(R"(halt enough; run 1; a = 0 to 5; run 1; a rejected halted; a says since iteration 1
+    a says cause frontend; a says enough; a says pid )" +
+       std::to_string(getpid()) + "; a raises BackendHalted; 0 is 0");
 }
 
 TEST_F(HaltTest, NoRequestIsServedThatWasSentAfterAHaltInTheSameStep) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  Batch request;
-  station.on_refuse = [&] {
-    frontend.halt("in the middle of a step");
-    add_request(frontend, Break{});
-    request = frontend.pulse();
-  };
-  add_request(frontend, Refuse{});
-  const Batch scheduled = frontend.pulse({.at = 2});
-  station.run(2);
-  EXPECT_EQ(request.handle(0).status, Status::halted);
+  play("while refused halt; while refused a = break; b = refuse at 2; run 2; a halted");
 }
 
 // rule H4
 TEST_F(HaltTest, EndsWhatWasSentBeforeItWhereverItIs) {
-  StartedStation station;
+  Trace trace({.segment = "pair"});
+  trace.play("a = 0 to 9 over 9; b = 1 to 1 at 20");
   UntypedFrontend frontend("pair");
-  const Batch running = send(frontend, 0, 9.0, {.pace = iterations(9)});
-  add(frontend, 1, 1.0);
-  const Batch scheduled = frontend.pulse({.at = 20});
   // so large that it is staged over several iterations
   for (int i = 0; i < 3000; ++i) add(frontend, 1, i);
   const Batch large = frontend.pulse();
-  station.run(2);
-  const Batch in_the_lane = send(frontend, 1, 7.0);
-  frontend.halt("");
-  station.run(1);
-  EXPECT_EQ(running.handle(0).status, Status::halted);
-  EXPECT_EQ(scheduled.handle(0).status, Status::halted);
-  EXPECT_EQ(scheduled.handle(0).iteration, 3);
-  station.run(20);
-  EXPECT_EQ(in_the_lane.handle(0).status, Status::halted);
+  trace.play(R"(run 2; c = 1 to 7; halt; run 1; a halted; b halted @3; run 20; c halted; 1 is 0)");
   EXPECT_EQ(large.handle(0).status, Status::halted);
   EXPECT_EQ(large.handle(2999).status, Status::halted);
-  EXPECT_EQ(desired(frontend.latest(), 1), 0.0);
 }
 
 TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
@@ -172,93 +122,36 @@ TEST_F(HaltTest, IsLatchedBeforeRowZero) {
 }
 
 TEST_F(HaltTest, IsTheBackendsOwnTooAndOnceForEachCause) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  for (int i = 0; i < 3; ++i) {
-    station.backend.halt(HaltCause::driver, "motor 3 is hot");
-    station.run(1);
-  }
-  const auto halt = frontend.halted();
-  ASSERT_TRUE(halt);
-  EXPECT_EQ(halt->number, 1U);
-  EXPECT_EQ(halt->cause, HaltCause::driver);
-  EXPECT_EQ(halt->who_text(), "");
-  EXPECT_EQ(halt->reason(), "motor 3 is hot");
+  play(R"(driver halts motor 3 is hot; run 1; driver halts motor 3 is hot; run 1
+    halted driver @1 why motor 3 is hot; r = resume 1; run 1; running)");
 }
 
 // rule H8
 TEST_F(HaltTest, OfTheBackendForAnotherReasonIsAnotherOne) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  station.backend.halt(HaltCause::driver, "the belt slipped");
-  station.run(1);
-  ASSERT_EQ(frontend.halted()->number, 1U);
-  for (int i = 0; i < 3; ++i) {
-    station.backend.halt(HaltCause::driver, "a person is in the cell");
-    station.run(1);
-    EXPECT_EQ(frontend.halted()->number, 2U);
-    EXPECT_EQ(frontend.halted()->reason(), "a person is in the cell");
-  }
-  const Batch resume = send_resume(frontend, 1);
-  station.run(1);
-  EXPECT_EQ(resume.handle(0).status, Status::rejected);
-  EXPECT_THAT(resume.handle(0).text, HasSubstr("halt 2 came after it"));
+  play(R"(driver halts the belt slipped; run 1; driver halts a person; run 1; driver halts a person
+    run 1; halted driver @2 why a person; r = resume 1; run 1; r rejected
+    r says halt 2 came after it)");
 }
 
 TEST_F(HaltTest, AStatusBearsNoReasonOfALaterHalt) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  const auto ended_by = [&](const char* why) {
-    const Batch batch = send(frontend, 0, 9.0, {.pace = iterations(9)});
-    station.run(2);
-    frontend.halt(why);
-    station.run(1);
-    return batch;
-  };
-  const Batch first = ended_by("the first");
-  const Batch refused = send(frontend, 0, 1.0);
-  station.run(1);
-  send_resume(frontend, 1);
-  station.run(1);
-  const Batch second = ended_by("the second");
-  for (const Handle& handle : {first.handle(0), refused.handle(0)}) {
-    EXPECT_EQ(handle.reason, Reason::halted);
-    EXPECT_EQ(handle.text, "the backend was halted") << "by which one is no longer known";
-  }
-  EXPECT_THAT(second.handle(0).text, HasSubstr("the second"));
-  // asked for, and not acting yet: it has ended nothing
-  frontend.halt("the third");
-  const Batch third = send(frontend, 0, 1.0);
-  EXPECT_EQ(third.handle(0).status, Status::queued);
-  station.run(1);
-  EXPECT_THAT(third.handle(0).text, HasSubstr("the third"));
+  play(R"(a = 0 to 9 over 9; run 2; halt the first; run 1; b = 0 to 1; run 1; r = resume 1; run 1
+    c = 0 to 9 over 9; run 2; halt the second; run 1
+    a halted halted; a says the backend was halted  # by which one is no longer known
+    b rejected halted; b says the backend was halted; c says the second
+    halt the third; d = 0 to 1; d queued; run 1; d says the third  # not acting before the step)");
 }
 
 // rule L8
 TEST_F(HaltTest, ARobotThatIsNotWhereItShouldBeHalts) {
-  StartedStation station({.segment = "pair"},
-                         [](Schema& schema) { schema.actuator(1).limits({.error = 0.25}); });
-  UntypedFrontend frontend("pair");
-  station.before_publish = [&] {
-    if (station.backend.iteration() == 3) station.now[1] = 0.75;  // it hit something
-  };
-  const Batch batch = send(frontend, 1, 1.0, {.pace = iterations(10)});
-  station.run(4);
-  ASSERT_TRUE(frontend.halted());
-  EXPECT_EQ(frontend.halted()->cause, HaltCause::error);
-  EXPECT_EQ(frontend.halted()->iteration, 3 + 1);
-  EXPECT_THAT(std::string(frontend.halted()->reason()),
-              AllOf(HasSubstr("actuator 'elbow'"), HasSubstr("observed at 0.75"),
-                    HasSubstr("desired at 0.3"), HasSubstr("0.25")));
-  EXPECT_EQ(batch.handle(0).status, Status::halted);
+  play({.segment = "pair"},
+       R"(a = 1 to 1 over 10; in 3 read 1 0.75; run 4; halted error @4; a halted
+    a says observed at 0.75; a says desired at 0.3)",
+       [](Schema& schema) { schema.actuator(1).limits({.error = 0.25}); });
 }
 
 TEST_F(HaltTest, AReadingThatIsNoNumberHaltsWhereThereIsAnErrorLimit) {
-  StartedStation station({.segment = "pair"},
-                         [](Schema& schema) { schema.actuator(1).limits({.error = 1e9}); });
-  station.before_publish = [&] { station.now[1] = std::nan(""); };
-  station.run(2);
-  EXPECT_TRUE(UntypedFrontend("pair").halted());
+  play({.segment = "pair"}, "in 1 read 1 nan; run 2; halted error",
+       [](Schema& schema) { schema.actuator(1).limits({.error = 1e9}); });
 }
 
 }  // namespace

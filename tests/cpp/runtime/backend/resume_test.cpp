@@ -19,48 +19,15 @@ using ResumeTest = StationTest;
 
 // rule H10
 TEST_F(ResumeTest, StartsAfreshFromWhereTheRobotIs) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  send(frontend, 0, 10.0, {.pace = iterations(10)});
-  station.run(3);
-  const std::uint64_t number = frontend.halt("");
-  station.run(1);
-  station.now = {1.5, -2.5};  // somebody moved it
-  const Batch resume = send_resume(frontend, number);
-  station.run(1);
-  EXPECT_EQ(resume.handle(0).status, Status::completed);
-  const auto fresh = frontend.wait_for(resume.handle(0).iteration, kAtOnce);
-  EXPECT_EQ(fresh.head().fresh, 1U);
-  EXPECT_EQ(fresh.head().halted, 0U);
-  EXPECT_EQ(desired(fresh), 1.5);
-  EXPECT_EQ(desired(fresh, 1), -2.5);
-  EXPECT_FALSE(frontend.halted());
-  EXPECT_EQ(frontend.latest().head().halted, 0U);
-  const Batch batch = send(frontend, 0, 2.5);
-  station.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  play(R"(a = 0 to 10 over 10; run 3; halt; run 1; read 0 1.5; read 1 -2.5  # somebody moved it
+    r = resume 1; run 1; r completed @5; row 5 fresh; 0 rows 5: 1.5; 1 rows 5: -2.5; running
+    row 6 free; b = 0 to 2.5; run 1; b completed)");
 }
 
 TEST_F(ResumeTest, OfAHaltThatWasRequestedInTheSameStepClearsIt) {
-  StartedStation station;
-  UntypedFrontend frontend("pair");
-  Batch resume;
-  // a scheduled request is served after the step has looked for halts, and before it takes batches
-  station.on_refuse = [&] {
-    BatchBuilder builder;
-    builder.resume(frontend.halt("in the middle of a step"));
-    resume = frontend.pulse(builder);
-  };
-  add_request(frontend, Refuse{});
-  const Batch scheduled = frontend.pulse({.at = 2});
-  const Batch motion = send(frontend, 0, 10.0, {.pace = iterations(10)});
-  station.run(2);
-  EXPECT_EQ(resume.handle(0).status, Status::completed);
-  EXPECT_EQ(motion.handle(0).status, Status::halted);
-  EXPECT_FALSE(frontend.halted());
-  station.run(1);
-  EXPECT_EQ(frontend.latest().head().halted, 0U)
-      << "the halt acts after its resume was reported as completed";
+  // a scheduled request is served after the step has polled for halts, and before it takes batches
+  play(R"(while refused halt; while refused r = resume 1; a = refuse at 2; b = 0 to 10 over 10
+    run 2; r completed; b halted; running; run 1; row 4 free  # the halt acts no more)");
 }
 
 // rule H10
@@ -101,23 +68,9 @@ void limit_shoulder(Schema& schema) {
 }
 
 TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
-  StartedStation station({.segment = "pair"}, limit_shoulder);
-  UntypedFrontend frontend("pair");
-  const auto resume = [&] {
-    BatchBuilder builder;
-    builder.resume(frontend.halt(""));
-    return frontend.pulse(builder);
-  };
-  const Batch at_rest = resume();
-  station.run(1);
-  EXPECT_EQ(at_rest.handle(0).status, Status::completed) << at_rest.handle(0).text;
-  EXPECT_FALSE(frontend.halted());
-  send(frontend, 0, 10.0, {.pace = fastest()});
-  station.run(5);
-  const Batch moving = resume();
-  station.run(1);
-  EXPECT_THAT(moving.handle(0).text, HasSubstr("still brakes"));
-  EXPECT_TRUE(frontend.halted());
+  play({.segment = "pair"}, R"(halt; r = resume 1; run 1; r completed; running
+    a = 0 to 10 fastest; run 5; halt; r = resume 2; run 1; r says still brakes; halted)",
+       limit_shoulder);
 }
 
 /// A shoulder that needs ten iterations to rest.
@@ -185,12 +138,11 @@ TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
 }
 
 TEST_F(ResumeTest, NeedsNoControl) {
-  StartedStation station({.segment = "pair", .lanes = 3});
+  StartedStation station;
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   holder.add_take_control();
   holder.pulse();
-  station.run(1);
   const std::uint64_t number = other.halt("");
   station.run(1);
   BatchBuilder mixed;

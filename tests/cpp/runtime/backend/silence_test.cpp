@@ -97,14 +97,8 @@ TEST_F(SilenceTest, AHaltEndsItTooAlsoWhatAHaltWouldLeave) {
 }
 
 TEST_F(SilenceTest, StopsIfToldSo) {
-  StartedStation station(watched(Stale::stop));
-  UntypedFrontend frontend("pair");
-  send(frontend, 0, 100.0, {.pace = iterations(100)});
-  for (int i = 0; i < 20 && station.iterate() == Step::run; ++i) {
-  }
-  EXPECT_THAT(std::string(station.backend.failure()),
-              HasSubstr("longer than the watchdog (silence) allows"));
-  EXPECT_LE(station.last(), 8);
+  play(watched(Stale::stop),
+       "a = 0 to 100 over 100; run 7; ends; fails longer than the watchdog (silence)");
 }
 
 TEST_F(SilenceTest, HaltsIfToldSo) {
@@ -243,20 +237,13 @@ TEST_F(SilenceTest, ASimulationNeedsNoWatchdog) {
   EXPECT_EQ(frontend.added(), 1U);
 }
 
-TEST_F(SilenceTest, TheSchemaTellsFrontends) {
-  StartedStation station(watched(Stale::halt, 7));
-  const UntypedFrontend frontend("pair");
-  EXPECT_EQ(frontend.schema().head.silence, 7);
-  EXPECT_EQ(frontend.schema().head.stale, Stale::halt);
-}
-
 // rule W4
 TEST_F(SilenceTest, HaltsUnlessAnotherPolicyIsAskedFor) {
-  const Station watched_station({.segment = "watched", .silence = 7});
-  const Station other({.segment = "other"});
-
-  EXPECT_EQ(watched_station.backend.schema().head.stale, Stale::halt);
-  EXPECT_EQ(other.backend.schema().head.stale, Stale::hold);
+  const StartedStation station({.segment = "watched", .silence = 7});
+  const UntypedFrontend frontend("watched");
+  EXPECT_EQ(frontend.schema().head.silence, 7);
+  EXPECT_EQ(frontend.schema().head.stale, Stale::halt);
+  EXPECT_EQ(Station({.segment = "other"}).backend.schema().head.stale, Stale::hold);
 }
 
 // rule W5

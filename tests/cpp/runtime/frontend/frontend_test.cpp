@@ -24,17 +24,15 @@ TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
   UntypedFrontend frontend("pair");
   const auto refusal = [&](auto&& call) { return message_of<InvalidArgument>(call); };
   EXPECT_THAT(refusal([&] { add(frontend, 1, 1.5); }), HasSubstr("elbow"));
-  EXPECT_NE(refusal([&] { add(frontend, 0, std::nan("")); }), "");
   EXPECT_NE(refusal([&] { add(frontend, 1, 0.5, {.pace = speed(11)}); }), "");
   EXPECT_THAT(refusal([&] { add(frontend, 2, 0.5); }), HasSubstr("shoulder (0), elbow (1)"));
   EXPECT_THAT(refusal([&] { static_cast<void>(frontend.actuator("elbwo")); }),
               HasSubstr("there are: shoulder, elbow. Did you mean 'elbow'?"));
-  EXPECT_THAT(refusal([&] { add(frontend, 0, -std::nan("")); }), HasSubstr("target nan for"));
   EXPECT_NE(refusal([&] { add(frontend, 0, 0.5, {.pace = iterations(0)}); }), "");
   EXPECT_NE(refusal([&] { add(frontend, 0, 0.5, {.pace = duration(-std::chrono::seconds(1))}); }),
             "");
   EXPECT_NE(refusal([&] { add(frontend, 0, 0.5, {.pace = until(-1)}); }), "");
-  EXPECT_THAT(refusal([&] { static_cast<void>(frontend.request_index("home")); }),
+  EXPECT_THAT(refusal([&] { static_cast<void>(frontend.request_index("dance")); }),
               HasSubstr("reset, snapshot, restore, refuse, break"));
   EXPECT_THAT(refusal([&] { static_cast<void>(frontend.request_index("rest")); }),
               HasSubstr("Did you mean 'reset'?"));

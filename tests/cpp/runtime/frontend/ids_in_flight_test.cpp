@@ -30,22 +30,6 @@ TEST(IdsInFlight, FollowEachOtherOverThePlacesOfWhatHasEnded) {
   }
 }
 
-TEST(IdsInFlight, PassOverThePlacesOfABatchThatStillRunsEveryTimeTheyComeRound) {
-  IdsInFlight ids(kPlaces);
-  ids.sent(1, 3);
-  const auto only_first_runs = [](CommandId end) { return end != 2; };
-  CommandId next = 4;
-  for (int i = 0; i < 100; ++i) {
-    const std::optional<CommandId> first = ids.draw(next, 4, only_first_runs);
-    ASSERT_TRUE(first);
-    for (CommandId id = *first; id < *first + 4; ++id) {
-      ASSERT_FALSE(id % kPlaces >= 1 && id % kPlaces <= 3) << id;
-    }
-    ids.sent(*first, 4);
-    next = *first + 4;
-  }
-}
-
 TEST(IdsInFlight, AreNoneWhenWhatRunsLeavesNoRow) {
   IdsInFlight ids(kPlaces);
   ids.sent(1, 10);

@@ -14,11 +14,6 @@ using NotCompletedTraces = StationTest;
 
 class NotCompletedTest : public StationTest {
  protected:
-  /// What a wait for the batch throws.
-  static std::string told(const Batch& batch) {
-    return message_of<NotCompleted>([&] { batch.wait(kAtOnce); });
-  }
-
   Station station_;
   Station& started_ = station_.start();  // before the frontends
   UntypedFrontend one_{"pair"};
@@ -96,24 +91,17 @@ TEST_F(NotCompletedTraces, SoIsARequestThatIsRejected) {
     a waits request 'refuse' was rejected; a waits it does not want to)");
 }
 
-TEST_F(NotCompletedTest, ListsFiveEndsAtMost) {
-  for (int i = 0; i < 7; ++i) add(one_, 0, i, {.pace = iterations(9)});
-  const Batch mine = one_.pulse();
-  station_.run(1);
-  two_.add_purge();
-  two_.pulse();
-  station_.run(1);
-  EXPECT_THAT(told(mine), AllOf(HasSubstr("7 of 7 commands"), HasSubstr("and 2 more")));
+TEST_F(NotCompletedTraces, ListsFiveEndsAtMost) {
+  std::string seven;
+  for (int i = 0; i < 7; ++i) seven += "0 to 1 over 9;";
+  play(seven +
+       "a = pulse; run 1; B: b = purge; run 1; a waits 7 of 7 commands; a waits and 2 more");
 }
 
 // rule S4
-TEST_F(NotCompletedTest, AHaltIsAnErrorOfItsOwn) {
-  const Batch mine = send(one_, 0, 9.0, {.pace = iterations(9)});
-  station_.run(1);
-  two_.halt("the ball is on the floor");
-  station_.run(1);
-  EXPECT_THAT(message_of<BackendHalted>([&] { mine.wait(kAtOnce); }),
-              HasSubstr("the ball is on the floor"));
+TEST_F(NotCompletedTraces, AHaltIsAnErrorOfItsOwn) {
+  play(R"(a = 0 to 9 over 9; run 1; B: halt the ball is on the floor; run 1
+    a raises BackendHalted the ball)");
 }
 
 TEST_F(NotCompletedTest, AnEmptyPulseAndWaitIsNoAnswerOfABackendThatHasEnded) {

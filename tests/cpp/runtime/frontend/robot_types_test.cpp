@@ -11,18 +11,13 @@ struct ThrowBall {
 };
 O80_DESCRIBE(ThrowBall, (speed, "[m/s]"));
 
-struct Home {};
-O80_DESCRIBE(Home);
+struct GoHome {};
+O80_DESCRIBE(GoHome);
 
 struct Launcher {
   using Actuators = NoActuators;
-  using Requests = o80::Requests<ThrowBall, Home>;
+  using Requests = o80::Requests<ThrowBall, GoHome>;
 };
-
-TEST(RobotTypesTest, NameARequestAfterItsStruct) {
-  EXPECT_EQ(request_name<ThrowBall>(), "throw_ball");
-  EXPECT_EQ(request_name<Home>(), "home");
-}
 
 TEST(RobotTypesTest, TellTheHelpOfARequestThatHasOne) {
   Schema schema;

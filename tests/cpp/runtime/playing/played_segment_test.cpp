@@ -1,7 +1,6 @@
 #include "runtime/playing/played_segment.hpp"
 
 #include <gmock/gmock.h>
-#include <signal.h>
 
 #include <cstring>
 #include <fstream>
@@ -168,38 +167,28 @@ TEST_F(PlayedSegmentTest, ABurstBeyondTheLastRowEndsWithTheRecording) {
   EXPECT_EQ(frontend.published(), kRows - 1);
 }
 
-TEST_F(PlayedSegmentTest, ABurstEndsWithItsSender) {
-  PlayedSegment played(options(true));
-  played.publish(rows(0, 0), {});
-  {
-    UntypedFrontend leaver("pair");
-    leaver.start_burst(1'000'000);
+TEST_F(PlayedSegmentTest, ABurstEndsWithItsSenderAndWithItsDeath) {
+  for (const bool dies : {false, true}) {
+    PlayedSegment played(options(true));
+    played.publish(rows(0, 0), {});
+    if (dies) {
+      StandingProcess sender([&](const StandingProcess::Stand& stand) {
+        UntypedFrontend frontend("pair");
+        frontend.start_burst(1'000'000);
+        stand();
+      });
+      sender.kill_now();
+    } else {
+      UntypedFrontend("pair").start_burst(1'000'000);
+    }
+    UntypedFrontend stayer("pair");
+    const Burst burst = stayer.start_burst(3);
+    std::thread player([&] { played.serve(rows(1, kRows - 1)); });
+    EXPECT_EQ(burst.wait(kPatience).iteration(), 3);
+    EXPECT_EQ(stayer.published(), 3);
+    played.ask_to_stop();
+    player.join();
   }
-  UntypedFrontend stayer("pair");
-  const Burst burst = stayer.start_burst(3);
-  std::thread player([&] { played.serve(rows(1, kRows - 1)); });
-  EXPECT_EQ(burst.wait(kPatience).iteration(), 3);
-  EXPECT_EQ(stayer.published(), 3);
-  played.ask_to_stop();
-  player.join();
-}
-
-TEST_F(PlayedSegmentTest, ABurstEndsWithTheDeathOfItsSender) {
-  PlayedSegment played(options(true));
-  played.publish(rows(0, 0), {});
-  StandingProcess sender([&](const StandingProcess::Stand& stand) {
-    UntypedFrontend frontend("pair");
-    frontend.start_burst(1'000'000);
-    stand();
-  });
-  ::kill(sender.pid(), SIGKILL);
-  sender.wait();
-  UntypedFrontend successor("pair");
-  const Burst burst = successor.start_burst(3);
-  std::thread player([&] { played.serve(rows(1, kRows - 1)); });
-  EXPECT_EQ(burst.wait(kPatience).iteration(), 3);
-  played.ask_to_stop();
-  player.join();
 }
 
 TEST_F(PlayedSegmentTest, ALyingBursterDoesNotStopTheOthers) {
@@ -242,8 +231,7 @@ TEST_F(PlayedSegmentTest, ARobotDoesNotInheritAHaltOfARecording) {
     played.publish(halted(0, 3), {});
     stand();
   });
-  ::kill(player.pid(), SIGKILL);
-  player.wait();
+  player.kill_now();
   StartedStation robot;
   EXPECT_FALSE(UntypedFrontend("pair").halted());
 }
@@ -255,8 +243,7 @@ TEST_F(PlayedSegmentTest, AKilledPlayerIsSeenAndReplaced) {
     stand();
   });
   const UntypedFrontend reader("pair");
-  ::kill(player.pid(), SIGKILL);
-  player.wait();
+  player.kill_now();
   EXPECT_EQ(reader.life(), Life::killed);
   EXPECT_THROW(reader.wait_for(10, kPatience), BackendKilled);
   EXPECT_TRUE(std::ranges::equal(reader.history(100).bytes, rows(0, 9)));
@@ -277,8 +264,7 @@ TEST_F(PlayedSegmentTest, DoesNotReplaceARobotThatLivesOrWasKilled) {
     StartedStation station;
     stand();
   });
-  ::kill(robot.pid(), SIGKILL);
-  robot.wait();
+  robot.kill_now();
   EXPECT_THAT([&] { const PlayedSegment refused{options()}; },
               ThrowsMessage<SegmentTaken>(HasSubstr("o80 save pair -o FILE.mcap")));
   EXPECT_EQ(UntypedFrontend("pair", {.timeout = kAtOnce, .dead = true}).life(), Life::killed);
