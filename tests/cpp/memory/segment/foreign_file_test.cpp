@@ -101,6 +101,8 @@ TEST_F(ForeignFileTest, CutAnywhereIsRefused) {
         << size;
     EXPECT_NO_THROW(list_segments());
   }
+  write_all(path, std::vector<char>(whole.size(), 'x'));
+  EXPECT_THAT(refusal(), HasSubstr("not made by o80"));
 }
 
 TEST_F(ForeignFileTest, ThatGrewIsRefused) {

@@ -53,14 +53,6 @@ TEST_F(LivenessTest, AsksTheKernelOnlyAboutLanesThatHaveAnOwner) {
   EXPECT_EQ(liveness.queries(), requested) << "nobody owns a lane any more";
 }
 
-TEST_F(LivenessTest, NoticesByItself) {
-  const OwnedSegment segment = running_segment();
-  const LaneLiveness liveness(segment);
-  const AttachedSegment attached = attach();
-  const LaneSender sender(attached);
-  while (liveness.lane(0).state != LaneState::alive) std::this_thread::yield();
-}
-
 TEST_F(LivenessTest, NoticesThatANameLeadsElsewhereAndNotThatABackendHasEnded) {
   for (const bool commanders : {false, true}) {
     const OwnedSegment segment = running_segment();
