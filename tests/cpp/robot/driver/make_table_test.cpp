@@ -116,13 +116,6 @@ TEST_F(MakeTableTest, NothingThatADriverThrowsCrossesTheTable) {
   EXPECT_STREQ(robot.fault(), "no power");
 }
 
-TEST_F(MakeTableTest, AnOptionThatIsNotThereListsThoseThatAre) {
-  EXPECT_THAT(message_of<InvalidArgument>([] { DriverInstance(table(), {{"gian", "2"}}); }),
-              HasSubstr("there are: fails, gain, finish_at"));
-  EXPECT_THAT(message_of<InvalidArgument>([] { DriverInstance(table(), {{"gain", "much"}}); }),
-              HasSubstr("'gain' must be a number, got 'much'"));
-}
-
 TEST_F(MakeTableTest, ADriverIsStoppedOnceAndOnlyIfAStartWasTried) {
   {
     const DriverInstance robot(table(), {});

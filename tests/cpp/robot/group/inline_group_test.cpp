@@ -163,20 +163,14 @@ void expect_end_between_iterations(InlineGroup& group, Timeout timeout,
   }
 }
 
-TEST_F(InlineGroupTest, EndsBetweenTwoIterationsWhenItsCallerSaysSo) {
+TEST_F(InlineGroupTest, EndsBetweenTwoIterationsWhenItsCallerSaysSoOrThrowsOrHasNoMoreTime) {
   InlineGroup group(drifter(), {}, group_of(4));
   expect_end_between_iterations<Cancelled>(group, kPatience, [] { return false; });
-}
-
-TEST_F(InlineGroupTest, EndsBetweenTwoIterationsByAnExceptionOfItsCaller) {
-  InlineGroup group(drifter(), {}, group_of(4));
+  InlineGroup other(drifter(), {}, group_of(4));
   expect_end_between_iterations<std::out_of_range>(
-      group, kPatience, []() -> bool { throw std::out_of_range("as Ctrl-C in Python"); });
-}
-
-TEST_F(InlineGroupTest, EndsBetweenTwoIterationsAfterItsTimeout) {
-  InlineGroup group(drifter(), {}, group_of(4));
-  expect_end_between_iterations<TimeoutError>(group, std::chrono::milliseconds(60), {});
+      other, kPatience, []() -> bool { throw std::out_of_range("as Ctrl-C in Python"); });
+  InlineGroup late(drifter(), {}, group_of(4));
+  expect_end_between_iterations<TimeoutError>(late, std::chrono::milliseconds(60), {});
 }
 
 TEST_F(InlineGroupTest, LeavesTheOthersTheirCallWhenOneThreadUsesIt) {
@@ -451,20 +445,14 @@ TEST_F(InlineGroupTest, IsClosedInASignalHandlerOfItsCallWhichDoesNotWaitForItse
   const InlineGroup::Following then{&follower, &following.plan, {}};
   leading.plan.then = &then;
 
-  expect_close_during(
-      [&](const KeepWaiting& handler) {
-        leader.burst(leading.plan, leading.all, kPatience, handler);
-      },
-      [&] { follower.close(); });
+  const auto lead = [&](const KeepWaiting& handler) {
+    leader.burst(leading.plan, leading.all, kPatience, handler);
+  };
+  expect_close_during(lead, [&] { follower.close(); });
   EXPECT_THROW(following.run(), Closed);
   leading.plan.then = nullptr;
   EXPECT_NO_THROW(leading.run());
-
-  expect_close_during(
-      [&](const KeepWaiting& handler) {
-        leader.burst(leading.plan, leading.all, kPatience, handler);
-      },
-      [&] { leader.close(); });
+  expect_close_during(lead, [&] { leader.close(); });
   EXPECT_THROW(leading.run(), Closed);
 }
 

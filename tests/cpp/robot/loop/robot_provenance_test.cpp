@@ -159,35 +159,24 @@ LoopOptions drawn_options(std::uint32_t seed) {
   return options;
 }
 
+Provenance::Options texts_of_all(const LoopOptions& options) {
+  Provenance::Options texts = texts_of(options.backend);
+  for (auto& text : texts_of(options.real_time)) texts.push_back(std::move(text));
+  return texts;
+}
+
 TEST(RunOptionTextsTest, GiveTheSameOptionsWhenTheyAreReadAgain) {
   for (std::uint32_t seed = 0; seed < 500; ++seed) {
     SCOPED_TRACE(seed);
     const LoopOptions drawn = drawn_options(seed);
     LoopOptions again;
-    Provenance::Options texts = texts_of(drawn.backend);
-    for (auto& text : texts_of(drawn.real_time)) texts.push_back(std::move(text));
+    const Provenance::Options texts = texts_of_all(drawn);
     for (const auto& [name, text] : texts) {
       const LoopOption* option = find_loop_option(name);
       ASSERT_NE(option, nullptr) << name;
       set_loop_option(again, *option, text, name);
     }
-    ASSERT_EQ(again.backend.period, drawn.backend.period);
-    ASSERT_EQ(again.backend.bursting, drawn.backend.bursting);
-    ASSERT_EQ(again.backend.history, drawn.backend.history);
-    ASSERT_EQ(again.backend.lanes, drawn.backend.lanes);
-    ASSERT_EQ(again.backend.lane_blocks, drawn.backend.lane_blocks);
-    ASSERT_EQ(again.backend.journal, drawn.backend.journal);
-    ASSERT_EQ(again.backend.permission, drawn.backend.permission);
-    ASSERT_EQ(again.backend.stale, drawn.backend.stale);
-    ASSERT_EQ(again.backend.silence, drawn.backend.silence);
-    ASSERT_EQ(again.backend.max_overruns, drawn.backend.max_overruns);
-    ASSERT_EQ(again.backend.resume, drawn.backend.resume);
-    ASSERT_EQ(again.backend.gap, drawn.backend.gap);
-    ASSERT_EQ(again.backend.accept_reading, drawn.backend.accept_reading);
-    ASSERT_EQ(again.real_time.policy, drawn.real_time.policy);
-    ASSERT_EQ(again.real_time.priority, drawn.real_time.priority);
-    ASSERT_EQ(again.real_time.processors, drawn.real_time.processors);
-    ASSERT_EQ(again.real_time.lock_memory, drawn.real_time.lock_memory);
+    ASSERT_EQ(texts_of_all(again), texts);
   }
 }
 
@@ -198,9 +187,7 @@ TEST(RunOptionTextsTest, NameEveryOptionOfABackend) {
   all.backend.gap = 0;
   all.real_time.policy = RealTimeOptions::Policy::fifo;
   all.real_time.processors = {0};
-  Provenance::Options texts = texts_of(all.backend);
-  for (auto& text : texts_of(all.real_time)) texts.push_back(std::move(text));
-  const auto named = map_of(texts);
+  const auto named = map_of(texts_of_all(all));
   for (const LoopOption& option : loop_options()) {
     const bool is_flag_only = (option.scope & LoopOption::kFlag) != 0;
     EXPECT_NE(named.contains(option.name), is_flag_only) << option.name;

@@ -102,20 +102,6 @@ TEST_F(RunningRequestLoopTest, MayEndInTheReadingOfAnothersFreshStart) {
   EXPECT_FALSE(frontend_->halted());
 }
 
-TEST_F(RunningRequestLoopTest, AReadingBringsItsOwnFreshStart) {
-  Puppet::on_read = [](Reading<Puppet>& reading) {
-    if (reading.iteration() == 2 && !reading.fresh()) reading.ended<Poke>(Served::start_afresh());
-    if (reading.fresh()) reading.observed = {7, 8};
-  };
-  const Batch batch = poke(5);
-  burst(2);
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
-  EXPECT_EQ(frontend_->latest().head().fresh, 1U);
-  EXPECT_EQ(desired(frontend_->latest(), 1), 8.0);
-}
-
-// ------------------------------------------------------------------------------ recoverable faults
-
 TEST_F(RunningRequestLoopTest, AResumeCannotRun) {
   Puppet::on_resume = [] { return Served::running("warming up"); };
   const std::uint64_t number = frontend_->halt("");

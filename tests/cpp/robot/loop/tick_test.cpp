@@ -129,20 +129,6 @@ TEST_F(TickTest, ATickWithoutAReadingCountsInItsRowLikeAnOverrun) {
   for (const std::int64_t i : {5, 6, 9}) EXPECT_EQ(overruns(i) - overruns(i - 1), 1U) << i;
 }
 
-TEST_F(TickTest, TooManyTicksWithoutAReadingHalt) {
-  const auto loop = make({.segment = "ticking", .period = 1'000'000, .max_overruns = 3});
-  Ticking::on_read = [](Reading<Ticking>& reading) {
-    reading.missed();
-    if (reading.iteration() == 12) reading.finish();
-  };
-  loop->start();
-  const UntypedFrontend frontend("ticking");
-  EXPECT_TRUE(loop->run().in_order);
-  ASSERT_TRUE(frontend.halted());
-  EXPECT_EQ(frontend.halted()->cause, HaltCause::overruns);
-  EXPECT_LE(frontend.halted()->iteration, 4);
-}
-
 // rule W9
 TEST_F(TickTest, TheStepAfterMissedTicksIsNotLarger) {
   const auto loop = make({.segment = "ticking", .period = 1'000'000});
