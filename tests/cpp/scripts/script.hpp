@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "control/batch/record.hpp"
+#include "o80/describe/describe.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80::test {
@@ -46,6 +47,9 @@ enum class Action : std::uint8_t {
   read,          // one number is observed at a value from now on
   track          // all numbers are observed where they are desired again
 };
+
+O80_DESCRIBE_ENUM(Action, command, pulse, run, settle, purge, purge_own, interrupt, halt, resume,
+                  restart, restart_with, read, track);
 
 struct ScriptStep {
   Action action = Action::run;

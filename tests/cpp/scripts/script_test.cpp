@@ -2,10 +2,10 @@
 // iteration. CONTRIBUTING.md says how to play more of them.
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cstdlib>
-#include <limits>
+#include <iterator>
 #include <map>
+#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -70,124 +70,108 @@ TEST(Script, KeepsThePromisesItBroke) {
   }
 }
 
-/// One actuator within limits of speed, acceleration and jerk, and when it is commanded.
-struct PlannedMotions {
-  std::vector<std::array<double, 3>> rates;
-  struct Command {
-    Iteration at;
-    RecordHead head;
-    std::vector<double> target;
-  };
-  std::vector<Command> commands;
+/// Motions of one actuator, found among many millions: a number for each `limits` of speed,
+/// acceleration and jerk, and commands behind the iteration in which they are sent.
+constexpr auto kPlannedMotions = R"(
+# a smooth motion that waits is longer than it proposed
+limits 10.784056006283391 1960.2497575799987 inf
+limits 15.6023539831279 2366.2537958306866 2675262.4812128879
+limits 50.552476925372581 5664.5644647638155 inf
+1 overwrite until 112 to 0.028353868843783339 -0.0019355163568690954 -0.50488292323075568
+56 smooth direct to -0.018106191681567518 0.080229592196452038 -0.089792749381096257
+67 overwrite direct to 0.26811152105645053 0.036255784666623651 -0.00056749143688849049
+97 direct every 26000000 to -0.0069565981036566549 0.082831905176821263 0.45845236485328944
+135 overwrite smooth speed 2.1682601588028603 \
+  to -0.01356849975671439 -0.32149732859814451 -0.78045541564760157
+# speeds just above its cruising speed lead to almost the same place
+limits 93.037650359279098 12157.93043307472 inf
+1 fastest to 4.797035938608051
+61 overwrite over 266 to -0.017503031628065761
+198 overwrite fastest to 2.3046609629018251
+201 overwrite smooth over 126 to 2.3046609629018251
+# it needs an iteration more to get to that speed
+limits 11.43274845604925 894.76297593409231 inf
+limits 31.336973028471022 1053.7761246337577 933796.68721175299
+limits 9.9087038305429438 3928.5954270252028 1188508.9379981598
+1 smooth direct to 0.042412536898759789 -0.49187007313364239 0
+46 overwrite smooth direct to 0.0092738268208743223 0.18684603144127931 0.00055665536383796527
+97 smooth over 221 to 0.009310702360843609 0.062237306242674359 0.00083973476658283711
+207 overwrite speed 4.3510159262401853 \
+  to -0.011169792426061968 0.5200890939122591 -0.44123512817299343
+# the same, to a lower speed
+limits 12.293948107652097 2230.2635983827986 586737.95519783429
+limits 3.5968741518713712 997.54560289787207 218923.93971848977
+limits 54.516033656318662 49290.432808096259 inf
+1 overwrite smooth until 286 to 0.013832444157506497 0.17012068870274477 -0.98344638904963455
+86 overwrite over 103 to 0.0093113952562822073 0.030022686472107027 -0.028623525483104074
+108 overwrite smooth speed 14.315428021725872 \
+  to -4.0664968067069367e-07 0.00076174941729415316 -0.0016390525456867122
+125 overwrite smooth until 195 to 0.055750313059936066 -8.8478027108189082e-06 1.7643933235569937
+# stretched by one iteration, it would end before its target
+limits 12.051086768181655 6047.6510841008694 1959210.0267242901
+limits 33.031060638526675 13974.889676894791 23787533.076953299
+1 fastest to -0.1785808099989418 0.02141616677031977
+22 fastest to -0.0014174751120996964 0.090848313246476353
+38 overwrite smooth speed 2.7677636590625019 to 0.0078911298338483066 -0.0082503754762126933
+45 smooth speed 7.2645971225958483 to 0.013020420013415811 0.089606414002495374
+52 overwrite smooth over 96 to 0.013020420013415811 0.089606414002495374
+)";
 
-  Script script() const {
-    Script script;
-    auto& numbers = script.actuators.emplace_back().numbers;
-    for (const auto& [speed, acceleration, jerk] : rates) {
-      numbers.emplace_back().limits = {.speed = speed, .acceleration = acceleration, .jerk = jerk};
+ScriptStep command_of(const std::vector<std::string>& words) {
+  ScriptStep step;
+  step.action = Action::command;
+  for (std::size_t i = 1; i < words.size(); ++i) {
+    const std::string& word = words[i];
+    const auto value = [&] { return std::stod(words.at(++i)); };
+    if (word == "overwrite") step.head.mode = Mode::overwrite;
+    if (word == "smooth") step.head.profile = Profile::minimum_jerk;
+    if (word == "direct") step.head.pace = Pace::direct;
+    if (word == "fastest") step.head.pace = Pace::fastest;
+    if (word == "until") step.head.pace = Pace::until;
+    if (word == "over") step.head.pace = Pace::iterations;
+    if (word == "speed") step.head.pace = Pace::speed;
+    if (word == "speed") step.head.speed = value();
+    if (word == "until" || word == "over" || word == "every") {
+      step.head.amount = static_cast<std::int64_t>(value());
     }
-    Iteration next = 1;
-    const auto add = [&](Action action) -> ScriptStep& {
-      script.steps.emplace_back().action = action;
-      return script.steps.back();
-    };
-    for (const Command& command : commands) {
-      add(Action::run).count = command.at - std::exchange(next, command.at);
-      ScriptStep& step = add(Action::command);
-      step.head = command.head;
-      step.values = command.target;
-      add(Action::pulse);
-    }
-    add(Action::settle);
-    return script;
+    while (word == "to" && i + 1 < words.size()) step.values.push_back(value());
   }
-};
+  return step;
+}
 
-// found among many millions
+std::vector<Script> planned_motions() {
+  std::vector<Script> scripts;
+  Iteration next = 1;
+  std::istringstream lines(kPlannedMotions);
+  for (std::string line; std::getline(lines, line);) {
+    for (std::string rest; line.ends_with('\\') && std::getline(lines, rest);) {
+      line = line.substr(0, line.size() - 1) + rest;
+    }
+    std::istringstream in(line);
+    const std::vector<std::string> words{std::istream_iterator<std::string>(in), {}};
+    if (words.empty()) continue;
+    if (words[0] == "#") {
+      scripts.emplace_back().actuators.emplace_back();
+      next = 1;
+    } else if (words[0] == "limits") {
+      scripts.back().actuators[0].numbers.emplace_back().limits = {
+          .speed = std::stod(words[1]),
+          .acceleration = std::stod(words[2]),
+          .jerk = std::stod(words[3])};
+    } else {
+      std::vector<ScriptStep>& steps = scripts.back().steps;
+      const Iteration at = std::stoll(words[0]);
+      steps.emplace_back().count = at - std::exchange(next, at);
+      steps.push_back(command_of(words));
+      steps.emplace_back().action = Action::pulse;
+    }
+  }
+  for (Script& script : scripts) script.steps.emplace_back().action = Action::settle;
+  return scripts;
+}
+
 TEST(Script, OfPlannedMotionsKeepsThePromisesItBroke) {
-  constexpr double kNone = std::numeric_limits<double>::infinity();
-  const RecordHead fastest = paced(Pace::fastest, 0);
-  const PlannedMotions all[] = {
-      {// a smooth motion that waits is longer than it proposed
-       {{10.784056006283391, 1960.2497575799987, kNone},
-        {15.6023539831279, 2366.2537958306866, 2675262.4812128879},
-        {50.552476925372581, 5664.5644647638155, kNone}},
-       {
-           {1,
-            overwriting(until(112)),
-            {0.028353868843783339, -0.0019355163568690954, -0.50488292323075568}},
-           {56,
-            smoothly(direct()),
-            {-0.018106191681567518, 0.080229592196452038, -0.089792749381096257}},
-           {67,
-            overwriting(direct()),
-            {0.26811152105645053, 0.036255784666623651, -0.00056749143688849049}},
-           {97,
-            paced(Pace::direct, 26000000),
-            {-0.0069565981036566549, 0.082831905176821263, 0.45845236485328944}},
-           {135,
-            overwriting(smoothly(at_speed(2.1682601588028603))),
-            {-0.01356849975671439, -0.32149732859814451, -0.78045541564760157}},
-       }},
-      {// speeds just above its cruising speed lead to almost the same place
-       {{93.037650359279098, 12157.93043307472, kNone}},
-       {
-           {1, fastest, {4.797035938608051}},
-           {61, overwriting(over(266)), {-0.017503031628065761}},
-           {198, overwriting(fastest), {2.3046609629018251}},
-           {201, overwriting(smoothly(over(126))), {2.3046609629018251}},
-       }},
-      {// it needs an iteration more to get to that speed
-       {{11.43274845604925, 894.76297593409231, kNone},
-        {31.336973028471022, 1053.7761246337577, 933796.68721175299},
-        {9.9087038305429438, 3928.5954270252028, 1188508.9379981598}},
-       {
-           {1, smoothly(direct()), {0.042412536898759789, -0.49187007313364239, 0}},
-           {46,
-            overwriting(smoothly(direct())),
-            {0.0092738268208743223, 0.18684603144127931, 0.00055665536383796527}},
-           {97,
-            smoothly(over(221)),
-            {0.009310702360843609, 0.062237306242674359, 0.00083973476658283711}},
-           {207,
-            overwriting(at_speed(4.3510159262401853)),
-            {-0.011169792426061968, 0.5200890939122591, -0.44123512817299343}},
-       }},
-      {// the same, to a lower speed
-       {{12.293948107652097, 2230.2635983827986, 586737.95519783429},
-        {3.5968741518713712, 997.54560289787207, 218923.93971848977},
-        {54.516033656318662, 49290.432808096259, kNone}},
-       {
-           {1,
-            overwriting(smoothly(until(286))),
-            {0.013832444157506497, 0.17012068870274477, -0.98344638904963455}},
-           {86,
-            overwriting(over(103)),
-            {0.0093113952562822073, 0.030022686472107027, -0.028623525483104074}},
-           {108,
-            overwriting(smoothly(at_speed(14.315428021725872))),
-            {-4.0664968067069367e-07, 0.00076174941729415316, -0.0016390525456867122}},
-           {125,
-            overwriting(smoothly(until(195))),
-            {0.055750313059936066, -8.8478027108189082e-06, 1.7643933235569937}},
-       }},
-      {// stretched by one iteration, it would end before its target
-       {{12.051086768181655, 6047.6510841008694, 1959210.0267242901},
-        {33.031060638526675, 13974.889676894791, 23787533.076953299}},
-       {
-           {1, fastest, {-0.1785808099989418, 0.02141616677031977}},
-           {22, fastest, {-0.0014174751120996964, 0.090848313246476353}},
-           {38,
-            overwriting(smoothly(at_speed(2.7677636590625019))),
-            {0.0078911298338483066, -0.0082503754762126933}},
-           {45,
-            smoothly(at_speed(7.2645971225958483)),
-            {0.013020420013415811, 0.089606414002495374}},
-           {52, overwriting(smoothly(over(96))), {0.013020420013415811, 0.089606414002495374}},
-       }},
-  };
-  for (const PlannedMotions& motions : all) {
-    const Script script = motions.script();
+  for (const Script& script : planned_motions()) {
     const auto failure = play(script);
     if (failure) ADD_FAILURE() << report(script, *failure);
   }

@@ -3,59 +3,16 @@
 #include <cmath>
 #include <cstdio>
 #include <sstream>
-#include <stdexcept>
-#include <utility>
 
+#include "o80/describe/options.hpp"
 #include "scripts/script.hpp"
 
 namespace o80::test {
 namespace {
 
-constexpr std::array<std::pair<Kind, const char*>, 12> kKindWords{{
-    {Kind::boolean, "boolean"},
-    {Kind::int8, "int8"},
-    {Kind::int16, "int16"},
-    {Kind::int32, "int32"},
-    {Kind::int64, "int64"},
-    {Kind::uint8, "uint8"},
-    {Kind::uint16, "uint16"},
-    {Kind::uint32, "uint32"},
-    {Kind::uint64, "uint64"},
-    {Kind::float32, "float32"},
-    {Kind::float64, "float64"},
-    {Kind::enumeration, "enumeration"},
-}};
-constexpr std::array<std::pair<Action, const char*>, 13> kActionWords{{
-    {Action::command, "command"},
-    {Action::pulse, "pulse"},
-    {Action::run, "run"},
-    {Action::settle, "settle"},
-    {Action::purge, "purge"},
-    {Action::purge_own, "purge_own"},
-    {Action::interrupt, "interrupt"},
-    {Action::halt, "halt"},
-    {Action::resume, "resume"},
-    {Action::restart, "restart"},
-    {Action::restart_with, "restart_with"},
-    {Action::read, "read"},
-    {Action::track, "track"},
-}};
-constexpr std::array<std::pair<Pace, const char*>, 6> kPaceWords{{
-    {Pace::direct, "direct"},
-    {Pace::duration, "duration"},
-    {Pace::speed, "speed"},
-    {Pace::until, "until"},
-    {Pace::iterations, "over"},
-    {Pace::fastest, "fastest"},
-}};
-
-template <class Words, class Value>
-std::string word_for(const Words& words, Value value) {
-  for (const auto& [each, word] : words) {
-    if (each == value) return word;
-  }
-  throw std::invalid_argument("a value without a word");
-}
+/// Words of the kinds, in their order.
+constexpr std::array kKindWords{"boolean", "int8",   "int16",  "int32",   "int64",   "uint8",
+                                "uint16",  "uint32", "uint64", "float32", "float64", "enumeration"};
 
 std::string digits(double value) {
   std::array<char, 40> text{};
@@ -64,7 +21,8 @@ std::string digits(double value) {
 }
 
 void print_number(std::ostringstream& out, const NumberSpec& number) {
-  out << "  number " << word_for(kKindWords, number.kind) << " at " << digits(number.start);
+  out << "  number " << kKindWords.at(static_cast<std::size_t>(number.kind)) << " at "
+      << digits(number.start);
   const auto limit = [&](const char* word, double value) {
     if (std::isfinite(value)) out << ' ' << word << ' ' << digits(value);
   };
@@ -83,7 +41,7 @@ std::string actuator_word(std::uint16_t actuator) {
 
 void print_command(std::ostringstream& out, const ScriptStep& step) {
   const RecordHead& head = step.head;
-  out << ' ' << step.actuator << " lane " << step.lane << ' ' << word_for(kPaceWords, head.pace);
+  out << ' ' << step.actuator << " lane " << step.lane << ' ' << to_text(head.pace);
   if (head.pace == Pace::speed) {
     out << ' ' << digits(head.speed);
   } else if (head.pace != Pace::direct && head.pace != Pace::fastest) {
@@ -102,7 +60,7 @@ void print_command(std::ostringstream& out, const ScriptStep& step) {
 }
 
 void print_step(std::ostringstream& out, const ScriptStep& step) {
-  out << word_for(kActionWords, step.action);
+  out << describing::option_text(step.action);
   switch (step.action) {
     case Action::command:
       print_command(out, step);
