@@ -50,6 +50,10 @@ def use(arm: o80.Frontend) -> float:
     assert_type(arm.halted, o80.Halt | None)
     rows = o80.wait_for_first([arm])
     assert_type(rows, dict[o80.Frontend, o80.Observation])
+    arm.add_command("elbow", {"position": 1.0}, until=3)
+    with o80.robots.load("two_joints").start(frequency=500.0, gain=2.0) as process:
+        assert_type(process.frontend(), o80.Frontend)
+    assert_type(o80.burst({arm: 3}), dict[o80.Frontend, o80.Observation])
     return float(position[0] + gripper + force[0] + first.sum() + numbers[0] + joints[0])
 
 
@@ -77,6 +81,10 @@ BAD = [
     ("joints: str = arm.latest().observed.joints['position']", "Incompatible types"),
     ("many: str = arm.history(3).observed['position']", "Incompatible types"),
     ("force: str = arm.latest().extended.force", "Incompatible types"),
+    ("arm.history(since=1.5)", "since"),
+    ("arm.add_command(0.5, 0.5)", "add_command"),
+    ("o80.Mode.REPLACE", "REPLACE"),
+    ("arm.pulse_and_wait(timeout='5')", "timeout"),
 ]
 
 

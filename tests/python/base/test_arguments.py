@@ -13,56 +13,45 @@ import o80
 @pytest.mark.parametrize(
     ("call", "text"),
     [
-        (lambda arm: arm.resume(-1), "number of a halt must be at least 1, got -1"),
         (lambda arm: arm.resume("x"), "number of a halt must be a whole number, got 'x'"),
         (lambda arm: arm.history("x"), "observations, must be a whole number, got 'x'"),
         (lambda arm: arm.history(since="x"), "since must be a whole number, got 'x'"),
         (lambda arm: arm.wait_for(-1), "no row -1: rows begin at 0"),
         (lambda arm: arm.journal(since=-1), "since must be .*, got -1"),
         (lambda arm: arm.journal(since="first"), "since must be .*, got 'first'"),
-        (lambda arm: arm.journal(since=1.5), "since must be .*, got 1.5"),
         (lambda arm: arm.journal(since=True), "since must be .*, got True"),
         (lambda arm: arm.mark(3), "text of a mark must be a string, got 3"),
         (lambda arm: arm.mark("\ud800"), r"text of a mark must be valid Unicode, got '\\ud800'"),
-        (lambda arm: arm.mark(""), "1 to 976 bytes of text, got 0"),
-        (lambda arm: arm.mark("x" * 977), "1 to 976 bytes of text, got 977"),
         (lambda arm: arm.mark("two\nlines"), r"one line of printable text, got 'two\\nlines'"),
         (lambda arm: arm.request("launch"), "reset, snapshot, restore"),
         (lambda arm: arm.request("reset", sed=1), "seed"),
         (lambda arm: arm.request("reset", seed=-1), "seed"),
         (lambda arm: arm.burst(0), "iterations .* at least 1, got 0"),
-        (lambda arm: arm.burst(-1), "iterations .* at least 1, got -1"),
         (lambda arm: arm.burst("many"), "a burst must be a whole number, got 'many'"),
         (lambda arm: o80.burst({arm: arm}), "a burst must be a whole number"),
         (lambda arm: arm.burst(1, at=9, late="never"), "late must be 'reject' or 'now'"),
         (lambda arm: arm.burst(1, at=-5, wait=False), "at must be .* from 0 on, got -5"),
+        (lambda arm: arm.pulse(at=-7), "at must be .* from 0 on, got -7"),
+        (lambda arm: arm.pulse(late="never"), "late must be 'reject' or 'now'"),
         (lambda arm: arm.prepared_burst("x"), "a burst must be a whole number, got 'x'"),
-        (lambda arm: arm.prepared_burst(0), "at least 1, got 0"),
         (lambda arm: arm.prepared_burst(steps=0), "steps .* at least 1, got 0"),
         (lambda arm: arm.prepared_burst(each=0), "each .* at least 1, got 0"),
         (lambda arm: arm.add_trajectory([[0, 0]], speed=0.0), "speed 0 .* positive"),
         (lambda arm: arm.add_trajectory([[0, 0]], times="abc"), "times .* got 'abc'"),
         (lambda arm: arm.add_command(0, 0.1, duration=float("nan")), "be a number, got nan"),
-        (lambda arm: arm.add_command(0, 0.1, duration=1e300), "duration must be at most 23058430"),
         (lambda arm: arm.add_command(0, 0.1, duration="1 s"), "be a number, got '1 s'"),
-        (lambda arm: arm.add_command(0, 0.1, speed=-1.0), "speed -1 .* positive and finite"),
         (lambda arm: arm.add_command(0, 0.1, until=-1), "until must be from 0 to .*, got -1"),
         (lambda arm: arm.add_command(0, 0.1, iterations=0), "iterations must be from 1 .* got 0"),
         (lambda arm: arm.add_command(0, 0.1, iterations=2**70), "must be a whole number, got 1180"),
         (lambda arm: arm.add_command(0, 0.1, mode="replace"), "'overwrite', got 'replace'"),
         (lambda arm: arm.add_command(0, 0.1, profile="smooth"), "'as_sent', got 'smooth'"),
         (lambda arm: arm.add_command(0, 0.1, start="here"), "'observed', got 'here'"),
-        (lambda arm: arm.add_command(0, 0.1, mode=None), "mode must be one of .*, got None"),
         (lambda arm: arm.add_command(0, 0.1, start=None), "start must be one of .*, got None"),
         (lambda arm: arm.add_command(0, 0.1, every=0), "every must be positive, got 0"),
-        (lambda arm: arm.add_command(0, 0.1, every="x"), "every .*'x'"),
         (lambda arm: arm.add_command(0, 0.1, every=True), "every .* got True"),
-        (lambda arm: arm.add_command(0, 0.1, every=2**62), "every must be seconds or a number"),
         (lambda arm: arm.add_command(0, 0.1, fastest=1), "fastest must be True or False, got 1"),
         (lambda arm: arm.add_command(True, 0.1), "index or its name, got True"),
-        (lambda arm: arm.add_command(1.5, 0.1), "index or its name, got 1.5"),
         (lambda arm: arm.add_command(2, 0.1), "shoulder.*elbow"),
-        (lambda arm: arm.add_command(-1, 0.1), "shoulder.*elbow"),
         (lambda arm: arm.add_command("wrist", 0.1), "shoulder.*elbow"),
         (lambda arm: arm.add_command(0, 0.1, profile="fastest"), "give fastest=True"),
         (
@@ -91,33 +80,6 @@ def test_a_frontend_says_which_argument_is_wrong(
 
     assert arm.added == 0
     assert arm.halted is None
-
-
-@pytest.mark.parametrize(
-    ("wrong", "text"),
-    [
-        ({"actuators": -1}, "number of actuators must be at least 0, got -1"),
-        ({"requests": ["home"]}, r"requests must be a mapping from names .*, got \['home'\]"),
-        ({"limits": [1.0]}, "limits must be a mapping from actuators"),
-    ],
-)
-def test_a_backend_says_which_argument_is_wrong(
-    segment: str, wrong: dict[str, Any], text: str
-) -> None:
-    with pytest.raises(o80.InvalidArgument, match=text):
-        o80.Backend(segment, **{"actuators": ["a"], **wrong})
-
-    assert segment not in [entry.name for entry in o80.segments()]
-
-
-def test_a_target_that_gives_no_field_is_refused(segment: str) -> None:
-    fields = {"position": float, "velocity": float}
-    with o80.Backend(segment, ["a"], fields) as backend:
-        backend.publish()
-        with o80.Frontend(segment) as frontend:
-            with pytest.raises(o80.InvalidArgument, match=r"names no field.*position"):
-                frontend.add_command("a", {})
-            assert frontend.added == 0
 
 
 def test_a_float_is_seconds_where_time_is_counted(segment: str) -> None:

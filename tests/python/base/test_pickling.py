@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 60.0  # [s] longer than any wait should take
 
 
 @pytest.fixture
