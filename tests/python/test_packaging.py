@@ -2,7 +2,7 @@
 
 import re
 import tomllib
-from importlib.metadata import entry_points, requires, version
+from importlib.metadata import requires, version
 from pathlib import Path
 from typing import Any
 
@@ -73,10 +73,6 @@ def test_packages_share_one_build_backend_and_license() -> None:
     assert len(licenses) == 1
 
 
-def test_the_compiled_library_has_the_version_of_the_package() -> None:
-    assert o80.version() == pyproject()["project"]["version"]
-
-
 def test_headers_library_and_stub_are_installed_with_the_package() -> None:
     for path in ("include/o80/base/version.hpp", "lib/libo80.so", "_core.pyi", "py.typed"):
         assert (INSTALLED / path).exists(), path
@@ -86,7 +82,3 @@ def test_the_core_brings_no_robot_but_its_example() -> None:
     bundled = {file.stem for file in (INSTALLED / "lib" / "o80" / "robots").iterdir()}
 
     assert bundled == {"two_joints"}
-
-
-def test_cmake_projects_built_by_python_find_the_package() -> None:
-    assert "o80" in {point.value for point in entry_points(group="cmake.prefix")}

@@ -11,12 +11,6 @@ MODELS = [
     for path in sorted((ROOT / "tests" / "proofs" / "models").rglob("*.*"))
     if path.suffix in {".pml", ".cpp", ".hpp"} and "Transcribed from" in path.read_text()
 ]
-TESTS = [
-    path
-    for path in (ROOT / "tests").rglob("*.*")
-    if path.suffix in {".pml", ".cpp", ".hpp", ".py"} and path != Path(__file__)
-]
-OLD_WORDS = re.compile(r"mourn|\bheirs?\b|offend|offence", re.IGNORECASE)
 TOKEN = re.compile(r"([\w/]+\.[ch]pp)|\(([^)]*)\)")
 
 
@@ -64,7 +58,3 @@ def test_there_are_transcriptions() -> None:
 def test_a_model_names_what_exists(model: Path) -> None:
     assert TOKEN.search(sentence(model))
     assert not missing(model)
-
-
-def test_old_words_of_the_protocols_are_gone() -> None:
-    assert not [path for path in TESTS if OLD_WORDS.search(path.read_text())]

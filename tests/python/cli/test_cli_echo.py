@@ -3,7 +3,6 @@
 import json
 import os
 import pty
-import signal
 import subprocess
 import time
 from collections.abc import Iterator
@@ -133,18 +132,6 @@ def test_echo_says_that_a_backend_waits_for_a_burst(segment: str) -> None:
         printed, _ = watching.communicate(timeout=WAIT)
     assert watching.returncode == 0
     assert len(printed.splitlines()) == 2
-
-
-def test_ctrl_c_ends_it_without_a_word(segment: str, backend: o80.Backend) -> None:
-    watching = subprocess.Popen(
-        [O80, "echo", segment], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
-    )
-    assert watching.stdout is not None
-    watching.stdout.readline()
-    watching.send_signal(signal.SIGINT)
-    _, said = watching.communicate(timeout=WAIT)
-    assert watching.returncode == 130
-    assert "Traceback" not in said
 
 
 def test_a_table_fits_a_terminal_of_80_columns(segment: str, backend: o80.Backend) -> None:

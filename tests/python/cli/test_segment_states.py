@@ -336,16 +336,6 @@ def test_the_view_says_what_it_has_not_seen(folder: Path, here: Machine, nobody:
     assert shown["state"] == "killed"
 
 
-def test_a_dead_segment_goes_on_being_named_as_it_ended(folder: Path, here: Machine) -> None:
-    process = here.backend()
-    end(process)
-    here.expect("killed")
-    said = here.o80("stop", "arm", fails=True)
-    assert "no backend 'arm' runs; nothing runs" in said
-    damaged(folder, 8, 4)
-    assert here.state() == "unknown"
-
-
 def test_of_a_directory_that_cannot_be_read_nobody_says_that_nothing_runs(
     folder: Path, here: Machine, nobody: Machine
 ) -> None:

@@ -24,11 +24,6 @@ def test_a_backend_is_stopped_by_its_name(process: o80.robots.Process, segment: 
             arm.wait_for_next(timeout=WAIT)
 
 
-def test_what_does_not_run_cannot_be_stopped(process: o80.robots.Process, segment: str) -> None:
-    with pytest.raises(o80.InvalidArgument, match=f"no backend 'arm' runs; running: .*{segment}"):
-        o80.stop("arm")
-
-
 def test_a_backend_that_does_not_stop_in_time_is_told_of(segment: str) -> None:
     program = (
         "import signal, o80\n"
