@@ -176,12 +176,6 @@ def test_a_module_refuses_another_robot(folder: Path, segment: str) -> None:
             module.attach(segment)
 
 
-def test_limits_do_not_make_it_another_robot(segment: str, tmp_path: Path) -> None:
-    (tmp_path / "one.py").write_text(module_of(o80.robots.load("two_joints").describe()))
-    with o80.robots.load("two_joints").inline(segment, frequency=250, gain=3.0):
-        imported(tmp_path / "one.py").attach(segment).close()
-
-
 def test_units_do_not_make_it_another_robot_and_types_do(segment: str) -> None:
     def digest(dtype: Any, unit: str) -> str:
         with o80.Backend(segment, ["a"], {"x": dtype}, units={"x": unit}) as backend:
