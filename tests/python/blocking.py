@@ -14,7 +14,6 @@ from typing import Any
 import o80
 from o80.robots.process import start_process
 
-WAIT = 60.0  # [s] longer than any wait should take
 # what calls import when they are first used: an interrupt during `exec` of a text, of which
 # dataclasses are made, makes Python end with the status of an interrupt that nobody caught
 for _module in (

@@ -1,8 +1,10 @@
 """Robots and segment names of their own for the tests of the package."""
 
 import itertools
+import json
 import os
 from collections.abc import Iterator
+from typing import Any
 
 import pytest
 
@@ -18,6 +20,17 @@ def segment() -> Iterator[str]:
     yield name
     if any(entry.name == name and not entry.alive for entry in o80.segments()):
         o80.clean(name)
+
+
+@pytest.fixture
+def forged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
+    """Provenance that recordings made in this test give instead of the truth."""
+    given: dict[str, Any] = {}
+    as_json = o80.Provenance.as_json
+    monkeypatch.setattr(
+        o80.Provenance, "as_json", lambda self: json.dumps(json.loads(as_json(self)) | given)
+    )
+    return given
 
 
 @pytest.fixture

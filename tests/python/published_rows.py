@@ -18,6 +18,7 @@ from mcap.reader import make_reader
 from minari import MinariDataset
 from mixed_robots import is_enum
 from numpy.typing import NDArray
+from processes import WAIT
 from rosbags.highlevel import AnyReader
 
 import o80
@@ -31,7 +32,6 @@ from o80.rows.history import columns_in
 from o80.view.base64_arrays import packed
 from o80.view.curves import Panels
 
-WAIT = 30.0  # [s] longer than any wait should take
 Columns = dict[str, NDArray[Any]]
 
 

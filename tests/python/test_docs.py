@@ -62,10 +62,6 @@ def anchors(page: Path) -> set[str]:
     return {heading.replace(" ", "-") for heading in plain}
 
 
-def test_there_are_pages() -> None:
-    assert len(PAGES) >= 12
-
-
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
 def test_every_link_leads_to_a_file_and_a_section(page: Path) -> None:
     broken = []

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from blocking import CALLS, WAIT, Place, place, waiting_methods
-from processes import run_python
+from blocking import CALLS, Place, place, waiting_methods
+from processes import WAIT, run_python
 
 import o80
 
@@ -252,22 +252,6 @@ def test_what_threads_add_and_pulse_at_once_is_sent_once(
     assert done == [300] * 4
     assert arm.added == 0
     assert sum(len(batch) for batch in batches) == 5 * 300
-
-
-def test_threads_that_burst_one_inline_robot_take_turns(arm: o80.Frontend) -> None:
-    rows: list[int] = []
-    each = 30  # of 8 threads: a lane keeps the results of 256 bursts, and a thread may stand long
-
-    def burst() -> None:
-        rows.extend(arm.burst(3).iteration for _ in range(each))
-
-    threads = [threading.Thread(target=burst) for _ in range(8)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join(WAIT)
-
-    assert sorted(rows) == list(range(3, 3 * 8 * each + 1, 3))
 
 
 def test_a_backend_is_used_by_one_thread(here: Place) -> None:

@@ -6,10 +6,9 @@ from collections.abc import Awaitable, Callable
 from typing import Literal
 
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 def waiting_threads() -> list[threading.Thread]:
@@ -69,16 +68,6 @@ def test_a_stream_gives_every_row_to_a_task(process: o80.robots.Process) -> None
 
     iterations = asyncio.run(read())
     assert iterations == list(range(iterations[0], iterations[0] + 30))
-
-
-def test_tasks_wait_side_by_side(process: o80.robots.Process) -> None:
-    async def read() -> None:
-        with process.frontend() as arm:
-            last = arm.published
-            rows = await asyncio.gather(*(arm.aio.wait_for(last + k, WAIT) for k in range(1, 40)))
-            assert [row.iteration for row in rows] == [last + k for k in range(1, 40)]
-
-    asyncio.run(read())
 
 
 CALLS: list[Callable[[o80.Frontend], Awaitable[object]]] = [
@@ -165,18 +154,6 @@ def test_a_cancelled_task_loses_no_row(process: o80.robots.Process) -> None:
                     seen[which] = row.iteration
 
     asyncio.run(read())
-
-
-def test_a_timeout_of_asyncio_cancels(bursting: o80.robots.Process) -> None:
-    async def wait() -> None:
-        with bursting.frontend() as arm:
-            with pytest.raises(TimeoutError):
-                await asyncio.wait_for(arm.aio.wait_for_next(), 0.01)
-            with pytest.raises(o80.TimeoutError, match="waits for a burst"):
-                await arm.aio.wait_for(5, timeout=0.01)
-            assert not waiting_threads()
-
-    asyncio.run(wait())
 
 
 def test_the_end_of_the_loop_ends_all_waits(bursting: o80.robots.Process) -> None:

@@ -1,25 +1,9 @@
 """Commands: targets, paces, profiles, queues."""
 
-import numpy as np
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
-
-
-def test_actuators_go_by_index_or_name(arm: o80.Frontend) -> None:
-    arm.add_command(np.int64(0), 0.25)
-    arm.add_command("elbow", 0.5)
-
-    assert arm.burst(1).desired.tolist() == [0.25, 0.5]
-
-
-@pytest.mark.parametrize("target", [1, 0.5, np.float32(0.5), np.int8(1), np.array(0.5), True])
-def test_every_number_is_a_target(arm: o80.Frontend, target: float) -> None:
-    arm.add_command("elbow", target)
-
-    assert arm.burst(1).desired[1] == float(target)
 
 
 # rule C5

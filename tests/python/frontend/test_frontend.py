@@ -4,10 +4,9 @@ import builtins
 import warnings
 
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 def test_it_gives_up_after_its_timeout(segment: str) -> None:
@@ -82,24 +81,6 @@ def fail_in(frontend: o80.Frontend) -> o80.Batch:
 def test_the_word_for_errors_is_checked(process: o80.robots.Process) -> None:
     with pytest.raises(o80.InvalidArgument, match="continue"):
         process.frontend(on_error="ignore")
-
-
-def test_exclusive_control_keeps_others_out(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, process.frontend() as other:
-        with arm.control():
-            other.add_command(0, 1.0)
-            refused = other.pulse()
-            with pytest.raises(o80.NotCompleted, match="exclusive control"):
-                refused.wait(WAIT)
-            with pytest.raises(o80.ControlTaken, match="exclusive control"), other.control():
-                pass
-        other.add_command(0, 1.0)
-        taken = other.pulse()
-        taken.wait(WAIT)
-
-    assert refused.statuses == [o80.Status.REJECTED]
-    assert refused.handles[0].reason == o80.Reason.EXCLUSIVE
-    assert taken.statuses == [o80.Status.COMPLETED]
 
 
 def test_control_within_control_changes_nothing(process: o80.robots.Process) -> None:

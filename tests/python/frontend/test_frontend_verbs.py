@@ -73,11 +73,6 @@ def test_an_error_of_the_call_itself_is_not_taken_for_wrong_arguments() -> None:
         arm.add_command(Seven(), 0.5)
 
 
-@pytest.mark.parametrize("name", sorted(declared(compiled=False)))
-def test_documents_a_verb_of_python(name: str) -> None:
-    assert inspect.getdoc(getattr(o80.Frontend, name))
-
-
 def test_names_each_of_its_files_in_the_table() -> None:
     table = o80.frontend.__doc__ or ""
     for source in SOURCES:

@@ -1,57 +1,14 @@
 """Limits, fields that rest, and the fastest way, as Python sees them."""
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
+from manual_backend import ManualBackend
 
 import o80
 
 JOINT = {"position": float, "velocity": float}
-
-
-class Loop:
-    """A robot of one joint whose loop the test itself runs, with a frontend."""
-
-    def __init__(self, segment: str, **options: Any) -> None:
-        self.backend = o80.Backend(segment, ["joint"], JOINT, frequency=1000.0, **options)
-        self.backend.publish({"position": 0.0, "velocity": 0.0})
-        self.frontend = o80.Frontend(segment)
-
-    def run(self, iterations: int) -> o80.History:
-        for _ in range(iterations):
-            desired = self.backend.step()
-            assert desired is not None
-            self.backend.publish(desired)
-        return self.frontend.history(iterations)
-
-    def close(self) -> None:
-        self.frontend.forget_added()
-        self.frontend.close()
-        self.backend.close()
-
-
-@pytest.fixture
-def loop(segment: str) -> Iterator[Loop]:
-    limits = o80.Limits(minimum=-1.0, maximum=1.0, speed=2.0, acceleration=20.0, jerk=2000.0)
-    loop = Loop(
-        segment,
-        limits={"joint": {"position": limits}},
-        rests_at={"joint": {"velocity": 0.0}},
-    )
-    yield loop
-    loop.close()
-
-
-def test_a_frontend_knows_all_limits(loop: Loop) -> None:
-    joint = loop.frontend.actuators[0]
-
-    assert joint.limits == o80.Limits(
-        minimum=-1.0, maximum=1.0, speed=2.0, acceleration=20.0, jerk=2000.0
-    )
-    assert joint.numbers[1].rest == 0.0
-    assert joint.numbers[0].rest is None
 
 
 NUMBERS = ("minimum", "maximum", "speed", "acceleration", "jerk", "error", "noise")
@@ -88,15 +45,16 @@ def test_so_is_whatever_else_a_robot_is_described_with(segment: str) -> None:
             make()
 
 
-def test_a_command_that_takes_longer_than_asked_says_by_how_much_and_why(loop: Loop) -> None:
-    loop.frontend.add_command("joint", {"position": 0.5}, iterations=100)
-    batch = loop.frontend.pulse()
-    loop.run(1)
-
-    begun = batch.handles[0]
-    assert (begun.status, begun.reason) == (o80.Status.ACTIVE, o80.Reason.LIMITS)
-    loop.run(600)
-    ended = batch.handles[0]
+def test_a_command_that_takes_longer_than_asked_says_by_how_much_and_why(segment: str) -> None:
+    limits = {"joint": o80.Limits(speed=2.0, acceleration=20.0, jerk=2000.0)}
+    with ManualBackend(segment, ["joint"], limits=limits) as robot:
+        robot.frontend.add_command("joint", 0.5, iterations=100)
+        batch = robot.frontend.pulse()
+        robot.run(1)
+        begun = batch.handles[0]
+        assert (begun.status, begun.reason) == (o80.Status.ACTIVE, o80.Reason.LIMITS)
+        robot.run(600)
+        ended = batch.handles[0]
 
     assert (ended.status, ended.reason) == (o80.Status.COMPLETED, o80.Reason.LIMITS)
     assert begun.iteration is not None
@@ -106,20 +64,14 @@ def test_a_command_that_takes_longer_than_asked_says_by_how_much_and_why(loop: L
     assert begun.text == ended.text
 
 
-def test_the_fastest_way_needs_limits(loop: Loop) -> None:
-    with pytest.raises(o80.InvalidArgument, match=r"velocity.*no limits of speed and acceleration"):
-        loop.frontend.add_command("joint", {"position": 0.5, "velocity": 0.0}, fastest=True)
-    with pytest.raises(o80.InvalidArgument, match="one pace"):
-        loop.frontend.add_command("joint", {"position": 0.5}, fastest=True, duration=1.0)
-
-
 def test_bounds_of_an_integral_reach_the_frontend(segment: str) -> None:
     bound = o80.IntegralBounds("position", minimum=-1.0, maximum=0.2, reaction=0.001)
     velocity = o80.Limits(speed=50.0, acceleration=5000.0, integral=bound)
     rests = {"joint": {"velocity": 0.0}}
-    loop = Loop(segment, limits={"joint": {"velocity": velocity}}, rests_at=rests)
-    assert loop.frontend.actuators[0].numbers[1].limits == velocity
-    loop.close()
+    limits = {"joint": {"velocity": velocity}}
+    with ManualBackend(segment, ["joint"], JOINT, limits=limits, rests_at=rests) as robot:
+        position, found = robot.frontend.actuators[0].numbers
+    assert (position.rest, found.rest, found.limits) == (None, 0.0, velocity)
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,9 @@ import threading
 from collections.abc import Iterator
 
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 STATE = {"position": float, "velocity": float, "held": bool}
 UNITS = {"position": "rad", "velocity": "rad/s"}
@@ -57,18 +56,6 @@ def plant(segment: str) -> Iterator[Plant]:
 def joints(plant: Plant, segment: str) -> Iterator[o80.Frontend]:
     with o80.Frontend(segment) as frontend:
         yield frontend
-
-
-def test_returns_the_first_observation_within_the_tolerance(joints: o80.Frontend) -> None:
-    observation = joints.move_to(
-        "joints_0", {"position": 1.0}, tolerance=0.01, timeout=WAIT, iterations=5
-    )
-
-    positions = joints.history().observed.joints["position"][:, 0]
-    assert abs(positions[-1] - 1.0) <= 0.01
-    assert abs(positions[-2] - 1.0) > 0.01
-    assert observation.iteration == joints.published
-    assert observation.desired.joints["position"][0] == 1.0
 
 
 def test_says_where_the_robot_is(plant: Plant, joints: o80.Frontend) -> None:

@@ -5,10 +5,9 @@ import pickle
 from collections.abc import Callable
 
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 Wait = Callable[[o80.Frontend], object]
 
@@ -81,16 +80,6 @@ def test_a_burst_does_not_judge_commands(arm: o80.Frontend) -> None:
     assert arm.burst(2).iteration == 7
     arm.add_command("elbow", 0.5, until=3)
     assert o80.burst({arm: 2})[arm].iteration == 9
-
-
-def test_with_nothing_added_there_is_no_answer_of_a_robot_that_has_ended(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment) as process, process.frontend() as arm:
-        assert arm.pulse_and_wait(WAIT).iteration >= 0
-        process.stop()
-        with pytest.raises(o80.BackendStopped):
-            arm.pulse_and_wait(WAIT)
-        with pytest.raises(o80.BackendStopped):
-            asyncio.run(arm.aio.pulse_and_wait(WAIT))
 
 
 def test_the_error_is_data(process: o80.robots.Process) -> None:

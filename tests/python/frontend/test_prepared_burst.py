@@ -4,10 +4,9 @@ import pickle
 
 import numpy as np
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 def test_it_sends_its_targets_and_fills_its_rows(arm: o80.Frontend) -> None:
@@ -45,15 +44,6 @@ def test_it_may_have_some_of_the_actuators(arm: o80.Frontend) -> None:
     assert arm.latest().desired.tolist() == [0.0, 0.5]
 
 
-def test_overwriting_drops_what_runs(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0, iterations=100)
-    burst = arm.prepared_burst(2, 0, mode="overwrite")
-    burst.targets[...] = 0.5
-    burst.run()
-
-    assert burst.rows["desired"][:, 0].tolist() == [0.5, 0.5]
-
-
 def test_what_comes_late_is_rejected_or_taken_at_once(arm: o80.Frontend) -> None:
     arm.burst(10)
     burst = arm.prepared_burst(2)
@@ -64,12 +54,6 @@ def test_what_comes_late_is_rejected_or_taken_at_once(arm: o80.Frontend) -> None
 
     assert burst.run(at=5, late="now") == 12
     assert burst.rows["desired"][:, 0].tolist() == [0.5, 0.5]
-
-
-def test_a_plain_burst_may_be_taken_later_too(arm: o80.Frontend) -> None:
-    arm.add_command(0, 0.5)
-    assert arm.burst(2, at=2).desired[0] == 0.5
-    assert arm.history(since=1, until=1).desired[0, 0] == 0.0
 
 
 def test_what_was_not_filled_is_refused(arm: o80.Frontend) -> None:
@@ -88,20 +72,6 @@ def test_it_bursts_a_robot_in_another_process(bursting: o80.robots.Process) -> N
         burst.targets[...] = 0.5
         assert [burst.run(WAIT) for _ in range(3)] == [5, 10, 15]
         assert burst.rows["iteration"].tolist() == [11, 12, 13, 14, 15]
-
-
-def test_a_backend_by_the_clock_has_none(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, pytest.raises(o80.NotBursting, match=process.segment):
-        arm.prepared_burst(5)
-
-
-def test_of_a_closed_frontend_it_says_so(segment: str) -> None:
-    arm = o80.robots.load("two_joints").inline(segment)
-    burst = arm.prepared_burst(1)
-    burst.targets[...] = 0.5
-    arm.close()
-    with pytest.raises(o80.Closed, match=segment):
-        burst.run()
 
 
 def test_it_is_not_pickled(arm: o80.Frontend) -> None:

@@ -1,10 +1,9 @@
 """Requests to a robot, and purges."""
 
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 def test_a_request_is_served_at_once_and_leaves_what_was_added(arm: o80.Frontend) -> None:
@@ -59,16 +58,3 @@ def test_purge_needs_no_pulse(arm: o80.Frontend) -> None:
     arm.purge("shoulder")
 
     assert batch.statuses == [o80.Status.PURGED, o80.Status.ACTIVE]
-
-
-def test_a_purge_may_be_part_of_a_pulse(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0, iterations=100)
-    first = arm.pulse()
-    arm.add_purge(0)
-    arm.add_command(0, 0.5, iterations=2)
-    assert first.statuses != [o80.Status.PURGED]
-
-    observation = arm.pulse_and_wait(timeout=WAIT)
-
-    assert first.statuses == [o80.Status.PURGED]
-    assert observation.desired[0] == 0.5

@@ -3,10 +3,9 @@
 from collections.abc import Iterator
 
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 @pytest.fixture

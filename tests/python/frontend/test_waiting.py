@@ -4,10 +4,9 @@ import os
 import signal
 
 import pytest
+from processes import WAIT
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 def test_a_killed_backend_is_an_error_and_its_history_stays(
@@ -31,19 +30,3 @@ def test_a_killed_backend_is_an_error_and_its_history_stays(
     with o80.Frontend(process.segment, dead=True) as late:
         assert late.published == arm.published
     arm.close()
-
-
-def test_dead_segments_are_listed_and_cleaned(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment) as process:
-        alive = next(entry for entry in o80.segments() if entry.name == segment)
-        assert (alive.alive, alive.pid, alive.life) == (True, process.pid, "running")
-        assert alive.bytes > 0
-        with pytest.raises(o80.SegmentTaken):
-            o80.clean(segment)
-        os.kill(process.pid, signal.SIGKILL)
-        process.wait(WAIT)
-
-        dead = next(entry for entry in o80.segments() if entry.name == segment)
-        assert (dead.alive, dead.life, dead.epoch) == (False, "killed", alive.epoch)
-        assert o80.clean(segment) == [segment]
-        assert o80.clean(segment) == []

@@ -1,7 +1,6 @@
 """A replay loads and reads only what the user trusts: a recording may come from a stranger."""
 
 import hashlib
-import json
 import os
 import shutil
 from dataclasses import dataclass, replace
@@ -15,17 +14,6 @@ from o80.replaying.recorded_run import FileRun, LiveRun, runs_in
 from o80.replaying.replay import RunReplay
 from o80.replaying.trust import options_of
 from o80.rows.provenance import Provenance, ProvenanceFile
-
-
-@pytest.fixture
-def forged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Provenance that recordings made in this test give instead of the truth."""
-    lies: dict[str, Any] = {}
-    honest = Provenance.as_json
-    monkeypatch.setattr(
-        Provenance, "as_json", lambda self: json.dumps(json.loads(honest(self)) | lies)
-    )
-    return lies
 
 
 def recording_of(folder: Path, segment: str) -> Path:
@@ -82,9 +70,9 @@ def run(tmp_path: Path, segment: str) -> FileRun:
 
 def test_a_recorded_name_is_not_taken_for_a_path(run: FileRun, stray: Path) -> None:
     for name in (str(stray), os.path.relpath(stray), "../stray.so"):
-        lies = Forged(run, run.schema | {"robot": name}, run.provenance)
+        forged = Forged(run, run.schema | {"robot": name}, run.provenance)
         with pytest.raises(o80.DriverError, match="may name any library") as refused:
-            RunReplay(lies).report()
+            RunReplay(forged).report()
         assert "--robot" in str(refused.value)
     assert not is_loaded(stray)
 
@@ -96,8 +84,8 @@ class Described:
 
 
 def checked(run: FileRun, text: str, files: tuple[ProvenanceFile, ...] = (), **given: str) -> Any:
-    lies = replace(run.provenance, options={"model": text}, files=files)
-    return options_of(Forged(run, run.schema, lies), Described(), given)["model"]  # type: ignore[arg-type]
+    forged = replace(run.provenance, options={"model": text}, files=files)
+    return options_of(Forged(run, run.schema, forged), Described(), given)["model"]  # type: ignore[arg-type]
 
 
 def test_a_recorded_file_is_read_only_with_its_recorded_content(

@@ -235,22 +235,6 @@ def test_arrays_that_lost_their_labels_refuse_words() -> None:
     assert (mixed == 2).tolist() == [False, True, False, True]
 
 
-def test_words_are_written_into_states_and_readings(segment: str) -> None:
-    class Gear(IntEnum):
-        OFF = 0
-        ON = 200
-
-    with o80.Backend(segment, ["left", "right"], Gear, extended={"gears": Gear}) as backend:
-        backend.publish(["ON", "OFF"], {"gears": "ON"})
-        with o80.Frontend(segment) as frontend:
-            assert (frontend.latest().observed == "ON").tolist() == [True, False]
-            frontend.add_trajectory([["ON", "ON"], ["OFF", Gear.ON.name]])
-            with pytest.raises(o80.InvalidArgument, match=r"'ONN'.*Did you mean 'ON'"):
-                frontend.add_trajectory([["ON", "ONN"]])
-        with pytest.raises(o80.InvalidArgument, match="'gears' has no label 'OPEN'"):
-            backend.publish(None, {"gears": "OPEN"})
-
-
 def test_robots_without_enumerations_have_plain_arrays(arm: o80.Frontend) -> None:
     assert arm.enums == {}
     states: list[NDArray[Any]] = [arm.latest().observed, arm.history().desired]
@@ -316,13 +300,3 @@ def test_labels_and_numbers_may_stand_side_by_side(segment: str) -> None:
                     _ = gears == wrong
                 with pytest.raises(ValueError, match=r"no label 'hihg'.*'high'"):
                     backend.publish(wrong)
-
-
-def test_one_struct_takes_labels_too(segment: str) -> None:
-    with o80.Backend(segment, 2, {"gear": GEARS, "force": float}) as backend:
-        states: Any = backend._observed
-        states[1]["gear"] = "high"
-        states[0]["force"] = 1.5
-        assert states["gear"].labels().tolist() == ["low", "high"]
-        with pytest.raises(ValueError, match="no label 'hihg'"):
-            states[0]["gear"] = "hihg"

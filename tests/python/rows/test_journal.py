@@ -3,12 +3,12 @@
 import contextlib
 
 import numpy as np
+from manual_backend import ManualBackend
+from processes import WAIT
 
 import o80
 from o80.frontend.reader import Journal
 from o80.rows.journal import JournalEntry
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 def of_kind(entries: list[JournalEntry], *kinds: str) -> list[JournalEntry]:
@@ -33,14 +33,10 @@ def test_shows_who_sent_what_and_when_it_began_and_ended(arm: o80.Frontend) -> N
 
 def test_targets_have_the_fields_that_were_given(segment: str) -> None:
     joint = np.dtype([("position", "f8"), ("gains", "f8", (2,)), ("enabled", "?")])
-    with o80.Backend(segment, ["a", "b"], joint) as backend:
-        backend.publish()
-        with o80.Frontend(segment) as frontend:
-            frontend.add_command("a", {"position": 0.25})
-            frontend.add_command("b", {"gains": [1.0, 2.0], "enabled": True})
-            frontend.pulse()
-            backend.step()
-            first, second = of_kind(frontend.journal(), "taken")[0].commands
+    with ManualBackend(segment, ["a", "b"], joint) as robot:
+        robot.frontend.add_command("a", {"position": 0.25})
+        robot.desired("b", {"gains": [1.0, 2.0], "enabled": True})
+        first, second = of_kind(robot.frontend.journal(), "taken")[0].commands
     assert first.targets == ({"position": 0.25},)
     (target,) = second.targets
     assert set(target) == {"gains", "enabled"}
@@ -49,14 +45,12 @@ def test_targets_have_the_fields_that_were_given(segment: str) -> None:
 
 
 def test_a_trajectory_has_all_its_rows(segment: str) -> None:
-    with o80.Backend(segment, ["a", "b"]) as backend:
-        backend.publish()
-        with o80.Frontend(segment) as frontend:
-            rows = np.linspace([0.0, 1.0], [1.0, 0.0], 20)
-            frontend.add_trajectory(rows, iterations=2)
-            frontend.pulse()
-            backend.step()
-            commands = of_kind(frontend.journal(), "taken")[0].commands
+    rows = np.linspace([0.0, 1.0], [1.0, 0.0], 20)
+    with ManualBackend(segment, ["a", "b"]) as robot:
+        robot.frontend.add_trajectory(rows, iterations=2)
+        robot.frontend.pulse()
+        robot.run()
+        commands = of_kind(robot.frontend.journal(), "taken")[0].commands
     targets = {
         name: target
         for command in commands
@@ -66,42 +60,19 @@ def test_a_trajectory_has_all_its_rows(segment: str) -> None:
 
 
 def test_goes_on_behind_the_entries_that_were_read(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend:
-        backend.publish()
-        with o80.Frontend(segment) as frontend:
-            journal = Journal(frontend)
-            new = Journal(frontend, new=True)
-            seen: list[int] = []
-            for target in range(5):
-                frontend.add_command("a", float(target))
-                frontend.pulse()
-                backend.step()
-                backend.publish([0.0])
-                entries = journal.read()
-                assert [entry.missed for entry in entries] == [0] * len(entries)
-                assert entries == new.read()
-                assert entries == frontend.journal(since=seen[-1] + 1 if seen else None)
-                seen += [entry.number for entry in entries]
-            assert journal.read() == []
-            assert len(of_kind(frontend.journal(), "taken")) == 5
-            assert sorted(set(seen)) == seen
-
-
-def test_a_halt_and_a_rejected_batch_say_why(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend:
-        backend.publish()
-        with o80.Frontend(segment) as frontend:
-            frontend.halt("the ball is on the floor")
-            backend.step()
-            backend.publish([0.0])
-            frontend.add_command("a", 1.0)
-            frontend.pulse()
-            backend.step()
-            halt, rejected = frontend.journal()
-    assert (halt.kind, halt.halt, halt.cause) == ("halt", 1, "frontend")
-    assert halt.text == "the ball is on the floor"
-    assert (rejected.kind, rejected.reason) == ("rejected", "halted")
-    assert rejected.commands[0].targets == (1.0,)
+    with ManualBackend(segment, ["a"]) as robot:
+        journal, new = Journal(robot.frontend), Journal(robot.frontend, new=True)
+        seen: list[int] = []
+        for target in range(5):
+            robot.desired("a", float(target))
+            entries = journal.read()
+            assert [entry.missed for entry in entries] == [0] * len(entries)
+            assert entries == new.read()
+            assert entries == robot.frontend.journal(since=seen[-1] + 1 if seen else None)
+            seen += [entry.number for entry in entries]
+        assert journal.read() == []
+        assert len(of_kind(robot.frontend.journal(), "taken")) == 5
+        assert sorted(set(seen)) == seen
 
 
 def test_of_a_backend_that_has_failed_the_journal_is_still_there(segment: str) -> None:
@@ -111,20 +82,6 @@ def test_of_a_backend_that_has_failed_the_journal_is_still_there(segment: str) -
     with o80.Frontend(segment, dead=True) as late:
         assert late.journal()[-1].kind == "ended"
         assert "it broke" in late.journal()[-1].text
-
-
-def test_a_batch_for_later_says_for_which_iteration(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend:
-        backend.publish()
-        with o80.Frontend(segment) as frontend:
-            frontend.add_command("a", 1.0)
-            frontend.pulse(at=2)
-            for _ in range(2):
-                backend.step()
-                backend.publish([0.0])
-            scheduled, taken = of_kind(frontend.journal(), "scheduled", "taken")
-    assert (scheduled.iteration, scheduled.at) == (1, 2)
-    assert (taken.iteration, taken.at) == (2, None)
 
 
 def test_a_request_comes_with_its_values(arm: o80.Frontend) -> None:

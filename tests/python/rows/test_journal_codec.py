@@ -7,8 +7,8 @@ import json
 import math
 import struct
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 from processes import WAIT, run_o80
@@ -19,7 +19,6 @@ from o80.base.words import ProfileWord
 from o80.recording.journal_channel import Entries
 from o80.recording.recorder import Recorder
 from o80.replaying.entry_feed import MotionRules
-from o80.rows.provenance import Provenance
 
 NEWER = _core.JOURNAL_CODEC + 1
 RECORDS = 1  # kind of an entry
@@ -200,19 +199,6 @@ def record_limited(path: Path, segment: str, profile: ProfileWord = "linear") ->
     return path
 
 
-@contextmanager
-def motion_rules(rules: object, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """Records as an o80 with these rules."""
-    honest = Provenance.as_json
-    with monkeypatch.context() as forged:
-        forged.setattr(
-            Provenance,
-            "as_json",
-            lambda self: json.dumps(json.loads(honest(self)) | {"motion_rules": rules}),
-        )
-        yield
-
-
 def test_a_recording_says_under_which_motion_rules_it_was_made(
     segment: str, tmp_path: Path
 ) -> None:
@@ -228,10 +214,10 @@ def test_a_recording_says_under_which_motion_rules_it_was_made(
 
 @pytest.mark.parametrize("other", [_core.MOTION_RULES - 1, _core.MOTION_RULES + 1])
 def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_change(
-    other: int, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    other: int, segment: str, tmp_path: Path, forged: dict[str, Any]
 ) -> None:
-    with motion_rules(other, monkeypatch):
-        path = record_limited(tmp_path / "run.mcap", segment)
+    forged["motion_rules"] = other
+    path = record_limited(tmp_path / "run.mcap", segment)
     (run,) = o80.replay(path)
 
     assert run.difference is None
@@ -246,10 +232,10 @@ def test_under_other_rules_rows_are_compared_up_to_the_first_command_that_they_c
 
 
 def test_rules_that_change_no_command_of_the_run_are_noted(
-    segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    segment: str, tmp_path: Path, forged: dict[str, Any]
 ) -> None:
-    with motion_rules(77, monkeypatch):
-        path = record(tmp_path / "run.mcap", segment)
+    forged["motion_rules"] = 77
+    path = record(tmp_path / "run.mcap", segment)
     (run,) = o80.replay(path)
 
     assert run.identical, run
@@ -266,13 +252,3 @@ def test_the_first_command_is_found_whatever_the_rules_are(segment: str, tmp_pat
             rules = MotionRules.of(epoch.schema, recorded, now)
             moved = [entry.iteration for entry in entries if rules.moved_otherwise(entry)]
             assert moved == (changed if recorded != now else []), (profile, recorded, now)
-
-
-@pytest.mark.parametrize("rules", ['"one"', "null", "[]", "1.5", "-1", "9" * 30])
-def test_damaged_rules_are_told(
-    rules: str, segment: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with motion_rules(json.loads(rules), monkeypatch):
-        path = record_limited(tmp_path / "run.mcap", segment)
-    with pytest.raises(o80.RecordingError, match="provenance is damaged"):
-        o80.replay(path)

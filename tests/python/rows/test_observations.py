@@ -9,8 +9,6 @@ import pytest
 
 import o80
 
-WAIT = 30.0  # [s] longer than any wait should take
-
 
 class Control(IntEnum):
     IDLE = 0
@@ -50,16 +48,6 @@ def test_states_of_one_number_are_a_float_array(arm: o80.Frontend) -> None:
     assert observation.clamped.tolist() == [False, False]
 
 
-def test_counters_come_with_each_observation(arm: o80.Frontend) -> None:
-    observation = arm.burst(7)
-
-    assert observation.iteration == 7
-    assert observation.time == 7_000_000
-    assert (observation.overruns, observation.skipped, observation.lateness) == (0, 0, 0)
-    assert not observation.fresh
-    assert observation.missed == 0
-
-
 def test_an_observation_changes_no_more(arm: o80.Frontend) -> None:
     before = arm.latest()
     observed = before.observed
@@ -95,46 +83,6 @@ def test_a_printed_record_names_the_values_of_enumerations(mixed: o80.Backend) -
         assert "mode=['POSITION']" in repr(many)
         assert "mode=POSITION" in repr(pickle.loads(pickle.dumps(row)))
         assert row.mode == Control.POSITION
-
-
-def test_extended_values_of_every_shape(mixed: o80.Backend) -> None:
-    with o80.Frontend(mixed.segment) as frontend:
-        extended = frontend.latest().extended
-
-        assert extended.force.tolist() == [1.0, 2.0, 3.0]
-        assert extended.pose.shape == (2, 2)
-        assert extended.hand.open
-        assert extended.hand["grip"] == 0.5
-        assert "force" in repr(extended)
-
-
-def test_histories_have_a_leading_dimension(mixed: o80.Backend) -> None:
-    for i in range(1, 5):
-        mixed.step()
-        mixed.publish({"gripper": float(i)}, {"force": np.full(3, i)})
-    with o80.Frontend(mixed.segment) as frontend:
-        history = frontend.history(4)
-
-        assert len(history) == 4
-        assert history.iteration.tolist() == [1, 2, 3, 4]
-        assert history.observed.gripper.tolist() == [1.0, 2.0, 3.0, 4.0]
-        assert history.observed.joints["velocity"].shape == (4, 3)
-        assert history.extended.force.shape == (4, 3)
-        assert history.extended.pose.shape == (4, 2, 2)
-        assert history.extended.hand.grip.tolist() == [0.5] * 4
-        assert history.active.shape == (4, 5)
-        assert np.all(np.diff(history.time) > 0)
-        assert not history.fresh.any()
-
-
-def test_flat_is_all_observed_then_all_extended(mixed: o80.Backend) -> None:
-    with o80.Frontend(mixed.segment) as frontend:
-        observation = frontend.latest()
-        expected = [0, 0, 0, 0, 0, 0, 0.25, 1, 1, 2, 3, 0, 0, 0, 0, 1, 0.5]
-
-        assert observation.flat().dtype == np.float32
-        assert observation.flat(np.float64).tolist() == expected
-        assert frontend.history(1).flat(np.float64).tolist() == [expected]
 
 
 def test_many_actuators_fill_several_words_of_a_mask(segment: str) -> None:
