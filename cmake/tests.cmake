@@ -177,18 +177,4 @@ foreach(source IN LISTS process_sources)
   target_link_libraries(${program} PRIVATE o80 o80_private_headers o80_warnings)
 endforeach()
 
-# their robots: lib/tests/<stem>.so
-if(NOT O80_STATIC)
-  set(bundled_robots ${O80_ROBOT_BUILD_DIR})
-  set(O80_ROBOT_BUILD_DIR ${PROJECT_BINARY_DIR}/lib/tests)
-  file(GLOB robot_sources CONFIGURE_DEPENDS ${PROJECT_SOURCE_DIR}/tests/processes/robots/*.cpp)
-  foreach(source IN LISTS robot_sources)
-    cmake_path(GET source STEM robot)
-    o80_add_robot(${robot} ${source})
-    target_include_directories(${robot} PRIVATE ${PROJECT_SOURCE_DIR}/tests/cpp)
-    target_link_libraries(${robot} PRIVATE o80_warnings)
-  endforeach()
-  set(O80_ROBOT_BUILD_DIR ${bundled_robots})
-endif()
-
 include(cmake/torture.cmake)

@@ -157,26 +157,6 @@ def test_what_stays_open_is_opened_above_the_standard_descriptors() -> None:
     assert not [call for file in files for call in unguarded(file)]
 
 
-def test_files_of_cpp_are_opened_in_these_places_only() -> None:
-    """By LockFile and the serial port, or for a moment."""
-    calls = re.compile(
-        r"[ (]::open\((path|text)|::socket\(|memfd_create|shm_open|openat\(|= open\(\""
-    )
-    files = [
-        file
-        for folder in ("src", "python/bindings", "robots/arms/src")
-        for file in (ROOT / folder).rglob("*.cpp")
-    ]
-    assert {file.stem for file in files if calls.search(file.read_text())} == {
-        "fork",
-        "serial_port",
-        "process_start",
-        "segment_file",
-        "service_manager",
-        "trusted_library",
-    }
-
-
 def test_programs_open_missing_standard_descriptors_first() -> None:
     mains = [
         (file, node)

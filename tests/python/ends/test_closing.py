@@ -12,12 +12,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from processes import end_of
+from processes import WAIT, end_of
 
 import o80
 from o80.rows.layout import HEAD
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 # arguments of what needs some, by class and name; None: nothing of the segment is used
 CALLS: dict[str, dict[str, Callable[[Any], Any]]] = {
@@ -154,17 +152,6 @@ def test_every_use_of_something_closed_says_so(things: Things, kind: str) -> Non
     for member in DATA[type(closed).__name__] - {"close"}:
         getattr(closed, member)
     assert "closed" in repr(closed)
-
-
-def test_a_group_with_one_that_is_closed_does_not_begin(segment: str) -> None:
-    joints = o80.robots.load("two_joints")
-    with joints.inline(f"{segment}-a") as one, joints.inline(f"{segment}-b") as other:
-        other.close()
-
-        with pytest.raises(o80.Closed, match=f"{segment}-b"):
-            o80.burst({one: 5, other: 5})
-
-        assert one.published == 0
 
 
 def test_control_that_was_not_waited_for_is_given_back(segment: str) -> None:

@@ -2,8 +2,6 @@
 
 import gc
 import os
-import threading
-import warnings
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -11,11 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import run_python
+from processes import WAIT, run_python
 
 import o80
-
-WAIT = 30.0  # [s] longer than any wait should take
 
 
 def held() -> dict[str, int]:
@@ -125,56 +121,6 @@ def test_a_cycle_of_a_backend_and_its_handler_is_collected(segment: str) -> None
     assert segment not in [entry.name for entry in o80.segments() if entry.alive]
 
 
-class Unfinished(o80.Frontend):
-    """A frontend whose construction fails before it is one."""
-
-    def __init__(self, segment: str) -> None:
-        assert "_attachment" in self.__dict__, segment
-
-
-def test_a_half_made_frontend_can_be_dropped(standing: o80.Backend) -> None:
-    before = held()
-
-    half = Unfinished(standing.segment)
-    del half
-
-    assert held() == before
-
-
-def test_the_last_name_may_go_while_another_thread_waits(standing: o80.Backend) -> None:
-    ended: list[object] = []
-    begun = threading.Event()
-
-    def wait(row: int) -> None:
-        begun.set()
-        ended.append(o80.Frontend(standing.segment).wait_for(row, WAIT).iteration)
-
-    waiting = threading.Thread(target=wait, args=(1,))
-    waiting.start()
-    begun.wait(WAIT)
-    gc.collect()
-    with o80.Frontend(standing.segment) as other:
-        other.burst(1, wait=False)
-        drain(standing)
-    waiting.join(WAIT)
-
-    assert ended == [1]
-
-
-def test_a_stream_that_is_dropped_in_the_middle_disturbs_nobody(arm: o80.Frontend) -> None:
-    arm.burst(20)
-    for observation in arm.stream(since=0):
-        if observation.iteration == 5:
-            break
-    rows = arm.stream(since=3)
-    assert next(rows).iteration == 3
-    del rows, observation
-    gc.collect()
-
-    assert next(arm.stream(since=7)).iteration == 7
-    assert arm.burst(1).iteration == 21
-
-
 def test_a_stream_keeps_its_frontend(standing: o80.Backend) -> None:
     rows = o80.Frontend(standing.segment).stream(since=0)
     gc.collect()
@@ -210,36 +156,6 @@ def test_an_inline_robot_that_is_dropped_stops_and_its_watchers_are_told(segment
         with pytest.raises(o80.BackendStopped):
             watcher.wait_for(10, WAIT)
         assert watcher.history().iteration.tolist() == [0, 1, 2, 3]
-
-
-def test_commands_of_a_dropped_frontend_are_warned_about(standing: o80.Backend) -> None:
-    frontend = o80.Frontend(standing.segment)
-    frontend.add_command(0, 1.0)
-
-    with pytest.warns(ResourceWarning, match="1 commands were added"):
-        del frontend
-
-
-def test_collecting_in_a_handler_is_harmless(segment: str) -> None:
-    with o80.Backend(segment, ["a"], requests={"home": None}) as backend:
-        backend.publish([0.0])
-
-        def home(_fields: o80.Record) -> None:
-            cycle: list[Any] = [o80.Frontend(segment), backend]
-            cycle.append(cycle)
-            cycle[0].add_command(0, 1.0)
-            cycle[0].pulse()
-            del cycle
-            gc.collect()
-
-        backend.on("home", home)
-        with o80.Frontend(segment) as other, warnings.catch_warnings():
-            warnings.simplefilter("ignore", ResourceWarning)
-            for _ in range(20):
-                other.add_request("home")
-                batch = other.pulse()
-                backend.publish(backend.step())
-                batch.wait(WAIT)
 
 
 def test_objects_may_be_referred_to_weakly(arm: o80.Frontend) -> None:

@@ -244,8 +244,3 @@ def test_o80_halt_all_halts_the_others_when_one_cannot_be_halted(
     assert f"halt 1 of {arm.segment}" in done.stdout
     assert arm.halted is not None
     assert arm.halted.text == "die Tür --now"
-
-
-def test_the_name_of_a_segment_does_not_begin_as_an_option(segment: str) -> None:
-    with pytest.raises(o80.InvalidArgument, match=r"'--all' .* neither '\.' nor '-' in front"):
-        o80.Backend("--all", ["a"])

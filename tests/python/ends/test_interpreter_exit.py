@@ -11,7 +11,6 @@ from processes import end_of, run_python
 
 import o80
 
-WAIT = 60.0  # [s] longer than any wait should take
 WORDS_OF_A_CRASH = ("Fatal", "terminate", "exception not rethrown", "Abort", "Segmentation")
 
 
@@ -185,19 +184,6 @@ def test_daemon_threads_in_full_work_do_not_crash_the_end(segment: str) -> None:
         assert not any(e.name == segment and e.alive for e in o80.segments())
 
 
-def test_a_thread_that_is_no_daemon_ends_first(segment: str) -> None:
-    program = (
-        "import threading, o80\n"
-        f"arm = o80.robots.load('two_joints').inline({segment!r})\n"
-        "threading.Thread(target=lambda: print(arm.burst(100_000).iteration)).start()\n"
-    )
-
-    ended = run(program)
-
-    assert (ended.returncode, ended.stdout) == (0, "100000\n"), ended.stderr
-    assert segment not in [entry.name for entry in o80.segments()]
-
-
 def test_what_was_never_pulsed_is_warned_about_at_the_end(segment: str) -> None:
     with o80.robots.load("two_joints").start(segment):
         ended = run(
@@ -225,23 +211,6 @@ arm = o80.robots.load("two_joints").inline()
 
     assert ended.returncode == 0, ended.stderr
     assert ended.stdout.splitlines() == ["after: 2 True", "before it was imported: True"]
-
-
-def test_a_lane_is_given_back_in_order_at_the_end_even_in_a_cycle(segment: str) -> None:
-    with o80.Backend(segment, ["a"], stale="stop", lanes=1) as backend:
-        backend.publish([0.0])
-        ended = run(
-            f"import o80\narm = o80.Frontend({segment!r})\ncycle = [arm]\ncycle.append(cycle)\n"
-            "arm.add_command(0, 1.0)\nbatch = arm.pulse()\n"
-        )
-        assert ended.returncode == 0, ended.stderr
-        for _ in range(3):  # one that died would end it
-            assert backend.step() is not None
-            backend.publish([1.0])
-        with o80.Frontend(segment) as next_one:
-            next_one.add_command(0, 2.0)
-            next_one.pulse()
-        assert backend.step() == [2.0]
 
 
 def test_one_that_fails_to_close_does_not_keep_the_others_open(segment: str) -> None:

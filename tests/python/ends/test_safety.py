@@ -175,21 +175,6 @@ def test_a_halt_is_shown_refuses_and_is_resumed(process: o80.robots.Process) -> 
         assert other.halted is None  # type: ignore[unreachable]
 
 
-def test_a_halt_ends_a_burst_and_an_inline_robot_knows_it(arm: o80.Frontend) -> None:
-    number = arm.halt("inline")
-    assert arm.halted is not None
-    assert arm.halted.iteration is not None, "latched at once"
-    assert arm.burst(3).halted
-    arm.add_command(0, 1.0)
-    with pytest.raises(o80.BackendHalted):
-        arm.burst(1)
-    arm.request("reset", seed=1)
-    assert arm.halted is not None, "a simulation that was reset is still halted"
-    arm.resume(number)
-    arm.add_command(0, 1.0)
-    assert arm.burst(1).desired[0] == 1.0
-
-
 def test_an_embedded_backend_halts_and_resumes(segment: str) -> None:
     told = []
     refuse = ["the door is open"]

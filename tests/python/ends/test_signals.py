@@ -3,9 +3,7 @@
 import contextlib
 import os
 import pty
-import re
 import select
-import shutil
 import signal
 import subprocess
 import sys
@@ -19,14 +17,12 @@ import pytest
 from alarm import alarm_in, handling
 from blocking import CALLS
 from interrupting import at_every_moment
-from processes import run_program
+from processes import WAIT
 
 import o80
 from o80.base.child_process import start_child
 from o80.recording.locked_file import LockedFile
 from o80.robots.process import Process
-
-WAIT = 60.0  # [s] longer than any wait should take
 
 PROGRAM = """
 import os, signal, sys, time
@@ -102,39 +98,6 @@ def test_ctrl_c_ends_every_wait_and_leaves_everything_usable(
     # a figure for the report, no limit: the machine may be slow
     record_property("longest delay of Ctrl-C [ms]", max(delays.values()))
     assert all(delay < WAIT * 1e3 for delay in delays.values())
-
-
-SLICES = """
-import signal, sys, o80
-backend = o80.Backend({name!r}, ["a"], bursting=True)
-backend.publish([0.0])
-with backend, o80.Frontend({name!r}) as frontend:
-    for wait in (
-        lambda: frontend.wait_for(5, 0.3),
-        lambda: backend.step(0.3),
-        lambda: frontend.burst(5, timeout=0.3),
-    ):
-        try:
-            wait()
-        except o80.TimeoutError:
-            pass
-"""
-
-
-@pytest.mark.check
-@pytest.mark.skipif(shutil.which("strace") is None, reason="strace is not installed")
-def test_no_wait_sleeps_longer_than_a_slice_between_looks_at_signals(segment: str) -> None:
-    program = SLICES.format(name=segment)
-    traced = run_program("strace", "-qq", "-e", "trace=futex", sys.executable, "-c", program)
-
-    sleeps = [
-        int(seconds) + int(nanoseconds) * 1e-9
-        for seconds, nanoseconds in re.findall(
-            r"FUTEX_WAIT, \d+, \{tv_sec=(\d+), tv_nsec=(\d+)\}", traced.stderr
-        )
-    ]
-    assert len(sleeps) >= 3, traced.stderr  # in three waits of 300 ms
-    assert max(sleeps) <= 0.05
 
 
 def test_a_handler_that_returns_lets_the_wait_go_on_with_its_timeout(arm: o80.Frontend) -> None:
@@ -213,49 +176,6 @@ def test_a_handler_cannot_burst_within_a_burst(arm: o80.Frontend) -> None:
     arm.forget_added()
     reached = arm.published
     assert arm.burst(1).iteration == reached + 1
-
-
-def test_ctrl_c_in_a_with_block_purges_what_the_frontend_sent(
-    process: o80.robots.Process,
-) -> None:
-    sent: list[o80.Batch] = []
-
-    def move() -> None:
-        with arm:
-            arm.add_command(0, 1.0, duration=1e6)
-            sent.append(arm.pulse())
-            arm.add_command(1, 1.0)
-            signal.setitimer(signal.ITIMER_REAL, 0.01)
-            sent[0].wait(WAIT)
-
-    arm = process.frontend()
-    with handling(signal.SIGALRM, signal.default_int_handler), pytest.raises(KeyboardInterrupt):
-        move()
-
-    assert arm.closed
-    with process.frontend() as other:
-        while sent[0].statuses != ["purged"]:
-            other.wait_for(other.published + 1, WAIT)
-        assert not other.latest().active.any()
-
-
-def test_ctrl_c_while_control_is_awaited_gives_it_back(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend:
-        backend.publish([0.0])
-        with o80.Frontend(segment) as one, o80.Frontend(segment) as other:
-            with (
-                handling(signal.SIGALRM, signal.default_int_handler),
-                pytest.raises(KeyboardInterrupt),
-                alarm_in(0.01),
-                one.control(WAIT),
-            ):
-                pass
-            other.add_command(0, 1.0)
-            batch = other.pulse()
-            backend.step()
-            backend.publish([1.0])
-
-            assert batch.statuses == ["completed"]
 
 
 @pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")
