@@ -8,13 +8,7 @@ struct Reading {
 };
 O80_DESCRIBE(Reading, (weight, "[kg]"));
 
-struct Calibrate {
-  double offset;
-  double factor = 2.0;
-};
-O80_DESCRIBE(Calibrate, (offset, "[kg]"), (factor, "of each kilogramme"));
-
-/// A pure sensor: it weighs as many kilogrammes as it has iterated, if nobody calibrates it.
+/// A pure sensor: it weighs as many kilogrammes as it has iterated.
 struct Scale {
   struct Config {
     bool broken = false;
@@ -22,7 +16,6 @@ struct Scale {
   };
   using Actuators = o80::NoActuators;
   using Extended = Reading;
-  using Requests = o80::Requests<Calibrate>;
 
   explicit Scale(const Config& config) : config(config) {}
   void start() {
@@ -31,14 +24,11 @@ struct Scale {
   }
   void write(const o80::Desired<Scale>&) {}
   void read(o80::Reading<Scale>& reading) {
-    reading.extended.weight =
-        calibration.offset + calibration.factor * static_cast<double>(reading.iteration());
+    reading.extended.weight = static_cast<double>(reading.iteration());
     if (reading.extended.weight >= config.full) reading.fault("it is full");
   }
-  void on(const Calibrate& request) { calibration = request; }
   void stop() noexcept {}
   Config config;
-  Calibrate calibration{0.0, 1.0};
 };
 O80_DESCRIBE(Scale::Config, broken, (full, "what is too much [kg]"));
 O80_ROBOT(scale, Scale)

@@ -97,23 +97,6 @@ def test_a_robot_library_needs_the_headers_and_no_more(scale: o80.robots.Robot) 
         assert robot.burst(2).extended.weight == 2.0
 
 
-def test_a_field_of_a_request_has_its_default_or_must_be_given(scale: o80.robots.Robot) -> None:
-    with scale.inline() as robot:
-        with pytest.raises(o80.InvalidArgument, match=r"needs 'offset'.*offset, factor"):
-            robot.request("calibrate", factor=3.0)
-        assert robot.burst(1).extended.weight == 1.0
-
-        robot.request("calibrate", offset=0.5)
-        assert robot.burst(1).extended.weight == 0.5 + 2.0 * robot.published
-
-        robot.request("calibrate", offset=0.5, factor=3.0)
-        assert robot.burst(1).extended.weight == 0.5 + 3.0 * robot.published
-
-        offset, factor = robot.schema["requests"][0]["type"]["fields"]
-        assert "default" not in offset
-        assert factor["default"] == 2.0
-
-
 def test_what_a_driver_prints_is_no_part_of_its_fault(scale: o80.robots.Robot) -> None:
     with pytest.raises(o80.DriverError) as caught:
         scale.start("scale-that-is-broken", broken=True)
@@ -131,15 +114,3 @@ def test_an_inline_robot_that_fails_leaves_no_segment_whose_name_nobody_knows(
         robot.burst(5)
 
     assert not [entry for entry in o80.segments() if entry.name.startswith(f"scale-{os.getpid()}")]
-
-
-def test_an_inline_robot_that_fails_leaves_a_segment_that_was_named(
-    scale: o80.robots.Robot,
-) -> None:
-    name = f"named-{os.getpid()}"
-    with scale.inline(name, full=2) as robot, pytest.raises(o80.DriverError):
-        robot.burst(5)
-
-    with o80.Frontend(name, dead=True) as reader:
-        assert reader.history().extended.weight.tolist() == [0.0, 1.0]
-    o80.clean(name)

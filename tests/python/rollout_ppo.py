@@ -26,14 +26,6 @@ def model_of(collector: Collector, *, steps: int, batch: int = 80, **options: An
     )
 
 
-def learned(collector: Collector, steps: int, iterations: int) -> bytes:
-    """The weights after some updates."""
-    with collector:
-        model = model_of(collector, steps=steps)
-        model.learn(iterations * steps * model.n_envs)
-        return copied(model).weights()
-
-
 class copied:  # noqa: N801 - a verb
     """A model as it was: weights, optimiser, statistics, generators."""
 

@@ -16,7 +16,6 @@ from o80.cli.histories import histories
 from o80.datasets.export import write
 from o80.joining.plot import Placed, origins
 from o80.plot import plot
-from o80.rows.columns import columns_of
 from o80.rows.history import columns_in
 from o80.rows.journal import command_ends
 
@@ -53,17 +52,6 @@ def test_columns_are_chosen_by_the_names_of_fields(arm: o80.Frontend, tmp_path: 
     ]
     with pytest.raises(o80.InvalidArgument, match=r"no field 'elbwo'.*Did you mean 'elbow'"):
         write(path, {"arm": arm.history()}, ["elbwo"])
-
-
-def test_columns_are_named_after_part_actuator_and_field(arm: o80.Frontend) -> None:
-    arm.add_command("elbow", 0.5)
-    arm.burst(3)
-    history = arm.history()
-    columns = columns_in(history)
-
-    assert np.array_equal(columns["desired.elbow"], history.desired[:, 1])
-    assert np.array_equal(columns["extended.effort[1]"], history.extended.effort[:, 1])
-    assert columns["active.elbow"].tolist() == history.active[:, 1].tolist()
 
 
 def test_formats_that_do_not_fit_are_named(arm: o80.Frontend, tmp_path: Path) -> None:
@@ -149,13 +137,6 @@ def test_an_enumeration_has_its_labels_at_the_axis() -> None:
     ]
 
 
-def test_any_robot_can_be_plotted() -> None:
-    history = recorded({"joints": ({"position": "f8"}, 3)}, {"force": ("f4", (2, 2))}, 5)
-    names = [column.name for column in columns_of(history.schema)]
-
-    assert len(plot({"robot": history}, names).axes) == 3 + 4
-
-
 def test_the_commands_write_files(arm: o80.Frontend, tmp_path: Path) -> None:
     with o80.Recording(tmp_path / "run.mcap", arm):
         arm.burst(20)
@@ -201,15 +182,6 @@ def test_ends_of_commands_are_marked_in_the_panels_of_their_actuators(arm: o80.F
     )
     # ends outside the rows are not drawn
     assert ends_in(plot({"arm": arm.history(3)}, ends={"arm": ends}), 0) == set()
-
-
-def test_ends_come_from_a_recording_too(arm: o80.Frontend, tmp_path: Path) -> None:
-    with o80.Recording(tmp_path / "run.mcap", arm):
-        arm.add_command("elbow", 0.3, iterations=10)
-        arm.burst(20)
-    epoch = o80.open(tmp_path / "run.mcap")[arm.segment].epochs[0]
-    assert command_ends(epoch.journal()) == command_ends(arm.journal())
-    assert [end.status for end in command_ends(epoch.journal())] == [o80.Status.COMPLETED]
 
 
 def test_a_rejected_batch_ends_its_commands(arm: o80.Frontend) -> None:

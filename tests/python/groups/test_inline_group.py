@@ -61,18 +61,6 @@ def test_a_burst_is_followed_by_one_whose_targets_are_its_rows(group: o80.Inline
         assert mirror.latest()["iteration"].tolist() == [4, 8, 8, 4, 8]
 
 
-def test_a_copy_whose_first_burst_fails_is_not_followed(group: o80.InlineGroup) -> None:
-    with o80.robots.load("two_joints").inline(copies=COPIES, threads=group) as mirror:
-        both = group.prepared_burst(4).then(mirror.prepared_burst(4, steps=4), "observed")
-        both.targets[...] = 0.5
-        group[1].halt("a test")
-        mirror[3].halt("a test")
-        with pytest.raises(o80.CopyFailed) as failed:
-            both.run()
-        assert sorted(failed.value.errors) == [1, 3]
-        assert mirror.latest()["iteration"].tolist() == [4, 0, 4, 0, 4]
-
-
 def test_what_cannot_follow_a_burst_is_said_when_it_is_made(group: o80.InlineGroup) -> None:
     robot = o80.robots.load("two_joints")
     first = group.prepared_burst(4)
@@ -96,18 +84,6 @@ def test_what_cannot_follow_a_burst_is_said_when_it_is_made(group: o80.InlineGro
         for one, other, numbers, words in wrong:
             with pytest.raises(o80.InvalidArgument, match=words):
                 one.then(other, numbers)
-
-
-def test_leaves_no_file_and_names_a_copy_on_request(group: o80.InlineGroup) -> None:
-    assert files() == []
-    group.publish(2, "shown")
-    with o80.Frontend("shown", read_only=True) as watcher:
-        group[2].burst(4)
-        assert watcher.published == 4
-    with pytest.raises(o80.Error, match="has a name already"):
-        group.publish(2, "again")
-    group.close()
-    assert files() == []
 
 
 def test_a_failed_copy_is_named_and_the_others_are_done(group: o80.InlineGroup) -> None:
@@ -289,30 +265,6 @@ def test_a_group_that_is_never_closed_is_warned_about_and_stopped() -> None:
     with pytest.warns(ResourceWarning, match="the inline group of 'two_joints' was never closed"):
         held.clear()
     assert files() == []
-
-
-def test_a_frontend_of_a_copy_may_be_closed(group: o80.InlineGroup) -> None:
-    with group[1] as frontend:
-        frontend.burst(3)
-    burst = group.prepared_burst(4)
-    burst.targets = np.zeros((COPIES, 1, 2))
-    burst.run()
-    assert burst.rows["iteration"][1, -1] == 7
-    assert group[1].published == 7
-    assert group[-1].published == 4
-
-
-def test_is_closed_and_says_so(group: o80.InlineGroup) -> None:
-    burst = group.prepared_burst(4)
-    frontend = group[0]
-    group.close()
-    group.close()
-    assert group.closed
-    assert frontend.closed
-    with pytest.raises(o80.Closed):
-        burst.run()
-    with pytest.raises(o80.Closed):
-        group.latest()
 
 
 CTRL_C = """

@@ -302,29 +302,6 @@ def test_a_leader_that_halts_or_ends_halts_the_follower(
     assert arm.halted.text == f"the leader '{segment}-1' {said}"
 
 
-def test_a_leader_without_rows_has_no_delay(led: Led) -> None:
-    assert led[1].delay(seconds=0.0) is None
-
-
-def test_while_the_follower_is_halted_it_waits_for_rows_of_the_leader(
-    segment: str, hand: o80.Frontend, arm: o80.Frontend
-) -> None:
-    with leader(f"{segment}-3") as silent, o80.Frontend(f"{segment}-3") as still:
-        robots = o80.Teleoperation(hand, arm)
-        arm.halt("look")
-        arm.burst(1)
-        hand.burst(1)
-        robots.step()
-        assert robots.why == f"'{segment}-2' is halted: look"
-        waiting = o80.Teleoperation(still, arm)
-        silent.step()
-        silent.publish([0.0])
-        waiting.step()
-        assert "is halted: look" in waiting.why
-        waiting.step()  # no further row
-        assert waiting.why == f"the leader '{segment}-3' has published nothing for 0.2 s"
-
-
 @pytest.mark.parametrize("how", ["halted", "far", "following"])
 def test_a_follower_that_ends_ends_it(segment: str, how: str) -> None:
     with (
@@ -441,15 +418,6 @@ def test_wrong_joints_are_refused(
 ) -> None:
     with pytest.raises(o80.InvalidArgument, match=text):
         o80.Teleoperation(hand, arm, joints=map(o80.Joint.parse, joints))
-
-
-def test_a_robot_cannot_follow_itself(segment: str) -> None:
-    with (
-        o80.robots.load(Arm).inline(segment) as arm,
-        o80.Frontend(segment) as other,
-        pytest.raises(o80.InvalidArgument, match="cannot follow itself"),
-    ):
-        o80.Teleoperation(other, arm)
 
 
 def test_robots_without_a_common_joint_are_refused(segment: str) -> None:

@@ -36,13 +36,6 @@ def test_equals_a_sync_vector_env_of_single_ones(task: type[Reach], mode: Any, s
     assert ends >= 2 * COPIES
 
 
-@pytest.mark.parametrize("mode", MODES)
-def test_equals_it_when_all_episodes_end_at_once(mode: Any) -> None:
-    with VectorEnvironment(Goal(3), autoreset_mode=mode) as vector:
-        still = lambda seen, number: np.ones(3, np.int64)  # noqa: E731
-        assert beside(vector, lambda: Environment(Goal()), still, steps=20, seed=[4, 9, 5])
-
-
 def test_a_single_environment_passes_the_checks_of_gymnasium() -> None:
     with Environment(Reach(), render_mode="rgb_array") as environment:
         with warnings.catch_warnings():
@@ -183,12 +176,3 @@ def test_gymnasium_makes_a_registered_task() -> None:
         assert vector.task.group.closed
     finally:
         del gymnasium.registry["o80-test/Reach-v0"]
-
-
-def test_renders_all_copies() -> None:
-    with VectorEnvironment(Reach(3), render_mode="rgb_array") as vector:
-        vector.reset(seed=1)
-        vector.step(np.zeros((3, 4), np.float32))
-        pictures = vector.render()
-        assert pictures is not None
-        assert [picture.max() for picture in pictures] == [1, 1, 1]

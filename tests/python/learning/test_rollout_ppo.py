@@ -10,8 +10,8 @@ import pytest
 import torch
 from gymnasium.spaces import Box
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
-from rollout_ppo import copied, learned, model_of
-from rollout_tasks import COPIES, INFOS, assert_same_rollouts, maker
+from rollout_ppo import copied, model_of
+from rollout_tasks import COPIES, INFOS, maker
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
@@ -140,25 +140,6 @@ def test_statistics_are_those_of_the_observations_of_all_rollouts(tmp_path: Path
     assert statistics.var == pytest.approx(np.concatenate(seen).var(axis=0), abs=1e-3)
 
 
-def test_a_resumed_training_goes_on_where_its_collector_begins_anew(tmp_path: Path) -> None:
-    each = STEPS * COPIES
-    with collector_of(tmp_path) as collector:
-        model = model_of(collector, steps=STEPS)
-        model.learn(each)
-        saved = copied(model)
-        told = Told(collector)
-        collector.restart(1)
-        model.learn(each, callback=told, reset_num_timesteps=False)
-    with collector_of(tmp_path) as collector:
-        resumed = model_of(collector, steps=STEPS)
-        saved.into(resumed)
-        again = Told(collector)
-        resumed.learn(each, callback=again, reset_num_timesteps=False)
-        assert collector.iteration == 2
-    assert_same_rollouts(again.rollouts, told.rollouts)
-    assert copied(resumed).weights() == copied(model).weights()
-
-
 def test_numbers_that_are_not_visible_change_nothing(tmp_path: Path) -> None:
     visible = np.array([1, 1, 1, 1, 0, 0])
     with collector_of(tmp_path) as collector:
@@ -168,10 +149,6 @@ def test_numbers_that_are_not_visible_change_nothing(tmp_path: Path) -> None:
         assert not buffer["observations"][..., 4:].any()
         assert buffer["observations"][..., :4].any()
         assert buffer["log_probs"] == pytest.approx(rollout.log_probabilities, abs=1e-4)
-
-
-def test_the_same_seed_gives_the_same_weights(tmp_path: Path) -> None:
-    assert learned(collector_of(tmp_path), STEPS, 3) == learned(collector_of(tmp_path), STEPS, 3)
 
 
 class Guess(gymnasium.Env[Any, Any]):
@@ -186,17 +163,6 @@ class Guess(gymnasium.Env[Any, Any]):
     def step(self, action: Any) -> Any:
         worth = -float(np.square(action - [0.4, -0.6]).sum())
         return np.zeros(3, np.float32), worth, True, False, {}
-
-
-def test_it_learns() -> None:
-    def make() -> Any:
-        return SyncVectorEnv([Guess] * 8, autoreset_mode=AutoresetMode.SAME_STEP)
-
-    with Collector(make, seed=1) as collector:
-        model = model_of(collector, steps=32, batch=64, policy_kwargs={"log_std_init": -1.2})
-        model.learn(12 * 32 * 8)
-    action, _ = model.predict(np.zeros((1, 3), np.float32), deterministic=True)
-    assert action[0] == pytest.approx([0.4, -0.6], abs=0.15)
 
 
 def test_it_leaves_no_temporary_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

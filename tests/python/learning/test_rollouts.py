@@ -101,31 +101,8 @@ def test_the_means_are_those_of_the_network() -> None:
     assert policy.means(seen) == pytest.approx(expected, abs=1e-4)
 
 
-def test_collectors_iterations_and_seeds_differ(tmp_path: Path) -> None:
-    rollouts = [collected(tmp_path, 2, number) for number in range(3)]
-    with Collector(maker(tmp_path), seed=6) as collector:
-        other = collector.collect(policies(1)[0], steps=STEPS)
-    noise = [each.log_probabilities.tobytes() for both in rollouts for each in both]
-    begins = [first.observations[0].tobytes() for first, _ in rollouts]
-    assert len({*noise, other.log_probabilities.tobytes()}) == 7
-    assert len({*begins, other.observations[0].tobytes()}) == 4
-
-
 def test_the_same_seed_gives_the_same_rollouts(tmp_path: Path) -> None:
     assert_same_rollouts(collected(tmp_path, 3), collected(tmp_path, 3))
-
-
-def test_a_restart_begins_anew_in_its_iteration(tmp_path: Path) -> None:
-    first, second = policies(2)
-    with collector_of(tmp_path) as collector:
-        collector.collect(first, steps=STEPS)
-        going_on = collector.collect(second, steps=STEPS)
-        collector.restart(1)
-        again = collector.collect(second, steps=STEPS)
-        assert collector.iteration == 2
-    with collector_of(tmp_path, iteration=1) as resumed:
-        assert_same_rollouts([resumed.collect(second, steps=STEPS)], [again])
-    assert again.observations.tobytes() != going_on.observations.tobytes()
 
 
 def test_after_an_exception_a_collector_begins_anew_and_repeats_the_iteration(
@@ -146,14 +123,6 @@ def test_arrays_are_read_only_and_shared_by_nobody(tmp_path: Path) -> None:
     arrays = [array for each in collected(tmp_path, 2) for _, array in arrays_of(each)]
     assert not any(array.flags.writeable for array in arrays)
     assert not any(np.shares_memory(a, b) for a, b in combinations(arrays, 2) if a.size and b.size)
-
-
-def test_a_rollout_without_an_end_has_empty_ends(tmp_path: Path) -> None:
-    with collector_of(tmp_path) as collector:
-        ends = collector.collect(policies(1)[0], steps=1).ends
-    assert ends.observations.shape == (0, 6)
-    assert {len(array) for _, array in arrays_of(ends)} == {0}
-    assert set(ends.infos) == set(INFOS)
 
 
 class Chance:

@@ -96,37 +96,3 @@ def test_another_autoreset_mode_is_refused() -> None:
         pytest.raises(o80.InvalidArgument, match="autoreset_mode='SameStep'"),
     ):
         o80.learning.stable_baselines3(vector)
-
-
-@pytest.mark.check
-def test_ppo_learns_on_copies() -> None:
-    import torch
-    from stable_baselines3 import PPO
-    from stable_baselines3.common.logger import Logger
-
-    class Near(Reach):
-        """Without noise and flags: the elbow should be at its goal."""
-
-        def flagged(self) -> Any:
-            return np.ones(self.copies, np.bool_)
-
-        def judge(self, copies: Any) -> o80.learning.Outcome:
-            apart = np.abs(2 * self.seen.observations[copies, :2] - self.goals[copies])
-            return o80.learning.Outcome(reward=-apart.max(axis=1))
-
-    copies = adapted(Near(16, max_steps=16))
-    threads = torch.get_num_threads()
-    torch.set_num_threads(1)
-    try:
-        model = PPO(
-            "MlpPolicy", copies, n_steps=64, batch_size=256, seed=1, device="cpu", gamma=0.8
-        )
-        model.set_logger(Logger(None, []))  # the default one leaves a folder in /tmp
-        model.learn(2048)
-        before = np.mean([each["r"] for each in model.ep_info_buffer or []])
-        model.learn(16_000)
-        after = np.mean([each["r"] for each in model.ep_info_buffer or []])
-        assert after > 0.8 * before, f"reward of an episode: {before:.2f}, then {after:.2f}"
-    finally:
-        torch.set_num_threads(threads)
-        copies.close()
