@@ -32,25 +32,6 @@ def recorded(segment: str, path: Path) -> o80.History:
     return o80.open(path)[segment].history()
 
 
-def test_every_row_of_a_robot_with_joints_is_a_joint_state(
-    arm: o80.Frontend, tmp_path: Path
-) -> None:
-    arm.add_command("elbow", 0.5, iterations=30)
-    arm.burst(30)
-    history = recorded(arm.segment, tmp_path / "run.mcap")
-    states = joint_states(tmp_path / "run.mcap", arm.segment)
-    offset = o80.open(tmp_path / "run.mcap")[arm.segment].epochs[0].wall_offset
-
-    assert len(states) == len(history) == 31
-    assert states[0].name == ["shoulder", "elbow"]
-    assert np.array_equal([state.position for state in states], history.observed)
-    assert np.array_equal([state.effort for state in states], history.extended.effort)
-    assert all(len(state.velocity) == 0 for state in states)
-    stamps = [state.header.stamp.sec * 10**9 + state.header.stamp.nanosec for state in states]
-    assert stamps == (history.time + offset).tolist()
-    assert {state.header.frame_id for state in states} == {""}
-
-
 def test_fields_of_a_state_are_position_velocity_and_effort(segment: str, tmp_path: Path) -> None:
     with o80.Backend(segment, {"joints": (JOINT, 3), "grip": "f8"}, bursting=True) as backend:
         observed = np.zeros(3, JOINT)

@@ -1,8 +1,6 @@
 """The journal in a recording: the same entries as a frontend reads, gaps, restarts, damage."""
 
-import sys
 from pathlib import Path
-from types import FrameType
 
 import numpy as np
 import pytest
@@ -49,37 +47,6 @@ def test_the_journal_of_a_file_is_that_of_the_robot(arm: o80.Frontend, tmp_path:
     assert recorded(path).journal_gaps == []
 
 
-def test_decisions_that_the_log_only_counts_are_not_put_into_words(
-    arm: o80.Frontend, tmp_path: Path
-) -> None:
-    recorder = Recorder(tmp_path / "run.mcap", [arm.segment])
-    play(arm, 100)
-    called = []
-
-    def note(frame: FrameType, event: str, _: object) -> None:
-        if event == "call" and "/rows/journal" in frame.f_code.co_filename:
-            called.append(frame.f_code.co_name)
-
-    sys.setprofile(note)
-    try:
-        recorder.poll()
-    finally:
-        sys.setprofile(None)
-    recorder.finish()
-
-    assert recorded(tmp_path / "run.mcap").journal()
-    assert called == []
-
-
-def test_it_begins_with_what_the_segment_still_holds(arm: o80.Frontend, tmp_path: Path) -> None:
-    play(arm, 5)
-    before = arm.journal()
-    with o80.Recording(tmp_path / "run.mcap", arm):
-        pass
-
-    assert texts(recorded(tmp_path / "run.mcap").journal()) == texts(before)
-
-
 def test_entries_are_chosen_by_their_number(arm: o80.Frontend, tmp_path: Path) -> None:
     with o80.Recording(tmp_path / "run.mcap", arm):
         play(arm, 10)
@@ -88,25 +55,6 @@ def test_entries_are_chosen_by_their_number(arm: o80.Frontend, tmp_path: Path) -
     assert texts(epoch.journal(since=40)) == texts(arm.journal(since=40))
     with pytest.raises(o80.InvalidArgument, match="since must be"):
         epoch.journal(since=-1)
-
-
-def test_each_run_of_a_robot_has_its_own_journal(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [segment])
-    journals = []
-    for commands in (3, 5):
-        arm = o80.robots.load("two_joints").inline(segment)
-        play(arm, commands)
-        while recorder.sources[segment].newest != 3 * commands:
-            recorder.catch_up()
-        journals.append(texts(arm.journal()))
-        arm.close()
-        recorder.catch_up()
-    recorder.finish()
-    found = [epoch.journal() for epoch in o80.open(path)[segment].epochs]
-
-    assert [texts(entries)[:-1] for entries in found] == journals
-    assert [entries[-1].kind for entries in found] == ["ended", "ended"]
 
 
 def test_entries_that_were_overwritten_are_a_gap(segment: str, tmp_path: Path) -> None:

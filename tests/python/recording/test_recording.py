@@ -125,33 +125,6 @@ def test_the_last_rows_before_a_restart_are_not_lost(segment: str, tmp_path: Pat
     assert [epoch.rows for epoch in o80.open(tmp_path / "run.mcap")[segment].epochs] == [6, 1]
 
 
-def test_log_times_are_those_of_the_segment(arm: o80.Frontend, tmp_path: Path) -> None:
-    offsets = []
-    for name in ("a.mcap", "b.mcap"):
-        with o80.Recording(tmp_path / name, arm):
-            arm.burst(10)
-        offsets.append(o80.open(tmp_path / name)[arm.segment].epochs[0].wall_offset)
-
-    assert offsets == [arm.provenance.wall_clock_offset] * 2
-
-
-def test_a_recording_says_how_its_robots_were_started(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    started = []
-    recorder = Recorder(path, [segment], split="1G")
-    for gain in (2.5, 3.5):
-        with o80.robots.load("two_joints").inline(segment, gain=gain) as arm:
-            while recorder.sources[segment].position != (arm.epoch, 0):
-                recorder.catch_up()
-            started.append(arm.provenance)
-        recorder.catch_up()
-    recorder.finish()
-    epochs = o80.open(path)[segment].epochs
-
-    assert [epoch.provenance for epoch in epochs] == started
-    assert [epoch.provenance.options["gain"] for epoch in epochs] == ["2.5", "3.5"]
-
-
 def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     arm.mark("before")  # still in the ring when the recorder begins
@@ -246,23 +219,6 @@ def test_a_recording_says_how_each_run_ended(segment: str, tmp_path: Path) -> No
     assert ends[2] == "", "recorded no further"
 
 
-def test_a_mark_has_the_log_time_of_the_newest_row(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    names = [segment, f"{segment}-absent"]
-    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, names) as file:
-        for episode in range(3):
-            file.mark("episode", number=episode)
-            arm.burst(200)  # at once; 0.2 s of the robot's time
-    epoch = o80.open(path)[segment].epochs[0]
-    with path.open("rb") as content:
-        logged = [
-            message.log_time - epoch.wall_offset
-            for _, channel, message in make_reader(content).iter_messages(topics=["/o80/marks"])
-        ]
-    times = epoch.history().time
-    assert logged == [int(times[row]) for row in (0, 200, 400)]
-
-
 def test_a_closed_recording_says_so(arm: o80.Frontend, tmp_path: Path) -> None:
     recording = o80.Recording(tmp_path / "run.mcap", arm)
     recording.close()
@@ -272,14 +228,3 @@ def test_a_closed_recording_says_so(arm: o80.Frontend, tmp_path: Path) -> None:
         recording.flush()
     with pytest.raises(o80.Closed):
         recording.mark("late")
-
-
-def test_integers_beyond_2_to_the_53_are_kept(segment: str, tmp_path: Path) -> None:
-    with o80.Backend(segment, {"count": np.int64}, bursting=True) as backend:
-        backend.publish({"count": 2**62 + 1})
-        recorder = Recorder(tmp_path / "run.mcap", [segment])
-        recorder.catch_up()
-        recorder.finish()
-
-    observed = o80.open(tmp_path / "run.mcap")[segment].history().observed
-    assert int(np.asarray(observed["count"]).ravel()[0]) == 2**62 + 1

@@ -6,18 +6,14 @@ import math
 from pathlib import Path
 from types import ModuleType
 
-import numpy as np
 import pytest
+from processes import WAIT
 
 import o80
 from o80 import _core
-from o80.cli.export import export
-from o80.cli.plot import plot
-from o80.recording.scan import scan
 
 RECORDINGS = Path(__file__).resolve().parents[2] / "data" / "recordings"
 NAMES = [path.stem for path in sorted(RECORDINGS.glob("*.mcap"))]
-WAIT = 60.0  # [s] longer than anything should take
 CODECS = {"codec_1": 1}
 
 
@@ -46,22 +42,6 @@ def test_a_recording_of_an_earlier_version_is_read(name: str, make: ModuleType) 
     for segment in o80.open(path).segments.values():
         for epoch in segment.epochs:
             assert epoch.journal_codec == CODECS[name]
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_recording_of_an_earlier_version_is_exported_and_plotted(
-    name: str, tmp_path: Path
-) -> None:
-    recording = RECORDINGS / f"{name}.mcap"
-    export(str(recording), tmp_path / "rows.npz", segment="joints")
-    plot([str(recording)], tmp_path / "rows.png", segment="joints")
-
-    (_, second) = o80.open(recording)["joints"].epochs
-    columns = np.load(tmp_path / "rows.npz")
-    rows = second.history()
-    assert np.array_equal(columns["joints/1/observed.elbow"], rows.observed[:, 1])
-    assert np.array_equal(columns["joints/1/time"], rows.time)
-    assert (tmp_path / "rows.png").read_bytes().startswith(b"\x89PNG")
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -113,14 +93,3 @@ def test_a_recording_of_an_earlier_version_is_played(name: str, segment: str) ->
         assert playback.wait(WAIT)
         with o80.Frontend(f"{prefix}joints", dead=True) as arm:
             assert repr(arm.journal()) == repr(run.journal()[:-1])  # without its end
-
-
-def test_messages_say_in_which_version_they_are() -> None:
-    for name, codec in CODECS.items():
-        texts = [
-            channel.metadata
-            for channel in scan(RECORDINGS / f"{name}.mcap").channels.values()
-            if channel.metadata.get("content") == "journal"
-        ]
-        assert texts
-        assert [each["codec"] for each in texts] == [str(codec)] * len(texts)

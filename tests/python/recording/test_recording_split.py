@@ -122,15 +122,6 @@ def test_repair_completes_every_file(arm: o80.Frontend, tmp_path: Path) -> None:
     assert o80.open(path).finished
 
 
-def test_a_folder_has_one_recorder(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with (
-        o80.Recording(path, arm, split="1M"),
-        pytest.raises(o80.RecordingError, match="is being written by another recorder"),
-    ):
-        Recorder(path, [arm.segment], proceed=True, split="1M")
-
-
 def test_a_folder_that_exists_is_not_written_to(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     path.mkdir()
@@ -153,14 +144,6 @@ def test_a_split_that_is_neither_size_nor_time_is_refused(
 ) -> None:
     with pytest.raises(o80.InvalidArgument, match="split must be a size such as 500M"):
         o80.Recording(tmp_path / "run.mcap", arm, split=text)
-
-
-def test_the_command_writes_a_folder(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    done = run_o80("record", arm.segment, "-o", path, "--seconds", 0.3, "--split", "0.1s")
-
-    assert f"in {path}" in done.stderr
-    assert o80.open(path)[arm.segment].epochs[0].rows == 1
 
 
 def bytes_in(folder: Path) -> int:

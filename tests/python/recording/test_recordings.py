@@ -167,26 +167,6 @@ def test_links_pipes_and_names_of_any_bytes_are_no_obstacle(folder: Path, tmp_pa
     assert fewer[-1].runs[0].rows < found[-1].runs[0].rows
 
 
-def test_what_one_user_may_not_read_others_read(
-    folder: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def refused(path: Path) -> Any:
-        raise o80.RecordingError(f"{path} cannot be read: Permission denied")
-
-    with monkeypatch.context() as patch:
-        patch.setattr(catalogue, "RecordingFile", refused)
-        patch.setattr(os, "access", lambda *words: False)
-        assert all("Permission" in each.problem for each in o80.recordings(folder))
-    assert not any(each.problem for each in o80.recordings(folder))
-
-    def scandir(path: Path) -> Any:
-        raise PermissionError(13, "Permission denied")
-
-    monkeypatch.setattr(os, "scandir", scandir)
-    with pytest.warns(RuntimeWarning, match="lab cannot be read .* is not listed"):
-        assert o80.recordings(folder) == []
-
-
 def test_a_folder_that_cannot_be_written_works_and_says_so_once(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -12,7 +12,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import o80
-from o80 import _core
 from o80.base.machine import this_machine
 from o80.recording.recorder import Recorder
 from o80.replaying.recorded_run import FileRun, RecordedRun, runs_in
@@ -153,16 +152,6 @@ def test_a_history_without_row_0_begins_at_a_reset_or_a_snapshot(segment: str, s
         assert len(began) > 1
 
 
-def test_a_snapshot_of_another_robot_is_refused() -> None:
-    library = _core.load_robot(str(o80.robots.path_of("two_joints")))
-    name = _core.unused_segment_name("replay")
-    replay = _core.Replay(library, name, [], [], 1_000_000)
-    with pytest.raises(o80.DriverError, match="cannot take the recorded snapshot of slot 1"):
-        replay.load_snapshot(1, b"another")
-    replay.close()
-    o80.clean(name)
-
-
 def test_a_restore_whose_snapshot_is_not_recorded_ends_the_replay(segment: str) -> None:
     with o80.robots.load("two_joints").inline(segment, history=60, journal=0.5) as arm:
         arm.request("snapshot", slot=2)
@@ -301,19 +290,6 @@ def test_the_command_says_whether_a_recording_repeats(arm: o80.Frontend, tmp_pat
     ):
         done = o80_replay(str(path), *words)
         assert (done.returncode, said in done.stderr) == (2, True), done.stderr
-
-
-def test_a_recording_in_several_files_repeats(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with o80.robots.load("two_joints").inline(segment) as arm:
-        with o80.Recording(path, arm, split="20k") as recording:
-            for part in range(5):
-                run_bursts(arm, part, 20)
-                recording.flush()
-        rows = arm.published + 1
-    assert len(list(path.glob("*.mcap"))) > 1
-    done = o80_replay(str(path))
-    assert f"{segment}: {rows} rows, identical" in done.stdout, done.stdout + done.stderr
 
 
 @pytest.mark.filterwarnings("ignore:no snapshot is recorded:RuntimeWarning")  # it often moves

@@ -19,36 +19,6 @@ JOINT = {"position": float, "velocity": float}
 NAMES = ("shoulder", "elbow", "wrist")
 
 
-def test_an_actuator_that_left_a_command_because_of_its_reading_leaves_it_again(
-    segment: str, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.mcap"
-    limits = {"follower": o80.Limits(speed=2.0, noise=0.03)}
-    with o80.Backend(
-        segment, ["follower", "other"], limits=limits, when_idle={"follower": "follow"}
-    ) as backend:
-
-        def run(iterations: int, place: float = 0.0) -> None:
-            for _ in range(iterations):
-                assert backend.step() is not None
-                backend.publish([place, 0.0])
-
-        backend.publish([0.0, 0.0])
-        with o80.Frontend(segment) as arm, o80.Recording(path, arm):
-            run(3)
-            arm.add_command("other", 1.0, iterations=10)
-            arm.add_command(["follower", "other"], [0.004, 2.0], iterations=5)
-            batch = arm.pulse()
-            run(9)
-            run(1, 1e6)
-            run(10)
-            assert batch.statuses == [o80.Status.COMPLETED, o80.Status.INTERRUPTED]
-            assert "'follower' was read at 1e+06" in batch[1].text
-            assert arm.latest().desired.tolist() == [0.0, 2.0]
-    report = o80.replay(path)
-    assert report.identical, report
-
-
 def send_anything(arm: o80.Frontend, choose: random.Random) -> o80.Batch:
     """Commands of every kind, some of them without effect."""
     for _ in range(choose.randrange(1, 3)):
@@ -159,26 +129,6 @@ def test_a_recording_that_begins_late_is_replayed_from_where_nothing_acts(
     assert (done.returncode, "not used" in done.stdout) == (2, True), done.stdout
 
 
-def test_the_journal_says_that_nothing_acts_however_much_is_written(
-    segment: str, tmp_path: Path
-) -> None:
-    """Bursts without commands fill its ring more than once."""
-    path = tmp_path / "run.mcap"
-    with o80.robots.load("two_joints").inline(segment, history=64, journal=0.5) as arm:
-        arm.add_command("elbow", 0.5, iterations=20)
-        arm.burst(100)
-        first = arm.journal()[0].number
-        while arm.journal()[0].number < first + 30_000:
-            for _ in range(1000):
-                arm.burst(1)
-        with o80.Recording(path, arm):
-            arm.add_command("elbow", 0.1, iterations=20)
-            arm.burst(30)
-    (run,) = o80.replay(path, driver=False)
-    assert (run.difference, run.gap) == (None, ""), run
-    assert run.rows > 60
-
-
 @pytest.fixture(scope="module")
 def recorded(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A run of a robot of the world: it moves by itself, and jumps when it is asked to."""
@@ -257,61 +207,6 @@ def test_rows_of_another_robot_are_refused(recorded: Path) -> None:
         replay.run(block.rows[1:3].tobytes())
     replay.close()
     o80.clean(name)
-
-
-class Guided:
-    """An arm that somebody pushes about."""
-
-    actuators = ("elbow",)
-    limits: ClassVar = {"elbow": o80.Limits(error=0.3, speed=1000.0)}
-    requests: ClassVar = {"relax": {}, "hold": {}, "push": {"to": float}}
-
-    def __init__(self) -> None:
-        self.place: float = 0.0
-        self.relaxed = False
-
-    def read(self, reading: Reading) -> None:
-        reading.observed = [self.place]
-        if self.relaxed:
-            reading.follow()
-
-    def on_relax(self, _: o80.Record) -> o80.StartAfresh:
-        self.relaxed = True
-        return o80.StartAfresh()
-
-    def on_hold(self, _: o80.Record) -> o80.StartAfresh:
-        self.relaxed = False
-        return o80.StartAfresh()
-
-    def on_push(self, fields: o80.Record) -> None:
-        self.place = float(fields["to"])
-
-
-def test_a_driver_may_let_actuators_follow_until_the_next_fresh_start(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with o80.robots.load(Guided).inline() as arm, o80.Recording(path, arm):
-        arm.burst(5)
-        arm.request("relax")
-        arm.burst(5)
-        for step in range(1, 11):
-            arm.request("push", to=0.2 * step)
-            arm.burst(2)
-        row = arm.latest()
-        assert (row.desired[0], row.observed[0], arm.halted) == (2.0, 2.0, None)
-        arm.request("hold")
-        arm.request("push", to=2.1)
-        assert arm.burst(5).desired[0] == 2.0
-        fresh = [entry for entry in arm.journal() if entry.kind == "fresh_start"]
-        assert [entry.follows for entry in fresh] == [True, False]
-        arm.request("push", to=2.5)
-        with pytest.raises(o80.BackendHalted, match="error limit"):
-            arm.burst(5)
-    (whole,) = report = o80.replay(path)
-    assert report.identical, report
-    # a replay cannot begin in a row in which it follows: the next such row is that of the hold
-    (part,) = report = o80.replay(path, since=8)
-    assert report.identical, report
-    assert part.rows < whole.rows - 20
 
 
 class Limp:

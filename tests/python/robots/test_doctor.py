@@ -1,6 +1,5 @@
 """The doctor: findings on recorded computers, and texts about files that it cannot read."""
 
-import itertools
 import json
 import os
 import re
@@ -20,7 +19,6 @@ from o80.robots.doctor.check import Finding
 from o80.robots.doctor.checks import CHECKS, Priority
 from o80.robots.doctor.computer import MAX_BYTES, list_of, processors_of
 from o80.robots.doctor.doctor import Report
-from o80.robots.doctor.load import load
 from o80.robots.doctor.wake_ups import WakeUps, measure, measure_beside_load
 from o80.robots.process import Process
 from real_time.recorded_computers import RecordedComputer, recorded
@@ -386,24 +384,6 @@ def test_no_damage_of_all_files_makes_the_doctor_fail(tmp_path: Path, kind: str)
         assert "as far as could be read" in report.verdict or report.culprits
 
 
-def test_no_damage_of_some_files_makes_the_doctor_fail(tmp_path: Path) -> None:
-    """Each file has each damage once, while three of four others are as they were."""
-    computer = recorded("laptop", tmp_path)
-    kinds = [kind for kind in DAMAGES if kind != "huge"]  # which takes long to write
-    computer.write(computer.before)
-    for turn, part in itertools.product(range(len(kinds)), range(4)):
-        damaged = list(computer.before)[part::4]
-        for place, path in enumerate(damaged):
-            damage(tmp_path / path, kinds[(turn + place) % len(kinds)])
-
-        report = RecordedComputer(tmp_path, "").examine(1000)
-
-        assert json.dumps(report.as_dict())
-        for path in damaged:
-            damage(tmp_path / path, "missing")
-            computer.write({path: computer.before[path]})
-
-
 def test_what_could_not_be_read_is_part_of_the_verdict(tmp_path: Path) -> None:
     computer = recorded("preempt_rt", tmp_path)
     computer.change("proc/interrupts", None)
@@ -439,17 +419,6 @@ def test_a_loop_is_measured(segment: str) -> None:
         measure(0.1, 0.05, []).failed
         == "no iteration at 0.1 Hz ended within 0.05 s: raise --seconds"
     )
-
-
-def test_the_load_computes_on_all_processors_and_ends() -> None:
-    with load() as process:
-        busy: set[str] = set()
-        while len(busy) < len(os.sched_getaffinity(0)):
-            for thread in Path(f"/proc/{process}/task").iterdir():
-                ticks = int((thread / "stat").read_text().rpartition(")")[2].split()[11])
-                if ticks > 0 and thread.name != str(process):
-                    busy.add(thread.name)
-    assert not Path(f"/proc/{process}").exists()
 
 
 def test_no_load_disturbs_a_robot_that_runs(

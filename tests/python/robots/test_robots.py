@@ -8,18 +8,11 @@ import tomllib
 from pathlib import Path
 
 import pytest
-from processes import run_python
+from processes import WAIT, run_python
 
 import o80
 
 ROOT = Path(__file__).resolve().parents[3]
-WAIT = 30.0  # [s] longer than any wait should take
-
-
-def test_bundled_robots_are_listed() -> None:
-    robots = {robot.name: robot.path for robot in o80.robots.list()}
-
-    assert robots["two_joints"].exists()
 
 
 def test_robots_that_are_shipped_say_that_they_are_simulated_or_are_hardware() -> None:
@@ -41,21 +34,6 @@ def test_robots_that_are_shipped_say_that_they_are_simulated_or_are_hardware() -
         if "def read(self, reading" in text and "simulated = True" not in text:
             silent.add(str(file.relative_to(devices).with_suffix("")))
     assert silent == hardware
-
-
-def test_a_robot_tells_its_options() -> None:
-    robot = o80.robots.load("two_joints")
-
-    gain = robot.options[0]
-    assert (robot.name, gain.name, gain.kind, gain.default) == (
-        "two_joints",
-        "gain",
-        "number",
-        "20",
-    )
-    assert gain.unit == "1/s"
-    assert gain.help
-    assert "two_joints" in repr(robot)
 
 
 def test_a_robot_is_loaded_by_path() -> None:
@@ -213,11 +191,6 @@ def test_a_process_never_stopped_is_warned_about_and_stopped(segment: str) -> No
         del process
 
     assert popen.returncode == 0
-
-
-def test_waiting_for_a_process_times_out(process: o80.robots.Process) -> None:
-    with pytest.raises(o80.TimeoutError, match=process.segment):
-        process.wait(0.01)
 
 
 # ---------------------------------------------------------------------------- inline

@@ -122,11 +122,6 @@ def test_a_curve_is_that_of_all_rows_within_one_pixel(seed: int) -> None:
         assert (one[1] <= high).all()
 
 
-def test_a_falling_curve_is_drawn_falling() -> None:
-    values = np.linspace(1, 0, 10_000)
-    assert (np.diff(values[drawn_rows(values)]) < 0).all()
-
-
 def covered(places: Floats, values: Floats, width: int) -> tuple[Floats, Floats]:
     """Lowest and highest value (width,) of a polyline in each column of pixels."""
     at = np.union1d(places, np.linspace(0, width, 64 * width, endpoint=False))
@@ -145,15 +140,6 @@ def widened(covered: tuple[Floats, Floats]) -> tuple[Floats, Floats]:
         np.min([low[:-2], low[1:-1], low[2:]], axis=0),
         np.max([high[:-2], high[1:-1], high[2:]], axis=0),
     )
-
-
-def test_curves_of_a_past_time_lie_around_it(arm: o80.Frontend) -> None:
-    arm.burst(3000)
-    look = looks_at(arm.segment)
-    middle = (look()["first"] + look()["last"]) / 2
-    curves = look(curves=True, at=middle, window=0.2)["curves"]
-    assert curves["begin"] == pytest.approx(middle - 0.1)
-    assert curves["end"] == pytest.approx(middle + 0.1)
 
 
 def test_numbers_that_are_not_finite_are_named_and_leave_the_model_whole(segment: str) -> None:
@@ -431,21 +417,3 @@ def test_the_plan_of_chunks_is_drawn_ahead_of_the_newest_row(arm: o80.Frontend) 
         history.desired[:, 1],
     )
     np.testing.assert_allclose(values[second], wanted, atol=2e-3)
-
-
-def test_a_recording_shows_what_chunks_planned(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with o80.Recording(path, arm) as recording, arm.chunks(step=50) as plan:
-        arm.burst(50)
-        for _ in range(3):
-            plan.send([[0.2, -0.1], [0.1, 0.3], [0.0, 0.5]], seen=arm.latest())
-            arm.burst(80)
-        recording.flush()
-    curves = looks_at(str(path))(curves=True, at=0.1, window=0.3, panels=["elbow"])["curves"]
-    seconds, values = (numbers(text) for text in curves["panels"]["elbow"]["planned"])
-    assert np.isnan(values).sum() >= 2, "also what another chunk took over"
-    history = arm.history()
-    times = (history.time - history.time[0]) * 1e-9
-    first = slice(0, np.flatnonzero(np.isnan(values))[0] - 70)  # until it was taken over
-    wanted = np.interp(seconds[first] + curves["begin"], times, history.desired[:, 1])
-    np.testing.assert_allclose(values[first], wanted, atol=2e-3)

@@ -2,10 +2,7 @@
 
 import math
 import os
-import select
 import signal
-import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -14,7 +11,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import chromium
 import o80
 from chromium import Chromium, Page
 from o80.view.page_file import write_page
@@ -58,18 +54,6 @@ def scrub(page: Page, seconds: float) -> None:
 
 def click(page: Page, button: str) -> None:
     page.value(f"document.getElementById('{button}').click()")
-
-
-def test_a_browser_does_not_outlive_a_killed_test() -> None:
-    program = "import chromium, time; print(chromium.Chromium().pid, flush=True); time.sleep(1000)"
-    environment = {**os.environ, "PYTHONPATH": str(Path(chromium.__file__).parent)}
-    command = [sys.executable, "-c", program]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, env=environment) as process:
-        assert process.stdout is not None
-        end = os.pidfd_open(int(process.stdout.readline()))
-        process.kill()
-    assert select.select([end], [], [], 60.0)[0]
-    os.close(end)
 
 
 def test_a_page_shows_the_robot_its_curves_and_its_state(browser: Chromium, segment: str) -> None:

@@ -111,28 +111,6 @@ def test_a_name_that_another_site_points_here_is_refused(server: PageServer) -> 
 
 
 @pytest.mark.parametrize(
-    ("origin", "token"),
-    [("https://evil.example", True), ("https://evil.example", False), (None, False)],
-)
-def test_an_upgrade_is_refused_before_it_happens(
-    server: PageServer, origin: str | None, token: bool
-) -> None:
-    query = f"?token={server.token}" if token else ""
-    own = f"http://127.0.0.1:{server.port}"
-    first = raw(
-        server,
-        f"GET /{query} HTTP/1.1",
-        f"Host: 127.0.0.1:{server.port}",
-        f"Origin: {origin or own}",
-        "Upgrade: websocket",
-        "Connection: Upgrade",
-        "Sec-WebSocket-Version: 13",
-        "Sec-WebSocket-Key: dGhlIHNhbXBsZSBub25jZQ==",
-    )
-    assert first == "HTTP/1.1 403 Forbidden"
-
-
-@pytest.mark.parametrize(
     "path",
     ["/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd", "/page/main.js", "/\\"],
 )
@@ -209,14 +187,6 @@ def test_only_shown_segments_are_halted(server: PageServer) -> None:
         assert code == 409
         assert "does not show" in answer["error"]
         assert frontend.halted is None
-
-
-def test_a_taken_port_is_an_error(server: PageServer) -> None:
-    with (
-        pytest.raises(o80.Error, match=f"port {server.port} .* is taken"),
-        page_server([], port=server.port),
-    ):
-        pass
 
 
 def test_the_server_listens_on_this_computer_alone(server: PageServer) -> None:
