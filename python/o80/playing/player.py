@@ -144,17 +144,7 @@ class Player:
         offset = epoch.wall_offset
         if self._has_clock(run):
             offset = time.time_ns() - time.monotonic_ns()
-        try:
-            return replace(epoch.provenance, wall_clock_offset=offset)
-        except RecordingError:  # a file of the first recorders, which does not say it
-            return Provenance(
-                robot=epoch.schema["robot"],
-                options={},
-                run_options={},
-                version="",
-                source_hash="",
-                wall_clock_offset=offset,
-            )
+        return replace(epoch.provenance, wall_clock_offset=offset)
 
     def _has_clock(self, run: int) -> bool:
         """Whether times of rows are those of the clock of this computer."""

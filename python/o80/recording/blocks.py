@@ -106,10 +106,19 @@ class Messages:
             yield struct.pack("<BQHIQQ", MESSAGE, length, self.channel, 0, time, time) + data
 
 
+MessageBlock = Block | Messages
+
+
 def _index(channel: int, entries: NDArray[np.uint64]) -> bytes:
     """The message index of a channel: (n, 2), log time and offset in the chunk."""
     content = entries.tobytes()
     return struct.pack("<BQHI", MESSAGE_INDEX, 6 + len(content), channel, len(content)) + content
+
+
+def stamps_of(times: NDArray[np.uint64]) -> NDArray[np.uint8]:
+    """Times [ns] as the bytes (n, 8) of builtin_interfaces/Time."""
+    parts = np.divmod(times, np.uint64(1_000_000_000))
+    return np.stack(parts, axis=1).astype("<u4").view(np.uint8)
 
 
 def messages_in(content: bytes, index: NDArray[np.uint64]) -> NDArray[np.uint8]:

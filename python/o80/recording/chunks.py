@@ -3,20 +3,27 @@
 import struct
 from array import array
 from collections.abc import Iterator, Sequence
-from typing import overload
+from io import BytesIO
+from typing import Any, overload
 
-from mcap.opcode import Opcode
-from mcap.records import ChunkIndex
+from mcap.data_stream import ReadDataStream, RecordBuilder
+from mcap.records import ChunkIndex, McapRecord
 
 HEAD = struct.Struct("<BQ")
 _BEGIN = struct.Struct("<QQQQI")  # after the head, until the offsets of message indexes
-_OFFSET = struct.Struct("<HQ")
-_MIDDLE = struct.Struct("<QI")
-_END = struct.Struct("<QQ")
+_OFFSET = 10  # bytes of the place of a message index, which begins with its channel
+
+
+def bytes_of(*records: McapRecord) -> bytes:
+    """Records as they are in a file."""
+    builder: Any = RecordBuilder()
+    for record in records:
+        record.write(builder)
+    return bytes(builder.end())
 
 
 class Chunks(Sequence[ChunkIndex]):
-    """In their order. A recording of days has very many: each is decoded when it is asked for."""
+    """Chunk indexes in file order, decoded on access: a recording of days has very many."""
 
     def __init__(self) -> None:
         self.records = bytearray()  #: as in a summary
@@ -28,30 +35,14 @@ class Chunks(Sequence[ChunkIndex]):
         self._channels: list[frozenset[int]] = []  # of each kind
 
     def append(self, chunk: ChunkIndex) -> None:
-        """Adds what describes a chunk."""
-        name, offsets = chunk.compression.encode(), chunk.message_index_offsets
-        length = _BEGIN.size + _OFFSET.size * len(offsets) + _MIDDLE.size + len(name) + _END.size
-        self.append_record(
-            HEAD.pack(Opcode.CHUNK_INDEX, length)
-            + _BEGIN.pack(
-                chunk.message_start_time,
-                chunk.message_end_time,
-                chunk.chunk_start_offset,
-                chunk.chunk_length,
-                _OFFSET.size * len(offsets),
-            )
-            + b"".join(_OFFSET.pack(*each) for each in offsets.items())
-            + _MIDDLE.pack(chunk.message_index_length, len(name))
-            + name
-            + _END.pack(chunk.compressed_size, chunk.uncompressed_size)
-        )
+        """Adds the index of a chunk."""
+        self.append_record(bytes_of(chunk))
 
     def append_record(self, record: bytes) -> None:
-        """Adds a record of a summary. Raises struct.error if it is damaged."""
+        """Adds a record of a summary. Raises struct.error, ValueError if it is damaged."""
         start, end, _, _, size = _BEGIN.unpack_from(record, HEAD.size)
         begin = HEAD.size + _BEGIN.size
-        _MIDDLE.unpack_from(record, begin + size)
-        low, high = (record[begin + i : begin + size : _OFFSET.size] for i in (0, 1))
+        low, high = (record[begin + i : begin + size : _OFFSET] for i in (0, 1))
         kind = self._numbers.get(low + high)
         if kind is None:
             kind = self._numbers[low + high] = len(self._channels)
@@ -91,21 +82,8 @@ class Chunks(Sequence[ChunkIndex]):
     def __getitem__(self, number: int | slice) -> "ChunkIndex | list[ChunkIndex]":
         if isinstance(number, slice):
             return [self[each] for each in range(len(self))[number]]
-        data, at = self.records, self._begins[number] + HEAD.size
-        start, end, offset, length, size = _BEGIN.unpack_from(data, at)
-        at += _BEGIN.size
-        offsets = dict(_OFFSET.iter_unpack(data[at : at + size]))
-        index_length, named = _MIDDLE.unpack_from(data, at + size)
-        at += size + _MIDDLE.size
-        compressed, uncompressed = _END.unpack_from(data, at + named)
-        return ChunkIndex(
-            chunk_length=length,
-            chunk_start_offset=offset,
-            compression=data[at : at + named].decode(),
-            compressed_size=compressed,
-            message_end_time=end,
-            message_index_length=index_length,
-            message_index_offsets=offsets,
-            message_start_time=start,
-            uncompressed_size=uncompressed,
-        )
+        at = self._begins[number]
+        _, length = HEAD.unpack_from(self.records, at)
+        record = bytes(self.records[at + HEAD.size : at + HEAD.size + length])
+        index: ChunkIndex = ChunkIndex.read(ReadDataStream(BytesIO(record)))
+        return index

@@ -9,6 +9,7 @@ from typing import NamedTuple
 from o80.base.errors import RecordingError
 from o80.base.machine import this_boot
 from o80.frontend.reader import Reader
+from o80.recording.cdr import ENCAPSULATION
 from o80.recording.scan import Scan
 
 DESCRIPTION = "application/x-o80-description"
@@ -159,6 +160,12 @@ def topic_of(segment: str, content: str = "") -> str:
     plain = re.sub(r"[^A-Za-z0-9]+", "_", segment).strip("_") or "x"
     name = f"x_{plain}" if plain[0].isdigit() else plain
     return f"/{name}/{content}" if content else f"/{name}"
+
+
+def iteration_in(message: bytes) -> int:
+    """Iteration of the row that a message holds, its first member."""
+    begin = len(ENCAPSULATION)
+    return int.from_bytes(message[begin : begin + 8], "little", signed=True)
 
 
 def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:

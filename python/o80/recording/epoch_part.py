@@ -11,8 +11,9 @@ from mcap.records import ChunkIndex
 
 from o80.base.errors import RecordingError
 from o80.recording.blocks import messages_in
-from o80.recording.cdr import ENCAPSULATION
-from o80.recording.epoch import EpochNote
+from o80.recording.epoch import EpochNote, channels_of, iteration_in
+from o80.recording.journal_channel import CONTENT as JOURNAL
+from o80.recording.journal_channel import Entries, entries_in
 from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of, unreadable
 
 UNFINISHED = "the recorder still runs, or was killed"
@@ -61,8 +62,7 @@ class EpochPart:
         assert chunk is not None
         with self.reading() as file:
             messages = messages_in(content_of(file, chunk), index_of(file, chunk, self.channel))
-        begin = len(ENCAPSULATION)  # the iteration is the first member
-        return int.from_bytes(messages[-1, begin : begin + 8].tobytes(), "little", signed=True)
+        return iteration_in(messages[-1].tobytes())
 
     @property
     def last_chunk(self) -> "ChunkIndex | None":
@@ -95,6 +95,13 @@ class EpochPart:
                 return place.create_time
         return 0
 
+    def last_entries(self) -> Entries | None:
+        """The last part of the journal. Raises RecordingError."""
+        if self.journal is None:
+            return None
+        with self.reading() as file:
+            return next(entries_in(file, self.found, self.journal, newest_first=True), None)
+
     def table(self) -> bytes:
         """The description of the robot. Raises RecordingError."""
         for place in self.found.attachments:
@@ -113,3 +120,16 @@ class EpochPart:
             raise RecordingError(unreadable(self.path, error)) from error
         except (ValueError, struct.error) as error:
             raise RecordingError(f"{self.path}: {error}") from error
+
+
+def parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
+    """The parts of runs in a file. Raises RecordingError."""
+    journals = channels_of(found, JOURNAL)
+    for channel in found.channels.values():
+        try:
+            note = EpochNote.of(channel.metadata)
+        except RecordingError as error:
+            raise RecordingError(f"{path}: {error}") from None
+        if note is not None:
+            journal = journals.get((note.segment, note.number))
+            yield EpochPart(path, found, channel.id, note, journal)

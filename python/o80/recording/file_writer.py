@@ -12,14 +12,12 @@ import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 import lz4.frame
 import zstandard
 from mcap.opcode import Opcode
 from mcap.records import (
     Attachment,
-    AttachmentIndex,
     Channel,
     ChunkIndex,
     Header,
@@ -30,10 +28,11 @@ from mcap.records import (
 
 import o80._core as _core
 from o80.base.errors import InvalidArgument, RecordingError
-from o80.recording.chunks import HEAD
+from o80.recording.blocks import MessageBlock
+from o80.recording.chunks import HEAD, bytes_of
 from o80.recording.locked_file import LockedFile, reserve
-from o80.recording.scan import CUT, MAGIC, Scan, scan
-from o80.recording.summary import bytes_of, end_of_file, room_for_end
+from o80.recording.scan import CUT, MAGIC, Scan, place_of, scan
+from o80.recording.summary import end_of_file, room_for_end
 
 PROFILE = "ros2"
 _COMPRESS: dict[str, Callable[[], Callable[[bytes], bytes]]] = {
@@ -59,20 +58,6 @@ class Form:
 
 
 USUAL = Form()
-
-
-class MessageBlock(Protocol):
-    """Messages of one channel; see o80.recording.blocks.Block."""
-
-    @property
-    def channel(self) -> int: ...
-    @property
-    def content(self) -> bytes: ...
-    @property
-    def count(self) -> int: ...
-    @property
-    def time_range(self) -> tuple[int, int]: ...
-    def index(self, offset: int) -> bytes: ...
 
 
 class FileWriter:
@@ -172,20 +157,28 @@ class FileWriter:
         self._found.channels[number] = channel
         return number
 
+    def add_topic(self, topic: str, name: str, definition: str) -> int:
+        """Adds a channel that belongs to no run, unless the file has it. Returns its number."""
+        for channel in self._found.channels.values():
+            if channel.topic == topic:
+                return channel.id
+        return self.add_channel(topic, self.add_schema(name, definition), {})
+
+    def copy_channel(
+        self, channel: Channel, schemas: Mapping[int, Schema], metadata: Mapping[str, str]
+    ) -> int:
+        """Adds a channel of another file, with its schema and other metadata."""
+        number, schema = 0, schemas.get(channel.schema_id)
+        if schema is not None:
+            text = schema.data.decode(errors="replace")
+            number = self.add_schema(schema.name, text, encoding=schema.encoding)
+        return self.add_channel(channel.topic, number, metadata, encoding=channel.message_encoding)
+
     def attach(self, name: str, media_type: str, data: bytes, time: int) -> None:
         """Adds an attachment. time: [ns] since 1970."""
-        record = bytes_of(Attachment(time, time, name, media_type, data))
-        self._found.attachments.append(
-            AttachmentIndex(
-                offset=self.size,
-                length=len(record),
-                log_time=time,
-                create_time=time,
-                data_size=len(data),
-                name=name,
-                media_type=media_type,
-            )
-        )
+        attachment = Attachment(time, time, name, media_type, data)
+        record = bytes_of(attachment)
+        self._found.attachments.append(place_of(attachment, self.size, len(record)))
         self._append(record)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:

@@ -65,20 +65,13 @@ class _Copier:
             case Schema():
                 self._schemas[record.id] = record
             case Channel() if record.id not in self._channels:
-                self._channels[record.id] = self._added(record)
+                self._channels[record.id] = self._writer.copy_channel(
+                    record, self._schemas, record.metadata
+                )
             case Attachment():
                 self._writer.attach(record.name, record.media_type, record.data, record.create_time)
             case Metadata():
                 self._writer.add_metadata(record.name, record.metadata)
-
-    def _added(self, channel: Channel) -> int:
-        number, schema = 0, self._schemas.get(channel.schema_id)
-        if schema is not None:
-            text = schema.data.decode(errors="replace")
-            number = self._writer.add_schema(schema.name, text, encoding=schema.encoding)
-        return self._writer.add_channel(
-            channel.topic, number, channel.metadata, encoding=channel.message_encoding
-        )
 
     def _flush(self) -> None:
         if self._waiting:

@@ -16,10 +16,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.recording.blocks import Block
+from o80.recording.blocks import Block, stamps_of
 from o80.recording.cdr import ENCAPSULATION, CdrWriter
 from o80.recording.epoch import EpochNote, topic_of
 from o80.recording.file_writer import FileWriter
+from o80.recording.message_types import HEADER
 from o80.rows.layout import Layout, is_plain
 
 TYPE = "sensor_msgs/msg/JointState"
@@ -29,15 +30,7 @@ string[] name
 float64[] position
 float64[] velocity
 float64[] effort
-{"=" * 80}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{"=" * 80}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
+{HEADER}"""
 CONTENT = "joint_states"
 """Name of this content in the metadata of the channel."""
 QUANTITIES = {
@@ -170,9 +163,7 @@ class JointWriter:
         block = Block.reserved(self.channel, log_times, first, len(self._template))
         messages = block.messages
         messages[:] = np.frombuffer(self._template, np.uint8)
-        stamps = np.empty((len(raw), 2), "<u4")
-        stamps[:, 0], stamps[:, 1] = np.divmod(log_times, np.uint64(1_000_000_000))
-        messages[:, self._stamp : self._stamp + 8] = stamps.view(np.uint8)
+        messages[:, self._stamp : self._stamp + 8] = stamps_of(log_times)
         for place, numbers in self._values:
             values = np.empty((len(raw), len(numbers)), "<f8")
             for i, number in enumerate(numbers):

@@ -123,8 +123,3 @@ def entries_in(
         messages = [*messages_of(file, chunk, channel)]
         for message in reversed(messages) if newest_first else messages:
             yield Entries.of(message, codec)
-
-
-def last_entries_in(file: IO[bytes], found: Scan, channel: int) -> Entries | None:
-    """The last part of a journal in a file. Raises ValueError if it is damaged."""
-    return next(entries_in(file, found, channel, newest_first=True), None)

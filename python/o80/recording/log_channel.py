@@ -16,7 +16,7 @@ from o80.recording.blocks import Messages
 from o80.recording.cdr import CdrWriter
 from o80.recording.file_writer import FileWriter
 from o80.recording.journal_channel import Entries
-from o80.recording.message_types import SEPARATOR
+from o80.recording.message_types import TIME
 from o80.rows.journal import ENDS, EntryDecoder, JournalEntry
 from o80.rows.journal_text import JournalText, command_text, status_text
 
@@ -36,11 +36,7 @@ string msg
 string file
 string function
 uint32 line
-{SEPARATOR}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-"""
+{TIME}"""
 MAX_BYTES = 1 << 16  # of a journal between two polls; of more, only notable entries are told
 MAX_ENDS = 20  # of commands that are told one by one in a poll
 _BATCHES = {"taken", "scheduled"}
@@ -81,10 +77,7 @@ class Line:
 
 def added_lines(file: FileWriter, lines: Sequence[Line]) -> Messages:
     """Messages of lines, at least one."""
-    found = (each.id for each in file.found.channels.values() if each.topic == TOPIC)
-    channel = next(found, None)
-    if channel is None:
-        channel = file.add_channel(TOPIC, file.add_schema(TYPE, DEFINITION), {})
+    channel = file.add_topic(TOPIC, TYPE, DEFINITION)
     return Messages(channel, [(each.time, each.message()) for each in lines])
 
 

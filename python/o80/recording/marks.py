@@ -92,10 +92,7 @@ def _plain(value: Any) -> Any:
 
 def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Messages:
     """Messages of marks, at least one, each with its log time: that of its newest row [ns]."""
-    channel = _channel_in(file.found)
-    if channel is None:
-        schema = file.add_schema(TYPE, DEFINITION)
-        channel = file.add_channel(TOPIC, schema, {})
+    channel = file.add_topic(TOPIC, TYPE, DEFINITION)
     return Messages(channel, [(time, mark.message()) for time, mark in marks])
 
 
@@ -118,8 +115,3 @@ def has_marks(found: Scan) -> bool:
     return any(
         each.topic == TOPIC and found.counts.get(each.id, 0) for each in found.channels.values()
     )
-
-
-def _channel_in(found: Scan) -> int | None:
-    """The newest channel of marks."""
-    return max((each.id for each in found.channels.values() if each.topic == TOPIC), default=None)

@@ -6,14 +6,29 @@ file.
 """
 
 import hashlib
+import math
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-from o80.rows.layout import HEAD, Layout, is_plain
+from o80.rows.layout import HEAD, Layout, dtype_of_field, is_plain
 
 PACKAGE = "o80"
 SEPARATOR = "=" * 80
+TIME = f"""\
+{SEPARATOR}
+MSG: builtin_interfaces/Time
+int32 sec
+uint32 nanosec
+"""
+"""Definition of a type that others contain."""
+HEADER = f"""\
+{SEPARATOR}
+MSG: std_msgs/Header
+builtin_interfaces/Time stamp
+string frame_id
+{TIME}"""
+"""Definition of std_msgs/Header and of the type in it."""
 
 
 @dataclass(frozen=True)
@@ -137,7 +152,7 @@ def _state_member(
 
 
 def _placed(member: Member, name: str, offset: int) -> Member:
-    return Member(name, member.kind, member.size, offset + member.offset, member.count, member.type)
+    return replace(member, name=name, offset=offset + member.offset)
 
 
 def _struct(described: dict[str, Any], fallback: str) -> MessageType:
@@ -150,18 +165,13 @@ def _struct(described: dict[str, Any], fallback: str) -> MessageType:
 
 
 def _field_member(described: dict[str, Any], name: str) -> Member:
-    count = 1
-    for length in described["shape"]:
-        count *= length
-    array = count if described["shape"] else None
+    array = math.prod(described["shape"]) if described["shape"] else None
     if described["kind"] == "struct":
         inner = _struct(described["type"], name)
         return Member(
             _field_name(name), inner.name, described["size"], described["offset"], array, inner
         )
-    kind = described["kind"]
-    if kind == "enum":
-        kind = f"{'int' if described['signed'] else 'uint'}{8 * described['size']}"
+    kind = dtype_of_field(described).name
     return Member(_field_name(name), kind, described["size"], described["offset"], array)
 
 
@@ -169,7 +179,7 @@ def _constants(described: dict[str, Any]) -> list[str]:
     """An enumeration's labels, as constants of its number type."""
     if described["kind"] != "enum":
         return []
-    kind = f"{'int' if described['signed'] else 'uint'}{8 * described['size']}"
+    kind = dtype_of_field(described).name
     prefix = _field_name(described["name"] or "state").upper()
     return [
         f"{kind} {prefix}_{_field_name(label).upper()}={number}"
@@ -210,17 +220,7 @@ def _with_unique_names(members: list[Member]) -> list[Member]:
             number += 1
             name = f"{member.name}_{number}"
         taken.add(name)
-        result.append(
-            Member(
-                name,
-                member.kind,
-                member.size,
-                member.offset,
-                member.count,
-                member.type,
-                member.bits,
-            )
-        )
+        result.append(replace(member, name=name))
     return result
 
 

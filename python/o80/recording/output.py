@@ -4,19 +4,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
-
 from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
 from o80.recording import joint_states
-from o80.recording.blocks import messages_in
-from o80.recording.cdr import ENCAPSULATION
 from o80.recording.epoch import EpochNote, WallClock, channels_of
+from o80.recording.epoch_part import parts_of
 from o80.recording.file_writer import USUAL, FileWriter, Form
-from o80.recording.journal_channel import CONTENT as JOURNAL
-from o80.recording.journal_channel import last_entries_in
 from o80.recording.reader import files_of, in_order
-from o80.recording.scan import NotARecordingError, Scan, content_of, has_end, index_of, scan
+from o80.recording.scan import NotARecordingError, Scan, has_end, scan
 
 
 @dataclass(frozen=True)
@@ -109,12 +104,10 @@ class Predecessor:
         """The clock that the last file goes on with. Raises RecordingError."""
         path, found = self._found[0]
         clock = WallClock({})
-        for channel in found.channels.values():
-            note = EpochNote.of(channel.metadata)
-            if note is not None and note.boot:
-                clock.offsets.setdefault(note.boot, note.wall_offset)
-                last = _last_row(path, found, channel.id)
-                clock.after = max(clock.after, last[1] if last else 0)
+        for part in parts_of(path, found):
+            if part.note.boot:
+                clock.offsets.setdefault(part.note.boot, part.note.wall_offset)
+                clock.after = max(clock.after, part.log_times[1] if part.last_chunk else 0)
         return clock
 
     def written(self, segment: str) -> dict[int, Written]:
@@ -134,49 +127,27 @@ class Predecessor:
             yield self._found[-1]
 
     def _add(self, epochs: dict[int, Written], path: Path, found: Scan, segment: str) -> None:
-        """Adds what a file before those that were added holds."""
-        journals = channels_of(found, JOURNAL)
+        """Adds the epochs of the next older file."""
         joints = channels_of(found, joint_states.CONTENT)
-        for channel in found.channels.values():
-            note = EpochNote.of(channel.metadata)
-            if note is None or note.segment != segment:
+        for part in parts_of(path, found):
+            note, journal = part.note, part.journal
+            if note.segment != segment:
                 continue
-            run = (segment, note.number)
-            journal = journals.get(run)
-            own = Written(note, channel=channel.id, journal=journal, joints=joints.get(run))
+            own = Written(
+                note,
+                channel=part.channel,
+                journal=journal,
+                joints=joints.get((segment, note.number)),
+            )
             known = epochs.get(note.epoch, own if path == self._last else Written(note))
             known = replace(known, has_journal=known.has_journal or journal is not None)
-            if known.last < 0 and (last := _last_row(path, found, channel.id)) is not None:
-                known = replace(known, last=last[0], last_log_time=last[1])
-            if known.journal_next == 0 and journal is not None:
-                known = replace(known, journal_next=_last_entry(path, found, journal))
+            if known.last < 0 and part.last_chunk is not None:
+                known = replace(known, last=part.last_row, last_log_time=part.log_times[1])
+            if known.journal_next == 0 and (last := part.last_entries()) is not None:
+                known = replace(known, journal_next=last.next)
             epochs[note.epoch] = known
 
 
 def _is_known(epoch: Written) -> bool:
-    """Whether older files cannot tell more of an epoch."""
+    """Whether older files hold nothing more of an epoch."""
     return epoch.last >= 0 and (epoch.journal_next > 0 or not epoch.has_journal)
-
-
-def _last_row(path: Path, found: Scan, channel: int) -> tuple[int, int] | None:
-    """Iteration and log time of the last row of a channel."""
-    for chunk in found.chunks.having(channel, newest_first=True):
-        try:
-            with path.open("rb") as stream:
-                index = index_of(stream, chunk, channel)
-                messages = messages_in(content_of(stream, chunk), index)
-        except ValueError as error:
-            raise RecordingError(f"{path}: {error}") from error
-        begin = len(ENCAPSULATION)  # the iteration is the first member
-        iteration = messages[-1, begin : begin + 8].copy().view(np.int64)[0]
-        return int(iteration), int(index[-1, 0])
-    return None
-
-
-def _last_entry(path: Path, found: Scan, channel: int) -> int:
-    try:
-        with path.open("rb") as stream:
-            last = last_entries_in(stream, found, channel)
-            return 0 if last is None else last.next
-    except ValueError as error:
-        raise RecordingError(f"{path}: {error}") from error

@@ -13,10 +13,9 @@ from mcap.records import Channel, ChunkIndex
 from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
 from o80.recording import joint_states
-from o80.recording.blocks import Block, Messages
-from o80.recording.cdr import ENCAPSULATION
-from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote
-from o80.recording.file_writer import FileWriter, MessageBlock
+from o80.recording.blocks import Block, MessageBlock, Messages
+from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote, iteration_in
+from o80.recording.file_writer import FileWriter
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries
@@ -227,9 +226,8 @@ class _PartWriter:
         self, channel: Channel, note: EpochNote, messages: Iterable[tuple[int, bytes]]
     ) -> list[tuple[int, bytes]]:
         kept = []
-        begin = len(ENCAPSULATION)  # the iteration is the first member
         for time, message in messages:
-            iteration = int.from_bytes(message[begin : begin + 8], "little", signed=True)
+            iteration = iteration_in(message)
             if not self._selection.holds(time) or iteration % self._selection.every:
                 continue
             new = self._channel(channel, iteration)
@@ -305,13 +303,7 @@ class _PartWriter:
                 texts = texts | {"begin": str(begin), "every": str(self._every(channel))}
                 if begin - int(channel.metadata["begin"]) >= self._every(channel):
                     texts |= {"before": "cut away"}
-            number, schema = 0, self._found.schemas.get(channel.schema_id)
-            if schema is not None:
-                text = schema.data.decode(errors="replace")
-                number = self._file.add_schema(schema.name, text, encoding=schema.encoding)
-            self._channels[key] = self._file.add_channel(
-                channel.topic, number, texts, encoding=channel.message_encoding
-            )
+            self._channels[key] = self._file.copy_channel(channel, self._found.schemas, texts)
         return self._channels[key]
 
     def _texts(self, channel: Channel) -> dict[str, str]:

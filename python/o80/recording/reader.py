@@ -9,10 +9,8 @@ from pathlib import Path
 from typing import Any
 
 from o80.base.errors import InvalidArgument, RecordingError
-from o80.recording.epoch import EpochNote, channels_of
-from o80.recording.epoch_part import UNFINISHED, EpochPart
+from o80.recording.epoch_part import UNFINISHED, EpochPart, parts_of
 from o80.recording.foreign_file import copied
-from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.marks import Mark, Marks, marks_in
 from o80.recording.recorded_epoch import RecordedEpoch
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan, unreadable
@@ -31,7 +29,7 @@ class RecordingFile:
         self._files = [*_scans_of(self.path)]
         parts: dict[str, dict[tuple[int, int], list[EpochPart]]] = {}
         for file, found in self._files:
-            for part in _parts_of(file, found):
+            for part in parts_of(file, found):
                 epochs = parts.setdefault(part.note.segment, {})
                 epochs.setdefault((part.note.number, part.note.epoch), []).append(part)
         self.segments: dict[str, RecordedSegment] = {
@@ -188,18 +186,6 @@ def _no_such_file(path: Path) -> str:
         f"there is no file {path}: give a recording. `o80 record {segment} -o {file}` records a "
         f"segment '{segment}'"
     )
-
-
-def _parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
-    journals = channels_of(found, JOURNAL)
-    for channel in found.channels.values():
-        try:
-            note = EpochNote.of(channel.metadata)
-        except RecordingError as error:
-            raise RecordingError(f"{path}: {error}") from None
-        if note is not None:
-            journal = journals.get((note.segment, note.number))
-            yield EpochPart(path, found, channel.id, note, journal)
 
 
 def _epochs_of(runs: list[list[EpochPart]], cut_at: Path | None) -> Iterator[RecordedEpoch]:

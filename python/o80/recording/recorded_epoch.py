@@ -16,7 +16,7 @@ from o80.recording.blocks import messages_in
 from o80.recording.epoch import GAP, OVERWRITTEN, Gap, Interruption
 from o80.recording.epoch_part import EpochPart
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
-from o80.recording.journal_channel import Entries, codec_of, entries_in, last_entries_in
+from o80.recording.journal_channel import Entries, codec_of, entries_in
 from o80.recording.message_plan import MessagePlan, plan_of_rows
 from o80.recording.scan import content_of, index_of
 from o80.rows.history import History, Selection
@@ -92,8 +92,7 @@ class RecordedEpoch:
     @property
     def model(self) -> str:
         """The model (MJCF) that draws the robot; empty if its driver names none."""
-        mjcf: str = self._decoder.layout.model
-        return mjcf
+        return self.layout.model
 
     @cached
     def gaps(self) -> list[Gap]:
@@ -174,8 +173,7 @@ class RecordedEpoch:
     @property
     def schema(self) -> dict[str, Any]:
         """The description of the robot."""
-        schema: dict[str, Any] = self._decoder.layout.schema
-        return schema
+        return self.layout.schema
 
     @cached
     def provenance(self) -> Provenance:
@@ -183,10 +181,9 @@ class RecordedEpoch:
         return self._started("json", Provenance.from_json)
 
     @property
-    def machine(self) -> Machine | None:
-        """The machine that recorded it; None: an older o80 recorded it. Raises RecordingError."""
-        known = "machine" in self._provenance_texts
-        return self._started("machine", Machine.from_json) if known else None
+    def machine(self) -> Machine:
+        """The machine that recorded it. Raises RecordingError."""
+        return self._started("machine", Machine.from_json)
 
     def _started(self, key: str, read: Callable[[str], T]) -> T:
         try:
@@ -280,7 +277,6 @@ class RecordedEpoch:
         self, from_time: int | None, to_time: int | None, *, newest_first: bool = False
     ) -> Iterator[History]:
         """The rows of each chunk that may have rows of these times."""
-        layout = self._decoder.layout
         offset = self.wall_offset
         start = 0 if from_time is None else from_time + offset
         end = 2**64 if to_time is None else to_time + offset
@@ -289,7 +285,7 @@ class RecordedEpoch:
                 part.channel, start=start, end=end, newest_first=newest_first
             )
             for raw in self._decoded_rows(part, chunks):
-                yield History(self._decoder, raw.view(layout.row).reshape(len(raw)))
+                yield History(self._decoder, raw.view(self.layout.row).reshape(len(raw)))
 
     def _last_blocks(self, n: int) -> list[History]:
         """The rows of the last chunks, which have n rows, if there are so many."""
@@ -309,7 +305,7 @@ class RecordedEpoch:
                 index = index_of(file, chunk, part.channel)
                 messages = messages_in(content_of(file, chunk), index)
                 if plan is None or plan.size != messages.shape[1]:
-                    plan = plan_of_rows(self._decoder.layout, messages.shape[1])
+                    plan = plan_of_rows(self.layout, messages.shape[1])
                 yield np.ascontiguousarray(plan.decode(messages))
 
     @property
@@ -335,10 +331,9 @@ class RecordedEpoch:
     def _end_in_journal(self) -> str:
         part = next((part for part in reversed(self._parts) if part.journal is not None), None)
         codec = self.journal_codec
-        if part is None or part.journal is None or codec is None or codec > _core.JOURNAL_CODEC:
+        if part is None or codec is None or codec > _core.JOURNAL_CODEC:
             return ""
-        with part.reading() as file:
-            last = last_entries_in(file, part.found, part.journal)
+        last = part.last_entries()
         if last is None:
             return ""
         entries = self._decoded(_core.RecordedJournal(self.description, 0), last)

@@ -22,9 +22,8 @@ from mcap.stream_reader import get_chunk_data_stream
 from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
 from o80.recording.blocks import LENGTH_ENDS_AT, MESSAGE, Messages
-from o80.recording.cdr import ENCAPSULATION
 from o80.recording.chunks import HEAD
-from o80.recording.epoch import GAP, EpochNote
+from o80.recording.epoch import GAP, EpochNote, iteration_in
 from o80.recording.file_writer import FileWriter
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
@@ -254,13 +253,7 @@ class _Salvage:
                 record = _record(opcode, self._data[begin + HEAD.size : end])
                 (schemas if opcode == Opcode.SCHEMA else self._channels)[record.id] = record
         for channel in self._channels.values():
-            number, schema = 0, schemas.get(channel.schema_id)
-            if schema is not None:
-                text = schema.data.decode()
-                number = self._file.add_schema(schema.name, text, encoding=schema.encoding)
-            self._new[channel.id] = self._file.add_channel(
-                channel.topic, number, channel.metadata, encoding=channel.message_encoding
-            )
+            self._new[channel.id] = self._file.copy_channel(channel, schemas, channel.metadata)
 
     def _add_chunk(self, chunk: Chunk, end: int) -> None:
         kept: dict[int, list[tuple[int, bytes]]] = {}
@@ -277,8 +270,7 @@ class _Salvage:
         texts = self._channels[number].metadata
         note = EpochNote.of(texts)
         if note is not None:
-            begin = len(ENCAPSULATION)  # the iteration is the first member
-            first = int.from_bytes(message[begin : begin + 8], "little", signed=True)
+            first = iteration_in(message)
             after, name, expected = first + 1, GAP, self._next.get(number, note.begin)
         elif texts.get("content") == JOURNAL:
             try:

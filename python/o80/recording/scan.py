@@ -74,9 +74,7 @@ class Scan:
     #: messages outside of chunks, chunks without indexes or with channels of their own: another
     #: program has written them
     foreign: bool = False
-    copy: "CopiedFile | None" = (
-        None  #: of a foreign file, as o80 writes one: what this is a scan of
-    )
+    copy: "CopiedFile | None" = None  #: of a foreign file, in the form of o80: what was scanned
 
     def take(self, opcode: int, stream: ReadDataStream) -> None:
         """Notes a header, a schema or a channel; nothing else."""
@@ -293,6 +291,19 @@ def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:
     return attachment
 
 
+def place_of(attachment: Attachment, offset: int, length: int) -> AttachmentIndex:
+    """The entry of the summary for an attachment, whose record is there [bytes]."""
+    return AttachmentIndex(
+        offset,
+        length,
+        attachment.log_time,
+        attachment.create_time,
+        len(attachment.data),
+        attachment.name,
+        attachment.media_type,
+    )
+
+
 class _Scanner:
     def __init__(self, file: IO[bytes], size: int, path: str | os.PathLike[str]) -> None:
         self._file, self._size, self._path = file, size, path
@@ -344,7 +355,7 @@ class _Scanner:
         scan = self._scan
         scan.take(opcode, stream)
         if opcode == Opcode.ATTACHMENT:
-            self._take_attachment(Attachment.read(stream), at, after - at)
+            scan.attachments.append(place_of(Attachment.read(stream), at, after - at))
         elif opcode == Opcode.MESSAGE:
             scan.foreign = True
         elif opcode == Opcode.METADATA:
@@ -353,19 +364,6 @@ class _Scanner:
             scan.metadata_places.append(MetadataIndex(at, after - at, metadata.name))
         scan.end = after
         return True
-
-    def _take_attachment(self, attachment: Attachment, at: int, length: int) -> None:
-        self._scan.attachments.append(
-            AttachmentIndex(
-                offset=at,
-                length=length,
-                log_time=attachment.log_time,
-                create_time=attachment.create_time,
-                data_size=len(attachment.data),
-                name=attachment.name,
-                media_type=attachment.media_type,
-            )
-        )
 
     # a chunk and the message indexes after it
 

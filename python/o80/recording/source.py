@@ -7,9 +7,9 @@ from time import monotonic, time_ns
 import o80._core as _core
 from o80.base.errors import BackendGone, RecordingError, SegmentError, TimeoutError
 from o80.frontend.frontend import Frontend
-from o80.recording.blocks import Block, Messages
+from o80.recording.blocks import Block, MessageBlock, Messages
 from o80.recording.epoch import EARLIER_FILE, GAP, WallClock, note_of
-from o80.recording.file_writer import FileWriter, MessageBlock
+from o80.recording.file_writer import FileWriter
 from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import JournalRecorder, codec_of

@@ -3,25 +3,15 @@
 import struct
 import zlib
 from collections.abc import Iterator
-from typing import Any
 
-from mcap.data_stream import RecordBuilder
 from mcap.opcode import Opcode
-from mcap.records import DataEnd, McapRecord, Statistics, SummaryOffset
+from mcap.records import DataEnd, Statistics, SummaryOffset
 
-from o80.recording.chunks import HEAD
+from o80.recording.chunks import HEAD, bytes_of
 from o80.recording.scan import MAGIC, Scan
 
 OF_A_CHUNK = 128  # most bytes of the summary that a chunk adds, with one channel
 OF_THE_REST = 65536
-
-
-def bytes_of(*records: McapRecord) -> bytes:
-    """Records as they stand in a file."""
-    builder: Any = RecordBuilder()
-    for record in records:
-        record.write(builder)
-    return bytes(builder.end())
 
 
 def end_of_file(found: Scan, size: int) -> Iterator[bytes | bytearray]:

@@ -6,11 +6,11 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from o80.recording.blocks import Block
+from o80.recording.blocks import Block, stamps_of
 from o80.recording.cdr import CdrWriter
 from o80.recording.file_writer import FileWriter
 from o80.recording.message_plan import plan_of_rows
-from o80.recording.message_types import SEPARATOR
+from o80.recording.message_types import HEADER, SEPARATOR
 from o80.rows.layout import Layout
 
 TOPIC = "/tf"
@@ -24,15 +24,7 @@ MSG: geometry_msgs/TransformStamped
 std_msgs/Header header
 string child_frame_id
 geometry_msgs/Transform transform
-{SEPARATOR}
-MSG: std_msgs/Header
-builtin_interfaces/Time stamp
-string frame_id
-{SEPARATOR}
-MSG: builtin_interfaces/Time
-int32 sec
-uint32 nanosec
-{SEPARATOR}
+{HEADER}{SEPARATOR}
 MSG: geometry_msgs/Transform
 geometry_msgs/Vector3 translation
 geometry_msgs/Quaternion rotation
@@ -72,11 +64,7 @@ class TransformWriter:
         self._layout = layout
         self._last = -1.0  # number of the period of the last message
         self._count = 0
-        found = (each.id for each in file.found.channels.values() if each.topic == TOPIC)
-        channel = next(found, None)
-        if channel is None:
-            channel = file.add_channel(TOPIC, file.add_schema(TYPE, DEFINITION), {})
-        self._channel = channel
+        self._channel = file.add_topic(TOPIC, TYPE, DEFINITION)
         cdr = CdrWriter()
         cdr.numbers("I", len(poses.bodies))
         self._stamps, self._places = [], []
@@ -106,9 +94,8 @@ class TransformWriter:
         self._count += len(chosen)
         messages: Any = block.messages
         messages[:] = np.frombuffer(self._template, np.uint8)
-        stamps = np.stack(np.divmod(log_times, np.uint64(1_000_000_000)), axis=1).astype("<u4")
         for at in self._stamps:
-            messages[:, at : at + 8] = stamps.view(np.uint8)
+            messages[:, at : at + 8] = stamps_of(log_times)
         for message, row in zip(messages, raw, strict=True):
             poses = self._poses.observed(row.tobytes())[:, _XYZ_THEN_XYZW]
             for at, pose in zip(self._places, poses, strict=True):
