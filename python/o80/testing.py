@@ -136,25 +136,23 @@ class _Suite:
 
     def _resets_by_its_seed(self) -> None:
         with self._inline() as arm:
-            found = []
-            for turn in range(_TURNS):
-                _Actions(arm, self._seed + 1 + turn).play()  # another past for each
-                arm.request("reset", **self._fields(arm, "reset", 7))
-                found.append(self._motion(arm))
-            for other in found[1:]:
-                _compare(found[0], other, "after two resets with the same seed")
+            self._repeats(arm, "reset", 7, "after two resets with the same seed")
 
     def _keeps_all_in_a_snapshot(self) -> None:
         with self._inline() as arm:
             _Actions(arm, self._seed).play()
             arm.request("snapshot", **self._fields(arm, "snapshot", 0))
-            found = []
-            for turn in range(_TURNS):
-                _Actions(arm, self._seed + 1 + turn).play()  # another past for each
-                arm.request("restore", **self._fields(arm, "restore", 0))
-                found.append(self._motion(arm))
-            for other in found[1:]:
-                _compare(found[0], other, "after the same snapshot was restored twice")
+            self._repeats(arm, "restore", 0, "after the same snapshot was restored twice")
+
+    def _repeats(self, arm: "Frontend", request: str, value: int, when: str) -> None:
+        """Compares the motions after a request that determines the state."""
+        found = []
+        for turn in range(_TURNS):
+            _Actions(arm, self._seed + 1 + turn).play()  # another past for each
+            arm.request(request, **self._fields(arm, request, value))
+            found.append(self._motion(arm))
+        for other in found[1:]:
+            _compare(found[0], other, when)
 
     def _motion(self, arm: "Frontend") -> History:
         """Rows of a script that is the same in each call."""
@@ -190,7 +188,7 @@ class _Suite:
         )
 
     @staticmethod
-    def _fields(arm: "Frontend", request: str, value: int) -> dict[str, int]:
+    def _fields(arm: "Frontend", request: str, value: int) -> dict[str, Any]:
         """Values for the seed or slot of a request, as far as it has one."""
         (described,) = (each for each in arm.schema["requests"] if each["name"] == request)
         fields = {field["name"] for field in (described.get("type") or {}).get("fields", ())}

@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 
 def open_standard_streams() -> None:
-    """Opens /dev/null on those of 0, 1, 2 that are closed. For programs, before all else."""
+    """Opens /dev/null on the closed ones of descriptors 0, 1, 2; the first call of a program."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)

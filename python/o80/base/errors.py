@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def exception_text(error: BaseException) -> str:
-    """Type and text of any exception, also of one whose text cannot be had."""
+    """Type and text of any exception, also if its own `__str__` fails."""
     try:
         text = str(error)
     except Exception:

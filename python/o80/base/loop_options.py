@@ -42,7 +42,7 @@ def names_of(place: Literal["start", "inline", "backend"]) -> list[str]:
 
 
 def loop_texts(given: Mapping[str, Any], names: Iterable[str]) -> list[tuple[str, str]]:
-    """Names and texts of those of the named options that are not None.
+    """Names and texts of the named options that are not None.
 
     given: the arguments of a function. Raises InvalidArgument, which names the option and what is
     allowed.

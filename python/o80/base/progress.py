@@ -7,7 +7,7 @@ from typing import Self
 
 from o80.base.screen import complain
 
-AFTER = 1.0  # from when on it is told [s]
+AFTER = 1.0  # from when on it is shown [s]
 BETWEEN = 0.2  # two figures on a terminal [s]
 of_a_command = False
 """Whether this process is a command (`o80 info`); else a program that uses o80."""
@@ -17,10 +17,10 @@ class Progress:
     """One reading; used in a `with` block, in which `at` is called again and again."""
 
     def __init__(self, text: str) -> None:
-        """text: what takes long, told once."""
+        """text: says what takes long; shown once."""
         self._text = text
         self._next = time.monotonic() + AFTER
-        self._told = False
+        self._shown = False
 
     def at(self, share: float) -> None:
         """share: from 0 to 1."""
@@ -28,8 +28,8 @@ class Progress:
         if now < self._next:
             return
         self._next = now + BETWEEN
-        if not self._told:
-            self._told = True
+        if not self._shown:
+            self._shown = True
             if of_a_command:
                 complain(self._text)
             else:
@@ -40,7 +40,7 @@ class Progress:
         return self
 
     def __exit__(self, *error: object) -> None:
-        if self._told:
+        if self._shown:
             self._show("")
 
     def _show(self, figure: str) -> None:

@@ -47,10 +47,7 @@ def cut(
 
     found = open_recording(recording)
     first, last = found.time_range
-    for name in segment or ():
-        if name not in found.segments:
-            there = ", ".join(found.segments) or "none"
-            raise InvalidArgument(f"no segment '{name}' in {recording}; there are: {there}")
+    found.chosen(segment)
     selection = Selection(
         _time(begin, first, last, "--from") if begin else first,
         _time(end, first, last, "--to") if end else 2**63,

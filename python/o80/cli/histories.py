@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 
-from o80.base.errors import BackendGone, InvalidArgument
-from o80.base.machine import this_boot
+from o80.base.errors import BackendGone
 from o80.cli.attach import attach
+from o80.frontend.segments import boot_of
 from o80.recording.epoch import OVERWRITTEN, Gap, Interruption
 from o80.rows.history import History
 from o80.rows.journal import JournalEntry, marks_in
@@ -49,7 +49,7 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
                 0,
                 history,
                 offset,
-                "" if offset is None or frontend.played else this_boot(),
+                boot_of(frontend),
                 lambda: entries,
                 marks_in(entries),
                 lambda: gaps,
@@ -58,10 +58,7 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
     from o80.recording.reader import open as open_recording
 
     recording = open_recording(Path(source))
-    if only is not None and only not in recording.segments:
-        there = ", ".join(recording) or "none"
-        raise InvalidArgument(f"no segment '{only}' in {source}; there are: {there}")
-    for name in [only] if only is not None else list(recording):
+    for name in recording.chosen(None if only is None else [only]):
         epochs, of_run = recording[name].epochs, recording.marks_by_run(name)
         for number, epoch in enumerate(epochs):
             history, journal = epoch.history(seconds=seconds), epoch.journal
@@ -74,7 +71,7 @@ def histories(source: str, only: str | None, *, seconds: float | None = None) ->
                 epoch.wall_offset,
                 epoch.boot,
                 journal,
-                of_run[number],
+                [(mark.name, mark.rows[name]) for mark in of_run[number]],
                 partial(getattr, epoch, "gaps"),
                 epoch.interruption,
             )

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from o80.base.errors import InvalidArgument
-from o80.cli.stop_request import StopRequest
+from o80.base.stop_request import StopRequest
 
 if TYPE_CHECKING:
     from o80.playing.playback import Playback

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from o80.base.screen import bytes_text, complain
-from o80.cli.stop_request import StopRequest
+from o80.base.stop_request import StopRequest
 
 if TYPE_CHECKING:
     from o80.frontend.frontend import Frontend
@@ -152,8 +152,8 @@ def _replay_text(source: "Source", frontend: "Frontend", from_now: bool) -> str:
 
     if source.journal_begin is None:
         return "cannot be replayed: it was started without a journal"
-    if source.begin > 0 and source.goes_on_at is not None:
-        return f"goes on with row {source.goes_on_at}; `o80 info` shows what the recording holds"
+    if source.begin > 0 and source.continues_at is not None:
+        return f"goes on with row {source.continues_at}; `o80 info` shows what the recording holds"
     alone = " without its driver" if reads_the_world(frontend.schema) else ""
     if source.begin == 0 and source.journal_begin == 0:
         return f"is recorded from row 0: the recording can be replayed{alone}"
@@ -187,7 +187,7 @@ class _Report:
         self._rows = 0
         self._missed = 0
         self._absent: set[str] = set()
-        self._told: dict[str, int] = {}  # for each segment the run that was reported
+        self._reported: dict[str, int] = {}  # for each segment the run that was reported
         self._terminal = sys.stderr.isatty()
 
     def show(self, last: bool = False) -> None:
@@ -212,8 +212,8 @@ class _Report:
     def _say_what_begins(self) -> None:
         for name, source in self._recorder.sources.items():
             run = source.position[0]
-            if source.frontend is not None and self._told.get(name) != run:
-                self._told[name] = run
+            if source.frontend is not None and self._reported.get(name) != run:
+                self._reported[name] = run
                 complain(f"'{name}' {_replay_text(source, source.frontend, self._from_now)}")
 
     def _say_what_changed(self, last: bool) -> None:
@@ -231,7 +231,7 @@ class _Report:
                         f"nothing of '{name}' was recorded: no robot of that name published a row"
                     )
             return
-        absent = {name for name, source in recorder.sources.items() if not source.attached}
+        absent = {name for name, source in recorder.sources.items() if source.frontend is None}
         for name in sorted(absent - self._absent):
             complain(f"waiting for segment '{name}'")
         self._absent = absent

@@ -91,7 +91,7 @@ def _print_marks(marks: "list[Mark]") -> None:
 
 
 def _print_starts(runs: "list[tuple[str, int, RecordedEpoch]]") -> None:
-    """How the runs were started; those that were started alike together."""
+    """Prints how the runs were started, runs with equal options together."""
     starts: dict[tuple[str, ...], list[str]] = {}
     for name, number, epoch in runs:
         start = (name, *started_with(epoch.provenance))
@@ -117,20 +117,21 @@ def _first_line(recording: "RecordingFile") -> str:
 
 
 def _row(name: str, number: int, epoch: "RecordedEpoch") -> list[str]:
-    fields = _summary(name, number, epoch)
+    from o80.recording.catalogue import run_found
+
+    run = run_found(name, number, epoch)
     local = time.localtime(epoch.recorded_at * 1e-9)
-    is_cut = any(gap.last is None for gap in epoch.gaps)
     return [
         plain(name),
         str(number),
-        plain(fields["robot"]),
+        plain(run.robot),
         time.strftime("%Y-%m-%d %H:%M:%S", local),
-        str(fields["first_row"]),
-        str(fields["rows"]),
-        age_text(fields["seconds"]) if epoch.rows else "-",
-        str(fields["missing"]),
+        str(epoch.first_row),
+        str(run.rows),
+        age_text((run.end - run.begin) * 1e-9) if run.rows else "-",
+        str(run.missing),
         _decisions(epoch.journal_codec),
-        fields["end"].partition(":")[0] or ("missing" if is_cut else "not recorded"),
+        run.ended.partition(":")[0] or "not recorded",
     ]
 
 
@@ -138,23 +139,6 @@ def _decisions(codec: int | None) -> str:
     if codec is None:
         return "none"
     return "recorded" if codec <= _core.JOURNAL_CODEC else f"for a newer o80 (format {codec})"
-
-
-def _summary(name: str, number: int, epoch: "RecordedEpoch") -> dict[str, Any]:
-    begin, end = epoch.time_range if epoch.rows else (0, 0)
-    return {
-        "segment": name,
-        "run": number,
-        "robot": epoch.schema["robot"],
-        "recorded_at": epoch.recorded_at,
-        "first_row": epoch.first_row,
-        "rows": epoch.rows,
-        "seconds": (end - begin) * 1e-9,
-        "missing": epoch.missing,
-        "decisions": epoch.has_journal,
-        "journal_codec": epoch.journal_codec,
-        "end": epoch.end,
-    }
 
 
 def _of_run(name: str, number: int) -> str:
@@ -193,8 +177,19 @@ def _missing(name: str, number: int, epoch: "RecordedEpoch") -> list[str]:
 
 def _fields(name: str, number: int, epoch: "RecordedEpoch") -> dict[str, Any]:
     """For tools."""
+    begin, end = epoch.time_range if epoch.rows else (0, 0)
     return {
-        **_summary(name, number, epoch),
+        "segment": name,
+        "run": number,
+        "robot": epoch.schema["robot"],
+        "recorded_at": epoch.recorded_at,
+        "first_row": epoch.first_row,
+        "rows": epoch.rows,
+        "seconds": (end - begin) * 1e-9,
+        "missing": epoch.missing,
+        "decisions": epoch.has_journal,
+        "journal_codec": epoch.journal_codec,
+        "end": epoch.end,
         "gaps": [gap._asdict() for gap in epoch.gaps],
         "interruption": str(epoch.interruption or ""),
         "decision_latency": latency_of(epoch),

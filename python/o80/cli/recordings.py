@@ -75,7 +75,7 @@ def recordings(
 
 
 def _rows(found: "FoundRecording", folder: Path) -> list[list[str]]:
-    """A row for each run; what is of the whole recording stands in the first one."""
+    """A row for each run; the first one also has path, marks and size of the recording."""
     rows = []
     for i, run in enumerate(found.runs):
         local = time.localtime(run.begin * 1e-9)

@@ -30,6 +30,13 @@ _COLUMNS = (
     Column("user", spare=4),
     Column("up", right=True, spare=5),
 )
+_OF_SEGMENT = (
+    *("state", "alive", "problem", "played", "pid", "user", "program", "started_at", "bytes"),
+)
+_OF_LOOP = (
+    *("robot", "frequency", "rate", "bursting", "iteration", "overruns", "missed_ticks"),
+    *("row_age", "state_of_loop", "halted"),
+)
 _STYLES = {
     "running": "green",
     "starting": "yellow",
@@ -65,31 +72,9 @@ def print_segments(*, as_json: bool) -> None:
 
 
 def _row(entry: Segment) -> dict[str, Any]:
-    row: dict[str, Any] = {
-        "segment": entry.name,
-        "state": entry.state,
-        "alive": entry.alive,
-        "problem": entry.problem,
-        "played": entry.played,
-        "pid": entry.pid,
-        "user": entry.user,
-        "program": entry.program,
-        "started_at": entry.started_at,
-        "bytes": entry.bytes,
-        "robot": None,
-        "frequency": None,
-        "rate": None,
-        "bursting": None,
-        "iteration": None,
-        "overruns": None,
-        "missed_ticks": None,
-        "row_age": None,
-        "hangs": False,
-        "state_of_loop": None,
-        "halted": None,
-        "running": [],
-        "decision_latency": {},
-    }
+    row: dict[str, Any] = {"segment": entry.name, "hangs": False, "running": []}
+    row |= {name: getattr(entry, name) for name in _OF_SEGMENT}
+    row |= {**dict.fromkeys(_OF_LOOP), "decision_latency": {}}
     if not entry.readable:
         return row
     try:

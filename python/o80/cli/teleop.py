@@ -15,8 +15,8 @@ import typer
 
 from o80.base.errors import BackendGone
 from o80.base.screen import complain
+from o80.base.stop_request import StopRequest
 from o80.cli.attach import attach
-from o80.cli.stop_request import StopRequest
 
 if TYPE_CHECKING:
     from o80.joining.teleoperation import Teleoperation
@@ -70,7 +70,7 @@ def teleop(
         try:
             while not stop.requested and not session.press(_pressed() if keys else ""):
                 robots.step()
-                session.tell()
+                session.report()
                 before, halted = halted, arm.halted is not None
                 if before and not halted:  # a watchdog that halts ends it
                     controls.close()
@@ -91,8 +91,8 @@ class _Session:
         self._episode = episode
         self._open = False  # a demonstration
         self._shown = 0  # of them
-        self._told = ""
-        self._tell_at = 0.0
+        self._reported = ""
+        self._report_at = 0.0
         self._mark("episode_dropped")  # what a session left open that was killed
 
     def head(self, keys: bool) -> str:
@@ -123,7 +123,7 @@ class _Session:
             self._shown -= 1
             self._mark("episode_dropped")
 
-    def tell(self) -> None:
+    def report(self) -> None:
         """Says what has changed; distances again and again while it waits."""
         robots = self._robots
         if not robots.engaged:
@@ -141,10 +141,10 @@ class _Session:
         now = time.monotonic()
         terminal = sys.stderr.isatty()
         # places change all the time: only a terminal shows each
-        told = state if terminal else robots.why if robots.moves else state.split(",")[0]
-        if told == self._told or (terminal and now < self._tell_at):
+        shown = state if terminal else robots.why if robots.moves else state.split(",")[0]
+        if shown == self._reported or (terminal and now < self._report_at):
             return
-        self._told, self._tell_at = told, now + _BETWEEN_REPORTS / 5
+        self._reported, self._report_at = shown, now + _BETWEEN_REPORTS / 5
         begin, end = ("\r\033[K", "") if terminal else ("", "\n")
         print(f"{begin}{state}", end=end, file=sys.stderr, flush=True)
 

@@ -2,9 +2,13 @@
 
 from typing import Any
 
+import numpy as np
+
 import o80._core as _core
 from o80._core import Observation
 from o80.base.errors import InvalidArgument
+from o80.rows.enumerations import Enumeration
+from o80.rows.record import Record
 
 
 class RowValues:
@@ -16,13 +20,12 @@ class RowValues:
 
     def plain(self, row: Observation) -> dict[str, Any]:
         """A row as plain values for JSON; enumerations as labels."""
-        sensors = self._schema.get("extended")
         return {
             "iteration": row.iteration,
             "time": row.time,
-            "desired": self._states(row.desired),
-            "observed": self._states(row.observed),
-            "extended": None if sensors is None else _described(row.extended, sensors),
+            "desired": _plain(row.desired),
+            "observed": _plain(row.observed),
+            "extended": _plain(row.extended) if "extended" in self._schema else None,
             "active": [bool(value) for value in row.active],
             "clamped": [bool(value) for value in row.clamped],
             "braking": [bool(value) for value in row.braking],
@@ -33,14 +36,6 @@ class RowValues:
             "missed_ticks": row.skipped,
             "starvations": row.starvations,
         }
-
-    def _states(self, states: Any) -> Any:
-        groups = self._schema["groups"]
-        if not groups:
-            return {}
-        if len(groups) == 1 and not groups[0]["name"]:
-            return _described(states, groups[0]["type"])
-        return {group["name"]: _described(states[group["name"]], group["type"]) for group in groups}
 
     def acting(self, row: Observation) -> str:
         """The actuators that commands drive, those that brake, and those whose plan is starved."""
@@ -92,34 +87,16 @@ class RowValues:
         return names | indices
 
 
-def _described(value: Any, described: dict[str, Any]) -> Any:
-    """Plain values of a described type, or of an array of it."""
-    fields = described["fields"]
-    if len(fields) == 1 and not fields[0]["name"]:
-        return _labelled(_listed(value), fields[0])
-    return {field["name"]: _member(value[field["name"]], field) for field in fields}
-
-
-def _member(value: Any, field: dict[str, Any]) -> Any:
-    if field["kind"] == "struct":
-        return _described(value, field["type"])
-    return _labelled(_listed(value), field)
-
-
-def _listed(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else value
-
-
-def _labelled(value: Any, field: dict[str, Any]) -> Any:
-    """Labels instead of the numbers of an enumeration; a number without a label stays."""
-    if field["kind"] != "enum":
-        return value
+def _plain(value: Any) -> Any:
+    """Lists, dictionaries and labels; a number without a label stays."""
+    if isinstance(value, Enumeration):
+        return value._texts_.get(int(value), int(value))
     if isinstance(value, list):
-        return [_labelled(each, field) for each in value]
-    for label, number in field["labels"].items():
-        if number == value:
-            return label
-    return value
+        return [_plain(each) for each in value]
+    names = value.keys() if isinstance(value, Record) else np.asarray(value).dtype.names
+    if names is not None:
+        return {name: _plain(value[name]) for name in names}
+    return _plain(value.tolist()) if isinstance(value, (np.ndarray, np.generic)) else value
 
 
 def text(value: Any) -> str:

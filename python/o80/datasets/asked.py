@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.words import Reason
-from o80.rows.columns import Column, columns_of
+from o80.rows.columns import Column, columns_of_part
 
 _Piece = tuple[int, float]  # from this iteration on; the value
 
@@ -26,7 +26,7 @@ class Asked:
         self._period = int(schema["period"])
         begin = schema["row"]["desired"]
         self._numbers: list[list[tuple[str, Column, int]]] = []  # of each actuator
-        columns = [each for each in columns_of(schema) if each.name.startswith("desired.")]
+        columns = columns_of_part(schema, "desired")
         for actuator in schema["actuators"]:
             count = len(actuator["limits"])
             self._numbers.append(

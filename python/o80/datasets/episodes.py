@@ -16,8 +16,8 @@ from o80.base.argument_checks import iterations
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument
 from o80.datasets.asked import Asked
-from o80.rows.columns import Column, chosen, columns_of
-from o80.rows.history import History, values_of
+from o80.rows.columns import Column, chosen, columns_of_part
+from o80.rows.history import History, numbers_of
 
 if TYPE_CHECKING:
     import o80._core as _core
@@ -27,8 +27,7 @@ if TYPE_CHECKING:
 
 BEGIN, END = "episode", "episode_end"
 """Names of the marks before and after an episode. The first may name a task: "episode: push"."""
-DROPPED = "_dropped"
-"""Behind the name of the first: a mark that ends an episode which is left out."""
+DROPPED = "_dropped"  #: behind the name of the first: a mark that ends an episode which is left out
 
 
 @dataclass(frozen=True)
@@ -54,12 +53,12 @@ class Episode:
     @cached
     def observed(self) -> NDArray[np.float64]:
         """The observed states: (T + 1, numbers)."""
-        return self._numbers(_columns(self.rows.schema, "observed"))
+        return numbers_of(self.rows, columns_of_part(self.rows.schema, "observed"))
 
     @cached
     def extended(self) -> NDArray[np.float64]:
         """Further sensor values: (T + 1, numbers)."""
-        return self._numbers(self.sensors)
+        return numbers_of(self.rows, self.sensors)
 
     @cached
     def observations(self) -> NDArray[np.float64]:
@@ -69,19 +68,13 @@ class Episode:
     @cached
     def actions(self) -> NDArray[np.float64]:
         """Actions of all steps, the desired states: (T, numbers)."""
-        return self._numbers(_columns(self.rows.schema, "desired"))[1:]
+        return numbers_of(self.rows[1:], columns_of_part(self.rows.schema, "desired"))
 
     def asked(self, columns: Sequence[Column]) -> NDArray[np.float64]:
         """Targets (T, columns) that commands asked for at the ends of the steps, of columns of
         desired numbers; NaN where none did.
         """
         return self._commands().at(self.rows.iteration[1:], columns)
-
-    def _numbers(self, columns: Sequence[Column]) -> NDArray[np.float64]:
-        numbers = np.empty((len(self.rows), len(columns)))
-        for i, column in enumerate(columns):
-            numbers[:, i] = values_of(self.rows, column)
-        return numbers
 
 
 @dataclass(frozen=True)
@@ -184,7 +177,7 @@ def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Itera
 
 
 def _misspelt(marks: Sequence["Mark"], segment: str) -> list[str]:
-    """Sentences about marks that look like those of episodes, and are none."""
+    """Sentences about marks with misspelt names of episode marks."""
     return [
         f"the mark '{mark.name}' at row {mark.rows[segment]}, which neither begins nor ends an "
         f"episode: marks are '{BEGIN}', '{BEGIN}: TASK', '{END}' and '{BEGIN}{DROPPED}'"
@@ -259,7 +252,7 @@ def _asked(epoch: "RecordedEpoch") -> Asked:
 
 @dataclass(frozen=True)
 class _Orders:
-    """The batches with commands that were taken, and the fresh starts, in their order."""
+    """The batches with commands that were taken, and the fresh starts, oldest first."""
 
     taken: NDArray[np.int64]  #: (N,) the iteration
     since: NDArray[np.int64]  #: (N,) the row that the batch answers; -1: not known, or none
@@ -362,13 +355,9 @@ def _segment(recording: "RecordingFile", segment: str | None) -> str:
     return moving[0]
 
 
-def _columns(schema: dict[str, Any], part: str) -> list[Column]:
-    return [each for each in columns_of(schema) if each.name.partition(".")[0] == part]
-
-
 def _sensors(segment: str, schema: dict[str, Any], fields: Sequence[str]) -> list[Column]:
     """The sensor values that a learner gets; by default no times, and nothing that is absent."""
-    every = _columns(schema, "extended")
+    every = columns_of_part(schema, "extended")
     if not fields:
         times = ("capture_time", "capture_error")
         return [
@@ -382,8 +371,8 @@ def _sensors(segment: str, schema: dict[str, Any], fields: Sequence[str]) -> lis
 
 def _names(schema: dict[str, Any], sensors: Sequence[Column]) -> dict[str, list[str]]:
     parts = {
-        "desired": _columns(schema, "desired"),
-        "observed": _columns(schema, "observed"),
+        "desired": columns_of_part(schema, "desired"),
+        "observed": columns_of_part(schema, "observed"),
         "extended": sensors,
     }
     return {

@@ -18,8 +18,9 @@ from o80.base.extras import needed
 from o80.base.finite import Say, json_text, say_not_finite, warn
 from o80.datasets.episodes import Episode, Episodes
 from o80.datasets.lerobot_numbers import Number, Units, numbers_of, sensor, values_in
-from o80.rows.columns import Column, chosen, columns_of
+from o80.rows.columns import Column, chosen, columns_of_part
 from o80.rows.history import History, values_of
+from o80.rows.history import numbers_of as numbers_in
 
 VERSION = "v3.0"
 DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
@@ -102,7 +103,7 @@ class _Chosen:
         if action_is not in ("acted", "asked"):
             raise InvalidArgument(f"action_is must be 'acted' or 'asked', got {action_is!r}")
         schema = episodes.all[0].rows.schema
-        extended = [each for each in columns_of(schema) if each.name.startswith("extended.")]
+        extended = columns_of_part(schema, "extended")
         names = [each.name for each in extended]
         observed = [each for each in sensors if each.partition(".")[0] == "observed"]
         others = [each for each in sensors if each not in observed]
@@ -133,7 +134,7 @@ class _Chosen:
         rows = episode.rows[:-1]
         acted = episode.rows[1:]
         wanted = [number.column for number in self.action]
-        desired = _values(acted, wanted)
+        desired = numbers_in(acted, wanted)
         asked = episode.asked(wanted)
         both = {"acted": desired, "asked": np.where(np.isnan(asked), desired, asked)}
         action = both.pop(self.action_is)
@@ -158,13 +159,7 @@ class _Chosen:
 
 def _observed(rows: History, numbers: Sequence[Number]) -> NDArray[np.float64]:
     """Numbers of rows (T, numbers) in LeRobot's units."""
-    return values_in(numbers, _values(rows, [number.column for number in numbers]))
-
-
-def _values(rows: History, columns: Sequence[Column]) -> NDArray[np.float64]:
-    """Numbers of rows (T, columns)."""
-    each = [values_of(rows, column).astype(np.float64) for column in columns]
-    return np.stack(each, axis=1) if each else np.empty((len(rows), 0))
+    return values_in(numbers, numbers_in(rows, [number.column for number in numbers]))
 
 
 def _not_finite(

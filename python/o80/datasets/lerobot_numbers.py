@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
 from o80.rows.actuators import actuators_of
-from o80.rows.columns import Column, chosen, columns_of
+from o80.rows.columns import Column, chosen, columns_of_part
 
 Units = Literal["degrees", "normalised", "native"]
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
@@ -64,7 +64,7 @@ def numbers_of(
     units = units or usual_units(schema)
     if units not in get_args(Units):
         raise InvalidArgument(f"units must be one of {', '.join(get_args(Units))}, got {units!r}")
-    columns = [each for each in columns_of(schema) if each.name.startswith(f"{part}.")]
+    columns = columns_of_part(schema, part)
     wanted = set(chosen(schema["robot"], [each.name for each in columns], fields))
     found = []
     rest = iter(columns)

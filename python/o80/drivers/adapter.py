@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base.argument_checks import mapping, nothing
+from o80.base.argument_checks import nothing
 from o80.base.descriptors import above_standard
 from o80.base.errors import Error, InvalidArgument, RequestRejected, exception_text
 from o80.drivers.backend import KEEPS
@@ -46,28 +45,13 @@ class Adapter:
         self.period = 0
 
     def describe(self, requested: int) -> _core.SchemaBuilder:
-        """The schema of the driver. asked: period that the user gave [ns]; 0: none."""
+        """The schema of the driver. requested: period that the user gave [ns]; 0: none."""
         self.period = self._period(requested)
-        writer = SchemaWriter(self._name, mapping(self._told("units"), "units", "fields to units"))
-        writer.add_actuators(self._told("actuators", ()), self._told("dtype", float))
-        if (extended := self._told("extended")) is not None:
-            writer.set_extended(extended)
-        requests = mapping(self._told("requests"), "requests", "names to dtypes or None")
-        writer.add_requests(requests, self._told("while_halted", ()))
-        writer.set_limits(mapping(self._told("limits"), "limits", "actuators to limits"))
-        rests = mapping(self._told("rests_at"), "rests_at", "actuators to fields and values")
-        writer.set_rests(rests)
-        writer.set_idle(self._told("when_idle", "hold"))
-        joints = mapping(self._told("joints"), "joints", "joints to what moves them")
-        writer.set_model(self._told("model"), joints)
-        if self._told("of_the_world") is not None:
-            raise InvalidArgument(
-                "every driver is of the world unless it says simulated = True: remove of_the_world"
-            )
-        if not isinstance(simulated := self._told("simulated", False), bool):
+        writer = SchemaWriter.of(self._name, self._given)
+        if not isinstance(simulated := self._given("simulated", False), bool):
             raise InvalidArgument(f"simulated must be True or False, got {simulated!r}")
         writer.builder.simulated(simulated)
-        if (gap := self._told("gap")) is not None:
+        if (gap := self._given("gap")) is not None:
             if not isinstance(gap, (int, float)) or not 1e-6 <= gap <= 3600:
                 raise InvalidArgument(f"gap must be from 0.000001 to 3600 s, got {gap!r}")
             writer.builder.gap(round(gap / NANOSECOND))
@@ -78,11 +62,11 @@ class Adapter:
         """Takes the differences for `Desired.rate`; call it after describe()."""
         self._desired.differences = differences
 
-    def _told(self, name: str, otherwise: Any = None) -> Any:
-        return getattr(self._driver, name, otherwise)
+    def _given(self, name: str, default: Any = None) -> Any:
+        return getattr(self._driver, name, default)
 
     def _period(self, requested: int) -> int:
-        own = self._told("frequency")
+        own = self._given("frequency")
         if own is None:
             return requested
         if not isinstance(own, (int, float)) or not 0 < own <= 1e9:
@@ -109,33 +93,31 @@ class Adapter:
                 )
         self.payload_sizes = [dtype_of_type(row["type"]).itemsize for row in self._requests]
 
-        def states() -> tuple[NDArray[np.uint8], NDArray[Any]]:
-            element, shape = layout.states.subdtype or (layout.states, ())
-            block = np.zeros(layout.states.itemsize, np.uint8)
-            return block, np.ndarray(shape, element, block)
-
-        self.desired_block, desired = states()
-        self.observed_block, observed = states()
-        self.fresh_block, fresh = states()
+        size = layout.states.itemsize
+        self.desired_block = np.zeros(size, np.uint8)
+        self.observed_block = np.zeros(size, np.uint8)
+        self.fresh_block = np.zeros(size, np.uint8)
         self.extended_block = np.zeros(layout.extras.itemsize, np.uint8)
         extended = layout.labelled_extras(self.extended_block)
-        observed, fresh = layout.labelled_states(observed), layout.labelled_states(fresh)
+        observed = layout.labelled_states(self.observed_block)
+        fresh = layout.labelled_states(self.fresh_block)
         self.active_words = np.zeros(8 * ((len(actuators) + 63) // 64), np.uint8)
-        self._desired = Desired(layout, desired, self.active_words, len(actuators))
+        desired = layout.states_in(self.desired_block)
+        self._desired = Desired(layout, desired, self.active_words)
         self._reading = Reading(observed, extended, fresh, actuators, names)
 
     # ------------------------------------------------------------------ verbs
 
     @above_standard()
     def start(self) -> None:
-        if verb := self._told("start"):
+        if verb := self._given("start"):
             nothing(verb(), "start()")
 
     def wait(self, due: int) -> None:
         nothing(self._driver.wait(due), "wait()")
 
     def write(self, iteration: int, time: int, period: int) -> None:
-        if verb := self._told("write"):
+        if verb := self._given("write"):
             desired = self._desired
             desired.iteration, desired.time = iteration, time
             desired.period = period * NANOSECOND
@@ -168,7 +150,7 @@ class Adapter:
         return Answer.DONE, ""
 
     def stop(self) -> None:
-        if verb := self._told("stop"):
+        if verb := self._given("stop"):
             try:
                 nothing(verb(), "stop()")
             except Exception:

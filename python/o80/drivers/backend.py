@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base import argument_checks, lifecycle
-from o80.base.argument_checks import mapping, nothing
+from o80.base.argument_checks import nothing
 from o80.base.errors import Closed, InvalidArgument, RequestRejected, exception_text
 from o80.base.loop_options import loop_texts, names_of
 from o80.base.words import IdleWord, StaleWord
-from o80.drivers.description import Described, Limit, SchemaWriter
+from o80.drivers.description import Described, Limit, SchemaWriter, numbered
 from o80.rows.enumerations import numbers_of
 from o80.rows.layout import Layout, request_fields
 from o80.rows.record import Record
@@ -136,19 +136,9 @@ class Backend(lifecycle.Managed):
         model: str | os.PathLike[str] | None = None,
         joints: Mapping[str, int | str | tuple[str, int]] | None = None,
     ) -> None:
-        loop = loop_texts(locals(), names_of("backend"))
-        requests = mapping(requests, "requests", "names to dtypes or None")
-        limits = mapping(limits, "limits", "actuators to limits")
-        rests_at = mapping(rests_at, "rests_at", "actuators to fields and values")
-        writer = SchemaWriter(robot or segment, mapping(units, "units", "fields to units"))
-        writer.add_actuators(actuators, dtype)
-        if extended is not None:
-            writer.set_extended(extended)
-        writer.add_requests(requests, while_halted)
-        writer.set_limits(limits)
-        writer.set_rests(rests_at)
-        writer.set_idle(when_idle)
-        writer.set_model(model, mapping(joints, "joints", "joints to what moves them"))
+        given = locals()
+        loop = loop_texts(given, names_of("backend"))
+        writer = SchemaWriter.of(robot or segment, given.get)
         self._native: _core.Backend | None = None
         native = _core.Backend(writer.builder, segment, loop)
         self._layout = Layout(native.description)
@@ -156,17 +146,12 @@ class Backend(lifecycle.Managed):
         self._handlers: dict[str, Handler] = {}
         self._fresh_start: StartAfresh | None = None  # of a request that has ended
         self._halt_handlers: dict[str, Callable[[], None]] = {}
-        self._observed = self._layout.labelled_states(self._states(native.observed))
-        self._fresh_desired = self._layout.labelled_states(self._states(native.fresh_desired))
+        self._observed = self._layout.labelled_states(native.observed)
+        self._fresh_desired = self._layout.labelled_states(native.fresh_desired)
         self._extended = self._layout.labelled_extras(native.extended)
         native.serve_with = Server(self)
         self._native = native
         lifecycle.close_later(self)
-
-    def _states(self, block: Any) -> NDArray[Any]:
-        """The states in a block of memory."""
-        element, shape = self._layout.states.subdtype or (self._layout.states, ())
-        return np.ndarray(shape, element, block)
 
     @property
     def _open(self) -> _core.Backend:
@@ -207,11 +192,10 @@ class Backend(lifecycle.Managed):
         native = self._open
         if self._fresh_start is not None:
             fresh, self._fresh_start = self._fresh_start, None
-            self._read_afresh(fresh)
+            read_afresh(fresh, self._observed, self._extended, self._fresh_desired)
         if not native.step(timeout):
             return None
-        states = self._states(native.desired())
-        return self._layout.of_states(states)
+        return self._layout.of_states(self._layout.states_in(native.desired()))
 
     # ------------------------------------------------------------------ requests and halts
 
@@ -255,14 +239,9 @@ class Backend(lifecycle.Managed):
         self._open.end_request(index, answer is not None, rejected)
 
     def _index_of(self, request: str) -> int:
-        known = [row["name"] for row in self._layout.schema["requests"]]
-        if request not in known:
-            instead = _core.names_instead(request, known)
-            raise InvalidArgument(f"there is no request '{request}'{instead}")
-        return known.index(request)
-
-    def _read_afresh(self, answer: StartAfresh) -> None:
-        read_afresh(answer, self._observed, self._extended, self._fresh_desired)
+        return numbered(
+            request, [row["name"] for row in self._layout.schema["requests"]], "request"
+        )
 
     def on_halt(self, handler: Callable[[], None]) -> None:
         """Sets a function to call when a halt begins: commands have ended, desired states brake."""
@@ -288,16 +267,8 @@ class Backend(lifecycle.Managed):
 
     def interrupt(self, actuator: int | str) -> None:
         """Ends the commands of an actuator as interrupted, in the current iteration."""
-        rows = self._layout.schema["actuators"]
-        names = [row["name"] for row in rows]
-        if isinstance(actuator, str):
-            if actuator not in names:
-                instead = _core.names_instead(actuator, names)
-                raise InvalidArgument(f"there is no actuator '{actuator}'{instead}")
-            actuator = names.index(actuator)
-        if not 0 <= actuator < len(names):
-            raise InvalidArgument(f"there is no actuator {actuator}: the robot has {len(names)}")
-        self._open.interrupt(actuator)
+        names = [row["name"] for row in self._layout.schema["actuators"]]
+        self._open.interrupt(numbered(actuator, names, "actuator"))
 
     def stop(self) -> None:
         """Makes `step` return None. May be called from any thread."""
@@ -328,8 +299,7 @@ class Backend(lifecycle.Managed):
     @property
     def active(self) -> NDArray[np.bool_]:
         """True where a command or braking gives the desired state: bool (actuators,)."""
-        bits = np.frombuffer(self._open.active(), np.uint8)
-        return np.unpackbits(bits, count=self._layout.actuators, bitorder="little").view(np.bool_)
+        return self._layout.mask_in(np.frombuffer(self._open.active(), np.uint8))
 
     @property
     def iteration(self) -> int:

@@ -1,7 +1,7 @@
 """Makes the schema of a segment from NumPy dtypes, for backends in Python."""
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ import numpy as np
 
 import o80._core as _core
 from o80.base import argument_checks
+from o80.base.argument_checks import mapping
 from o80.base.errors import InvalidArgument
 from o80.rows.actuators import Limits
 
@@ -18,12 +19,40 @@ Described = Any
 Limit = Limits | Sequence[float | None]
 
 
+def numbered(name: str | int, known: Sequence[str], what: str) -> int:
+    """The number of an actuator or a request, by its name or number. Raises InvalidArgument."""
+    if isinstance(name, str) and name in known:
+        return known.index(name)
+    if isinstance(name, int) and not isinstance(name, bool) and 0 <= name < len(known):
+        return name
+    raise InvalidArgument(f"there is no {what} {name!r}{_core.names_instead(str(name), [*known])}")
+
+
 class SchemaWriter:
     """Fills a schema from Python values."""
 
     def __init__(self, robot: str, units: Mapping[str, str]) -> None:
         self.builder = _core.SchemaBuilder(robot)
         self._units = units
+
+    @classmethod
+    def of(cls, robot: str, given: Callable[[str, Any], Any]) -> "SchemaWriter":
+        """The schema of a backend. given: arguments of `o80.Backend` by name and default."""
+
+        def named(name: str, holds: str) -> Mapping[Any, Any]:
+            return mapping(given(name, None), name, holds)
+
+        writer = cls(robot, named("units", "fields to units"))
+        writer.add_actuators(given("actuators", ()), given("dtype", float))
+        if (extended := given("extended", None)) is not None:
+            writer.set_extended(extended)
+        requests = named("requests", "names to dtypes or None")
+        writer.add_requests(requests, given("while_halted", ()))
+        writer.set_limits(named("limits", "actuators to limits"))
+        writer.set_rests(named("rests_at", "actuators to fields and values"))
+        writer.set_idle(given("when_idle", "hold"))
+        writer.set_model(given("model", None), named("joints", "joints to what moves them"))
+        return writer
 
     def add_actuators(self, actuators: Any, dtype: Described) -> None:
         """Adds actuators: their names, their number, or a mapping from groups to their members."""
@@ -137,14 +166,7 @@ class SchemaWriter:
                 self.builder.moves_joint(self._index(moved_by), joint)
 
     def _index(self, named: int | str) -> int:
-        names = self.builder.actuators
-        if isinstance(named, str):
-            if named in names:
-                return names.index(named)
-        elif 0 <= named < len(names):
-            return named
-        instead = _core.names_instead(str(named), names)
-        raise InvalidArgument(f"there is no actuator {named!r}{instead}")
+        return numbered(named, self.builder.actuators, "actuator")
 
     # ------------------------------------------------------------------ types
 

@@ -124,10 +124,6 @@ class DriverClass:
         config = self.config(texts)
         return Adapter(self._driver() if config is None else self._driver(config), self.name)
 
-    def library(self) -> _core.RobotLibrary:
-        """The class as a robot."""
-        return _core.python_library(self, self.source.rpartition(":")[0])
-
 
 _libraries: dict[type[Any], _core.RobotLibrary] = {}
 
@@ -139,7 +135,7 @@ def library_of(driver: type[Any], place: str | None = None) -> _core.RobotLibrar
             described = DriverClass(driver, place or place_of(driver))
         except InvalidArgument as error:
             raise DriverError(str(error)) from None
-        _libraries[driver] = described.library()
+        _libraries[driver] = _core.python_library(described, described.source.rpartition(":")[0])
     return _libraries[driver]
 
 

@@ -1,9 +1,8 @@
 """The options of a driver in Python: the fields of its Config, a dataclass."""
 
 import dataclasses
-import types
 import typing
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum
 from typing import Any, Literal, NewType, get_args, get_origin
 
@@ -16,6 +15,7 @@ Seed = NewType("Seed", int)
 SEED_KIND = "seed"
 DRAWN = "drawn at each start"
 YES, NO = ("true", "1", "yes", "True"), ("false", "0", "no", "False")
+TRUTH = {**dict.fromkeys(YES, True), **dict.fromkeys(NO, False)}
 
 
 def option(default: Any, help: str = "", unit: str = "") -> Any:
@@ -30,10 +30,8 @@ def option(default: Any, help: str = "", unit: str = "") -> Any:
 class Kind:
     """A type of options."""
 
-    name: str
-    """number, integer, boolean, text, "one of: a, b", "3 x number", or seed"""
-    parse: Callable[[str], Any]
-    """Raises ValueError."""
+    name: str  #: number, integer, boolean, text, "one of: a, b", "3 x number", or seed
+    parse: Callable[[str], Any]  #: raises ValueError
     text: Callable[[Any], str] = str
 
 
@@ -43,8 +41,7 @@ class Options:
 
     config: type[Any] | None
     kinds: dict[str, Kind]
-    rows: list[list[str]]
-    """Name, kind, default, help and unit of each."""
+    rows: list[list[str]]  #: name, kind, default, help and unit of each
 
     @classmethod
     def of(cls, driver: type[Any]) -> "Options":
@@ -120,7 +117,7 @@ def _simple_kind(annotation: Any) -> Kind | None:
     if annotation is Seed:
         return Kind(SEED_KIND, _seed)
     if annotation is bool:
-        return Kind("boolean", _boolean, lambda value: "true" if value else "false")
+        return Kind("boolean", _one_of(TRUTH), lambda value: "true" if value else "false")
     if annotation is int:
         return Kind("integer", int)
     if annotation is float:
@@ -131,10 +128,10 @@ def _simple_kind(annotation: Any) -> Kind | None:
         return Kind("text", Path)
     if isinstance(annotation, type) and issubclass(annotation, Enum):
         labels = ", ".join(annotation.__members__)
-        return Kind(f"one of: {labels}", lambda text: _member(annotation, text), lambda v: v.name)
+        return Kind(f"one of: {labels}", _one_of(annotation.__members__), lambda v: v.name)
     if get_origin(annotation) is Literal and all(isinstance(w, str) for w in get_args(annotation)):
         words = get_args(annotation)
-        return Kind(f"one of: {', '.join(words)}", lambda text: _word(words, text))
+        return Kind(f"one of: {', '.join(words)}", _one_of({word: word for word in words}))
     return None
 
 
@@ -157,23 +154,15 @@ def _seed(text: str) -> int:
     return value
 
 
-def _boolean(text: str) -> bool:
-    if text not in YES + NO:
-        raise ValueError(text)
-    return text in YES
+def _one_of(known: Mapping[str, Any]) -> Callable[[str], Any]:
+    """Reads one of these words."""
 
+    def parse(text: str) -> Any:
+        if text not in known:
+            raise ValueError(text)
+        return known[text]
 
-def _member(labels: type[Enum], text: str) -> Enum:
-    members: types.MappingProxyType[str, Enum] = labels.__members__
-    if text not in members:
-        raise ValueError(text)
-    return members[text]
-
-
-def _word(words: Sequence[str], text: str) -> str:
-    if text not in words:
-        raise ValueError(text)
-    return text
+    return parse
 
 
 def _with_article(kind: str) -> str:

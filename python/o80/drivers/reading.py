@@ -11,6 +11,7 @@ import o80._core as _core
 from o80.base import argument_checks
 from o80.base.errors import InvalidArgument
 from o80.drivers.backend import Running, StartAfresh, check_end, fill
+from o80.drivers.description import numbered
 from o80.rows.layout import Layout
 
 #: from offsets in the desired block and an order to the differences of those numbers
@@ -21,25 +22,13 @@ class DriverFaultError(Exception):
     """Ends the loop; see `Reading.fault`."""
 
 
-def numbered(name: str | int, known: Sequence[str], what: str) -> int:
-    """The number of an actuator or a request, by its name or number. Raises InvalidArgument."""
-    if isinstance(name, str) and name in known:
-        return known.index(name)
-    if isinstance(name, int) and not isinstance(name, bool) and 0 <= name < len(known):
-        return name
-    raise InvalidArgument(f"there is no {what} {name!r}{_core.names_instead(str(name), [*known])}")
-
-
 class Desired:
     """Desired states of an iteration. Its arrays change with the next one: copy them to keep."""
 
-    def __init__(
-        self, layout: Layout, block: NDArray[Any], active: NDArray[np.uint8], count: int
-    ) -> None:
+    def __init__(self, layout: Layout, block: NDArray[Any], active: NDArray[np.uint8]) -> None:
         self._layout = layout
         self._block = block
         self._words = active
-        self._count = count
         self.iteration = 0
         self.time = 0  #: [ns]
         self.period = 0.0  #: [s]
@@ -53,8 +42,7 @@ class Desired:
     @property
     def active(self) -> NDArray[np.bool_]:
         """(actuators,) True where a command or braking gives the state."""
-        bits = np.unpackbits(self._words, count=self._count, bitorder="little")
-        return bits.view(np.bool_)
+        return self._layout.mask_in(self._words)
 
     def rate(self, field: str | None = None) -> NDArray[np.float64]:
         """Velocities of the desired states, for feed-forward [unit/s], in write() only.
@@ -206,25 +194,12 @@ class Reading:
 
     def report(self) -> tuple[Any, ...] | None:
         """Calls on this reading, for the compiled loop; None: none."""
-        if not (
-            self._finished
-            or self._missed
-            or self._has_desired
-            or self._follows
-            or self._halt is not None
-            or self._interrupted
-            or self._reports
-        ):
-            return None
-        return (
-            self._finished,
-            self._missed,
-            self._has_desired,
-            self._halt,
-            self._interrupted,
-            self._reports,
+        report = (
+            *(self._finished, self._missed, self._has_desired),
+            *(self._halt, self._interrupted, self._reports),
             self._follows,
         )
+        return None if report == (False, False, False, None, [], [], False) else report
 
 
 class Answer:

@@ -25,8 +25,8 @@ def halt_text(
     reason = f": {text}" if text else ""
     if played:
         return f"was halted{since} when it was recorded{reason}"
-    told = sentence(f"halted{since} (halt {number}, cause {cause}{by}){reason}")
-    return f"{told} Go on with: o80 resume {segment} {number}"
+    halted = sentence(f"halted{since} (halt {number}, cause {cause}{by}){reason}")
+    return f"{halted} Go on with: o80 resume {segment} {number}"
 
 
 def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:

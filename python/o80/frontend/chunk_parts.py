@@ -60,7 +60,7 @@ class SentChunk:
 
     @property
     def shift(self) -> int | None:
-        """By how many iterations its rows are later, because the actuators stood still."""
+        """By how many iterations its rows are later, because the actuators were at rest."""
         return None if self._decided is None else self._decided.shift
 
     def wait(self, timeout: float | None = None) -> None:
@@ -97,7 +97,7 @@ class ChunkPart:
         self.start: Moment | None = None
         self._way = way
         self._computed: Moment | None = None
-        self._row: int | None = None  # the first that is reached, if the loop has told it
+        self._row: int | None = None  # the first that is reached, if the loop has reported it
 
     def begin(self, start: Moment, known: bool = True) -> None:
         """From place and derivatives in the iteration before it."""
@@ -124,7 +124,7 @@ class ChunkPart:
         return places[place], slopes[place], curvatures[place]
 
     def acts(self, iteration: int) -> bool:
-        """Whether what comes in the iteration after this one goes on from this plan."""
+        """Whether a motion in the iteration after this one continues this plan."""
         batch = self.sent.batch
         # dropped commands act no more in the iteration in which they end, and braking is no plan
         behind = {Status.COMPLETED: 0, Status.OVERWRITTEN: 1}.get(batch[0].status, 2)

@@ -3,6 +3,7 @@
 import contextlib
 import warnings
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import TYPE_CHECKING, Any, Self, cast
 
 import o80._core as _core
@@ -45,7 +46,7 @@ class Frontend(Commander, lifecycle.Managed):
 
     _is_set_up = False
     _attachment: _core.Attachment  # from __new__ to __init__
-    _arguments: tuple[str, float | None, bool, OnErrorWord, bool] | None
+    _arguments: dict[str, Any] | None
 
     def __new__(
         cls,
@@ -75,7 +76,8 @@ class Frontend(Commander, lifecycle.Managed):
             raise InvalidArgument(f"on_error must be 'purge' or 'continue', got {on_error!r}")
         self._on_error = on_error
         self._unnamed = False
-        self._arguments = (segment, timeout, read_only, on_error, dead)
+        self._arguments = {"segment": segment, "timeout": timeout, "read_only": read_only}
+        self._arguments |= {"on_error": on_error, "dead": dead}
         self._set_up(self.__dict__.pop("_attachment"))
 
     @classmethod
@@ -185,8 +187,8 @@ class Frontend(Commander, lifecycle.Managed):
         """
         if self._arguments is None:
             raise InvalidArgument("an inline robot cannot be attached again: start a new one")
-        segment, _, read_only, *_ = self._arguments
-        attachment = self._attach_again(timeout, read_only)
+        segment = self._arguments["segment"]
+        attachment = self._attach_again(timeout, self._arguments["read_only"])
         difference = _core.difference(self._description, attachment.description)
         if difference:
             raise SchemaMismatch(
@@ -208,7 +210,7 @@ class Frontend(Commander, lifecycle.Managed):
                 f"the frontend of an inline robot cannot be pickled: it lives in this process. "
                 f"Attach to its segment: o80.Frontend({self.segment!r})"
             )
-        return _open_again, (type(self), *self._arguments)
+        return partial(type(self), **self._arguments), ()
 
     def __repr__(self) -> str:
         try:
@@ -220,18 +222,6 @@ class Frontend(Commander, lifecycle.Managed):
         except UsedAfterFork:
             state = "of the parent process"
         return f"<o80.{type(self).__name__} of '{self.segment}' ({self.robot}), {state}>"
-
-
-def _open_again(
-    cls: type[Frontend],
-    segment: str,
-    timeout: float | None,
-    read_only: bool,
-    on_error: OnErrorWord,
-    dead: bool,
-) -> Frontend:
-    """Opens a pickled frontend again."""
-    return cls(segment, timeout, read_only=read_only, on_error=on_error, dead=dead)
 
 
 def register_frontend(robot: str, cls: type["Frontend"]) -> None:

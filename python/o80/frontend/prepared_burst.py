@@ -119,7 +119,7 @@ def _checked(count: int, name: str) -> int:
 def _states(
     layout: Layout, copies: tuple[int, ...], actuators: list[int], steps: int
 ) -> NDArray[Any]:
-    """Memory for targets: in each copy those of the first actuator, then of the second, ..."""
+    """Memory for targets: in each copy, all steps of the first actuator, then of the second, ..."""
     if copies and not actuators:
         return np.empty((*copies, 0, steps))  # it only runs them
     kinds = state_types(actuators, layout)

@@ -95,7 +95,7 @@ def module_of(schema: dict[str, Any], segment: str | None = None) -> str:
 
 
 def _typed(described: Any) -> Any:
-    """A description without what no type tells."""
+    """A description without units, helps and offsets, which no type depends on."""
     if isinstance(described, dict):
         left_out = ("unit", "help", "offset")
         return {name: _typed(each) for name, each in described.items() if name not in left_out}

@@ -1,7 +1,7 @@
 """The segments on this computer."""
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING
 
 import o80._core as _core
@@ -51,22 +51,9 @@ class Segments(list[Segment]):
 
 def segments() -> list[Segment]:
     """All segments, alive and dead, sorted by name."""
+    names = [field.name for field in fields(Segment) if field.name != "bytes"]
     return Segments(
-        Segment(
-            name=entry.name,
-            life=entry.life,
-            readable=entry.readable,
-            pid=entry.pid,
-            process_start=entry.process_start,
-            user=entry.user,
-            program=entry.program,
-            started_at=entry.started_at,
-            bytes=entry.size,
-            epoch=entry.epoch,
-            state=entry.state,
-            played=entry.played,
-            problem=entry.problem,
-        )
+        Segment(bytes=entry.size, **{name: getattr(entry, name) for name in names})
         for entry in _core.list_segments()
     )
 
@@ -79,6 +66,14 @@ def clean(name: str | None = None) -> list[str]:
     if name is None:
         return _core.clean_dead()
     return [name] if _core.clean(name) else []
+
+
+def boot_of(frontend: "Reader") -> str:
+    """Id of the boot on whose clock its rows are; empty: not known, as of a played recording."""
+    from o80.base.machine import this_boot  # late: `o80 list` never asks
+
+    real_time = frontend.schema["clock"] == "monotonic" and not frontend.played
+    return this_boot() if real_time else ""
 
 
 def is_own(frontend: "Reader") -> bool:

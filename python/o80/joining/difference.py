@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.errors import InvalidArgument
-from o80.rows.columns import columns_of
+from o80.rows.columns import columns_of, is_within
 from o80.rows.history import History, columns_in
 
 OF_THE_CLOCK = ("time", "lateness", "overruns", "skipped")
@@ -60,12 +60,12 @@ def first_difference(
     mine, others = columns_in(one), columns_in(other)
     every = dict.fromkeys([*mine, *others])
     for named in [*ignore, *(tolerances or {})]:
-        if not any(_belongs(column, named) for column in every):
+        if not any(is_within(column, named) for column in every):
             known = [name.partition(separator)[0] for separator in ".[" for name in every]
             instead = _core.names_instead(named, list(dict.fromkeys(known)))
             raise InvalidArgument(f"there is no column '{named}'{instead}")
     for column in every:
-        if (column in mine) != (column in others) and not any(_belongs(column, n) for n in ignore):
+        if (column in mine) != (column in others) and not any(is_within(column, n) for n in ignore):
             raise RobotsDifferError(
                 f"the robots differ in their fields: {column} is in one of them"
             )
@@ -76,10 +76,10 @@ def first_difference(
     left_out = [*ignore, COUNT, *(OF_THE_CLOCK if real_time else ())]
     left_out += [each.name for each in columns_of(one.schema) if each.origin == "clock"]
     for column in mine:
-        if column == "iteration" or any(_belongs(column, named) for named in left_out):
+        if column == "iteration" or any(is_within(column, named) for named in left_out):
             continue
         tolerance = max(
-            (value for named, value in (tolerances or {}).items() if _belongs(column, named)),
+            (value for named, value in (tolerances or {}).items() if is_within(column, named)),
             default=None,
         )
         a, b = mine[column][first], others[column][second]
@@ -89,11 +89,6 @@ def first_difference(
             iteration = int(mine["iteration"][first][at])
             found.append(Difference(iteration, column, (a[at].item(), b[at].item())))
     return min(found, key=lambda each: each.iteration, default=None)
-
-
-def _belongs(column: str, named: str) -> bool:
-    """Whether a name means this column, or what it is part of."""
-    return column == named or column.startswith((named + ".", named + "["))
 
 
 def _rows_of_both(

@@ -12,8 +12,8 @@ from o80.base.arrays import FloatArray
 from o80.base.errors import Error, InvalidArgument
 from o80.joining.row_selection import NANOSECOND
 from o80.joining.sources import CAPTURE_ERROR, Timed, timed
-from o80.rows.columns import Column, columns_of
-from o80.rows.history import History, values_of
+from o80.rows.columns import Column, columns_of, is_within
+from o80.rows.history import History, numbers_of, values_of
 
 if TYPE_CHECKING:
     from o80.joining.sources import Source
@@ -33,15 +33,12 @@ MIN_CORRELATION = 0.5
 class Latency:
     """How much later one signal shows a motion than another."""
 
-    seconds: float
-    """Delay of the second signal behind the first [s]; negative if it is ahead."""
+    seconds: float  #: delay of the second signal behind the first [s]; negative if it is ahead
     uncertainty: float
     """Standard error: a jackknife over 20 parts of the time, and the errors of capture times that
     devices state (`capture_error`) [s]."""
-    correlation: float
-    """Correlation of the two signals at this delay, at most 1."""
-    samples: int
-    """Times at which the signals were compared."""
+    correlation: float  #: correlation of the two signals at this delay, at most 1
+    samples: int  #: times at which the signals were compared
 
     def __str__(self) -> str:
         return (
@@ -238,14 +235,10 @@ def _peak(moments: FloatArray) -> tuple[float, float]:
 
 def columns_below(history: History, path: str) -> list[Column]:
     """The number that a path names, or all numbers below it. Raises InvalidArgument for none."""
-    columns = {column.name: column for column in columns_of(history.schema)}
-    chosen = [
-        column
-        for name, column in columns.items()
-        if name == path or name.startswith((path + ".", path + "["))
-    ]
+    columns = [*columns_of(history.schema)]
+    chosen = [column for column in columns if is_within(column.name, path)]
     if not chosen:
-        instead = _core.names_instead(path, list(columns))
+        instead = _core.names_instead(path, [column.name for column in columns])
         raise InvalidArgument(f"there is no field '{path}'{instead}")
     return chosen
 
@@ -254,9 +247,8 @@ def norm_of(path: str) -> Callable[[History], NDArray[np.float64]]:
     """Makes the Euclidean norm (T,) of all numbers below a path, such as "extended.velocity"."""
 
     def norm(history: History) -> NDArray[np.float64]:
-        chosen = columns_below(history, path)
-        numbers = [values_of(history, column).astype(np.float64) for column in chosen]
-        length: NDArray[np.float64] = np.linalg.norm(numbers, axis=0)
+        numbers = numbers_of(history, columns_below(history, path))
+        length: NDArray[np.float64] = np.linalg.norm(numbers, axis=1)
         return length
 
     return norm

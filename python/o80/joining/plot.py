@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
 from o80.base.words import CommandEnd, Status
-from o80.rows.columns import Column, chosen, columns_of
+from o80.rows.columns import Column, chosen, columns_of, is_within
 from o80.rows.history import History, values_of
 from o80.rows.journal import Decisions
 from o80.rows.plans import Planned
@@ -22,7 +22,6 @@ MAX_PANELS = 24
 PANEL = (9.0, 1.9)  # width and height [inch]
 MAX_OF_MARK = 36  # characters that fit in a panel
 MARK_WIDTH = 0.012  # of the text of a mark, as a share of the axis
-PARTS = ("desired", "observed", "extended")
 END_STYLES = {"COMPLETED": ("|", "tab:green"), "OVERWRITTEN": ("|", "tab:purple")}
 STYLES = {"desired": "--", "observed": "-", "extended": "-"}
 
@@ -33,7 +32,6 @@ class Curve(NamedTuple):
     robot: str
     panel: str  #: curves of one panel have this in common
     column: Column
-    unit: str
 
 
 def plot(
@@ -53,14 +51,10 @@ def plot(
     histories: by name of robot.
     fields: such as "observed.elbow", "elbow" (desired and observed), "extended.force", "extended";
         empty: all states.
-    ends: ends of commands to mark, by name of robot: o80.command_ends.command_ends(arm.journal()).
-    marks: text and iteration of the marks of a recording, by name of robot.
-    decided: for a panel of decision latencies, by name of robot: `o80.rows.journal.decisions` of
-        its journal. Robots of which none is known have no panel.
-    planned: the plans of chunks to draw, by name of robot: `o80.rows.plans.planned_by_chunks` of
-        its journal.
-    origins: the time of a row [ns] that is 0 on the axis, by name of robot (None: the earliest row
-        of all). Give those of `o80.timelines.origins` if the clocks of the robots differ.
+    ends, marks, decided, planned: by name of robot, as `command_ends`, `marks_in`, `decisions` and
+        `planned_by_chunks` give them. Robots of which no decision is known have no such panel.
+    origins: the time of a row [ns] that is 0 on the axis, by name of robot, as `origins` gives it
+        (None: the earliest row of all).
     label: of the time axis.
     window: a figure that `matplotlib.pyplot.show` shows.
     Raises InvalidArgument for an unknown field, MissingExtra without matplotlib.
@@ -123,26 +117,13 @@ def _chosen(name: str, history: History, fields: Sequence[str]) -> Iterable[Curv
     wanted = list(columns) if fields else [each for each in columns if _part(each) != "extended"]
     if fields:
         wanted = chosen(name, list(columns), fields)
-    units = _units(history.schema)
     for each in wanted:
         panel = each if _part(each) == "extended" else each.partition(".")[2]
-        yield Curve(name, panel, columns[each], units.get(panel.partition("[")[0], ""))
+        yield Curve(name, panel, columns[each])
 
 
 def _part(column: str) -> str:
     return column.partition(".")[0]
-
-
-def _units(schema: dict[str, Any]) -> dict[str, str]:
-    """Units by panel."""
-    units = {}
-    for actuator in schema["actuators"]:
-        for field in schema["groups"][actuator["group"]]["type"]["fields"]:
-            path = f"{actuator['name']}.{field['name']}" if field["name"] else actuator["name"]
-            units[path] = field["unit"]
-    for field in schema.get("extended", {}).get("fields", []):
-        units[f"extended.{field['name']}"] = field["unit"]
-    return units
 
 
 def _draw(
@@ -162,7 +143,8 @@ def _draw(
             ax.set_yticks(list(curve.column.labels.values()), list(curve.column.labels))
     first = curves[0]
     title = f"{first.robot}: {first.panel}" if several else first.panel
-    ax.set_ylabel(f"{title}\n[{first.unit}]" if first.unit else title)
+    unit = first.column.unit
+    ax.set_ylabel(f"{title}\n[{unit}]" if unit else title)
     ax.grid(alpha=0.3)
     _shade(ax, times, history.halted, "tab:red", "halted")
     late = np.flatnonzero(np.diff(history.overruns.astype(np.int64), prepend=history.overruns[:1]))
@@ -189,7 +171,7 @@ def _mark_ends(
             for end in ends
             if end.status is status
             and iterations[0] <= end.iteration <= iterations[-1]
-            and any(_is_of(panel, name) for name in end.actuators)
+            and any(is_within(panel, name) for name in end.actuators)
         }
         if places:
             marker, color = END_STYLES.get(status.name, ("x", "tab:red"))
@@ -244,7 +226,7 @@ def _draw_marks(
 
 
 def _draw_latency(ax: "Axes", history: History, taken: Decisions, zero: int) -> None:
-    """A dot for each batch whose row and whose first row are there."""
+    """Draws a dot for each batch whose seen row and first iteration are in the history."""
     known = taken.since >= 0
     rows, first, since = history.iteration, taken.taken[known], taken.since[known]
     if len(rows):
@@ -254,10 +236,6 @@ def _draw_latency(ax: "Axes", history: History, taken: Decisions, zero: int) -> 
         ax.plot((begun - zero) * 1e-9, delay * 1e-6, ".", color="tab:brown", markersize=3)
     ax.set_ylim(bottom=0.0)
     ax.grid(alpha=0.3)
-
-
-def _is_of(panel: str, actuator: str) -> bool:
-    return panel == actuator or panel.startswith((actuator + ".", actuator + "["))
 
 
 def _shares(ax: "Axes") -> Any:

@@ -1,6 +1,6 @@
 """For each time of a list the rows of a history around it."""
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,14 +14,11 @@ NANOSECOND = 1e-9
 NOWHERE = np.iinfo(np.int64).max  # age where there is no row [ns]
 
 
-@dataclass(frozen=True)
-class Picked:
+class Picked(NamedTuple):
     """Rows for T times."""
 
-    rows: NDArray[np.void]
-    """(T,)"""
-    age: NDArray[np.int64]
-    """(T,) time less that of the row; NOWHERE without one [ns]."""
+    rows: NDArray[np.void]  #: (T,)
+    age: NDArray[np.int64]  #: (T,) time less that of the row; NOWHERE without one [ns]
 
 
 def before(source: Timed, times: NDArray[np.int64]) -> Picked:

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from o80.base.argument_checks import whole
 from o80.base.errors import InvalidArgument
-from o80.base.machine import this_boot
+from o80.frontend.segments import boot_of
 from o80.rows.history import History
 
 if TYPE_CHECKING:
@@ -34,10 +34,8 @@ class Timed:
     """A history and the times of its rows."""
 
     history: History
-    rows: NDArray[np.intp]
-    """(N,) the rows that were captured, in the order of their capture."""
-    times: NDArray[np.int64]
-    """(N,) of their capture, on the common clock [ns]."""
+    rows: NDArray[np.intp]  #: (N,) the rows that were captured, in the order of their capture
+    times: NDArray[np.int64]  #: (N,) of their capture, on the common clock [ns]
 
 
 def timed(
@@ -111,7 +109,7 @@ def run_of(name: str, source: Any) -> Any:
 def _boot_of(run: Any) -> str:
     """Id of the boot on whose clock the rows of a run are; empty: not known."""
     if hasattr(run, "provenance") and not hasattr(run, "wall_offset"):  # a frontend
-        return "" if run.played else this_boot()
+        return boot_of(run)
     boot: str = getattr(run, "boot", "")
     return boot
 

@@ -22,12 +22,9 @@ if TYPE_CHECKING:
     from o80.joining.latency import Latency
     from o80.rows.actuators import Actuator
 
-NEAR = 0.15
-"""Largest difference of a joint at which the follower begins to follow, in its unit."""
-HELD = 0.5
-"""So long all joints must be near before it does [s]."""
-SILENCE = 0.2
-"""After so long without a row of the leader the follower is halted [s]."""
+NEAR = 0.15  #: largest difference of a joint at which the follower begins to follow, in its unit
+HELD = 0.5  #: so long all joints must be near before it does [s]
+SILENCE = 0.2  #: after so long without a row of the leader the follower is halted [s]
 FASTEST = 200.0  # set-points a second
 _JOINT = re.compile(r"([\w.\[\]]+)=(?:([^*=]+)\*)?([\w.\[\]]+?)([+-][\d.]+(?:e[+-]?\d+)?)?")
 
@@ -140,12 +137,12 @@ class Teleoperation:
         except (TimeoutError, BackendGone) as error:
             gone = isinstance(error, BackendGone)
             how = "has ended" if gone else f"has published nothing for {self.silence:g} s"
-            self._let_go(f"the leader '{self.leader.segment}' {how}")
+            self._disengage(f"the leader '{self.leader.segment}' {how}")
             if gone:
                 raise
             return False
         if seen.halted:
-            self._let_go(f"the leader '{self.leader.segment}' is halted")
+            self._disengage(f"the leader '{self.leader.segment}' is halted")
             return False
         is_new, self._last = seen.iteration != self._last, seen.iteration
         why = self._refused()
@@ -164,7 +161,7 @@ class Teleoperation:
         if jumped:
             self.engaged, self._near_since = False, None
         if not self.engaged:
-            self._look_whether_near(seen, wanted)
+            self._check_distance(seen, wanted)
         if self.engaged:
             for joint, field, place in zip(self.joints, self._fields, wanted.tolist(), strict=True):
                 state = {field: place} if field else place
@@ -228,13 +225,13 @@ class Teleoperation:
             return f"'{self.follower.segment}' rejects commands: {sent[0].text or sent[0].reason}"
         return ""
 
-    def _let_go(self, why: str) -> None:
+    def _disengage(self, why: str) -> None:
         self.why, self._near_since, self.far, self.moves = why, None, {}, []
         if self.engaged:
             self.engaged = False
             self.follower.halt(why)
 
-    def _look_whether_near(self, seen: _core.Observation, wanted: NDArray[np.float64]) -> None:
+    def _check_distance(self, seen: _core.Observation, wanted: NDArray[np.float64]) -> None:
         here = _places(self.follower.latest(), self._to)
         distant = ~(np.abs(wanted - here) <= self.near)
         self.far = {

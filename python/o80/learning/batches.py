@@ -20,7 +20,7 @@ def rows(batch: Any, copies: Any) -> Any:
 
 
 def put(batch: Any, copies: Index, values: Any) -> None:
-    """Replaces those of some copies."""
+    """Replaces the entries of some copies."""
     if isinstance(batch, dict):
         for name, each in batch.items():
             put(each, copies, values[name])

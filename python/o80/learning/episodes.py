@@ -20,10 +20,8 @@ _NOBODY: NDArray[np.intp] = np.zeros(0, np.intp)
 class Begun:
     """Observations of n copies when their episodes begin."""
 
-    observations: Any
-    """(n, ...) a fresh batch."""
-    info: Mapping[str, Any]
-    """(n, ...)"""
+    observations: Any  #: (n, ...) a fresh batch
+    info: Mapping[str, Any]  #: (n, ...)
 
 
 @dataclass(slots=True)
@@ -33,14 +31,10 @@ class Stepped(Begun):
     rewards: NDArray[np.float64]
     terminated: NDArray[np.bool_]
     truncated: NDArray[np.bool_]
-    judged: NDArray[np.intp]
-    """Numbers of the copies that were judged."""
-    judged_info: Mapping[str, Any]
-    """Info of the judged copies."""
-    halted: NDArray[np.intp]
-    """Numbers of the copies that are halted; they were judged too."""
-    halt_info: Mapping[str, Any]
-    """Info of the halted copies."""
+    judged: NDArray[np.intp]  #: numbers of the copies that were judged
+    judged_info: Mapping[str, Any]  #: info of the judged copies
+    halted: NDArray[np.intp]  #: numbers of the copies that are halted; they were judged too
+    halt_info: Mapping[str, Any]  #: info of the halted copies
 
 
 def begin(

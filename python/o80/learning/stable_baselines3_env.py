@@ -86,7 +86,7 @@ class StableBaselines3Env(VecEnv):
         return observations, rewards.astype(np.float32), over, found
 
     def _last_info(self, infos: Info, copy: int) -> Info:
-        """Info of a copy whose episode has ended; its sums begin anew."""
+        """Info of a copy after the end of its episode; resets its sums."""
         info = _of_copy(infos["final_info"], copy)
         info["terminal_observation"] = infos["final_obs"][copy]
         info["episode"] = {

@@ -1,4 +1,4 @@
-"""A task: what copies of a robot do in episodes, and what it is worth."""
+"""A task: actions, observations and rewards of copies of a robot in episodes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -19,8 +19,7 @@ from o80.learning.halts import halts_of
 
 Index = slice | NDArray[np.intp]
 """Some copies, as an index of arrays over all copies: an array of numbers, or `EVERY`."""
-EVERY = slice(None)
-"""All copies, as an index."""
+EVERY = slice(None)  #: all copies, as an index
 
 
 @dataclass(frozen=True)
@@ -28,8 +27,7 @@ class Outcome:
     """Outcome of a step for the n copies that were judged: an entry for each, or one for all."""
 
     reward: ArrayLike = 0.0
-    terminated: ArrayLike = False
-    """Ended by what happened."""
+    terminated: ArrayLike = False  #: ended by what happened
     truncated: ArrayLike = False
     """Ended by something that is not part of the task, such as a time limit."""
     info: Mapping[str, Any] = field(default_factory=dict)
@@ -52,8 +50,7 @@ class Task(ABC):
     robots: Sequence[InlineGroup | Frontend] = ()
     """Robots that the task moves. A halt of one ends the episode, and the next reset resumes it:
     see docs/learning.md. A frontend belongs to all copies. Without them a halt is an exception."""
-    resumes: bool = True
-    """Whether a reset resumes robots that run by their own clock."""
+    resumes: bool = True  #: whether a reset resumes robots that run by their own clock
     halts: Mapping[int, str] = {}
     """The copies that are halted after the last step, each with the text of its halt."""
     metadata: Mapping[str, Any] = {"render_modes": []}
@@ -144,9 +141,9 @@ class Task(ABC):
         """Observations (n, ...) of these n copies; the environment copies them."""
 
     def flagged(self) -> NDArray[np.bool_]:
-        """(copies,) the copies that `judge` looks at after a step; by default all of them.
+        """(copies,) the copies that `judge` gets after a step; by default all of them.
 
-        A step of the others is worth 0, and their episodes go on. Called after every step: cheap.
+        The others get reward 0, and their episodes continue. Called in every step: keep it cheap.
         """
         return np.ones(self.copies, np.bool_)
 

@@ -134,7 +134,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
             )
 
     def _after(self, stepped: episodes.Stepped, info: infos.Info) -> StepResult:
-        """The result of a step of all copies; begins episodes where others ended, if told so."""
+        """The result of a step of all copies; begins new episodes in SAME_STEP mode."""
         if not stepped.judged.size:
             infos.add(info, stepped.info, EVERY, self.num_envs)
             return self._result(stepped, info)

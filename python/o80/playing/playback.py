@@ -161,7 +161,7 @@ class Playback(Closeable):
                     break
                 for player in self._players:
                     player.begin(0)
-        except BaseException as error:  # told by wait and by the end of the `with` block
+        except BaseException as error:  # raised by wait and by the end of the `with` block
             self._failure = error
         finally:
             if not self._hold:
@@ -201,7 +201,7 @@ class Playback(Closeable):
         return start + (since if self._speed == 1.0 else (since / self._speed).astype(np.int64))
 
     def _play_by_bursts(self) -> None:
-        """Serves each track in a thread of its own: each stands still until it is burst."""
+        """Serves each track in a thread of its own, which waits for bursts."""
         threads = [
             threading.Thread(target=self._serve, args=(player,), daemon=True)
             for player in self._players

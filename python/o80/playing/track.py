@@ -33,7 +33,7 @@ class Track:
     """The runs of one segment."""
 
     def __init__(self, name: str, epochs: Sequence["RecordedEpoch"], offsets: list[int]) -> None:
-        """offsets: of the monotonic clocks met so far, to wall-clock time [ns].
+        """offsets: of the monotonic clocks seen so far, to wall-clock time [ns].
 
         Robots on one monotonic clock keep the differences of their times exactly, although each
         offset was measured at another moment.

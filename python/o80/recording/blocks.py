@@ -24,7 +24,7 @@ MESSAGE, MESSAGE_INDEX = 0x05, 0x07
 
 @dataclass(frozen=True)
 class Block:
-    """Messages of one channel, of equal size, as they stand in a chunk."""
+    """Messages of one channel, of equal size, as records of a chunk."""
 
     channel: int
     log_times: NDArray[np.uint64]  #: (n,) [ns]

@@ -14,11 +14,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
-from typing import Any
 
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.base.finite import json_text
 from o80.recording.reader import RecordingFile
+from o80.recording.recorded_epoch import RecordedEpoch
 
 INDEX = ".o80-recordings.sqlite"
 VERSION = 2  # of what the index holds
@@ -118,7 +118,7 @@ def recordings(
 
 
 def _nanoseconds(time: datetime) -> int:
-    """Since 1970; of a year that no clock has, such as that of `datetime.min`, 0 or very many."""
+    """Since 1970 [ns]; clamped for years outside the range of `timestamp()`."""
     try:
         return int(time.timestamp() * 1e9)
     except (ValueError, OverflowError):
@@ -162,7 +162,7 @@ def _statuses(folder: os.DirEntry[str]) -> Iterator[os.stat_result]:
 
 
 def _is_readable(path: Path) -> bool:
-    """Whether this user may read a recording; who may not must not tell others that it is bad."""
+    """Whether this user may read a recording; if not, its problem is not stored for others."""
     return all(os.access(each, os.R_OK) for each in (path, *path.glob("*")))
 
 
@@ -171,7 +171,7 @@ def _summary(path: Path) -> str:
     try:
         recording = RecordingFile(path)
         runs = [
-            asdict(_run(name, number, epoch))
+            asdict(run_found(name, number, epoch))
             for name in recording
             for number, epoch in enumerate(recording[name].epochs)
         ]
@@ -188,7 +188,8 @@ def _summary(path: Path) -> str:
         return json_text(nothing | {"problem": str(error) or repr(error)})
 
 
-def _run(segment: str, number: int, epoch: Any) -> FoundRun:
+def run_found(segment: str, number: int, epoch: RecordedEpoch) -> FoundRun:
+    """What is listed of a run. Raises RecordingError."""
     begin, end = epoch.time_range if epoch.rows else (0, 0)
     is_cut = any(gap.last is None for gap in epoch.gaps)
     return FoundRun(

@@ -3,8 +3,7 @@
 import struct
 from collections.abc import Sequence
 
-ENCAPSULATION = b"\x00\x01\x00\x00"
-"""First bytes of a message: CDR, little endian."""
+ENCAPSULATION = b"\x00\x01\x00\x00"  #: first bytes of a message: CDR, little endian
 
 
 class CdrWriter:

@@ -1,4 +1,4 @@
-"""The chunks of a file, by their index: a few bytes each, as they stand in its summary."""
+"""Chunk indexes of a file, as the records of its summary: a few bytes each."""
 
 import struct
 from array import array

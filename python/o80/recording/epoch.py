@@ -7,8 +7,8 @@ from datetime import datetime
 from typing import NamedTuple
 
 from o80.base.errors import RecordingError
-from o80.base.machine import this_boot
 from o80.frontend.reader import Reader
+from o80.frontend.segments import boot_of
 from o80.recording.cdr import ENCAPSULATION
 from o80.recording.scan import Scan
 
@@ -104,25 +104,11 @@ class EpochNote:
         """The metadata of a channel of this run that holds something else than its rows."""
         return {"content": content} | self.run_texts()
 
-    @property
-    def attachment(self) -> str:
-        """Name of the attachment with the robot's description."""
-        return f"{self.segment}/{self.number}/description"
-
-    @property
-    def provenance(self) -> str:
-        """Name of the metadata record that says how the backend was started."""
-        return f"{self.segment}/{self.number}/provenance"
-
-    @property
-    def end(self) -> str:
-        """Name of the metadata record that says how the run ended and which row was its last."""
-        return f"{self.segment}/{self.number}/end"
-
-    @property
-    def interruption(self) -> str:
-        """Name of the metadata record if nothing of the segment was recorded before the run."""
-        return f"{self.segment}/{self.number}/interruption"
+    def record(self, what: str) -> str:
+        """Name of a record of this run: its description (an attachment), its provenance, its end
+        with the last row, or the interruption before it, in which nothing was recorded.
+        """
+        return f"{self.segment}/{self.number}/{what}"
 
     def not_before(self, first_time: int, log_time: int) -> "EpochNote":
         """The same; the log time of a row at `first_time` is later than `log_time`."""
@@ -170,7 +156,6 @@ def iteration_in(message: bytes) -> int:
 
 def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:
     """Note about the rows from `begin` on."""
-    clock = frontend.schema["clock"]
     return EpochNote(
         segment=frontend.segment,
         robot=frontend.robot,
@@ -178,8 +163,8 @@ def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:
         number=number,
         begin=begin,
         wall_offset=frontend.provenance.wall_clock_offset,
-        clock=clock,
-        boot=this_boot() if clock == "monotonic" and not frontend.played else "",
+        clock=frontend.schema["clock"],
+        boot=boot_of(frontend),
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
-from mcap.records import ChunkIndex
+from mcap.records import AttachmentIndex, ChunkIndex
 
 from o80.base.errors import RecordingError
 from o80.recording.blocks import messages_in
@@ -71,7 +71,7 @@ class EpochPart:
 
     @property
     def why_cut(self) -> str:
-        """Why the file may lack the end of the run; empty if its recorder was told to end."""
+        """Why the file may lack the end of the run; empty if its recorder ended in order."""
         if not self.found.finished:
             return UNFINISHED
         last = self.last_chunk.chunk_start_offset if self.last_chunk else 0
@@ -88,12 +88,15 @@ class EpochPart:
         return int(first), int(last)
 
     @property
+    def _description(self) -> AttachmentIndex | None:
+        name = self.note.record("description")
+        return next((each for each in self.found.attachments if each.name == name), None)
+
+    @property
     def began_at(self) -> int:
         """When its recording began, on the wall clock [ns since 1970]."""
-        for place in self.found.attachments:
-            if place.name == self.note.attachment:
-                return place.create_time
-        return 0
+        place = self._description
+        return 0 if place is None else place.create_time
 
     def last_entries(self) -> Entries | None:
         """The last part of the journal. Raises RecordingError."""
@@ -104,11 +107,11 @@ class EpochPart:
 
     def table(self) -> bytes:
         """The description of the robot. Raises RecordingError."""
-        for place in self.found.attachments:
-            if place.name == self.note.attachment:
-                with self.reading() as file:
-                    return attachment_of(file, place).data
-        raise RecordingError(f"{self.path} lacks the description of '{self.note.segment}'")
+        place = self._description
+        if place is None:
+            raise RecordingError(f"{self.path} lacks the description of '{self.note.segment}'")
+        with self.reading() as file:
+            return attachment_of(file, place).data
 
     @contextmanager
     def reading(self) -> Iterator[IO[bytes]]:

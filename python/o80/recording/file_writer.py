@@ -76,7 +76,7 @@ class FileWriter:
 
     @classmethod
     def continued(cls, path: Path, form: Form = USUAL) -> "FileWriter":
-        """Goes on behind the last whole group of a file.
+        """Continues a file after its last whole group.
 
         Raises RecordingError if it is being written, NotARecordingError, OSError.
         """

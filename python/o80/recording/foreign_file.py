@@ -41,13 +41,13 @@ class _Copier:
 
     def copy(self, path: Path) -> None:
         size = path.stat().st_size
-        told = Progress(f"{path} was written by another program: it is copied to be read")
-        with path.open("rb") as file, told:
+        progress = Progress(f"{path} was written by another program: it is copied to be read")
+        with path.open("rb") as file, progress:
             try:
                 for record in StreamReader(file).records:
                     self._take(record)
                     if not self._waiting:  # some were written
-                        told.at(file.tell() / size)
+                        progress.at(file.tell() / size)
             except EndOfFile:
                 pass
             except Exception as error:  # each compression has exceptions of its own

@@ -31,8 +31,7 @@ float64[] position
 float64[] velocity
 float64[] effort
 {HEADER}"""
-CONTENT = "joint_states"
-"""Name of this content in the metadata of the channel."""
+CONTENT = "joint_states"  #: name of this content in the metadata of the channel
 QUANTITIES = {
     "position": ("position",),
     "velocity": ("velocity",),

@@ -22,10 +22,8 @@ uint64 first  # number of the first entry
 uint64 next  # number after the last entry
 uint8[] entries  # o80.open decodes them
 """
-CONTENT = "journal"
-"""Name of this content in the metadata of the channel."""
-CODEC = "codec"
-"""Name of the format's version in the metadata."""
+CONTENT = "journal"  #: name of this content in the metadata of the channel
+CODEC = "codec"  #: name of the format's version in the metadata
 GAP = "o80.journal_gap"
 """Name of the metadata record of entries that were overwritten before they were read."""
 MOST = 4 << 20  # bytes that are read at once
@@ -63,18 +61,13 @@ class JournalRecorder:
     def __init__(self, frontend: "Frontend", channel: int | None, first: int) -> None:
         """first: number of the first entry to read, if it is still there; 0: the oldest."""
         self.channel = channel
-        self.missed = 0  #: entries that were overwritten before they were read
         self.begin = 0  #: number of the first entry; of a journal that is continued, 0
         self.drained = False  #: nothing was left at the last read
         self.marks: list[tuple[str, int]] = []  #: text and iteration, in the last read
         self.notable = False  #: the last read has more than batches, bursts and ends of commands
         self._core = _core.RawJournal(frontend, first)
+        self.exists = self._core.exists  #: the backend was started with a journal
         self._next = first if first > 0 else None  # None: begins with the oldest entry
-
-    @property
-    def exists(self) -> bool:
-        """The backend was started with a journal."""
-        return self._core.exists
 
     @property
     def unread(self) -> float:
@@ -101,7 +94,6 @@ class JournalRecorder:
             self.begin = first
         if self._next is not None and first > self._next:
             gap = self._next, first - 1
-            self.missed += first - self._next
         self._next = end
         return Entries(first, end, content), gap
 

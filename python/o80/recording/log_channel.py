@@ -37,8 +37,8 @@ string file
 string function
 uint32 line
 {TIME}"""
-MAX_BYTES = 1 << 16  # of a journal between two polls; of more, only notable entries are told
-MAX_ENDS = 20  # of commands that are told one by one in a poll
+MAX_BYTES = 1 << 16  # of a journal between two polls; of more, only notable entries get lines
+MAX_ENDS = 20  # of commands that get a line each in a poll
 _BATCHES = {"taken", "scheduled"}
 _SILENT = {*_BATCHES, "burst", "burst_ended"}
 _LEVELS = {
@@ -82,7 +82,7 @@ def added_lines(file: FileWriter, lines: Sequence[Line]) -> Messages:
 
 
 class JournalLog:
-    """Tells the entries of a journal while they are recorded."""
+    """Makes lines of the entries of a journal while they are recorded."""
 
     def __init__(self, frontend: Frontend) -> None:
         self._description = frontend._description
@@ -90,8 +90,8 @@ class JournalLog:
         self._decoder = EntryDecoder(frontend.schema)
         self._open: dict[tuple[int, int], _core.JournalRecord] = {}  # by lane and id, until the end
 
-    def told(self, entries: Entries, notable: bool) -> list[tuple[int, int, str]]:
-        """Iteration, level and text of what is worth a line.
+    def lines(self, entries: Entries, notable: bool) -> list[tuple[int, int, str]]:
+        """Iteration, level and text of each line.
 
         notable: there are others among the entries than batches, bursts and ends of commands.
         """
@@ -111,7 +111,7 @@ class JournalLog:
         if many:
             natives = [each for each in natives if each.kind not in {*_SILENT, "status"}]
         ends = [each for each in natives if each.kind == "status" and each.status in ENDS]
-        told: list[tuple[int, int, str]] = []
+        lines: list[tuple[int, int, str]] = []
         for native in natives:
             if native.kind in _BATCHES:
                 self._open.update({(native.lane, each.id): each for each in native.records})
@@ -119,15 +119,15 @@ class JournalLog:
                 if native.status in ENDS:
                     record = self._open.pop((native.lane, native.id), None)
                     if len(ends) <= MAX_ENDS:
-                        told.append(self._end(native, record))
+                        lines.append(self._end(native, record))
             elif native.kind not in _SILENT:
                 entry = self._decoder.entry(native)
-                told.append((entry.iteration, _level(entry), JournalText().text(entry)))
+                lines.append((entry.iteration, _level(entry), JournalText().text(entry)))
         if len(ends) > MAX_ENDS:
             counts = Counter(each.status for each in ends)
             text = ", ".join(f"{count} {status}" for status, count in counts.items())
-            told.append((ends[-1].iteration, INFO, f"commands ended: {text}"))
-        return sorted(told, key=lambda line: line[0])
+            lines.append((ends[-1].iteration, INFO, f"commands ended: {text}"))
+        return sorted(lines, key=lambda line: line[0])
 
     def _end(
         self, native: _core.JournalEntry, record: _core.JournalRecord | None

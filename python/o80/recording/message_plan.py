@@ -7,7 +7,7 @@ together.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,8 +19,7 @@ from o80.rows.layout import Layout
 Bytes = NDArray[np.uint8]
 
 
-@dataclass(frozen=True)
-class Copy:
+class Copy(NamedTuple):
     """Bytes of a row that are at another place in a message."""
 
     row: int
@@ -28,13 +27,12 @@ class Copy:
     length: int
 
 
-@dataclass(frozen=True)
-class Mask:
+class Mask(NamedTuple):
     """Bits of a row that are bytes of 0 or 1 in a message."""
 
     row: int
     message: int
-    count: int
+    bits: int
 
 
 class MessagePlan:
@@ -56,9 +54,9 @@ class MessagePlan:
                 :, copy.row : copy.row + copy.length
             ]
         for mask in self._masks:
-            bits = np.ascontiguousarray(rows[:, mask.row : mask.row + (mask.count + 7) // 8])
-            messages[:, mask.message : mask.message + mask.count] = np.unpackbits(
-                bits, axis=1, count=mask.count, bitorder="little"
+            bits = np.ascontiguousarray(rows[:, mask.row : mask.row + (mask.bits + 7) // 8])
+            messages[:, mask.message : mask.message + mask.bits] = np.unpackbits(
+                bits, axis=1, count=mask.bits, bitorder="little"
             )
 
     def decode(self, messages: Bytes) -> Bytes:
@@ -69,7 +67,7 @@ class MessagePlan:
                 :, copy.message : copy.message + copy.length
             ]
         for mask in self._masks:
-            values = messages[:, mask.message : mask.message + mask.count]
+            values = messages[:, mask.message : mask.message + mask.bits]
             packed = np.packbits(values, axis=1, bitorder="little")
             rows[:, mask.row : mask.row + packed.shape[1]] = packed
         return rows

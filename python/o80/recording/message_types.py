@@ -11,7 +11,7 @@ import re
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from o80.rows.layout import HEAD, Layout, dtype_of_field, is_plain
+from o80.rows.layout import HEAD, MASKS, Layout, dtype_of_field, is_plain
 
 PACKAGE = "o80"
 SEPARATOR = "=" * 80
@@ -89,7 +89,7 @@ def row_type(layout: Layout) -> MessageType:
                 mask_type,
                 True,
             )
-            for mask in ("active", "clamped", "braking", "starved")
+            for mask in MASKS
         ]
         members.append(Member("off_plan", "float32", 4, row["off_plan"], layout.actuators))
     if layout.extras.itemsize:

@@ -29,7 +29,7 @@ class Written:
 
 
 def opened(path: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
-    """A new file; or, to `proceed`, the one that is there. Raises RecordingError."""
+    """Creates a file; proceed: continues an existing one. Raises RecordingError."""
     try:
         if proceed and path.exists():
             return FileWriter.continued(path, form)
@@ -90,8 +90,8 @@ def next_file(file: FileWriter) -> FileWriter:
 class Predecessor:
     """Contents of the files of a recording that is continued.
 
-    Looks into them from the newest back, into each once at most, and no further than it must: the
-    newest epoch of a segment is the only one that can go on.
+    Reads them from the newest back, each once at most, until the newest epoch of a segment is
+    known: only that one can continue.
     """
 
     def __init__(self, file: FileWriter, before: Sequence[Path]) -> None:
@@ -101,7 +101,7 @@ class Predecessor:
         self._unread = list(before)
 
     def clock(self) -> WallClock:
-        """The clock that the last file goes on with. Raises RecordingError."""
+        """The clock of the last file, for its next rows. Raises RecordingError."""
         path, found = self._found[0]
         clock = WallClock({})
         for part in parts_of(path, found):

@@ -51,7 +51,7 @@ def write_part(
 ) -> dict[str, tuple[int, int, int]]:
     """Writes a new file. Returns number, first and last iteration of the rows of each segment.
 
-    poses: gives those of the bodies of a run, of which transforms are added, or None.
+    poses: returns the bodies of a run to add transforms of, or None.
     Raises RecordingError: then no new file is left.
     """
     read = [RecordingFile(path) for path in recordings]
@@ -64,20 +64,16 @@ def write_part(
     file = opened(output, proceed=False)
     try:
         writer = _PartWriter(file, selection, offsets)
-        for recording in read if selection.transforms else ():
-            for name in recording:
-                for epoch in recording[name].epochs:
-                    writer.add_poses((name, epoch.epoch), epoch, poses(name, epoch))
+        for run, epoch in _epochs_in(read) if selection.transforms else ():
+            writer.add_poses(run, epoch, poses(run[0], epoch))
         for path, found in chain.from_iterable(in_order):
             with found.opened(path) as content:
                 try:
                     writer.add(content, found)
                 except (ValueError, LookupError, struct.error) as error:
                     raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
-        for recording in read:
-            for name in recording:
-                for epoch in recording[name].epochs:
-                    writer.add_end((name, epoch.epoch), epoch)
+        for run, epoch in _epochs_in(read):
+            writer.add_end(run, epoch)
         file.finish()
     except OSError as error:
         file.close()
@@ -88,6 +84,13 @@ def write_part(
         output.unlink(missing_ok=True)
         raise
     return writer.rows
+
+
+def _epochs_in(recordings: Sequence[RecordingFile]) -> Iterator[tuple[Run, RecordedEpoch]]:
+    for recording in recordings:
+        for name in recording:
+            for epoch in recording[name].epochs:
+                yield (name, epoch.epoch), epoch
 
 
 def _begin_of(files: list[tuple[Path, Scan]], offsets: dict[str, int]) -> int:
@@ -276,18 +279,20 @@ class _PartWriter:
         number = self._numbers[note.segment, note.epoch] = len(numbers)
         new = replace(note, number=number)
         for place in found.attachments:
-            if place.name == note.attachment:
+            if place.name == note.record("description"):
                 old = attachment_of(content, place)
-                self._file.attach(new.attachment, old.media_type, old.data, old.create_time)
+                self._file.attach(
+                    new.record("description"), old.media_type, old.data, old.create_time
+                )
         for each in found.metadata:
             run = each.metadata.get("segment"), each.metadata.get("number")
-            if each.name == note.provenance:
-                self._file.add_metadata(new.provenance, each.metadata)
-            elif each.name == note.interruption:
+            if each.name == note.record("provenance"):
+                self._file.add_metadata(new.record("provenance"), each.metadata)
+            elif each.name == note.record("interruption"):
                 shift = self._shifts[note.segment, note.epoch]
                 texts = each.metadata | {"number": str(number)}
                 texts["since"] = str(int(texts["since"]) + shift)
-                self._file.add_metadata(new.interruption, texts)
+                self._file.add_metadata(new.record("interruption"), texts)
             elif each.name == JOURNAL_GAP and run == (note.segment, str(note.number)):
                 self._file.add_metadata(each.name, each.metadata | {"number": str(number)})
 
@@ -322,7 +327,7 @@ class _PartWriter:
         return {"segment": run[0], "epoch": str(run[1]), "number": str(self._numbers[run])}
 
     def _every(self, channel: Channel) -> int:
-        """Every so manieth row of a channel is kept, of one that was thinned before too."""
+        """Row interval of a channel in the output, earlier thinning included."""
         text = channel.metadata.get("every", "")
         return math.lcm(self._selection.every, int(text) if text.isdecimal() else 1)
 

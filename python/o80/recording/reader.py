@@ -3,18 +3,19 @@
 import os
 import struct
 from bisect import bisect
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
+from o80.base.cached import cached
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.epoch_part import UNFINISHED, EpochPart, parts_of
 from o80.recording.foreign_file import copied
 from o80.recording.marks import Mark, Marks, marks_in
 from o80.recording.recorded_epoch import RecordedEpoch
 from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan, unreadable
-from o80.rows.history import History
+from o80.rows.history import History, Range
 
 
 class RecordingFile:
@@ -67,7 +68,7 @@ class RecordingFile:
         """Size of its files [bytes]."""
         return sum(_size(path) for path, _ in self._files)
 
-    @property
+    @cached
     def marks(self) -> list[Mark]:
         """The notes in the recording, in their order. Raises RecordingError."""
         marks = Marks()
@@ -81,15 +82,23 @@ class RecordingFile:
                 raise RecordingError(f"{path}: {error}") from error
         return marks
 
-    def marks_by_run(self, name: str) -> list[list[tuple[str, int]]]:
-        """Name and iteration of the marks of a segment, for each of its runs."""
+    def marks_by_run(self, name: str) -> list[list[Mark]]:
+        """The marks of a segment, for each of its runs."""
         epochs = self.segments[name].epochs
         begins = [epoch.recorded_at for epoch in epochs]
-        runs: list[list[tuple[str, int]]] = [[] for _ in epochs]
+        runs: list[list[Mark]] = [[] for _ in epochs]
         for mark in self.marks:
             if name in mark.rows:
-                runs[max(bisect(begins, mark.time) - 1, 0)].append((mark.name, mark.rows[name]))
+                runs[max(bisect(begins, mark.time) - 1, 0)].append(mark)
         return runs
+
+    def chosen(self, names: Iterable[str] | None = None) -> list[str]:
+        """These segments, or all of them. Raises InvalidArgument for one that is not there."""
+        for name in names or ():
+            if name not in self.segments:
+                there = ", ".join(self.segments) or "none"
+                raise InvalidArgument(f"no segment '{name}' in {self.path}; there are: {there}")
+        return [*(names or self.segments)]
 
     def __getitem__(self, name: str) -> "RecordedSegment":
         try:
@@ -135,7 +144,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def in_order(folder: Path) -> list[Path]:
-    """The files NAME.mcap of a folder; those that a recorder has numbered by their number."""
+    """The files NAME.mcap of a folder by name; numbered ones by their number, last."""
     return sorted(
         folder.glob("*.mcap"),
         key=lambda file: (int(file.stem) if file.stem.isdecimal() else -1, file.name),
@@ -161,13 +170,13 @@ def _scans_of(path: Path) -> Iterator[tuple[Path, Scan]]:
 
 
 def _scanned(path: Path) -> Scan:
-    with told(path):
+    with errors_explained(path):
         found = scan(path)
         return copied(path) if found.foreign else found
 
 
 @contextmanager
-def told(path: Path) -> Iterator[None]:
+def errors_explained(path: Path) -> Iterator[None]:
     """Makes errors of a scan of a file RecordingErrors, which say what to do."""
     try:
         yield
@@ -202,7 +211,7 @@ class RecordedSegment:
         self.name = name
         self.epochs = epochs
 
-    def history(self, n: int | None = None, **selection: Any) -> History:
+    def history(self, n: int | None = None, **selection: Unpack[Range]) -> History:
         """Rows of the only epoch; the arguments are those of `Frontend.history`.
 
         Raises InvalidArgument if there are several: choose one of `epochs`.

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, TypeVar, Unpack
 
 import numpy as np
 from mcap.records import ChunkIndex
@@ -19,7 +19,7 @@ from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of, entries_in
 from o80.recording.message_plan import MessagePlan, plan_of_rows
 from o80.recording.scan import content_of, index_of
-from o80.rows.history import History, Selection
+from o80.rows.history import History, Range, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
 from o80.rows.layout import Layout, decoder_of
 from o80.rows.provenance import Provenance
@@ -151,7 +151,7 @@ class RecordedEpoch:
         Other runs may have come and gone then. Raises RecordingError.
         """
         for part in self._parts:
-            for (since,), _ in part.records(part.note.interruption, "since"):
+            for (since,), _ in part.records(part.note.record("interruption"), "since"):
                 return Interruption(since, part.log_times[0] if part.rows else self.recorded_at)
         return None
 
@@ -190,13 +190,13 @@ class RecordedEpoch:
             return read(self._provenance_texts[key])
         except (KeyError, TypeError, ValueError, RecursionError) as error:
             raise RecordingError(
-                f"{self._parts[0].path}: the record {self._note.provenance} is damaged"
+                f"{self._parts[0].path}: the record {self._note.record('provenance')} is damaged"
             ) from error
 
     @cached
     def _provenance_texts(self) -> dict[str, str]:
         for each in self._parts[0].found.metadata:
-            if each.name == self._note.provenance:
+            if each.name == self._note.record("provenance"):
                 texts: dict[str, str] = each.metadata
                 return texts
         raise RecordingError(
@@ -221,31 +221,20 @@ class RecordedEpoch:
 
     # ------------------------------------------------------------------ rows
 
-    def history(
-        self,
-        n: int | None = None,
-        *,
-        since: int | None = None,
-        until: int | None = None,
-        seconds: float | None = None,
-        from_time: int | None = None,
-        to_time: int | None = None,
-    ) -> History:
+    def history(self, n: int | None = None, **selection: Unpack[Range]) -> History:
         """Many observations at once; the arguments are those of `Frontend.history`.
 
         Raises RecordingError if the file is damaged there.
         """
-        wanted = Selection.checked(n, since, until, seconds, from_time, to_time)
+        wanted = Selection.checked(n, **selection)
         blocks: Iterable[History]
         if wanted.n is not None:
             blocks = self._last_blocks(wanted.n)
         elif wanted.duration is not None and self.rows:
             blocks = self._blocks(self.time_range[1] - wanted.duration, None)
         else:
-            blocks = self._blocks(from_time, to_time)
-        return History._joined(self._decoder, blocks).select(
-            n, since=since, until=until, seconds=seconds, from_time=from_time, to_time=to_time
-        )
+            blocks = self._blocks(wanted.from_time, wanted.to_time)
+        return History._joined(self._decoder, blocks).select(n, **selection)
 
     def blocks(
         self, *, from_time: int | None = None, to_time: int | None = None
@@ -325,7 +314,9 @@ class RecordedEpoch:
     @property
     def end_record(self) -> tuple[int, dict[str, str]]:
         """Note of the recorder about the end: the last row, -1 for nothing, and texts."""
-        found = [each for part in self._parts for each in part.records(part.note.end, "last")]
+        found = [
+            each for part in self._parts for each in part.records(part.note.record("end"), "last")
+        ]
         return (found[-1][0][0], found[-1][1]) if found else (-1, {})
 
     def _end_in_journal(self) -> str:
@@ -396,8 +387,9 @@ class RecordedEpoch:
         return max(codecs, default=None)
 
     def journal_since_row(self, first: int) -> list[JournalEntry]:
-        """The decisions from this iteration on, and so many before them that of each command that
-        ended since then the batch is there, if it was recorded. Raises RecordingError.
+        """Entries from this iteration on, and recorded batches of all commands that end after it.
+
+        Raises RecordingError.
         """
         decoder = EntryDecoder(self.schema)
         blocks: list[list[JournalEntry]] = []

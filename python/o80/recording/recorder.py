@@ -35,8 +35,7 @@ _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 class Recorder:
     """Reads segments and writes rows and journals; `poll` does a part of the work. One thread."""
 
-    between_chunks = 0.1
-    """Time between two questions whether a chunk is due [s]."""
+    between_chunks = 0.1  #: time between two questions whether a chunk is due [s]
 
     def __init__(
         self,
@@ -139,7 +138,7 @@ class Recorder:
         self._polled = time.monotonic()
         with self.writing():
             if self._is_full():
-                self._go_on_in_next_file()
+                self._continue_in_next_file()
             if self._patterns and time.monotonic() >= self._search_at:
                 self._search()
             blocks = [block for source in self.sources.values() for block in source.poll()]
@@ -223,7 +222,7 @@ class Recorder:
             return False
         return self._split.is_due(self.file.size, self._file_begun)
 
-    def _go_on_in_next_file(self) -> None:
+    def _continue_in_next_file(self) -> None:
         """Another recorder that continues finds one of the two files locked at any moment."""
         full, self.file = self.file, next_file(self.file)
         self._file_begun = time.monotonic()
@@ -232,7 +231,7 @@ class Recorder:
         self.file.make_room = _weakly(self._make_room)
         try:
             for source in self.sources.values():
-                source.go_on_in(self.file)
+                source.continue_in(self.file)
         finally:
             full.finish()
             self._bytes_before += full.size - not_finished

@@ -135,7 +135,7 @@ class Recording(Closeable):
             with self._lock:
                 if self._recorder.is_due():
                     self._recorder.catch_up()
-        except Exception as error:  # told by the next call, at the latest by close
+        except Exception as error:  # raised by the next call, at the latest by close
             self._failure = error
         return self._failure is None
 

@@ -30,7 +30,7 @@ from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries
 from o80.recording.locked_file import LockedFile
 from o80.recording.output import opened
-from o80.recording.reader import told
+from o80.recording.reader import errors_explained
 from o80.recording.scan import CUT, MAGIC, Scan, damage_in, has_end, has_summary, scan
 
 REASON = "damaged"
@@ -60,7 +60,7 @@ def repaired(path: Path, *, is_last: bool) -> list[str]:
     is_last: no file of the recording follows it. A damaged file is kept as NAME.mcap.damaged.
     Raises RecordingError.
     """
-    with told(path):
+    with errors_explained(path):
         size, found = path.stat().st_size, None
         if size >= len(MAGIC):
             with suppress(RecordingError):
@@ -68,7 +68,7 @@ def repaired(path: Path, *, is_last: bool) -> list[str]:
             damage = [] if found is None else [*damage_in(path, found)]
             if found is not None and found.foreign and damage:
                 raise RecordingError("\n".join(f"{path}: {each}" for each in damage))
-            if found is None or damage or _goes_on_behind(path, found):
+            if found is None or damage or _has_data_behind(path, found):
                 return _salvaged(path, found, is_last)
             if found.finished and (found.foreign or has_summary(path)):
                 return []
@@ -78,7 +78,7 @@ def repaired(path: Path, *, is_last: bool) -> list[str]:
     return [f"{path} is complete now: {kept} bytes kept, {size - kept} bytes behind them removed"]
 
 
-def _goes_on_behind(path: Path, found: Scan) -> bool:
+def _has_data_behind(path: Path, found: Scan) -> bool:
     """Whether data are whole behind the record at which the scan of a file ended."""
     if found.finished:
         return False
@@ -122,9 +122,9 @@ def _salvaged(path: Path, found: Scan | None, is_last: bool) -> list[str]:
 
 
 def _parts(data: mmap.mmap, at: int = len(MAGIC), found: Scan | None = None) -> Iterator[Part]:
-    """All bytes of a file but records that are made anew, and those between them that are not.
+    """Records to keep and damaged stretches of a file, without records that are written anew.
 
-    found: tells where records are whose own heads may be damaged.
+    found: has the places of records, if their own heads are damaged.
     """
     known = {} if found is None else _places_in(found)
     places = sorted(known, reverse=True)
@@ -246,7 +246,7 @@ class _Salvage:
         return damaged
 
     def _add_channels(self) -> None:
-        """The last copies, which are those of the summary: it has a checksum."""
+        """Adds the last copy of each: the one in the summary, which has a checksum."""
         schemas: dict[int, Schema] = {}
         for begin, end, opcode in self._parts:
             if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -294,13 +294,13 @@ class _Salvage:
             if note is None:
                 continue
             after = self._next.get(number, note.begin)
-            if note.end in ends:
-                (last,) = _numbers(ends[note.end], "last")
+            if note.record("end") in ends:
+                (last,) = _numbers(ends[note.record("end")], "last")
                 if last >= after:
                     self._holes.append((GAP, number, after, last))
             elif damage_end > self._last.get(number, 0):
                 texts = note.run_texts() | {"last": str(after - 1), "reason": REASON}
-                self._file.add_metadata(note.end, texts)
+                self._file.add_metadata(note.record("end"), texts)
 
     def _note_holes(self) -> None:
         known = [each for each in self._file.found.metadata if each.name in (GAP, JOURNAL_GAP)]

@@ -33,9 +33,11 @@ class RowWriter:
         layout = frontend._layout
         message = row_type(layout)
         schema = file.add_schema(f"{PACKAGE}/msg/{message.name}", message.definition)
-        file.attach(note.attachment, DESCRIPTION, frontend._description.table(), time.time_ns())
+        file.attach(
+            note.record("description"), DESCRIPTION, frontend._description.table(), time.time_ns()
+        )
         file.add_metadata(
-            note.provenance,
+            note.record("provenance"),
             {"json": frontend.provenance.as_json(), "machine": this_machine().as_json()},
         )
         channel = file.add_channel(topic_of(note.segment), schema, note.texts())

@@ -134,7 +134,7 @@ def has_end(path: str | os.PathLike[str]) -> bool:
 
 
 def has_summary(path: str | os.PathLike[str]) -> bool:
-    """Whether the summary of a file is whole and tells everything. Raises OSError."""
+    """Whether a file has a complete summary. Raises OSError."""
     with Path(path).open("rb") as file:
         return _by_summary(file, os.fstat(file.fileno()).st_size) is not None
 
@@ -150,7 +150,7 @@ def _footer(file: IO[bytes], size: int) -> Footer | None:
 
 
 def _by_summary(file: IO[bytes], size: int) -> Scan | None:
-    """The scan that the summary gives; None if there is none that is whole and tells everything."""
+    """Scan from the file's summary; None if that is missing or incomplete."""
     try:
         return _summary(file, size)
     except _DAMAGED:  # a scan of all records says where
@@ -167,7 +167,7 @@ def _scanned(file: IO[bytes], size: int, path: str | os.PathLike[str]) -> Scan:
 
 
 def damage_in(path: Path, found: Scan) -> Iterator[str]:
-    """Places that disagree with their checksum, and chunks whose indexes lead elsewhere."""
+    """Texts about wrong checksums, and about message indexes with wrong places."""
     with found.opened(path) as file:
         for chunk in found.chunks:
             try:
@@ -225,7 +225,7 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
             found.metadata_places.append(MetadataIndex.read(stream))
         elif opcode == Opcode.STATISTICS:
             statistics = Statistics.read(stream)
-    is_told = statistics is not None and (
+    is_complete = statistics is not None and (
         len(found.chunks),
         len(found.attachments),
         len(found.metadata_places),
@@ -238,7 +238,7 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
         statistics.channel_count,
         statistics.schema_count,
     )
-    if statistics is None or not is_told or (statistics.message_count and not found.chunks):
+    if statistics is None or not is_complete or (statistics.message_count and not found.chunks):
         return None
     found.counts = statistics.channel_message_counts
     for place in found.metadata_places:

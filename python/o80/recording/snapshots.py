@@ -10,8 +10,7 @@ from o80.base.words import Status
 from o80.frontend.frontend import Frontend
 from o80.rows.journal import ENDS
 
-SLOT = 7
-"""The last of the slots that simulations have: the recorder's."""
+SLOT = 7  #: the last of the slots that simulations have: the recorder's
 
 
 def interval(seconds: float) -> float:

@@ -19,7 +19,7 @@ from o80.recording.row_writer import RowWriter
 from o80.recording.snapshots import SnapshotRequests
 
 LARGEST_BLOCK = 4 << 20  # of the rows read at once [bytes]
-BETWEEN_LOOKS = 0.05  # for a backend that is not there [s]
+BETWEEN_ATTEMPTS = 0.05  # for a backend that is not there [s]
 
 
 class Source:
@@ -53,19 +53,14 @@ class Source:
         self._writer: RowWriter | None = None
         self._journal: JournalRecorder | None = None
         self._journal_log: JournalLog | None = None
-        self._has_told_end = False
+        self._end_noted = False
         self._was_interrupted = bool(written)
         self._snapshots = None if snapshots is None else SnapshotRequests(snapshots)
         self._next = 0
         self._last_log_time = max((each.last_log_time for each in written.values()), default=0)
-        self._look_at = 0.0
+        self._attempt_at = 0.0
         self._attach()  # recording begins now
         self._from_now = False  # a robot that starts later is recorded from its first row
-
-    @property
-    def attached(self) -> bool:
-        """Rows come, or may come."""
-        return self._frontend is not None
 
     @property
     def position(self) -> tuple[int, int]:
@@ -97,8 +92,8 @@ class Source:
         return -1 if self._frontend is None else self._written[self._frontend.epoch].note.begin
 
     @property
-    def goes_on_at(self) -> int | None:
-        """The row with which this recorder goes on; None: the file has the first recorded one."""
+    def continues_at(self) -> int | None:
+        """First row of this recorder in a run of an earlier recorder; None: no such run."""
         if self._writer is None or self._writer.note.before != EARLIER_FILE:
             return None
         return self._writer.note.begin
@@ -153,9 +148,9 @@ class Source:
     def _attach(self) -> bool:
         """Attaches to a backend that is not the one that was read. False: there is none."""
         now = monotonic()
-        if now < self._look_at:
+        if now < self._attempt_at:
             return False
-        self._look_at = now + BETWEEN_LOOKS
+        self._attempt_at = now + BETWEEN_ATTEMPTS
         try:
             found = Frontend(self.name, timeout=0, read_only=True, dead=True)
         except (TimeoutError, SegmentError, BackendGone):
@@ -190,13 +185,13 @@ class Source:
             self._journal_log = JournalLog(frontend)
             if known.journal is None:
                 self._journal.add_channel(self._file, note)
-        self._has_told_end = False
+        self._end_noted = False
         if self._was_interrupted and known.last < 0:  # other runs may have come between
             texts = note.run_texts() | {"since": str(self._last_log_time)}
-            self._file.add_metadata(note.interruption, texts)
+            self._file.add_metadata(note.record("interruption"), texts)
         self._was_interrupted = False
         if known.channel is None:
-            self._tell(
+            self._note(
                 self._next, INFO, f"run {note.number} of {note.robot} is recorded from here on"
             )
 
@@ -211,7 +206,7 @@ class Source:
                 f"{codec}, this o80 writes {_core.JOURNAL_CODEC}): record to another file"
             )
 
-    def go_on_in(self, file: FileWriter) -> None:
+    def continue_in(self, file: FileWriter) -> None:
         """Writes what follows into another file."""
         self._file = file
         if self._frontend is None or self._writer is None:
@@ -267,23 +262,23 @@ class Source:
             return None
         assert self._journal.channel is not None
         assert self._journal_log is not None
-        for iteration, level, text in self._journal_log.told(entries, self._journal.notable):
-            self._tell(iteration, level, text)
+        for iteration, level, text in self._journal_log.lines(entries, self._journal.notable):
+            self._note(iteration, level, text)
         time = self._last_log_time or time_ns()
         return Messages(self._journal.channel, [(time, entries.message())])
 
     def _note_end(self, frontend: Frontend) -> None:
         """A backend that was killed could not write its end into the journal."""
-        if self._has_told_end or self._writer is None:
+        if self._end_noted or self._writer is None:
             return
-        self._has_told_end = True
+        self._end_noted = True
         texts = {"how": frontend.life, "last": str(frontend.published)}
         note = self._writer.note
-        self._file.add_metadata(note.end, note.run_texts() | texts)
+        self._file.add_metadata(note.record("end"), note.run_texts() | texts)
         if frontend.life in ("killed", "superseded"):
-            self._tell(frontend.published, ERROR, f"the backend was {frontend.life}")
+            self._note(frontend.published, ERROR, f"the backend was {frontend.life}")
 
-    def _tell(self, iteration: int, level: int, text: str) -> None:
+    def _note(self, iteration: int, level: int, text: str) -> None:
         """Adds a line to the log."""
         said = f"row {iteration}: {text}" if iteration >= 0 else text
         self.log.append(Line(self.name, self.log_time(iteration), level, said))

@@ -15,8 +15,7 @@ from o80.rows.layout import Layout
 
 TOPIC = "/tf"
 TYPE = "tf2_msgs/msg/TFMessage"
-WORLD = "world"
-"""Frame of the models' world, in which all poses are."""
+WORLD = "world"  #: frame of the models' world, in which all poses are
 DEFINITION = f"""\
 geometry_msgs/TransformStamped[] transforms
 {SEPARATOR}

@@ -5,15 +5,12 @@ from typing import Any
 from o80.base.machine import Machine, this_machine
 from o80.rows.provenance import Provenance
 
-TOLERANCE = 1e-9
-"""Largest difference that counts as equal where bits need not agree."""
+TOLERANCE = 1e-9  #: largest difference that counts as equal where bits need not agree
 
 
 def reads_the_world(schema: dict[str, Any]) -> str:
     """Why a robot must not be started for a replay, because it may be hardware; else empty."""
-    said_nothing = not schema.get("of_the_world")  # in old recordings
-    served = {request["name"] for request in schema["requests"]}
-    if schema.get("simulated") or (said_nothing and {"snapshot", "restore"} <= served):
+    if schema.get("simulated"):
         return ""
     return (
         "the robot may be hardware: it does not say that it is simulated (in describe "
@@ -50,7 +47,7 @@ def changes(recorded: Provenance, now: Provenance) -> list[str]:
     return found
 
 
-def other_arithmetic(recorded: Provenance, now: Provenance, machine: Machine | None) -> str:
+def other_arithmetic(recorded: Provenance, now: Provenance, machine: Machine) -> str:
     """Why rows may differ in their last bits although nothing is wrong; empty if they may not.
 
     machine: that the run was recorded on.
@@ -62,4 +59,4 @@ def other_arithmetic(recorded: Provenance, now: Provenance, machine: Machine | N
             f"another build of o80 {now.version} recorded it (sources {recorded.source_hash[:12]}, "
             f"these are {now.source_hash[:12]})"
         )
-    return machine.difference(this_machine()) if machine is not None else ""
+    return machine.difference(this_machine())

@@ -4,10 +4,12 @@ report = o80.replay("run.mcap")
 assert report.identical, report
 """
 
+import itertools
 import os
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,10 +39,10 @@ from o80.replaying.start import (
     find_start,
 )
 from o80.rows.columns import columns_of
+from o80.rows.history import History
 
 if TYPE_CHECKING:
     from o80.recording.reader import RecordingFile
-    from o80.rows.history import History
 
 Progress = Callable[[str, int, int], None]
 
@@ -106,24 +108,21 @@ def _runs_of(
     return runs
 
 
+@dataclass
 class RunReplay:
     """The replay of one run; the arguments are those of `replay`."""
 
-    def __init__(
-        self,
-        run: RecordedRun,
-        robot: OtherRobot = None,
-        options: Mapping[str, Any] | None = None,
-        tolerances: Mapping[str, float] | None = None,
-        ignore: tuple[str, ...] = (),
-        since: int | None = None,
-        driver: bool = True,
-        progress: Progress | None = None,
-    ) -> None:
-        self._run, self._robot, self._options = run, robot, options or {}
-        self._tolerances, self._ignore, self._progress = tolerances, ignore, progress
-        self._since = since
-        self._no_driver = reads_the_world(run.schema) if driver else "as requested"
+    run: RecordedRun
+    robot: OtherRobot = None
+    options: Mapping[str, Any] | None = None
+    tolerances: Mapping[str, float] | None = None
+    ignore: tuple[str, ...] = ()
+    since: int | None = None
+    driver: bool = True
+    progress: Progress | None = None
+
+    def __post_init__(self) -> None:
+        self._no_driver = reads_the_world(self.run.schema) if self.driver else "as requested"
         self._start = Start()
         self._rows = 0
         self._times = [0, 0]  # of the first and the last row compared [ns]
@@ -134,15 +133,15 @@ class RunReplay:
         begin = time.monotonic()
         difference = self._compare()
         return RunReport(
-            segment=self._run.segment,
-            number=self._run.number,
+            segment=self.run.segment,
+            number=self.run.number,
             first=self._start.row,
             rows=self._rows,
             difference=difference,
             gap="" if difference else self._gap,
             missing=tuple(self._missing() if difference is None else ()),
             driver=not self._no_driver,
-            unused=bool(self._no_driver and (self._robot or self._options)),
+            unused=bool(self._no_driver and (self.robot or self.options)),
             notes=tuple(self._notes),
             seconds=time.monotonic() - begin,
             recorded_seconds=(self._times[1] - self._times[0]) * 1e-9,
@@ -150,10 +149,10 @@ class RunReplay:
 
     def _missing(self) -> Iterator[str]:
         """Texts about rows that are not compared although the caller left nothing out."""
-        if self._rows and self._start.row > 0 and self._since is None:
+        if self._rows and self._start.row > 0 and self.since is None:
             yield f"rows before {self._start.row} were not compared"
         if not self._gap:
-            yield from self._run.missing
+            yield from self.run.missing
 
     def _compare(self) -> Difference | None:
         start = self._found_start()
@@ -168,15 +167,15 @@ class RunReplay:
         # without a driver, a restored snapshot is read as any other row
         known = Start() if self._no_driver else start
         rules = self._motion_rules()
-        slots = SlotsKept(Requests(self._run.schema), known)
-        feed = EntryFeed(self._run.entries(), start, slots, rules)
-        blocks = self._whole(self._run.blocks())
+        slots = SlotsKept(Requests(self.run.schema), known)
+        feed = EntryFeed(self.run.entries(), start, slots, rules)
+        blocks = self._whole(self.run.blocks())
         first = next(blocks, None)
         if first is None:
             return None
         with self._started() as runner:
             runner.begin_at(start)
-            for block in self._chain(first, blocks):
+            for block in itertools.chain([first], blocks):
                 runner.native.add(feed.read(int(block.iteration[-1])))
                 if int(block.iteration[-1]) > feed.until:
                     block = _settled(block.select(until=feed.until))
@@ -189,8 +188,8 @@ class RunReplay:
         return None
 
     def _motion_rules(self) -> MotionRules:
-        recorded = self._run.provenance.motion_rules
-        rules = MotionRules.of(self._run.schema, recorded, _core.MOTION_RULES)
+        recorded = self.run.provenance.motion_rules
+        rules = MotionRules.of(self.run.schema, recorded, _core.MOTION_RULES)
         if rules.differ:
             self._notes.append(
                 f"{rules}: rows are compared up to the first command that is not linear, or is of "
@@ -200,19 +199,19 @@ class RunReplay:
 
     def _found_start(self) -> Start | None:
         """Where to begin; None if nowhere: `_gap` says why."""
-        rows = (int(block.iteration[0]) for block in self._run.blocks() if len(block))
+        rows = (int(block.iteration[0]) for block in self.run.blocks() if len(block))
         first = next(rows, None)
         if first is None:
             return Start()
-        if self._since is None and first == 0:
-            entry = next(iter(self._run.entries()), None)
+        if self.since is None and first == 0:
+            entry = next(iter(self.run.entries()), None)
             if entry is None or not entry.missed:
                 return Start()
-        found = self._first_start(max(first, self._since or 0))
-        if found is None and first == 0 and self._since is None:
+        found = self._first_start(max(first, self.since or 0))
+        if found is None and first == 0 and self.since is None:
             return Start()  # says what the journal lacks
-        if found is None and self._since is not None:
-            self._gap = f"no {self._beginnings(' and no ')} is recorded from row {self._since} on"
+        if found is None and self.since is not None:
+            self._gap = f"no {self._beginnings(' and no ')} is recorded from row {self.since} on"
         elif found is None:
             self._gap = (
                 f"the first recorded row is row {first}: a replay begins at row 0, at a "
@@ -229,7 +228,7 @@ class RunReplay:
 
     def _first_start(self, since: int) -> Start | None:
         ways = (find_rest, find_fresh_start) if self._no_driver else (find_start, find_kept)
-        found = (find(self._run, since) for find in ways)
+        found = (find(self.run, since) for find in ways)
         return min((each for each in found if each), key=lambda each: each.row, default=None)
 
     def _beginnings(self, between: str) -> str:
@@ -240,12 +239,7 @@ class RunReplay:
         )
         return between.join(begins)
 
-    @staticmethod
-    def _chain(first: "History", others: "Iterator[History]") -> "Iterator[History]":
-        yield first
-        yield from others
-
-    def _whole(self, blocks: "Iterator[History]") -> "Iterator[History]":
+    def _whole(self, blocks: Iterator[History]) -> Iterator[History]:
         """Rows from the start to the first gap.
 
         No block ends with the row of a fresh start: the decisions after it are of the same step.
@@ -264,7 +258,7 @@ class RunReplay:
             if len(jumps):  # thinned
                 block = block[: int(jumps[0]) + 1]
             expected = int(block.iteration[-1]) + 1
-            whole = block if held is None else _joined(held, block)
+            whole = block if held is None else History._joined(block._decoder, [held, block])
             held = None
             settled = _settled(whole)
             if len(settled) < len(whole):
@@ -278,21 +272,21 @@ class RunReplay:
 
     def _started(self) -> AbstractContextManager[Runner]:
         if not self._no_driver:
-            return with_driver(self._run, self._robot, self._options, _HISTORY)
+            return with_driver(self.run, self.robot, self.options or {}, _HISTORY)
         self._notes.append(
             f"compared: desired states, from the recorded readings; not repeated: readings of the "
             f"world. No driver was started: {self._no_driver}"
         )
-        if self._robot or self._options:
+        if self.robot or self.options:
             self._notes.append("the robot and the options that were given are not used")
-        if blended := blended_columns(self._run.schema):
-            self._ignore = (*self._ignore, *blended)
+        if blended := blended_columns(self.run.schema):
+            self.ignore = (*self.ignore, *blended)
             self._notes.append(
                 f"not compared, because code of the driver interpolates them: {', '.join(blended)}"
             )
-        return without_driver(self._run, _HISTORY)
+        return without_driver(self.run, _HISTORY)
 
-    def _compare_block(self, runner: Runner, block: "History") -> Difference | None:
+    def _compare_block(self, runner: Runner, block: History) -> Difference | None:
         first, last = int(block.iteration[0]), int(block.iteration[-1])
         native = runner.native
         try:
@@ -307,8 +301,8 @@ class RunReplay:
             found = self._first_difference(block[: len(replayed)], replayed)
         except RobotsDifferError as error:
             raise InvalidArgument(
-                f"robot '{self._run.schema['robot']}' is described differently than when segment "
-                f"'{self._run.segment}' was recorded: {sentence(error)} Give the robot as it was "
+                f"robot '{self.run.schema['robot']}' is described differently than when segment "
+                f"'{self.run.segment}' was recorded: {sentence(error)} Give the robot as it was "
                 f"then (--robot FILE.so, in Python robot=), or compare only desired states "
                 f"(--without-driver, in Python driver=False)"
             ) from None
@@ -322,14 +316,14 @@ class RunReplay:
 
     def _note_changes(self, frontend: Frontend) -> None:
         """Says what has changed since the run, and adds a tolerance where bits need not agree."""
-        recorded, now = self._run.provenance, frontend.provenance
+        recorded, now = self.run.provenance, frontend.provenance
         if not self._no_driver:
             self._notes += changes(recorded, now)
-        why = other_arithmetic(recorded, now, self._run.machine)
+        why = other_arithmetic(recorded, now, self.run.machine)
         if not why:
             return
-        if self._tolerances is None:
-            self._tolerances = dict.fromkeys(self._numbers(frontend), TOLERANCE)
+        if self.tolerances is None:
+            self.tolerances = dict.fromkeys(self._numbers(frontend), TOLERANCE)
             why += f": numbers are compared with a tolerance of {TOLERANCE:g}"
         self._notes.append(why)
 
@@ -338,32 +332,26 @@ class RunReplay:
         parts = ["desired", "observed", "off_plan"] if frontend.actuators else []
         return [*parts, "extended"] if "extended" in frontend._layout.schema else parts
 
-    def _first_difference(self, recorded: "History", replayed: "History") -> Difference | None:
+    def _first_difference(self, recorded: History, replayed: History) -> Difference | None:
         if same_bytes(recorded, replayed):
             return None
         world = [each.name for each in columns_of(recorded.schema) if each.origin == "world"]
         return first_difference(
-            recorded, replayed, ignore=[*self._ignore, *world], tolerances=self._tolerances
+            recorded, replayed, ignore=[*self.ignore, *world], tolerances=self.tolerances
         )
 
-    def _count(self, compared: "History") -> None:
+    def _count(self, compared: History) -> None:
         if not len(compared):
             return
         if self._rows == 0:
             self._times[0] = int(compared.time[0])
         self._rows += len(compared)
         self._times[1] = int(compared.time[-1])
-        if self._progress is not None:
-            self._progress(self._run.segment, self._rows, self._run.rows)
+        if self.progress is not None:
+            self.progress(self.run.segment, self._rows, self.run.rows)
 
 
-def _settled(block: "History") -> "History":
+def _settled(block: History) -> History:
     """The block without fresh starts at its end: later decisions belong to the same step."""
     settled = np.flatnonzero(block.rows["fresh"] == 0)
     return block[: int(settled[-1]) + 1 if len(settled) else 0]
-
-
-def _joined(one: "History", other: "History") -> "History":
-    from o80.rows.history import History
-
-    return History._joined(one._decoder, [one, other])

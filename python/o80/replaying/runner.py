@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -68,16 +68,9 @@ def with_driver(
     own = options_of(run, loaded, {name: text_of(value) for name, value in options.items()})
     name = _core.unused_segment_name(loaded.name)
     period = run.schema["period"]
-    try:
-        native = _core.Replay(
-            loaded._library, name, _loop_options(run, history), [*own.items()], period
-        )
-        try:
-            yield Runner(native, "driver", period)
-        finally:
-            native.close()
-    finally:
-        _core.clean(name)
+    given = loaded._library, name, _loop_options(run, history), [*own.items()], period
+    with _removed_at_end(name), closing(_core.Replay(*given)) as native:
+        yield Runner(native, "driver", period)
 
 
 @contextmanager
@@ -88,14 +81,17 @@ def without_driver(run: "RecordedRun", history: int) -> Iterator[Runner]:
     """
     name = _core.unused_segment_name("replay")
     period = run.schema["period"]
+    given = run.description, name, _loop_options(run, history), period
+    with _removed_at_end(name), closing(_core.DriverlessReplay(*given)) as native:
+        yield Runner(native, "backend", period)
+
+
+@contextmanager
+def _removed_at_end(segment: str) -> Iterator[None]:
     try:
-        native = _core.DriverlessReplay(run.description, name, _loop_options(run, history), period)
-        try:
-            yield Runner(native, "backend", period)
-        finally:
-            native.close()
+        yield
     finally:
-        _core.clean(name)
+        _core.clean(segment)
 
 
 def _loop_options(run: "RecordedRun", history: int) -> list[tuple[str, str]]:

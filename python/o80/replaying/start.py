@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from o80.rows.layout import MASKS
+
 if TYPE_CHECKING:
     import o80._core as _core
     from o80.replaying.recorded_run import RecordedRun
@@ -95,17 +97,22 @@ class Purges:
         return is_inside and self._newest_purge[at - 1] > self._oldest_behind[at]
 
 
+def _fresh_starts(run: "RecordedRun") -> set[int]:
+    """Iterations of the fresh starts without a halt."""
+    return {
+        int(row)
+        for block in run.blocks()
+        for row in block.iteration[(block.rows["fresh"] != 0) & (block.rows["halted"] == 0)]
+    }
+
+
 def find_start(run: "RecordedRun", since: int) -> Start | None:
     """The first one at row `since` or later, or None.
 
     A reset determines the whole state of a simulation, and so does a restored snapshot that the
     journal holds. Nothing else may act on: no halt, no request that takes time.
     """
-    begun = {
-        int(row)
-        for block in run.blocks()
-        for row in block.iteration[(block.rows["fresh"] != 0) & (block.rows["halted"] == 0)]
-    }
+    begun = _fresh_starts(run)
     requests, purges = Requests(run.schema), Purges(run.entries())
     snapshots: dict[int, bytes] = {}
     sent: set[tuple[int, int]] = set()  # lane and id of requests
@@ -175,11 +182,7 @@ def find_fresh_start(run: "RecordedRun", since: int) -> Start | None:
     It drops all queues, and its row has the state of the robot. The batch that caused it must hold
     nothing else, because what follows in the batch acts after the fresh start.
     """
-    begun = {
-        int(row)
-        for block in run.blocks()
-        for row in block.iteration[(block.rows["fresh"] != 0) & (block.rows["halted"] == 0)]
-    }
+    begun = _fresh_starts(run)
     purges = Purges(run.entries())
     taken = (-1, -1, 0)  # iteration, lane and length of the last batch
     for entry in run.entries():
@@ -207,7 +210,7 @@ def find_rest(run: "RecordedRun", since: int) -> Start | None:
     for block in run.blocks():
         calm = (block.rows["fresh"] == 0) & (block.rows["halted"] == 0)
         calm &= block.iteration >= since
-        for mask in ("active", "clamped", "braking", "starved"):
+        for mask in MASKS:
             calm &= ~getattr(block, mask).any(axis=1)
         rows = block.iteration[calm]
         ranges = [each for each in ranges if len(block) == 0 or each[1] >= block.iteration[0]]
@@ -259,8 +262,7 @@ def _note(
 
 
 def times_from(times: np.ndarray[Any, Any], start: Start, first: int, period: int) -> Any:
-    """The times of a block of rows, and before the first row of a later start one more: that of the
-    row that shows the robot before it."""
+    """The times of a block of rows; at the first row of a later start, also the time before it."""
     if first != start.row or start.row == 0:
         return np.ascontiguousarray(times)
     return np.concatenate([times[:1] - period, times])

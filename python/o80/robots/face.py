@@ -15,8 +15,7 @@ from o80.base.errors import InvalidArgument, TimeoutError, exception_text
 from o80.frontend.frontend import Frontend
 from o80.frontend.segments import segments
 
-OF_SIMULATIONS = ("reset", "snapshot", "restore")
-"""Requests that every simulation adds to its own."""
+OF_SIMULATIONS = ("reset", "snapshot", "restore")  #: requests that every simulation adds to its own
 _LIMITS = {
     "minimum": -math.inf,
     **dict.fromkeys(("maximum", "speed", "acceleration", "jerk", "error"), math.inf),

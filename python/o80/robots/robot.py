@@ -7,7 +7,7 @@ import os
 import sys
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, overload
 
@@ -137,23 +137,23 @@ def preset_of(name: str) -> tuple[str, dict[str, Any]] | None:
 
     Raises DriverError if the options are not to be had here, with the reason.
     """
-    point = announced(GROUP).get(name)
-    if point is None or name in dict(_core.find_robots()):
-        return None
-    value = _value_of(point)
-    if not isinstance(value, tuple):
-        return None
-    robot, options = value
-    return robot, options()
+    value = _announced(name)
+    return (value[0], value[1]()) if isinstance(value, tuple) else None
 
 
 def _announced_class(name: str) -> type[Any] | None:
     """The driver class that a Python package announces under a name."""
-    point = announced(GROUP).get(name)
-    if point is None or name in dict(_core.find_robots()):
-        return None
-    value = _value_of(point)
+    value = _announced(name)
     return value if isinstance(value, type) else None
+
+
+def _announced(name: str) -> Any:
+    """Value of the entry point of a robot, unless a bundled one has its name; None: there is none.
+
+    Raises DriverError.
+    """
+    point = announced(GROUP).get(name)
+    return None if point is None or name in dict(_core.find_robots()) else _value_of(point)
 
 
 def _value_of(point: "EntryPoint") -> Any:
@@ -211,14 +211,9 @@ class Robot:
     @property
     def options(self) -> builtins.list[Option]:
         """The robot's own options, besides those of every robot."""
+        names = [field.name for field in fields(Option)]
         return [
-            Option(
-                name=option.name,
-                kind=option.kind,
-                default=option.default,
-                help=option.help,
-                unit=option.unit,
-            )
+            Option(**{name: getattr(option, name) for name in names})
             for option in self._library.options
         ]
 

@@ -1,14 +1,14 @@
 """Actuators of a robot: their numbers and limits, and tables of them."""
 
-import itertools
 import math
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from dataclasses import fields as fields_of
 from typing import Any
 
 from o80.base import argument_checks
 from o80.base.errors import InvalidArgument
+from o80.rows.columns import numbers_below
 
 ACTUATOR_HEADS = ("", "actuator", "state", "limits", "idle")
 
@@ -153,18 +153,6 @@ class Actuator:
         return self.numbers[0].speed
 
 
-def names_of(described: dict[str, Any], path: str = "") -> Iterator[tuple[str, str, str]]:
-    """Path, unit and help of every number of a described type, in order."""
-    for field in described["fields"]:
-        inner = f"{path}.{field['name']}" if path and field["name"] else path or field["name"]
-        for place in itertools.product(*map(range, field["shape"])):
-            here = inner + "".join(f"[{i}]" for i in place)
-            if field["kind"] == "struct":
-                yield from names_of(field["type"], here)
-            else:
-                yield here, field["unit"], field["help"]
-
-
 def _limits(described: dict[str, Any], paths: list[str]) -> Limits:
     """The limits of one number. paths: names of all numbers of the state."""
     given = {key: described[key] for key in LIMITS if described.get(key) is not None}
@@ -179,17 +167,17 @@ def actuators_of(schema: dict[str, Any]) -> list[Actuator]:
     actuators = []
     for index, row in enumerate(schema["actuators"]):
         group = schema["groups"][row["group"]]
-        names = [*names_of(group["type"])]
-        paths = [name for name, _, _ in names]
+        columns = [*numbers_below(group["type"])]
+        paths = [column.name for column in columns]
         numbers = tuple(
             Number(
-                name=name,
-                unit=unit,
-                help=text,
+                name=column.name,
+                unit=column.unit,
+                help=column.help,
                 limits=_limits(limit, paths),
                 rest=limit.get("rest"),
             )
-            for (name, unit, text), limit in zip(names, row["limits"], strict=True)
+            for column, limit in zip(columns, row["limits"], strict=True)
         )
         actuators.append(
             Actuator(

@@ -21,6 +21,7 @@ class Column(NamedTuple):
     labels: dict[str, int] | None  #: of an enumeration
     origin: str = "robot"  #: or "clock" or "world", from which its value comes (docs/drivers.md)
     unit: str = ""
+    help: str = ""
 
 
 def columns_of(schema: Mapping[str, Any]) -> Iterator[Column]:
@@ -33,28 +34,33 @@ def columns_of(schema: Mapping[str, Any]) -> Iterator[Column]:
             offset = row[part] + group["offset"]
             offset += counts[actuator["group"]] * group["type"]["size"]
             counts[actuator["group"]] += 1
-            yield from _numbers(group["type"], f"{part}.{actuator['name']}", offset)
+            yield from numbers_below(group["type"], f"{part}.{actuator['name']}", offset)
     if "extended" in schema:
-        yield from _numbers(schema["extended"], "extended", row["extended"])
+        yield from numbers_below(schema["extended"], "extended", row["extended"])
 
 
-def _numbers(
-    described: dict[str, Any], path: str, start: int, outer: str = "robot"
+def columns_of_part(schema: Mapping[str, Any], part: str) -> list[Column]:
+    """The columns of "desired", "observed" or "extended" numbers."""
+    return [each for each in columns_of(schema) if each.name.startswith(f"{part}.")]
+
+
+def numbers_below(
+    described: Mapping[str, Any], path: str = "", start: int = 0, outer: str = "robot"
 ) -> Iterator[Column]:
-    """The columns of a described type, in order. outer: origin of the field that holds it."""
+    """The numbers of a described type, in order. outer: origin of the field that holds it."""
     for field in described["fields"]:
         origin = field.get("origin", outer)
-        inner = f"{path}.{field['name']}" if field["name"] else path
+        inner = ".".join(filter(None, (path, field["name"])))
         dtype = dtype_of_field(field)
         places = itertools.product(*map(range, field["shape"]))
         for i, place in enumerate(places):
             name = inner + "".join(f"[{k}]" for k in place)
             offset = start + field["offset"] + i * dtype.itemsize
             if field["kind"] == "struct":
-                yield from _numbers(field["type"], name, offset, origin)
+                yield from numbers_below(field["type"], name, offset, origin)
             else:
                 labels = labels_of_field(field)._labels_ if field["kind"] == "enum" else None
-                yield Column(name, dtype, offset, labels, origin, field["unit"])
+                yield Column(name, dtype, offset, labels, origin, field["unit"], field["help"])
 
 
 def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:
@@ -63,7 +69,7 @@ def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:
     Raises InvalidArgument if there is none.
     """
     columns = list(columns_of(schema))
-    found = [c for c in columns if c.name == path or c.name.startswith((path + ".", path + "["))]
+    found = [column for column in columns if is_within(column.name, path)]
     if not found:
         found = [c for c in columns if _group_path(c, schema) == path]
     if not found:
@@ -81,9 +87,7 @@ def _group_path(column: Column, schema: Mapping[str, Any]) -> str:
     """The path of the group of a state: "observed.joints"."""
     part, _, rest = column.name.partition(".")
     for actuator in schema["actuators"] if part != "extended" else ():
-        if rest == actuator["name"] or rest.startswith(
-            (actuator["name"] + ".", actuator["name"] + "[")
-        ):
+        if is_within(rest, actuator["name"]):
             return f"{part}.{schema['groups'][actuator['group']]['name']}"
     return ""
 
@@ -99,12 +103,14 @@ def numbers_in(row: Any, layout: Layout, path: str) -> Any:
     return values[0] if len(values) == 1 else np.array(values)
 
 
+def is_within(column: str, path: str) -> bool:
+    """Whether a path names a column, or what it is part of."""
+    return column == path or column.startswith((path + ".", path + "["))
+
+
 def is_part(column: str, field: str) -> bool:
     """Whether a field such as "observed.elbow", "elbow" or "extended" names or holds a column."""
-    for name in (column, column.partition(".")[2]):
-        if name == field or name.startswith((field + ".", field + "[")):
-            return True
-    return False
+    return is_within(column, field) or is_within(column.partition(".")[2], field)
 
 
 def chosen(robot: str, columns: Sequence[str], fields: Sequence[str]) -> list[str]:

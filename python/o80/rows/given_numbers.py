@@ -1,13 +1,14 @@
 """The numbers of several actuators that rows of targets give."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80.rows.actuators import actuators_of
-from o80.rows.layout import Layout, dtype_of_type, labels_of_type, runs_of
+from o80.rows.columns import numbers_below
+from o80.rows.layout import Layout, dtype_of_type
 from o80.rows.plans import NumberLimits, limits_of
 
 
@@ -36,7 +37,12 @@ class GivenNumbers:
         words = iter(masks)
         self._numbers: list[_Number] = []
         for place, described in enumerate(types):
-            numbers = [*_numbers_of(place, described)]
+            numbers = [
+                _Number(
+                    place, each.dtype, each.offset, nth, each.dtype.kind == "b" or bool(each.labels)
+                )
+                for nth, each in enumerate(numbers_below(described))
+            ]
             count = -(-len(numbers) // 64)
             bits = sum(next(words) << 64 * i for i in range(count)) if masks else -1
             self._numbers += [each for each in numbers if bits >> each.nth & 1]
@@ -73,18 +79,3 @@ class GivenNumbers:
         """(numbers,) the desired values in an observation, read from its memory."""
         numbers = zip(self._numbers, self._in_row, strict=True)
         return np.array([np.ndarray((), each.kind, row, at) for each, at in numbers], np.float64)
-
-
-def _numbers_of(place: int, described: dict[str, Any]) -> Iterator[_Number]:
-    kind, labels = dtype_of_type(described), labels_of_type(described)
-    fields = [("", kind, 0)]
-    if kind.names is not None and kind.fields is not None:
-        fields = [(name, *kind.fields[name][:2]) for name in kind.names]
-    index = 0
-    for name, field, offset in fields:
-        of_field = labels.get(name) if isinstance(labels, Mapping) else labels
-        for number, at, count in runs_of(field, offset):
-            switches = number.kind == "b" or isinstance(of_field, type)
-            for i in range(count):
-                yield _Number(place, number, at + i * number.itemsize, index, switches)
-                index += 1

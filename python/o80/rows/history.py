@@ -1,9 +1,9 @@
 """Many observations at once."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self, overload
+from typing import TYPE_CHECKING, Any, Self, TypedDict, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 import o80._core as _core
 from o80.base.argument_checks import whole, whole_or_none
 from o80.base.errors import InvalidArgument, RowOverwritten
-from o80.rows.layout import with_padding
+from o80.rows.layout import MASKS, Layout, with_padding
 from o80.rows.record import Record, States
 
 if TYPE_CHECKING:
@@ -23,6 +23,16 @@ LONGEST = 2.0**62  # duration [ns], 146 years
 _HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted", "starvations")
 _ENDS = 5  # rows of each end of a history that a notebook shows
 _COLUMNS = 16  # most numbers of its rows
+
+
+class Range(TypedDict, total=False):
+    """The keywords of `Frontend.history`."""
+
+    since: int | None
+    until: int | None
+    seconds: float | None
+    from_time: int | None
+    to_time: int | None
 
 
 @dataclass(frozen=True)
@@ -40,11 +50,11 @@ class Selection:
     def checked(
         cls,
         n: int | None,
-        since: int | None,
-        until: int | None,
-        seconds: float | None,
-        from_time: int | None,
-        to_time: int | None,
+        since: int | None = None,
+        until: int | None = None,
+        seconds: float | None = None,
+        from_time: int | None = None,
+        to_time: int | None = None,
     ) -> Self:
         """Makes a selection from the arguments of a call. Raises InvalidArgument."""
         ends = since, until, from_time, to_time
@@ -105,7 +115,7 @@ class History:
         """Raises InvalidArgument if the rows do not lie as the description says."""
         decoder.layout.check(rows)
         self._decoder = decoder
-        self._layout = decoder.layout
+        self._layout: Layout = decoder.layout
         self.rows = rows  #: structured array (T,): whole rows, as in the segment
 
     @classmethod
@@ -121,8 +131,7 @@ class History:
     @property
     def schema(self) -> dict[str, Any]:
         """The description of the robot."""
-        schema: dict[str, Any] = self._layout.schema
-        return schema
+        return self._layout.schema
 
     @overload
     def __getitem__(self, index: int) -> _core.Observation: ...
@@ -229,7 +238,16 @@ class History:
 
         Raises MissingExtra without pandas.
         """
-        return _frame_of(self)
+        from o80.base.extras import needed
+        from o80.rows.columns import columns_of
+
+        pandas = needed("pandas", "pandas", "a data frame")
+        data: dict[str, Any] = columns_in(self)
+        index = pandas.Index(data.pop("iteration"), name="iteration")
+        for column in columns_of(self.schema):
+            if column.labels is not None:
+                data[column.name] = _categories(pandas, data[column.name], column.labels)
+        return pandas.DataFrame(data, index=index)
 
     @property
     def iteration(self) -> NDArray[np.int64]:
@@ -280,44 +298,37 @@ class History:
     @property
     def desired(self) -> States:
         """The desired states: (T, actuators), or a record of groups."""
-        states: States = self._layout.many(self.rows, "desired")
-        return states
+        return self._layout.many(self.rows, "desired")
 
     @property
     def observed(self) -> States:
         """The observed states: (T, actuators), or a record of groups."""
-        states: States = self._layout.many(self.rows, "observed")
-        return states
+        return self._layout.many(self.rows, "observed")
 
     @property
     def extended(self) -> Record:
         """Further sensor values: a record with an array (T, ...) for each field."""
-        extended: Record = self._layout.many_extras(self.rows)
-        return extended
+        return self._layout.many_extras(self.rows)
 
     @property
     def active(self) -> NDArray[np.bool_]:
         """True where a command or braking gave the desired state: (T, actuators)."""
-        mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "active")
-        return mask
+        return self._layout.many_masks(self.rows, "active")
 
     @property
     def clamped(self) -> NDArray[np.bool_]:
         """True where the limits changed the desired state: (T, actuators)."""
-        mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "clamped")
-        return mask
+        return self._layout.many_masks(self.rows, "clamped")
 
     @property
     def braking(self) -> NDArray[np.bool_]:
         """True where the actuator comes to rest without a command: (T, actuators)."""
-        mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "braking")
-        return mask
+        return self._layout.many_masks(self.rows, "braking")
 
     @property
     def starved(self) -> NDArray[np.bool_]:
         """True where a plan of chunks has no row left and is not closed: (T, actuators)."""
-        mask: NDArray[np.bool_] = self._layout.many_masks(self.rows, "starved")
-        return mask
+        return self._layout.many_masks(self.rows, "starved")
 
     @property
     def off_plan(self) -> NDArray[np.float32]:
@@ -331,8 +342,7 @@ class History:
 
     def flat(self, dtype: Any = None) -> NDArray[Any]:
         """All observed numbers, then all extended ones: (T, numbers), float32 by default."""
-        numbers: NDArray[Any] = self._layout.many_flat(self.rows, dtype)
-        return numbers
+        return self._layout.many_flat(self.rows, dtype)
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
         """The rows, for NumPy and h5py."""
@@ -353,7 +363,30 @@ class History:
 
     def _repr_html_(self) -> str:
         """As a table of a notebook: the first and the last rows."""
-        return _html_of(self)
+        from o80.base.screen import html  # late: most processes show no table
+        from o80.rows.columns import columns_of
+
+        columns = [*columns_of(self.schema)]
+        shown = columns[:_COLUMNS]
+        more = (
+            f"; {len(columns) - len(shown)} more numbers a row" if len(columns) > _COLUMNS else ""
+        )
+        count = len(self)
+        places = [*range(count)]
+        if count > 2 * _ENDS:
+            places = [*range(_ENDS), *range(count - _ENDS, count)]
+        rows: list[list[Any]] = []
+        for place in places:
+            row = self.rows[place : place + 1]
+            rows.append([row["iteration"][0], row["time"][0]])
+            for column in shown:
+                value = row.getfield(column.dtype, column.offset)[0].item()
+                words = [word for word, number in (column.labels or {}).items() if number == value]
+                rows[-1].append(words[0] if words else f"{value:.6g}")
+        if len(places) < count:
+            rows.insert(_ENDS, ["…"] * (2 + len(shown)))
+        heads = ["iteration", "time [ns]", *(column.name for column in shown)]
+        return html(heads, rows, f"{count} observations{more}")
 
     def __repr__(self) -> str:
         if not len(self):
@@ -368,6 +401,14 @@ def values_of(history: History, column: "Column") -> NDArray[Any]:
     return values
 
 
+def numbers_of(history: History, columns: Sequence["Column"]) -> NDArray[np.float64]:
+    """The numbers of columns: (T, columns)."""
+    numbers = np.empty((len(history), len(columns)))
+    for i, column in enumerate(columns):
+        numbers[:, i] = values_of(history, column)
+    return numbers
+
+
 def columns_in(history: History) -> dict[str, NDArray[Any]]:
     """All numbers of all rows, by name, as in `History.to_frame`; enumerations as numbers."""
     from o80.rows.columns import columns_of  # late: most processes that attach never ask
@@ -376,24 +417,10 @@ def columns_in(history: History) -> dict[str, NDArray[Any]]:
     for column in columns_of(history.schema):
         columns[column.name] = values_of(history, column)
     names = [actuator["name"] for actuator in history.schema["actuators"]]
-    for part in ("active", "clamped", "braking", "starved", "off_plan"):
+    for part in (*MASKS, "off_plan"):
         mask = getattr(history, part)
         columns.update({f"{part}.{name}": mask[:, i].copy() for i, name in enumerate(names)})
     return columns
-
-
-def _frame_of(history: History) -> "pandas.DataFrame":
-    """A row for each observation, a column for each number."""
-    from o80.base.extras import needed
-    from o80.rows.columns import columns_of
-
-    pandas = needed("pandas", "pandas", "a data frame")
-    data: dict[str, Any] = columns_in(history)
-    index = pandas.Index(data.pop("iteration"), name="iteration")
-    for column in columns_of(history.schema):
-        if column.labels is not None:
-            data[column.name] = _categories(pandas, data[column.name], column.labels)
-    return pandas.DataFrame(data, index=index)
 
 
 def _categories(pandas: Any, values: NDArray[Any], labels: dict[str, int]) -> Any:
@@ -402,32 +429,6 @@ def _categories(pandas: Any, values: NDArray[Any], labels: dict[str, int]) -> An
     for code, value in enumerate(labels.values()):
         codes[values == value] = code
     return pandas.Categorical.from_codes(codes, list(labels))
-
-
-def _html_of(history: History) -> str:
-    """The first and the last rows of a history."""
-    from o80.base.screen import html  # late: most processes show no table
-    from o80.rows.columns import columns_of
-
-    columns = [*columns_of(history.schema)]
-    shown = columns[:_COLUMNS]
-    more = f"; {len(columns) - len(shown)} more numbers a row" if len(columns) > _COLUMNS else ""
-    count = len(history)
-    places = [*range(count)]
-    if count > 2 * _ENDS:
-        places = [*range(_ENDS), *range(count - _ENDS, count)]
-    rows: list[list[Any]] = []
-    for place in places:
-        row = history.rows[place : place + 1]
-        rows.append([row["iteration"][0], row["time"][0]])
-        for column in shown:
-            value = row.getfield(column.dtype, column.offset)[0].item()
-            words = [word for word, number in (column.labels or {}).items() if number == value]
-            rows[-1].append(words[0] if words else f"{value:.6g}")
-    if len(places) < count:
-        rows.insert(_ENDS, ["…"] * (2 + len(shown)))
-    heads = ["iteration", "time [ns]", *(column.name for column in shown)]
-    return html(heads, rows, f"{count} observations{more}")
 
 
 def _nanoseconds(seconds: float) -> int:

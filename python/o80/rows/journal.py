@@ -114,7 +114,7 @@ def marks_in(entries: Iterable[JournalEntry]) -> list[tuple[str, int]]:
 
 
 class Decisions(NamedTuple):
-    """The N batches that were taken and said by which row they were decided, in their order."""
+    """The N taken batches with a `seen` row, oldest first."""
 
     taken: NDArray[np.int64]  #: (N,) the iteration that took it
     epoch: NDArray[np.uint64]  #: (N,) the run that published the row
@@ -123,7 +123,7 @@ class Decisions(NamedTuple):
 
     @property
     def latency(self) -> NDArray[np.int64]:
-        """(M,) the decision latency of those of which it is known [iterations]."""
+        """(M,) the decision latencies that are known [iterations]."""
         latency: NDArray[np.int64] = (self.taken - self.since)[self.since >= 0]
         return latency
 

@@ -16,7 +16,7 @@ def _without_style(text: str, _style: str) -> str:
 
 
 class JournalText:
-    """Tells entries in words; remembers commands that have not ended, to name them at their end."""
+    """Describes entries in words; keeps commands that have not ended, to name them at their end."""
 
     def __init__(self, style: Callable[[str, str], str] = _without_style) -> None:
         """style: marks a text as in `o80.base.screen.style`."""

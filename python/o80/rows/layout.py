@@ -1,7 +1,7 @@
 """Conversion of a robot's rows to NumPy arrays."""
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import lru_cache
+from functools import lru_cache, partialmethod
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import o80._core as _core
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument
 from o80.rows.enumerations import Enumeration, enumeration_of, labelled
-from o80.rows.record import Fields, Record
+from o80.rows.record import Fields, Record, States
 
 HEAD = (
     ("iteration", "i8"),
@@ -23,6 +23,7 @@ HEAD = (
     ("halted", "u4"),
     ("starvations", "i8"),
 )
+MASKS = ("active", "clamped", "braking", "starved")  #: parts of a row with a bit for each actuator
 
 
 def dtype_of_field(field: dict[str, Any]) -> np.dtype[Any]:
@@ -191,20 +192,13 @@ class Layout:
     def __init__(self, description: _core.Description) -> None:
         schema = description.schema()
         row = schema["row"]
-        self.schema = schema
+        self.schema: dict[str, Any] = schema
         self._description = description
         self.size: int = row["size"]
         self.actuators = len(schema["actuators"])
         self.states = dtype_of_block(schema["groups"], row["observed"] - row["desired"])
         self.extras = dtype_of_type(schema["extended"]) if "extended" in schema else np.dtype([])
-        self._desired_at: int = row["desired"]
-        self._observed_at: int = row["observed"]
-        self._extended_at: int = row["extended"]
-        self._active_at: int = row["active"]
-        self._clamped_at: int = row["clamped"]
-        self._braking_at: int = row["braking"]
-        self._starved_at: int = row["starved"]
-        self._off_plan_at: int = row["off_plan"]
+        self._at: dict[str, int] = row
         self._mask_bytes: int = row["mask_words"] * 8
         self._is_array = self.states.subdtype is not None
         self._element, self._shape = self.states.subdtype or (self.states, ())
@@ -231,17 +225,12 @@ class Layout:
         parts = [(name, np.dtype(kind), self.schema["row"][name]) for name, kind in HEAD]
         if self.actuators:
             mask = np.dtype(("u1", (self._mask_bytes,)))
-            parts += [
-                ("desired", self.states, self._desired_at),
-                ("observed", self.states, self._observed_at),
-                ("active", mask, self._active_at),
-                ("clamped", mask, self._clamped_at),
-                ("braking", mask, self._braking_at),
-                ("starved", mask, self._starved_at),
-                ("off_plan", np.dtype(("f4", (self.actuators,))), self._off_plan_at),
-            ]
+            off_plan = np.dtype(("f4", (self.actuators,)))
+            kinds = {"desired": self.states, "observed": self.states, "off_plan": off_plan}
+            kinds |= dict.fromkeys(MASKS, mask)
+            parts += [(name, kind, self._at[name]) for name, kind in kinds.items()]
         if self.extras.itemsize:
-            parts.append(("extended", self.extras, self._extended_at))
+            parts.append(("extended", self.extras, self._at["extended"]))
         # NumPy saves only fields that are in the order of their offsets
         parts.sort(key=lambda part: part[2])
         names, formats, offsets = zip(*parts, strict=True)
@@ -255,8 +244,8 @@ class Layout:
         return joined(
             run
             for dtype, offset in (
-                (self.states, self._observed_at),
-                (self.extras, self._extended_at),
+                (self.states, self._at["observed"]),
+                (self.extras, self._at["extended"]),
             )
             for run in runs_of(dtype, offset)
         )
@@ -291,11 +280,14 @@ class Layout:
             return states
         return labelled(states, self.labels[""]) if self._is_array else Record(states, self.labels)
 
-    def labelled_states(self, states: NDArray[Any]) -> NDArray[Any]:
-        """The same states as an array to write: it takes labels."""
-        array: NDArray[Any] = labelled(
-            states, self.labels.get("") if self._is_array else self.labels
-        )
+    def states_in(self, buffer: Any, offset: int = 0) -> NDArray[Any]:
+        """The states of all actuators in a buffer, a view."""
+        return np.ndarray(self._shape, self._element, buffer, offset)
+
+    def labelled_states(self, buffer: Any) -> NDArray[Any]:
+        """The states in a buffer as an array to write: it takes labels."""
+        labels = self.labels.get("") if self._is_array else self.labels
+        array: NDArray[Any] = labelled(self.states_in(buffer), labels)
         return array
 
     def labelled_extras(self, buffer: Any) -> NDArray[Any]:
@@ -305,36 +297,30 @@ class Layout:
 
     # one row, as a buffer => arrays over its memory
 
-    def _block(self, row: Any, offset: int) -> Any:
-        return self.of_states(np.ndarray(self._shape, self._element, row, offset))
+    def _states(self, part: str, row: Any) -> Any:
+        return self.of_states(self.states_in(row, self._at[part]))
 
-    def desired(self, row: Any) -> Any:
-        return self._block(row, self._desired_at)
-
-    def observed(self, row: Any) -> Any:
-        return self._block(row, self._observed_at)
+    desired = partialmethod(_states, "desired")
+    observed = partialmethod(_states, "observed")
 
     def extended(self, row: Any) -> Record:
-        return Record(np.ndarray((), self.extras, row, self._extended_at), self.extended_labels)
+        return Record(np.ndarray((), self.extras, row, self._at["extended"]), self.extended_labels)
 
-    def _mask(self, row: Any, offset: int) -> NDArray[np.bool_]:
-        bits = np.ndarray((self._mask_bytes,), np.uint8, row, offset)
+    def mask_in(self, buffer: Any, offset: int = 0) -> NDArray[np.bool_]:
+        """(actuators,) the mask in a buffer, a bit for each actuator."""
+        bits = np.ndarray((self._mask_bytes,), np.uint8, buffer, offset)
         return np.unpackbits(bits, count=self.actuators, bitorder="little").view(np.bool_)
 
-    def active(self, row: Any) -> NDArray[np.bool_]:
-        return self._mask(row, self._active_at)
+    def _mask(self, part: str, row: Any) -> NDArray[np.bool_]:
+        return self.mask_in(row, self._at[part])
 
-    def clamped(self, row: Any) -> NDArray[np.bool_]:
-        return self._mask(row, self._clamped_at)
-
-    def braking(self, row: Any) -> NDArray[np.bool_]:
-        return self._mask(row, self._braking_at)
-
-    def starved(self, row: Any) -> NDArray[np.bool_]:
-        return self._mask(row, self._starved_at)
+    active = partialmethod(_mask, "active")
+    clamped = partialmethod(_mask, "clamped")
+    braking = partialmethod(_mask, "braking")
+    starved = partialmethod(_mask, "starved")
 
     def off_plan(self, row: Any) -> NDArray[np.float32]:
-        return np.ndarray((self.actuators,), np.float32, row, self._off_plan_at)
+        return np.ndarray((self.actuators,), np.float32, row, self._at["off_plan"])
 
     def flat(self, row: Any, dtype: Any = None) -> NDArray[Any]:
         kind = np.dtype(np.float32 if dtype is None else dtype)
@@ -365,11 +351,11 @@ class Layout:
             f"single fields, such as history.observed"
         )
 
-    def many(self, rows: NDArray[Any], part: str) -> Any:
+    def many(self, rows: NDArray[Any], part: str) -> States:
         """The states of an array of rows: (T, actuators), or a record of groups."""
-        if not self.actuators:
-            return Record(np.empty(len(rows), np.dtype([])))
-        return self.of_states(rows[part])
+        nothing: Any = Record(np.empty(len(rows), np.dtype([])))
+        states: States = self.of_states(rows[part]) if self.actuators else nothing
+        return states
 
     def many_extras(self, rows: NDArray[Any]) -> Record:
         """The extended values of an array of rows."""

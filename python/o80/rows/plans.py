@@ -42,7 +42,7 @@ class Decision:
 
 
 def decide(sent: ChunkRows, taken: int, shift: int, stood: bool) -> Decision:
-    """As the loop decides (src/control/receiving/chunk_rows.cpp), from what its status tells."""
+    """The decision of the loop (src/control/receiving/chunk_rows.cpp), from a chunk's status."""
     anchor = sent.anchor + shift
     first = 0 if stood else sent.first
     begins = max(taken, anchor + (int(sent.due[first - 1]) if first else 0) + 1)

@@ -246,7 +246,7 @@ def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]
 
 
 def first_fields(actuators: Sequence[int], layout: Layout) -> list[int]:
-    """Words with a bit for each number that an array of targets gives, as those of states_of()."""
+    """Mask of the numbers that an array of targets gives, as `states_of` returns it."""
     kinds = state_types(actuators, layout)
     masks = [_mask_of(kind.names[:1], kind) if kind.names else [] for kind in kinds]
     if not any(masks):

@@ -89,7 +89,7 @@ class Answers:
                 continue
             shown = self._shown_of(source, wait=False)
             if shown is not None and shown.scene is not None:
-                found[source.label]["pose"] = shown.scene.poses(_bytes_of(row), row.active)["pose"]
+                found[source.label]["pose"] = shown.scene.poses(row)["pose"]
                 if known.get(source.label) != source.key:
                     found[source.label]["scene"] = shown.scene.geometry
         return found
@@ -114,7 +114,7 @@ class Answers:
         if query.get("key") != source.key:
             answer["new"] = shown.introduction(source)
         if shown.scene is not None:
-            answer |= shown.scene.poses(_bytes_of(row), row.active)
+            answer |= shown.scene.poses(row)
         panels = query.get("panels")
         panels = shown.panels.first if not isinstance(panels, list) else [str(p) for p in panels]
         answer["values"] = shown.panels.values(row, panels)
@@ -222,10 +222,6 @@ def _marks_in(rows: History, marks: Sequence[tuple[str, int]], begin: int) -> li
     ][-MAX_MARKS:]
 
 
-def _bytes_of(row: Any) -> bytes:
-    return bytes(memoryview(row))
-
-
 def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
     for source in sources:
         if source.label == label:
@@ -234,7 +230,7 @@ def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
 
 
 def first_of(sources: Sequence[Source]) -> Source | None:
-    """The source that a page opens on: one with a model, best one that stands."""
+    """The source that a page shows first: with a fixed model, else with any model, else any."""
     models = [source for source in sources if source.drawn is not None]
     standing = [source for source in models if source.drawn and not source.drawn.standing.floats]
     return next(iter([*standing, *models, *sources]), None)
@@ -319,7 +315,7 @@ class AnswerCache:
         self._lock = threading.Lock()
 
     def get(self, query: Hashable, work: Callable[[], Any]) -> Any:
-        """The answer of `work`, or the one that another page has just got."""
+        """Returns the cached answer to this query, or calls `work` and caches its result."""
         with self._lock:
             begin = time.monotonic()
             until, answer = self._answers.get(query, (0.0, None))

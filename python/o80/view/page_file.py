@@ -166,7 +166,7 @@ class _Recorded:
         poses: dict[str, list[Any]] = {"pose": [], "ghost": []}
         for tick in self.ticks.tolist():
             row: Any = self.rows[tick]
-            found = scene.poses(bytes(memoryview(row)), row.active)
+            found = scene.poses(row)
             for kind, texts in poses.items():
                 if found[kind] is not None:
                     texts.append(np.frombuffer(base64.b64decode(found[kind]), "f4"))

@@ -6,7 +6,7 @@ import os
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,23 +15,16 @@ from o80.base.arrays import Image
 from o80.base.errors import InvalidArgument
 from o80.base.extras import needed
 from o80.base.lifecycle import Closeable
+from o80.frontend.frontend import Frontend
 from o80.view.scene import Scene
+from o80.view.source import Source
 from o80.view.world import drawn
+
+if TYPE_CHECKING:
+    from o80.recording.recorded_epoch import RecordedEpoch
 
 SHADOWS = 1024
 """Size of the map of shadows [pixels]: finer ones take software renderers much longer."""
-
-
-class Modelled(Protocol):
-    """A robot with a model: a frontend, or a run of a recording."""
-
-    @property
-    def schema(self) -> dict[str, Any]:
-        """The description of the robot."""
-
-    @property
-    def model(self) -> str:
-        """The model (MJCF); empty if the driver names none."""
 
 
 class Pictures(Closeable):
@@ -49,7 +42,7 @@ class Pictures(Closeable):
 
     def __init__(
         self,
-        robot: Modelled,
+        robot: "Frontend | RecordedEpoch | Source",
         *,
         size: tuple[int, int] = (480, 360),
         camera: str | int | None = None,
@@ -77,8 +70,7 @@ class Pictures(Closeable):
         """A fresh picture (height, width, 3) of where a row observed the robot."""
         if self._renderer is None:
             raise InvalidArgument("these pictures were closed; make new ones")
-        bytes_of_row: Any = row
-        return self._scene.picture(bytes(memoryview(bytes_of_row)), self._renderer, self._camera)
+        return self._scene.picture(row, self._renderer, self._camera)
 
     def close(self) -> None:
         """Gives the renderer back; may be called twice."""

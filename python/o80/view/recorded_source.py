@@ -2,13 +2,15 @@
 
 import threading
 from bisect import bisect
-from collections.abc import Mapping, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from o80._core import Observation
 from o80.base.errors import Error
+from o80.recording.marks import Mark
 from o80.recording.recorded_epoch import RecordedEpoch
 from o80.rows.history import History
 from o80.rows.plans import ChunkEntries, Planned, planned_by_chunks
@@ -31,19 +33,22 @@ class RecordedSource(Source):
         name: str,
         number: int,
         epoch: RecordedEpoch,
-        marks: Sequence[tuple[str, int]] = (),
-        moments: Mapping[Moment, tuple[int, int]] | None = None,
+        marks: Sequence[Mark],
         *,
         model_files: bool = False,
     ) -> None:
-        """moments: of this run, iteration and wall-clock time [ns] of each mark."""
+        """marks: of this run."""
         self.trusted = model_files
         self.name = name
         self.label = f"{name}, run {number + 1}" if number else name
         self.key = f"recorded {name} {number} {epoch.epoch}"
         self._epoch = epoch
-        self._marks = marks
-        self._moments = moments or {}
+        self._marks = [(mark.name, mark.rows[name]) for mark in marks]
+        counts: Counter[str] = Counter()
+        self._moments: dict[Moment, tuple[int, int]] = {}  # iteration and wall clock [ns]
+        for mark in marks:
+            self._moments[mark.name, counts[mark.name]] = mark.rows[name], mark.time
+            counts[mark.name] += 1
         self._times: dict[Moment, int] = {}
         self._chunks = epoch.chunk_times
         self._lock = threading.Lock()

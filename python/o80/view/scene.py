@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from o80._core import Observation
 from o80.base.arrays import Image
 from o80.base.errors import Error, MissingExtra
 from o80.view.base64_arrays import packed, packed_indices
@@ -86,17 +87,15 @@ class Scene:
             value["name"], body, address, count, observed, desired, follows, factor, shift
         )
 
-    def poses(self, row: bytes, active: NDArray[np.bool_]) -> dict[str, Any]:
-        """Positions and quaternions of the moving bodies (bodies, 7), observed and desired.
-
-        active: actuators that a command drives.
-        """
+    def poses(self, row: Observation) -> dict[str, Any]:
+        """Positions and quaternions of the moving bodies (bodies, 7), observed and desired."""
         found: dict[str, Any] = {"pose": None, "ghost": None, "not_finite": []}
         with self._lock:
             observed = [place.observed for place in self._places]
             pose = self._pose(row, observed, found["not_finite"])
             found["pose"] = packed(pose.astype(np.float32))
             if self._has_ghost:
+                active = row.active
                 desired = [place.wanted(active) for place in self._places]
                 found["ghost"] = packed(self._pose(row, desired, []).astype(np.float32))
         return found
@@ -112,7 +111,7 @@ class Scene:
         """The compiled model."""
         return self._model
 
-    def picture(self, row: bytes, renderer: Any, camera: str | int) -> Image:
+    def picture(self, row: Observation, renderer: Any, camera: str | int) -> Image:
         """A fresh picture (height, width, 3) of the observed positions."""
         with self._lock:
             self._pose(row, [place.observed for place in self._places], [])
@@ -126,7 +125,7 @@ class Scene:
         with self._lock:
             return self._pose(row, [place.observed for place in self._places], [])
 
-    def _pose(self, row: bytes, offsets: list[int], not_finite: list[str]) -> NDArray[np.float64]:
+    def _pose(self, row: Any, offsets: list[int], not_finite: list[str]) -> NDArray[np.float64]:
         self._data.qpos[:] = self._start
         lost = []
         for place, offset in zip(self._places, offsets, strict=True):

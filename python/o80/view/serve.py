@@ -1,16 +1,15 @@
-"""Runs the server of a page until it is told to stop."""
+"""Runs the server of a page until a signal, or the end of the standard input."""
 
 import contextlib
 import os
 import resource
-import signal
 import sys
 import threading
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from types import FrameType
 
 from o80.base.errors import Error
+from o80.base.stop_request import StopRequest
 from o80.view.answers import Answers
 from o80.view.server import PageServer
 from o80.view.source_list import SourceList
@@ -65,21 +64,15 @@ def allow_descriptors(wanted: int) -> None:
 
 def wait_for_end(*, until_eof: bool) -> None:
     """Returns after Ctrl-C or SIGTERM, or when the standard input ends."""
-    end = threading.Event()
-
-    def stop(_number: int, _frame: FrameType | None) -> None:
-        end.set()
-
-    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        signal.signal(number, stop)
+    end = StopRequest()
     if until_eof:
 
         def read() -> None:
             with contextlib.suppress(OSError):
                 while os.read(sys.stdin.fileno(), 1 << 10):
                     pass
-            end.set()
+            end.requested = True
 
         threading.Thread(target=read, daemon=True).start()
-    while not end.wait(0.5):  # with a timeout, so that the signals are seen
-        pass
+    while not end.requested:
+        end.wait(0.5)

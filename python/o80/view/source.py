@@ -58,7 +58,7 @@ class Source(ABC):
 
     @abstractmethod
     def refresh(self) -> None:
-        """Looks whether another run has begun."""
+        """Attaches to a newer run, if there is one."""
 
     @abstractmethod
     def extent(self) -> tuple[int, int]:
@@ -92,7 +92,7 @@ class Source(ABC):
 
     @abstractmethod
     def state(self) -> dict[str, Any]:
-        """Its line in the list of segments."""
+        """Entry of this source in the segment list: state, rate, overruns, age of the last row."""
 
     def seconds(self, time: int) -> float:
         """A time [ns] as the page shows it [s]."""

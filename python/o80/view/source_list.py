@@ -3,8 +3,6 @@
 import fnmatch
 import threading
 import time
-from bisect import bisect
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -80,29 +78,17 @@ class SourceList:
 
 
 def _runs_of(path: str, model_files: bool) -> list[Source]:
-    from o80.recording.marks import Mark
     from o80.recording.reader import RecordingFile
     from o80.view.recorded_source import RecordedSource
 
     recording = RecordingFile(path)
-    marks = recording.marks
-    found: list[Source] = []
-    for name, segment in recording.segments.items():
-        begins = [epoch.recorded_at for epoch in segment.epochs]
-        runs: list[list[Mark]] = [[] for _ in begins]
-        for mark in marks:
-            if name in mark.rows:
-                runs[max(bisect(begins, mark.time) - 1, 0)].append(mark)
-        for number, (epoch, its) in enumerate(zip(segment.epochs, runs, strict=True)):
-            texts = [(mark.name, mark.rows[name]) for mark in its]
-            moments: dict[tuple[str, int], tuple[int, int]] = {}
-            counts: Counter[str] = Counter()
-            for mark in its:
-                moments[mark.name, counts[mark.name]] = mark.rows[name], mark.time
-                counts[mark.name] += 1
-            found.append(
-                RecordedSource(name, number, epoch, texts, moments, model_files=model_files)
-            )
+    found: list[Source] = [
+        RecordedSource(name, number, epoch, marks, model_files=model_files)
+        for name, segment in recording.segments.items()
+        for number, (epoch, marks) in enumerate(
+            zip(segment.epochs, recording.marks_by_run(name), strict=True)
+        )
+    ]
     if not found:
         raise RecordingError(f"{path} holds no segment")
     return found

@@ -1,4 +1,4 @@
-"""The models that draw segments, and which of them stand in one world."""
+"""The models that draw segments, and which of them share one world."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -51,14 +51,14 @@ def drawn(schema: dict[str, Any], mjcf: str, *, trusted: bool) -> Drawn | None:
 
 @dataclass(frozen=True)
 class Standing:
-    """Where a model stands."""
+    """Fixed places of a model."""
 
     #: name and position [mm] of the bodies and shapes that the world carries
     places: frozenset[tuple[str, int, int, int]] = frozenset()
     floats: bool = False  #: nothing of it stands: a tracked ball, subjects of motion capture
 
     def shares(self, other: "Standing") -> bool:
-        """Whether both stand in one world: a thing of one name stands at one place in both."""
+        """Whether both are in one world: they have a named thing at the same place."""
         return self.floats or other.floats or not self.places.isdisjoint(other.places)
 
 

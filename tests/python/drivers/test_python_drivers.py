@@ -430,7 +430,6 @@ class OddOption:
         ({"actuators": ["a"], "limits": {"b": (0, 1)}}, "no actuator 'b'"),
         ({"frequency": -1}, "frequency must be a positive number"),
         ({"simulated": "no"}, "simulated must be True or False"),
-        ({"of_the_world": False}, "unless it says simulated = True"),
         ({"extended": {"image": object}}, "must be a number of 1 to 8 bytes"),
     ],
 )

@@ -59,8 +59,7 @@ class Collector(Closeable):
         """
         self.seed = whole(seed, "seed", 0)
         self.number = whole(number, "number", 0)
-        self.iteration = whole(iteration, "iteration", 0)
-        """Iteration of the next `collect`."""
+        self.iteration = whole(iteration, "iteration", 0)  #: iteration of the next `collect`
         self._make, self._infos = make, tuple(infos)
         self._interrupted = False  # a rollout was begun and not finished
         self._closed = False

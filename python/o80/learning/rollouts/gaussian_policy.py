@@ -19,18 +19,12 @@ class GaussianPolicy:
     last layer gives the means of the actions. The actions are not clipped.
     """
 
-    mean: Float32Array
-    """(M,) taken off the observations."""
-    scale: Float32Array
-    """(M,) then multiplied with them."""
-    weights: tuple[Float32Array, ...]
-    """Weights of each layer (out, in)."""
-    biases: tuple[Float32Array, ...]
-    """Biases of each layer (out,)."""
-    log_std: Float32Array
-    """(A,) logarithm of the standard deviation of each action."""
-    clip: float = 10.0
-    """Normalised observations are clipped into plus or minus this."""
+    mean: Float32Array  #: (M,) taken off the observations
+    scale: Float32Array  #: (M,) then multiplied with them
+    weights: tuple[Float32Array, ...]  #: weights of each layer (out, in)
+    biases: tuple[Float32Array, ...]  #: biases of each layer (out,)
+    log_std: Float32Array  #: (A,) logarithm of the standard deviation of each action
+    clip: float = 10.0  #: normalised observations are clipped into plus or minus this
 
     def __post_init__(self) -> None:
         sizes = [len(self.mean), *(len(bias) for bias in self.biases)]

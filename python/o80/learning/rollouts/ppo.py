@@ -34,7 +34,7 @@ ALONE = "a collector steps its copies itself: give CollectorEnv to a RolloutPPO 
 
 
 class CollectorEnv(VecEnv):
-    """Stands for the copies of a collector in a RolloutPPO, which alone can step them."""
+    """The copies of a collector as environment of a RolloutPPO, which cannot step them."""
 
     def __init__(self, collector: Collector) -> None:
         self.collector = collector
@@ -142,8 +142,8 @@ class RolloutPPO(PPO):
         for step in range(steps):
             self.num_timesteps += self.n_envs
             dones, infos = rollout.over[step], rollout.infos(step)
-            told = {"rewards": rollout.rewards[step], "dones": dones, "infos": infos}
-            callback.update_locals(told)
+            known = {"rewards": rollout.rewards[step], "dones": dones, "infos": infos}
+            callback.update_locals(known)
             if not callback.on_step():
                 return False
             self._update_info_buffer(infos, dones)

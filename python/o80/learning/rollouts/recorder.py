@@ -14,13 +14,13 @@ Numbers = NDArray[np.int64]
 
 
 class EpisodeSums:
-    """Reward and length so far of the episode of each copy; they go on from rollout to rollout."""
+    """Reward and length so far of the episode of each copy, kept from rollout to rollout."""
 
     def __init__(self, copies: int) -> None:
         self.rewards, self.lengths = np.zeros(copies), np.zeros(copies, np.int64)
 
     def restart(self, copies: Numbers) -> None:
-        """Their episodes ended."""
+        """Begins new sums for copies after the ends of their episodes."""
         self.rewards[copies] = 0.0
         self.lengths[copies] = 0
 

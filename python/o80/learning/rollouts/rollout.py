@@ -12,14 +12,10 @@ from numpy.typing import NDArray
 class Ends:
     """The E episodes that ended in a rollout, in the order of their steps, then of their copies."""
 
-    steps: NDArray[np.int64]
-    """(E,) the step of the rollout in which the episode ended."""
-    copies: NDArray[np.int64]
-    """(E,)"""
-    rewards: NDArray[np.float64]
-    """(E,) sum over the episode, earlier rollouts included."""
-    lengths: NDArray[np.int64]
-    """(E,) steps of the episode, earlier rollouts included."""
+    steps: NDArray[np.int64]  #: (E,) the step of the rollout in which the episode ended
+    copies: NDArray[np.int64]  #: (E,)
+    rewards: NDArray[np.float64]  #: (E,) sum over the episode, earlier rollouts included
+    lengths: NDArray[np.int64]  #: (E,) steps of the episode, earlier rollouts included
     observations: NDArray[Any]
     """(E, ...) the last of the episode, before the reset: a learner bootstraps truncated episodes
     from it."""
@@ -35,14 +31,10 @@ class Rollout:
     """(T + 1, N, ...) before each step; the next rollout begins with the last ones."""
     actions: NDArray[Any]
     """(T, N, ...) as the policy drew them: before they were clipped into the action space."""
-    log_probabilities: NDArray[np.float64]
-    """(T, N) of the actions, under the policy."""
-    rewards: NDArray[np.float64]
-    """(T, N)"""
-    terminated: NDArray[np.bool_]
-    """(T, N) the episode ended in this step, by what happened."""
-    truncated: NDArray[np.bool_]
-    """(T, N) the episode was cut off after this step."""
+    log_probabilities: NDArray[np.float64]  #: (T, N) of the actions, under the policy
+    rewards: NDArray[np.float64]  #: (T, N)
+    terminated: NDArray[np.bool_]  #: (T, N) the episode ended in this step, by what happened
+    truncated: NDArray[np.bool_]  #: (T, N) the episode was cut off after this step
     ends: Ends
 
 

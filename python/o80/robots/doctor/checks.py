@@ -16,8 +16,6 @@ LOCKED = 256 << 20  # [bytes] of a robot with the default history, and half as m
 
 
 class Priority(Check):
-    """Limit of real-time priorities for this user."""
-
     name = "priority limit"
     delay = 10e-3
     effect = "the loop is an ordinary thread, which waits up to 10 ms while other programs compute"
@@ -60,8 +58,6 @@ class Priority(Check):
 
 
 class GroupShare(Check):
-    """Share of real-time threads in this process's control group."""
-
     name = "real-time share of the control group"
     delay = 10e-3
     effect = "the kernel refuses real-time priorities to all processes of this group, root included"
@@ -78,8 +74,6 @@ class GroupShare(Check):
 
 
 class LockedMemory(Check):
-    """Limit of memory that may be kept resident."""
-
     name = "locked memory limit"
     delay = 5e-3
     effect = "--lock-memory is refused: a page that is not resident costs up to 5 ms"
@@ -101,8 +95,6 @@ class LockedMemory(Check):
 
 
 class Throttling(Check):
-    """Share of each second that real-time threads may have."""
-
     name = "throttling of real-time threads"
     delay = 50e-3
     effect = (
@@ -125,8 +117,6 @@ class Throttling(Check):
 
 
 class Preemption(Check):
-    """Moments at which the kernel gives a processor away."""
-
     name = "kernel without PREEMPT_RT"
     delay = 500e-6
     effect = "the kernel finishes its own work before the loop may run, up to {longest}"
@@ -182,8 +172,6 @@ class Preemption(Check):
 
 
 class VirtualMachine(Check):
-    """Virtual machine, which its host may stop at any moment."""
-
     name = "virtual machine"
     delay = 2e-3
     effect = "the host stops it at any moment, for milliseconds, and nothing here can prevent that"
@@ -199,8 +187,6 @@ class VirtualMachine(Check):
 
 
 class Quota(Check):
-    """Share of the processors that this process's control group may use."""
-
     name = "processor quota"
     delay = 50e-3
     effect = "ordinary threads are stopped for the rest of each {period:g} ms when it is used up"
@@ -228,8 +214,6 @@ class Quota(Check):
 
 
 class Neighbours(Check):
-    """Programs that compute on the processors of the loop."""
-
     name = "busy neighbours"
     of_host = False
     delay = 100e-6
@@ -254,8 +238,6 @@ class Neighbours(Check):
 
 
 class Isolation(Check):
-    """Processor of its own for the loop."""
-
     name = "missing isolation"
     delay = 100e-6
     effect = "{busy}ticks and deferred work of the kernel run on the processor of the loop"
@@ -285,8 +267,6 @@ class Isolation(Check):
 
 
 class Interrupts(Check):
-    """Interrupts of devices on the processors of the loop."""
-
     name = "interrupts"
     delay = 100e-6
     effect = "{rate} a second interrupt processor {processor}, 5 to 20 us each"
@@ -314,8 +294,6 @@ class Interrupts(Check):
 
 
 class Governor(Check):
-    """Governor of the processors' frequency."""
-
     name = "frequency governor"
     delay = 200e-6
     effect = "a processor slows down while the loop sleeps, and begins each iteration slowly"
@@ -331,8 +309,6 @@ class Governor(Check):
 
 
 class SleepStates(Check):
-    """Sleep states of the processors, and the time that they take to wake."""
-
     name = "sleep states"
     delay = 0.0
     effect = "a processor that sleeps so deeply takes {latency} us to wake"
@@ -358,8 +334,6 @@ class SleepStates(Check):
 
 
 class HyperThreads(Check):
-    """Threads of the hardware that share a core with the loop."""
-
     name = "hyper-threads"
     delay = 50e-6
     effect = "what runs on the other half of the core takes up to half of its speed"
@@ -383,8 +357,6 @@ class HyperThreads(Check):
 
 
 class ClockSource(Check):
-    """Clock that the kernel reads."""
-
     name = "clock source"
     delay = 100e-6
     effect = "each look at the clock takes microseconds, more if several processors look at once"
@@ -408,8 +380,6 @@ class ClockSource(Check):
 
 
 class HugePages(Check):
-    """Huge pages that the kernel makes by itself."""
-
     name = "transparent huge pages"
     delay = 200e-6
     effect = "the kernel joins pages while programs run, and stops them meanwhile"
@@ -422,8 +392,6 @@ class HugePages(Check):
 
 
 class Swap(Check):
-    """Disk that holds memory of programs that do not run for a while."""
-
     name = "swap"
     delay = 10e-3
     effect = "memory that was written to disk takes up to 10 ms to come back{rest}"
@@ -443,8 +411,6 @@ class Swap(Check):
 
 
 class SharedMemory(Check):
-    """Size of /dev/shm, where segments are."""
-
     name = "size of /dev/shm"
     of_host = False
     delay = 1.0
@@ -487,8 +453,6 @@ class SharedMemory(Check):
 
 
 class Autogroup(Check):
-    """Division of the processors between sessions before threads."""
-
     name = "autogroup"
     delay = 10e-3
     effect = (

@@ -128,7 +128,7 @@ class Computer:
 
     @cached_property
     def loop_processors(self) -> list[int]:
-        """Processors that suit a loop: the isolated ones, else all."""
+        """Processors for a loop: the isolated ones, else all."""
         return self.isolated or self.processors
 
     @cached_property

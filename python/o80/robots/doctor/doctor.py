@@ -90,7 +90,7 @@ Measure = Callable[[Computer], WakeUps | None]
 def examine(
     computer: Computer, frequency: float, measure: Measure, measure_loaded: Measure
 ) -> Report:
-    """Looks at a computer before and after a measurement, then measures beside a load.
+    """Samples a computer before and after a measurement, then measures beside a load.
 
     None of the first: it was not measured.
     """

@@ -1,4 +1,4 @@
-"""Ctrl-C and SIGTERM, for commands that end in order."""
+"""Ctrl-C and SIGTERM, for programs that end in order."""
 
 import signal
 import time
