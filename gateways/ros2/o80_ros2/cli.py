@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from o80.cli.stop_request import StopRequest
+from o80.base.stop_request import StopRequest
 from o80.errors import InvalidArgument
 from o80_ros2 import ros
 from o80_ros2.gateway import Gateway

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import o80
-from o80.cli.stop_request import StopRequest
+from o80.base.stop_request import StopRequest
 from o80.errors import MissingExtra
 from o80_ros2 import ros
 from o80_ros2.source import Source

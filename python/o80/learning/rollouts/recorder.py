@@ -104,7 +104,7 @@ class Recorder:
             Ends(steps, copies, rewards, lengths, last, infos),
         )
         for _, array in arrays_of(rollout):
-            array.flags.writeable = False  # as arrays that come from Ray are
+            array.flags.writeable = False
         return rollout
 
 
