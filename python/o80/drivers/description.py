@@ -21,10 +21,11 @@ Limit = Limits | Sequence[float | None]
 
 def numbered(name: str | int, known: Sequence[str], what: str) -> int:
     """The number of an actuator or a request, by its name or number. Raises InvalidArgument."""
-    if isinstance(name, str) and name in known:
-        return known.index(name)
-    if isinstance(name, int) and not isinstance(name, bool) and 0 <= name < len(known):
-        return name
+    if isinstance(name, str):
+        if name in known:
+            return known.index(name)
+    elif hasattr(name, "__index__") and not isinstance(name, bool) and 0 <= name < len(known):
+        return int(name)
     raise InvalidArgument(f"there is no {what} {name!r}{_core.names_instead(str(name), [*known])}")
 
 

@@ -189,7 +189,7 @@ def _summary(path: Path) -> str:
 
 
 def run_found(segment: str, number: int, epoch: RecordedEpoch) -> FoundRun:
-    """What is listed of a run. Raises RecordingError."""
+    """Entry of a run in the catalogue. Raises RecordingError."""
     begin, end = epoch.time_range if epoch.rows else (0, 0)
     is_cut = any(gap.last is None for gap in epoch.gaps)
     return FoundRun(

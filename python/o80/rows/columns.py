@@ -60,7 +60,9 @@ def numbers_below(
                 yield from numbers_below(field["type"], name, offset, origin)
             else:
                 labels = labels_of_field(field)._labels_ if field["kind"] == "enum" else None
-                yield Column(name, dtype, offset, labels, origin, field["unit"], field["help"])
+                yield Column(
+                    name, dtype, offset, labels, origin, field["unit"], field.get("help", "")
+                )
 
 
 def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:

@@ -39,7 +39,11 @@ class GivenNumbers:
         for place, described in enumerate(types):
             numbers = [
                 _Number(
-                    place, each.dtype, each.offset, nth, each.dtype.kind == "b" or bool(each.labels)
+                    place,
+                    each.dtype,
+                    each.offset,
+                    nth,
+                    each.dtype.kind == "b" or each.labels is not None,
                 )
                 for nth, each in enumerate(numbers_below(described))
             ]
