@@ -59,7 +59,7 @@ class FileRun:
     is_own = False
 
     def __init__(self, segment: str, number: int, epoch: "RecordedEpoch") -> None:
-        self.segment, self.number, self._epoch = segment, number, epoch
+        self.segment, self.number, self.epoch = segment, number, epoch
         self.schema, self.description = epoch.schema, epoch.description
         self.provenance, self.machine = epoch.provenance, epoch.machine
         self.rows = epoch.rows
@@ -67,22 +67,22 @@ class FileRun:
     @property
     def missing(self) -> list[str]:
         return [
-            *map(str, filter(None, [self._epoch.interruption])),
-            *(str(gap) for gap in self._epoch.gaps if gap.first >= self._epoch.next_row),
+            *map(str, filter(None, [self.epoch.interruption])),
+            *(str(gap) for gap in self.epoch.gaps if gap.first >= self.epoch.next_row),
         ]
 
     def blocks(self) -> "Iterator[History]":
-        for block in self._epoch.blocks():
+        for block in self.epoch.blocks():
             for begin in range(0, len(block), ROWS_AT_ONCE):
                 yield block[begin : begin + ROWS_AT_ONCE]
 
     def entries(self) -> Iterator[_core.JournalEntry]:
-        if not self._epoch.has_journal:
+        if not self.epoch.has_journal:
             raise InvalidArgument(
                 f"the recording has no journal of '{self.segment}', which a replay needs: its "
                 f"robot was started without one"
             )
-        return self._epoch.native_journal(rests=True)
+        return self.epoch.native_journal(rests=True)
 
 
 RecordedRun = LiveRun | FileRun
