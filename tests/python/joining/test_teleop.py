@@ -188,7 +188,7 @@ def test_the_sentence_names_the_leaders_joint(
     session = _Session(robots, "episode")
     hand.burst(1)
     robots.step()
-    session.tell()
+    session.report()
     assert "move the leader's lamp from 0.00 to 0.30" in capsys.readouterr().err
     with pytest.raises(o80.InvalidArgument, match="scale must not be 0"):
         o80.Teleoperation(hand, arm, joints=[o80.Joint("gripper", "lamp", 0.0)])
@@ -387,7 +387,7 @@ def test_demonstrations_are_of_a_robot_that_follows(
                 arm.burst(1)
                 hand.burst(1)
                 robots.step()
-                session.tell()
+                session.report()
                 arm.resume()
                 while not robots.engaged:
                     hand.burst(10)  # type: ignore[unreachable]
