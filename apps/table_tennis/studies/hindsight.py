@@ -44,7 +44,7 @@ def store(buffer: Any, before: Any, action: Any, info: dict[str, Any]) -> None:
 
 
 def trained(worlds: int, updates: int, balls: int, seed: int) -> list[tuple[float, bool, bool]]:
-    """Reward of each played ball, and whether it was touched and returned."""
+    """Trains while it plays `balls` balls; for each ball its reward, touched, returned."""
     played = []
     with closing(TableTennisEnvironment(rig=RigSettings(worlds=worlds), task=TASK)) as environment:
         network: dict[str, Any] = {"net_arch": [64, 64]}

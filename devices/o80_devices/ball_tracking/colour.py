@@ -48,10 +48,10 @@ def of_hue(
 def of_examples(
     ball: NDArray[np.uint8], others: NDArray[np.uint8], share: float = 0.1
 ) -> ColourTable:
-    """The table of examples: pixels (n, 3) of balls, and pixels (m, 3) of everything else.
+    """Table from example pixels: (n, 3) of balls, and (m, 3) of everything else.
 
-    share: how many of all pixels are of the ball where the tracker looks. Colours near to the
-    examples count as well, so that a few hundred pixels are enough. Raises InvalidArgument.
+    share: fraction of ball pixels where the tracker searches. Colours near to the examples count
+    as well, so that a few hundred pixels are enough. Raises InvalidArgument without pixels.
     """
     if len(ball) == 0 or len(others) == 0:
         raise InvalidArgument(

@@ -73,7 +73,7 @@ def in_world(
 
 
 def _check_not_mirrored(cameras: Sequence[RigCamera], known: FloatArray) -> None:
-    """Mirrored corners in a plane fit as well, by a rig that is turned upside down."""
+    """Raises InvalidArgument for mirrored corners, which fit a rig that is upside down."""
     _, sizes, axes = np.linalg.svd(known - known.mean(0))
     if len(sizes) > 2 and sizes[2] > FLAT * sizes[0]:
         return

@@ -89,7 +89,9 @@ class ClockMap:
     # ------------------------------------------------------------------ the map
 
     def capture(self, stamp: int, arrival: int) -> Capture | None:
-        """The capture time of what came with a stamp; None for an old or repeated stamp: drop it.
+        """Capture time of the data with this stamp; None if the stamp is old or repeated.
+
+        Drop the data then.
 
         stamp: [ticks]. arrival: [ns] on the monotonic clock (`time.monotonic_ns`).
         """
@@ -149,7 +151,7 @@ class ClockMap:
         return expected + (stamp - expected + half) % self._wrap - half
 
     def _is_old(self, stamp: int) -> bool:
-        """Whether a stamp is repeated or overtaken, rather than the first after a restart."""
+        """True for a stamp that is repeated or out of order, but not after a restart."""
         if stamp > self._last:
             return False
         behind = (self._last - stamp) * self._tick

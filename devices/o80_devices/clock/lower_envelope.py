@@ -36,7 +36,10 @@ class LowerEnvelope:
     def __init__(
         self, *, window: float, bucket: float, max_rate: float, rate: float, rate_error: float
     ) -> None:
-        """window, bucket: [ns]. rate, rate_error: what is known of the rate before any point."""
+        """Window and buckets in it: lengths [ns]. max_rate: bound of |rate|.
+
+        rate, rate_error: estimate of the rate before any point, and its standard error.
+        """
         self._window = window
         self._bucket = bucket
         self._max_rate = max_rate

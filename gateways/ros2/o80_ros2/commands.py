@@ -75,7 +75,7 @@ class Commands:
                 self._arm.keep_alive()
 
     def _tried(self, what: str, run: Callable[..., str | None], *given: Any) -> tuple[bool, str]:
-        """Runs it; whether it was not refused, and its text or the reason."""
+        """Calls `run`: True and its text, or False and why o80 refused it."""
         try:
             return True, run(*given) or ""
         except (Error, ValueError, TypeError, OverflowError) as error:

@@ -50,7 +50,7 @@ def number(value: Any, name: str) -> float:
 
 
 def text(value: Any, name: str) -> str:
-    """A text. Raises InvalidArgument."""
+    """The value, if it is a text; else raises InvalidArgument that names the argument."""
     if not isinstance(value, str):
         raise InvalidArgument(f"{name} must be a string, got {value!r}")
     return value

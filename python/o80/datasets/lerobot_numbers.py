@@ -22,7 +22,7 @@ _RANGES = re.compile(r"calibrated ranges ([\d. ]+) rad$")
 
 @dataclass(frozen=True)
 class Number:
-    """A number of an actuator's state, in a row and at LeRobot."""
+    """A number of an actuator's state: its place in a row, its name and unit in LeRobot."""
 
     name: str  #: LeRobot's: the actuator's name and ".pos", or the path of a field
     column: Column

@@ -101,7 +101,10 @@ class SchemaWriter:
     def add_requests(
         self, requests: Mapping[str, Described | None], while_halted: Sequence[str] = ()
     ) -> None:
-        """Adds requests, each with its fields (None: no fields)."""
+        """Adds requests, each with its fields (None: no fields).
+
+        while_halted: names of those that are also served while the robot is halted.
+        """
         for name in while_halted:
             if name not in requests:
                 instead = _core.names_instead(name, list(requests))

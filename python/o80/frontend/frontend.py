@@ -1,4 +1,4 @@
-"""Frontend: opens, closes and attaches again; classes for single robots; a wait for several."""
+"""The class Frontend, frontend classes of single robots, and a wait for several frontends."""
 
 import contextlib
 import warnings

@@ -89,7 +89,7 @@ PLAIN = {name: f"o80.{name}" for name in ("PreparedBurst", "Preview")}
 def module_of(schema: dict[str, Any], segment: str | None = None) -> str:
     """The text of the typed module for a robot with this schema.
 
-    segment: to which it attaches without another name (None: of the name of the robot).
+    segment: default segment of the module; None: the robot's name.
     """
     return "".join(Module(schema).parts(segment or schema["robot"]))
 

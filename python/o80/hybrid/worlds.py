@@ -53,7 +53,7 @@ class Counts:
 
 
 class Worlds:
-    """The worlds of n robots, so many of each: an inline group of all, or the frontend of one."""
+    """Simulated worlds of n robots: an inline group for all of them, or a frontend for one."""
 
     stalled = ""
     """The text of what made a step impossible: nothing here."""

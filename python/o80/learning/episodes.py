@@ -26,7 +26,7 @@ class Begun:
 
 @dataclass(slots=True)
 class Stepped(Begun):
-    """Observations of n copies after a step; its rewards and ends in arrays over all copies."""
+    """Result of a step of n copies: their observations; rewards and end flags of all copies."""
 
     rewards: NDArray[np.float64]
     terminated: NDArray[np.bool_]

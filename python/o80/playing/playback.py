@@ -108,7 +108,7 @@ class Playback(Closeable):
 
     @property
     def names(self) -> list[str]:
-        """The names of the segments in shared memory."""
+        """Names of the segments that this playback publishes."""
         return [player.name for player in self._players]
 
     @property

@@ -111,7 +111,7 @@ def codec_of(found: Scan, channel: int) -> int:
 def entries_in(
     file: IO[bytes], found: Scan, channel: int, *, newest_first: bool = False
 ) -> "Iterator[Entries]":
-    """All parts of a journal. Raises ValueError if one is damaged."""
+    """Entries of a journal, chunk by chunk. Raises ValueError for a damaged chunk."""
     codec = codec_of(found, channel)
     for chunk in found.chunks.having(channel, newest_first=newest_first):
         messages = [*messages_of(file, chunk, channel)]

@@ -111,7 +111,7 @@ def marks_in(file: IO[bytes], found: Scan) -> list[Mark]:
 
 
 def has_marks(found: Scan) -> bool:
-    """Whether a file holds a mark."""
+    """True if a scanned file holds a mark."""
     return any(
         each.topic == TOPIC and found.counts.get(each.id, 0) for each in found.channels.values()
     )

@@ -231,7 +231,7 @@ def _field_name(name: str) -> str:
 
 
 def _identifier(name: str, fallback: str) -> str:
-    """A valid name of a type: letters and digits, an upper-case letter first."""
+    """The name as a valid type name: letters and digits, upper-case first; or the fallback."""
     words = re.findall(r"[A-Za-z0-9]+", name) or re.findall(r"[A-Za-z0-9]+", fallback)
     joined = "".join(word[0].upper() + word[1:] for word in words) or "Type"
     return joined if joined[0].isalpha() else f"T{joined}"

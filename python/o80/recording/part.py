@@ -157,7 +157,7 @@ class _PartWriter:
                 self._channel(channel)
 
     def add_poses(self, run: Run, epoch: RecordedEpoch, poses: Poses | None) -> None:
-        """Adds transforms of a run while its rows are added."""
+        """Adds the transforms of a run with its rows; none where `poses` is None."""
         if poses is not None and poses.bodies:
             self._poses[run] = epoch, poses
 

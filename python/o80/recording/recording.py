@@ -1,4 +1,4 @@
-"""A recording made by a program, beside what it does."""
+"""Recording from within a program, in a background thread."""
 
 import os
 import threading

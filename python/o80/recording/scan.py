@@ -344,7 +344,7 @@ class _Scanner:
             at = after
 
     def _take(self, opcode: int, at: int, length: int) -> bool:
-        """Notes one record. False: it does not belong here."""
+        """Adds one record; False if its kind is invalid at this place."""
         if opcode == Opcode.MESSAGE_INDEX:
             return self._take_index(at, length)
         self._end_chunk(whole=True)

@@ -1,8 +1,8 @@
-"""Compiles a model that may come from a stranger: in a recording, or of another user's robot.
+"""Compiles an untrusted model: from a recording, or from the robot of another user.
 
-Such a model may name any file of this computer, and may be made so that its compilation takes all
-memory or never ends. So models that name files are refused, and a process of its own compiles them,
-with limits.
+Such a model may name any file of this computer, and its compilation may take all memory or never
+end. So a model that names files is refused; any other is compiled by a separate process with
+limits.
 """
 
 import os

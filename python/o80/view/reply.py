@@ -21,7 +21,7 @@ class Reply:
 
     @classmethod
     def json(cls, code: int, body: dict[str, Any]) -> "Reply":
-        """A JSON object."""
+        """A reply whose body is JSON."""
         return cls(code, json_text(body, say=complain_once).encode(), "application/json")
 
     def as_bytes(self, *, last: bool) -> bytes:

@@ -79,7 +79,7 @@ class Flight:
 
 @dataclass(frozen=True, eq=False)
 class FlightFit:
-    """Flights joined by bounces."""
+    """Result of a fit: successive flights, joined at bounces."""
 
     flights: tuple[Flight, ...]
     bounce_times: FloatArray
@@ -210,7 +210,7 @@ def _covered(positions: FloatArray) -> tuple[int, int, list[int]]:
 def meeting(
     before: Flight, after: Flight, earliest: float, latest: float
 ) -> tuple[float, FloatArray]:
-    """Time [s] and point (3,) [m] at which the fall `before` and the rise `after` are as high."""
+    """Time [s] and point (3,) [m], between two times, where two flights have equal height."""
     times = np.linspace(earliest, latest, 257)
     falling, rising = before.at(times)[0], after.at(times)[0]
     gap = rising[:, 2] - falling[:, 2]

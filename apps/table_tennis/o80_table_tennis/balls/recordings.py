@@ -126,7 +126,9 @@ def _ball_gun_rows(file: Path) -> FloatArray:
 
 
 def _read_shots(file: Path) -> list[BallTrajectory]:
-    """Shots originals/<i>/{positions, velocities (N, 3), time_stamps (N)}, in order of i."""
+    """Reads all shots of an HDF5 file, in order of i.
+
+    originals/<i> has positions (N, 3), velocities (N, 3) and time_stamps (N,)."""
     import h5py
 
     try:

@@ -144,7 +144,7 @@ class Processes(Closeable):
 
 
 class Watched(Attached):
-    """An observer of a segment that may end and come back."""
+    """Observes a segment whose backend may end and start again."""
 
     @property
     def now(self) -> o80.Frontend | None:

@@ -213,7 +213,7 @@ class HittingPolicy:
         return Swing.between(now, end, max(self.strike.time, control.shortest))
 
     def _follow(self, position: FloatArray, velocity: FloatArray) -> None:
-        """Predicts the ball, or goes on along its last predicted path."""
+        """Predicts the path of the ball; an unseen ball continues on its last predicted path."""
         self._spin = self._spin_after(position, velocity)
         self._seen = np.concatenate([position, velocity])
         if self._steps % PREDICTED_EVERY == 0:

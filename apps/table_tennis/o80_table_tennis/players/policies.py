@@ -56,7 +56,7 @@ class RandomPolicy:
         """The draws go on: no episode repeats another."""
 
     def act(self, observation: Float32Array) -> NDArray[np.float32]:
-        """Uniform in [-1, 1]."""
+        """Random action, uniform in [-1, 1]."""
         return self._rng.uniform(-1.0, 1.0, MUSCLES).astype(np.float32)
 
 

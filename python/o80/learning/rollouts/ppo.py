@@ -47,11 +47,11 @@ class CollectorEnv(VecEnv):
         return np.zeros((self.num_envs, *(space.shape or ())), space.dtype)
 
     def step_async(self, actions: Any) -> None:
-        """Refused."""
+        """Not supported: raises InvalidArgument."""
         raise InvalidArgument(ALONE)
 
     def step_wait(self) -> Any:
-        """Refused."""
+        """Not supported: raises InvalidArgument."""
         raise InvalidArgument(ALONE)
 
     def close(self) -> None:
@@ -63,11 +63,11 @@ class CollectorEnv(VecEnv):
         return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
-        """Refused."""
+        """Not supported: raises InvalidArgument."""
         raise InvalidArgument(f"give '{attr_name}' to what makes the collector's environments")
 
     def env_method(self, method_name: str, *_: Any, indices: Any = None, **__: Any) -> list[Any]:
-        """Refused."""
+        """Not supported: raises InvalidArgument."""
         raise InvalidArgument(f"'{method_name}' cannot be called in a collector's environments")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:

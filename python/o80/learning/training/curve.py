@@ -84,7 +84,7 @@ def success_share(successes: FloatArray) -> float:
 
 
 def names_of(kind: type[Any]) -> list[str]:
-    """Names of the numbers of a kind of points, a dataclass."""
+    """Names of the numeric fields of a dataclass of points."""
     return [each.name for each in fields(kind)]
 
 
