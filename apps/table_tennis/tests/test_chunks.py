@@ -1,16 +1,18 @@
 """Action chunks: each row acts in its own iterations, however late the policy answers."""
 
 from contextlib import closing
+from pathlib import Path
 from typing import Any
 
 import gymnasium
 import numpy as np
 import pytest
-from opened_environment import opened
+from opened_environment import opened, played_out
 
 import o80
 import o80_table_tennis
 from o80.hybrid.single import Single
+from o80_table_tennis.report.recorded_episodes import recorded_episodes
 from o80_table_tennis.settings import Pacing, TaskSettings
 from o80_table_tennis.task.actions import COARSE, changed_pressures
 from o80_table_tennis.world.arm import MUSCLES
@@ -130,6 +132,14 @@ def test_an_episode_is_given_up_when_nothing_was_planned_for_too_long(
         for lateness, stalled in ((36 + 20, False), (36 + 21, True)):
             monkeypatch.setattr(Single, "lateness", lateness)
             assert environment.step(chunks()[0])[-1]["stalled"] is stalled
+
+
+def test_a_recording_holds_chunks_as_actions(tmp_path: Path) -> None:
+    with closing(opened(task=CHUNKED, record=tmp_path / "run.mcap")) as environment:
+        environment.reset(seed=1)
+        steps = len(played_out(environment, chunks()[0]))
+    (episode,) = recorded_episodes(tmp_path / "run.mcap")
+    np.testing.assert_array_equal(episode.actions, np.tile(chunks()[0], (steps, 1, 1)))
 
 
 def test_what_cannot_be_is_refused() -> None:

@@ -8,6 +8,8 @@ import pytest
 from opened_environment import PATIENT, PUSH, STILL, WAITING, opened, played_out
 
 import o80
+from o80.hybrid import relive
+from o80_table_tennis.copies import TableTennisCopies
 from o80_table_tennis.report.recorded_episodes import RecordedEpisode, recorded_episodes
 from o80_table_tennis.settings import Pacing, TaskSettings
 
@@ -101,6 +103,8 @@ def test_an_abandoned_episode_is_left_out(tmp_path: Path) -> None:
         played_out(environment)
 
     assert [episode.summary.number for episode in recorded_episodes(path)] == [1]
+    with pytest.raises(o80.InvalidArgument, match="whose `__init__` takes a `recorded` robot"):
+        next(relive(path, TableTennisCopies))
 
 
 def test_a_stalled_episode_is_recorded_as_such(tmp_path: Path) -> None:

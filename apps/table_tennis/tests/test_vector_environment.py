@@ -14,6 +14,7 @@ from recorded_rows import simulated_shot
 from vector_equality import MODES, beside, both
 
 import o80_table_tennis
+from o80 import GroupBurst
 from o80.learning import VectorEnvironment
 from o80_table_tennis.balls.sources import balls_from
 from o80_table_tennis.settings import Pacing, RigSettings, TaskSettings
@@ -98,6 +99,21 @@ def test_resets_some_copies_with_a_ball_of_the_callers() -> None:
         with pytest.raises(ValueError, match="unknown options: bal"):
             vector.reset(options={"bal": 2})
     singles.close()
+
+
+def test_a_step_has_no_timeout(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A training that somebody stops (Ctrl-Z, a debugger) must go on when it is continued."""
+    run, timeouts = GroupBurst.run, []
+
+    def noted(*arguments: Any, timeout: float | None = None) -> None:
+        timeouts.append(timeout)
+        run(*arguments, timeout=timeout)
+
+    monkeypatch.setattr(GroupBurst, "run", noted)
+    with made(2) as vector:
+        vector.reset(seed=1)
+        vector.step(np.zeros((2, MUSCLES), np.float32))
+    assert set(timeouts) == {None}
 
 
 def test_plays_long_recorded_flights() -> None:

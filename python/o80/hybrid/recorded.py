@@ -5,6 +5,7 @@ import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, ExitStack, closing
 from dataclasses import dataclass
+from inspect import signature
 from itertools import groupby
 from operator import attrgetter
 from typing import Any
@@ -59,8 +60,12 @@ def relive(
     An episode ends with its last world, or where the recorded one ended. Raises InvalidArgument,
     RecordingError.
     """
-    if not hasattr(task, "_parameters"):
-        raise InvalidArgument(f"a class derived from o80.hybrid.HybridTask is needed, got {task!r}")
+    takes = signature(task).parameters.values() if hasattr(task, "_parameters") else ()
+    if not any(each.name == "recorded" or each.kind is each.VAR_KEYWORD for each in takes):
+        raise InvalidArgument(
+            "a class derived from o80.hybrid.HybridTask, whose `__init__` takes a `recorded` robot "
+            f"as that does, is needed, got {task!r}"
+        )
     draws = np.random.SeedSequence(seed)
     for robot, group in groupby(_spans(RecordingFile(path), segment), attrgetter("robot")):
         spans = list(group)
@@ -91,9 +96,8 @@ class _Span:
 
 
 def _spans(recording: RecordingFile, segment: str | None) -> Iterator[_Span]:
-    marks = recording.marks
     robot, parameters, begun = None, {}, None
-    for mark in marks:
+    for mark in recording.marks:
         values = mark.values
         if mark.name == "environment" and "robot" in values:
             robot, parameters, begun = recording[values["robot"]], values["options"], None
@@ -139,11 +143,8 @@ def _played(environment: Environment, span: _Span) -> Iterator[Transitions]:
             over = terminated or truncated
             span.first += engine.iterations
         span.reset = span.first
-        columns = [np.stack(each) for each in zip(*seen, strict=True)]
-        observations, (rewards, ended, cut, running) = (
-            columns[0],
-            (each[1:] for each in columns[1:]),
-        )
+        observations, *columns = (np.stack(each) for each in zip(*seen, strict=True))
+        rewards, ended, cut, running = (each[1:] for each in columns)
         cut[-1] |= running[-1] & ~ended[-1]
         yield Transitions(observations, np.stack(actions), rewards, ended, cut, running)
         over = span.actions is None

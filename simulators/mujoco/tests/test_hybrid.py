@@ -631,7 +631,7 @@ def test_marks_of_other_programs_are_not_taken_for_episodes_of_a_task(tmp_path: 
         recording.mark("episode_end", actions=[[0, 0]])
     with pytest.raises(o80.InvalidArgument, match="its marks of episodes are not those"):
         list(relive(file, Push))
-    with pytest.raises(o80.InvalidArgument, match="HybridTask is needed, got <class 'int'>"):
+    with pytest.raises(o80.InvalidArgument, match="is needed, got <class 'int'>"):
         list(relive(file, int))
 
 
