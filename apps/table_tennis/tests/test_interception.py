@@ -13,7 +13,6 @@ from o80_table_tennis.players.interception import (
     coming_ball,
 )
 from o80_table_tennis.world.arm import racket_pose
-from o80_table_tennis.world.materials import RACKET_RESTITUTION
 
 NARROW = 0.074  # from the middle of the blade to its nearest rim [m]
 
@@ -36,7 +35,7 @@ def test_a_planned_strike_sends_the_ball_to_the_target(seed: int) -> None:
     assert offset @ normal == pytest.approx(TOUCH, abs=0.002)
     assert np.linalg.norm(offset - TOUCH * normal) < NARROW
     racket = np.cross([0.0, 0.0, strike.speeds[0]], pose.position)
-    outgoing = leaving(velocity, ball.spin, racket, normal, RACKET_RESTITUTION)
+    outgoing = leaving(velocity, ball.spin, racket, normal)
     flight = position, outgoing.velocity
     time = predict(*flight, 1.5, spin=outgoing.spin).bounce_times[0]
     landing = predict(*flight, time, spin=outgoing.spin, period=time).positions[-1]

@@ -20,7 +20,6 @@ from o80_table_tennis.physics.impact import bounced, leaving
 from o80_table_tennis.players.policies import default_policy
 from o80_table_tennis.settings import TaskSettings
 from o80_table_tennis.task.actions import COARSE
-from o80_table_tennis.world.materials import RACKET_RESTITUTION
 from o80_table_tennis.world.table import TABLE
 from o80_table_tennis.world.timing import PERIOD
 
@@ -107,7 +106,6 @@ def test_a_ball_leaves_the_racket_alike() -> None:
             before,
             record["surface_velocity"],
             record["normal"],
-            RACKET_RESTITUTION,
         )
         np.testing.assert_allclose(record["velocity_after"], after.velocity, rtol=0, atol=SMALL)
         seen = np.array(history.observed.balls["spin"][row, 0])

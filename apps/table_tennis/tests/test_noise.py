@@ -14,7 +14,7 @@ from o80_table_tennis.physics.prediction import predict
 from o80_table_tennis.settings import TaskSettings
 from o80_table_tennis.task.ball_record import BallRecord
 from o80_table_tennis.task.noise import NoiseSettings
-from o80_table_tennis.task.perception import BLOCK, Perception
+from o80_table_tennis.task.perception import BLOCK, NoisyPerception
 from o80_table_tennis.task.state import State
 
 STEPS = 2 * BLOCK + 10
@@ -33,7 +33,7 @@ def perceived(
     noise: NoiseSettings, balls: FloatArray, *, seed: int = 0
 ) -> tuple[FloatArray, NDArray[Any], FloatArray]:
     """Observed balls (T, 6), missed (T,) and pressures (T, 8) of one episode."""
-    perception = Perception(noise, 0.01, 1)
+    perception = NoisyPerception(noise, 0.01, 1)
     half = np.full((1, 8), 0.5)
     generator, only = np.random.default_rng(seed), np.zeros(1, np.int64)
     seen = [perception.begin(state_of(balls[:1], half), [generator], only)]

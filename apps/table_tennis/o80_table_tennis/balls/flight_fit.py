@@ -9,7 +9,7 @@ that the path has no jump.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -43,12 +43,14 @@ FEWEST = 4
 SLOPE_SHARE = 1e-3
 """Change of an unknown for a difference, as a share of its scale."""
 CLOSE_ENOUGH = 1e-3
-"""The search ends when no unknown moves by more than this share of its scale."""
+"""Precision of a fit, see `fitted`."""
 MAX_ROUNDS = 12
 SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.1 * AERODYNAMICS.drag] + [0.1] * 3)
 """Typical sizes of the ten unknowns, for differences and damping."""
 BELIEFS = np.array([0.0] * 6 + [1 / (DRAG_BELIEF * AERODYNAMICS.drag)] + [1 / TURN_BELIEF] * 3)
 """How sure each unknown is known before [1 / its unit]."""
+Fly = Callable[[FloatArray], FloatArray]
+"""Positions (T, 3, B) of B flights of unknowns (K, B)."""
 _TURNING = replace(AERODYNAMICS, spin_decay=0.0, lift_saturation=0.0).air
 
 
@@ -73,7 +75,7 @@ class Flight:
 
     def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Positions [m] and velocities [m/s], each (T, 3), at `times` (T,) [s]."""
-        positions, velocities = _fly(self.unknowns[:, None], times - self.origin)
+        positions, velocities = fly(self.unknowns[:, None], times - self.origin)
         return positions[..., 0], velocities[..., 0]
 
 
@@ -236,36 +238,71 @@ def fit_segment(
     unknowns = _guess(stamps - origin, positions) if start is None else start.unknowns
     times = np.concatenate([stamps, [time for time, _ in anchors]]) - origin
     points = np.concatenate([positions, *(point[None] for _, point in anchors)])
-    noise = np.full(len(points), POSITION_NOISE)
-    noise[len(stamps) :] = ANCHOR_NOISE
     centre = np.concatenate([np.zeros(6), [AERODYNAMICS.drag], expected_turn])
+    unknowns = fitted(
+        lambda tried: fly(tried, times)[0],
+        unknowns,
+        points,
+        anchors=len(anchors),
+        scales=SCALES,
+        beliefs=BELIEFS,
+        centre=centre,
+        precision=CLOSE_ENOUGH,
+    )
+    return Flight(origin=origin, unknowns=unknowns)
 
+
+def fitted(
+    fly: Fly,
+    unknowns: FloatArray,
+    points: FloatArray,
+    *,
+    anchors: int,
+    scales: FloatArray,
+    beliefs: FloatArray,
+    centre: FloatArray,
+    precision: float,
+    largest: FloatArray | float = np.inf,
+) -> FloatArray:
+    """The unknowns (K,) of the flight that goes best through `points` (n, 3), from a first guess.
+
+    It goes through the last `anchors` points exactly. Scales, centre, certainty (`beliefs`) and
+    limit of each unknown are (K,); one with a limit changes by at most its scale in a step. The
+    search ends when no unknown moves by more than `precision`, a share of its scale.
+    """
+    rows = len(points) - anchors
+    noise = np.full(len(points), POSITION_NOISE)
+    noise[rows:] = ANCHOR_NOISE
+    largest = np.asarray(largest)
+    largest_step = np.where(np.isinf(largest), np.inf, 1.0)
     for _ in range(MAX_ROUNDS):
-        flown, slopes = sloped(unknowns, times)
+        flown, slopes = sloped(fly, unknowns, scales)
         misses = points - flown
 
         # far rows count less
         distance = np.linalg.norm(misses, axis=1) / noise
         usual = max(1.0, float(np.median(distance)))
         weight = np.sqrt(np.minimum(1.0, FAR * usual / np.maximum(distance, 1e-9)))
-        weight[len(stamps) :] = 1.0
+        weight[rows:] = 1.0
         weight /= noise
 
         # rows and beliefs => the step
-        matrix = np.vstack([(weight[:, None, None] * slopes).reshape(-1, 10), np.diag(BELIEFS)])
-        right = np.concatenate([(weight[:, None] * misses).ravel(), BELIEFS * (centre - unknowns)])
-        step = np.linalg.lstsq(matrix * SCALES, right, rcond=1e-10)[0]
-        unknowns = unknowns + SCALES * step
-        if np.abs(step).max() < CLOSE_ENOUGH:
+        weighted = (weight[:, None, None] * slopes).reshape(-1, len(unknowns))
+        matrix = np.vstack([weighted, np.diag(beliefs)])
+        right = np.concatenate([(weight[:, None] * misses).ravel(), beliefs * (centre - unknowns)])
+        step = np.linalg.lstsq(matrix * scales, right, rcond=1e-10)[0]
+        step = np.clip(step, -largest_step, largest_step)
+        unknowns = np.clip(unknowns + scales * step, -largest, largest)
+        if np.abs(step).max() < precision:
             break
-    return Flight(origin=origin, unknowns=unknowns)
+    return unknowns
 
 
-def sloped(unknowns: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Positions (T, 3) of a flight at `times` (T,), and their slopes (T, 3, 10) in its unknowns."""
-    # one flight as it is and ten with one unknown changed
-    change = SLOPE_SHARE * SCALES
-    flown, _ = _fly(unknowns[:, None] + np.column_stack([np.zeros(10), np.diag(change)]), times)
+def sloped(fly: Fly, unknowns: FloatArray, scales: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Positions (T, 3) of a flight, and their slopes (T, 3, K) in its unknowns (K,)."""
+    # the flight as it is and others with one unknown changed
+    change = SLOPE_SHARE * scales
+    flown = fly(unknowns[:, None] + np.column_stack([np.zeros(len(change)), np.diag(change)]))
     return flown[..., 0], (flown[..., 1:] - flown[..., :1]) / change
 
 
@@ -277,7 +314,7 @@ def _guess(times: FloatArray, positions: FloatArray) -> FloatArray:
     return np.concatenate([coefficients[0], coefficients[1], [AERODYNAMICS.drag], np.zeros(3)])
 
 
-def _fly(unknowns: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
+def fly(unknowns: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Positions and velocities (T, 3, B) of B flights, `unknowns` (10, B), at `times` (T,)."""
     # a spin without saturation and decay turns the flight as its turn says
     balls = np.ascontiguousarray(np.vstack([unknowns[:6], unknowns[7:] / AERODYNAMICS.magnus]).T)

@@ -25,6 +25,7 @@ from .flight_fit import (
     Flight,
     bounce_rows,
     fit_segment,
+    fly,
     meeting,
     sloped,
 )
@@ -131,7 +132,8 @@ def _missed(
     A flight gives way to a frame missed in its middle, so that no row looks wrong by itself: each
     cut is judged by the residual after the best flight for it, to first order.
     """
-    _, slopes = sloped(flight.unknowns, frames.astype(np.float64) * period)
+    times = frames.astype(np.float64) * period
+    _, slopes = sloped(lambda tried: fly(tried, times)[0], flight.unknowns, SCALES)
     matrix = np.vstack([slopes.reshape(-1, 10) / POSITION_NOISE, np.diag(BELIEFS)])
     basis = np.linalg.qr(matrix * SCALES)[0][: misses.size]
     left = misses.ravel() / POSITION_NOISE

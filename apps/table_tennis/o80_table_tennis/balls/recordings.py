@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import math
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,7 @@ import numpy as np
 from o80.base.arrays import FloatArray
 
 from .frame_stamps import FRAME_PERIOD, frames_of, new_frames
-from .trajectories import BallTrajectory, require_enough_rows
+from .trajectories import BallTrajectory, require_enough_rows, require_finite
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def _read_ball_gun(file: Path) -> list[BallTrajectory]:
     every_row = _ball_gun_rows(file)
     numbers = np.flatnonzero(new_frames(every_row[:, :3]))
     rows = every_row[numbers]
-    _require_finite(file, rows)
+    require_finite(f"{file}:", rows)  # time stamps cannot be reconstructed around others
     require_enough_rows(str(file), len(rows))
     frames = frames_of(rows[:, :3], rows[:, 3:], numbers)
     trajectory = BallTrajectory(
@@ -98,7 +98,7 @@ def _read_ball_gun(file: Path) -> list[BallTrajectory]:
         positions=BALL_GUN_FRAME.point(rows[:, :3]),
         velocities=BALL_GUN_FRAME.direction(rows[:, 3:]),
     )
-    return [trajectory.named(file.stem)]
+    return [replace(trajectory, name=file.stem)]
 
 
 def _ball_gun_rows(file: Path) -> FloatArray:
@@ -166,19 +166,9 @@ def _read_shot(file: Path, shot: Any) -> BallTrajectory:
         positions=LAUNCHER_FRAME.point(positions),
         velocities=LAUNCHER_FRAME.direction(velocities),
     )
-    return trajectory.named(f"{file.stem}/{shot.name.rsplit('/', 1)[-1]}")
+    return replace(trajectory, name=f"{file.stem}/{shot.name.rsplit('/', 1)[-1]}")
 
 
 def _number(key: str) -> tuple[int, str]:
     """Orders "2" before "10", and names after numbers."""
     return (int(key), "") if key.isdigit() else (sys.maxsize, key)
-
-
-def _require_finite(file: Path, rows: FloatArray) -> None:
-    """Time stamps cannot be reconstructed around rows that are not numbers."""
-    broken = np.flatnonzero(~np.isfinite(rows).all(axis=1))
-    if len(broken):
-        raise ValueError(
-            f"{file}: NaN or infinity (first in row {broken[0]}); "
-            "remove the rows in which the ball was not seen"
-        )

@@ -19,7 +19,7 @@ from o80_mujoco.balls import path
 from ..physics.aerodynamics import AERODYNAMICS
 from ..physics.impact import spin_after
 from ..physics.interpolation import along_path
-from .flight_fit import ANCHOR_NOISE, FAR, POSITION_NOISE, FlightFit
+from .flight_fit import FlightFit, fitted
 
 STEP = 0.02
 """Step of the integration [s]."""
@@ -31,11 +31,8 @@ MAX_ERRORS = 2.5
 """A spin is at most so many expected errors away: where lift saturates, flights say little."""
 SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.3] * 3)
 """Typical changes of position [m], velocity [m/s] and spin [expected errors], for differences."""
-SLOPE_SHARE = 1e-3
-"""Change of an unknown for a difference, as a share of its scale."""
 CLOSE_ENOUGH = 1e-4
-"""The search ends when no unknown moves by more than this share of its scale."""
-MAX_ROUNDS = 12
+"""Precision of a fit, see `fitted`."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,45 +133,26 @@ def _fitted(
 
     `spin_errors` (K, 3) [rad/s]: in these directions the spin may differ, about so far.
     """
-    rows = len(times) - anchors
-    noise = np.full(len(times), POSITION_NOISE)
-    noise[rows:] = ANCHOR_NOISE
-    count = 6 + len(spin_errors)
-    scales = SCALES[:count]
-    beliefs = np.diag([0.0] * 6 + [1.0] * len(spin_errors))
-    unknowns = np.concatenate([start.state, np.zeros(len(spin_errors))])
+    spins = len(spin_errors)
 
     def states(tried: FloatArray) -> FloatArray:
         """(9, B)"""
         return np.concatenate([tried[:6], start.spin[:, None] + spin_errors.T @ tried[6:]])
 
-    for _ in range(MAX_ROUNDS):
-        # the flight as it is and others with one unknown changed
-        change = SLOPE_SHARE * scales
-        tried = unknowns[:, None] + np.column_stack([np.zeros(count), np.diag(change)])
-        ways = flown(states(tried), times - start.origin)[0]
-        slopes = (ways[..., 1:] - ways[..., :1]) / change
-        misses = positions - ways[..., 0]
-
-        # far rows count less
-        distance = np.linalg.norm(misses, axis=1) / noise
-        usual = max(1.0, float(np.median(distance)))
-        weight = np.sqrt(np.minimum(1.0, FAR * usual / np.maximum(distance, 1e-9)))
-        weight[rows:] = 1.0
-        weight /= noise
-
-        # rows and beliefs => the step
-        matrix = np.vstack([(weight[:, None, None] * slopes).reshape(-1, count), beliefs])
-        right = np.concatenate([(weight[:, None] * misses).ravel(), -beliefs @ unknowns])
-        step = np.linalg.lstsq(matrix * scales, right, rcond=1e-10)[0]
-        step[6:] = np.clip(step[6:], -1.0, 1.0)  # the slopes of a spin hold nearby only
-        unknowns = unknowns + scales * step
-        unknowns[6:] = np.clip(unknowns[6:], -MAX_ERRORS, MAX_ERRORS)
-        if np.abs(step).max() < CLOSE_ENOUGH:
-            break
+    unknowns = fitted(
+        lambda tried: flown(states(tried), times - start.origin)[0],
+        np.concatenate([start.state, np.zeros(spins)]),
+        positions,
+        anchors=anchors,
+        scales=SCALES[: 6 + spins],
+        beliefs=np.array([0.0] * 6 + [1.0] * spins),
+        centre=np.zeros(6 + spins),
+        precision=CLOSE_ENOUGH,
+        largest=np.array([np.inf] * 6 + [MAX_ERRORS] * spins),
+    )
     found = states(unknowns[:, None])[:, 0]
     flight = replace(start, state=found[:6], spin=found[6:])
-    if not len(spin_errors):
+    if not spins:
         return flight
     # a spin that was held at its most has left position and velocity behind
     return _fitted(flight, np.zeros((0, 3)), times, positions, anchors=anchors)

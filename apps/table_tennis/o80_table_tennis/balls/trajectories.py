@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -23,6 +23,15 @@ def require_enough_rows(name: str, rows: int) -> None:
     if rows < SHORTEST:
         raise ValueError(
             f"{name}: {rows} rows are too few to fit a flight, {SHORTEST} are needed; leave it out"
+        )
+
+
+def require_finite(what: str, rows: FloatArray) -> None:
+    """Raises ValueError unless all numbers are finite."""
+    if not np.isfinite(rows).all():
+        raise ValueError(
+            f"{what} NaN or infinity (first in row {np.argwhere(~np.isfinite(rows))[0][0]}); "
+            "remove the rows in which the ball was not seen"
         )
 
 
@@ -53,12 +62,7 @@ class BallTrajectory:
         ):
             if array.shape != shape:
                 raise ValueError(f"{self.name}: {what} have shape {array.shape}, not {shape}")
-            if not np.isfinite(array).all():
-                row = int(np.argwhere(~np.isfinite(array))[0][0])
-                raise ValueError(
-                    f"{self.name}: {what} hold NaN or infinity (first in row {row}); "
-                    "remove the rows in which the ball was not seen"
-                )
+            require_finite(f"{self.name}: {what} hold", array)
         falling = np.flatnonzero(np.diff(self.stamps) <= 0)
         if len(falling):
             raise ValueError(
@@ -70,10 +74,6 @@ class BallTrajectory:
     def duration(self) -> float:
         """From the first row to the last [s]."""
         return float(self.stamps[-1] - self.stamps[0])
-
-    def named(self, name: str) -> BallTrajectory:
-        """The same trajectory under another name."""
-        return replace(self, name=name)
 
     @cached_property
     def fit(self) -> FlightFit:

@@ -18,7 +18,7 @@ from o80_mujoco.balls import Platform
 from o80_mujoco.balls import bounced as bounced_off
 
 from ..world.ball import BALL_INERTIA, BALL_RADIUS
-from ..world.materials import Restitution
+from ..world.materials import RACKET_RESTITUTION
 from ..world.table import TABLE, Table
 from .aerodynamics import AERODYNAMICS
 
@@ -69,13 +69,7 @@ def spin_after(velocity: FloatArray, turn: FloatArray, spin: FloatArray | None) 
     return bounced(velocity[0], spin).spin
 
 
-def leaving(
-    ball: FloatArray,
-    spin: FloatArray,
-    racket: FloatArray,
-    normal: FloatArray,
-    restitution: Restitution,
-) -> Leaving:
+def leaving(ball: FloatArray, spin: FloatArray, racket: FloatArray, normal: FloatArray) -> Leaving:
     """The ball after an impact on a racket.
 
     `ball` and `spin` (3,) are those before it, `racket` (3,) is the velocity of the racket at the
@@ -86,8 +80,8 @@ def leaving(
         np.concatenate([np.zeros(3), ball, spin]),
         towards.tolist(),
         racket.tolist(),
-        (restitution.tangential, restitution.tangential, restitution.normal),
-        restitution.friction,
+        (RACKET_RESTITUTION.tangential, RACKET_RESTITUTION.tangential, RACKET_RESTITUTION.normal),
+        RACKET_RESTITUTION.friction,
         radius=BALL_RADIUS,
         inertia=BALL_INERTIA,
     )

@@ -13,7 +13,7 @@ from o80_mujoco.balls import predicted_flight
 
 from ..world.ball import NO_SPIN
 from ..world.table import TABLE, Table
-from .aerodynamics import AERODYNAMICS, Aerodynamics
+from .aerodynamics import AERODYNAMICS
 from .impact import platform
 from .interpolation import along_path
 
@@ -48,7 +48,6 @@ def predict(
     *,
     spin: Numbers = NO_SPIN,
     period: float = 0.01,
-    aerodynamics: Aerodynamics = AERODYNAMICS,
     table: Table | None = TABLE,
 ) -> PredictedFlight:
     """The flight from `position` (3,) [m], `velocity` (3,) [m/s], `spin` (3,) [rad/s], world frame.
@@ -56,12 +55,12 @@ def predict(
     Rows every `period` [s] from 0 to `duration` [s]; the ball bounces on `table` if there is one.
     """
     _require_positive(duration=duration, period=period)
-    nodes = flight_nodes(position, velocity, spin, duration, aerodynamics, table)
+    nodes = flight_nodes(position, velocity, spin, duration, table)
     starts = nodes[:, TIME]
     times = period * np.arange(math.floor(duration / period + 1e-9) + 1, dtype=np.float64)
     positions, velocities = along_path(times, nodes[:, STATE], starts)
     last = np.searchsorted(starts, times, side="right") - 1
-    decayed = np.exp(-aerodynamics.spin_decay * (times - starts[last]))
+    decayed = np.exp(-AERODYNAMICS.spin_decay * (times - starts[last]))
     spins = nodes[last, SPIN] * decayed[:, None]
     return PredictedFlight(times, positions, velocities, starts[nodes[:, BOUNCED] == 1.0], spins)
 
@@ -71,7 +70,6 @@ def flight_nodes(
     velocity: Numbers,
     spin: Numbers,
     duration: float,
-    aerodynamics: Aerodynamics = AERODYNAMICS,
     table: Table | None = TABLE,
     *,
     step: float = STEP,
@@ -84,7 +82,7 @@ def flight_nodes(
     if not np.isfinite(ball).all():
         raise ValueError(f"position {position} and velocity {velocity} must be finite")
     on = None if table is None else platform(table)
-    return predicted_flight(ball, aerodynamics.air, on, duration, step)
+    return predicted_flight(ball, AERODYNAMICS.air, on, duration, step)
 
 
 def _require_positive(**values: float) -> None:

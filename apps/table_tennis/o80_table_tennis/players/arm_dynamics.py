@@ -7,6 +7,7 @@ couplings of the wrist.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -53,10 +54,7 @@ class ArmModel:
         w1, w2, w3, _ = dq.tolist()
         t1, t2, t3, t4 = self.turning
         torque1, torque2, torque3 = t1 * a1, t2 * a2, t3 * a3
-        for mass, along_upper, along_fore in self._points():
-            out2, up2 = along_upper * math.sin(q[1]), along_upper * math.cos(q[1])
-            out3, up3 = along_fore * math.sin(q[1] + q[2]), along_fore * math.cos(q[1] + q[2])
-            out, up = out2 + out3, up2 + up3
+        for mass, out, up, out3, up3 in self._points(q):
             # rotation about the vertical, and its centrifugal effect
             torque1 += mass * out * (out * a1 + 2.0 * w1 * (up * w2 + up3 * w3))
             away = -out * w1 * w1
@@ -74,17 +72,8 @@ class ArmModel:
         at_rest = np.zeros_like(q)
         bias = self.torque(q, dq, at_rest) - np.array(self.damping) * dq
         # joint 1 turns the plane in which joints 2 and 3 bend the arm
-        s2, c2 = math.sin(q[1]), math.cos(q[1])
-        s23, c23 = math.sin(q[1] + q[2]), math.cos(q[1] + q[2])
         mass = np.diag(np.array(self.turning) + duration * np.array(self.damping))
-        for weight, along_upper, along_fore in self._points():
-            out2, up2, out3, up3 = (
-                along_upper * s2,
-                along_upper * c2,
-                along_fore * s23,
-                along_fore * c23,
-            )
-            out, up = out2 + out3, up2 + up3
+        for weight, out, up, out3, up3 in self._points(q):
             mass[0, 0] += weight * out * out
             mass[1, 1] += weight * (up * up + out * out)
             mass[1, 2] += weight * (up * up3 + out * out3)
@@ -94,10 +83,14 @@ class ArmModel:
         result: FloatArray = dq + change
         return result
 
-    def _points(self) -> tuple[tuple[float, float, float], ...]:
-        """Mass [kg], and how far it lies along the upper arm and the forearm [m]."""
-        return (
+    def _points(self, q: FloatArray) -> Iterator[tuple[float, float, float, float, float]]:
+        """Masses [kg]: how far out and up each lies from joint 2, then from joint 3 [m]."""
+        s2, c2 = math.sin(q[1]), math.cos(q[1])
+        s23, c23 = math.sin(q[1] + q[2]), math.cos(q[1] + q[2])
+        for mass, along_upper, along_fore in (
             (self.upper_arm.mass, self.upper_arm.centre, 0.0),
             (self.elbow.mass, UPPER_ARM, 0.0),
             (self.forearm.mass, UPPER_ARM, self.forearm.centre),
-        )
+        ):
+            out3, up3 = along_fore * s23, along_fore * c23
+            yield mass, along_upper * s2 + out3, along_upper * c2 + up3, out3, up3

@@ -13,16 +13,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from o80.base.arrays import FloatArray
+from o80_mujoco.balls import path
 
-from ..physics.aerodynamics import AERODYNAMICS, Aerodynamics
+from ..physics.aerodynamics import AERODYNAMICS
 from ..physics.impact import Leaving, leaving
 from ..physics.prediction import predict
 from ..world.arm import BLADE_THICKNESS, racket_pose
 from ..world.ball import BALL_GUN_SPIN, BALL_RADIUS
-from ..world.materials import RACKET_RESTITUTION, Restitution
 from ..world.scene import Vector
-from ..world.table import TABLE, Table
-from .aiming import velocity_to_land
+from ..world.table import TABLE
 from .inverse_kinematics import posture_towards
 
 PATH_PERIOD = 0.01
@@ -31,6 +30,9 @@ TOUCH = BALL_RADIUS + BLADE_THICKNESS / 2
 """From the middle of the blade to the centre of a ball that touches it [m]."""
 LATEST = 1.6
 """No ball is followed further ahead than this [s]."""
+STEPS, CORRECTIONS = 6, 2
+"""Steps of the flight to the target, and flights to find its first velocity."""
+AIR = replace(AERODYNAMICS, spin_decay=0.0).air
 FIRST_ROUNDS = 4
 """Iterations for the first strike of a ball; later searches start at the last one, and take one."""
 
@@ -81,9 +83,6 @@ class InterceptionSettings:
     """Weight of a touch off the middle of the blade, relative to the same error [1/s]."""
     spin: Vector = BALL_GUN_SPIN
     """Spin of an approaching ball, before its bounce [rad/s]."""
-    racket: Restitution = RACKET_RESTITUTION
-    aerodynamics: Aerodynamics = AERODYNAMICS
-    table: Table = TABLE
 
 
 @dataclass(frozen=True)
@@ -130,18 +129,11 @@ def coming_ball(
     if velocity[1] > -0.5 or position[1] < settings.nearest:
         return None
     duration = min(LATEST, 1.6 * (position[1] - settings.nearest) / -velocity[1] + 0.1)
-    path = predict(
-        position,
-        velocity,
-        duration,
-        spin=settings.spin if spin is None else spin,
-        period=PATH_PERIOD,
-        aerodynamics=settings.aerodynamics,
-        table=settings.table,
-    )
-    rising = np.flatnonzero(np.diff(path.velocities[:, 2]) > 0.0)
+    spin = settings.spin if spin is None else spin
+    flight = predict(position, velocity, duration, spin=spin, period=PATH_PERIOD)
+    rising = np.flatnonzero(np.diff(flight.velocities[:, 2]) > 0.0)
     first = int(rising[-1]) + 2 if len(rising) else 0
-    y = path.positions[:, 1]
+    y = flight.positions[:, 1]
     near = np.flatnonzero((y <= settings.farthest + 0.03) & (y >= settings.nearest - 0.03))
     near = near[near >= first]
     if len(near) < 2:
@@ -149,7 +141,7 @@ def coming_ball(
     rows = slice(int(near[0]), int(near[-1]) + 1)
     middle = (rows.start + rows.stop) // 2
     return ComingBall(
-        path.stamps[rows], path.positions[rows], path.velocities[rows], path.spins[middle]
+        flight.stamps[rows], flight.positions[rows], flight.velocities[rows], flight.spins[middle]
     )
 
 
@@ -204,9 +196,16 @@ class StrikePlanner:
         """Velocity (3,) with which the ball should leave."""
         s = self._settings
         position, _ = ball.at(float(guess[0]))
-        target = np.array([s.target_x, s.target_y, s.table.bounce_height])
+        target = np.array([s.target_x, s.target_y, TABLE.bounce_height])
         spin = self._leaving(ball, guess)[0].spin
-        return velocity_to_land(position, target, s.flight, spin=spin, aerodynamics=s.aerodynamics)
+        # start with a flight without air, then add the miss that the air causes
+        velocity: FloatArray = (target - position) / s.flight
+        velocity[2] += 0.5 * AERODYNAMICS.gravity * s.flight
+        for _ in range(CORRECTIONS):
+            leaving = np.concatenate([position, velocity, spin])[np.newaxis]
+            landing = path(leaving, s.flight / STEPS, STEPS, AIR)[-1, 0, :3]
+            velocity = velocity + (target - landing) / s.flight
+        return velocity
 
     def _error(self, ball: ComingBall, guess: FloatArray, wanted: FloatArray) -> FloatArray:
         """Velocity of the leaving ball less `wanted`, and the racket's offset from it, (6,)."""
@@ -220,7 +219,7 @@ class StrikePlanner:
         pose = racket_pose(touching_posture(position, float(guess[1])))
         normal = np.array(pose.normal)
         racket = np.array([-speed * position[1], speed * position[0], 0.0])
-        after = leaving(velocity, ball.spin, racket, normal, self._settings.racket)
+        after = leaving(velocity, ball.spin, racket, normal)
         return after, position - TOUCH * normal - np.array(pose.position)
 
 

@@ -7,6 +7,7 @@ called for each new episode, `observe` exactly once after each step.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from gymnasium import spaces
@@ -17,7 +18,7 @@ from .ball_play import ReturnTask, observes_as_published
 from .full_observation import FullObservation
 from .full_observer import FullObserver
 from .noise import NO_NOISE, NoiseSettings
-from .perception import Perceived, Perceiving, Perception
+from .perception import NoisyPerception, Perceived, Perception
 from .state import State
 
 EVERY = slice(None)
@@ -41,9 +42,9 @@ class Observer:
         largest_change: of an asked pressure in that time, normalised.
         """
         self._task = task
-        self._perception: Perceiving | None = (
-            Perception(noise, interval, count) if noise.of_observations else None
-        )
+        self._perception = Perception()
+        if noise.of_observations:
+            self._perception = NoisyPerception(noise, interval, count)
         observed = task if full is None else full
         self.low, self.high = observed.low, observed.high
         """(M,) bounds of an observation."""
@@ -55,7 +56,7 @@ class Observer:
         """M, the numbers of an observation."""
         self.is_ball_play = (
             full is None
-            and self._perception is None
+            and not noise.of_observations
             and observes_as_published(task)
             and bool(np.all(self.low < self.high))
         )
@@ -65,7 +66,7 @@ class Observer:
         if full is not None:
             self._full = FullObserver(full, noise, interval, largest_change, count)
 
-    def look_through(self, perception: Perceiving) -> None:
+    def look_through(self, perception: Perception) -> None:
         """From the next episode on, ball and pressures are what this one perceives."""
         self._perception = perception
 
@@ -80,22 +81,14 @@ class Observer:
         `state` is theirs alone, as are the `generators`, of which each is drawn from once if there
         is any noise.
         """
-        seen = (
-            exactly(state)
-            if self._perception is None
-            else self._perception.begin(state, generators, which)
-        )
+        seen = self._perception.begin(state, generators, which)
         if self._full is None:
             return self._of_task(state, seen)
         return self.clip(self._full.begin(state, seen, which))
 
     def observe(self, state: State, which: IntArray | slice = EVERY) -> Float32Array:
         """The observations (n, M) after a step of the episodes `which` (n,), in this state."""
-        if self._perception is None and self._full is None:
-            return self.clip(self._task.observe(state))
-        seen = (
-            exactly(state) if self._perception is None else self._perception.perceive(state, which)
-        )
+        seen = self._perception.perceive(state, which)
         if self._full is None:
             return self._of_task(state, seen)
         return self.clip(self._full.observe(state, seen, which))
@@ -106,9 +99,5 @@ class Observer:
         return within.astype(np.float32)
 
     def _of_task(self, state: State, seen: Perceived) -> Float32Array:
-        return self.clip(self._task.observe(state.perceived(seen.ball, seen.pressures)))
-
-
-def exactly(state: State) -> Perceived:
-    """Perception without noise."""
-    return Perceived(state.ball, np.zeros(len(state.ball), np.bool_), state.pressures)
+        state = replace(state, ball=seen.ball, pressures=seen.pressures)
+        return self.clip(self._task.observe(state))

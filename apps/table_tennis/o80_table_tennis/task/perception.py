@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,21 +41,21 @@ class Perceived:
     """The balls are seen for the first time in this episode: what was said before was a guess."""
 
 
-class Perceiving(Protocol):
-    """Source of the ball and the pressures in observations: noise, or a device."""
+class Perception:
+    """Source of the ball and the pressures in observations: as they are."""
 
     def begin(
         self, state: State, generators: Sequence[np.random.Generator], which: IntArray
     ) -> Perceived:
-        """First perception of new episodes."""
-        ...
+        """First perception of new episodes `which` (n,), whose state this is."""
+        return self.perceive(state, which)
 
     def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
-        """After a step."""
-        ...
+        """After a step of some of the N episodes."""
+        return Perceived(state.ball, np.zeros(len(state.ball), np.bool_), state.pressures)
 
 
-class Perception:
+class NoisyPerception(Perception):
     """The noise of N episodes (`count`).
 
     `interval` is the time from one observation to the next [s].
@@ -73,24 +72,24 @@ class Perception:
         self._at = np.zeros(count, np.int64)
         self._every = np.arange(count)
         self._last = np.zeros((count, BALL))
-        self._delay = Delay(noise.latency, interval, count)
+        self._delay = Delay(noise.latency, interval, count) if noise.latency else None
 
     def begin(
         self, state: State, generators: Sequence[np.random.Generator], which: IntArray
     ) -> Perceived:
-        """New episodes `which` (n,) in this state; each generator gives the seed of its noise."""
+        """Each generator gives the seed of its noise."""
         for copy, generator in zip(which.tolist(), generators, strict=True):
             self._generators[copy] = np.random.default_rng(int(generator.integers(SEEDS)))
             self._draw(copy)
             self._missed[copy, 0] = False  # an episode begins with a ball that is seen
         self._at[which] = 0
-        if self._delay:
+        if self._delay is not None:
             self._delay.begin(state.ball, which)
         return self._look(state, which)
 
     def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
-        """The next observations of some of the N, which `state` holds."""
-        if self._delay:
+        """With the next noise."""
+        if self._delay is not None:
             self._delay.add(state.ball, which)
         chosen = self._every[which]
         at = (self._at[chosen] + 1) % BLOCK
@@ -101,7 +100,7 @@ class Perception:
 
     def _look(self, state: State, which: IntArray) -> Perceived:
         at = self._at[which]
-        ball = self._delay.delayed(which) if self._delay else state.ball
+        ball = state.ball if self._delay is None else self._delay.delayed(which)
         noise, missed = self._normal[which, at], self._missed[which, at]
         ball = np.where(missed[:, None], self._last[which], ball + noise[:, :BALL])
         self._last[which] = ball
@@ -115,16 +114,13 @@ class Perception:
 
 
 class Delay:
-    """The balls of N episodes as they were some time ago; false where there is no latency."""
+    """The balls of N episodes as they were some time ago."""
 
     def __init__(self, latency: float, interval: float, copies: int) -> None:
         self._late, self._share = int(latency / interval), latency / interval % 1.0
-        self._used, self._interval = latency > 0, interval
+        self._interval = interval
         self._past = np.zeros((copies, self._late + 2, BALL))
         """Balls of the last observations, the newest first."""
-
-    def __bool__(self) -> bool:
-        return self._used
 
     def begin(self, balls: FloatArray, which: IntArray) -> None:
         """New episodes with these balls (n, 6): before, they were on the way to where they are."""

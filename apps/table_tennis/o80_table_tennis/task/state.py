@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -53,19 +53,8 @@ class State:
         """(...) how far the ball is from the arm, towards the opponent [m]."""
         return self.ball[..., 1]
 
-    def perceived(self, ball: FloatArray, pressures: FloatArray) -> State:
-        """The same as it is observed: another ball (..., 6), other pressures (..., 8)."""
-        return replace(self, ball=ball, pressures=pressures)
-
     def at(self, index: Any) -> State:
         """Some of N episodes, by an index or a mask (N,)."""
-        return State(
-            np.asarray(self.steps)[index],
-            self.motion[index],
-            self.pressures[index],
-            self.asked[index],
-            self.racket[index],
-            self.ball[index],
-            self.record.at(index),
-            self.goal[index],
-        )
+        names = [name for name in self.__slots__ if name not in ("steps", "record")]
+        arrays = {name: getattr(self, name)[index] for name in names}
+        return State(np.asarray(self.steps)[index], record=self.record.at(index), **arrays)

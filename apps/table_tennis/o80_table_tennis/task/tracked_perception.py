@@ -19,7 +19,7 @@ from o80_devices.ball_tracking.ball_row import Reason
 
 from ..balls.launches import WIDE
 from ..physics.prediction import STATE, flight_nodes
-from .perception import Perceived
+from .perception import Perceived, Perception
 from .state import State
 
 STEP = 0.005
@@ -31,7 +31,7 @@ KNOWN_VELOCITY = 0.25
 once or twice [m/s]."""
 
 
-class TrackedPerception:
+class TrackedPerception(Perception):
     """Perception by the tracker, of one episode after the other.
 
     `tracker` is an observer of its segment, or None while there is none; `now` the time of the row
