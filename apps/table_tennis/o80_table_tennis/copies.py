@@ -35,7 +35,7 @@ from .rig.rig import rig_of
 from .rig.rows import RigRows
 from .settings import RigSettings, TaskSettings
 from .task.actions import changed_pressures
-from .task.end import End, terminated, undecided
+from .task.end import End, terminated
 from .task.state import State
 from .world.arm import MUSCLES
 from .world.timing import ITERATIONS
@@ -48,12 +48,6 @@ TEXTS = np.array([end.text for end in End], object)
 """Texts of the ends, by their numbers."""
 BALL_STATE = np.dtype([(name, np.float64, (3,)) for name in ("position", "velocity", "spin")])
 """State of a ball that is sent to its world."""
-
-
-def _running(copies: int) -> dict[str, NDArray[Any]]:
-    """Entries of `info` where no episode has ended."""
-    ends = np.full(copies, End.RUNNING, np.int64)
-    return {"stalled": np.zeros(copies, np.bool_), "end": ends, "end_text": TEXTS[ends]}
 
 
 class TableTennisCopies(HybridTask):
@@ -156,7 +150,8 @@ class TableTennisCopies(HybridTask):
         self._observations = np.zeros((total, self.observer.size), np.float32)
         self._ends = np.zeros(total, np.int64)
         self._unobserved = self._some_ended = False
-        self._running = _running(self.copies)
+        ends, nobody = np.full(self.copies, End.RUNNING), np.zeros(self.copies, np.bool_)
+        self._running = {"stalled": nobody, "end": ends, "end_text": TEXTS[ends]}
 
     @property
     def single(self) -> Single:
@@ -276,7 +271,7 @@ class TableTennisCopies(HybridTask):
     def _fly(self, touched: Numbers) -> None:
         """The touched balls of these copies fly to their ends, unless they are there."""
         state = self.state.at(touched)
-        flying = touched[undecided(self.task.end(state), state.record.touched)]
+        flying = touched[state.record.touched & ~terminated(self.task.end(state))]
         if flying.size:
             every = ITERATIONS * self.settings.steps
             fields = fly_out_fields(every=every, passed_y=self.settings.end.passed_y)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from gymnasium.vector import AutoresetMode
@@ -17,7 +18,7 @@ from .settings import Pacing, RigSettings, TaskSettings
 def _made(rig: RigSettings | None, pacing: Pacing, rest: dict[str, Any]) -> TableTennisEnvironment:
     """An environment with this pacing. Raises TypeError for anything but settings."""
     refuse_wrong_arguments(rig, None, None, [])
-    return TableTennisEnvironment(rig=(rig or RigSettings()).paced(pacing), **rest)
+    return TableTennisEnvironment(rig=replace(rig or RigSettings(), pacing=pacing), **rest)
 
 
 def accelerated_environment(

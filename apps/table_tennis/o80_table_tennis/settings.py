@@ -89,10 +89,6 @@ class RigSettings:
         """Duration of a step of the environment [s]."""
         return ITERATIONS * self.period
 
-    def paced(self, pacing: Pacing) -> RigSettings:
-        """The same rig in another way of pacing."""
-        return replace(self, pacing=pacing)
-
 
 @dataclass(frozen=True)
 class TaskSettings:

@@ -38,17 +38,17 @@ def main(
     """Fits the distribution of the launches of the first set."""
     first, *others = [recorded_numbers(load_trajectories(path)) for path in sets]
     fit_on, test_on = halves(len(first))
-    found = fitted(first[fit_on][:, LAUNCH])
-    factor = np.linalg.cholesky(found.covariance)
+    mean, covariance = fitted(first[fit_on][:, LAUNCH])
+    factor = np.linalg.cholesky(covariance)
     print(f"fitted on {len(fit_on)} shots, position [m], velocity [m/s], spin [rad/s]:")
-    print("mean  ", ", ".join(f"{value:.4f}" for value in found.mean))
+    print("mean  ", ", ".join(f"{value:.4f}" for value in mean))
     for number, row in enumerate(factor):
         print(
             "factor" if number == 0 else "      ", ", ".join(f"{v:.4f}" for v in row[: number + 1])
         )
 
     rng = np.random.default_rng(0)
-    distribution = NormalLaunches(tuple(found.mean), tuple(map(tuple, factor)))
+    distribution = NormalLaunches(tuple(mean), tuple(map(tuple, factor)))
     drawn = simulated_numbers([drawn_launch(rng, distribution) for _ in range(DRAWN)])
     compared = {"other half": first[test_on]}
     compared |= {path.stem: rows for path, rows in zip(sets[1:], others, strict=True)}

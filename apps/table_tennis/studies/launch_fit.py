@@ -8,7 +8,6 @@ launches of one half of a set and compared with the other half, number by number
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
@@ -32,25 +31,15 @@ LAUNCH = slice(0, 9)
 """The numbers of the launch."""
 
 
-@dataclass(frozen=True, eq=False)
-class FittedLaunches:
-    """A normal distribution of launches."""
-
-    mean: FloatArray
-    """(9,)"""
-    covariance: FloatArray
-    """(9, 9)"""
-
-
 def halves(count: int) -> tuple[FloatArray, FloatArray]:
     """Numbers of the shots to fit, and of those to test: drawn once and for all."""
     shuffled = np.random.default_rng(0).permutation(count)
     return np.sort(shuffled[: count // 2]), np.sort(shuffled[count // 2 :])
 
 
-def fitted(launches: FloatArray) -> FittedLaunches:
-    """The distribution of launches (N, 9)."""
-    return FittedLaunches(launches.mean(axis=0), np.cov(launches.T))
+def fitted(launches: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Mean (9,) and covariance (9, 9) of launches (N, 9)."""
+    return launches.mean(axis=0), np.cov(launches.T)
 
 
 def recorded_numbers(shots: Sequence[BallTrajectory]) -> FloatArray:

@@ -65,12 +65,3 @@ def test_the_motion_of_the_dead_time_is_predicted_from_the_actions_in_flight() -
         assert error < 0.25 * np.std(moved), joint
         if ahead > 1:
             assert error < 0.7 * np.std(continued), joint
-
-
-def test_without_dead_time_the_arm_is_where_it_is() -> None:
-    settings = HittingSettings()
-    predictor = ArmPredictor(
-        settings.arm, settings.muscles, settings.lag, settings.dead_time, BEGIN
-    )
-    now = ArmState(np.ones(4), np.ones(4), np.full(8, 0.5))
-    assert predictor.predict(now) is now

@@ -46,7 +46,7 @@ def test_the_constants_are_those_of_the_fit(sets: list[BounceSet]) -> None:
 
     assert lift == pytest.approx(AERODYNAMICS.lift_coefficient, abs=0.03)
     assert saturation == pytest.approx(AERODYNAMICS.lift_saturation, abs=0.1)
-    assert grip == pytest.approx(TABLE_RESTITUTION.grip, abs=0.01)
+    assert grip == pytest.approx(1.0 - TABLE_RESTITUTION.tangential, abs=0.01)
     spins = [Law().spin(bounce)[0] for bounce in sets[0].bounces]
     assert np.median(spins) == pytest.approx(BALL_GUN_SPIN[0], abs=2.0)
     for each, most in zip(sets, (0.095, 0.1, 0.3), strict=True):

@@ -42,11 +42,7 @@ def test_a_planned_strike_sends_the_ball_to_the_target(seed: int) -> None:
     assert landing[:2] == pytest.approx((0.0, 2.5), abs=0.1)
 
 
-def test_a_ball_that_flies_away_is_left_alone() -> None:
-    away = np.array([0.2, 3.0, 1.0])
-    assert coming_ball(np.array([0.5, 1.0, 1.2]), away, InterceptionSettings()) is None
-
-
-def test_a_ball_behind_the_arm_is_left_alone() -> None:
-    coming = np.array([0.2, -3.0, 0.0])
-    assert coming_ball(np.array([0.6, -0.5, 1.2]), coming, InterceptionSettings()) is None
+@pytest.mark.parametrize(("y", "speed"), [(1.0, 3.0), (-0.5, -3.0)])
+def test_a_ball_that_flies_away_or_is_behind_the_arm_is_left_alone(y: float, speed: float) -> None:
+    place, velocity = np.array([0.5, y, 1.2]), np.array([0.2, speed, 0.5])
+    assert coming_ball(place, velocity, InterceptionSettings()) is None

@@ -38,13 +38,13 @@ def test_the_constants_are_those_of_the_fit(recorded: FloatArray) -> None:
     fit_on, test_on = halves(len(recorded))
     assert len(fit_on) == len(test_on) == 40
     assert not set(fit_on) & set(test_on)
-    found = fitted(recorded[fit_on][:, LAUNCH])
+    mean, covariance = fitted(recorded[fit_on][:, LAUNCH])
     factor = np.zeros((9, 9))
     for number, row in enumerate(NARROW.factor):
         factor[number, : number + 1] = row
-    np.testing.assert_allclose(NARROW.mean, found.mean, atol=0.01)
-    deviations = np.sqrt(np.diag(found.covariance))
-    off = (factor @ factor.T - found.covariance) / np.outer(deviations, deviations)
+    np.testing.assert_allclose(NARROW.mean, mean, atol=0.01)
+    deviations = np.sqrt(np.diag(covariance))
+    off = (factor @ factor.T - covariance) / np.outer(deviations, deviations)
     assert np.abs(off).max() < 0.05
 
 

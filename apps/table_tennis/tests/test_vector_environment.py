@@ -126,16 +126,6 @@ def test_plays_long_recorded_flights() -> None:
         np.testing.assert_allclose(seen[0, BALL_POSITION], shot.positions[300], atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("rig", "text"),
-    [
-        (RigSettings(pacing=Pacing.PROCESSES), "needs pacing=Pacing.INLINE"),
-        (
-            RigSettings(pacing=Pacing.PROCESSES, arm_segment="arm", attach=True),
-            "make it of single environments",
-        ),
-    ],
-)
-def test_a_rig_that_copies_cannot_have_is_refused(rig: RigSettings, text: str) -> None:
-    with pytest.raises(ValueError, match=text):
-        made(2, rig=rig)
+def test_a_rig_that_copies_cannot_have_is_refused() -> None:
+    with pytest.raises(ValueError, match=r"needs pacing=Pacing\.INLINE.*make it of single env"):
+        made(2, rig=RigSettings(pacing=Pacing.PROCESSES))

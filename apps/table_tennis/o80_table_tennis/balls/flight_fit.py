@@ -64,11 +64,6 @@ class Flight:
     """(10,) position [m], velocity [m/s], drag [1/m], turn (3) [1/s]"""
 
     @property
-    def drag_coefficient(self) -> float:
-        """Cd of the flight."""
-        return float(self.unknowns[6]) / AERODYNAMICS.drag_per_coefficient
-
-    @property
     def turn(self) -> FloatArray:
         """(3,) Magnus acceleration = turn x velocity [1/s]."""
         return self.unknowns[7:]

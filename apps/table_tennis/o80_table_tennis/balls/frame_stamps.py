@@ -51,14 +51,8 @@ def new_frames(positions: FloatArray) -> NDArray[np.bool_]:
     return np.concatenate([[True], ~repeated])
 
 
-def frames_of(
-    positions: FloatArray,
-    velocities: FloatArray,
-    rows: IntArray,
-    *,
-    period: float = FRAME_PERIOD,
-) -> IntArray:
-    """Number of the frame (N,) of each row, from 0; times `period` [s] these are the stamps.
+def frames_of(positions: FloatArray, velocities: FloatArray, rows: IntArray) -> IntArray:
+    """Number of the frame (N,) of each row, from 0; times `FRAME_PERIOD` these are the stamps.
 
     `positions` (N, 3) [m], `velocities` (N, 3) [m/s] of new frames only, and their number in the
     file `rows` (N,).
@@ -69,15 +63,15 @@ def frames_of(
     before: Flight | None = None
     for first, last in pairwise(edges):
         segment = slice(first + 1, last)
-        counted = _count(positions[segment], velocities[segment], rows[segment], period)
+        counted = _count(positions[segment], velocities[segment], rows[segment])
         mine, flight = counted.frames, counted.flight
         if before is not None:
             # the segment goes on after the one before, the lowest row lies between them
             start = int(frames[first - 1])
-            ahead, between = _gap(before, flight, start, positions[first], period)
+            ahead, between = _gap(before, flight, start, positions[first])
             frames[first] = start + between
             mine = mine + start + ahead
-            flight = replace(flight, origin=flight.origin + (start + ahead) * period)
+            flight = replace(flight, origin=flight.origin + (start + ahead) * FRAME_PERIOD)
         frames[segment] = mine
         before = flight
     return frames
@@ -88,22 +82,22 @@ class _Count:
     frames: IntArray
     """(n,), from 0"""
     flight: Flight
-    """Through the rows at frames * period."""
+    """Through the rows at frames * `FRAME_PERIOD`."""
     distance: float
     """Root mean square of the rows' distances from the flight [m]."""
 
 
-def _count(positions: FloatArray, velocities: FloatArray, rows: IntArray, period: float) -> _Count:
+def _count(positions: FloatArray, velocities: FloatArray, rows: IntArray) -> _Count:
     """Frames of the rows between two bounces; a second first guess where the first fits badly."""
-    by_reader = _settle((rows - rows[0]) * READER_PERIOD, positions, period)
+    by_reader = _settle((rows - rows[0]) * READER_PERIOD, positions)
     if by_reader.distance < CLOSE:
         return by_reader
     durations = _durations(positions, velocities)
-    by_speed = _settle(np.cumsum(np.concatenate([[0.0], durations])), positions, period)
+    by_speed = _settle(np.cumsum(np.concatenate([[0.0], durations])), positions)
     return min(by_reader, by_speed, key=lambda count: count.distance)
 
 
-def _settle(times: FloatArray, positions: FloatArray, period: float) -> _Count:
+def _settle(times: FloatArray, positions: FloatArray) -> _Count:
     """Frames near `times` (n,) [s] that agree with the flight fitted to them."""
     frames = np.zeros(0, dtype=np.int64)
     flight: Flight | None = None
@@ -113,26 +107,24 @@ def _settle(times: FloatArray, positions: FloatArray, period: float) -> _Count:
         flown, speed = flight.at(times)
         misses = positions - flown
         late = np.sum(misses * speed, axis=1) / np.sum(speed**2, axis=1)
-        again = _whole((times + late) / period)
+        again = _whole((times + late) / FRAME_PERIOD)
         if np.array_equal(again, frames):
-            again = again + _missed(flight, frames, misses, speed, period)
+            again = again + _missed(flight, frames, misses, speed)
         if np.array_equal(again, frames):
             break
         frames = again
-        times = frames.astype(np.float64) * period
+        times = frames.astype(np.float64) * FRAME_PERIOD
     assert flight is not None
     return _Count(frames, flight, float(np.sqrt(np.mean(np.sum(misses**2, axis=1)))))
 
 
-def _missed(
-    flight: Flight, frames: IntArray, misses: FloatArray, speed: FloatArray, period: float
-) -> IntArray:
+def _missed(flight: Flight, frames: IntArray, misses: FloatArray, speed: FloatArray) -> IntArray:
     """Frames (n,) to add where one frame more or less from some row on brings the rows closer.
 
     A flight gives way to a frame missed in its middle, so that no row looks wrong by itself: each
     cut is judged by the residual after the best flight for it, to first order.
     """
-    times = frames.astype(np.float64) * period
+    times = frames.astype(np.float64) * FRAME_PERIOD
     _, slopes = sloped(lambda tried: fly(tried, times)[0], flight.unknowns, SCALES)
     matrix = np.vstack([slopes.reshape(-1, 10) / POSITION_NOISE, np.diag(BELIEFS)])
     basis = np.linalg.qr(matrix * SCALES)[0][: misses.size]
@@ -140,7 +132,7 @@ def _missed(
 
     # column c: change of the misses when all rows after c come one frame later
     later = np.tri(len(frames), k=-1)[:, :-1]
-    shifts = (later[:, None, :] * (speed * period)[..., None]).reshape(misses.size, -1)
+    shifts = (later[:, None, :] * (speed * FRAME_PERIOD)[..., None]).reshape(misses.size, -1)
     shifts /= POSITION_NOISE
     shifts -= basis @ (basis.T @ shifts)
     along, size = left @ shifts, np.sum(shifts**2, axis=0)
@@ -181,23 +173,21 @@ def _whole(frames: FloatArray) -> IntArray:
     return whole
 
 
-def _gap(
-    before: Flight, after: Flight, frame: int, lowest: FloatArray, period: float
-) -> tuple[int, int]:
+def _gap(before: Flight, after: Flight, frame: int, lowest: FloatArray) -> tuple[int, int]:
     """Frames from the last row before a bounce, `frame`, to the first row after, and to the lowest.
 
     Of all gaps, the one with which the two flights meet best, in one point.
     """
     best = (np.inf, 2, 1)
-    start = frame * period
+    start = frame * FRAME_PERIOD
     for ahead in range(2, LONGEST_GAP + 1):
-        shifted = replace(after, origin=start + ahead * period)
-        time, _ = meeting(before, shifted, start, start + ahead * period)
+        shifted = replace(after, origin=start + ahead * FRAME_PERIOD)
+        time, _ = meeting(before, shifted, start, start + ahead * FRAME_PERIOD)
         at = np.array([time])
         apart = float(np.linalg.norm(before.at(at)[0] - shifted.at(at)[0]))
         # the lowest row lies on one of the two flights
         between = np.arange(1, ahead)
-        times = start + between.astype(np.float64) * period
+        times = start + between.astype(np.float64) * FRAME_PERIOD
         path = np.where((times < time)[:, None], before.at(times)[0], shifted.at(times)[0])
         off = np.linalg.norm(path - lowest, axis=1)
         best = min(best, (apart + float(off.min()), ahead, int(between[off.argmin()])))

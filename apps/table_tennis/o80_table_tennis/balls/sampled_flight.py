@@ -41,8 +41,3 @@ class SampledFlight:
     def residual(self) -> float:
         """Root mean square of the distances of the recorded rows from the fit [m]."""
         return float(np.sqrt(np.mean(self.residuals**2)))
-
-    @property
-    def duration(self) -> float:
-        """From the first row to the last [s]."""
-        return (len(self.positions) - 1) * self.period

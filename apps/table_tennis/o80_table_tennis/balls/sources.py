@@ -13,9 +13,6 @@ from .sampled_flight import SampledFlight
 from .simulated_shots import DISTRIBUTIONS, NUMBERS, SimulatedShots
 from .trajectories import BallTrajectory
 
-DEFAULT_BALLS = "narrow"
-"""Balls that are played where none are named."""
-
 
 class KeptFlights:
     """Flights that are read or fitted when first asked for, and kept."""
@@ -79,7 +76,7 @@ def balls_from(
     `seed` is that of simulated shots, of which there are `count`; None: no end of them. Shared in
     this process. Raises FileNotFoundError or ValueError.
     """
-    name = balls or DEFAULT_BALLS
+    name = balls or "narrow"
     if name in DISTRIBUTIONS:
         return SimulatedShots(DISTRIBUTIONS[name], seed, count or NUMBERS, period)
     if count is not None:

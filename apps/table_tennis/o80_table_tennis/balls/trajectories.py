@@ -70,11 +70,6 @@ class BallTrajectory:
                 "sort the rows by time and remove repeated ones"
             )
 
-    @property
-    def duration(self) -> float:
-        """From the first row to the last [s]."""
-        return float(self.stamps[-1] - self.stamps[0])
-
     @cached_property
     def fit(self) -> FlightFit:
         """The flight, with its bounces, that explains the positions best."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,10 +59,16 @@ class Aerodynamics:
         """1/2 rho Cl A r/m []: the Magnus acceleration is magnus * (omega x v)."""
         return self.lift_coefficient * self.drag_per_coefficient * self.radius
 
-    @property
+    @cached_property
     def air(self) -> Air:
         """As predictions want it."""
-        return _air(self)
+        return Air(
+            drag=self.drag,
+            magnus=self.magnus,
+            spin_decay=self.spin_decay,
+            gravity=self.gravity,
+            saturation=self.lift_saturation * self.radius,
+        )
 
     def halved_at(self, spin: float) -> float:
         """The speed at which saturation halves the lift of a spin [rad/s], in [m/s]."""
@@ -84,17 +90,6 @@ class Aerodynamics:
         share = np.maximum(1.0 - lost / np.maximum(speeds, 1e-9), 1.0 / MAX_SATURATED)
         spins: NDArray[np.float64] = turn / (self.magnus * share[:, None])
         return spins
-
-
-@cache
-def _air(numbers: Aerodynamics) -> Air:
-    return Air(
-        drag=numbers.drag,
-        magnus=numbers.magnus,
-        spin_decay=numbers.spin_decay,
-        gravity=numbers.gravity,
-        saturation=numbers.lift_saturation * numbers.radius,
-    )
 
 
 MAX_SATURATED = 10.0

@@ -54,7 +54,9 @@ def predict(
 
     Rows every `period` [s] from 0 to `duration` [s]; the ball bounces on `table` if there is one.
     """
-    _require_positive(duration=duration, period=period)
+    for name, value in (("duration", duration), ("period", period)):
+        if not (math.isfinite(value) and value > 0):
+            raise ValueError(f"{name} must be a positive number of seconds, got {value}")
     nodes = flight_nodes(position, velocity, spin, duration, table)
     starts = nodes[:, TIME]
     times = period * np.arange(math.floor(duration / period + 1e-9) + 1, dtype=np.float64)
@@ -83,9 +85,3 @@ def flight_nodes(
         raise ValueError(f"position {position} and velocity {velocity} must be finite")
     on = None if table is None else platform(table)
     return predicted_flight(ball, AERODYNAMICS.air, on, duration, step)
-
-
-def _require_positive(**values: float) -> None:
-    for name, value in values.items():
-        if not (math.isfinite(value) and value > 0):
-            raise ValueError(f"{name} must be a positive number of seconds, got {value}")

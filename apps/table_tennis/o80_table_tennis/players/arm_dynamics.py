@@ -28,39 +28,31 @@ def _joined(*parts: tuple[PointMass, float]) -> PointMass:
 UPPER_ARM_MASS, ELBOW_MASS = mass_of("upper_arm"), mass_of("elbow")
 FOREARM_MASS = _joined((mass_of("forearm"), 0.0), (mass_of("racket"), FOREARM))
 """Forearm and racket."""
+TURNING = (0.012, 0.0145, 0.0115, 0.004)
+"""Inertia of the links about their own centres, and of the pulleys, for each joint, fitted to the
+torques of the scene [kg m^2]."""
 
 
 @dataclass(frozen=True)
 class ArmModel:
-    """Masses and damping of the scene."""
+    """Masses of the scene, and damping."""
 
-    upper_arm: PointMass = UPPER_ARM_MASS
-    """From joint 2."""
-    elbow: PointMass = ELBOW_MASS
-    """On joint 3."""
-    forearm: PointMass = FOREARM_MASS
-    """Forearm and racket, from joint 3."""
-    turning: tuple[float, float, float, float] = (0.012, 0.0145, 0.0115, 0.004)
-    """Inertia of the links about their own centres, and of the pulleys, for each joint, fitted to
-    the torques of the scene [kg m^2]."""
     damping: tuple[float, ...] = JOINT_DAMPING
     """[Nm s/rad]"""
-    gravity: float = GRAVITY
-    """[m/s^2]"""
 
     def torque(self, q: FloatArray, dq: FloatArray, acceleration: FloatArray) -> FloatArray:
         """Torques of the muscles (4,) [Nm] for angles, speeds and accelerations (4,)."""
         a1, a2, a3, a4 = acceleration.tolist()
         w1, w2, w3, _ = dq.tolist()
-        t1, t2, t3, t4 = self.turning
+        t1, t2, t3, t4 = TURNING
         torque1, torque2, torque3 = t1 * a1, t2 * a2, t3 * a3
-        for mass, out, up, out3, up3 in self._points(q):
+        for mass, out, up, out3, up3 in points(q):
             # rotation about the vertical, and its centrifugal effect
             torque1 += mass * out * (out * a1 + 2.0 * w1 * (up * w2 + up3 * w3))
             away = -out * w1 * w1
             # the vertical plane, gravity as an acceleration upwards
             outwards = up * a2 + up3 * a3 + away
-            upwards = -out * a2 - out3 * a3 + self.gravity
+            upwards = -out * a2 - out3 * a3 + GRAVITY
             torque2 += mass * (up * outwards - out * upwards)
             torque3 += mass * (up3 * outwards - out3 * upwards)
         return np.array([torque1, torque2, torque3, t4 * a4]) + np.array(self.damping) * dq
@@ -72,8 +64,8 @@ class ArmModel:
         at_rest = np.zeros_like(q)
         bias = self.torque(q, dq, at_rest) - np.array(self.damping) * dq
         # joint 1 turns the plane in which joints 2 and 3 bend the arm
-        mass = np.diag(np.array(self.turning) + duration * np.array(self.damping))
-        for weight, out, up, out3, up3 in self._points(q):
+        mass = np.diag(np.array(TURNING) + duration * np.array(self.damping))
+        for weight, out, up, out3, up3 in points(q):
             mass[0, 0] += weight * out * out
             mass[1, 1] += weight * (up * up + out * out)
             mass[1, 2] += weight * (up * up3 + out * out3)
@@ -83,14 +75,15 @@ class ArmModel:
         result: FloatArray = dq + change
         return result
 
-    def _points(self, q: FloatArray) -> Iterator[tuple[float, float, float, float, float]]:
-        """Masses [kg]: how far out and up each lies from joint 2, then from joint 3 [m]."""
-        s2, c2 = math.sin(q[1]), math.cos(q[1])
-        s23, c23 = math.sin(q[1] + q[2]), math.cos(q[1] + q[2])
-        for mass, along_upper, along_fore in (
-            (self.upper_arm.mass, self.upper_arm.centre, 0.0),
-            (self.elbow.mass, UPPER_ARM, 0.0),
-            (self.forearm.mass, UPPER_ARM, self.forearm.centre),
-        ):
-            out3, up3 = along_fore * s23, along_fore * c23
-            yield mass, along_upper * s2 + out3, along_upper * c2 + up3, out3, up3
+
+def points(q: FloatArray) -> Iterator[tuple[float, float, float, float, float]]:
+    """Masses [kg]: how far out and up each lies from joint 2, then from joint 3 [m]."""
+    s2, c2 = math.sin(q[1]), math.cos(q[1])
+    s23, c23 = math.sin(q[1] + q[2]), math.cos(q[1] + q[2])
+    for mass, along_upper, along_fore in (
+        (UPPER_ARM_MASS.mass, UPPER_ARM_MASS.centre, 0.0),
+        (ELBOW_MASS.mass, UPPER_ARM, 0.0),
+        (FOREARM_MASS.mass, UPPER_ARM, FOREARM_MASS.centre),
+    ):
+        out3, up3 = along_fore * s23, along_fore * c23
+        yield mass, along_upper * s2 + out3, along_upper * c2 + up3, out3, up3

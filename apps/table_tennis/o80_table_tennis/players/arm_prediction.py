@@ -70,18 +70,18 @@ class ArmPredictor:
         result = ArmState(q.copy(), dq.copy(), pressures.copy())
         steps = math.ceil(self.longest / INTEGRATION_STEP)
         duration = self.longest / steps
-        for number in range(steps):
+        for number in range(steps + 1):
+            if number > 0:
+                targets = self._targets((number - 0.5) * duration)
+                pressures = self._lag.after(pressures, targets, duration)
+                torque = self._muscles.torque(pressures, q)
+                dq = self._arm.speeds_after(q, dq, torque, duration)
+                q = q + duration * dq
             for joint, dead_time in enumerate(self._dead_time):
-                if round(dead_time / duration) == number:
-                    _take(result, joint, q, dq, pressures)
-            targets = self._targets((number + 0.5) * duration)
-            pressures = self._lag.after(pressures, targets, duration)
-            torque = self._muscles.torque(pressures, q)
-            dq = self._arm.speeds_after(q, dq, torque, duration)
-            q = q + duration * dq
-        for joint, dead_time in enumerate(self._dead_time):
-            if round(dead_time / duration) >= steps:
-                _take(result, joint, q, dq, pressures)
+                if min(round(dead_time / duration), steps) == number:
+                    part = slice(2 * joint, 2 * joint + 2)
+                    result.q[joint], result.dq[joint] = q[joint], dq[joint]
+                    result.pressures[part] = pressures[part]
         return result
 
     def _targets(self, time: float) -> FloatArray:
@@ -94,12 +94,3 @@ class ArmPredictor:
             part = slice(2 * joint, 2 * joint + 2)
             targets[part] = self._commanded[index][part]
         return targets
-
-
-def _take(
-    state: ArmState, joint: int, q: FloatArray, dq: FloatArray, pressures: FloatArray
-) -> None:
-    """Copies what belongs to one joint."""
-    part = slice(2 * joint, 2 * joint + 2)
-    state.q[joint], state.dq[joint] = q[joint], dq[joint]
-    state.pressures[part] = pressures[part]

@@ -27,11 +27,6 @@ class Page:
         if not screen:
             complain(f"no screen found; the view is at {self._view.url}")
 
-    @property
-    def url(self) -> str:
-        """Address of the page."""
-        return self._view.url
-
     def after_step(self) -> None:
         """Waits until the step has taken as long as in real time."""
         if self._step:

@@ -126,11 +126,6 @@ class Played:
         return self.returns / max(1, len(self.episodes))
 
     @property
-    def interval(self) -> tuple[float, float]:
-        """Wilson's interval of the share of returned balls, 95 %."""
-        return wilson(self.returns, len(self.episodes))
-
-    @property
     def reward(self) -> float:
         """Mean of an episode."""
         return float(np.mean([episode.reward for episode in self.episodes]))
@@ -149,12 +144,13 @@ class Played:
         return float(np.median(apart)) if apart else math.nan
 
     def as_json(self) -> dict[str, Any]:
-        """The figures."""
+        """The figures; `returned_95_percent` is Wilson's interval."""
+        interval = wilson(self.returns, len(self.episodes))
         return {
             "balls": len(self.episodes),
             "touched": round(self.touched, 4),
             "returned": round(self.returned, 4),
-            "returned_95_percent": [round(each, 4) for each in self.interval],
+            "returned_95_percent": [round(each, 4) for each in interval],
             "miss": round(self.miss, 3) if self.returns else None,
             "speed": round(self.speed, 2) if self.returns else None,
             "reward": round(self.reward, 4),

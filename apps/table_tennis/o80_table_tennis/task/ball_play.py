@@ -62,11 +62,11 @@ class ReturnTask:
 
         Cheap: it is called after every step, `end` and `reward` only where it is true.
         """
-        return self.rule.ended(state.record, state.ball_y, state.steps)
+        return self.rule.ended(state.record, state.ball[..., 1], state.steps)
 
     def end(self, state: State) -> NDArray[np.int64]:
         """(...) numbers of `End`: RUNNING, or why the episode has ended."""
-        return self.rule.judge(state.record, state.ball_y, state.steps)
+        return self.rule.judge(state.record, state.ball[..., 1], state.steps)
 
     def reward(self, state: State) -> FloatArray:
         """(...) reward of an episode that ends in this state; 0 if it is truncated or goes on."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from o80.base.arrays import IntArray
 
-from .ball_record import BallRecord, Flags, Numbers
+from .ball_record import BallRecord, Numbers
 from .outcome import beyond_net, on_top
 
 MAX_STEPS = 300
@@ -59,11 +59,6 @@ BY_EVENT = np.array([end.terminated for end in End])
 # plain numbers: NumPy takes ten times as long to read a member of an IntEnum
 _RUNNING, _RETURNED, _NET, _FLOOR, _PASSED, _OUT_OF_STEPS = map(int, list(End)[:6])
 _OWN_HALF, _TABLE_SIDE = int(End.OWN_HALF), int(End.TABLE_SIDE)
-
-
-def undecided(ends: Any, touched: Flags) -> Any:
-    """(...) whether a ball was touched and no event has ended its episode yet."""
-    return touched & ~terminated(ends)
 
 
 def terminated(ends: Any) -> Any:

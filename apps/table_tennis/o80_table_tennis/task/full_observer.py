@@ -10,10 +10,9 @@ from ..physics.ball_filter import FilterSettings, ball_filter
 from ..world.arm import MUSCLES
 from .full_observation import FullObservation
 from .noise import NoiseSettings
-from .perception import Perceived
+from .perception import EVERY, Perceived
 from .state import State
 
-EVERY = slice(None)
 MIN_POSITION_NOISE = 0.0005
 """With less noise the filter still expects so much: the laws are not quite exact [m]."""
 MIN_VELOCITY_NOISE = 0.02

@@ -22,21 +22,17 @@ BALL_POSITION = slice(16, 19)
 BALL_VELOCITY = slice(19, 22)
 """World frame [m/s]."""
 SIZE = 22
-JOINT_POSITION_BOUND = 1.75
-"""[rad]: the real arm passes its stops a little, to 1.73 rad in public logs."""
-JOINT_VELOCITY_BOUND = 40.0
-"""[rad/s]: joints of the simulated arm reach 39 when its muscles are switched fully, those of the
-real one 8."""
 
 
 @dataclass(frozen=True)
 class ObservationBounds:
     """The box of observations; values outside are clipped into it."""
 
-    joint_position: float = JOINT_POSITION_BOUND
-    """Either way [rad]."""
-    joint_velocity: float = JOINT_VELOCITY_BOUND
-    """Either way [rad/s]."""
+    joint_position: float = 1.75
+    """Either way [rad]: the real arm passes its stops a little, to 1.73 rad in public logs."""
+    joint_velocity: float = 40.0
+    """Either way [rad/s]: joints of the simulated arm reach 39 when its muscles are switched fully,
+    those of the real one 8."""
     ball_low: Vector = (-3.0, -3.0, -1.0)
     """[m]"""
     ball_high: Vector = (3.0, 5.0, 4.0)

@@ -18,10 +18,8 @@ from .ball_play import ReturnTask, observes_as_published
 from .full_observation import FullObservation
 from .full_observer import FullObserver
 from .noise import NO_NOISE, NoiseSettings
-from .perception import NoisyPerception, Perceived, Perception
+from .perception import EVERY, NoisyPerception, Perceived, Perception
 from .state import State
-
-EVERY = slice(None)
 
 
 class Observer:

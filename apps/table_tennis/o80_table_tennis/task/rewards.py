@@ -51,34 +51,25 @@ class OrderedReward:
     """A landing this far from the target has accuracy 0 [m]: accuracy is 1 - (d / 3)^0.75."""
     exponent: float = 0.75
 
-    def accuracy(self, distance: Numbers) -> FloatArray:
-        """(...) of landings at distances (...) from the target, in [0, 1]."""
-        return np.maximum(falling(distance, self.reach, self.exponent), 0.0)
-
     def returned(self, state: State) -> FloatArray:
         """(...) see the class."""
-        return self._ordered(state, smashed=False)
+        return self._paid(state, 1.0)
 
     def smashed(self, state: State) -> FloatArray:
         """(...) the same, accuracy times the largest speed of the ball after the touch [m/s]."""
-        return self._ordered(state, smashed=True)
+        return self._paid(state, state.record.largest_speed)
 
-    def _missed(self, state: State) -> FloatArray:
-        missed: FloatArray = -np.minimum(state.record.smallest_distance, self.farthest_miss)
-        return missed
-
-    def _ordered(self, state: State, *, smashed: bool) -> FloatArray:
+    def _paid(self, state: State, factor: Numbers) -> FloatArray:
         record = state.record
+        missed: FloatArray = -np.minimum(record.smallest_distance, self.farthest_miss)
         if none(record.touched):
-            return self._missed(state)
+            return missed
         apart = distance(ended_at(state), state.goal)
-        accuracy = self.accuracy(apart)
-        if smashed:
-            accuracy = accuracy * record.largest_speed
+        accuracy = np.maximum(falling(apart, self.reach, self.exponent), 0.0) * factor
         relative = apart / self.touch_scale
         touch = self.touch / (1.0 + relative * relative)
         paid = np.where(returned(record), 1.0 + accuracy, touch)
-        return np.where(record.touched, paid, self._missed(state))
+        return np.where(record.touched, paid, missed)
 
 
 @dataclass(frozen=True)
@@ -98,25 +89,19 @@ class PublishedReward:
     floor: float = -0.2
     """The least a touched ball is worth."""
 
-    def landing_term(self, distance: Numbers) -> FloatArray:
-        """max(1 - (d / reach)^exponent, floor), for distances d (...) from the target [m]."""
-        return np.maximum(falling(distance, self.reach, self.exponent), self.floor)
-
     def returned(self, state: State) -> FloatArray:
         """(...) see the class."""
-        return self._paid(state, self._term(state))
+        return self._paid(state, 1.0)
 
     def smashed(self, state: State) -> FloatArray:
         """(...) the same times the largest speed of the ball after the touch [m/s]."""
-        term = self._term(state) * state.record.largest_speed
-        return self._paid(state, np.maximum(term, self.floor))
+        return self._paid(state, state.record.largest_speed)
 
-    def _term(self, state: State) -> FloatArray:
-        return self.landing_term(distance(state.record.landing, state.goal))
-
-    def _paid(self, state: State, landing: FloatArray) -> FloatArray:
+    def _paid(self, state: State, factor: Numbers) -> FloatArray:
         record = state.record
-        touched = np.where(record.landed, landing, self.floor)
+        apart = distance(record.landing, state.goal)
+        landing = np.maximum(falling(apart, self.reach, self.exponent), self.floor) * factor
+        touched = np.where(record.landed, np.maximum(landing, self.floor), self.floor)
         return np.where(record.touched, touched, -np.asarray(record.smallest_distance))
 
 

@@ -48,11 +48,6 @@ class State:
         """(..., 4) [rad/s]"""
         return self.motion[..., JOINTS:]
 
-    @property
-    def ball_y(self) -> Any:
-        """(...) how far the ball is from the arm, towards the opponent [m]."""
-        return self.ball[..., 1]
-
     def at(self, index: Any) -> State:
         """Some of N episodes, by an index or a mask (N,)."""
         names = [name for name in self.__slots__ if name not in ("steps", "record")]

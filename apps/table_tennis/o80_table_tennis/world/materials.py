@@ -21,11 +21,6 @@ class Restitution:
     """Coefficient of friction: a ball whose slip needs more than this slides."""
 
     @property
-    def grip(self) -> float:
-        """Share of its slip that a ball which does not slide loses in velocity."""
-        return 1.0 - self.tangential
-
-    @property
     def text(self) -> str:
         """As the simulator wants it: two tangents, the normal, the friction if there is a limit."""
         numbers = [self.tangential, self.tangential, self.normal]
