@@ -6,7 +6,6 @@ Every policy plays the same balls. Prints a table and draws where the balls land
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
 from dataclasses import asdict, replace
 from itertools import product
 from pathlib import Path
@@ -86,7 +85,10 @@ def main(
     except (ValueError, OSError, o80.Error) as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
-    paired = _paired(policies, [*played.values()]) if real_time else {}
+    paired: dict[str, Paired] = {}
+    if real_time:  # each policy played accelerated, then in real time
+        each_way = iter(played.values())
+        paired = {name: Paired.of(next(each_way), next(each_way)) for name in policies}
     figures: dict[str, Any] = {label: each.as_json() for label, each in played.items()}
     print_table(console, "the same balls", figures)
     for name, pair in paired.items():
@@ -114,12 +116,6 @@ def named_policy(name: str, **changed: str) -> tuple[Policy, Conditions]:
     if name == "scripted":
         policy = default_policy(HittingSettings.of_rig(conditions.rig()))
     return policy, conditions
-
-
-def _paired(policies: list[str], played: Sequence[Played]) -> dict[str, Paired]:
-    """By policy; each was played accelerated, then in real time."""
-    ways = zip(played[::2], played[1::2], strict=True)
-    return {name: Paired.of(*each) for name, each in zip(policies, ways, strict=True)}
 
 
 if __name__ == "__main__":

@@ -1,20 +1,10 @@
 """Torques to pressures to actions."""
 
-import mujoco
 import numpy as np
 import pytest
 
-import o80
 from o80_table_tennis.players.pressure_control import MusclePair, PressureActions, PressureLag
-from o80_table_tennis.rig.pressure_range import PressureRange
 from o80_table_tennis.task.actions import COARSE, FINE, changed_pressures
-from o80_table_tennis.world.scene import MODEL
-from o80_table_tennis.world.timing import PERIOD
-
-
-@pytest.fixture(scope="module")
-def model() -> mujoco.MjModel:
-    return mujoco.MjModel.from_xml_path(str(MODEL))
 
 
 def test_pressures_make_their_torques() -> None:
@@ -53,34 +43,3 @@ def test_actions_lead_to_the_wanted_pressures(factor: float) -> None:
         pressures = changed_pressures(pressures, taken, factor=factor)
         assert actions.commanded == pytest.approx(pressures)
     assert pressures == pytest.approx(np.clip(wanted, 0.0, 1.0), abs=1e-6)
-
-
-def test_the_lag_is_that_of_the_arm() -> None:
-    with o80.robots.load("pam").inline("pressure-lag-test") as arm:
-        pressures = PressureRange.of(arm)
-        start = pressures.normalised(np.array(arm.latest().observed))
-        commanded = np.linspace(0.2, 0.9, 8)
-        arm.add_command(None, pressures.raw(commanded))
-        arm.pulse()
-        for row in (1, 2, 7):
-            seen = pressures.normalised(np.array(arm.burst(row).observed))
-            elapsed = float(arm.latest().iteration) * PERIOD
-            wanted = PressureLag().after(
-                start, pressures.normalised(pressures.raw(commanded)), elapsed
-            )
-            assert seen == pytest.approx(wanted, abs=1e-9)
-
-
-def test_the_muscles_hold_the_arm_as_the_robots_do(model: mujoco.MjModel) -> None:
-    """The robot starts in equilibrium: its pressures make the torques of gravity."""
-    with o80.robots.load("pam").inline("pressure-equilibrium-test") as arm:
-        row = arm.latest()
-        pressures = PressureRange.of(arm).normalised(np.array(row.observed))
-        q = np.array(row.extended.joint_positions)
-    data = mujoco.MjData(model)
-    data.qpos[:4] = q
-    mujoco.mj_inverse(model, data)
-    for joint in range(4):
-        mean = float(pressures[2 * joint : 2 * joint + 2].mean())
-        wanted = MusclePair().pressures(data.qfrc_inverse[:4], q, mean)[joint]
-        assert wanted == pytest.approx(pressures[2 * joint : 2 * joint + 2], abs=1e-4)

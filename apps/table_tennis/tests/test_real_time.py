@@ -7,7 +7,6 @@ import numpy as np
 from opened_environment import PUSH, WAITING, opened
 
 import o80
-from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.settings import Pacing
 from o80_table_tennis.world.arm import MUSCLES
 
@@ -16,24 +15,18 @@ LATE_STEPS = (5, 20)
 STEPS = 40
 
 
-def play_late(environment: TableTennisEnvironment, *, seed: int) -> None:
-    """Steps of random actions, of which some are sent after the iteration they were meant for."""
-    rng = np.random.default_rng(seed)
-    environment.reset(seed=seed)
-    for step in range(STEPS):
-        if step in LATE_STEPS:
-            row = environment.task.single.span[2]
-            environment.arm.wait_for(row + LATE_BY, timeout=WAITING)
-        environment.step(rng.uniform(-1, 1, MUSCLES).astype(np.float32))
-
-
 def test_a_run_in_real_time_with_late_actions_and_resets_replays_bit_for_bit(
     tmp_path: Path,
 ) -> None:
-    path = tmp_path / "run.mcap"
+    path, rng = tmp_path / "run.mcap", np.random.default_rng(0)
     with opened(Pacing.REAL_TIME, record=path) as environment:
         for episode in range(2):
-            play_late(environment, seed=episode)
+            environment.reset(seed=episode)
+            for step in range(STEPS):
+                if step in LATE_STEPS:  # sent after the iteration for which the action is meant
+                    row = environment.task.single.span[2]
+                    environment.arm.wait_for(row + LATE_BY, timeout=WAITING)
+                environment.step(rng.uniform(-1, 1, MUSCLES).astype(np.float32))
         assert environment.statistics().late_actions >= 2 * len(LATE_STEPS)
         published = [environment.arm.published, environment.twins[0].published]
 

@@ -6,22 +6,15 @@ import numpy as np
 import pytest
 from recorded_rows import simulated_shot
 
-from o80_table_tennis.balls.launches import (
-    NARROW,
-    WIDE,
-    Launch,
-    LaunchDistribution,
-    UniformLaunches,
-)
+from o80_table_tennis.balls.launches import NARROW, WIDE, Launch, UniformLaunches
 from o80_table_tennis.balls.playable import REACH, Verdict, verdict
-from o80_table_tennis.balls.simulated_shots import SimulatedShots, drawn_launch
+from o80_table_tennis.balls.simulated_shots import LaunchDistribution, SimulatedShots, drawn_launch
 from o80_table_tennis.physics.prediction import predict
 from o80_table_tennis.world.arm import SHOULDER
 from o80_table_tennis.world.ball import BALL_RADIUS
 from o80_table_tennis.world.table import NET_HEIGHT, TABLE
 
 TINY = (0.0, -0.001, 0.001)  # [m]
-BOTH = pytest.mark.parametrize("distribution", [NARROW, WIDE])
 
 
 def test_simulated_shots_bounce_once_and_come_into_reach_like_the_recorded_ones() -> None:
@@ -78,7 +71,7 @@ def test_the_verdict_is_that_of_the_predicted_flight() -> None:
     assert seen == set(Verdict)
 
 
-@BOTH
+@pytest.mark.parametrize("distribution", [NARROW, WIDE])
 def test_few_draws_are_refused(distribution: LaunchDistribution) -> None:
     rng = np.random.default_rng(1)
     verdicts = [verdict(distribution.draw(rng)) for _ in range(1000)]

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
@@ -53,14 +52,6 @@ class Launch:
         return BallTrajectory(
             self.name, flight.stamps, flight.positions, flight.velocities, flight.spins
         )
-
-
-class LaunchDistribution(Protocol):
-    """Distribution that launches are drawn from."""
-
-    def draw(self, rng: np.random.Generator) -> Launch:
-        """Another launch; the same `rng` gives the same one."""
-        ...
 
 
 @dataclass(frozen=True)

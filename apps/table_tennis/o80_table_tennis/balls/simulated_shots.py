@@ -7,11 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..world.timing import PERIOD
-from .launcher_shots import LAUNCHER
-from .launches import NARROW, WIDE, Launch, LaunchDistribution
+from .launcher_shots import LAUNCHER, LauncherShots
+from .launches import NARROW, WIDE, Launch, NormalLaunches, UniformLaunches
 from .playable import Verdict, verdict
 from .sampled_flight import SampledFlight
 
+LaunchDistribution = NormalLaunches | UniformLaunches | LauncherShots
+"""Distribution that launches are drawn from: the same generator gives the same ones."""
 DISTRIBUTIONS: dict[str, LaunchDistribution] = {
     "narrow": NARROW,
     "wide": WIDE,

@@ -206,10 +206,12 @@ class HittingPolicy:
             self._follow(position, velocity)
             ball = None if self._ball is None else self._ball.later(self._ahead)
             self.strike = None if ball is None else self._planner.plan(ball)
-        now = swing.at(0.0)
-        if self.strike is None:
-            return Swing.between(now, _resting(now, control.stop), control.stop)
-        end = JointMotion(self.strike.posture, self.strike.speeds, np.zeros(JOINTS))
+        now, still = swing.at(0.0), np.zeros(JOINTS)
+        if self.strike is None:  # the joints come to rest without haste
+            rest = now.q + 0.5 * control.stop * now.dq
+            rest = np.clip(rest, -0.95 * JOINT_LIMIT, 0.95 * JOINT_LIMIT)
+            return Swing.between(now, JointMotion(rest, still, still), control.stop)
+        end = JointMotion(self.strike.posture, self.strike.speeds, still)
         return Swing.between(now, end, max(self.strike.time, control.shortest))
 
     def _follow(self, position: FloatArray, velocity: FloatArray) -> None:
@@ -264,9 +266,3 @@ class HittingPolicy:
         in_muscles = s.muscles.pressures(torque, wanted.q, control.mean_pressure).ravel()
         begin = s.lag.after(pressures, self._actions.commanded, control.begin)
         return self._actions.towards(s.lag.asking(begin, in_muscles, control.settling))
-
-
-def _resting(now: JointMotion, stop: float) -> JointMotion:
-    """Where the joints come to rest without haste."""
-    q = np.clip(now.q + 0.5 * stop * now.dq, -0.95 * JOINT_LIMIT, 0.95 * JOINT_LIMIT)
-    return JointMotion(q, np.zeros(JOINTS), np.zeros(JOINTS))

@@ -73,11 +73,7 @@ class FullObserver:
         return self._scaled(rows, state, seen, which)
 
     def _scaled(
-        self,
-        rows: FloatArray,
-        state: State,
-        seen: Perceived,
-        which: IntArray | slice,
+        self, rows: FloatArray, state: State, seen: Perceived, which: IntArray | slice
     ) -> FloatArray:
         rows[:, self._motion] = state.motion
         rows[:, self._pressures] = seen.pressures

@@ -69,10 +69,7 @@ class Observer:
         self._perception = perception
 
     def begin(
-        self,
-        state: State,
-        generators: Sequence[np.random.Generator],
-        which: IntArray,
+        self, state: State, generators: Sequence[np.random.Generator], which: IntArray
     ) -> Float32Array:
         """The first observations (n, M) of new episodes `which` (n,).
 

@@ -17,7 +17,7 @@ import numpy as np
 from o80.base.arrays import FloatArray
 
 from ..world.table import NET_Y, TABLE
-from .ball_record import BallRecord, Flags
+from .ball_record import BallRecord
 from .state import State
 
 SMALL = 1e-6
@@ -72,7 +72,7 @@ def outcome(record: BallRecord, target: Any) -> dict[str, Any]:
     equal. The arrays may be views, or shared and read-only.
     """
     landed = record.landed
-    if none(landed):
+    if not np.count_nonzero(landed):
         is_returned, nowhere, apart = _unlanded(np.shape(landed))
     else:
         nowhere = np.where(np.asarray(landed)[..., np.newaxis], record.landing, np.inf)
@@ -93,8 +93,3 @@ def _unlanded(shape: tuple[int, ...]) -> tuple[Any, FloatArray, Any]:
     for array in (nowhere, returned, apart):
         array.flags.writeable = False
     return returned, nowhere, apart
-
-
-def none(flags: Flags) -> bool:
-    """Whether no flag is set; cheap."""
-    return not np.count_nonzero(flags)

@@ -19,7 +19,7 @@ from o80.base.arrays import FloatArray
 from ..world.scene import Vector
 from ..world.table import TARGET
 from .ball_record import Numbers
-from .outcome import distance, ended_at, none, returned
+from .outcome import distance, ended_at, returned
 from .state import State
 
 # of math, not of NumPy, which differ in the last bit: one episode and many get the same rewards
@@ -62,7 +62,7 @@ class OrderedReward:
     def _paid(self, state: State, factor: Numbers) -> FloatArray:
         record = state.record
         missed: FloatArray = -np.minimum(record.smallest_distance, self.farthest_miss)
-        if none(record.touched):
+        if not np.count_nonzero(record.touched):
             return missed
         apart = distance(ended_at(state), state.goal)
         accuracy = np.maximum(falling(apart, self.reach, self.exponent), 0.0) * factor
