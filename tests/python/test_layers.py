@@ -207,22 +207,22 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_455, 0),
-    "python/bindings": (5_725, 0),
-    "python/o80": (30_500, 0),
+    "include, src": (34_228, 0),
+    "python/bindings": (5_721, 0),
+    "python/o80": (29_895, 0),
     "python/o80/hybrid": (2_400, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
     "devices": (8_850, 4_500),
     "gateways/lerobot": (530, 690),
     "gateways/ros2": (900, 955),
-    "robots/arms": (4_420, 3_095),
+    "robots/arms": (4_420, 3_128),
     "robots/pam, robots/two_joints": (2_104, 1_184),
-    "simulators/mujoco": (5_335, 4_620),
-    "apps/table_tennis": (9_400, 4_995),
-    "benchmarks, tools": (4_607, 0),
-    "examples": (1_975, 0),
-    "tests, conftest.py": (0, 67_075),
+    "simulators/mujoco": (5_363, 4_663),
+    "apps/table_tennis": (8_400, 4_400),
+    "benchmarks, tools": (4_426, 0),
+    "examples": (2_076, 0),
+    "tests, conftest.py": (0, 63_260),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

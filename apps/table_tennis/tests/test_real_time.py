@@ -10,24 +10,20 @@ import o80
 from o80_table_tennis.settings import Pacing
 from o80_table_tennis.world.arm import MUSCLES
 
-LATE_BY = 7  # rows
-LATE_STEPS = (5, 20)
-STEPS = 40
-
 
 def test_a_run_in_real_time_with_late_actions_and_resets_replays_bit_for_bit(
     tmp_path: Path,
 ) -> None:
-    path, rng = tmp_path / "run.mcap", np.random.default_rng(0)
+    path, rng, late_steps = tmp_path / "run.mcap", np.random.default_rng(0), (5, 20)
     with opened(Pacing.REAL_TIME, record=path) as environment:
         for episode in range(2):
             environment.reset(seed=episode)
-            for step in range(STEPS):
-                if step in LATE_STEPS:  # sent after the iteration for which the action is meant
+            for step in range(40):
+                if step in late_steps:  # sent after the iteration for which the action is meant
                     row = environment.task.single.span[2]
-                    environment.arm.wait_for(row + LATE_BY, timeout=WAITING)
+                    environment.arm.wait_for(row + 7, timeout=WAITING)
                 environment.step(rng.uniform(-1, 1, MUSCLES).astype(np.float32))
-        assert environment.statistics().late_actions >= 2 * len(LATE_STEPS)
+        assert environment.statistics().late_actions >= 2 * len(late_steps)
         published = [environment.arm.published, environment.twins[0].published]
 
     report = o80.replay(path)

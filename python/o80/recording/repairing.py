@@ -75,6 +75,8 @@ def repaired(path: Path, *, is_last: bool) -> list[str]:
     file = opened(path, proceed=True)
     kept = file.kept
     file.finish()
+    if size < len(MAGIC):
+        return [f"{path} held no rows: it is a complete recording without segments now"]
     return [f"{path} is complete now: {kept} bytes kept, {size - kept} bytes behind them removed"]
 
 

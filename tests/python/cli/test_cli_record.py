@@ -141,6 +141,10 @@ def test_repair_finishes_a_cut_file_once(arm: o80.Frontend, tmp_path: Path) -> N
     assert "is complete" in run("repair", path)
     assert path.read_bytes() == repaired
 
+    path.write_bytes(b"")
+    assert "held no rows" in run("repair", path)
+    assert o80.open(path).finished
+
 
 def test_info_describes_a_recording(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
