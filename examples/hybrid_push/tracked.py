@@ -30,7 +30,7 @@ JAW = (-0.1745, 1.7453)  # closed, open [rad]
 
 
 def noisy(row: Any, random: np.random.Generator) -> dict[str, Any]:
-    """What a tracker makes of the true places of a row, or of several (n,)."""
+    """Places of a row, or of several (n,), with the noise of a tracker."""
     return {name: random.normal(row[name], noise) for name, noise in NOISE.items()}
 
 
