@@ -123,8 +123,8 @@ class EnvironmentProcess:
         if any(self._watched[name].now is None for name in (ARM, WORLD)):
             return None
         arm, twin = map(self._settings.segment, (ARM, WORLD))
-        paced = replace(RIG, pacing=Pacing.REAL_TIME, attach=True)
-        rig = replace(paced, arm_segment=arm, twin_segment=twin)
+        rig = replace(RIG, attach=True, arm_segment=arm, twin_segment=twin)
+        rig = replace(rig, pacing=Pacing.REAL_TIME)
         try:
             environment = TableTennisEnvironment(rig=rig, task=self._task)
         except OPENING:
