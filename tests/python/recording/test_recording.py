@@ -117,7 +117,7 @@ def test_the_last_rows_before_a_restart_are_not_lost(segment: str, tmp_path: Pat
 
         source: Any = recorder.sources[segment]
         source._frontend = RestartsWhenAsked(source._frontend, restart)
-        source._look_at = 0.0  # it may attach at once
+        source._attempt_at = 0.0  # it may attach at once
         while not arm.closed or source.newest != 0:
             recorder.poll()
         recorder.finish()
@@ -199,7 +199,7 @@ def test_a_recording_says_how_each_run_ended(segment: str, tmp_path: Path) -> No
     recorder = Recorder(path, [segment])
 
     def look() -> None:
-        recorder.sources[segment]._look_at = 0.0  # now
+        recorder.sources[segment]._attempt_at = 0.0  # now
         recorder.catch_up()
 
     for reason in ("", "the sensor is off"):

@@ -201,7 +201,7 @@ def everything(request: pytest.FixtureRequest, segment: str, tmp_path: Path) -> 
                 arm.resume()
                 arm.burst(5)
             recording.flush()
-            recording._recorder.sources[second]._look_at = 0.0  # now
+            recording._recorder.sources[second]._attempt_at = 0.0  # now
     o80.clean(second)
     cut(path, tmp_path / "shown.mcap", transforms=60.0)
     return path

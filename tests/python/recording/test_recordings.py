@@ -36,7 +36,7 @@ def folder(segment: str, tmp_path: Path) -> Path:
                             recording.flush()
                         recording.flush()
                 recording.flush()
-                recording._recorder.sources[segment]._look_at = 0.0
+                recording._recorder.sources[segment]._attempt_at = 0.0
             if path == "monday/b.mcap":
                 recording.mark("Changed the battery", volts=24.5)
     return root

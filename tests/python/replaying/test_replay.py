@@ -231,7 +231,7 @@ def test_a_flipped_bit_is_found_in_its_row_and_field(
     (place,) = [column.offset for column in columns_of(run.schema) if column.name == name]
     byte = place + data.draw(st.integers(0, 7))
     flipped = Flipped(run, row, byte, 1 << data.draw(st.integers(0, 7)))
-    report = RunReplay(flipped).report()
+    report = RunReplay(flipped).report()  # type: ignore[arg-type]
 
     assert report.difference is not None
     assert (report.difference.iteration, report.difference.field) == (row, name)
@@ -251,10 +251,10 @@ def test_what_another_build_recorded_is_compared_with_a_tolerance(run_in_file: F
     row = run_in_file.rows - 2
     run = FromElsewhere(run_in_file, row, place, 1, provenance=other)
 
-    report = RunReplay(run).report()
+    report = RunReplay(run).report()  # type: ignore[arg-type]
     assert report.identical, report
     assert any("another build of o80" in note and "1e-09" in note for note in report.notes)
-    report = RunReplay(run, tolerances={}).report()
+    report = RunReplay(run, tolerances={}).report()  # type: ignore[arg-type]
     assert report.difference is not None
     assert report.difference.iteration == row
 
@@ -268,7 +268,7 @@ def test_another_machine_is_noted(run_in_file: FileRun) -> None:
     lesser = replace(machine, features=machine.features[1:])
     assert "the processors differ" in lesser.difference(machine)
     run = FromElsewhere(run_in_file, 0, 0, 0, provenance=run_in_file.provenance, machine=older)
-    report = RunReplay(run).report()
+    report = RunReplay(run).report()  # type: ignore[arg-type]
     assert report.identical, report
     assert any("glibc 2.1 recorded it" in note for note in report.notes)
 

@@ -72,7 +72,7 @@ def test_a_recorded_name_is_not_taken_for_a_path(run: FileRun, stray: Path) -> N
     for name in (str(stray), os.path.relpath(stray), "../stray.so"):
         forged = Forged(run, run.schema | {"robot": name}, run.provenance)
         with pytest.raises(o80.DriverError, match="may name any library") as refused:
-            RunReplay(forged).report()
+            RunReplay(forged).report()  # type: ignore[arg-type]
         assert "--robot" in str(refused.value)
     assert not is_loaded(stray)
 

@@ -167,7 +167,7 @@ def test_a_changed_decision_is_found(recorded: Path) -> None:
         def entries(self) -> Iterator[Any]:
             return (entry for entry in self.run.entries() if entry.kind == "status")
 
-    report = RunReplay(Silent(run, 0, 0, 0)).report()
+    report = RunReplay(Silent(run, 0, 0, 0)).report()  # type: ignore[arg-type]
     assert report.difference is not None or "the journal lacks" in report.gap
 
 
