@@ -249,7 +249,7 @@ def test_the_tracker_of_the_example_stands_for_the_world() -> None:
         tracker.start("tracker", frequency=100, arm="tracked_arm"),
         make(module.Tracked, pacing="real_time", attach="tracked_arm", **patient) as environment,
     ):
-        task: Any = environment.unwrapped.task
+        task: Any = environment.task
         environment.reset(seed=1)
         for _ in range(10_000):  # until a row shows where the tracker has put the puck
             environment.step(np.zeros(2, np.float32))
