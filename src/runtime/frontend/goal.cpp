@@ -99,6 +99,7 @@ std::string not_reached_text(const std::string& segment, const std::vector<Miss>
     text += " within " + text_of(std::chrono::duration<double>(*timeout).count(), "s");
   }
   std::vector<std::string> each;
+  each.reserve(misses.size());
   for (const Miss& miss : misses) {
     each.push_back((miss.field.empty() ? "" : miss.field + " of ") + "'" + miss.actuator +
                    "' is observed at " + text_of(miss.observed, miss.unit) + ", " +
