@@ -25,7 +25,7 @@ sys.path.insert(0, str(Path(__file__).parent))
 from push import Push
 
 NOISE = {"tip": 0.001, "puck_place": 0.001, "puck_velocity": 0.005}  # [m], [m], [m/s]
-LATE = 2  # rows of the arm
+LATE = 1  # rows of the arm, beside up to a row of the tracker
 JAW = (-0.1745, 1.7453)  # closed, open [rad]
 
 
