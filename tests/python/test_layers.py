@@ -219,7 +219,7 @@ CEILINGS = {
     "robots/arms": (4_420, 3_128),
     "robots/pam, robots/two_joints": (2_104, 1_184),
     "simulators/mujoco": (5_363, 4_663),
-    "apps/table_tennis": (8_400, 4_400),
+    "apps/table_tennis": (8_393, 4_400),
     "benchmarks, tools": (4_426, 0),
     "examples": (2_076, 0),
     "tests, conftest.py": (0, 63_260),

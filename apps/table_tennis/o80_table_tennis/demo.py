@@ -31,7 +31,7 @@ from .players.policies import BASELINES, DEFAULT_FACTOR, Policy, default_policy
 from .playing import play
 from .report.episode_summary import EpisodeSummary
 from .report.recorded_episodes import recorded_episodes
-from .report.report import Figures, mode_figures, policy_figures, print_table
+from .report.report import Figures, mode_figures, print_table
 from .report.statistics import Played
 from .settings import Pacing, RigSettings, TaskSettings
 
@@ -140,7 +140,7 @@ def main(
             pacing.value: mode_figures(played, recorded.count(pacing.value))
             for pacing, played in modes.items()
         },
-        "policies": {name: policy_figures(played) for name, played in policies.items()},
+        "policies": {name: played.as_json() for name, played in policies.items()},
         "seconds": round(time.monotonic() - begin, 1),
     }
     (output / "report.json").write_text(json_text(report, indent=2) + "\n")

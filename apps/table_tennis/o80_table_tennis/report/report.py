@@ -19,9 +19,9 @@ PERCENTILES = (50, 90, 99, 99.9, 100)
 LABELS = {
     "episodes": "episodes",
     "balls": "balls",
-    "returned": "returned to the opponent's half",
-    "returned_95_percent": "share returned (95 % sure)",
-    "touched": "touched by the racket",
+    "returned": "returned",
+    "returned_95_percent": "returned (95 % interval)",
+    "touched": "touched",
     "reward": "mean reward",
     "miss": "miss of the target, median [m]",
     "speed": "speed after the touch, median [m/s]",
@@ -37,14 +37,13 @@ LABELS = {
     "arm_rate": "iterations of the arm a second [1/s]",
     "arm_overruns": "overruns of the arm",
     "arm_skipped": "periods the arm left out",
-    "returned_at_least": "share returned, at least (95 % sure)",
-    "returned_at_most": "share returned, at most (95 % sure)",
     "recorded_episodes": "episodes in the recording",
     "seconds": "seconds played",
     "arm_lateness_us": "arm late by at most, {} % of rows [us]",
     "arm_jitter_us": "arm period off by, {} % of rows [us]",
 }
 """By the names of the figures; those of percentiles end in "_p" and the percentage."""
+SHARES = ("touched", "returned", "returned_95_percent")  #: where they are no counts
 
 
 def print_table(console: Console, title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
@@ -56,25 +55,19 @@ def print_table(console: Console, title: str, columns: Mapping[str, Mapping[str,
     for key in dict.fromkeys(key for figures in columns.values() for key in figures):
         name, _, percentile = key.rpartition("_p")
         if label := LABELS.get(key) or LABELS.get(name):
-            values = [_text(figures.get(key)) for figures in columns.values()]
+            values = [_text(key, figures.get(key)) for figures in columns.values()]
             grid.add_row(escape(label.format(percentile)), *values)
     console.print(grid)
 
 
-def _text(value: Any) -> str:
+def _text(key: str, value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, list):
-        return " to ".join(map(_text, value))
-    return f"{value:g}" if isinstance(value, float) else str(value)
-
-
-def policy_figures(played: Played) -> Figures:
-    """How well a policy played."""
-    figures = played.as_json()
-    low, high = figures.pop("returned_95_percent")
-    del figures["ends"], figures["speed"], figures["miss"]
-    return figures | {"returned_at_least": low, "returned_at_most": high}
+        return " to ".join(_text(key, each) for each in value)
+    if not isinstance(value, float):
+        return str(value)
+    return f"{100 * value:.3g} %" if key in SHARES else f"{value:g}"
 
 
 def mode_figures(played: Played, recorded: int) -> Figures:
