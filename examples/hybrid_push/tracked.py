@@ -63,7 +63,7 @@ class Tracker:
         self.row = self.arm.latest().iteration
 
     def read(self, reading: Reading) -> None:
-        for row in self.arm.history(since=self.row).rows:
+        for row in self.arm.history(since=self.row + 1).rows:
             self.row = row["iteration"]
             seen, speeds = row["observed"], row["extended"]["measured"]["velocity"]
             angles = *seen["joints"], np.interp(seen["gripper"], (0, 1), JAW)
@@ -78,6 +78,10 @@ class Tracker:
         self.world.request("place", body="puck", position=fields.position, velocity=(0, 0, 0))
         self.world.burst(LATE + 1)
         return o80.StartAfresh()
+
+    def stop(self) -> None:
+        self.world.close()
+        self.arm.close()
 
 
 class Tracked(Push):

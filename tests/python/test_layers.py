@@ -216,12 +216,12 @@ CEILINGS = {
     "devices": (8_850, 4_500),
     "gateways/lerobot": (530, 690),
     "gateways/ros2": (900, 955),
-    "robots/arms": (4_420, 3_128),
+    "robots/arms": (4_420, 3_137),
     "robots/pam, robots/two_joints": (2_104, 1_184),
     "simulators/mujoco": (5_363, 4_663),
     "apps/table_tennis": (8_393, 4_400),
     "benchmarks, tools": (4_426, 0),
-    "examples": (2_076, 0),
+    "examples": (2_080, 0),
     "tests, conftest.py": (0, 63_260),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""

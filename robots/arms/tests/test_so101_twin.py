@@ -5,7 +5,9 @@ import os
 import random
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -258,6 +260,13 @@ def test_the_tracker_of_the_example_stands_for_the_world() -> None:
                 break
         assert 0.215 < abs(puck[0]) < 0.245
         assert 0.07 < abs(far[0]) < 0.12
+        own = module.Tracker(module.Tracker.Config("tracked_arm"))
+        own.start()
+        with closing(own.world), closing(own.arm):
+            first = own.row
+            while own.row < first + 30:
+                own.read(SimpleNamespace())
+            assert own.world.latest().iteration == own.row - first, "it mirrors each row once"
     with make_vec(module.Noisy, 2) as environments:
         observation, _ = environments.reset(seed=1)
         assert np.isfinite(observation).all()
