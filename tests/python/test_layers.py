@@ -218,7 +218,7 @@ CEILINGS = {
     "gateways/ros2": (900, 955),
     "robots/arms": (4_420, 3_137),
     "robots/pam, robots/two_joints": (2_104, 1_184),
-    "simulators/mujoco": (5_363, 4_663),
+    "simulators/mujoco": (5_363, 4_667),
     "apps/table_tennis": (8_393, 4_400),
     "benchmarks, tools": (4_426, 0),
     "examples": (2_080, 0),

@@ -52,7 +52,8 @@ TEST(Simulation, LeavesTheEngineOutWhereItHasNothingToIntegrate) {
 // the pass that computes the sensors of a row is the first half of the next step
 TEST(Simulation, StepsWithSensorsAreThoseOfAPlainLoop) {
   for (const std::string integrator : {"Euler", "implicit", "implicitfast", "RK4"})
-    for (const std::string sensor : {"", "<accelerometer site='tip'/>"}) {
+    for (const std::string sensor : {"", "<accelerometer site='tip'/>",
+                                     "<velocimeter site='tip' nsample='5' delay='.006'/>"}) {
       const std::string file = testing::TempDir() + "/o80_sensors_" + integrator + ".xml";
       std::ofstream(file) << "<mujoco><option integrator='" << integrator << "'/><worldbody>"
                           << "<geom name='floor' type='plane' size='1 1 1'/>"
@@ -62,8 +63,9 @@ TEST(Simulation, StepsWithSensorsAreThoseOfAPlainLoop) {
                           << "<body name='box' pos='.3 0 .1'><freejoint/>"
                           << "<geom name='cube' type='box' size='.05 .05 .05'/></body></worldbody>"
                           << "<actuator><motor joint='hinge'/></actuator>"
-                          << "<sensor><framepos objtype='body' objname='box'/>" << sensor
-                          << "</sensor></mujoco>";
+                          << "<sensor><framepos objtype='body' objname='box'/>"
+                          << "<subtreelinvel body='box'/><subtreeangmom body='box'/>"
+                          << "<e_potential/><e_kinetic/>" << sensor << "</sensor></mujoco>";
       Simulation simulation(config_of({{"model", file}, {"mode", "control"}}));
       simulation.steps(2);
       std::filesystem::remove(file);
