@@ -15,16 +15,10 @@ import o80
 from o80.robots.process import start_process
 
 # what calls import when they are first used: an interrupt during `exec` of a text, of which
-# dataclasses are made, makes Python end with the status of an interrupt that nobody caught
-for _module in (
-    "base.screen",
-    "frontend.results",
-    "frontend.stopping",
-    "rows.actuators",
-    "rows.journal",
-    "rows.provenance",
-):
-    importlib.import_module(f"o80.{_module}")
+# dataclasses are made, makes Python end with the status of an interrupt that nobody caught, and
+# one as an import gives back its lock is lost
+for _name in o80.__all__:
+    getattr(o80, _name)
 
 
 @dataclass(frozen=True)
