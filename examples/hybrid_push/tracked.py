@@ -63,6 +63,8 @@ class Tracker:
         self.row = self.arm.latest().iteration
 
     def read(self, reading: Reading) -> None:
+        if not self.arm.alive:
+            reading.fault(f"the arm '{self.arm.segment}' has ended: start it, then the tracker")
         for row in self.arm.history(since=self.row + 1).rows:
             self.row = row["iteration"]
             seen, speeds = row["observed"], row["extended"]["measured"]["velocity"]

@@ -16,6 +16,7 @@ constexpr std::uint32_t kMaxRows = 1U << 20;
 constexpr std::uint32_t kMaxActuators =
     0xFFFF;  // a record has 16 bits for an actuator; one value means all
 constexpr std::uint32_t kLargestType = 1U << 28;
+constexpr std::uint32_t kLargestOfFace = 1U << 24;  // a face may come from a stranger
 constexpr std::uint32_t kMaxNested = 16;
 
 [[noreturn]] void refuse(const std::string& why) {
@@ -366,6 +367,9 @@ void check_face(const Schema& face) {
   }
   check(face);
   for (const TypeRow& type : face.types) {
+    if (type.size > kLargestOfFace) {
+      throw InvalidArgument("the type '" + type.name.str() + "' of the face is too large");
+    }
     if (type.blends == 0) continue;
     throw InvalidArgument("the state '" + type.name.str() +
                           "' has an interpolation that only its robot knows");

@@ -1,7 +1,6 @@
 """Every call that waits, and a place where each of them waits until somebody ends it."""
 
 import contextlib
-import importlib
 import inspect
 import os
 import re

@@ -131,10 +131,10 @@ def main(
             modes = demo.play_modes(muscle, episodes, real_time_episodes, recording)
             scripted = modes.get(Pacing.INLINE) or modes[Pacing.REAL_TIME]
             policies = demo.play_policies(scripted, muscle, of_learned)
+        recorded = [episode.pacing for episode in recorded_episodes(recording)]
     except o80.Error as error:
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
-    recorded = [episode.pacing for episode in recorded_episodes(recording)]
     report: Figures = {
         "modes": {
             pacing.value: mode_figures(played, recorded.count(pacing.value))

@@ -56,12 +56,12 @@ class TableTennisEnvironment(HybridEnvironment):
         record: str | Path | None = None,
     ) -> None:
         refuse_wrong_arguments(rig, task, render_mode, self.metadata["render_modes"])
-        made, self._page = TableTennisCopies(None, rig=rig, task=task, camera=camera), None
+        self.task = made = TableTennisCopies(None, rig=rig, task=task, camera=camera)
+        self._page, its_rig = None, made.rig_settings
         self.arm, *self.twins = frontends = made.single.frontends
         """Frontends of the arm, and of the worlds; the ball of the first one is played."""
         self._counts = EpisodeCounts()
         self._number, self._summary = -1, None
-        its_rig = made.rig_settings
         try:
             told = settings_mark(its_rig, made.settings, [each.epoch for each in frontends])
             super().__init__(made, record=record, options=told)
@@ -70,7 +70,6 @@ class TableTennisEnvironment(HybridEnvironment):
                 step = 0.0 if its_rig.pacing.real_time else its_rig.step
                 self._page = Page([*self.twins, self.arm], step)
         except BaseException:
-            made.close()
             self.close()
             raise
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 from typing import Any
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -9,6 +10,7 @@ from opened_environment import PATIENT, PUSH, STILL, WAITING, opened, played_out
 
 import o80
 from o80.hybrid import relive
+from o80.recording.recorded_epoch import RecordedEpoch
 from o80_table_tennis.copies import TableTennisCopies
 from o80_table_tennis.report.recorded_episodes import RecordedEpisode, recorded_episodes
 from o80_table_tennis.settings import Pacing, TaskSettings
@@ -74,8 +76,11 @@ def check_rows(episode: RecordedEpisode) -> None:
     assert episode.times[-1] == pytest.approx((rows - 1) * episode.period)
 
 
-def test_each_environment_continues_the_file(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
+def test_each_environment_continues_the_file(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path, decoded = tmp_path / "run.mcap", Mock(side_effect=RecordedEpoch.history)
+    monkeypatch.setattr(RecordedEpoch, "history", lambda run: decoded(run))
     for pacing in (Pacing.INLINE, Pacing.PROCESSES):
         with opened(pacing, record=path) as environment:
             for _ in range(2):
@@ -83,12 +88,9 @@ def test_each_environment_continues_the_file(tmp_path: Path) -> None:
                 played_out(environment)
 
     episodes = recorded_episodes(path)
-    assert [(each.pacing, each.summary.number) for each in episodes] == [
-        ("inline", 0),
-        ("inline", 1),
-        ("processes", 0),
-        ("processes", 1),
-    ]
+    assert decoded.call_count == 4, "each run of arm and twin once"
+    found = [(each.pacing, each.summary.number) for each in episodes]
+    assert found == [(pacing, n) for pacing in ("inline", "processes") for n in (0, 1)]
     for one, other in zip(episodes[:2], episodes[2:], strict=True):
         assert one.arm.observed.tobytes() == other.arm.observed.tobytes()
         assert one.balls.tobytes() == other.balls.tobytes()

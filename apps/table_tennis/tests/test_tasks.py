@@ -1,7 +1,8 @@
 """Tasks are exchanged without touching the environment: the named ones, and a user's own."""
 
+import threading
 from contextlib import closing
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,8 @@ STILL = np.zeros(MUSCLES, dtype=np.float32)
 @dataclass(frozen=True)
 class KeepStillTask(ReturnTask):
     """A user's own: each step costs the speed of the arm, whatever the ball does."""
+
+    lock: Any = field(default_factory=threading.Lock)  # cannot be copied
 
     def eventful(self, state: State) -> Any:
         return np.ones(np.shape(state.steps), np.bool_)

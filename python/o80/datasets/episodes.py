@@ -112,6 +112,7 @@ def episodes_of(
     step = iterations(every, "every", float(robot.schema["period"]) * 1e-9, 1)
     taken = {epoch: _Orders.of(epoch.native_journal()) for epoch in epochs}
     commands = {epoch: functools.cache(functools.partial(_asked, epoch)) for epoch in epochs}
+    rows = {epoch: functools.cache(epoch.history) for epoch in epochs}  # decoded once
     _sensors(robot.name, robot.schema, fields)  # refuses fields that it lacks
     usual = (begin, end) == (BEGIN, END)
     left_out = _misspelt(recording.marks, robot.name) if usual else []
@@ -120,9 +121,7 @@ def episodes_of(
         if not span.dropped:
             _refuse_wrong_rewards(span, robot.name)
         try:
-            found.append(
-                _episode(span, epochs, robot.name, step, taken, commands, fields, left_out)
-            )
+            found.append(_episode(span, rows, robot.name, step, taken, commands, fields, left_out))
         except InvalidArgument as error:
             left_out.append(str(error))
     if not found:
@@ -191,7 +190,7 @@ def _misspelt(marks: Sequence["Mark"], segment: str) -> list[str]:
 
 def _episode(
     span: _Span,
-    epochs: Sequence["RecordedEpoch"],
+    rows_of: Mapping["RecordedEpoch", Callable[[], History]],
     segment: str,
     every: int,
     taken: Mapping["RecordedEpoch", "_Orders"],
@@ -204,12 +203,14 @@ def _episode(
     where = f"episode {span.number} (mark at row {mark.rows[segment]})"
     if span.dropped:
         raise InvalidArgument(f"{where}: it was thrown away")
+    epochs = [*rows_of]
     epoch = _epoch_at(mark, epochs)
+    run = rows_of[epoch]()
     first = mark.rows[segment]
     last = None
     if span.until is not None and _epoch_at(span.until, epochs) is epoch:
         last = span.until.rows[segment]
-    rows = epoch.history(since=first, until=last)
+    rows = run.select(since=first, until=last)
     if not len(rows) or rows.iteration[0] != first:
         raise InvalidArgument(f"{where}: its first row is not in the recording")
     fresh = np.flatnonzero(rows.fresh[1:])
@@ -230,7 +231,7 @@ def _episode(
     if steps < 1:
         raise InvalidArgument(f"{where}: it has no step")
     rows = rows[: steps * every + 1 : every]
-    seen, delays = taken[epoch].decided(rows.iteration[1:], epoch)
+    seen, delays = taken[epoch].decided(rows.iteration[1:], run)
     ending = span.ending
     task = str(mark.values.get("task", "")) or mark.name.partition(": ")[2]
     return Episode(
@@ -272,16 +273,16 @@ class _Orders:
         return cls(orders[:, 0], orders[:, 1])
 
     def decided(
-        self, iterations: NDArray[np.int64], epoch: "RecordedEpoch"
+        self, iterations: NDArray[np.int64], run: History
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
         """`seen` and `delays` of the newest batch that was taken at each of these iterations."""
         newest = np.searchsorted(self.taken, iterations, side="right") - 1
         seen: NDArray[np.int64] = np.append(self.since, -1)[newest]  # the last one: none yet
         taken = np.append(self.taken, 0)[newest]
         known = seen >= 0
-        delays = np.where(known, (taken - seen) * epoch.schema["period"] * 1e-9, np.nan)
-        if known.any() and not epoch.schema["bursting"]:  # by the clock: periods may be skipped
-            rows = epoch.history(since=int(seen[known].min()), until=int(iterations[-1]))
+        delays = np.where(known, (taken - seen) * run.schema["period"] * 1e-9, np.nan)
+        if known.any() and not run.schema["bursting"]:  # by the clock: periods may be skipped
+            rows = run.select(since=int(seen[known].min()), until=int(iterations[-1]))
             delays[known] = (_times(rows, taken) - _times(rows, seen))[known]
         return seen, delays
 

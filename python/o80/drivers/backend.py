@@ -205,9 +205,9 @@ class Backend(lifecycle.Managed):
         It returns None, StartAfresh if the robot jumped, or Running if it takes time. To reject the
         request it raises RequestRejected; the sender reads the text.
         """
-        self._index_of(request)
+        index = self._index_of(request)
         self._open.check()
-        self._handlers[request] = handler
+        self._handlers[self._layout.schema["requests"][index]["name"]] = handler
 
     def running(self, request: str) -> bool:
         """True if a request was answered with Running and has not ended.

@@ -25,7 +25,7 @@ class HybridEnvironment(Environment):
     | mark | when | values |
     |---|---|---|
     | `environment` | when it is made | segments of robot and world, options |
-    | `episode` | in `reset` | number, task, seed, state of the generator, options |
+    | `episode` | before the first step | number, task, seed, state of the generator, options |
     | `episode_end` | after the last step | actions, rewards, rows, how it ended |
     | `episode_dropped` | in a reset before it | |
 
@@ -66,6 +66,8 @@ class HybridEnvironment(Environment):
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Info]:
         """Carries out an action."""
+        if self._marks is not None:
+            self._marks.mark_begin()
         stepped = super().step(action)
         if self._marks is not None:
             self._marks.step(action, *stepped[1:])
@@ -90,7 +92,7 @@ class _Marks:
         self._margin = 2 * task.engine.iterations
         self._actions: list[Any] = []
         self._rewards: list[float] = []
-        self._runs = False
+        self._runs, self._begins = False, dict[str, Any]()
         self.recording = Recording(path, self._members, proceed=Path(path).exists())
         names = [each.segment for each in self._members]
         self.recording.mark("environment", robot=names[0], world=names[1], options=_plain(options))
@@ -103,11 +105,16 @@ class _Marks:
         self._runs = False
 
     def begin(self, seed: int | None, state: str, options: Mapping[str, Any]) -> None:
-        """An episode begins; state: of its generator before the reset."""
+        """An episode begins with its next step; state: of its generator before the reset."""
         values = {"task": self._task, "seed": seed, "generator": state, "options": _plain(options)}
-        self.recording.mark("episode", number=self._number, **values)
+        self._begins = {"number": self._number, **values}
         self._number += 1
-        self._actions, self._rewards, self._runs = [], [], True
+
+    def mark_begin(self) -> None:
+        """Marks the begin before the first step: rows before it do not belong to the episode."""
+        if not self._runs and self._begins:
+            self.recording.mark("episode", **self._begins)
+            self._actions, self._rewards, self._runs = [], [], True
 
     def step(
         self, action: Any, reward: float, terminated: bool, truncated: bool, info: Info

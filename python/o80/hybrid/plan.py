@@ -31,7 +31,7 @@ class Plan:
         if self.rig.delay >= self.iterations:
             raise InvalidArgument(
                 f"delay must be less than the {self.iterations} iterations of a step, got "
-                f"{self.rig.delay}: give more iterations (every), or chunks"
+                f"{self.rig.delay}: give a smaller delay, more iterations a step, or chunks"
             )
 
     @property

@@ -130,8 +130,8 @@ class HybridTask(Task):
             pacing == "inline" or recorded is not None or (rig.worlds or 1) > 1
         ):
             raise InvalidArgument(
-                f"world '{rig.world.segment}' runs already: it is the only world of one robot that "
-                "is not inline, pacing='real_time' or pacing='processes'"
+                f"world '{rig.world.segment}' runs in another process: only one robot that is not "
+                "inline can have it, as its only world: pacing='real_time' or pacing='processes'"
             )
         if threads is not None and pacing != "inline":
             raise InvalidArgument("threads step copies inline: leave them out of other pacings")

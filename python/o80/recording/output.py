@@ -77,8 +77,8 @@ def opened_in(folder: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
 
 def all_files_of(path: Path) -> list[Path]:
     """The files of a recording, also those that were being created. Raises RecordingError."""
-    there = files_of(path)
-    return in_order(path) if path.is_dir() else there
+    there = in_order(path) if path.is_dir() else []
+    return there if there and all(map(Path.is_file, there)) else files_of(path)
 
 
 def next_file(file: FileWriter) -> FileWriter:

@@ -98,6 +98,8 @@ def text_of_face(schema: Mapping[str, Any]) -> str:
     """The text of a description that include/o80/describe/face.hpp reads."""
     try:
         builder, period = _built(schema), int(schema.get("period", 0))
+    except InvalidArgument:
+        raise
     except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
         why = exception_text(error)[:_MOST_OF_A_REASON]
         raise InvalidArgument(f"the description is not complete: {why}") from None

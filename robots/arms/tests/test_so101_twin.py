@@ -16,6 +16,7 @@ from fake_arm import JOINTS, FakeArm
 from gymnasium.spaces import Box
 
 import o80
+from o80.drivers import Reading
 from o80.hybrid import HybridTask, Mirror, Outcome, Rig, make, make_vec
 
 PLACES = dict(zip(JOINTS, (0.1, -0.2, 0.3, 0.2, -0.1, 0.5), strict=True))
@@ -247,7 +248,7 @@ def test_the_tracker_of_the_example_stands_for_the_world() -> None:
     }
     tracker = o80.robots.load(f"{EXAMPLE / 'tracked.py'}:Tracker")
     with (
-        o80.robots.load("so101_twin").start("tracked_arm"),
+        o80.robots.load("so101_twin").start("tracked_arm") as arm,
         tracker.start("tracker", frequency=100, arm="tracked_arm"),
         make(module.Tracked, pacing="real_time", attach="tracked_arm", **patient) as environment,
     ):
@@ -267,6 +268,9 @@ def test_the_tracker_of_the_example_stands_for_the_world() -> None:
             while own.row < first + 30:
                 own.read(SimpleNamespace())
             assert own.world.latest().iteration == own.row - first, "it mirrors each row once"
+            arm.stop()
+            with pytest.raises(Exception, match="the arm 'tracked_arm' has ended"):
+                own.read(Reading.__new__(Reading))
     with make_vec(module.Noisy, 2) as environments:
         observation, _ = environments.reset(seed=1)
         assert np.isfinite(observation).all()

@@ -334,7 +334,7 @@ def test_a_rig_that_cannot_be_is_refused(changes: dict[str, Any], message: str) 
         ({"ens": 1}, "no parameter 'ens'. Did you mean 'ends'"),
         ({"pacing": "fast"}, "pacing must be one of"),
         ({"attach": "arm"}, "attach is for pacing='real_time'"),
-        ({"world": attach("camera")}, "world 'camera' runs already.*not inline"),
+        ({"world": attach("camera")}, "world 'camera' runs in another process.*not inline"),
         ({"copies": 2, "pacing": "processes"}, "2 copies are inline"),
         ({"threads": 2, "pacing": "processes"}, "threads step copies inline"),
         ({"action_steps": 2}, "action_steps must be at most chunk_size"),
@@ -596,13 +596,25 @@ def test_a_recording_holds_the_episodes_and_replays(tmp_path: Path) -> None:
         environment.reset()
     recording = o80.open(file)
     marks = [mark for mark in recording.marks if mark.name.startswith("episode")]
-    assert [mark.name for mark in marks] == ["episode", "episode_end"] * 2 + ["episode"]
+    assert [mark.name for mark in marks] == ["episode", "episode_end"] * 2
     assert marks[0].values["seed"] == 3
     assert marks[0].values["options"] == {"a": 1}
     assert marks[3].values["rewards"] == rewards
     assert marks[3].values["truncated"]
     for segment in recording:
         assert o80.replay(file, segment=segment).identical
+
+
+def test_by_the_clock_too_an_episode_begins_with_its_first_step(tmp_path: Path) -> None:
+    file, options = tmp_path / "run.mcap", {"max_late": 10**6, "max_drift": 1e6, "max_steps": 2}
+    with make(Still, pacing="real_time", record=file, **options) as environment:
+        environment.reset(seed=1)
+        robot = environment.task.engine.frontends[0]
+        name, waited = robot.segment, robot.wait_for(robot.published + 50, 60).iteration
+        while not environment.step(np.zeros(2, np.float32))[3]:
+            pass
+    begun, _ = (mark for mark in o80.open(file).marks if mark.name.startswith("episode"))
+    assert begun.rows[name] >= waited
 
 
 class Watched(Still):

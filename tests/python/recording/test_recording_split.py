@@ -121,6 +121,10 @@ def test_repair_completes_every_file(arm: o80.Frontend, tmp_path: Path) -> None:
     assert run_o80("repair", path).stdout.count("is complete now") == 2
     assert o80.open(path).finished
 
+    for file in path.iterdir():
+        file.write_bytes(b"")  # of a recorder that was killed at once
+    assert run_o80("repair", path).stdout.count("held no rows") == len([*path.iterdir()])
+
 
 def test_a_folder_that_exists_is_not_written_to(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"

@@ -16,7 +16,7 @@ import numpy as np
 from o80.base.arrays import FloatArray
 from o80_mujoco.balls import path
 
-from ..physics.aerodynamics import AERODYNAMICS
+from ..physics.aerodynamics import AERODYNAMICS, AIR
 from ..physics.impact import spin_after
 from ..physics.interpolation import along_path
 from .flight_fit import FlightFit, fitted
@@ -164,6 +164,6 @@ def flown(states: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray
     `states` (9, B): position [m], velocity [m/s] and spin [rad/s].
     """
     steps = max(1, int(np.ceil(times.max(initial=0.0) / STEP)))
-    balls = path(np.ascontiguousarray(states.T), STEP, steps, AERODYNAMICS.air)
+    balls = path(np.ascontiguousarray(states.T), STEP, steps, AIR)
     nodes = balls[..., :6].swapaxes(1, 2)
     return along_path(times, nodes, STEP * np.arange(len(nodes), dtype=np.float64))

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,7 +58,7 @@ class Aerodynamics:
         """1/2 rho Cl A r/m []: the Magnus acceleration is magnus * (omega x v)."""
         return self.lift_coefficient * self.drag_per_coefficient * self.radius
 
-    @cached_property
+    @property
     def air(self) -> Air:
         """As predictions want it."""
         return Air(
@@ -94,3 +93,4 @@ class Aerodynamics:
 
 MAX_SATURATED = 10.0
 AERODYNAMICS = Aerodynamics()
+AIR = AERODYNAMICS.air

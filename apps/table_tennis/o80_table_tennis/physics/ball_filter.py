@@ -23,7 +23,7 @@ from o80_mujoco.balls import BallFilter, path, predicted_flight
 
 from ..world.table import TABLE
 from ..world.timing import STEP
-from .aerodynamics import AERODYNAMICS
+from .aerodynamics import AIR
 from .impact import platform
 
 TYPICAL = (0.46, 2.95, 1.37, 0.24, -4.14, 2.28, 30.0)
@@ -76,7 +76,7 @@ def ball_filter(settings: FilterSettings, count: int) -> BallFilter:
     table = gains(settings)
     return BallFilter(
         count=count,
-        air=AERODYNAMICS.air,
+        air=AIR,
         platform=platform(TABLE),
         before=table.before,
         after=table.after,
@@ -131,7 +131,7 @@ def _slopes(move: Callable[[FloatArray], FloatArray], ball: FloatArray) -> Float
 
 def _flown(balls: FloatArray, *, step: float) -> FloatArray:
     """Balls (n, 7) after a step [s] of free flight."""
-    return path(_whole(balls), step, 1, AERODYNAMICS.air)[1, :, :7]
+    return path(_whole(balls), step, 1, AIR)[1, :, :7]
 
 
 def _bounced(balls: FloatArray) -> FloatArray:
@@ -142,7 +142,7 @@ def _bounced(balls: FloatArray) -> FloatArray:
 def _past_table(ball: FloatArray, *, step: float) -> FloatArray:
     """A ball (7,) that touches the table within a step [s], after the step."""
     whole = _whole(ball[None])[0]
-    return predicted_flight(whole, AERODYNAMICS.air, platform(TABLE), step, step)[-1, 1:8]
+    return predicted_flight(whole, AIR, platform(TABLE), step, step)[-1, 1:8]
 
 
 def _whole(balls: FloatArray) -> FloatArray:

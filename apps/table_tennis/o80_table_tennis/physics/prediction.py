@@ -13,7 +13,7 @@ from o80_mujoco.balls import predicted_flight
 
 from ..world.ball import NO_SPIN
 from ..world.table import TABLE, Table
-from .aerodynamics import AERODYNAMICS
+from .aerodynamics import AERODYNAMICS, AIR
 from .impact import platform
 from .interpolation import along_path
 
@@ -84,4 +84,4 @@ def flight_nodes(
     if not np.isfinite(ball).all():
         raise ValueError(f"position {position} and velocity {velocity} must be finite")
     on = None if table is None else platform(table)
-    return predicted_flight(ball, AERODYNAMICS.air, on, duration, step)
+    return predicted_flight(ball, AIR, on, duration, step)

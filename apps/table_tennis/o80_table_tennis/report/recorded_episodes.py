@@ -8,7 +8,8 @@ in base64: as texts in JSON they would take a fifth of a fast step.
 from __future__ import annotations
 
 import base64
-from collections.abc import Mapping, Sequence
+import functools
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, is_dataclass
 from pathlib import Path
 from typing import Any
@@ -28,15 +29,12 @@ MARK = "table_tennis"
 
 def settings_mark(rig: RigSettings, task: TaskSettings, epochs: Sequence[int]) -> dict[str, Any]:
     """Options in the mark of an environment; epochs: of arm and twins."""
-    told: dict[str, Any] = dict(vars(task))
+    told: dict[str, Any] = dict(vars(task)) | {"task": task.title}
     for name, each in told.items():
-        if is_dataclass(each) and not isinstance(each, type):
-            told[name] = asdict(each)
-    return {
-        "rig": asdict(rig) | {"pacing": rig.pacing.value},
-        "task": told | {"task": task.title},
-        "epochs": epochs,
-    }
+        if is_dataclass(each):
+            told[name] = {field.name: getattr(each, field.name) for field in fields(each)}
+    rig_values = dict(vars(rig)) | {"pacing": rig.pacing.value}
+    return {"rig": rig_values, "task": told, "epochs": epochs}
 
 
 def mark_episode(
@@ -95,18 +93,23 @@ class RecordedEpisode:
 def recorded_episodes(path: Path | str) -> list[RecordedEpisode]:
     """All episodes that came to an end, in their order.
 
-    Raises o80.RecordingError if rows of an episode are missing.
+    Raises o80.RecordingError if rows of an episode are missing, or another task marked episodes.
     """
     recording, episodes = o80.open(path), []
     marks: dict[str, Mapping[str, Any]] = {}
+    rows = functools.cache(functools.partial(_rows, recording))
     for mark in recording.marks:
         marks[mark.name] = mark.values
         if mark.name == MARK:
-            episodes.append(_episode(recording, marks))
+            episodes.append(_episode(recording.path, rows, marks))
+    if "episode_end" in marks and not episodes:
+        raise o80.RecordingError(f"{path}: its episodes lack the mark '{MARK}'")
     return episodes
 
 
-def _episode(recording: o80.RecordingFile, marks: Mapping[str, Any]) -> RecordedEpisode:
+def _episode(
+    path: Path, rows: Callable[[str, int], o80.History | None], marks: Mapping[str, Any]
+) -> RecordedEpisode:
     place, ended, values = marks["environment"], marks["episode_end"], dict(marks[MARK])
     summary = EpisodeSummary(
         **{each.name: values.pop(each.name) for each in fields(EpisodeSummary)}
@@ -114,13 +117,23 @@ def _episode(recording: o80.RecordingFile, marks: Mapping[str, Any]) -> Recorded
     packed, steps = values.pop("observations"), slice(summary.steps)
     settings = dict(place["options"])
     arm, twin, *_ = settings.pop("epochs")
+
+    def part(segment: str, epoch: int, first: int, last: int) -> o80.History:
+        run = rows(segment, epoch)
+        if run is None or len(found := run.select(since=first, until=last)) != last - first + 1:
+            raise o80.RecordingError(
+                f"{path} lacks rows of '{segment}' from iteration {first} to {last}: the recorder "
+                "was too late. Give arm and twins a longer history"
+            )
+        return found
+
     return RecordedEpisode(
         summary=summary,
         environment=settings,
         begun=marks["episode"],
         drawn=values,
-        arm=_rows(recording, place["robot"], arm, summary.arm_first, summary.arm_last),
-        twin=_rows(recording, place["world"], twin, summary.twin_first, summary.twin_last),
+        arm=part(place["robot"], arm, summary.arm_first, summary.arm_last),
+        twin=part(place["world"], twin, summary.twin_first, summary.twin_last),
         actions=np.array(ended["actions"][steps], np.float32),
         rewards=np.array(ended["rewards"][steps], np.float64),
         observations=np.frombuffer(base64.b64decode(packed["float32"]), "<f4").reshape(
@@ -129,13 +142,7 @@ def _episode(recording: o80.RecordingFile, marks: Mapping[str, Any]) -> Recorded
     )
 
 
-def _rows(
-    recording: o80.RecordingFile, segment: str, epoch: int, first: int, last: int
-) -> o80.History:
-    runs = [run for run in recording[segment].epochs if run.epoch == epoch]
-    if runs and len(rows := runs[0].history(since=first, until=last)) == last - first + 1:
-        return rows
-    raise o80.RecordingError(
-        f"{recording.path} lacks rows of '{segment}' from iteration {first} to {last}: the "
-        "recorder was too late. Give arm and twins a longer history"
-    )
+def _rows(recording: o80.RecordingFile, segment: str, epoch: int) -> o80.History | None:
+    """All rows of a run; None if it was not recorded."""
+    runs = (run for run in recording[segment].epochs if run.epoch == epoch)
+    return next((run.history() for run in runs), None)

@@ -188,6 +188,11 @@ Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
   });
   model = std::move(made.model);
   mjcf = std::move(made.mjcf);
+  if (config.slots > 0 && (model->opt.enableflags & mjENBL_SLEEP) != 0) {
+    throw DriverError(
+        "bodies of the model may sleep (<flag sleep='enable'/>), which snapshots do not hold: give "
+        "slots=0, or leave the flag out");
+  }
   if (!config.keyframe.empty()) keyframe = find(*model, mjOBJ_KEY, config.keyframe, "keyframe");
   sensors = sensors_in(*model);
   const bool actuated = config.mode == JointMode::actuated || !config.like.empty();

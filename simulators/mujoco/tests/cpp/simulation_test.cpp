@@ -89,6 +89,14 @@ TEST(Simulation, StepsWithSensorsAreThoseOfAPlainLoop) {
     }
 }
 
+TEST(Simulation, HasNoSnapshotsOfBodiesThatSleep) {
+  const std::string file = testing::TempDir() + "/o80_sleep.xml";
+  std::ofstream(file) << "<mujoco><option><flag sleep='enable'/></option></mujoco>";
+  EXPECT_THROW(Simulation(config_of({{"model", file}})), DriverError);
+  EXPECT_EQ(Simulation(config_of({{"model", file}, {"slots", "0"}})).slots(), 0u);
+  std::filesystem::remove(file);
+}
+
 TEST(Simulation, SharesItsModelWithEqualOnesOnly) {
   const auto model_of = [](const Simulation& simulation) { return simulation.model().model.get(); };
   const Simulation one(config_of(court()));
