@@ -32,7 +32,7 @@ class BurstGroup:
     def wait(self, timeout: float | None = None) -> dict[Frontend, _core.Observation]:
         """Waits for all bursts and returns the last observation of each.
 
-        timeout: for all of them together [s].
+        timeout: for all bursts together [s].
 
         If it raises (TimeoutError, BackendGone, Ctrl-C, Error for a burst that was rejected, for
         example because another frontend has control), the rest of all bursts is cancelled.
@@ -41,7 +41,7 @@ class BurstGroup:
         return dict(zip(self._bursts, rows, strict=True))
 
     def __await__(self) -> Generator[Any, None, dict[Frontend, _core.Observation]]:
-        """As `wait`, for a task of asyncio; a task that is cancelled cancels the bursts."""
+        """Awaits all bursts in asyncio, as `wait`; cancelling the task cancels the bursts."""
         from o80.base.awaiting import in_thread
 
         return in_thread(self.wait).__await__()
@@ -69,12 +69,12 @@ def burst(
     wait: bool = True,
     seen: _core.Observation | _core.Seen | None = None,
 ) -> dict[Frontend, _core.Observation] | BurstGroup:
-    """Lets several bursting backends run at the same time, each its number of iterations.
+    """Runs several bursting backends at the same time, each for its number of iterations.
 
     All members are checked first: nothing runs unless each is alive, bursting, and has a lane with
     room for the added commands. Then all bursts start.
 
-    seen: the observation by which all of them were decided, as in `Frontend.pulse`.
+    seen: the observation on which all commands are based, as in `Frontend.pulse`.
 
     Returns the last observation of each; with `wait=False` a BurstGroup, to wait for or to cancel.
     Raises NotBursting, InvalidArgument, NoLane, LaneFull and BackendGone before anything runs, and

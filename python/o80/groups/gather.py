@@ -40,7 +40,7 @@ _Number: TypeAlias = tuple[str, tuple[_Place, float, float, float, float]]
 
 
 class Gather:
-    """Numbers and flags that `InlineGroup.gather` reads of each copy.
+    """Numbers and flags that `InlineGroup.gather` reads from each copy.
 
     observations: float32 (copies, numbers).
     flags: bool (copies, flags); `gather["name"]` is one flag of all copies.
@@ -55,12 +55,12 @@ class Gather:
 
     @property
     def names(self) -> list[str]:
-        """The name of each number of an observation."""
+        """Names of the numbers of an observation."""
         return list(self._names)
 
     @property
     def flag_names(self) -> list[str]:
-        """The name of each flag."""
+        """Names of the flags."""
         return list(self._flag_names)
 
     def __getitem__(self, name: str) -> NDArray[np.bool_]:
@@ -72,7 +72,7 @@ class Gather:
 
 
 def numbers_from(wanted: Sequence[str | Gathered], schema: dict[str, Any]) -> list[_Number]:
-    """The numbers of an observation. Raises InvalidArgument."""
+    """Returns the numbers of an observation. Raises InvalidArgument for an unknown path."""
     found: list[_Number] = []
     for each in sequence(wanted, "numbers", "['observed']"):
         gathered = Gathered(each) if isinstance(each, str) else each
@@ -102,7 +102,7 @@ def _numbers_of(gathered: Gathered, schema: dict[str, Any]) -> Iterator[_Number]
 def flags_from(
     wanted: Mapping[str, str | Comparison], schema: dict[str, Any]
 ) -> dict[str, tuple[_Place, str, float]]:
-    """For each name of a flag its place, comparison and value. Raises InvalidArgument."""
+    """Returns place, comparison and value by flag. Raises InvalidArgument for a wrong one."""
     flags = {}
     for name, given in mapping(wanted, "flags", "names to comparisons").items():
         comparison = (given, "!=", 0) if isinstance(given, str) else given

@@ -1,4 +1,4 @@
-"""Bursts and requests of copies that are repeated."""
+"""Repeatable bursts and requests of copies."""
 
 import copy
 from collections.abc import Iterator, Mapping
@@ -13,7 +13,7 @@ from o80.base.errors import InvalidArgument
 from o80.frontend.prepared_burst import BurstArrays
 from o80.rows.layout import field_at
 
-#: Numbers of copies, each once, a slice, or a mask with a bool for each copy; None: all of them.
+#: Copies to act on: numbers, each once, a slice, or a mask with a bool for each copy; None: all.
 Copies = ArrayLike | slice | None
 
 
@@ -37,12 +37,12 @@ class GroupBurst(BurstArrays):
         """Sends the targets, with all else that was added, and bursts; fills `rows`.
 
         copies: numbers of the copies that run, a slice, or a mask (None: all).
-        timeout: for all of them together [s].
+        timeout: for all copies together [s].
 
         Raises CopyFailed with the exception of each copy that failed (for example targets that the
-        robot cannot follow, a halt, a fault of its driver); all others are done. All rows of a copy
-        that was halted are its last one; those of others that failed are not valid. TimeoutError
-        and Ctrl-C leave each copy between two iterations; some have not run at all then.
+        robot cannot follow, a halt, a driver fault); all others are done. All rows of a halted copy
+        are its last row; rows of other failed copies are not valid. TimeoutError and Ctrl-C leave
+        each copy between two iterations; some may not have run at all.
         """
         chosen = self._all
         if copies is not None:
@@ -50,7 +50,7 @@ class GroupBurst(BurstArrays):
         self._group.burst(self._compiled, chosen, timeout)
 
     def then(self, following: "GroupBurst", numbers: str | Mapping[str, str]) -> "GroupBurst":
-        """This burst and one of another group that follows it, copy by copy, in one call.
+        """Returns a burst that runs this one and then `following` of another group, copy by copy.
 
         numbers: for each field of the targets of `following` the path in the rows of this one
             that gives it: `{"position": "extended.joint_positions"}`; for targets of one number
@@ -58,8 +58,8 @@ class GroupBurst(BurstArrays):
 
         The other group has as many copies and shares the threads of this one (`threads=group`).
 
-        Returns a burst with the targets of this one and the rows of `following`. The burst of a
-        copy that fails is not followed. Raises InvalidArgument.
+        The returned burst has the targets of this one and the rows of `following`. A copy that
+        fails does not run `following`. Raises InvalidArgument if numbers and targets do not match.
         """
         feeds = list(_feeds(self._rows.dtype, following._targets, numbers))
         both = copy.copy(self)
@@ -72,12 +72,12 @@ class GroupBurst(BurstArrays):
 
 
 class GroupRequest:
-    """A request that is sent to copies again and again; from `InlineGroup.prepared_request`.
+    """A repeatable request to copies, made by `InlineGroup.prepared_request`.
 
     fields: (copies,), structured: the fields of the request of each copy. They keep their values
         from run to run.
     rows: (copies,), structured like `history().rows`: the newest row of each copy after its last
-        run. Every run overwrites those of its copies.
+        run. Every run overwrites the rows of its copies.
     """
 
     def __init__(
@@ -101,7 +101,7 @@ class GroupRequest:
         """Sends the request and runs each copy until its request has ended.
 
         copies: numbers of the copies, a slice, or a mask (None: all).
-        timeout: for all of them together [s].
+        timeout: for all copies together [s].
 
         Raises as `InlineGroup.request`.
         """
@@ -111,7 +111,7 @@ class GroupRequest:
 
 
 def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.uint32]:
-    """Numbers of copies. Raises InvalidArgument."""
+    """Returns the numbers of the chosen copies. Raises InvalidArgument for a wrong choice."""
     if copies is None:
         return everybody
     if isinstance(copies, slice):
@@ -135,7 +135,7 @@ def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.u
 def _feeds(
     rows: np.dtype[Any], targets: NDArray[Any], numbers: str | Mapping[str, str]
 ) -> Iterator[tuple[int, int, int, int]]:
-    """Feed of each number of each actuator: offset in the row and in the targets, stride, size."""
+    """Yields row offset, target offset, stride and size of each number of each actuator."""
     state = targets.dtype
     if targets.ndim == 1:
         raise InvalidArgument(

@@ -33,9 +33,9 @@ class InlineGroup(Closeable):
     """Copies of one robot in this process; made by `Robot.inline(copies=...)`.
 
     Each copy does what a single inline robot does, bit for bit, with any number of threads. A call
-    runs the copies in all threads of the group, without the GIL. A copy that fails in it raises
-    CopyFailed with its number; the others are done. Ctrl-C ends a call within about 50 ms and
-    leaves each copy between two iterations.
+    runs the copies in all threads of the group, without the GIL. If a copy fails, the call raises
+    CopyFailed with its number after all other copies are done. Ctrl-C ends a call within about
+    50 ms and leaves each copy between two iterations.
 
     One thread at a time may call the group. In a forked child its calls raise UsedAfterFork.
     """
@@ -72,9 +72,9 @@ class InlineGroup(Closeable):
         return self.copies
 
     def __getitem__(self, copy: int) -> Frontend:
-        """A frontend of one copy: to see what the robot is, and to command, halt or read that copy.
+        """Returns a frontend of one copy: to inspect the robot, and to command, halt or read it.
 
-        A burst of it runs that copy alone, in the calling thread.
+        A burst of this frontend runs that copy alone, in the calling thread.
         """
         number = self._number(copy)
         found = self._frontends.get(number)
@@ -95,11 +95,11 @@ class InlineGroup(Closeable):
         start: StartWord = "desired",
         delay: int = 0,
     ) -> GroupBurst:
-        """Prepares a burst of the copies that is repeated: it sends targets and returns all rows.
+        """Prepares a repeatable burst of the copies: it sends targets and returns all rows.
 
         iterations: number of iterations of each burst.
         actuators: indices or names of the actuators that get targets (None: all; []: none, for
-            copies that play what was sent to them). Their states may be of several types, see
+            copies that run commands sent earlier). Their states may be of several types, see
             `GroupBurst`.
         steps: number of targets of each actuator in a burst.
         each: iterations to reach each target.
@@ -120,7 +120,7 @@ class InlineGroup(Closeable):
 
         name: name of the request.
         copies: numbers of the copies, a slice, or a mask (None: all).
-        timeout: for all of them together [s].
+        timeout: for all copies together [s].
         fields: fields of the request. A value with one dimension more than the field has one entry
             for each of these copies: `seed=[3, 4]`.
 
@@ -134,12 +134,12 @@ class InlineGroup(Closeable):
         self._group.request(index, given, payloads, bytearray(), timeout)
 
     def prepared_request(self, name: str, /, **fields: Any) -> GroupRequest:
-        """Prepares a request that is repeated, as the reset of a simulation.
+        """Prepares a repeatable request, such as the reset of a simulation.
 
         name: name of the request.
         fields: fields of the request, the same for all copies; `GroupRequest.fields` changes them.
 
-        Raises InvalidArgument.
+        Raises InvalidArgument for an unknown request or field.
         """
         index = self._group.request_index(name)
         payload = self._group.payloads(index, [fields])
@@ -153,23 +153,23 @@ class InlineGroup(Closeable):
 
     @property
     def halted(self) -> dict[int, Halt]:
-        """The halts in force, or requested, by copy; empty if no copy is halted."""
+        """Halts in force or requested, by number of the copy; empty if no copy is halted."""
         found = self._group.halted()
         return {copy: halt_of(fields) for copy, fields in found.items()} if found else {}
 
     def resume(self, copies: Copies = None, *, timeout: float | None = None) -> None:
         """Ends halts: each copy runs until it is at rest, then starts afresh where it is.
 
-        copies: numbers of the copies, a slice, or a mask (None: all). Those that are not halted do
+        copies: numbers of the copies, a slice, or a mask (None: all). Copies that are not halted do
             nothing.
-        timeout: for all of them together [s].
+        timeout: for all copies together [s].
 
         Raises CopyFailed for copies that refuse; they stay halted, all others are resumed.
         """
         self._group.resume(chosen_copies(copies, self._all).view(np.uint8), timeout)
 
     def latest(self, copies: Copies = None) -> NDArray[Any]:
-        """The newest row of each copy, structured like `history().rows`: (copies,)."""
+        """Returns the newest row of each copy, structured like `history().rows`: (copies,)."""
         chosen = chosen_copies(copies, self._all)
         rows = np.zeros(len(chosen), self._layout.row)
         self._group.latest(chosen.view(np.uint8), rows.view(np.uint8))
@@ -198,7 +198,7 @@ class InlineGroup(Closeable):
         return gather
 
     def publish(self, copy: int, name: str) -> None:
-        """Gives the segment of one copy a name, so that other processes can attach to it.
+        """Publishes the segment of one copy under a name, so that other processes can attach to it.
 
         `o80 view`, `o80 record` and `o80.Frontend(name)` then work as for any backend, until the
         group is closed. Raises SegmentTaken, and Error if that copy has a name already.
@@ -233,7 +233,7 @@ class InlineGroup(Closeable):
         return number % self.copies
 
     def _spread(self, name: str, field: str, value: Any, count: int) -> Sequence[Any]:
-        """A value for each of `count` copies."""
+        """Returns a value for each of `count` copies."""
         if isinstance(value, str) or np.ndim(value) <= self._dimensions(name, field):
             return [value] * count
         if len(value) != count:
@@ -248,7 +248,7 @@ class InlineGroup(Closeable):
                 for known in request["type"]["fields"]:
                     if known["name"] == field:
                         return len(known["shape"])
-        return 0  # C++ says what is unknown
+        return 0  # C++ reports the unknown name
 
     def __repr__(self) -> str:
         state = "closed" if self._closed else f"{self.threads} threads"

@@ -1,4 +1,4 @@
-"""Plays a recording: its segments in shared memory again, in a thread."""
+"""Plays a recording: publishes its segments in shared memory again, from a thread."""
 
 import math
 import os
@@ -21,32 +21,32 @@ NEVER = 2**62  # later than any time [ns]
 
 
 class Playback(Closeable):
-    """Segments of a recording that are played until the end of its `with` block.
+    """Plays segments of a recording until the end of its `with` block.
 
     with o80.play("run.mcap", prefix="old-"):
         arm = o80.Frontend("old-arm")
 
-    Readers see what they saw when it was recorded; commands, requests and halts are refused.
+    Readers get the rows as during the recording; commands, requests and halts are refused.
     `o80.play` is another name of this class.
 
     segments: names of the segments to play (None: all).
     speed: 0.5 is half as fast as recorded; math.inf is as fast as it can be.
     bursts: rows are published when a frontend requests iterations, as by a bursting robot.
-    loop: begin again after the last row, as a robot that is restarted.
+    loop: begin again after the last row, like a restarted robot.
     begin, end: play only this part, in seconds since the first row of the recording.
     prefix: put before the names of the segments, for example if the robots run.
     names: a mapping from recorded names to others.
     history: rows that each segment keeps (None: all of a run, 64 MiB at most).
     permission: as for `o80.robots.Robot.start`; commands are refused in any case.
-    hold: keep the segments after the last row until `close` (None: if speed is math.inf). By bursts
-        a run ends when a frontend requests more iterations than it has.
+    hold: keep the segments after the last row until `close` (None: if speed is math.inf). With
+        `bursts`, a run ends when a frontend requests more iterations than the run has.
 
-    At speed 1 the rows of robots in real time get new times, by one constant, so that each row
-    has the time at which it is published; their ages and rates are right. In all other
-    cases rows are exactly as recorded, and their clock counts as simulated.
+    At speed 1 a constant is added to the row times of robots in real time, so that each row has
+    the time at which it is published; ages and rates are right. In all other cases rows are exactly
+    as recorded, and their clock counts as simulated.
 
-    It runs in a thread. Raises RecordingError, InvalidArgument, SegmentTaken if a living robot has
-    the name, or if it leads to the last rows of one that was killed.
+    Playing runs in a thread. Raises RecordingError for an unreadable file, InvalidArgument, and
+    SegmentTaken if the name is that of a living robot or leads to the last rows of a killed one.
     """
 
     def __init__(
@@ -118,7 +118,7 @@ class Playback(Closeable):
 
     @property
     def position(self) -> float:
-        """Time of the newest row since the beginning of the recording's part [s]."""
+        """Time of the newest row since the beginning of the played part [s]."""
         return max(0, self._now - self._begin) * 1e-9
 
     @property
@@ -129,8 +129,8 @@ class Playback(Closeable):
     def wait(self, timeout: float | None = None) -> bool:
         """Waits until the last row is published; False if that took longer than `timeout` [s].
 
-        Raises what stopped it early, for example SegmentTaken if a robot took the name between two
-        runs.
+        Raises the exception that ended it early, for example SegmentTaken if a robot took the name
+        between two runs.
         """
         done = self._over.wait(timeout)
         if self._failure is not None:
@@ -194,7 +194,7 @@ class Playback(Closeable):
                 self._players[i].end()
 
     def _due(self, part: Part, start: int) -> np.ndarray[tuple[int], np.dtype[np.int64]] | None:
-        """When each row is published, on the monotonic clock [ns]; None: at once."""
+        """Returns when to publish each row, on the monotonic clock [ns]; None: at once."""
         if math.isinf(self._speed):
             return None
         since = part.wall - self._begin
@@ -230,7 +230,7 @@ class Playback(Closeable):
                 each.stop()
 
     def _note_served(self) -> None:
-        """One track has published its last row."""
+        """Counts a track that has published its last row; after the last one, playback is done."""
         with self._lock:
             self._served += 1
             if self._served == len(self._players) and not self._loop:
@@ -250,7 +250,7 @@ class Playback(Closeable):
 
 
 def _tracks(path: str | os.PathLike[str], segments: str | Sequence[str] | None) -> list[Track]:
-    """Tracks of these segments in a recording. Raises InvalidArgument, RecordingError."""
+    """Returns the tracks of these segments. Raises InvalidArgument for an unknown segment."""
     from o80.recording.reader import RecordingFile
 
     file = RecordingFile(path)

@@ -1,4 +1,4 @@
-"""One segment that is played: the segment in shared memory that shows the rows of a track."""
+"""Publishes the rows of one track as a segment in shared memory."""
 
 import threading
 import time
@@ -24,7 +24,7 @@ NO_TIME = np.empty(0, np.int64)
 class Player:
     """Publishes the parts of a track; each run of its robot is a run of the segment.
 
-    Used by one thread; `stop` may come from any.
+    One thread uses it; any thread may call `stop`.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class Player:
     ) -> None:
         """real_time: rows of robots in real time get the times at which they are published.
 
-        Raises SegmentTaken, SegmentError, InvalidArgument.
+        Raises SegmentTaken for a taken name, InvalidArgument for a wrong one, SegmentError.
         """
         self.track = track
         self.name = name
@@ -55,7 +55,7 @@ class Player:
         self.begin(0)
 
     def begin(self, run: int) -> None:
-        """Ends the run before, and takes the name for this one."""
+        """Ends the previous run and creates the segment of this one."""
         self.end()
         with self._lock:
             if self._stopped:
@@ -98,13 +98,13 @@ class Player:
         return done == len(part.rows)
 
     def end_at_burst(self) -> None:
-        """After the last row of a run by bursts: ends it when a frontend requests another one."""
+        """Ends a run played by bursts once a frontend requests a row after its last one."""
         if self._segment is not None:
             self._segment.wait_for_burst()
         self.end()
 
     def end(self) -> None:
-        """Ends the run: frontends learn that no row follows."""
+        """Ends the run and reports to frontends that no row follows."""
         with self._lock:
             if self._segment is not None:
                 self._segment.end()
@@ -118,10 +118,10 @@ class Player:
                 self._segment.ask_to_stop()
 
     def _of(self, part: Part) -> _core.PlayedSegment | None:
-        """The segment of the part's run, with the journal of the part."""
+        """Returns the segment of the part's run, with the part's journal; None after `stop`."""
         if self._segment is None or part.run != self._run:
             self.begin(part.run)
-        # one iteration more, because the end of a backend belongs to the one after its last row
+        # one iteration more, because a backend's end belongs to the iteration after its last row
         last = int(part.rows["iteration"][-1]) + 1
         while self._segment is not None and self._journal_until <= last:
             entries = next(self._journal, None)
@@ -129,7 +129,7 @@ class Player:
         return self._segment
 
     def _add(self, entries: Entries) -> int:
-        """Returns the iteration of the last one. Raises RecordingError."""
+        """Adds entries, returns the last iteration. Raises RecordingError if they are invalid."""
         assert self._segment is not None
         try:
             return self._segment.add_journal(entries.content, entries.codec)
@@ -139,7 +139,7 @@ class Player:
             ) from error
 
     def _provenance(self, run: int) -> Provenance:
-        """Provenance of the recorded robot, with the clock of the rows as they are played."""
+        """Returns the recorded provenance with the clock offset of the rows as they are played."""
         epoch = self.track.epochs[run]
         offset = epoch.wall_offset
         if self._has_clock(run):
@@ -147,7 +147,7 @@ class Player:
         return replace(epoch.provenance, wall_clock_offset=offset)
 
     def _has_clock(self, run: int) -> bool:
-        """Whether times of rows are those of the clock of this computer."""
+        """Whether row times are on the monotonic clock of this computer."""
         clock: str = self.track.epochs[run].schema["clock"]
         return self._real_time and clock == "monotonic"
 

@@ -1,4 +1,4 @@
-"""The rows of one recorded segment, in time: what is played, and when."""
+"""Rows of one recorded segment, with the wall-clock times at which they are played."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from o80.recording.recorded_epoch import RecordedEpoch
 
-MAX_ROWS = 256  # of a part: what is published by one call
+MAX_ROWS = 256  # most rows of a part, which one call publishes
 SAME_CLOCK = 500_000_000  # clocks whose offsets differ by less are one clock [ns]
 
 
@@ -19,10 +19,10 @@ class Part:
 
     run: int  #: number of the run among those that are played, from 0
     rows: NDArray[Any]  #: structured array (n,), as in the segment
-    wall: NDArray[np.int64]  #: when they were published, on the wall clock [ns]
+    wall: NDArray[np.int64]  #: times of publication, on the wall clock [ns]
 
     def split(self, count: int) -> tuple["Part", "Part | None"]:
-        """The first rows, and the rest if there is one."""
+        """Returns the first `count` rows, and the rest or None."""
         if count >= len(self.rows):
             return self, None
         head = replace(self, rows=self.rows[:count], wall=self.wall[:count])
@@ -33,9 +33,9 @@ class Track:
     """The runs of one segment."""
 
     def __init__(self, name: str, epochs: Sequence["RecordedEpoch"], offsets: list[int]) -> None:
-        """offsets: of the monotonic clocks seen so far, to wall-clock time [ns].
+        """offsets: monotonic to wall-clock time [ns] of the clocks seen so far; may be extended.
 
-        Robots on one monotonic clock keep the differences of their times exactly, although each
+        Robots on one monotonic clock keep the exact differences of their times, although each
         offset was measured at another moment.
         """
         self.name = name
@@ -44,14 +44,14 @@ class Track:
 
     @property
     def time_range(self) -> tuple[int, int]:
-        """Wall-clock times of the first and the last row [ns]."""
+        """Returns the wall-clock times of the first and the last row [ns]."""
         ranges = [epoch.time_range for epoch in self.epochs]
         begins = [first + offset for (first, _), offset in zip(ranges, self.offsets, strict=True)]
         ends = [last + offset for (_, last), offset in zip(ranges, self.offsets, strict=True)]
         return min(begins), max(ends)
 
     def parts(self, begin: int, end: int) -> Iterator[Part]:
-        """The rows from `begin` to `end` [ns], on the wall clock, in small parts."""
+        """Yields the rows from `begin` to `end` [ns on the wall clock] in small parts."""
         for run, (epoch, offset) in enumerate(zip(self.epochs, self.offsets, strict=True)):
             for history in epoch.blocks(from_time=begin - offset, to_time=end - offset):
                 for first in range(0, len(history), MAX_ROWS):
@@ -60,7 +60,7 @@ class Track:
 
 
 def _offset(epoch: "RecordedEpoch", offsets: list[int]) -> int:
-    """Wall-clock time less row time of an epoch [ns]."""
+    """Returns wall-clock time minus row time of an epoch [ns]; equal for epochs of one clock."""
     if epoch.schema["clock"] != "monotonic":
         return epoch.wall_offset
     for known in offsets:

@@ -9,7 +9,7 @@ TOLERANCE = 1e-9  #: largest difference that counts as equal where bits need not
 
 
 def reads_the_world(schema: dict[str, Any]) -> str:
-    """Why a robot must not be started for a replay, because it may be hardware; else empty."""
+    """Returns why a replay must not start the robot (it may be hardware), or an empty string."""
     if schema.get("simulated"):
         return ""
     return (
@@ -19,7 +19,7 @@ def reads_the_world(schema: dict[str, Any]) -> str:
 
 
 def blended_columns(schema: dict[str, Any]) -> list[str]:
-    """Desired states that code of the driver interpolates."""
+    """Returns the columns of desired states whose interpolation is code of the driver."""
     return [
         f"desired.{actuator['name']}"
         for actuator in schema["actuators"]
@@ -33,7 +33,7 @@ def _blends(described: dict[str, Any]) -> bool:
 
 
 def changes(recorded: Provenance, now: Provenance) -> list[str]:
-    """Changes, in words, that may be the cause of a difference instead of the run."""
+    """Returns texts about changed files that may explain a difference between run and replay."""
     found = []
     if recorded.library_sha256 and recorded.library_sha256 != now.library_sha256:
         ran = "" if recorded.library == now.library else f" (it ran from {recorded.library!r})"
@@ -48,9 +48,9 @@ def changes(recorded: Provenance, now: Provenance) -> list[str]:
 
 
 def other_arithmetic(recorded: Provenance, now: Provenance, machine: Machine) -> str:
-    """Why rows may differ in their last bits although nothing is wrong; empty if they may not.
+    """Returns why last bits of rows may differ without a fault; empty if they must agree.
 
-    machine: that the run was recorded on.
+    machine: the computer that recorded the run.
     """
     if recorded.version != now.version:
         return f"o80 {recorded.version} recorded it, this is {now.version}"

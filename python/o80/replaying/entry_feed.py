@@ -1,4 +1,4 @@
-"""Gives the entries of a journal to a replay, just before the rows that they act in."""
+"""Passes journal entries to a replay, just before the rows in which they act."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -28,7 +28,7 @@ class EntryFeed:
         self.until = 2**62  #: the last iteration whose decisions are known
 
     def read(self, last: int) -> list[_core.JournalEntry]:
-        """The entries that act up to iteration `last`, less those of earlier calls."""
+        """Returns the entries that act up to iteration `last`, without those of earlier calls."""
         found = []
         while not self.gap and (entry := self._next()) is not None:
             slot = self._slots.unknown(entry)
@@ -62,7 +62,7 @@ class EntryFeed:
         return found
 
     def _lacks(self, entry: _core.JournalEntry) -> bool:
-        """True if entries before this one are missing, other than those before the start."""
+        """True if entries between the start of the replay and this entry are missing."""
         return entry.missed > 0 and (entry.number > self._begins or self._begins == 0)
 
     def _next(self) -> _core.JournalEntry | None:
@@ -80,16 +80,16 @@ class EntryFeed:
 
 @dataclass(frozen=True)
 class MotionRules:
-    """The rules of a recorded run and of this o80.
+    """Versions of the motion rules of a recorded run and of this o80.
 
-    Under other rules a command may move otherwise if its motion is not a straight line: where there
-    is a limit of speed (one of acceleration needs it) or a value at rest, or with another profile.
+    If they differ, a command may move differently unless its motion is a straight line: where there
+    is a speed limit (an acceleration limit needs one) or a value at rest, or with another profile.
     """
 
     recorded: int
     now: int
-    names: tuple[str, ...]  #: of all actuators
-    limited: frozenset[int]  #: the actuators with such limits
+    names: tuple[str, ...]  #: names of all actuators
+    limited: frozenset[int]  #: indices of the actuators with a speed limit or a value at rest
 
     @classmethod
     def of(cls, schema: dict[str, Any], recorded: int, now: int) -> "MotionRules":
@@ -107,7 +107,7 @@ class MotionRules:
         return self.recorded != self.now
 
     def moved_otherwise(self, entry: _core.JournalEntry) -> str:
-        """The first actuator that a taken batch may move otherwise; empty: none."""
+        """Returns the first actuator that a taken batch may move differently; empty: none."""
         if not self.differ or entry.kind != "taken":
             return ""
         for record in entry.records:

@@ -1,4 +1,4 @@
-"""Run of a backend, as a replay needs it: its rows, its journal, how it was started."""
+"""Sources of a replay: rows, journal and provenance of a run, in memory or in a file."""
 
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
@@ -14,35 +14,35 @@ if TYPE_CHECKING:
     from o80.recording.recorded_epoch import RecordedEpoch
     from o80.rows.history import History
 
-ROWS_AT_ONCE = 1024  # Ctrl-C waits for them
+ROWS_AT_ONCE = 1024  # Ctrl-C is handled between two such blocks
 _BYTES_AT_ONCE = 1 << 20
 
 
 class LiveRun:
-    """A run that a segment in shared memory holds."""
+    """Reads a run from a segment in shared memory."""
 
-    number = 0  #: of the run in a file
+    number = 0  #: index of the run in a file
 
     def __init__(self, frontend: "Frontend") -> None:
         self._frontend = frontend
         self.segment, self.schema = frontend.segment, frontend.schema
         self.description = frontend._description  #: the schema, as the compiled library reads it
         self.provenance = frontend.provenance
-        self.machine = this_machine()  #: on which it ran
-        self.is_own = is_own(frontend)  #: of a robot of this user; files may come from strangers
-        self.rows = frontend.published + 1 - frontend.oldest  #: their number, for a progress bar
-        #: texts about an end of the run, or runs before it, that are missing
+        self.machine = this_machine()  #: the computer that ran it
+        self.is_own = is_own(frontend)  #: a robot of this user ran it, as a file cannot prove
+        self.rows = frontend.published + 1 - frontend.oldest  #: number of rows, for a progress bar
+        #: texts about missing parts: the end of this run, or runs before it
         self.missing: list[str] = []
 
     def blocks(self) -> "Iterator[History]":
-        """Rows in their order, a few thousand at a time."""
+        """Yields all rows in order, in blocks of at most `ROWS_AT_ONCE`."""
         last = self._frontend.published
         for since in range(self._frontend.oldest, last + 1, ROWS_AT_ONCE):
             yield self._frontend.history(since=since, until=min(last, since + ROWS_AT_ONCE - 1))
 
     def entries(self) -> Iterator[_core.JournalEntry]:
-        """The journal in its order, with its entries `at_rest`."""
-        # as a recorder does: it tells which entries were overwritten before the first read
+        """Yields the entries of the journal in order, the `at_rest` entries included."""
+        # read as a recorder reads it, which reports the entries overwritten before the first read
         journal = _core.RawJournal(self._frontend, 0)
         if not journal.exists:
             raise InvalidArgument(
@@ -54,7 +54,7 @@ class LiveRun:
 
 
 class FileRun:
-    """A run in a recording, with the members of LiveRun."""
+    """Reads a run from a recording; has the members of LiveRun."""
 
     is_own = False
 
@@ -89,7 +89,7 @@ RecordedRun = LiveRun | FileRun
 
 
 def runs_in(recording: "RecordingFile", segment: str | None = None) -> list[FileRun]:
-    """The runs of all segments of a recording, or of one. Raises InvalidArgument."""
+    """Returns the runs of all segments, or of one. Raises InvalidArgument if that is unknown."""
     return [
         FileRun(name, number, epoch)
         for name in recording.chosen(None if segment is None else [segment])

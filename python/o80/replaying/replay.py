@@ -64,10 +64,10 @@ def replay(
     """Repeats recorded runs with the same robots and options, and compares every row bit for bit.
 
     source: a recording, or a frontend whose segment holds all rows and decisions of its run.
-    segment: replay only this one of a recording.
-    robot: name or library of another robot than the recorded one, for example after a change; or a
-        mapping from names of recorded robots to such. None: robots that are found here by the
-        recorded names. A library that only the recording names is not loaded.
+    segment: replay only this segment of the recording.
+    robot: name or library of the robot to start instead of the recorded one, for example after a
+        change; or a mapping from recorded robot names to these. None: the robots that are found
+        here by the recorded names. A library that only the recording names is not loaded.
     options: options of the robot that differ from the recorded ones. A recorded option that names
         a file must be given if the file has another content here.
     tolerances, ignore: by column, as for `o80 diff`. None: bit for bit, but with a tolerance if
@@ -79,12 +79,12 @@ def replay(
     driver: False starts no robot, as for hardware.
     progress: called with the name of a run, its rows compared, and all its rows.
 
-    Only robots that say that they are simulated are started. Of all others, and with driver=False,
-    only the backend runs: it reads the recorded observed and extended values, obeys the recorded
-    halts, interrupts and fresh starts of the driver too, and its desired states are compared. No
-    hardware is touched. The report says so.
-
-    Raises InvalidArgument, RecordingError, DriverError.
+    Only robots that declare themselves simulated are started. For all others, and with
+    driver=False, only the backend runs, and no hardware is touched: the backend reads the recorded
+    observed and extended values and obeys the recorded halts, interrupts and fresh starts of the
+    driver; its desired states are compared. The report says so. Raises InvalidArgument for wrong
+    arguments or changed files, RecordingError for an unreadable recording, DriverError for a robot
+    that is unknown or fails.
     """
     return ReplayReport(
         tuple(
@@ -110,7 +110,7 @@ def _runs_of(
 
 @dataclass
 class RunReplay:
-    """The replay of one run; the arguments are those of `replay`."""
+    """Replays one run; the arguments are those of `replay`."""
 
     run: RecordedRun
     robot: OtherRobot = None
@@ -125,7 +125,7 @@ class RunReplay:
         self._no_driver = reads_the_world(self.run.schema) if self.driver else "as requested"
         self._start = Start()
         self._rows = 0
-        self._times = [0, 0]  # of the first and the last row compared [ns]
+        self._times = [0, 0]  # times of the first and the last compared row [ns]
         self._gap = ""
         self._notes: list[str] = []
 
@@ -148,7 +148,7 @@ class RunReplay:
         )
 
     def _missing(self) -> Iterator[str]:
-        """Texts about rows that are not compared although the caller left nothing out."""
+        """Yields texts about rows that were not compared, unless the caller excluded them."""
         if self._rows and self._start.row > 0 and self.since is None:
             yield f"rows before {self._start.row} were not compared"
         if not self._gap:
@@ -198,7 +198,7 @@ class RunReplay:
         return rules
 
     def _found_start(self) -> Start | None:
-        """Where to begin; None if nowhere: `_gap` says why."""
+        """Returns where to begin, or None; then `_gap` says why there is no start."""
         rows = (int(block.iteration[0]) for block in self.run.blocks() if len(block))
         first = next(rows, None)
         if first is None:
@@ -240,9 +240,9 @@ class RunReplay:
         return between.join(begins)
 
     def _whole(self, blocks: Iterator[History]) -> Iterator[History]:
-        """Rows from the start to the first gap.
+        """Yields the rows from the start to the first gap.
 
-        No block ends with the row of a fresh start: the decisions after it are of the same step.
+        No block ends with a fresh start, because decisions behind that row belong to its step.
         """
         held: History | None = None
         expected = self._start.row
@@ -315,7 +315,7 @@ class RunReplay:
         return found
 
     def _note_changes(self, frontend: Frontend) -> None:
-        """Says what has changed since the run, and adds a tolerance where bits need not agree."""
+        """Notes changes since the run, and adds a tolerance where bits need not agree."""
         recorded, now = self.run.provenance, frontend.provenance
         if not self._no_driver:
             self._notes += changes(recorded, now)
@@ -352,6 +352,6 @@ class RunReplay:
 
 
 def _settled(block: History) -> History:
-    """The block without fresh starts at its end: later decisions belong to the same step."""
+    """Returns the block without fresh starts at its end: later decisions belong to their step."""
     settled = np.flatnonzero(block.rows["fresh"] == 0)
     return block[: int(settled[-1]) + 1 if len(settled) else 0]

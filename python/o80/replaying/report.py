@@ -8,29 +8,29 @@ from o80.joining.difference import Difference
 
 @dataclass(frozen=True, kw_only=True)
 class RunReport:
-    """The replay of one run of a robot."""
+    """Result of the replay of one run."""
 
     segment: str
-    number: int = 0  #: of the run in the recording, from 0
+    number: int = 0  #: index of the run in the recording
     first: int = 0  #: iteration of the first row
-    rows: int = 0  #: number of rows that were compared, from this one on
+    rows: int = 0  #: number of compared rows, from `first` on
     difference: Difference | None = None  #: the first one; values: recorded and replayed
     gap: str = ""  #: why later rows were not replayed; empty: all were
-    missing: tuple[str, ...] = ()  #: of the run in the recording, or before where it began
-    driver: bool = True  #: it was started; else desired states were compared, and no readings
+    missing: tuple[str, ...] = ()  #: texts about rows that the recording lacks or before the start
+    driver: bool = True  #: the driver was started; if not, only desired states were compared
     unused: bool = False  #: a robot or options were given, but none was started
     notes: tuple[str, ...] = ()  #: what differs between then and now
-    seconds: float = 0.0  #: that the replay took
-    recorded_seconds: float = 0.0  #: that the compared rows span, on the clock of the run
+    seconds: float = 0.0  #: duration of the replay [s]
+    recorded_seconds: float = 0.0  #: time span of the compared rows, on the clock of the run [s]
 
     @property
     def name(self) -> str:
-        """The segment, and the number of the run if it is not the first."""
+        """Name of the segment, followed by the number of the run if that is not 0."""
         return self.segment if self.number == 0 else f"{self.segment}/{self.number}"
 
     @property
     def identical(self) -> bool:
-        """Every row of the run was compared, and none differs."""
+        """True if every row of the run was compared and none differs."""
         return self.difference is None and not self.gap and not self.missing
 
     def __str__(self) -> str:
@@ -47,18 +47,18 @@ class RunReport:
 
 @dataclass(frozen=True)
 class ReplayReport:
-    """The replay of all runs of a recording."""
+    """Results of a replay, one for each run of the recording."""
 
     runs: tuple[RunReport, ...]
 
     @property
     def identical(self) -> bool:
-        """Every row of every run was compared, and none differs."""
+        """True if every row of every run was compared and none differs."""
         return bool(self.runs) and all(run.identical for run in self.runs)
 
     @property
     def difference(self) -> Difference | None:
-        """The first difference of the first run that has one."""
+        """The difference of the first run that has one; None if all are identical."""
         return next((run.difference for run in self.runs if run.difference), None)
 
     def __iter__(self) -> Iterator[RunReport]:

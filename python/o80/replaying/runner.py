@@ -1,4 +1,4 @@
-"""Runners of a replay: the recorded robot, or its backend alone."""
+"""Starts the recorded robot, or its backend alone, for a replay."""
 
 import os
 from collections.abc import Iterator, Mapping
@@ -20,20 +20,20 @@ if TYPE_CHECKING:
 
 OtherRobot = str | os.PathLike[str] | Mapping[str, str | os.PathLike[str]] | None
 
-# of the run options, those that decide what a backend does; the others are of its process
+# the run options that decide what a backend does; the others concern its process only
 _OF_BACKEND = ("lanes", "lane_blocks")
 
 
 @dataclass(frozen=True)
 class Runner:
-    """A replay that was started. Its rows are in a segment of its own."""
+    """A started replay, which publishes its rows in a segment of its own."""
 
     native: _core.Replay | _core.DriverlessReplay
-    who: str  #: what may fail: "driver" or "backend"
+    who: str  #: part that may fail, for error messages: "driver" or "backend"
     period: int  #: [ns]
 
     def begin_at(self, start: Start) -> None:
-        """Begins at this row."""
+        """Loads the snapshots of the start and begins at its row."""
         if start.row == 0:
             return
         if isinstance(self.native, _core.Replay):
@@ -59,9 +59,9 @@ class Runner:
 def with_driver(
     run: "RecordedRun", robot: OtherRobot, options: Mapping[str, Any], history: int
 ) -> Iterator[Runner]:
-    """The recorded robot, or another one, with the recorded options.
+    """Starts the recorded robot, or another one, with the recorded options.
 
-    history: rows that the replay keeps. Raises DriverError, InvalidArgument.
+    history: rows to keep. Raises DriverError for an unknown robot, InvalidArgument for its options.
     """
     chosen = robot.get(run.schema["robot"]) if isinstance(robot, Mapping) else robot
     loaded = robots.load(chosen or robot_of(run))
@@ -75,9 +75,9 @@ def with_driver(
 
 @contextmanager
 def without_driver(run: "RecordedRun", history: int) -> Iterator[Runner]:
-    """A backend of the recorded description, which reads what was recorded.
+    """Starts a backend of the recorded description, which reads the recorded values.
 
-    history: rows that the replay keeps. Raises InvalidArgument.
+    history: rows to keep. Raises InvalidArgument if the backend refuses the recorded options.
     """
     name = _core.unused_segment_name("replay")
     period = run.schema["period"]

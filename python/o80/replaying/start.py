@@ -1,5 +1,5 @@
-"""Where a replay can begin: at row 0, at a reset, at a restored snapshot that is recorded, or at a
-snapshot that was taken while nothing acted.
+"""Finds where a replay can begin: row 0, a reset, the restore of a recorded snapshot, or a snapshot
+that was taken while nothing acted.
 
 Without a driver: at row 0, at a fresh start, or at a row in which nothing acts.
 """
@@ -22,25 +22,25 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Start:
-    """The first row of a replay, and what the robot then needs to know."""
+    """First row of a replay, with the state that the robot needs to continue from there."""
 
     row: int = 0
     entry: int = 0  #: number of the first entry of the journal to obey
-    request: str = ""  #: that began it: "reset" or "restore"; empty at row 0 and at rest
-    snapshots: dict[int, bytes] = field(default_factory=dict)  #: by slot
+    request: str = ""  #: "reset", "restore" or "fresh start"; empty at row 0 and at rest
+    snapshots: dict[int, bytes] = field(default_factory=dict)  #: content by slot
     is_at_rest: bool = False  #: nothing acts in this row; with a driver, in the row before
-    slot: int = 0  #: at rest, with a driver: of the snapshot
-    before: bytes = b""  #: at rest, with a driver: the row before
+    slot: int = 0  #: at rest, with a driver: slot of the snapshot
+    before: bytes = b""  #: at rest, with a driver: the preceding row
 
 
 class Requests:
-    """Names and slots of the requests in entries of a journal."""
+    """Reads names and slots of the requests in journal entries."""
 
     def __init__(self, schema: dict[str, Any]) -> None:
         self._names = [request["name"] for request in schema["requests"]]
 
     def of(self, entry: "_core.JournalEntry") -> Iterator[tuple[str, int, int]]:
-        """Name, slot and id of each request of a batch; slot -1: the request has none."""
+        """Yields name, slot and id of each request of a batch; slot -1: the request has none."""
         for record in entry.records:
             if record.kind != "request":
                 continue
@@ -50,14 +50,14 @@ class Requests:
 
 
 class SlotsKept:
-    """Which slots hold a snapshot that a replay knows."""
+    """Tracks the slots whose snapshots the replay knows."""
 
     def __init__(self, requests: Requests, start: Start) -> None:
         self._requests, self._start = requests, start
         self._known = set(start.snapshots)
 
     def unknown(self, entry: "_core.JournalEntry") -> int | None:
-        """The slot that this batch restores although its snapshot is not known, or None."""
+        """Returns a slot that this batch restores although its snapshot is unknown, or None."""
         if entry.kind != "taken" or self._start.row == 0:
             return None
         for name, slot, _ in self._requests.of(entry):
@@ -69,10 +69,10 @@ class SlotsKept:
 
 
 class Purges:
-    """Purges before a start that still end commands behind it.
+    """Finds purges before a start that end commands taken after the start.
 
-    A purge also ends commands that were sent before it and are taken after it, for example because
-    they were sent for a later iteration. A replay that begins between the two does not know it.
+    A purge also ends commands that were sent before it but are taken after it, for example because
+    they were sent for a later iteration. A replay that begins between the two misses the purge.
     """
 
     def __init__(self, entries: "Iterator[_core.JournalEntry]") -> None:
@@ -80,7 +80,7 @@ class Purges:
         base = 0
         for entry in entries:
             if entry.kind == "order_lost":
-                base += 1 << 64  # earlier purges end nothing any more
+                base += 1 << 64  # earlier purges no longer end commands
             elif entry.kind == "taken":
                 purges = any(record.kind == "purge" for record in entry.records)
                 taken.append((entry.number, base + entry.ticket, purges))
@@ -91,14 +91,14 @@ class Purges:
         self._oldest_behind = [*itertools.accumulate(tickets, min)][::-1]
 
     def reach_past(self, number: int) -> bool:
-        """True if a purge before the entry with this number ends a command behind it."""
+        """True if a purge before entry `number` ends a command that is taken from there on."""
         at = bisect.bisect_left(self._numbers, number)
         is_inside = 0 < at < len(self._numbers)
         return is_inside and self._newest_purge[at - 1] > self._oldest_behind[at]
 
 
 def _fresh_starts(run: "RecordedRun") -> set[int]:
-    """Iterations of the fresh starts without a halt."""
+    """Returns the iterations of fresh starts without a halt."""
     return {
         int(row)
         for block in run.blocks()
@@ -107,10 +107,10 @@ def _fresh_starts(run: "RecordedRun") -> set[int]:
 
 
 def find_start(run: "RecordedRun", since: int) -> Start | None:
-    """The first one at row `since` or later, or None.
+    """Returns the first reset or restore at row `since` or later that can be a start, or None.
 
     A reset determines the whole state of a simulation, and so does a restored snapshot that the
-    journal holds. Nothing else may act on: no halt, no request that takes time.
+    journal holds. Nothing else may be active: no halt, no request that takes time.
     """
     begun = _fresh_starts(run)
     requests, purges = Requests(run.schema), Purges(run.entries())
@@ -134,9 +134,9 @@ def find_start(run: "RecordedRun", since: int) -> Start | None:
 
 
 def find_kept(run: "RecordedRun", since: int) -> Start | None:
-    """The first snapshot, in row `since` or later, that was taken where nothing acted, or None.
+    """Returns a start at the first snapshot from `since` on taken while nothing acted, or None.
 
-    It is the state after the row before, which has the desired states that go on.
+    The snapshot is the state after the preceding row, which has the desired states that continue.
     """
     requests, purges = Requests(run.schema), Purges(run.entries())
     found: dict[int, tuple[int, int]] = {}  # by iteration: number of the first and the last entry
@@ -177,10 +177,10 @@ def _kept_at(run: "RecordedRun", row: int, numbers: tuple[int, int], before: byt
 
 
 def find_fresh_start(run: "RecordedRun", since: int) -> Start | None:
-    """For a replay without a driver: the first fresh start at row `since` or later, or None.
+    """Returns the first fresh start from `since` on, for a replay without a driver, or None.
 
-    It drops all queues, and its row has the state of the robot. The batch that caused it must hold
-    nothing else, because what follows in the batch acts after the fresh start.
+    A fresh start drops all queues, and its row has the state of the robot. The batch that caused it
+    must hold nothing else, because later records of the batch act after the fresh start.
     """
     begun = _fresh_starts(run)
     purges = Purges(run.entries())
@@ -196,10 +196,10 @@ def find_fresh_start(run: "RecordedRun", since: int) -> Start | None:
 
 
 def find_rest(run: "RecordedRun", since: int) -> Start | None:
-    """For a replay without a driver: the first row at `since` or later in which nothing acts.
+    """Returns the first row from `since` on in which nothing acts, for a replay without a driver.
 
     The journal marks where such rows begin; they end before the next entry by which something acts.
-    The masks of the row must be clear, as those of a backend that begins.
+    All masks of the row must be clear, as in a backend that begins.
     """
     purges = Purges(run.entries())
     ranges = [
@@ -227,7 +227,7 @@ _ACTS = {"halt", "resume", "died", "silent", "interrupted", "fresh_start", "stop
 
 
 def _rests(entries: "Iterator[_core.JournalEntry]") -> Iterator[tuple[int, int, int]]:
-    """First row, last row, and number of the mark of each stretch in which nothing acts."""
+    """Yields first row, last row and number of the mark of each stretch in which nothing acts."""
     began: _core.JournalEntry | None = None
     newest = -1
     for entry in entries:
@@ -235,7 +235,7 @@ def _rests(entries: "Iterator[_core.JournalEntry]") -> Iterator[tuple[int, int, 
             entry.kind == "taken" and (len(entry.records) > 0 or entry.records_lost)
         )
         if began is not None and (acts or entry.missed):
-            # something may have acted in the iteration of the last entry before those missed
+            # something may have acted in the iteration of the last entry before the missing ones
             last = max(began.iteration, newest - 1) if entry.missed else entry.iteration - 1
             yield began.iteration, last, began.number
             began = None
@@ -262,7 +262,7 @@ def _note(
 
 
 def times_from(times: np.ndarray[Any, Any], start: Start, first: int, period: int) -> Any:
-    """The times of a block of rows; at the first row of a later start, also the time before it."""
+    """Returns the times of a block; at a later start, preceded by the time of the row before it."""
     if first != start.row or start.row == 0:
         return np.ascontiguousarray(times)
     return np.concatenate([times[:1] - period, times])

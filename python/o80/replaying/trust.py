@@ -1,4 +1,4 @@
-"""Trust of a replay in a recording, which may come from a stranger.
+"""Decides which robots and files a replay loads: a recording may come from a stranger.
 
 A recording can name any library and any file of this computer. A replay loads only robots that are
 found here by their names, and reads only files whose content is the recorded one, unless the user
@@ -18,11 +18,11 @@ if TYPE_CHECKING:
     from o80.replaying.recorded_run import RecordedRun
     from o80.rows.provenance import Provenance
 
-_LARGEST_HASHED = 64 << 20  # [bytes], as when it was recorded
+_LARGEST_HASHED = 64 << 20  # largest file that is hashed [bytes], as at recording
 
 
 def robot_of(run: "RecordedRun") -> Path | str | type[Any]:
-    """The recorded robot: its library, or its class in Python.
+    """Returns the recorded robot: its library, or its class in Python.
 
     Raises DriverError if no robot of this name is known here.
     """
@@ -49,7 +49,7 @@ def robot_of(run: "RecordedRun") -> Path | str | type[Any]:
 def options_of(
     run: "RecordedRun", library: robots.Robot, given: Mapping[str, str]
 ) -> dict[str, str]:
-    """The options of the robot: the recorded ones, then those that the user gives.
+    """Returns the recorded options of the robot, overridden by those that the user gives.
 
     Raises InvalidArgument for a recorded file that has another content here.
     """
@@ -64,7 +64,7 @@ def options_of(
 
 
 def _checked(option: str, text: str, provenance: "Provenance") -> str:
-    """The text of an option, if it is no file, or a file with the recorded content."""
+    """Returns the option's text, or the path of a file with the recorded content; else raises."""
     files = [file for file in provenance.files if file.option == option]
     path = Path(text)
     if not files and not _may_be_a_file(path):
