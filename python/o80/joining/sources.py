@@ -46,7 +46,7 @@ def timed(
 ) -> dict[str, Timed]:
     """Reads the histories of sources and puts their times on one clock.
 
-    seconds: last seconds of each. offsets: see `align`. Raises InvalidArgument for unrelated clocks.
+    seconds: last seconds of each. offsets: see `align`. Raises InvalidArgument for other clocks.
     """
     given = named(sources)
     found = {name: opened(name, source, seconds) for name, source in given.items()}
