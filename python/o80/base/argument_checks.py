@@ -10,7 +10,7 @@ from o80.base.errors import InvalidArgument
 
 
 def whole(value: Any, name: str, least: int | None = None) -> int:
-    """A whole number. Raises InvalidArgument."""
+    """Returns a whole number of at least `least`. Raises InvalidArgument for another value."""
     try:
         number = operator.index(value)
     except TypeError:
@@ -23,14 +23,14 @@ def whole(value: Any, name: str, least: int | None = None) -> int:
 
 
 def whole_or_none(value: Any, name: str, least: int | None = None) -> int | None:
-    """A whole number, or None. Raises InvalidArgument."""
+    """Returns a whole number or None. Raises InvalidArgument for another value."""
     return None if value is None else whole(value, name, least)
 
 
 def iterations(value: Any, name: str, period: float, least: int) -> int:
-    """A time that is counted: a whole number of iterations, or a float of seconds.
+    """Converts a time to iterations: a whole number of them, or a float of seconds.
 
-    period: of an iteration [s]. Raises InvalidArgument.
+    period: of an iteration [s]. Raises InvalidArgument for another value.
     """
     if not isinstance(value, (float, np.floating)):
         return whole(value, name, least)
@@ -40,7 +40,7 @@ def iterations(value: Any, name: str, period: float, least: int) -> int:
 
 
 def number(value: Any, name: str) -> float:
-    """A number, of Python or NumPy. Raises InvalidArgument."""
+    """Converts a number of Python or NumPy to float. Raises InvalidArgument for another value."""
     try:
         if not isinstance(value, (bool, np.bool_, str, bytes)):
             return float(value)
@@ -50,20 +50,20 @@ def number(value: Any, name: str) -> float:
 
 
 def text(value: Any, name: str) -> str:
-    """The value, if it is a text; else raises InvalidArgument that names the argument."""
+    """Returns a text unchanged. Raises InvalidArgument with the argument's name for others."""
     if not isinstance(value, str):
         raise InvalidArgument(f"{name} must be a string, got {value!r}")
     return value
 
 
 def nothing(value: Any, call: str, otherwise: str = "") -> None:
-    """Refuses what a function of the user returned. Raises InvalidArgument."""
+    """Raises InvalidArgument if a function of the user returned a value."""
     if value is not None:
         raise InvalidArgument(f"{call} must return None{otherwise}; got {value!r}")
 
 
 def mapping(value: Any, name: str, holds: str) -> Mapping[Any, Any]:
-    """A mapping; None is an empty one. Raises InvalidArgument."""
+    """Returns a mapping; an empty one for None. Raises InvalidArgument for another value."""
     if value is None:
         return {}
     if not isinstance(value, Mapping):
@@ -72,7 +72,7 @@ def mapping(value: Any, name: str, holds: str) -> Mapping[Any, Any]:
 
 
 def sequence(value: Any, name: str, example: str) -> Sequence[Any]:
-    """A sequence that is not a string, as a list. Raises InvalidArgument."""
+    """Converts a sequence to a list. Raises InvalidArgument for a string or another value."""
     if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)):
         raise InvalidArgument(f"{name} must be a list such as {example}, got {value!r}")
     return list(value)

@@ -1,4 +1,4 @@
-"""Types of arrays by their numbers."""
+"""Types of arrays, named after the types of their elements."""
 
 import numpy as np
 from numpy.typing import NDArray

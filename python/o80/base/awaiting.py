@@ -45,7 +45,7 @@ async def in_thread(wait: Callable[[], Result]) -> Result:
     except asyncio.CancelledError:
         canceller.cancel()
         while not ended.done():
-            # the task may be cancelled again; the result of the call is not needed any more
+            # the task may be cancelled again; nothing needs the result of the call any more
             with contextlib.suppress(Exception, asyncio.CancelledError):
                 await asyncio.shield(ended)
         if not ended.cancelled():
@@ -57,7 +57,7 @@ async def in_thread(wait: Callable[[], Result]) -> Result:
         if ended.done():
             thread.join()
         raise
-    thread.join()  # it has done its work
+    thread.join()  # the call has ended
     return result
 
 
@@ -68,7 +68,7 @@ async def end_of(sent: _core.Burst) -> _core.Observation: ...
 async def end_of(sent: _core.Batch | _core.Burst) -> _core.Batch | _core.Observation:
     """Waits for a batch and returns it, or for a burst and returns its last observation.
 
-    Raises as their `wait`: NotCompleted if a command of the batch did not complete.
+    Raises the exceptions of `wait`: NotCompleted if a command of the batch did not complete.
     """
     if isinstance(sent, _core.Burst):
         return await in_thread(sent.wait)
@@ -77,7 +77,7 @@ async def end_of(sent: _core.Batch | _core.Burst) -> _core.Batch | _core.Observa
 
 
 async def next_of(stream: _core.Stream) -> _core.Observation:
-    """The next observation of a stream.
+    """Waits for the next observation of a stream and returns it.
 
     The task reads it, not the thread: a cancelled task loses no observation.
     """

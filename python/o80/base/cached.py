@@ -9,8 +9,8 @@ T = TypeVar("T")
 class cached(Generic[T]):  # noqa: N801, used as a decorator
     """`functools.cached_property` without the lock that it has in Python 3.11.
 
-    That is one lock for all objects of a class. If another thread computes a value when the process
-    is forked, the child would wait for it for ever. Two threads may compute a value twice.
+    That is one lock for all objects of a class: if another thread computes a value during a fork,
+    the child would wait for it for ever. Without the lock two threads may both compute a value.
     """
 
     def __init__(self, compute: Callable[[Any], T]) -> None:

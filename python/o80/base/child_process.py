@@ -1,4 +1,4 @@
-"""Child processes that end when their standard input does, so with this process."""
+"""Child processes that end when their standard input ends, and so with this process."""
 
 import contextlib
 import math
@@ -19,7 +19,7 @@ POLL = 0.01  # [s] between checks of a process that has no descriptor
 
 
 class _Child(subprocess.Popen[bytes]):
-    """A child that ends when it is lost, for example to Ctrl-C before its starter has it."""
+    """A child that ends when it is garbage collected, for example after an early Ctrl-C."""
 
     def __del__(self) -> None:
         # Popen keeps a lost process that runs, and its pipes with it
@@ -36,7 +36,7 @@ _children: WeakSet[subprocess.Popen[bytes]] = WeakSet()
 def start_child(command: Sequence[str | Path], **options: Any) -> subprocess.Popen[bytes]:
     """Starts a program that ends at the end of its standard input. options: of Popen.
 
-    In a forked child its pipes are closed, so that it ends with the parent.
+    A forked child of this process closes the program's pipes, so that it ends with the parent.
     """
     # A process group of its own: Ctrl-C reaches only this program, which ends the child in order.
     # Not a session of its own: the kernel divides processor time between sessions first, so a robot
@@ -48,7 +48,7 @@ def start_child(command: Sequence[str | Path], **options: Any) -> subprocess.Pop
 
 
 def ends_within(child: subprocess.Popen[bytes], timeout: float | None) -> bool:
-    """True if it ends within `timeout`. Ctrl-C ends this wait at once, unlike Popen.wait."""
+    """True if the child ends within `timeout`. Ctrl-C ends this wait at once, unlike Popen.wait."""
     if child.poll() is not None:
         return True
     try:
@@ -73,12 +73,12 @@ def ends_within(child: subprocess.Popen[bytes], timeout: float | None) -> bool:
 def end_child(
     child: subprocess.Popen[bytes], grace: float, also: signal.Signals | None = None
 ) -> None:
-    """Ends its standard input, sends a signal `also`, and kills it after `grace` [s]."""
+    """Ends the child's standard input, sends a signal `also`, and kills it after `grace` [s]."""
     if child.stdin is not None:
         with contextlib.suppress(OSError):
             child.stdin.close()
     if also is not None:
-        with contextlib.suppress(OSError):  # refused: the end of its input ends it, too
+        with contextlib.suppress(OSError):  # refused: the end of the child's input ends it, too
             child.send_signal(also)
     if not ends_within(child, grace):
         child.kill()

@@ -1,4 +1,4 @@
-"""Descriptors from 3 on: what is printed must not go into a file that got number 0, 1 or 2."""
+"""Descriptors from 3 on: prints must not go into a file that got descriptor 0, 1 or 2."""
 
 import contextlib
 import errno
@@ -9,7 +9,7 @@ from collections.abc import Iterator
 
 
 def open_standard_streams() -> None:
-    """Opens /dev/null on the closed ones of descriptors 0, 1, 2; the first call of a program."""
+    """Opens /dev/null on closed ones of descriptors 0, 1, 2; the first call of a program."""
     for number, name in enumerate(("stdin", "stdout", "stderr")):
         try:
             os.fstat(number)
@@ -32,7 +32,7 @@ def _open_null(number: int) -> None:
 _lock = threading.Lock()
 _users = 0
 _held: list[int] = []
-# a fork waits for it, so that it is free in the child
+# a fork waits for the lock, so that it is free in the child
 os.register_at_fork(
     before=_lock.acquire, after_in_parent=_lock.release, after_in_child=_lock.release
 )
@@ -40,9 +40,9 @@ os.register_at_fork(
 
 @contextlib.contextmanager
 def above_standard() -> Iterator[None]:
-    """Files that are opened in it get descriptors from 3 on. For all that stays open.
+    """Makes files that are opened in its block get descriptors from 3 on; for files that stay open.
 
-    A host program may have been started without 0, 1, 2; it prints to them all the same, and finds
+    A host program may have been started without 0, 1, 2; it prints to them nevertheless, and finds
     them closed as before.
     """
     global _users
@@ -67,9 +67,9 @@ def _hold() -> None:
 
 
 def process_descriptor(pid: int) -> int | None:
-    """A pidfd; None where there is none (gVisor, profiles of containers, some builds of Python).
+    """Opens a pidfd; None if that is refused (gVisor, container profiles, some builds of Python).
 
-    Raises ProcessLookupError.
+    Raises ProcessLookupError if there is no such process.
     """
     try:
         with above_standard():

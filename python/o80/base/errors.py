@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
 
 def exception_text(error: BaseException) -> str:
-    """Type and text of any exception, also if its own `__str__` fails."""
+    """Returns type and text of any exception, also if its own `__str__` fails."""
     try:
         text = str(error)
     except Exception:
@@ -20,7 +20,7 @@ def exception_text(error: BaseException) -> str:
 
 
 def sentence(text: object) -> str:
-    """A text with its full stop, if it does not end a sentence already: another one follows."""
+    """Returns a text with a full stop, unless it ends a sentence already."""
     return str(text) if str(text).endswith((".", "!", "?")) else f"{text}."
 
 
@@ -35,7 +35,7 @@ class InvalidArgument(Error, ValueError):
 class TimeoutError(Error, builtins.TimeoutError):
     """A wait ended by its timeout.
 
-    `batch` is the batch that was waited for, or None: wait again, or look at its `handles`.
+    `batch` is the batch of the wait, or None: wait again, or inspect its `handles`.
     """
 
     def __init__(
@@ -47,20 +47,20 @@ class TimeoutError(Error, builtins.TimeoutError):
 
     @property
     def handles(self) -> "Sequence[Handle]":
-        """The handles of that batch, with their statuses; empty if there is no batch."""
+        """Handles of the batch, with their statuses; empty if there is no batch."""
         return list(self._handles) if self.batch is None else self.batch.handles
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # another process cannot wait for the batch: keep its statuses
+        # another process cannot wait for the batch: keep the statuses
         return type(self), (str(self), None, self.handles)
 
 
 class NotCompleted(Error):
-    """Commands or requests of a batch ended otherwise than completed, or all of it was rejected.
+    """Commands or requests of a batch did not complete, or the whole batch was rejected.
 
-    A command that a later command of the same frontend has overwritten is not among them.
+    Commands that a later command of the same frontend has overwritten do not count.
 
-    handles: of those that did not complete, with their statuses.
+    handles: handles that did not complete, with their statuses.
     observation: the row of the last iteration of the batch (the newest row if that one is gone).
     """
 
@@ -91,7 +91,7 @@ class NotCompleted(Error):
 
 
 class Miss(NamedTuple):
-    """A number that was observed too far from its target; of a NotReached."""
+    """A number that was observed too far from its target; part of a NotReached."""
 
     actuator: str
     field: str  #: empty if the state is a number
@@ -107,7 +107,7 @@ class NotReached(TimeoutError):
 
     misses: the numbers that were too far away; empty if only the commands had not ended.
     observation: the row in which they were observed.
-    batch: the commands, those that have not ended continue; `handles` are theirs.
+    batch: the commands; commands that have not ended continue. `handles` are those of the batch.
     """
 
     def __init__(
@@ -203,7 +203,7 @@ class DriverError(Error, RuntimeError):
 
 
 class CopyFailed(Error):
-    """Copies of an inline group failed in a call; all others have done it.
+    """Copies of an inline group failed in a call; all other copies have completed it.
 
     The text names the copies. `errors` has the exception of each; the first one is the cause.
     """

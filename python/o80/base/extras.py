@@ -7,7 +7,7 @@ from o80.base.errors import MissingExtra
 
 
 def needed(module: str, extra: str | None, purpose: str, *, package: str = "o80") -> ModuleType:
-    """Imports a module of `package`, or one that an extra of it installs.
+    """Imports a module of `package`, or a module that an extra of `package` installs.
 
     Raises MissingExtra with the names of module, package and extra.
     """

@@ -1,4 +1,4 @@
-"""Numbers that are not finite, for formats that have none: the one place that writes JSON."""
+"""Writes JSON; reports numbers that are not finite to formats that cannot hold them."""
 
 import json
 import math
@@ -12,12 +12,12 @@ _MOST_NAMED = 5
 
 
 def warn(text: str) -> None:
-    """As a warning of the caller of what calls this."""
+    """Gives a RuntimeWarning, at the caller of the function that called `say`."""
     warnings.warn(text, RuntimeWarning, stacklevel=4)
 
 
 def say_not_finite(found: Mapping[str, int], become: str, say: Say = warn) -> None:
-    """Says how many numbers of which fields are not finite, and what becomes of them."""
+    """Reports how many numbers of which fields are not finite, and what replaces them."""
     counts = {name: count for name, count in found.items() if count}
     if not counts:
         return
@@ -32,7 +32,7 @@ def say_not_finite(found: Mapping[str, int], become: str, say: Say = warn) -> No
 def json_text(
     value: Any, *, say: Say = warn, default: Callable[[Any], Any] | None = None, **options: Any
 ) -> str:
-    """Strict JSON: numbers that are not finite become null, and `say` gets a sentence about them.
+    """Writes strict JSON: non-finite numbers become null, and `say` gets a sentence about them.
 
     default, options: as in `json.dumps`.
     """
@@ -48,7 +48,7 @@ def json_text(
 def _finite(
     value: Any, name: str, found: Counter[str], default: Callable[[Any], Any] | None
 ) -> Any:
-    """The value with None for each float that is not finite, counted by name."""
+    """Replaces each float that is not finite by None, and counts it by name."""
     if isinstance(value, float):
         if math.isfinite(value):
             return value

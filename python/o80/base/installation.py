@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 @cache
 def announced(group: str) -> "dict[str, EntryPoint]":
-    """The entry points of a group, by name.
+    """Returns the entry points of a group, by name.
 
     importlib.metadata takes milliseconds to import and to read all packages, so it is used only if
     a package has an entry point of this group.
@@ -44,7 +44,7 @@ def _names_group(place: str, group: bytes) -> bool:
 
 
 def prefix() -> "Path":
-    """The folder that holds o80's include/, lib/ and bin/."""
+    """Returns the folder that holds o80's include/, lib/ and bin/."""
     from pathlib import Path
 
     return Path(__file__).resolve().parents[1]

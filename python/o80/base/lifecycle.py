@@ -2,9 +2,9 @@
 
 At the end, segments, lanes and processes that are still open are closed.
 
-A module that another thread imports when the process is forked stays locked in the child, which
-waits for ever when it imports it too. o80 imports many of its modules at their first use, so a fork
-waits for these imports.
+If another thread imports a module during a fork, the module stays locked in the child, which waits
+for ever when it imports the module, too. o80 imports many of its modules at their first use, so a
+fork waits for these imports.
 """
 
 import _thread
@@ -24,12 +24,12 @@ class Owner(Protocol):
     def _close_at_exit(self) -> None: ...
 
 
-_open: WeakKeyDictionary[Owner, int] = WeakKeyDictionary()  # with the process that opened it
+_open: WeakKeyDictionary[Owner, int] = WeakKeyDictionary()  # owner and the process that opened it
 _workers: set[int] = set()  # multiprocessing workers that have the exit handler
 
 
 def close_later(owner: Owner) -> None:
-    """Closes `owner` at exit, unless it is closed before. The last one opened is closed first."""
+    """Closes `owner` at exit, unless it is closed before; the last one opened is closed first."""
     _open[owner] = os.getpid()
     _watch_worker()
 
@@ -62,7 +62,7 @@ class Managed:
     """Ends with a `with` block."""
 
     def _leave(self, error: BaseException | None) -> None:
-        """At the end of the block; error: what has left it early."""
+        """Ends the object after the block; error: exception that has left the block, or None."""
         raise NotImplementedError
 
     def __enter__(self) -> Self:
@@ -78,7 +78,7 @@ class Managed:
 
 
 class Closeable(Managed):
-    """Has `close`; give the object to `close_later` too."""
+    """An object with `close`; give it to `close_later` too."""
 
     def close(self) -> None:
         raise NotImplementedError
@@ -91,13 +91,13 @@ class Closeable(Managed):
 
 
 LONGEST = 1.0  # [s] that a fork waits for imports
-LOOK = 0.001  # [s] between its looks
+LOOK = 0.001  # [s] between two checks
 
 
 def _wait_for_imports() -> None:
     """Waits until other threads have finished their imports.
 
-    At most LONGEST: one of them may wait for this thread.
+    Waits at most LONGEST, because such a thread may wait for this one.
     """
     end = time.monotonic() + LONGEST
     while _others_import() and time.monotonic() < end:

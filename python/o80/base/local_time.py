@@ -1,4 +1,4 @@
-"""Texts of local times as instants. No other place computes with hours of the local clock."""
+"""Converts texts of local times to instants. No other place computes with local hours."""
 
 import re
 from datetime import UTC, datetime, time, timedelta
@@ -10,21 +10,21 @@ _MOST = 5  # instants that an error lists
 
 
 def nanoseconds(instant: datetime) -> int:
-    """Since 1970, of a datetime with an offset."""
+    """Converts a datetime with an offset to ns since 1970."""
     return (instant - _EPOCH) // timedelta(microseconds=1) * 1000
 
 
 def local(at: int) -> datetime:
-    """The local time of an instant [ns since 1970], with its offset."""
+    """Converts an instant [ns since 1970] to local time, with its offset."""
     return (_EPOCH + timedelta(microseconds=at // 1000)).astimezone()
 
 
 def instant(text: str, *, within: tuple[int, int] | None = None, is_end: bool = False) -> datetime:
-    """The instant that "2026-11-24", "2026-11-24 10:02", "10:02:30.5" or "10:02+01:00" names.
+    """Parses "2026-11-24", "2026-11-24 10:02", "10:02:30.5" or "10:02+01:00" as an instant.
 
-    within: first and last time of a recording [ns since 1970]: a time without a date is the one
-        within it, or the nearest one if none is. Otherwise a time without a date is of today.
-    is_end: a day means its end.
+    within: first and last time of a recording [ns since 1970]: a time without a date is placed
+        within it, or as near as possible. Without it, such a time is of today.
+    is_end: a day stands for its end.
 
     Raises InvalidArgument, also for a time that comes twice or never because the clocks change.
     """
@@ -58,9 +58,9 @@ def instant(text: str, *, within: tuple[int, int] | None = None, is_end: bool = 
 
 
 def _instants(given: datetime, most: int = 2) -> list[datetime]:
-    """The instants at which the local clock shows a time: one; in the hour of a change two or none.
+    """Returns instants at which the local clock shows a time: one; at a clock change two or none.
 
-    most: with 1 one in any case, the first one; of a time that never comes the end of the gap.
+    most: 1 returns exactly one, the first; for a skipped time the end of the gap.
     """
     if given.tzinfo is not None:
         return [given]

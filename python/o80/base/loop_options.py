@@ -1,6 +1,6 @@
 """Options of a backend and its loop that every robot has.
 
-The one description is in src/robot/loop/loop_options.cpp.
+src/robot/loop/loop_options.cpp describes them, and nothing else does.
 """
 
 import numbers
@@ -32,20 +32,20 @@ class LoopOption:
 
 @cache
 def loop_options() -> dict[str, LoopOption]:
-    """All options by name, in the order of the help."""
+    """Returns all options by name, in the order of the help."""
     return {fields[0]: LoopOption(*fields) for fields in _core.loop_options()}
 
 
 def names_of(place: Literal["start", "inline", "backend"]) -> list[str]:
-    """Names of the options that can be given there."""
+    """Returns the names of the options that can be given there."""
     return [option.name for option in loop_options().values() if getattr(option, f"of_{place}")]
 
 
 def loop_texts(given: Mapping[str, Any], names: Iterable[str]) -> list[tuple[str, str]]:
-    """Names and texts of the named options that are not None.
+    """Converts the named options that are not None to names and texts.
 
-    given: the arguments of a function. Raises InvalidArgument, which names the option and what is
-    allowed.
+    given: the arguments of a function. Raises InvalidArgument with the option's name and allowed
+    values for a wrong value.
     """
     texts = []
     for name in names:
@@ -60,7 +60,7 @@ def loop_texts(given: Mapping[str, Any], names: Iterable[str]) -> list[tuple[str
 
 
 def option_text(name: str, value: Any, kind: str, allowed: str) -> str:
-    """The text of an option's value for C++. Raises InvalidArgument."""
+    """Converts an option's value to text for C++. Raises InvalidArgument for a wrong value."""
     if not _is_a(kind, value):
         raise InvalidArgument(f"{name} must be {allowed}, got {value!r}")
     if kind != "octal":
@@ -87,7 +87,7 @@ def _is_a(kind: str, value: Any) -> bool:
 
 
 def text_of(value: Any) -> str:
-    """A value as the text that is read in C++."""
+    """Converts a value to the text that C++ reads."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, (str, os.PathLike)):
@@ -100,7 +100,7 @@ def text_of(value: Any) -> str:
 
 
 def did_you_mean(name: str, known: Iterable[str]) -> str:
-    """Ends an error about an unknown name, if another one is near."""
-    readable = name.encode(errors="replace").decode()  # half a letter is none in C++
+    """Returns the end of an error about an unknown name: the nearest known name, or nothing."""
+    readable = name.encode(errors="replace").decode()  # C++ accepts no half characters
     near = _core.nearest_name(readable, list(known))
     return f". Did you mean '{near}'?" if near else ""

@@ -1,4 +1,4 @@
-"""Machine, as far as it decides the last bits of a computation: C library and processor."""
+"""The properties of a machine that decide the last bits of a computation."""
 
 import json
 import os
@@ -13,26 +13,26 @@ from o80.base.finite import json_text
 
 @dataclass(frozen=True)
 class Machine:
-    """The C library and the processor of a machine. Mathematical functions differ between them."""
+    """C library and processor of a machine; mathematical functions differ between them."""
 
     libc: str  #: "glibc 2.36"
     architecture: str  #: "x86_64"
-    features: tuple[str, ...]  #: of the processor, sorted
+    features: tuple[str, ...]  #: features of the processor, sorted
 
     def as_json(self) -> str:
-        """As one line of JSON, which `from_json` reads."""
+        """Converts to one line of JSON, which `from_json` reads."""
         return json_text(asdict(self), sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """Raises ValueError, KeyError, TypeError if it is damaged."""
+        """Parses `as_json`. Raises ValueError, KeyError, TypeError if the text is damaged."""
         found = json.loads(text)
         return cls(
             str(found["libc"]), str(found["architecture"]), tuple(map(str, found["features"]))
         )
 
     def difference(self, other: "Machine") -> str:
-        """Difference to another machine, in words; empty if there is none."""
+        """Describes the difference to another machine; empty if there is none."""
         if self.libc != other.libc:
             return f"{self.libc} recorded it, this machine has {other.libc}"
         if self.architecture != other.architecture:
@@ -46,7 +46,7 @@ class Machine:
 
 @lru_cache
 def this_machine() -> Machine:
-    """The machine of this process."""
+    """Returns the machine of this process."""
     try:
         libc = os.confstr("CS_GNU_LIBC_VERSION") or ""
     except (ValueError, OSError):
@@ -56,7 +56,7 @@ def this_machine() -> Machine:
 
 @lru_cache
 def this_boot() -> str:
-    """Id of this boot: monotonic times of one boot are on one clock. Empty: not known."""
+    """Returns the id of this boot, within which monotonic times agree; empty: not known."""
     try:
         return Path("/proc/sys/kernel/random/boot_id").read_text().strip()
     except OSError:
@@ -64,7 +64,7 @@ def this_boot() -> str:
 
 
 def _features() -> tuple[str, ...]:
-    """Features of the first processor, as Linux lists them."""
+    """Reads the features of the first processor, as listed by Linux."""
     try:
         text = Path("/proc/cpuinfo").read_text()
     except OSError:

@@ -1,4 +1,4 @@
-"""How far a long reading of a file is, for those who wait: on stderr, or as a warning."""
+"""Shows the progress of reading a long file: on stderr, or as a warning."""
 
 import sys
 import time
@@ -7,23 +7,23 @@ from typing import Self
 
 from o80.base.screen import complain
 
-AFTER = 1.0  # from when on it is shown [s]
-BETWEEN = 0.2  # two figures on a terminal [s]
+AFTER = 1.0  # time after which progress is shown [s]
+BETWEEN = 0.2  # interval of figures on a terminal [s]
 of_a_command = False
 """Whether this process is a command (`o80 info`); else a program that uses o80."""
 
 
 class Progress:
-    """One reading; used in a `with` block, in which `at` is called again and again."""
+    """Progress of one file; in its `with` block the reader calls `at` repeatedly."""
 
     def __init__(self, text: str) -> None:
-        """text: says what takes long; shown once."""
+        """text: names the slow work; shown once."""
         self._text = text
         self._next = time.monotonic() + AFTER
         self._shown = False
 
     def at(self, share: float) -> None:
-        """share: from 0 to 1."""
+        """Shows the share of the work that is done, from 0 to 1."""
         now = time.monotonic()
         if now < self._next:
             return

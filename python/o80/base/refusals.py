@@ -9,7 +9,7 @@ from o80.base.errors import Error
 
 @contextlib.contextmanager
 def explained(what: str) -> Iterator[None]:
-    """Raises Error, with the line of source, for a call that the system refuses. what: a verb."""
+    """Turns a refused system call into an Error with its source line. what: a verb."""
     try:
         yield
     except OSError as error:

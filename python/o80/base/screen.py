@@ -1,6 +1,6 @@
 """Texts for terminals (tables that fit, JSON, errors on stderr) and tables for notebooks.
 
-Programs of o80 call `keep_printing` first: no print of theirs raises then.
+Programs of o80 call `keep_printing` first: after that no print raises.
 """
 
 import errno
@@ -23,7 +23,7 @@ _CODES = {"bold": "1", "dim": "2", "red": "31", "green": "32", "yellow": "33"}
 
 
 def style(text: str, name: str, stream: TextIO | None = None) -> str:
-    """The text in a colour or weight, if the stream is a terminal."""
+    """Returns the text in a colour or weight, if the stream is a terminal."""
     out = sys.stdout if stream is None else stream
     if not name or "NO_COLOR" in os.environ or os.environ.get("TERM") == "dumb":
         return text
@@ -66,7 +66,7 @@ def _names(columns: Sequence[Column]) -> list[str]:
 
 
 def html(heads: Sequence[str], rows: Iterable[Sequence[Any]], above: str = "") -> str:
-    """An HTML table; all texts are escaped, because other users may have written them."""
+    """Makes an HTML table; all texts are escaped, because other users may have written them."""
     lines = [f"<p>{escape(above)}</p>"] if above else []
     cells = "".join(f"<th>{escape(head)}</th>" for head in heads)
     lines.append(f"<table><thead><tr>{cells}</tr></thead><tbody>")
@@ -82,12 +82,12 @@ def print_json(value: Any) -> None:
 
 
 def plain(text: str) -> str:
-    """A text of one line, from shared memory or a recording: it must not control the terminal."""
+    """Makes a line from memory or a recording printable: it must not control the terminal."""
     return _core.printable(text)
 
 
 def bytes_text(size: float) -> str:
-    """A number of bytes with its unit."""
+    """Formats a number of bytes with its unit."""
     if size >= 1e9:
         return f"{size / 1e9:.1f} GB"
     return f"{size / 1e6:.1f} MB" if size >= 1e5 else f"{size / 1e3:.1f} kB"
@@ -104,7 +104,7 @@ def complain(text: str) -> None:
 
 @functools.cache
 def complain_once(text: str) -> None:
-    """Prints it on stderr unless this process has done so."""
+    """Prints a remark on stderr unless this process has already printed it."""
     complain(text)
 
 
@@ -112,7 +112,7 @@ def complain_once(text: str) -> None:
 
 
 class _Output(io.FileIO):
-    """A descriptor that drops what it cannot write: full device, closed pipe, closed descriptor."""
+    """A descriptor that drops bytes it cannot write: full device, closed pipe or descriptor."""
 
     failure: OSError | None = None  #: the first one
 
@@ -131,10 +131,10 @@ _stdout: _Output | None = None
 
 
 def keep_printing() -> None:
-    """From now on no print of this program raises: long work does not end by its messages.
+    """Makes all prints of this program raise nothing, so that a message never ends long work.
 
-    Characters that the encoding lacks are replaced. Streams that somebody captures stay as they
-    are. For programs, as the first call; a library leaves the streams of its host alone.
+    Replaces characters that the encoding lacks. Leaves captured streams alone. For programs, as the
+    first call; a library leaves the streams of its host alone.
     """
     global _stdout
     open_standard_streams()
@@ -162,16 +162,16 @@ def keep_printing() -> None:
 
 
 def emit(text: str, end: str = "\n") -> None:
-    """Prints one of many texts; raises SystemExit if standard output takes no more of them."""
+    """Prints one of many texts; raises SystemExit if standard output accepts no more."""
     print(text, end=end, flush=True)
     if _stdout is not None and _stdout.failure is not None:
         raise SystemExit
 
 
 def unprinted() -> int:
-    """Exit code of a program by its output: 1, and why, if something could not be printed.
+    """Returns the exit code by the output: 1, with a message, if something could not be printed.
 
-    0 if the reader closed the pipe: it wanted no more (`o80 list | head`).
+    Returns 0 if the reader has closed the pipe (`o80 list | head`).
     """
     sys.stdout.flush()
     failure = None if _stdout is None else _stdout.failure

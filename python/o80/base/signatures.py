@@ -13,7 +13,7 @@ _Class = TypeVar("_Class")
 
 @cache
 def _declared(signature: str) -> Any:
-    """A function of this signature without a body."""
+    """Makes a function of this signature without a body."""
     made: dict[str, Any] = {}
     exec(f"from __future__ import annotations\n{signature}: ...", made)
     return made[signature.removeprefix("def ").partition("(")[0]]
@@ -26,7 +26,7 @@ class _Annotation(str):
 
 
 def signature_of(signature: str) -> inspect.Signature:
-    """The result of `inspect.signature` for a method with this signature."""
+    """Returns the result of `inspect.signature` for a method with this signature."""
     plain = inspect.signature(_declared(signature))
     return plain.replace(
         parameters=[
@@ -48,7 +48,7 @@ def refuse(
 ) -> None:
     """Raises the TypeError of a function with this signature, with a list of its arguments.
 
-    refused: the error of nanobind, or of a method that has acted nevertheless: what it has done.
+    refused: the error of nanobind, or an error of a method that has acted, with what it has done.
     Returns if the arguments fit.
     """
     function = _declared(signature)
@@ -67,7 +67,7 @@ def refuse(
 
 
 def explained(function: _Function) -> _Function:
-    """A method of Python that refuses wrong arguments as a compiled one does."""
+    """Makes a method of Python report wrong arguments like a compiled method."""
 
     @wraps(function)
     def verb(*arguments: Any, **keywords: Any) -> Any:
@@ -75,7 +75,7 @@ def explained(function: _Function) -> _Function:
             return function(*arguments, **keywords)
         except TypeError as error:
             trace = error.__traceback__
-            if trace is None or trace.tb_next is not None:  # raised inside of the function
+            if trace is None or trace.tb_next is not None:  # raised inside the function
                 raise
             text = str(error).replace(function.__qualname__, function.__name__)
         raise _refusal(text, inspect.signature(function), arguments[1:], keywords)

@@ -6,7 +6,7 @@ from types import FrameType
 
 
 class StopRequest:
-    """Notes signals that ask the program to end, from its construction on."""
+    """Notes signals that request the end of the program, from its construction on."""
 
     def __init__(self) -> None:
         self.requested = False
@@ -17,7 +17,7 @@ class StopRequest:
         self.requested = True
 
     def wait(self, seconds: float) -> None:
-        """Waits so long, or until the program is asked to end."""
+        """Waits for some seconds, or until the end is requested."""
         end = time.monotonic() + seconds
         while not self.requested and (left := end - time.monotonic()) > 0:
             time.sleep(min(left, 0.05))

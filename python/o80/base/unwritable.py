@@ -1,4 +1,4 @@
-"""Why a file cannot be written, in words."""
+"""Reasons why a file cannot be written."""
 
 import os
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from o80.base.errors import Error
 
 
 def reason(path: Path, error: OSError) -> str:
-    """For example "there is no folder results"."""
+    """Returns the reason, for example "there is no folder results"."""
     if isinstance(error, FileNotFoundError) and not path.parent.exists():
         return f"there is no folder {path.parent}"
     if path.is_dir():
@@ -19,7 +19,7 @@ def reason(path: Path, error: OSError) -> str:
 
 @contextmanager
 def writing(path: Path) -> Iterator[None]:
-    """Makes an OSError of its block an Error that names the file."""
+    """Turns an OSError of its block into an Error that names the file."""
     try:
         yield
     except Error:

@@ -1,6 +1,6 @@
 """String enumerations of the API.
 
-Arguments accept the aliases at the end: a member of an enumeration, or the string itself.
+The aliases at the end are types of arguments: a member of an enumeration, or the string itself.
 """
 
 from enum import StrEnum
@@ -20,13 +20,13 @@ class Profile(StrEnum):
     LINEAR = "linear"
     MINIMUM_JERK = "minimum_jerk"
     AS_SENT = "as_sent"  #: no interpolation: each target in its iteration, where limits allow
-    MONOTONE = "monotone"  #: of rows: a curve through them that stays between them
-    HOLD = "hold"  #: of rows: each from the iteration after the one before it
-    SMOOTH = "smooth"  #: of rows: a curve through them, as of samples of a smooth motion
+    MONOTONE = "monotone"  #: for rows: a curve through them that stays between them
+    HOLD = "hold"  #: for rows: each is held from the iteration after the previous row
+    SMOOTH = "smooth"  #: for rows: a curve through them, as samples of a smooth motion
 
 
 class Start(StrEnum):
-    """The state a command starts from."""
+    """The state that a command starts from."""
 
     DESIRED = "desired"
     OBSERVED = "observed"
@@ -62,18 +62,18 @@ class Reason(StrEnum):
     STOPPED = "stopped"
     HALTED = "halted"
     FULL = "full"  #: too many batches of its frontend wait for later iterations
-    READING = "reading"  #: the robot cannot be where it was read
-    OLDER = "older"  #: the chunk answers an older observation than the one before it
+    READING = "reading"  #: the robot cannot be at the position that was read
+    OLDER = "older"  #: the chunk is based on an older observation than the previous chunk
 
 
 class CommandEnd(NamedTuple):
-    """The end of a command; of a request if it has no actuators."""
+    """The end of a command, or of a request (no actuators)."""
 
     iteration: int
     status: Status
     actuators: tuple[str, ...]
     reason: Reason = Reason.NONE
-    text: str = ""  #: the reason in words; a journal does not have it
+    text: str = ""  #: the reason as a sentence; empty in a journal
 
 
 ModeWord: TypeAlias = Mode | Literal["queue", "overwrite"]

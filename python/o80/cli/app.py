@@ -69,9 +69,9 @@ def root(
 
 
 def run_app(words: list[str]) -> None:
-    """Runs the command that `words` begin with, or shows which there are.
+    """Runs the command at the begin of `words`, or lists all commands.
 
-    Only the module of that command is imported: others need what takes long to import. Installed
+    Only the module of that command is imported: others import slow packages. Installed
     packages add commands by entry points of the group `o80.commands`, each a typer.Typer.
     """
     progress.of_a_command = True

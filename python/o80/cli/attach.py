@@ -6,9 +6,9 @@ from o80.frontend.frontend import Frontend
 
 
 def attach(segment: str, *, wait: bool | None = None, read_only: bool = True) -> Frontend:
-    """A frontend of an existing segment; a read-only one also attaches to a dead segment.
+    """Attaches to an existing segment; a read-only frontend also attaches to a dead segment.
 
-    wait: True waits for a segment that does not exist yet and says so; None: the command has no
+    wait: True waits for a segment that does not exist yet and reports it; None: the command has no
         flag --wait.
     """
     try:

@@ -16,7 +16,7 @@ def clean(
         list[str] | None, typer.Argument(help="Names of segments (default: all dead ones).")
     ] = None,
 ) -> None:
-    """Remove dead segments. A robot can start again without it: it takes over its dead segment.
+    """Remove dead segments. A robot can restart without this: it takes over its dead segment.
 
     Segments of running backends stay.
     """

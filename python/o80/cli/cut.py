@@ -101,7 +101,7 @@ def _write(
 
 
 def _time(text: str, first: int, last: int, option: str) -> int:
-    """A log time [ns]; first and last: those of the recording, which may be of several days."""
+    """Parses a log time [ns]; first, last: times of the recording, which may span several days."""
     try:
         seconds = float(text)
     except ValueError:

@@ -10,7 +10,7 @@ from o80.base.errors import InvalidArgument
 from o80.cli.histories import Named, histories
 from o80.rows.history import History
 
-GAPS = 10  # that are listed for each run
+GAPS = 10  # gaps that are listed for each run
 
 
 def _tolerances(texts: list[str] | None) -> dict[str, float]:
@@ -76,7 +76,7 @@ def diff(
 
 
 def _comparable(one: Named, other: Named) -> History:
-    """The rows that the other one has, or would have if it had no gaps."""
+    """Returns the rows of `one`, without rows that `other` lacks because of a gap."""
     history = one.history
     iteration = history.iteration
     lacks = np.zeros(len(history), bool)
@@ -87,7 +87,7 @@ def _comparable(one: Named, other: Named) -> History:
 
 
 def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, Named, Named]]:
-    """The same runs of the same segments; two single ones may have different names."""
+    """Pairs the same runs of the same segments; two single runs may have different names."""
     if len(ours) == len(theirs) == 1:
         return [(ours[0].name, ours[0], theirs[0])]
     there = {(each.name, each.number): each for each in theirs}

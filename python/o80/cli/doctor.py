@@ -30,7 +30,7 @@ def doctor(
 ) -> None:
     """Say whether this computer can serve a robot at a rate, and if not, why.
 
-    Each finding names what is in the way, the command that cures it and the one that undoes it.
+    Each finding names the problem, the command that solves it and the command that undoes this.
     Nothing is changed. The exit status is 0 if nothing is in the way, else 1.
     """
     from o80.robots.doctor.computer import Computer

@@ -98,7 +98,7 @@ def echo(
 
 
 def _rows(frontend: Frontend, rate: float | None, timeout: float | None) -> Iterator[Observation]:
-    """Yields every row (rate None), or at most `rate` rows a second; prints why none comes."""
+    """Yields every row (rate None), or at most `rate` rows a second; reports why none comes."""
     remarks = _Remarks(frontend)
     row = frontend.latest()
     while True:

@@ -105,7 +105,7 @@ def export(
 
 
 def _time(text: str) -> float:
-    """Iterations of a whole number, seconds of another one."""
+    """Parses a whole number as iterations, another number as seconds."""
     try:
         return int(text) if text.isdecimal() else float(text)
     except ValueError:

@@ -35,7 +35,7 @@ def film(
         bool, typer.Option("--model-files", help="Read files that the recorded models name.")
     ] = False,
 ) -> None:
-    """Draw the robots of a recording as their models look, at the same times, into a film.
+    """Draw the models of a recording's robots at the same times, side by side, into a film.
 
     Seconds are those of the first robot that is shown.
     """
@@ -83,7 +83,7 @@ def film(
 def _rows(
     sources: list["Source"], begin: float, end: float | None, step: float
 ) -> Iterator[list[Any]]:
-    """The rows of all robots at the times of the first one."""
+    """Yields the rows of all robots at the times of the first robot."""
     first = sources[0]
     last = first.seconds(first.extent()[1])
     end = last if end is None else min(end, last)

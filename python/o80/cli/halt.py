@@ -1,6 +1,6 @@
-"""``o80 halt``: halts a robot, whatever else is wrong with the call or the terminal.
+"""``o80 halt``: halts a robot, even if other parts of the call or the terminal are broken.
 
-It reads its words itself: an option parser would refuse what it does not know, and takes long to
+It parses its words itself: an option parser would refuse unknown options, and takes long to
 import.
 """
 
@@ -37,7 +37,7 @@ def halt_words(words: list[str]) -> int:
     if not words or words[0] in ("--help", "-h"):
         print(_USAGE, end="", file=sys.stdout if words else sys.stderr)
         return 0 if words else 2
-    name, text = words[0], _core.printable(" ".join(words[1:]))  # also of what is no UTF-8
+    name, text = words[0], _core.printable(" ".join(words[1:]))  # also for words not in UTF-8
     if name == "--all":
         return _halt_all(text)
     failed = not _halt(name, text)
@@ -72,7 +72,7 @@ def _halt_all(text: str) -> int:
 
 
 def _names_in(words: list[str], halted: str) -> list[str]:
-    """The names of other running robots with which a text begins."""
+    """Returns the names of other running robots at the begin of a text."""
     running: set[str] = set()
     with contextlib.suppress(Exception):
         running = {entry.name for entry in _core.list_segments() if entry.life in _ALIVE}
@@ -90,7 +90,7 @@ def _complain(text: str) -> None:
 
 
 def _print(text: str, stream: TextIO | None) -> None:
-    """Prints past the stream's buffer: Python would complain at exit of what it cannot write."""
+    """Prints past the stream's buffer: at exit Python would report text that it cannot write."""
     if stream is None:  # closed when the program began: its number may be that of another file
         return
     with contextlib.suppress(OSError, ValueError):

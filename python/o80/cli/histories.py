@@ -16,21 +16,21 @@ from o80.rows.journal import JournalEntry, marks_in
 
 @dataclass(frozen=True)
 class Named:
-    """The rows of one run of a robot."""
+    """Rows of one run of a robot."""
 
-    name: str  #: of the segment
-    number: int  #: of the run, from 0; runs of a segment in one file
+    name: str  #: name of the segment
+    number: int  #: index of the run, among the runs of the segment in one file
     history: History
-    wall_offset: int | None  #: wall clock less row time [ns]; None: not known
+    wall_offset: int | None  #: wall clock minus row time [ns]; None: not known
     boot: str  #: id of the boot on whose clock the rows are; empty: not known
-    journal: Callable[[], list[JournalEntry]]  #: what its backend decided, as far as known
+    journal: Callable[[], list[JournalEntry]]  #: reads the known decisions of the backend
     marks: list[tuple[str, int]] = field(default_factory=list)  #: name and iteration
-    gaps: Callable[[], list[Gap]] = list  #: rows that are missing
+    gaps: Callable[[], list[Gap]] = list  #: finds the missing rows
     interruption: Interruption | None = None
 
 
 def histories(source: str, only: str | None, *, seconds: float | None = None) -> Iterator[Named]:
-    """Histories of a file, or of a segment in shared memory.
+    """Yields the histories of a file, or of a segment in shared memory.
 
     source: a path that ends in .mcap, or the name of a segment. only: one segment of a file.
     """

@@ -90,7 +90,7 @@ def info(
 
 
 def _argument(field: dict[str, Any]) -> str:
-    """A field of a request, with its default if it has one."""
+    """Formats a field of a request, with its default if it has one."""
     if "default" not in field:
         return str(field["name"])
     default = field["default"]
@@ -101,7 +101,7 @@ def _argument(field: dict[str, Any]) -> str:
 
 
 def _enumerations(enums: Mapping[str, Any]) -> list[str]:
-    """The labels and numbers of each: "status: ok 0, moved 3"."""
+    """Formats labels and numbers of each enumeration: "status: ok 0, moved 3"."""
     short = [name for name in enums if "." not in name or name.rpartition(".")[2] not in enums]
     return [
         f"{name}: "

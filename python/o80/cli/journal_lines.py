@@ -16,14 +16,14 @@ from o80.frontend.reader import Journal
 from o80.rows.journal import JournalEntry
 from o80.rows.journal_text import JournalText
 
-_LOOK = 0.05  # between two looks for new entries [s]
+_LOOK = 0.05  # interval of polls for new entries [s]
 _BEFORE = 10  # entries of a living backend that are printed at the start
 
 
 def follow(frontend: Frontend, count: int, as_json: bool, timeout: float | None) -> None:
-    """Prints the last entries, then new ones; ends after `count` of both, 0: never.
+    """Prints the last entries, then new ones; ends after `count` entries in total, 0: never.
 
-    Of a dead backend it then raises the reason of its end.
+    For a dead backend it then raises the reason of the backend's end.
     """
     journal = Journal(frontend)
     if not journal.exists:
@@ -74,7 +74,7 @@ def print_recorded(path: str, count: int, as_json: bool) -> None:
 
 
 class _Lines:
-    """Lines of entries."""
+    """Formats entries as lines."""
 
     def __init__(self, as_json: bool) -> None:
         self._as_json = as_json

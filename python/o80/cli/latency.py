@@ -1,4 +1,4 @@
-"""``o80 latency``: the delay between two segments that see the same motion."""
+"""``o80 latency``: the delay between two segments that record the same motion."""
 
 import re
 from collections.abc import Callable
@@ -32,7 +32,7 @@ def latency(
 ) -> None:
     """Estimate how much later B shows a motion than A, by cross-correlation.
 
-    Move the robot to and fro, without a fixed rhythm, while both segments see it.
+    Move the robot back and forth, without a fixed rhythm, while both segments record it.
     """
     from o80.joining.latency import latency as estimate
     from o80.recording.reader import open as open_recording
@@ -52,7 +52,7 @@ def latency(
 
 
 def _signal(text: str) -> "str | Callable[[History], Any]":
-    """A field, or the length of several numbers."""
+    """Parses a field, or norm(FIELD): the length of several numbers."""
     match = re.fullmatch(r"norm\((.+)\)", text)
     if match is None:
         return text

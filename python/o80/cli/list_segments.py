@@ -30,7 +30,7 @@ def list_segments(
 
 
 def _watch() -> None:
-    """Lists each second; a terminal is left as it was."""
+    """Prints the list each second; restores the terminal at the end."""
     terminal = sys.stdout.isatty()
     if isinstance(sys.stdout, io.TextIOWrapper):
         sys.stdout.reconfigure(line_buffering=False)  # a list is one write: it does not flicker

@@ -129,7 +129,7 @@ def _head(playback: "Playback", bursts: bool) -> str:
 
 
 def _follow(playback: "Playback", stop: StopRequest) -> None:
-    """Shows how far it is, again and again on a terminal."""
+    """Prints the progress of a playback, repeatedly on a terminal."""
     terminal = sys.stderr.isatty()
     while not stop.requested and not playback.wait(0.05):
         if terminal:

@@ -28,7 +28,7 @@ def _seconds(value: float | None) -> float | None:
 
 
 def _size(text: str | None) -> float | None:
-    """Bytes of "500M", "2G" or a plain number."""
+    """Parses "500M", "2G" or a plain number as bytes."""
     if text is None:
         return None
     number, factor = (text[:-1], _SUFFIXES[text[-1]]) if text[-1:] in _SUFFIXES else (text, 1.0)
@@ -102,7 +102,7 @@ def record(
 ) -> None:
     """Record rows and decisions of robots to an MCAP file until Ctrl-C.
 
-    A robot that is not there yet is waited for; one that restarts is recorded on in the same file.
+    Waits for robots that have not started; a robot that restarts continues in the same file.
     """
     from o80.recording.file_writer import Form
     from o80.recording.recorder import Recorder
@@ -147,7 +147,7 @@ def _say_warning(message: Warning | str, *_: Any, **__: Any) -> None:
 
 
 def _replay_text(source: "Source", frontend: "Frontend", from_now: bool) -> str:
-    """From which row on a run is recorded, and from where it can be replayed."""
+    """Returns from which row on a run is recorded, and from where it can be replayed."""
     from o80.replaying.conditions import reads_the_world
 
     if source.journal_begin is None:
@@ -178,7 +178,7 @@ def _replay_text(source: "Source", frontend: "Frontend", from_now: bool) -> str:
 
 
 class _Report:
-    """Shows on stderr how far a recording is: one line, again and again on a terminal."""
+    """Prints the progress of a recording on stderr: one line, rewritten on a terminal."""
 
     def __init__(self, recorder: "Recorder", from_now: bool) -> None:
         self._recorder = recorder

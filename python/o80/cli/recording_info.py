@@ -21,10 +21,10 @@ if TYPE_CHECKING:
     from o80.recording.reader import RecordingFile
     from o80.recording.recorded_epoch import RecordedEpoch
 
-MARKS_AT_ENDS = 10  # listed at the beginning and at the end
-LONGEST_VALUE = 60  # of a mark, in characters
-GAPS = 10  # listed for each run
-MAX_ENTRIES = 200_000  # of a journal that are read for the latency of decisions, the newest
+MARKS_AT_ENDS = 10  # marks listed at the beginning and at the end
+LONGEST_VALUE = 60  # of a mark [characters]
+GAPS = 10  # gaps listed for each run
+MAX_ENTRIES = 200_000  # newest entries of a journal that are read for the decision latency
 COLUMNS = (
     Column("segment"),
     Column("run", right=True),
@@ -40,7 +40,7 @@ COLUMNS = (
 
 
 def recording_info(path: Path, *, as_json: bool = False) -> None:
-    """Prints what a recording holds. Raises RecordingError."""
+    """Prints the contents of a recording. Raises RecordingError if it cannot be read."""
     from o80.recording.reader import open as open_recording
 
     recording = open_recording(path)
@@ -146,14 +146,14 @@ def _of_run(name: str, number: int) -> str:
 
 
 def latency_of(epoch: "RecordedEpoch") -> dict[str, int]:
-    """The decision latency of the batches in the last entries of its journal, of recorded rows."""
+    """Computes the decision latency from the last entries of the journal, of recorded rows."""
     from o80.rows.journal import latencies_of
 
     return latency_percentiles(latencies_of(_last_entries(epoch)))
 
 
 def _last_entries(epoch: "RecordedEpoch") -> "list[_core.JournalEntry]":
-    """The last entries of its journal, of recorded rows; none of a newer o80."""
+    """Reads the last journal entries of recorded rows; none if a newer o80 wrote the journal."""
     if epoch.journal_codec is None or epoch.journal_codec > _core.JOURNAL_CODEC:
         return []
     rows = range(epoch.first_row, epoch.next_row)
@@ -161,13 +161,13 @@ def _last_entries(epoch: "RecordedEpoch") -> "list[_core.JournalEntry]":
 
 
 def starvations_of(epoch: "RecordedEpoch") -> int:
-    """How often a plan of chunks ran out of rows, up to the last recorded row."""
+    """Counts how often a plan of chunks ran out of rows, up to the last recorded row."""
     last = epoch.history(1).starvations
     return int(last[0]) if len(last) else 0
 
 
 def _missing(name: str, number: int, epoch: "RecordedEpoch") -> list[str]:
-    """Gaps and their reasons, a line each; of many the first ones."""
+    """Lists gaps and their reasons, a line each; only the first ones if there are many."""
     of_run = _of_run(name, number)
     lines = [f"{of_run}: {epoch.interruption}"] if epoch.interruption else []
     lines += [f"{of_run}: {gap}" for gap in epoch.gaps[:GAPS]]
@@ -176,7 +176,7 @@ def _missing(name: str, number: int, epoch: "RecordedEpoch") -> list[str]:
 
 
 def _fields(name: str, number: int, epoch: "RecordedEpoch") -> dict[str, Any]:
-    """For tools."""
+    """Describes a run, for tools."""
     begin, end = epoch.time_range if epoch.rows else (0, 0)
     return {
         "segment": name,

@@ -43,7 +43,7 @@ def recordings(
 ) -> None:
     """List the recordings below a folder: robots, times, how runs ended, marks.
 
-    It keeps what it found in a file .o80-recordings.sqlite there, so that the next call is quick.
+    The index .o80-recordings.sqlite, which is written there, makes the next call quick.
     """
     from o80.recording.catalogue import recordings as find
 
@@ -75,7 +75,7 @@ def recordings(
 
 
 def _rows(found: "FoundRecording", folder: Path) -> list[list[str]]:
-    """A row for each run; the first one also has path, marks and size of the recording."""
+    """Makes a row for each run; the first row also has path, marks and size of the recording."""
     rows = []
     for i, run in enumerate(found.runs):
         local = time.localtime(run.begin * 1e-9)

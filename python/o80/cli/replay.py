@@ -60,7 +60,7 @@ def replay(
         bool, typer.Option("--exact", help="Bit for bit, also if another build of o80 recorded it.")
     ] = False,
 ) -> None:
-    """Start recorded robots again, let them do what they did, and compare every row bit for bit.
+    """Start recorded robots again, repeat their decisions, and compare every row bit for bit.
 
     Exit code 0: all rows are identical. 1: a row differs, and the first one is printed. 2: not all
     rows could be compared (rows or decisions are missing, or this o80 moves by other rules), and

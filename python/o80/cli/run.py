@@ -41,7 +41,7 @@ def run(context: typer.Context) -> None:
 
 
 def _with_face(flags: list[str]) -> list[str]:
-    """The flags; in --like the text of a face instead of the name of a robot."""
+    """Returns the flags; in --like the name of a robot is replaced by the text of its face."""
     joined: list[str] = []
     for flag in flags:
         joined.append(f"{joined.pop()}={flag}" if joined and joined[-1] == "--like" else flag)

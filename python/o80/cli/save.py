@@ -11,7 +11,7 @@ def save(
     names: Annotated[list[str], typer.Argument(help="Segments, alive or dead; see o80 list.")],
     output: Annotated[Path, typer.Option("--output", "-o", help="File to write, NAME.mcap.")],
 ) -> None:
-    """Save what segments still hold, also those of robots that have ended or crashed."""
+    """Save the rows that segments still hold, also of robots that have ended or crashed."""
     from o80.base.errors import SegmentError
     from o80.frontend.segments import segments as all_segments
     from o80.recording.recorder import Recorder
@@ -33,7 +33,7 @@ def save(
 def repair(
     path: Annotated[Path, typer.Argument(help="A recording that was cut or damaged.")],
 ) -> None:
-    """Complete a recording whose recorder was killed; of a damaged one, keep what is whole."""
+    """Complete a recording whose recorder was killed; keep the intact parts of a damaged one."""
     from o80.recording.output import all_files_of
     from o80.recording.reader import open as open_recording
     from o80.recording.repairing import REASON, repaired

@@ -80,7 +80,7 @@ def _row(entry: Segment) -> dict[str, Any]:
     try:
         state = _core.backend_state(entry.name)
     except Error:
-        return row  # it has ended since
+        return row  # the backend has ended since
     loop = state.loop
     row |= {
         "robot": state.robot,

@@ -46,7 +46,7 @@ def teleop(
 ) -> None:
     """Move one robot by hand, and another one follows within its limits.
 
-    It follows once both are near to each other. Record demonstrations with `o80 record` beside it.
+    The follower begins once both are near to each other. Record demonstrations with `o80 record`.
     """
     stop = StopRequest()
     from o80.joining.teleoperation import Joint, Teleoperation
@@ -59,7 +59,7 @@ def teleop(
     with (
         attach(leader) as hand,
         attach(follower, read_only=False) as arm,
-        contextlib.ExitStack() as controls,  # a second hand would pull it to and fro
+        contextlib.ExitStack() as controls,  # a second controller would conflict
         _keyboard() as keys,
     ):
         robots = Teleoperation(hand, arm, joints=joints, near=near, silence=silence)
@@ -72,7 +72,7 @@ def teleop(
                 robots.step()
                 session.report()
                 before, halted = halted, arm.halted is not None
-                if before and not halted:  # a watchdog that halts ends it
+                if before and not halted:  # a halt by the watchdog has ended the control
                     controls.close()
                     controls.enter_context(arm.control())
         except BackendGone as error:
@@ -84,16 +84,16 @@ def teleop(
 
 
 class _Session:
-    """The side of the person: what is shown, and marks by keys."""
+    """User interface of a session: shows its state, and makes marks by keys."""
 
     def __init__(self, robots: "Teleoperation", episode: str) -> None:
         self._robots = robots
         self._episode = episode
-        self._open = False  # a demonstration
-        self._shown = 0  # of them
+        self._open = False  # whether a demonstration is open
+        self._shown = 0  # number of demonstrations
         self._reported = ""
         self._report_at = 0.0
-        self._mark("episode_dropped")  # what a session left open that was killed
+        self._mark("episode_dropped")  # drops a demonstration that a killed session left open
 
     def head(self, keys: bool) -> str:
         robots = self._robots
@@ -124,10 +124,10 @@ class _Session:
             self._mark("episode_dropped")
 
     def report(self) -> None:
-        """Says what has changed; distances again and again while it waits."""
+        """Prints changes of the state; distances repeatedly while the follower waits."""
         robots = self._robots
         if not robots.engaged:
-            self._throw_away()  # a demonstration of a robot that follows nobody
+            self._throw_away()  # the follower does not follow
         if robots.engaged:
             state = "follows"
             if self._open:
@@ -149,7 +149,7 @@ class _Session:
         print(f"{begin}{state}", end=end, file=sys.stderr, flush=True)
 
     def end(self) -> None:
-        """Says how late the follower was. What was not ended by a key is thrown away."""
+        """Prints the delay of the follower. Drops a demonstration that no key has ended."""
         with contextlib.suppress(BackendGone):
             self._throw_away()
         self.clear()
@@ -160,7 +160,7 @@ class _Session:
         print(f"{self._demonstrations()}; delay from hand to motor {measured}")
 
     def clear(self) -> None:
-        """Clears the line of the state, in a terminal."""
+        """Clears the line of the state, on a terminal."""
         print(end="\r\033[K" if sys.stderr.isatty() else "", file=sys.stderr, flush=True)
 
     def _demonstrations(self) -> str:
@@ -172,7 +172,7 @@ class _Session:
 
 @contextlib.contextmanager
 def _keyboard() -> Iterator[bool]:
-    """Keys come one by one, without being shown; False where there is no keyboard."""
+    """Makes keys come one by one, without echo; False where there is no keyboard."""
     if not sys.stdin.isatty():
         yield False
         return
@@ -190,7 +190,7 @@ def _keyboard() -> Iterator[bool]:
 
 
 def _pressed() -> str:
-    """The key that was pressed; empty for none."""
+    """Returns the pressed key; empty for none."""
     if not select.select([sys.stdin], [], [], 0)[0]:
         return ""
     return os.read(sys.stdin.fileno(), 1).decode(errors="replace") or "q"

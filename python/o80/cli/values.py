@@ -19,7 +19,7 @@ class RowValues:
         self._actuators: list[str] = [actuator["name"] for actuator in schema["actuators"]]
 
     def plain(self, row: Observation) -> dict[str, Any]:
-        """A row as plain values for JSON; enumerations as labels."""
+        """Converts a row to plain values for JSON; enumerations become labels."""
         return {
             "iteration": row.iteration,
             "time": row.time,
@@ -38,7 +38,7 @@ class RowValues:
         }
 
     def acting(self, row: Observation) -> str:
-        """The actuators that commands drive, those that brake, and those whose plan is starved."""
+        """Names the actuators that are driven, that brake, and whose plan is starved."""
         active, braking, starved = row.active, row.braking, row.starved
         driven = [name for i, name in enumerate(self._actuators) if active[i] and not braking[i]]
         slowing = [name for i, name in enumerate(self._actuators) if braking[i]]
@@ -56,9 +56,9 @@ class RowValues:
         return ", ".join(names[:5]) + rest
 
     def choose(self, plain: dict[str, Any], path: str) -> Any:
-        """One value by its path: "observed.elbow", "extended.effort", "observed.position.0".
+        """Selects a value by its path: "observed.elbow", "extended.effort", "observed.position.0".
 
-        Raises InvalidArgument.
+        Raises InvalidArgument for an unknown path.
         """
         value: Any = plain
         walked = ""
@@ -76,7 +76,7 @@ class RowValues:
         return value
 
     def _steps(self, value: Any) -> dict[str, Any]:
-        """Possible next steps of a path: names of fields and actuators, or indices."""
+        """Returns possible next steps of a path: names of fields and actuators, or indices."""
         if isinstance(value, dict):
             return {name: name for name in value}
         if not isinstance(value, list):
@@ -88,7 +88,7 @@ class RowValues:
 
 
 def _plain(value: Any) -> Any:
-    """Lists, dictionaries and labels; a number without a label stays."""
+    """Converts to lists, dictionaries and labels; a number without a label stays."""
     if isinstance(value, Enumeration):
         return value._texts_.get(int(value), int(value))
     if isinstance(value, list):
@@ -100,7 +100,7 @@ def _plain(value: Any) -> Any:
 
 
 def text(value: Any) -> str:
-    """A plain value in one line."""
+    """Formats a plain value in one line."""
     if isinstance(value, dict):
         return " ".join(f"{name} {_inner(each)}" for name, each in value.items())
     return _inner(value)

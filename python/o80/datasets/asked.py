@@ -1,4 +1,4 @@
-"""Targets that commands asked for in each iteration, from the journal of a recording."""
+"""Reads the targets of commands in each iteration from the journal of a recording."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -10,22 +10,22 @@ import o80._core as _core
 from o80.base.words import Reason
 from o80.rows.columns import Column, columns_of_part
 
-_Piece = tuple[int, float]  # from this iteration on; the value
+_Piece = tuple[int, float]  # first iteration, value
 
 
 class Asked:
     """Targets of the newest command for each number.
 
 
-    A command asks for its target from the iteration in which it is taken. Of a chunk or a
-    trajectory each row is asked for until the iteration in which it is due. A batch that a halt
-    rejects asks too. A purge and a fresh start end what was asked for.
+    A target counts from the iteration in which its command is taken. A row of a chunk or a
+    trajectory counts until the iteration in which it is due. A batch that a halt rejects counts
+    too. A purge and a fresh start end all targets.
     """
 
     def __init__(self, entries: Iterable[_core.JournalEntry], schema: Mapping[str, Any]) -> None:
         self._period = int(schema["period"])
         begin = schema["row"]["desired"]
-        self._numbers: list[list[tuple[str, Column, int]]] = []  # of each actuator
+        self._numbers: list[list[tuple[str, Column, int]]] = []  # numbers of each actuator
         columns = columns_of_part(schema, "desired")
         for actuator in schema["actuators"]:
             count = len(actuator["limits"])
@@ -43,7 +43,7 @@ class Asked:
             self._add(entry)
 
     def at(self, iterations: NDArray[np.int64], columns: Sequence[Column]) -> NDArray[np.float64]:
-        """Values (T, columns) of desired numbers in these iterations; NaN where none was asked."""
+        """Returns targets (T, columns) in these iterations; NaN where there was none."""
         found = np.full((len(iterations), len(columns)), np.nan)
         for i, column in enumerate(columns):
             pieces = self._pieces[column.name]
@@ -86,7 +86,7 @@ class Asked:
                 pieces += zip(begins[used].tolist(), values[used].tolist(), strict=True)
 
     def _begins(self, record: _core.JournalRecord, taken: int) -> NDArray[np.int64]:
-        """The first iteration (rows,) in which each row is asked for."""
+        """Returns the first iteration (rows,) in which each row is the target."""
         rows = max(1, record.rows)
         if record.pace == "chunk":
             due = record.anchor + np.array(record.due, np.int64)
@@ -94,7 +94,7 @@ class Asked:
             due = np.zeros(1, np.int64)
         elif record.row_times:
             due = taken + np.array(record.row_times, np.int64) // self._period
-        else:  # at a speed, when rows are due is not known: one iteration each
+        else:  # at a speed, due times of rows are unknown: one iteration each
             each = record.amount if record.pace == "iterations" else 1
             due = taken + each * np.arange(1, rows + 1) - 1
         begins: NDArray[np.int64] = np.maximum(np.append(taken, due[:-1] + 1), taken)

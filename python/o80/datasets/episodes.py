@@ -1,4 +1,4 @@
-"""The episodes of a recording, from the marks of the program that recorded it.
+"""Finds the episodes of a recording by the marks of the recording program.
 
 The rules are in docs/recording.md, Export for learning.
 """
@@ -27,23 +27,23 @@ if TYPE_CHECKING:
 
 BEGIN, END = "episode", "episode_end"
 """Names of the marks before and after an episode. The first may name a task: "episode: push"."""
-DROPPED = "_dropped"  #: behind the name of the first: a mark that ends an episode which is left out
+DROPPED = "_dropped"  #: suffix of the first name: a mark that ends an episode and drops it
 
 
 @dataclass(frozen=True)
 class Episode:
     """An episode of T steps."""
 
-    rows: History  #: T + 1 rows: what was there before each step, and after the last one
+    rows: History  #: T + 1 rows: before each step, and after the last step
     rewards: NDArray[np.float64]  #: (T,)
-    #: (T,) the iteration of the row by which each action was decided, as `pulse(seen=row)` said (of
-    #: a row of another robot: the newest one of this robot then); -1: not known.
+    #: (T,) iteration of the row on which each action was based, by `pulse(seen=row)` (for a row of
+    #: another robot: the newest row of this robot at that time); -1: not known.
     seen: NDArray[np.int64]
-    #: (T,) the decision latency of each action, from that row to its first one [s]; NaN: not known.
+    #: (T,) decision latency of each action, from that row to its first iteration [s]; NaN: unknown
     delays: NDArray[np.float64]
-    terminated: bool  #: it ended by itself; else it was cut off
+    terminated: bool  #: the episode ended by itself; if not, it was truncated
     task: str
-    values: Mapping[str, Any]  #: of the mark before it
+    values: Mapping[str, Any]  #: values of the mark at its begin
     sensors: Sequence[Column]  #: the columns of `extended`
     _commands: Callable[[], Asked] = field(repr=False)
 
@@ -71,20 +71,20 @@ class Episode:
         return numbers_of(self.rows[1:], columns_of_part(self.rows.schema, "desired"))
 
     def asked(self, columns: Sequence[Column]) -> NDArray[np.float64]:
-        """Targets (T, columns) that commands asked for at the ends of the steps, of columns of
-        desired numbers; NaN where none did.
+        """Returns the commands' targets (T, columns) at the ends of the steps, for columns of
+        desired numbers; NaN where there was no target.
         """
         return self._commands().at(self.rows.iteration[1:], columns)
 
 
 @dataclass(frozen=True)
 class Episodes:
-    """The episodes of one robot, and those that could not be used."""
+    """Episodes of one robot, and the reasons for episodes that could not be used."""
 
     segment: str
     robot: str
     frequency: float  #: steps a second [1/s]
-    names: Mapping[str, Sequence[str]]  #: of the numbers in desired, observed and extended
+    names: Mapping[str, Sequence[str]]  #: names of the numbers in desired, observed and extended
     all: Sequence[Episode]
     left_out: Sequence[str]  #: why an episode, or the end of one, is missing: a sentence for each
 
@@ -98,14 +98,14 @@ def episodes_of(
     end: str = END,
     fields: Sequence[str] = (),
 ) -> Episodes:
-    """The episodes of one segment of a recording.
+    """Finds the episodes of one segment of a recording.
 
-    segment: may be left out if there is only one with actuators.
-    every: a step is so many iterations, or as a float so long [s].
+    segment: may be left out if only one segment has actuators.
+    every: length of a step in iterations, or as a float in seconds.
     begin, end: names of the marks before and after an episode.
-    fields: of the sensor values, such as "measured.velocity" (empty: all but times of clocks, and
-        what a twin lacks).
-    Raises InvalidArgument.
+    fields: names of sensor values such as "measured.velocity" (empty: all except clock times and
+        values that a twin lacks).
+    Raises InvalidArgument for an unknown segment or field, or wrong rewards.
     """
     robot = recording[_segment(recording, segment)]
     epochs = [epoch for epoch in robot.epochs if epoch.rows]
@@ -148,14 +148,14 @@ def episodes_of(
 @dataclass(frozen=True)
 class _Span:
     number: int
-    marks: Sequence["Mark"]  #: the one before it, and those in it
+    marks: Sequence["Mark"]  #: the mark at its begin, and marks in it
     until: "Mark | None"  #: the mark at which it ends
-    ending: "Mark | None"  #: that, if it is a mark for the end
-    dropped: bool  #: whether it is not wanted
+    ending: "Mark | None"  #: `until`, if it is an end mark
+    dropped: bool  #: whether the program dropped it
 
 
 def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Iterator[_Span]:
-    """Where the marks say that episodes begin and end."""
+    """Yields the spans between marks that begin and end episodes."""
     open_at: list[Mark] = []
     number = 0
     for mark in marks:
@@ -176,7 +176,7 @@ def _spans(marks: Sequence["Mark"], segment: str, begin: str, end: str) -> Itera
 
 
 def _misspelt(marks: Sequence["Mark"], segment: str) -> list[str]:
-    """Sentences about marks with misspelt names of episode marks."""
+    """Returns sentences about marks with misspelt names of episode marks."""
     return [
         f"the mark '{mark.name}' at row {mark.rows[segment]}, which neither begins nor ends an "
         f"episode: marks are '{BEGIN}', '{BEGIN}: TASK', '{END}' and '{BEGIN}{DROPPED}'"
@@ -198,7 +198,7 @@ def _episode(
     fields: Sequence[str],
     left_out: list[str],
 ) -> Episode:
-    """Raises InvalidArgument if its rows are not all there."""
+    """Makes an episode. Raises InvalidArgument if it was dropped or rows are missing."""
     mark = span.marks[0]
     where = f"episode {span.number} (mark at row {mark.rows[segment]})"
     if span.dropped:
@@ -256,7 +256,7 @@ class _Orders:
     """The batches with commands that were taken, and the fresh starts, oldest first."""
 
     taken: NDArray[np.int64]  #: (N,) the iteration
-    since: NDArray[np.int64]  #: (N,) the row that the batch answers; -1: not known, or none
+    since: NDArray[np.int64]  #: (N,) row on which the batch was based; -1: not known, or none
 
     @classmethod
     def of(cls, entries: "Iterable[_core.JournalEntry]") -> "_Orders":
@@ -275,9 +275,9 @@ class _Orders:
     def decided(
         self, iterations: NDArray[np.int64], run: History
     ) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-        """`seen` and `delays` of the newest batch that was taken at each of these iterations."""
+        """Returns `seen` and `delays` of the newest batch taken at each of these iterations."""
         newest = np.searchsorted(self.taken, iterations, side="right") - 1
-        seen: NDArray[np.int64] = np.append(self.since, -1)[newest]  # the last one: none yet
+        seen: NDArray[np.int64] = np.append(self.since, -1)[newest]  # index -1: no batch yet
         taken = np.append(self.taken, 0)[newest]
         known = seen >= 0
         delays = np.where(known, (taken - seen) * run.schema["period"] * 1e-9, np.nan)
@@ -288,14 +288,14 @@ class _Orders:
 
 
 def _times(rows: History, iterations: NDArray[np.int64]) -> NDArray[np.float64]:
-    """Times of the rows of these iterations [s]; NaN where one is missing."""
+    """Returns times of the rows of these iterations [s]; NaN for a missing row."""
     at = np.minimum(np.searchsorted(rows.iteration, iterations), len(rows) - 1)
     times = (rows.time[at] - rows.time[0]) * 1e-9
     return np.where(rows.iteration[at] == iterations, times, np.nan)
 
 
 def _epoch_at(mark: "Mark", epochs: Sequence["RecordedEpoch"]) -> "RecordedEpoch":
-    """The run of the robot that was recorded when a mark was made."""
+    """Returns the run that was being recorded at the time of a mark."""
     begun = [epoch for epoch in epochs if epoch.recorded_at <= mark.time]
     return begun[-1] if begun else epochs[0]
 
@@ -324,7 +324,7 @@ def _is_number(value: object) -> bool:
 def _rewards(
     span: _Span, ending: "Mark | None", segment: str, every: int, steps: int
 ) -> NDArray[np.float64]:
-    """The reward of each step: `rewards` of the last mark, or the sum of `reward` of all marks."""
+    """Returns each step's reward: `rewards` of the last mark, or sums of `reward` of marks."""
     rewards = np.zeros(steps)
     given = ending.values.get("rewards") if ending is not None else None
     if given:
@@ -357,7 +357,7 @@ def _segment(recording: "RecordingFile", segment: str | None) -> str:
 
 
 def _sensors(segment: str, schema: dict[str, Any], fields: Sequence[str]) -> list[Column]:
-    """The sensor values that a learner gets; by default no times, and nothing that is absent."""
+    """Chooses the sensor values for a learner; by default no times and no absent values."""
     every = columns_of_part(schema, "extended")
     if not fields:
         times = ("capture_time", "capture_error")

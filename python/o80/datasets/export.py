@@ -1,4 +1,4 @@
-"""Histories as files of other formats, one column a number."""
+"""Writes histories to files of other formats, one column for each number."""
 
 import csv
 import math
@@ -22,16 +22,16 @@ Labels = dict[str, dict[int, str]]
 def write(
     path: Path, histories: Mapping[str, History], fields: Sequence[str] = (), say: Say = warn
 ) -> None:
-    """Writes histories, by name, in the format that the suffix of the path names.
+    """Writes histories, by name, in the format of the path's suffix.
 
     fields: such as "observed.elbow", "elbow" or "extended" (empty: all); iteration and time are
         always written.
 
     .npz: arrays `name/column`. .h5, .hdf5: a group per name with a dataset per column. .csv,
     .parquet: one table; only for a single history. In .csv numbers that are not finite are empty
-    cells, and `say` gets a sentence about them. Enumerations are numbers. Their labels are in an
-    array `name/column.labels` of (label, number), in the HDF5 type of the dataset, or as JSON in
-    the metadata `labels` of the column of Parquet. Raises InvalidArgument, MissingExtra, OSError.
+    cells, reported to `say`. Enumerations are numbers; their labels are in an array
+    `name/column.labels` of (label, number), in the dataset's HDF5 type, or as JSON in the metadata
+    `labels` of Parquet's column. Raises InvalidArgument (format, field), MissingExtra, OSError.
     """
     if path.suffix not in WRITERS:
         known = ", ".join(WRITERS)
@@ -50,12 +50,12 @@ def write(
 
 
 def _count(values: NDArray[Any]) -> int:
-    """How many are not finite."""
+    """Counts the numbers that are not finite."""
     return int(np.count_nonzero(~np.isfinite(values))) if values.dtype.kind == "f" else 0
 
 
 def labels_in(history: History) -> Labels:
-    """The labels of the columns with an enumeration, by number."""
+    """Returns the labels of columns with enumerations, by number."""
     return {
         column.name: {number: label for label, number in reversed(column.labels.items())}
         for column in columns_of(history.schema)

@@ -1,6 +1,6 @@
-"""Episodes as a LeRobot data set: its documented format v3.0, Parquet tables and JSON.
+"""Writes episodes as a LeRobot data set: its documented format v3.0, Parquet tables and JSON.
 
-Written without LeRobot, which is large; it reads the result:
+Writing does not need LeRobot, which is large; LeRobot reads the result:
 `LeRobotDataset("o80/NAME", root=path)`.
 """
 
@@ -27,7 +27,7 @@ DATA = "data/chunk-{chunk_index:03d}/file-{file_index:03d}.parquet"
 EPISODES = "meta/episodes/chunk-000/file-000.parquet"
 TASKS = "meta/tasks.parquet"
 EXTRA = "complementary_info."
-"""Begin of the names of what no policy gets: LeRobot gives it all `observation` and `action`."""
+"""Prefix of columns for no policy: LeRobot gives policies all `observation` and `action`."""
 Columns = dict[str, NDArray[Any]]
 
 
@@ -42,17 +42,17 @@ def write(
     units: Units | None = None,
     action_is: Literal["acted", "asked"] = "acted",
 ) -> None:
-    """Writes a folder, which must not exist.
+    """Writes a folder, which must not exist; docs/lerobot.md lists all columns.
 
     state, action: actuators or fields of their states in observation.state, which is observed, and
         in action (empty: all).
     sensors: sensor values in observation.environment_state, also "observed" (empty: none).
     units: of states and actions: "degrees", "normalised" or "native" (None: those of LeRobot's
         driver of this arm, else "native").
-    action_is: "acted": the desired states that were reached with the step; "asked": the targets of
-        the commands. The other one is complementary_info.action_asked or .action_acted.
+    action_is: "acted": the desired states at the end of the step; "asked": the targets of the
+        commands. The other actions are in complementary_info.action_asked or .action_acted.
 
-    docs/lerobot.md lists the other columns. Raises InvalidArgument, MissingExtra, OSError.
+    Raises InvalidArgument for an existing folder or unknown fields, MissingExtra, OSError.
     """
     needed("pyarrow", "export", "a LeRobot data set")
     if path.exists():
@@ -82,12 +82,12 @@ def write(
 
 @dataclass(frozen=True)
 class _Chosen:
-    """Numbers of the rows that the data set holds."""
+    """Chosen numbers of the rows, for the columns of the data set."""
 
     state: Sequence[Number]
     action: Sequence[Number]
     sensors: Sequence[Number]
-    captures: Mapping[str, Column | None]  #: stamps by what was captured; None: the row's own time
+    captures: Mapping[str, Column | None]  #: capture times by origin; None: the row's own time
     action_is: Literal["acted", "asked"]
 
     @classmethod
@@ -130,7 +130,7 @@ class _Chosen:
         return f"{EXTRA}action_{'asked' if self.action_is == 'acted' else 'acted'}"
 
     def columns(self, episode: Episode) -> Columns:
-        """Values of an episode: (T,) or (T, numbers)."""
+        """Returns the columns of an episode: (T,) or (T, numbers)."""
         rows = episode.rows[:-1]
         acted = episode.rows[1:]
         wanted = [number.column for number in self.action]
@@ -158,14 +158,14 @@ class _Chosen:
 
 
 def _observed(rows: History, numbers: Sequence[Number]) -> NDArray[np.float64]:
-    """Numbers of rows (T, numbers) in LeRobot's units."""
+    """Returns numbers of rows (T, numbers) in LeRobot's units."""
     return values_in(numbers, numbers_in(rows, [number.column for number in numbers]))
 
 
 def _not_finite(
     features: Mapping[str, dict[str, Any]], frames: Sequence[Columns]
 ) -> dict[str, int]:
-    """How many values of each number are not finite."""
+    """Counts the values of each number that are not finite."""
     found = {}
     for name, each in features.items():
         values = np.concatenate([columns[name] for columns in frames])
@@ -176,7 +176,7 @@ def _not_finite(
 
 
 def _features(episodes: Episodes, numbers: _Chosen) -> dict[str, dict[str, Any]]:
-    """Every column of the frames: type, shape, and the names of its numbers."""
+    """Describes every column of the frames: type, shape, names of its numbers."""
     action = [number.name for number in numbers.action]
     sensors = [number.name for number in numbers.sensors]
     captures = list(numbers.captures)
@@ -206,7 +206,7 @@ def _features(episodes: Episodes, numbers: _Chosen) -> dict[str, dict[str, Any]]
 
 
 def _indices(episode: Episode, number: int, first: int, task: int, frequency: float) -> Columns:
-    """Columns (T,) that place the frames of an episode. Times are k / fps, as LeRobot checks."""
+    """Returns columns (T,) that place an episode's frames; times k / fps, as LeRobot checks."""
     steps = np.arange(len(episode))
     return {
         "next.reward": episode.rewards,
@@ -220,12 +220,12 @@ def _indices(episode: Episode, number: int, first: int, task: int, frequency: fl
 
 
 def _typed(columns: Columns, features: Mapping[str, Any]) -> Columns:
-    with np.errstate(over="ignore"):  # what is too large for 32 bits is infinite, and is said
+    with np.errstate(over="ignore"):  # too large numbers become infinite, which is reported
         return {name: columns[name].astype(each["dtype"]) for name, each in features.items()}
 
 
 def _row(episode: Episode, number: int, first: int, columns: Columns) -> dict[str, Any]:
-    """Row about an episode: where its frames are, and their statistics."""
+    """Makes the table row of an episode: place of its frames, and their statistics."""
     row: dict[str, Any] = {
         "episode_index": number,
         "tasks": [episode.task],
@@ -243,7 +243,7 @@ def _row(episode: Episode, number: int, first: int, columns: Columns) -> dict[st
 
 
 def _stats(values: NDArray[Any]) -> dict[str, list[float | None]]:
-    """Statistics of the finite values of each number of a column; None if it has none."""
+    """Computes statistics of the finite values of each number in a column; None without any."""
     numbers = values.reshape(len(values), -1).astype(np.float64)
     finite = [number[np.isfinite(number)] for number in numbers.T]
 
@@ -280,7 +280,7 @@ def _info(episodes: Episodes, features: Mapping[str, Any], frames: int, tasks: i
 
 
 def _write_frames(path: Path, frames: list[Columns], features: Mapping[str, Any]) -> None:
-    """One row group for each episode, so that readers can take one."""
+    """Writes one row group for each episode, so that readers can read one episode."""
     import pyarrow as arrow
     import pyarrow.parquet as parquet
 
@@ -323,7 +323,7 @@ def _write_table(path: Path, rows: list[dict[str, Any]]) -> None:
 
 
 def _write_tasks(path: Path, tasks: list[str]) -> None:
-    """A table whose index, as pandas stores it, is the text of the task."""
+    """Writes a table whose index, as stored by pandas, is the text of the task."""
     import pyarrow as arrow
     import pyarrow.parquet as parquet
 

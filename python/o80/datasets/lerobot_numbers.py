@@ -1,4 +1,4 @@
-"""Numbers of a robot as LeRobot names and scales them: "elbow_flex.pos" in degrees."""
+"""Names and scales a robot's numbers as LeRobot does: "elbow_flex.pos" in degrees."""
 
 import math
 import re
@@ -24,23 +24,23 @@ _RANGES = re.compile(r"calibrated ranges ([\d. ]+) rad$")
 class Number:
     """A number of an actuator's state: its place in a row, its name and unit in LeRobot."""
 
-    name: str  #: LeRobot's: the actuator's name and ".pos", or the path of a field
+    name: str  #: name in LeRobot: the actuator's name and ".pos", or the path of a field
     column: Column
     actuator: str
     field: str  #: path in the state; empty: the state is this number
     scale: float  #: LeRobot's unit per unit of the row
-    lowest: float  #: at which LeRobot's drivers clip their readings, in LeRobot's unit
+    lowest: float  #: limits at which LeRobot's drivers clip readings, in LeRobot's unit
     highest: float
     minimum: float  #: limits of the robot, in the unit of the row
     maximum: float
 
     def of_row(self, value: Any) -> Any:
-        """Values of rows in LeRobot's unit, clipped as LeRobot's drivers do."""
+        """Converts values of rows to LeRobot's unit, clipped as by LeRobot's drivers."""
         return np.clip(np.asarray(value, np.float64) * self.scale, self.lowest, self.highest)
 
 
 def usual_units(schema: Mapping[str, Any]) -> Units:
-    """Units of LeRobot 0.4.4's driver of this arm, else "native"."""
+    """Returns the units of LeRobot 0.4.4's driver of this arm, else "native"."""
     if tuple(each["name"] for each in schema["actuators"]) != JOINTS:
         return "native"
     return "normalised" if schema["robot"].startswith("koch") else "degrees"
@@ -52,14 +52,14 @@ def numbers_of(
     units: Units | None = None,
     fields: Sequence[str] = (),
 ) -> list[Number]:
-    """Numbers of the actuators' states, in the order of the actuators.
+    """Returns the numbers of the actuators' states, in the order of the actuators.
 
     units: "degrees" for angles in radians; "normalised" for -100 to 100 over the calibrated range;
-        both with openings of 0 to 1 as 0 to 100; "native": as they are in rows (None: those of
+        in both, openings of 0 to 1 become 0 to 100; "native": as in rows (None: the units of
         LeRobot's driver of this arm, else "native").
     fields: only these, such as "elbow_flex" (empty: all).
 
-    Raises InvalidArgument for a field that the robot lacks, and where "normalised" lacks the range.
+    Raises InvalidArgument for an unknown field, and for "normalised" without a calibrated range.
     """
     units = units or usual_units(schema)
     if units not in get_args(Units):
@@ -92,18 +92,18 @@ def numbers_of(
 
 
 def sensor(column: Column) -> Number:
-    """A sensor value, as it is in rows."""
+    """Makes the number of a sensor value, unscaled."""
     name = column.name.removeprefix("extended.")
     return Number(name, column, "", "", 1.0, -math.inf, math.inf, -math.inf, math.inf)
 
 
 def _short(field: str) -> str:
-    """LeRobot's ending of a number: positions are "pos", velocities "vel"."""
+    """Returns LeRobot's suffix for a number: "pos" for positions, "vel" for velocities."""
     return {"": "pos", "position": "pos", "velocity": "vel"}.get(field, field)
 
 
 def _range(schema: Mapping[str, Any], index: int) -> float:
-    """Calibrated range of an actuator [rad], as the driver says it in the help of its joints."""
+    """Reads an actuator's calibrated range [rad] from the help of its joints in the schema."""
     first = 0
     for group in schema["groups"]:
         said = _RANGES.search(group["type"]["fields"][0].get("help", ""))
@@ -118,6 +118,6 @@ def _range(schema: Mapping[str, Any], index: int) -> float:
 
 
 def values_in(numbers: Sequence[Number], columns: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Values (T, numbers) of rows in LeRobot's units."""
+    """Converts values (T, numbers) of rows to LeRobot's units."""
     each = [number.of_row(columns[:, i]) for i, number in enumerate(numbers)]
     return np.stack(each, axis=1) if each else np.empty((len(columns), 0))

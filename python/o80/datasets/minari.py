@@ -1,4 +1,4 @@
-"""Episodes as a Minari data set, written by Minari itself."""
+"""Writes episodes as a Minari data set, by means of Minari itself."""
 
 from pathlib import Path
 
@@ -14,7 +14,7 @@ def write(path: Path, episodes: Episodes, say: Say = warn) -> None:
     """Writes a folder, which must not exist: `minari.MinariDataset(path / "data")` reads it.
 
     An observation is the observed numbers, then the sensor values; an action the desired numbers.
-    Raises InvalidArgument, MissingExtra, OSError.
+    Raises InvalidArgument for an existing folder, MissingExtra, OSError.
     """
     minari = needed("minari", "minari", "a Minari data set")
     needed("h5py", "minari", "a Minari data set")
@@ -26,7 +26,7 @@ def write(path: Path, episodes: Episodes, say: Say = warn) -> None:
         raise InvalidArgument(f"{path} exists: a data set is written to a new folder")
     size = len(episodes.names["observed"]) + len(episodes.names["extended"])
     actions = len(episodes.names["desired"])
-    data = path.absolute() / "data"  # of a relative one Minari makes two
+    data = path.absolute() / "data"  # Minari would create a relative path twice
     data.mkdir(parents=True)
     storage = MinariStorage.new(
         data,

@@ -1,4 +1,4 @@
-"""Drivers in Python: a class with the verbs of a driver becomes a robot.
+"""Drivers in Python: a class with the methods of a driver becomes a robot.
 
 class Thermometer:
     extended = {"temperature": float}

@@ -1,4 +1,4 @@
-"""One driver object as the compiled loop calls it."""
+"""Connects one driver object to the compiled loop."""
 
 import inspect
 import traceback
@@ -20,7 +20,7 @@ NANOSECOND = 1e-9
 
 
 def fault_of(error: BaseException) -> str:
-    """The text that frontends read of an exception of a driver."""
+    """Returns the text that frontends get for an exception of a driver."""
     if isinstance(error, (DriverFaultError, Error)):
         return str(error)
     text = exception_text(error)
@@ -32,10 +32,10 @@ def fault_of(error: BaseException) -> str:
 
 
 class Adapter:
-    """Holds the memory through which rows pass, and calls the verbs.
+    """Holds the memory through which rows pass, and calls the methods of the driver.
 
     The compiled loop fills `desired_block` and `active_words` before `write`, fills
-    `observed_block` and `extended_block` before `read`, and takes them after it; `fresh_block` has
+    `observed_block` and `extended_block` before `read`, and reads these after it; `fresh_block` has
     the desired states of a fresh start.
     """
 
@@ -45,7 +45,7 @@ class Adapter:
         self.period = 0
 
     def describe(self, requested: int) -> _core.SchemaBuilder:
-        """The schema of the driver. requested: period that the user gave [ns]; 0: none."""
+        """Describes the driver as a schema. requested: period from the user [ns]; 0: none."""
         self.period = self._period(requested)
         writer = SchemaWriter.of(self._name, self._given)
         if not isinstance(simulated := self._given("simulated", False), bool):
@@ -59,7 +59,7 @@ class Adapter:
         return writer.builder
 
     def give_differences(self, differences: Differences) -> None:
-        """Takes the differences for `Desired.rate`; call it after describe()."""
+        """Stores the differences for `Desired.rate`; call it after describe()."""
         self._desired.differences = differences
 
     def _given(self, name: str, default: Any = None) -> Any:
@@ -80,7 +80,7 @@ class Adapter:
         return period
 
     def _make_blocks(self, layout: Layout) -> None:
-        """Memory for the states and the sensor values of a row."""
+        """Allocates the states and the sensor values of a row."""
         schema = layout.schema
         actuators = [row["name"] for row in schema["actuators"]]
         self._requests: list[Mapping[str, Any]] = schema["requests"]
@@ -158,7 +158,7 @@ class Adapter:
 
 
 def check_verbs(driver: type[Any]) -> None:
-    """Raises InvalidArgument for a verb that is missing or takes other arguments."""
+    """Raises InvalidArgument if a method is missing or takes other arguments."""
     wanted = {
         "start": (),
         "write": ("desired",),

@@ -1,4 +1,4 @@
-"""The side that iterates, inside a Python program."""
+"""Backends whose loop runs inside a Python program."""
 
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -38,7 +38,7 @@ class StartAfresh:
 class Running:
     """Returned by the handler of a request that runs until `Backend.end_request`.
 
-    progress: text that frontends see meanwhile; `Backend.progress` changes it.
+    progress: text for frontends while it runs; `Backend.progress` changes it.
     """
 
     progress: str = ""
@@ -48,7 +48,7 @@ class Running:
 
 
 def check_end(answer: StartAfresh | None, rejected: str | None) -> None:
-    """Checks how a request ends. Raises InvalidArgument."""
+    """Raises InvalidArgument for a wrong answer, a wrong text, or both together."""
     if answer is not None and not isinstance(answer, StartAfresh):
         raise InvalidArgument(
             f"answer must be None or o80.StartAfresh(...), got {answer!r}; to reject the "
@@ -81,30 +81,30 @@ class Backend(lifecycle.Managed):
         an IntEnum, or a mapping from field names to these.
     extended: dtype (or mapping) of further sensor values.
     requests: names of the requests it serves, each with the dtype of its fields, or None; see `on`.
-        Its fields have no defaults: the sender must give all of them.
+            The fields have no defaults: the sender must give all of them.
     limits: of actuators: o80.Limits, or (minimum, maximum, speed, ...), of the first number of the
         state, or a mapping from fields to these; None is no limit.
-    rests_at: of actuators: a mapping from fields to the values to which they go without a command
-        (a velocity to 0).
+    rests_at: of actuators: a mapping from fields to the values that they approach without a command
+        (a velocity: 0).
     when_idle: "hold" or "follow", for all actuators or a mapping from each.
     units: of fields, by their name or by "group.field".
-    frequency: iterations a second [1/s] (None: 1000). The program keeps the pace itself; bursting,
-        it is that of simulated time.
-    bursting: `step` waits until a frontend asks for iterations.
-    robot: what it calls itself (None: as the segment).
+    frequency: iterations a second [1/s] (None: 1000). The program keeps the pace itself; with
+        `bursting` it is the frequency of simulated time.
+    bursting: `step` waits until a frontend requests iterations.
+    robot: name of the robot (None: that of the segment).
     history: observations kept (None: as many as 16 MiB hold, 100000 at most).
     while_halted: requests that are served during a halt too, because they move nothing.
     lanes, lane_blocks, journal, permission, stale, silence, resume: as for
         `o80.robots.Robot.start`.
-    model: what `o80 view` draws: the path of an MJCF file, or its text.
-    joints: of the model, each with what moves it: an actuator, whose state must begin with a
+    model: model for `o80 view`: the path of an MJCF file, or its text.
+    joints: joints of the model, each with its source: an actuator, whose state must begin with a
         float64, or (field, index) of an extended field of float64.
     max_overruns: halt when so many rows within a second come half a period late, or later.
-    accept_reading: begin where the robot is read to be, even if it cannot have come there.
+    accept_reading: begin at the read position, even if the robot cannot have reached it.
 
-    Leaving a `with` block by an exception ends it as failed: frontends raise its text.
-    Used by one thread; `stop` and `close` may come from any. Raises SegmentTaken, SegmentError,
-    InvalidArgument.
+    An exception that leaves the `with` block ends the backend as failed: frontends raise its text.
+    One thread uses it; any thread may call `stop` and `close`. Raises SegmentTaken if the name is
+    taken, SegmentError if there is no memory, InvalidArgument for a wrong description.
     """
 
     def __init__(
@@ -144,7 +144,7 @@ class Backend(lifecycle.Managed):
         self._layout = Layout(native.description)
         self._segment = segment
         self._handlers: dict[str, Handler] = {}
-        self._fresh_start: StartAfresh | None = None  # of a request that has ended
+        self._fresh_start: StartAfresh | None = None  # answer of a request that has ended
         self._halt_handlers: dict[str, Callable[[], None]] = {}
         self._observed = self._layout.labelled_states(native.observed)
         self._fresh_desired = self._layout.labelled_states(native.fresh_desired)
@@ -169,9 +169,9 @@ class Backend(lifecycle.Managed):
             leaves out, keep the values of the row before.
 
         Raises InvalidArgument if row 0 has a number that is NaN, infinite or, in real time, too far
-        outside its bounds: publish it again when the robot reads. In real time also if the robot
-        cannot have come from row 0 to the next reading: one of the two is wrong, and the backend
-        ends.
+        outside its bounds: publish it again when the reading is right. In real time also if the
+        robot cannot have moved from row 0 to the next reading: one of the two is wrong, and the
+        backend ends.
         """
         native = self._open
         if observed is not None:
@@ -185,9 +185,9 @@ class Backend(lifecycle.Managed):
         `stop`.
 
         In bursting mode it waits until a frontend requests iterations, and raises TimeoutError
-        after `timeout` [s]. It calls the handlers of requests. An exception of a handler (other
-        than RequestRejected) is raised here, and so is InvalidArgument for a StartAfresh with NaN
-        or infinite numbers: then close the backend.
+        after `timeout` [s]. It calls the handlers of requests. If a handler raises (other than
+        RequestRejected) or returns a StartAfresh with NaN or infinite numbers, `step` raises that
+        exception or InvalidArgument: then close the backend.
         """
         native = self._open
         if self._fresh_start is not None:
@@ -202,8 +202,8 @@ class Backend(lifecycle.Managed):
     def on(self, request: str, handler: Handler) -> None:
         """Sets the handler of a request, which is called between two iterations with its fields.
 
-        It returns None, StartAfresh if the robot jumped, or Running if it takes time. To reject the
-        request it raises RequestRejected; the sender reads the text.
+        The handler returns None, StartAfresh if the robot jumped, or Running if the request takes
+        time. It raises RequestRejected to reject the request; the sender reads the text.
         """
         index = self._index_of(request)
         self._open.check()
@@ -212,12 +212,12 @@ class Backend(lifecycle.Managed):
     def running(self, request: str) -> bool:
         """True if a request was answered with Running and has not ended.
 
-        A halt ends it, unless it is one of `while_halted`: the program must then stop the motion.
+        A halt ends it, unless it is in `while_halted`: the program must then stop the motion.
         """
         return self._open.runs(self._index_of(request))
 
     def progress(self, request: str, text: str) -> None:
-        """Sets the text that frontends see while a request runs: at most 247 bytes."""
+        """Sets the text that frontends get while a request runs: at most 247 bytes."""
         self._open.show_progress(self._index_of(request), argument_checks.text(text, "progress"))
 
     def end_request(
@@ -226,10 +226,10 @@ class Backend(lifecycle.Managed):
         """Ends a request that was answered with Running.
 
         answer: None, or StartAfresh if the robot jumped: the next step makes a fresh start, and the
-            request ends with the row of that.
+            request ends with the row of this fresh start.
         rejected: the reason of its failure, for the sender.
 
-        It ends with the row that is published next. No effect if it does not run any more.
+        Without a jump it ends with the next published row. No effect if it does not run any more.
         """
         index = self._index_of(request)
         check_end(answer, rejected)
@@ -249,7 +249,7 @@ class Backend(lifecycle.Managed):
         self._halt_handlers["halt"] = handler
 
     def on_resume(self, handler: Callable[[], None]) -> None:
-        """Sets a function to call before a halt is cleared; it raises RequestRejected to keep it.
+        """Sets a function to call before a halt is cleared; RequestRejected in it keeps the halt.
 
         Desired states then continue from the last observed states.
         """
@@ -259,8 +259,8 @@ class Backend(lifecycle.Managed):
     def halt(self, reason: str = "") -> None:
         """Halts: commands end, actuators brake, nothing moves until a frontend resumes.
 
-        In force from the first `step` begun after it. May be called from any thread. The same
-        reason again is the same halt; another reason is another halt.
+        The halt is in force from the next `step` on. May be called from any thread. A call with the
+        same reason belongs to the same halt; another reason is another halt.
         """
         self._open.halt(reason)
         argument_checks.text(reason, "the reason of a halt")
@@ -366,12 +366,12 @@ class Server:
         return True
 
     def halt(self) -> None:
-        """Called when a halt begins."""
+        """Calls the handler of on_halt, when a halt begins."""
         if handler := self._halt_handlers.get("halt"):
             nothing(handler(), "the handler of on_halt")
 
     def resume(self) -> str | None:
-        """Called before a halt is cleared; returns the reason to keep it, or None."""
+        """Calls the handler of on_resume; returns its reason to keep the halt, or None."""
         self._desired[...] = self._observed
         handler = self._halt_handlers.get("resume")
         if handler is None:
@@ -410,7 +410,7 @@ def fill(block: NDArray[Any], values: Any, what: str) -> None:
             if names is None or name not in names:
                 instead = _core.names_instead(str(name), list(names or ()))
                 raise InvalidArgument(f"{what} has no field {name!r}{instead}")
-            if isinstance(value, Mapping):  # NumPy would take it for one value, which is true
+            if isinstance(value, Mapping):  # NumPy would treat it as one value, which is true
                 fill(block[name], value, f"{what}.{name}")
                 continue
             try:

@@ -20,7 +20,7 @@ Limit = Limits | Sequence[float | None]
 
 
 def numbered(name: str | int, known: Sequence[str], what: str) -> int:
-    """The number of an actuator or a request, by its name or number. Raises InvalidArgument."""
+    """Returns the number of an actuator or a request. Raises InvalidArgument if unknown."""
     if isinstance(name, str):
         if name in known:
             return known.index(name)
@@ -38,7 +38,7 @@ class SchemaWriter:
 
     @classmethod
     def of(cls, robot: str, given: Callable[[str, Any], Any]) -> "SchemaWriter":
-        """The schema of a backend. given: arguments of `o80.Backend` by name and default."""
+        """Makes the schema of a backend. given: returns arguments of `o80.Backend` by name."""
 
         def named(name: str, holds: str) -> Mapping[Any, Any]:
             return mapping(given(name, None), name, holds)
@@ -56,7 +56,7 @@ class SchemaWriter:
         return writer
 
     def add_actuators(self, actuators: Any, dtype: Described) -> None:
-        """Adds actuators: their names, their number, or a mapping from groups to their members."""
+        """Adds actuators by names, by number, or by a mapping from groups to their members."""
         if isinstance(actuators, Mapping):
             for group, members in actuators.items():
                 self._add_group(group, members)
@@ -77,7 +77,7 @@ class SchemaWriter:
             )
 
     def _add_group(self, group: str, members: Any) -> None:
-        """Adds a group. members: a type (one actuator), (type, how many), or (type, names)."""
+        """Adds a group. members: a type (one actuator), (type, number), or (type, names)."""
         if not (isinstance(members, tuple) and len(members) == 2):
             self.builder.add_actuators(group, self._type(group, members), 1, False)
             return
@@ -103,7 +103,7 @@ class SchemaWriter:
     ) -> None:
         """Adds requests, each with its fields (None: no fields).
 
-        while_halted: names of those that are also served while the robot is halted.
+        while_halted: names of requests that are also served while the robot is halted.
         """
         for name in while_halted:
             if name not in requests:
@@ -129,7 +129,7 @@ class SchemaWriter:
                 )
 
     def set_rests(self, rests: Mapping[Any, Mapping[str, float]]) -> None:
-        """Sets the values to which fields of actuators go without a command."""
+        """Sets the values that fields of actuators approach without a command."""
         for named, fields in rests.items():
             for field, value in fields.items():
                 rest = argument_checks.number(value, f"rests_at of {field!r} of actuator {named!r}")
@@ -153,7 +153,7 @@ class SchemaWriter:
         model: str | os.PathLike[str] | None,
         joints: Mapping[str, int | str | tuple[str, int]],
     ) -> None:
-        """Sets the model that viewers draw, and what moves its joints."""
+        """Sets the model for viewers, and the source of each joint's position."""
         if model is None:
             if joints:
                 raise InvalidArgument("joints were given without a model: give model too")
@@ -213,7 +213,7 @@ class SchemaWriter:
 
 
 def _text_of(model: Path) -> str:
-    """The text of an MJCF file."""
+    """Reads the text of an MJCF file. Raises InvalidArgument if it is unreadable."""
     try:
         return model.read_text()
     except (OSError, UnicodeDecodeError) as error:

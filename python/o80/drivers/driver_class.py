@@ -1,4 +1,4 @@
-"""A driver class in Python as a robot: found by "module:Class", described for the compiled loop."""
+"""Makes a driver class in Python a robot: finds it by "module:Class", describes it for C++."""
 
 import importlib
 import importlib.util
@@ -15,12 +15,12 @@ from o80.base.errors import DriverError, Error, InvalidArgument
 from o80.drivers.adapter import Adapter, check_verbs
 from o80.drivers.option import Options
 
-#: the driver that this process imports, if it is the process of a robot
+#: place of the driver that this process is importing, if it is the process of a robot
 imported_to_run = ""
 
 
 def found_to_run(place: str) -> type[Any]:
-    """As `found`, in the process of that robot; there the import may start no further robot."""
+    """Calls `found` in the process of that robot, where the import may start no other robot."""
     global imported_to_run
     imported_to_run = place
     try:
@@ -30,15 +30,15 @@ def found_to_run(place: str) -> type[Any]:
 
 
 def found(place: str) -> type[Any]:
-    """The class at "module:Class" or "file.py:Class". Raises DriverError."""
+    """Imports the class at "module:Class" or "file.py:Class". Raises DriverError if it fails."""
     driver: type[Any] = imported(place, "driver", DriverError, type)
     return driver
 
 
 def imported(place: str, what: str, failure: type[Error], *kinds: type[Any]) -> Any:
-    """The object at "module:name" or "file.py:name", of one of these kinds. Raises `failure`.
+    """Imports the object at "module:name" or "file.py:name". Raises `failure` for other kinds.
 
-    what: noun for the message.
+    what: noun for the error message.
     """
     where, _, name = place.rpartition(":")
     try:
@@ -56,7 +56,7 @@ def imported(place: str, what: str, failure: type[Error], *kinds: type[Any]) -> 
 
 
 def _file(path: Path) -> Any:
-    """Imports a file as the module of its name; its folder is searched for other modules."""
+    """Imports a file as the module of its name; adds its folder to the import path."""
     path = path.resolve()
     if path.stem not in sys.modules and str(path.parent) not in sys.path:
         sys.path.insert(0, str(path.parent))
@@ -71,7 +71,7 @@ def _file(path: Path) -> Any:
 
 
 def place_of(driver: Any) -> str:
-    """Where another process finds a class."""
+    """Returns the place where another process finds a class; empty: nowhere."""
     if driver.__module__ == "__main__":
         file = getattr(sys.modules["__main__"], "__file__", None)
         return f"{Path(file).resolve()}:{driver.__qualname__}" if file else ""
@@ -79,7 +79,7 @@ def place_of(driver: Any) -> str:
 
 
 def source_of(driver: type[Any]) -> str:
-    """ "file.py:Class", as the provenance names it; empty if it has no file."""
+    """Returns "file.py:Class", as in the provenance; empty if the class has no file."""
     try:
         file = inspect.getsourcefile(driver)
     except (OSError, TypeError):
@@ -88,12 +88,12 @@ def source_of(driver: type[Any]) -> str:
 
 
 def loaded(source: str) -> type[Any] | None:
-    """The class of this source that this process has loaded as a robot."""
+    """Returns the class of this source that this process has loaded as a robot, or None."""
     return next((driver for driver in _libraries if source_of(driver) == source), None)
 
 
 class DriverClass:
-    """A driver class as the compiled loop sees it."""
+    """Describes a driver class for the compiled loop."""
 
     def __init__(self, driver: type[Any], place: str) -> None:
         """Raises InvalidArgument if the class is no driver."""
@@ -115,12 +115,12 @@ class DriverClass:
         return self._options.rows
 
     def config(self, texts: Sequence[tuple[str, str]]) -> Any:
-        """The Config of options; None without one. Raises InvalidArgument."""
+        """Makes the Config from options, or None. Raises InvalidArgument for wrong options."""
         values = self._options.values(texts)
         return None if self._options.config is None else self._options.config(**values)
 
     def make(self, texts: Sequence[tuple[str, str]]) -> Adapter:
-        """A driver object."""
+        """Makes a driver object."""
         config = self.config(texts)
         return Adapter(self._driver() if config is None else self._driver(config), self.name)
 
@@ -129,7 +129,7 @@ _libraries: dict[type[Any], _core.RobotLibrary] = {}
 
 
 def library_of(driver: type[Any], place: str | None = None) -> _core.RobotLibrary:
-    """A driver class as a robot; the same one for each call. Raises DriverError."""
+    """Makes a driver class a robot, once per class. Raises DriverError for an invalid class."""
     if driver not in _libraries:
         try:
             described = DriverClass(driver, place or place_of(driver))
@@ -140,5 +140,5 @@ def library_of(driver: type[Any], place: str | None = None) -> _core.RobotLibrar
 
 
 def _words(name: str) -> str:
-    """ "BallTracker" as ball_tracker."""
+    """Converts "BallTracker" to ball_tracker."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()

@@ -10,7 +10,7 @@ import o80._core as _core
 from o80.base.errors import InvalidArgument
 
 Seed = NewType("Seed", int)
-"""A field of this type is drawn at each start, unless it is given, and recorded."""
+"""A field of this type gets a random seed at each start, unless given; it is recorded."""
 
 SEED_KIND = "seed"
 DRAWN = "drawn at each start"
@@ -19,7 +19,7 @@ TRUTH = {**dict.fromkeys(YES, True), **dict.fromkeys(NO, False)}
 
 
 def option(default: Any, help: str = "", unit: str = "") -> Any:
-    """A field of a Config with a text for `--help`, and a unit such as "rad/s"."""
+    """Makes a field of a Config with a text for `--help`, and a unit such as "rad/s"."""
     metadata = {"help": help, "unit": unit}
     if isinstance(default, list):
         return dataclasses.field(default_factory=lambda: list(default), metadata=metadata)
@@ -28,7 +28,7 @@ def option(default: Any, help: str = "", unit: str = "") -> Any:
 
 @dataclasses.dataclass(frozen=True)
 class Kind:
-    """A type of options."""
+    """A type of options, with its parser."""
 
     name: str  #: number, integer, boolean, text, "one of: a, b", "3 x number", or seed
     parse: Callable[[str], Any]  #: raises ValueError
@@ -45,7 +45,7 @@ class Options:
 
     @classmethod
     def of(cls, driver: type[Any]) -> "Options":
-        """Options of the class `Config` in a driver class. Raises InvalidArgument."""
+        """Reads the options of a driver's `Config`. Raises InvalidArgument for a wrong field."""
         config = getattr(driver, "Config", None)
         if config is None:
             return cls(None, {}, [])
@@ -68,7 +68,7 @@ class Options:
         return cls(config, kinds, rows)
 
     def values(self, texts: Sequence[tuple[str, str]]) -> dict[str, Any]:
-        """The values of options. Raises InvalidArgument."""
+        """Parses texts of options. Raises InvalidArgument for an unknown option or a wrong text."""
         values = {}
         for name, text in texts:
             if name not in self.kinds:
@@ -96,7 +96,7 @@ def _default(field: dataclasses.Field[Any]) -> Any:
 
 
 def kind_of(annotation: Any, default: Any, name: str) -> Kind:
-    """The kind of an option. Raises InvalidArgument for a type that cannot be one."""
+    """Returns the kind of an option. Raises InvalidArgument for a type that cannot be one."""
     simple = _simple_kind(annotation)
     if simple is not None:
         return simple
@@ -155,7 +155,7 @@ def _seed(text: str) -> int:
 
 
 def _one_of(known: Mapping[str, Any]) -> Callable[[str], Any]:
-    """Reads one of these words."""
+    """Makes a parser for these words."""
 
     def parse(text: str) -> Any:
         if text not in known:

@@ -1,4 +1,4 @@
-"""Arguments of a driver's verbs: the desired states to write, and a reading to fill."""
+"""Arguments of a driver's methods: the desired states to write, and a reading to fill."""
 
 import warnings
 from collections.abc import Callable, Sequence
@@ -14,7 +14,7 @@ from o80.drivers.backend import Running, StartAfresh, check_end, fill
 from o80.drivers.description import numbered
 from o80.rows.layout import Layout
 
-#: from offsets in the desired block and an order to the differences of those numbers
+#: computes differences of numbers from their offsets in the desired block, and an order
 Differences = Callable[[list[int], int], list[float]]
 
 
@@ -23,7 +23,7 @@ class DriverFaultError(Exception):
 
 
 class Desired:
-    """Desired states of an iteration. Its arrays change with the next one: copy them to keep."""
+    """Desired states of an iteration. The next one overwrites the arrays: copy them to keep."""
 
     def __init__(self, layout: Layout, block: NDArray[Any], active: NDArray[np.uint8]) -> None:
         self._layout = layout
@@ -47,8 +47,8 @@ class Desired:
     def rate(self, field: str | None = None) -> NDArray[np.float64]:
         """Velocities of the desired states, for feed-forward [unit/s], in write() only.
 
-        Each is the difference to the last iteration by the period, so that times the period their
-        sums are the positions; 0 for actuators that are not `active`.
+        Each is the difference to the last iteration divided by the period, so that the sum of
+        velocities times period is the position; 0 for actuators that are not `active`.
 
         field: of states that are structs: "angle", or with its group "arm.angle"
         Returns: (actuators,), and the shape of the field
@@ -105,9 +105,9 @@ class Reading:
         self.begin(0, 0, False, [])
 
     def begin(self, iteration: int, time: int, fresh: bool, runs: Sequence[bool]) -> None:
-        """A new reading."""
+        """Begins a new reading."""
         self.iteration = iteration
-        self.time = time  #: [ns], of the row
+        self.time = time  #: time of the row [ns]
         self.fresh = fresh
         """True in the reading of a fresh start: after a reset or a resume. Not in row 0."""
         self._runs = runs
@@ -135,7 +135,7 @@ class Reading:
         fill(self._extended, values, "extended")
 
     def halt(self, reason: str) -> None:
-        """Halts the robot. May be repeated with each reading; the same text is the same halt."""
+        """Halts the robot. May be repeated in each reading; an equal text is the same halt."""
         self._halt = _core.printable(reason)
         if not isinstance(cast(object, reason), str):  # an exception would end the loop instead
             warnings.warn(
@@ -153,7 +153,7 @@ class Reading:
         self._finished = True
 
     def missed(self) -> None:
-        """This tick brought no reading: it counts as an overrun."""
+        """Reports that this tick brought no reading: it counts as an overrun."""
         self._missed = True
 
     def interrupt(self, actuator: int | str) -> None:
@@ -161,12 +161,12 @@ class Reading:
         self._interrupted.append(numbered(actuator, self._actuators, "actuator"))
 
     def go_on_from(self, desired: Any) -> None:
-        """In a fresh start: the desired states to go on from, instead of the observed ones."""
+        """Sets the desired states of a fresh start, instead of the observed ones."""
         fill(self._desired, desired, "desired")
         self._has_desired = True
 
     def follow(self) -> None:
-        """In a fresh start: until the next one, all actuators without a command follow."""
+        """Lets all actuators without a command follow from this fresh start until the next one."""
         self._follows = True
 
     def runs(self, request: str) -> bool:
@@ -180,7 +180,7 @@ class Reading:
     def ended(
         self, request: str, answer: StartAfresh | None = None, *, rejected: str | None = None
     ) -> None:
-        """Ends a request that runs: done, with a fresh start, or rejected for a reason."""
+        """Ends a running request: done, with a fresh start, or rejected for a reason."""
         check_end(answer, rejected)
         if rejected is not None:
             self._report(request, Answer.REJECTED, rejected)
@@ -193,7 +193,7 @@ class Reading:
         self._reports.append((index, answer, text))
 
     def report(self) -> tuple[Any, ...] | None:
-        """Calls on this reading, for the compiled loop; None: none."""
+        """Returns the calls on this reading, for the compiled loop; None: no calls."""
         report = (
             *(self._finished, self._missed, self._has_desired),
             *(self._halt, self._interrupted, self._reports),
@@ -203,7 +203,7 @@ class Reading:
 
 
 class Answer:
-    """Results of a request, as the compiled loop numbers them."""
+    """Results of a request, with the numbers of the compiled loop."""
 
     DONE = 0
     REJECTED = 1
@@ -213,7 +213,7 @@ class Answer:
 
     @staticmethod
     def of(answer: Any, what: str) -> tuple[int, str]:
-        """Answer and text for what a handler returned. Raises InvalidArgument."""
+        """Converts a handler's answer to number and text. Raises InvalidArgument for others."""
         if answer is None:
             return Answer.DONE, ""
         if isinstance(answer, Running):

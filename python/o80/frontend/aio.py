@@ -1,4 +1,4 @@
-"""The waits of a frontend, for programs on asyncio."""
+"""The waiting methods of a frontend, for programs on asyncio."""
 
 import asyncio
 from collections.abc import Sequence
@@ -17,8 +17,8 @@ class Waits:
 
     Arguments, results and exceptions are those of the methods with the same names. Several tasks
     may wait at the same time. A cancelled task continues within 50 ms; the rest of its burst is
-    then cancelled too, as after a timeout. Commands that it has pulsed continue; a cancelled
-    `pulse_and_wait` purges those of its frontend, as an error in a `with` block does, unless
+    then cancelled too, as after a timeout. Commands that the task has pulsed continue; a cancelled
+    `pulse_and_wait` purges the commands of its frontend, like an error in a `with` block, unless
     `on_error` is "continue".
     """
 
@@ -31,10 +31,10 @@ class Waits:
         return await in_thread(lambda: frontend.wait_for(iteration, timeout))
 
     async def wait_for_next(self, timeout: float | None = None) -> _core.Observation:
-        """The next observation in sequence; see `Frontend.wait_for_next`.
+        """Waits for the next observation in sequence; see `Frontend.wait_for_next`.
 
-        A cancelled task loses no observation. Tasks that each need every observation need a stream
-        each.
+        A cancelled task loses no observation. Tasks that each need every observation need one
+        stream each.
         """
         frontend = self._frontend
         awaited = frontend._next
@@ -51,7 +51,7 @@ class Waits:
         seen: _core.Observation | _core.Seen | None = None,
         check: bool = True,
     ) -> _core.Observation:
-        """Sends what was added and waits until it has ended; see `Frontend.pulse_and_wait`."""
+        """Sends all added commands and waits for their end; see `Frontend.pulse_and_wait`."""
         frontend = self._frontend
         try:
             if frontend._is_inline:  # iterations of an inline robot run in the calling thread
@@ -83,7 +83,7 @@ class Waits:
         profile: ProfileWord | None = None,
         start: StartWord = "desired",
     ) -> _core.Observation:
-        """Sends the robot to targets and waits until it is there; see `Frontend.move_to`."""
+        """Moves the robot to targets and waits until it reaches them; see `Frontend.move_to`."""
         frontend = self._frontend
         options = _core.CommandOptions(
             duration=duration,
@@ -111,7 +111,7 @@ class Waits:
         late: LateWord = "reject",
         seen: _core.Observation | _core.Seen | None = None,
     ) -> _core.Observation:
-        """Sends what was added and bursts; see `Frontend.burst`."""
+        """Sends all added commands and bursts; see `Frontend.burst`."""
         frontend = self._frontend
         if frontend._is_inline:
             return await in_thread(
@@ -133,7 +133,7 @@ class Waits:
         seen: _core.Observation | _core.Seen | None = None,
         **fields: Any,
     ) -> None:
-        """Sends a request at once and waits for its answer; see `Frontend.request`."""
+        """Sends a request at once and waits for its end; see `Frontend.request`."""
         frontend = self._frontend
         if frontend._is_inline:
             await in_thread(lambda: frontend.request(name, timeout=timeout, seen=seen, **fields))

@@ -13,9 +13,9 @@ if TYPE_CHECKING:
 def halt_text(
     segment: str, halt: tuple[int, str, int, str, str] | None, *, played: bool = False
 ) -> str:
-    """The reason of a halt and the command that resumes; empty if there is no halt.
+    """Returns the reason of a halt and the command that resumes; empty if there is no halt.
 
-    played: the halt is one of a recording.
+    played: the halt is part of a played recording.
     """
     if halt is None:
         return ""
@@ -30,7 +30,7 @@ def halt_text(
 
 
 def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:
-    """A line for each running request."""
+    """Returns a line for each running request."""
     return [
         f"request '{name}' of {who} has been running since iteration {since}"
         + (f": {progress}" if progress else "")
@@ -39,7 +39,7 @@ def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:
 
 
 def rate_text(rate: float | None, frequency: float) -> str:
-    """The rate that is reached [1/s] and the frequency that was requested."""
+    """Formats the reached rate and the requested frequency [1/s]."""
     return f"{frequency:g} Hz" if rate is None else f"{_rounded(rate)} of {frequency:g} Hz"
 
 
@@ -48,7 +48,7 @@ def _rounded(rate: float) -> str:
 
 
 def pace_text(loop: _core.LoopState) -> str:
-    """Rate, overruns and age of the last row, in one line."""
+    """Formats rate, overruns and age of the last row in one line."""
     if loop.bursting:
         return f"bursting: runs when a frontend requests iterations; at row {loop.last}"
     if loop.played and loop.row_age is None:
@@ -59,21 +59,21 @@ def pace_text(loop: _core.LoopState) -> str:
 
 
 def starved_text(starvations: int) -> str:
-    """How often a plan of chunks ran out of rows; empty if it never did."""
+    """Returns how often a plan of chunks ran out of rows; empty if it never did."""
     times = "once" if starvations == 1 else f"{starvations} times"
     return f"plans of chunks ran out of rows {times} (docs/chunks.md)" if starvations else ""
 
 
 def clipped_text(entries: "Iterable[JournalEntry | _core.JournalEntry]") -> str:
-    """How many numbers `clip` has put inside their bounds, in how many batches; empty if none."""
+    """Returns how many numbers `clip` has moved into bounds, in how many batches, or nothing."""
     counts = [each.clipped for each in entries if each.kind == "taken" and each.clipped]
     batches = "1 batch" if len(counts) == 1 else f"{len(counts)} batches"
     return f"{sum(counts)} numbers of targets were clipped, in {batches}" if counts else ""
 
 
 def latency_percentiles(latencies: list[int]) -> dict[str, int]:
-    """Median, p95 and max of the decision latencies of batches [iterations]; how many batches, and
-    of how many it is not known (-1). Empty without batches.
+    """Returns median, p95 and max of decision latencies [iterations], the number of batches, and
+    how many of these have an unknown latency (-1). Empty without batches.
     """
     if not latencies:
         return {}
@@ -87,9 +87,9 @@ def latency_percentiles(latencies: list[int]) -> dict[str, int]:
 
 
 def latency_text(summary: dict[str, int], period: float) -> str:
-    """The decision latency of batches, in one line; empty if none says what it was decided by.
+    """Formats the decision latency of batches in one line; empty if no batch has a `seen` row.
 
-    summary: of latency_percentiles(). period: [ns].
+    summary: from latency_percentiles(). period: [ns].
     """
     if not summary:
         return ""
@@ -105,7 +105,7 @@ def latency_text(summary: dict[str, int], period: float) -> str:
 
 
 def age_text(seconds: float) -> str:
-    """A duration with one unit."""
+    """Formats a duration with one unit."""
     for unit, length in (("h", 3600), ("min", 60)):
         if seconds >= 2 * length:
             return f"{seconds / length:.0f} {unit}"
@@ -113,7 +113,7 @@ def age_text(seconds: float) -> str:
 
 
 def watchdog_text(schema: dict[str, Any]) -> str:
-    """Text about what the backend does when a commander hangs or dies."""
+    """Describes the backend's reaction to a commander that hangs or dies."""
     silence, stale = schema["silence"], schema["stale"]
     if silence:
         return f"watchdog: {stale} after {silence} iterations without a sign of life"

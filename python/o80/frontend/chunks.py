@@ -34,12 +34,12 @@ Start = tuple[float, float, float]
 #: Time of a take-over where no number has a limit of acceleration, if a step is not longer [s].
 EASE = 0.1
 
-_LATEST = 2**31  # a row is due at most so many iterations after its anchor
+_LATEST = 2**31  # largest distance of a row's due iteration from the anchor
 _MOST_ITERATIONS = 2**47
-# chunks that are sent, and iterations that pass, before send() looks at what became of the former
-# ones, if nobody asks for the plan
+# number of sent chunks, and of passed iterations, after which send() updates the plan by itself,
+# if nothing reads the plan
 _UNSETTLED, _UNSEEN = 16, 1000
-_ENTRIES = 1000  # of the journal that are read at once
+_ENTRIES = 1000  # entries of the journal that are read at once
 
 
 def _from_to(value: Any, name: str, low: int, high: int) -> int:
@@ -62,7 +62,7 @@ def _fraction(step: Any) -> Fraction:
 
 
 def _due_after(step: Fraction, rows: Any) -> Any:
-    """Iterations of so many steps, halves up."""
+    """Converts rows to iterations after the anchor, halves up."""
     return (rows * (2 * step.numerator) + step.denominator) // (2 * step.denominator)
 
 
@@ -84,7 +84,7 @@ def _finite(values: "ArrayLike", name: str) -> "NDArray[np.float64]":
 
 
 class ChunkWaits:
-    """The wait of a plan as a coroutine, as those of `Frontend.aio`."""
+    """The waiting method of a plan as a coroutine, like those of `Frontend.aio`."""
 
     def __init__(self, plan: "Chunks") -> None:
         self._plan = plan
@@ -92,12 +92,12 @@ class ChunkWaits:
     async def wait(
         self, lead: float = 0, timeout: float | None = None, *, grid: bool = False
     ) -> _core.Observation:
-        """Waits as `Chunks.wait`."""
+        """Waits like `Chunks.wait`."""
         return await in_thread(lambda: self._plan.wait(lead, timeout, grid=grid))
 
 
 class Chunks(Managed):
-    """The plan of a policy that answers with rows of targets, late, while the robot moves.
+    """The plan of a policy that returns rows of targets, late, while the robot moves.
 
     See docs/chunks.md. Made by `Frontend.chunks`. Use it as a context manager.
     """
@@ -113,15 +113,15 @@ class Chunks(Managed):
         ensemble: float | None = None,
         clip: bool = False,
     ) -> None:
-        arm.latest()  # raises what a frontend that cannot be used raises
+        arm.latest()  # raises the error of a frontend that cannot be used
         self._arm = arm
         self._actuators, self._single = arm._chosen(actuators)
         self._masks = first_fields(self._actuators, arm._layout)
         self._given = GivenNumbers(self._actuators, self._masks, arm._layout)
-        self.clip = clip  #: whether numbers outside minimum and maximum are put on them
+        self.clip = clip  #: whether numbers outside minimum and maximum are moved to them
         self.step = _fraction(step)  #: iterations from row to row
         self._dues = np.empty(0, np.int64)
-        self.ease = 0  #: iterations of a take-over; 0: those that the limits need
+        self.ease = 0  #: iterations of a take-over; 0: as many as the limits need
         if not any(math.isfinite(each.rates[1]) for each in self._given.limits):
             self.ease = max(math.ceil(self.step), round(EASE / arm.period))
         if ease is not None:
@@ -132,20 +132,20 @@ class Chunks(Managed):
         self.ensemble = ensemble if ensemble is None else number(ensemble, "ensemble")
         if self.ensemble is not None and not math.isfinite(self.ensemble):
             raise InvalidArgument(f"ensemble must be a finite number, got {ensemble}")
-        # no other plan has it, also not that of a process which had the same lane before
+        # a unique number, also among plans of former processes on the same lane
         self._number = int.from_bytes(os.urandom(8))
         self._closed = False
         self._lock = threading.RLock()
-        self._newest: SentChunk | None = None  # the one sent last
-        self._seen = -1  # the row that `wait` returned last
-        self._open: list[SentChunk] = []  # those that _parts does not know yet
-        self._settled = 0  # the anchor at which these were looked at by send()
+        self._newest: SentChunk | None = None  # the last sent chunk
+        self._seen = -1  # the last row that `wait` returned
+        self._open: list[SentChunk] = []  # chunks that are not in _parts yet
+        self._settled = 0  # the anchor at which send() updated the plan last
         self._parts: list[ChunkPart] = []
-        self._over = 0  # of these, so many from the first one on are over
+        self._over = 0  # number of parts that are over, from the first one on
         self._journal = _core.Journal(arm)
         self._journal.seek_end()
         self._starts: dict[int, dict[tuple[int, int], Start]] = {}  # of an iteration, by number
-        self._answers: dict[int, int] = {}  # for a due iteration, how many chunks had a row for it
+        self._answers: dict[int, int] = {}  # number of chunks with a row for a due iteration
 
     # ------------------------------------------------------------------ sending
 
@@ -165,22 +165,21 @@ class Chunks(Managed):
 
         rows: (n, actuators), or (n,) for a single actuator: the first field of each; or a mapping
             from fields, groups, actuators or paths to such arrays, as in add_trajectory.
-        seen: the observation that the policy saw, or its iteration (None: the newest). Of another
-            segment on the same clock: the newest row from before its capture counts.
-        first: number of rows at the begin that are what was planned before; they are not played,
-            and an answer that comes before the last of them is over gives the same motion however
-            late it is.
-        fixed: rows keep their iterations also where the actuators have stood still.
+        seen: the observation that the policy saw, or its iteration (None: the newest). For an
+            observation of another segment on the same clock, the newest row before its capture.
+        first: number of rows at the begin that repeat the former plan; they are not played, and an
+            answer that arrives before the last of them is over gives the same motion at any delay.
+        fixed: rows keep their iterations also if the actuators have stood still.
         late: rows that are due before the chunk is taken are skipped ("skip"); or, if row `first`
             is among them, the whole chunk is rejected ("reject").
         due: an own iteration for each row, rising, instead of the steps.
-        weights: the share of each row (n,); the rest is the plan in its iteration, where there is
-            one.
+        weights: the share of each row (n,); the rest is the share of the plan in its iteration, if
+            there is one.
         final: no chunk follows, so that the plan is not starved when its rows end.
 
-        It replaces what its actuators do, from the plan of the chunk before it without a jump. If
-        they stood still, rows are later by the time in which they did. Raises InvalidArgument,
-        and the exceptions of pulse.
+        The chunk replaces the motion of its actuators, and continues the plan of the previous
+        chunk without a jump. If they stood still, rows are later by the time of the standstill.
+        Raises InvalidArgument, and the exceptions of pulse.
         """
         if self._closed:
             raise InvalidArgument("this plan was closed: open another one with chunks()")
@@ -194,7 +193,7 @@ class Chunks(Managed):
         after = self._due(count) if due is None else _iterations(due, "due") - anchor
         if due is not None or after[-1] > _LATEST:
             self._check_due(after, count, anchor)
-        with self._lock:  # those of several threads are known in the order in which they are sent
+        with self._lock:  # chunks of several threads are stored in the order of sending
             clipped = 0
             if self.clip:
                 inside, clipped = self._arm._clip(self._actuators, count, states, masks)
@@ -247,7 +246,7 @@ class Chunks(Managed):
         return since
 
     def _note_given(self, masks: list[int]) -> None:
-        """The plan is known of the numbers that its chunks give."""
+        """Selects the numbers that chunks give; the plan of other numbers is unknown."""
         if masks == self._masks:
             return
         self._masks = masks
@@ -255,7 +254,7 @@ class Chunks(Managed):
         self._parts, self._open, self._over = [], [], 0
 
     def _due(self, count: int) -> "NDArray[np.int64]":
-        """Iterations after the anchor: (j + 1) x step, halves up."""
+        """Returns iterations after the anchor: (j + 1) x step, halves up."""
         dues = self._dues  # another thread may send a chunk of another length
         if len(dues) != count:
             dues = self._dues = _due_after(self.step, np.arange(1, count + 1, dtype=np.int64))
@@ -303,14 +302,14 @@ class Chunks(Managed):
 
     @property
     def left(self) -> int:
-        """Iterations from the newest row to the last row of the plan; 0 if there is none."""
+        """Iterations from the newest row to the last row of the plan; 0 without a plan."""
         self._settle()
         parts = self._parts
         return max(0, parts[-1].last - self._arm.published) if parts else 0
 
     @property
     def starved(self) -> bool:
-        """Whether the plan is open, and the newest row says that it has no row ahead."""
+        """Whether the plan is open, and has no row left in the newest row."""
         if self._closed or self._newest is None:
             return False
         return bool(self._arm.latest().starved[self._actuators].any())
@@ -322,14 +321,14 @@ class Chunks(Managed):
         *,
         step: float | Fraction | None = None,
     ) -> "NDArray[np.float64]":
-        """Planned places for the iterations since + step, since + 2 steps, ...: at most n rows.
+        """Returns planned places for iterations since + step, since + 2 steps, ...: at most n rows.
 
         since: an iteration or an observation, such as the one that a policy sees.
         step: iterations from row to row (None: that of the plan; 1: every iteration).
 
-        Returns (rows, numbers), of each actuator those that the chunks give, or (rows,) for a
-        single number: in a policy's prefix the targets that are played whatever it answers. It
-        counts the chunks that were decided, and holds if nobody else commands.
+        Returns (rows, numbers), with the numbers that the chunks give, or (rows,) for a single
+        number: in a policy's prefix the targets that are played for any answer. The result
+        includes chunks that were decided, and holds if nobody else commands.
         """
         anchor = self._anchor(since)
         n = whole_or_none(n, "n", 0)
@@ -346,19 +345,19 @@ class Chunks(Managed):
 
     @property
     def aio(self) -> ChunkWaits:
-        """The same wait for asyncio: `seen = await plan.aio.wait(lead=120)`."""
+        """The waiting method for asyncio: `seen = await plan.aio.wait(lead=120)`."""
         return ChunkWaits(self)
 
     def wait(
         self, lead: float = 0, timeout: float | None = None, *, grid: bool = False
     ) -> _core.Observation:
-        """Waits until the chunk sent last was decided and at most `lead` is planned.
+        """Waits until the last sent chunk was decided and at most `lead` is planned.
 
         Returns the newest observation, or, with `grid`, the newest that lies whole steps after the
-        one that the last chunk answers; none of a backend in real time twice. A bursting backend
-        runs until then.
+        one on which the last chunk is based; in real time never the same one twice. A bursting
+        backend runs until then.
 
-        lead: iterations, or as a float the time [s]. timeout: how long to wait [s]. Raises
+        lead: iterations, or as a float the time [s]. timeout: longest wait [s]. Raises
         TimeoutError, BackendGone, BackendHalted.
         """
         arm = self._arm
@@ -389,7 +388,7 @@ class Chunks(Managed):
         return arm.wait_for(anchor + _due_after(self.step, max(0, steps)))
 
     def _plan_at(self, iteration: int) -> "NDArray[np.float64] | None":
-        """Places in an iteration; None if nothing is planned for it, or not known yet."""
+        """Returns places in an iteration; None if it is not planned, or its plan not known yet."""
         with self._lock:
             i = len(self._parts) - 1
             while i >= 0 and self._parts[i].begins > iteration:
@@ -399,7 +398,7 @@ class Chunks(Managed):
             part = self._parts[i]
             if part.start is not None:
                 return part.at(iteration)[0]
-            # what it goes on from is not there any more, or not yet
+            # the start of its motion is no longer available, or not yet
             while i > 0 and self._parts[i - 1].acts(self._parts[i].begins - 1):
                 i -= 1
             if self._parts[i].sent._begun is not None:
@@ -407,7 +406,7 @@ class Chunks(Managed):
             return None
 
     def _settle(self) -> None:
-        """Adds the plans of chunks that were decided meanwhile, in their order."""
+        """Adds the plans of chunks that were decided meanwhile, in order."""
         with self._lock:
             parts = self._parts
             while self._open and self._open[0].decided:
@@ -415,13 +414,13 @@ class Chunks(Managed):
                 decision = sent._decided
                 if decision is None:
                     continue
-                # those that wait for the same or a later iteration are overwritten
+                # chunks that wait for the same or a later iteration are overwritten
                 while parts and parts[-1].begins >= decision.begins:
                     parts.pop()
                 given = self._given
                 way = ChunkWay(sent._sent, decision, self.profile, given.limits, given.switches)
                 parts.append(ChunkPart(sent, way))
-            # nothing becomes of the others any more
+            # the plans of these parts do not change any more
             self._over = min(self._over, len(parts))
             changing = parts[self._over :]
             for part in changing:
@@ -435,14 +434,14 @@ class Chunks(Managed):
                     part.end_in(successor.begins)
             while self._over < len(parts) - 1 and parts[self._over].is_over(published):
                 self._over += 1
-            # of what is over, the history has the rows
+            # the history has the rows of parts that are over
             oldest = self._arm.oldest
             while len(parts) > 1 and parts[1].begins <= oldest:
                 del parts[0]
                 self._over = max(0, self._over - 1)
 
     def _begin(self, parts: list[ChunkPart], former: ChunkPart | None) -> None:
-        """Notes from where each part begins, as far as that is there."""
+        """Sets the start of each part, as far as it is available."""
         for part in parts:
             has_begun = part.sent._begun is not None
             if part.known:
@@ -454,14 +453,14 @@ class Chunks(Managed):
                 with contextlib.suppress(RowOverwritten, InvalidArgument):
                     part.begin(self._start_of(part))
             else:
-                # it waits: if nobody else commands, what rests goes on to rest
+                # it waits: if nobody else commands, resting actuators continue to rest
                 latest = self._arm.latest()
                 if part.start is None and not latest.active[self._actuators].any():
                     part.begin(self._rest_in(latest), known=False)
             former = part
 
     def _start_of(self, part: ChunkPart) -> Moment:
-        """Places and derivatives in the iteration before a chunk that has begun, from the journal.
+        """Reads places and derivatives before the begin of a begun chunk, from the journal.
 
         Raises RowOverwritten; InvalidArgument behind a command without a journal.
         """
@@ -479,7 +478,7 @@ class Chunks(Managed):
                 if entry.kind == "chunk_begun":
                     of_it = self._starts.setdefault(entry.iteration, {})
                     of_it.update({(actuator, number): at for actuator, number, at in entry.starts})
-        # those of chunks before it are not needed any more
+        # starts of earlier chunks are not needed any more
         self._starts = {key: of_it for key, of_it in self._starts.items() if key >= part.begins}
         of_it = self._starts.get(part.begins, {})
         keys = self._given.keys
@@ -502,9 +501,9 @@ class Chunks(Managed):
     # ------------------------------------------------------------------ its end
 
     def close(self) -> None:
-        """Ends the plan: what was sent is played to its last row. May be called twice.
+        """Ends the plan: sent chunks are played to their last rows. May be called twice.
 
-        Raises LaneFull if the backend cannot be told yet.
+        Raises LaneFull if the end cannot be sent to the backend yet.
         """
         arm = self._arm
         if self._number in arm._open_plans and not arm._forked:

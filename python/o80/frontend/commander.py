@@ -234,7 +234,7 @@ class Commander(Reader):
         return self._add_trajectories(chosen, rows, states, masks, ends, options, clip)
 
     def _chosen(self, actuators: int | str | Sequence[int | str] | None) -> tuple[list[int], bool]:
-        """Indices of the actuators; True if a single one was named without a list."""
+        """Returns indices of the actuators; True if a single one was named without a list."""
         if actuators is None:
             return list(range(len(self.actuators))), False
         if isinstance(actuators, (int, str, np.integer)):
@@ -244,7 +244,7 @@ class Commander(Reader):
         return [index for each in chosen for index in each], False
 
     def _group(self, named: int | str) -> list[int]:
-        """The actuators of a group; none if this names no group, or an actuator too."""
+        """Returns the actuators of a group; none for other names, and for names of actuators."""
         if not isinstance(named, str) or any(each.name == named for each in self.actuators):
             return []
         return [each.index for each in self.actuators if each.group == named]
@@ -258,17 +258,17 @@ class Commander(Reader):
         seen: _core.Observation | _core.Seen | None = None,
         **fields: Any,
     ) -> None:
-        """Sends a request to the driver at once and waits for its answer.
+        """Sends a request to the driver at once and waits for its end.
 
         name: name of the request; `requests` lists them.
         timeout: how long to wait for the end of the request [s].
         seen: as in pulse.
         fields: fields of the request; those with a default may be left out.
 
-        It needs no pulse; what was added and not pulsed stays added. A bursting backend runs until
+        No pulse is needed; commands that were not pulsed stay added. A bursting backend runs until
         the request has ended. Raises RequestRejected with the driver's text, BackendHalted if a
-        halt ended it, BackendGone, and TimeoutError, whose `batch` can be waited for again: the
-        request continues. `add_request` makes it a part of a pulse and does not wait.
+        halt ended the request, BackendGone, and TimeoutError, whose `batch` can be waited for
+        again: the request continues. `add_request` makes a request part of a pulse without waiting.
         """
         batch = self._send_request(name, fields, seen)
         self._wait_for_answer(name, batch, timeout)
@@ -296,7 +296,7 @@ class Commander(Reader):
 
     @property
     def running_requests(self) -> "list[RunningRequest]":
-        """The requests that take time and have not ended, oldest first, whoever sent them."""
+        """Requests that take time and have not ended, oldest first, of all frontends."""
         from o80.frontend.results import RunningRequest
 
         return [RunningRequest(*fields) for fields in self._running_requests]
@@ -318,23 +318,23 @@ class Commander(Reader):
         every: float | int | None = None,
         initial: Any = None,
     ) -> "Preview":
-        """Computes what `add_command` with the same arguments would do after the newest row.
+        """Computes the effect of `add_command` with the same arguments after the newest row.
 
-        The code of the loop computes it here, so the robot does the same bit for bit. Sends
+        The code of the loop computes it here, so the robot's motion is the same, bit for bit. Sends
         nothing, adds nothing, works read-only.
 
         actuator, target, duration, speed, until, iterations, fastest, profile, start, every: as in
             add_command.
         initial: the state from which it begins at rest, in the form of `target`. Fields that are
-            left out, and with None all, begin as they are in the newest row.
+            left out, and all fields with None, begin as in the newest row.
 
         With None, fields of type float64 with acceleration limits begin with the velocity and
         acceleration of the last three rows, other fields at rest. Commands that run or wait do not
         count. Actuators without a target are shown as if they had no command.
 
-        Raises InvalidArgument as add_command, for an `until` that has passed, for a motion of more
-        than a million iterations, for states that the driver interpolates in C++ (`blend`), and for
-        fields with the bound of an integral, which depends on what will be observed.
+        Raises InvalidArgument like add_command, for a past `until`, for a motion of more than a
+        million iterations, for states that the driver interpolates in C++ (`blend`), and for
+        fields whose integral has bounds: their motion depends on future observations.
         """
         options = _core.CommandOptions(
             duration=duration,
@@ -381,14 +381,14 @@ class Commander(Reader):
             Booleans and enumerations must be equal.
         timeout: how long to wait [s].
 
-        It first waits until the command has ended. It needs no pulse; what was added and not
-        pulsed stays added. A bursting backend runs until the robot is there; `timeout` is then
-        time of the robot (iterations x period), so that a script always ends alike.
+        It first waits until the command has ended. No pulse is needed; commands that were not
+        pulsed stay added. A bursting backend runs until the robot is at its targets; `timeout` is
+        then time of the robot (iterations x period), so that a script always ends alike.
 
-        Returns the observation in which it was within the tolerance. Raises NotReached after
-        the timeout, which says where the robot is; commands that have not ended continue.
-        Raises NotCompleted if the command ended otherwise than completed, BackendHalted,
-        BackendGone, InvalidArgument, and the exceptions of pulse.
+        Returns the observation in which the robot was within the tolerance. Raises NotReached, with
+        the position, after the timeout; commands that have not ended continue. Raises NotCompleted
+        if the command ended otherwise than completed, BackendHalted, BackendGone, InvalidArgument,
+        and the exceptions of pulse.
         """
         options = _core.CommandOptions(
             duration=duration,
@@ -468,7 +468,7 @@ class Commander(Reader):
         profile: ProfileWord = "linear",
         start: StartWord = "desired",
     ) -> PreparedBurst:
-        """Prepares a burst that is repeated: it sends targets and returns all rows.
+        """Prepares a repeatable burst, which sends targets and returns all rows.
 
         iterations: number of iterations of each burst.
         actuators: indices or names of the actuators that get targets (None: all).
@@ -477,7 +477,7 @@ class Commander(Reader):
             rows of a trajectory, one every so many iterations.
         mode, profile, start: as in add_command.
 
-        Raises NotBursting, InvalidArgument.
+        Raises NotBursting for a backend in real time, InvalidArgument.
         """
         self._check_usable()
         if not self.bursting:
@@ -491,10 +491,10 @@ class Commander(Reader):
     # ------------------------------------------------------------------ control and halts
 
     def control(self, timeout: float | None = 5.0) -> AbstractContextManager[Self]:
-        """Exclusive control within a `with` block: batches of other frontends are rejected.
+        """Takes exclusive control in a `with` block: batches of other frontends are rejected.
 
         Blocks of one frontend may nest or overlap: control ends with the last of them. An interrupt
-        (Ctrl-C) at any moment gives it back too.
+        (Ctrl-C) at any moment releases control too.
         Raises ControlTaken, naming the holder, if another frontend has it.
         """
         return cast(AbstractContextManager[Self], _core.Control(self, timeout))
@@ -516,7 +516,7 @@ class Commander(Reader):
 
     @property
     def halted(self) -> "Halt | None":
-        """The halt in force, or requested (its iteration is then None); None if there is none."""
+        """The halt in force or requested (iteration None: not in force yet); None: no halt."""
         fields = self._halted
         if fields is None:
             return None
@@ -536,16 +536,16 @@ class Commander(Reader):
         number: number of the halt (None: the one in force now). A halt that came after it stays.
         timeout: how long to wait until the halt is in force, the robot is at rest, and the backend
             has answered [s].
-        accept_reading: go on from where the robot is read to be, even if it cannot have come
-            there since the halt.
+        accept_reading: continue from the read position, even if the robot cannot have moved there
+            since the halt.
 
         Needs a lane, but no control. In bursting mode it does not wait until the robot is at rest:
         burst until it is.
 
-        Raises BackendHalted if it is refused: another halt came after it, the robot refuses, it
-        cannot be where it is read, or, in bursting mode, it still brakes. Raises
+        Raises BackendHalted if the backend refuses: another halt followed, the robot refuses, it
+        cannot be at the read position, or, in bursting mode, it still brakes. Raises
         TimeoutError, NoLane, BackendGone.
-        Returns True if it ended a halt, False if there was none.
+        Returns True if the call ended a halt, False if there was none.
         """
         if number is None:
             halt = self.halted
@@ -555,7 +555,7 @@ class Commander(Reader):
         return self._resume(whole(number, "the number of a halt", 1), timeout, accept_reading)
 
     def _purge_on_error(self) -> None:
-        """Drops the commands of this frontend after an error, unless they shall continue."""
+        """Drops the commands of this frontend after an error, unless `on_error` is "continue"."""
         if self._on_error == "purge":
             with contextlib.suppress(Error):
                 self._purge_own()

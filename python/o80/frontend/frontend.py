@@ -40,7 +40,7 @@ class Frontend(Commander, lifecycle.Managed):
 
     May be used from several threads: all of them add to one buffer, and any pulse sends it. In a
     forked child its calls raise UsedAfterFork. A pickled frontend attaches again by name.
-    Raises TimeoutError, SegmentError, BackendFailed.
+    Raises TimeoutError without a backend, SegmentError for an unreadable one, BackendFailed.
     Returns an object of the robot's own frontend class if its package registers one.
     """
 
@@ -82,7 +82,7 @@ class Frontend(Commander, lifecycle.Managed):
 
     @classmethod
     def _of(cls, attachment: _core.Attachment, *, unnamed: bool) -> "Frontend":
-        """The frontend of an inline robot. unnamed: o80 chose the name of its segment."""
+        """Makes the frontend of an inline robot. unnamed: o80 chose the segment's name."""
         chosen = class_of(attachment.robot) or cls
         self = _core.Frontend.__new__(chosen)
         assert isinstance(self, Frontend)
@@ -112,19 +112,19 @@ class Frontend(Commander, lifecycle.Managed):
         ensemble: float | None = None,
         clip: bool = False,
     ) -> "Chunks":
-        """Opens a plan for a policy that answers with rows of targets, late (docs/chunks.md).
+        """Opens a plan for a policy that returns rows of targets, late (docs/chunks.md).
 
         actuators: indices or names, also of groups, of any types (None: all).
         step: iterations from row to row, whole or a fraction (50 / 3: 30 rows a second at 500 Hz).
-        ease: iterations of a take-over, or as a float its time [s] (None: those that the limits
-            need, at least a step and at most half of what is ahead; without a limit of
+        ease: iterations of a take-over, or as a float its time [s] (None: as many as the limits
+            need, at least a step and at most half of the rows ahead; without a limit of
             acceleration 0.1 s, or a step if that is longer).
         profile: between rows: "smooth", a curve through them; "monotone", one that stays between
             them; "linear"; or "hold".
         ensemble: mix each new row with the plan, as ACT does: share exp(-ensemble * i) of the i-th
             answer for an iteration (None: new rows replace the plan).
-        clip: True puts numbers of rows outside minimum and maximum on them, counted in the
-            `clipped` of what `send` returns, instead of refusing the chunk.
+        clip: True moves numbers of rows outside minimum and maximum to these bounds, and counts
+            them in `clipped` of the sent chunk, instead of refusing the chunk.
 
         with arm.chunks(["shoulder", "elbow"], step=10) as plan:
             seen = plan.wait(lead=120)
@@ -167,7 +167,7 @@ class Frontend(Commander, lifecycle.Managed):
             _core.clean(self.segment)
 
     def _close_at_exit(self) -> None:
-        """A frontend that only reads stays open: daemon threads may wait with it."""
+        """Closes the frontend at exit, unless it only reads: daemon threads may wait with it."""
         if not self.closed and (self._is_inline or self._has_lane or self.added):
             self.close()
 
@@ -181,7 +181,7 @@ class Frontend(Commander, lifecycle.Managed):
         self.close()
 
     def reattach(self, timeout: float | None = 5.0) -> None:
-        """Attaches to the backend that owns the name now, after the former one has ended.
+        """Attaches to the backend that has the name now, after the former backend has ended.
 
         Raises TimeoutError, SchemaMismatch if the robot is described differently, and Closed.
         """
@@ -233,7 +233,7 @@ def register_frontend(robot: str, cls: type["Frontend"]) -> None:
 
 
 def class_of(robot: str) -> type["Frontend"] | None:
-    """The class of that robot, or None."""
+    """Returns the frontend class of that robot, or None."""
     if robot not in _registered and robot in announced(GROUP):
         _registered[robot] = announced(GROUP)[robot].load()
     return _registered.get(robot)
@@ -248,10 +248,10 @@ def wait_for_first(
         mapping from frontends to iterations.
     timeout: for the first row [s].
 
-    Returns the observations that are published: of one frontend or more. Raises TimeoutError, and
-    BackendGone with the segment's name if a backend ends before any row is published. It needs no
-    thread and does not poll: it sleeps on all segments at once. With read-only frontends, and on
-    Linux before 5.16, it looks every millisecond instead.
+    Returns the published observations, of one frontend or more. Raises TimeoutError, and
+    BackendGone with the segment's name if a backend ends before any row is published. The call
+    needs no thread and does not poll: it sleeps on all segments at once. Only with read-only
+    frontends, and on Linux before 5.16, it polls every millisecond.
     """
     wanted: list[tuple[Frontend, int | None]] = (
         list(members.items())

@@ -1,4 +1,4 @@
-"""Bursts that are repeated: options are checked and buffers looked up once."""
+"""Repeatable bursts: options are checked and buffers are found once."""
 
 from typing import Any
 
@@ -13,7 +13,7 @@ from o80.rows.enumerations import labelled, numbers_of
 from o80.rows.layout import Layout
 from o80.rows.targets import labels_of, state_types, states_from
 
-#: Axes of targets, by their number.
+#: Axes of targets, by the number of axes.
 _AXES = {1: "(copies,)", 2: "(steps, actuators)", 3: "(copies, steps, actuators)"}
 
 
@@ -33,7 +33,7 @@ class BurstArrays:
         start: StartWord,
         delay: int,
     ) -> None:
-        """copies: their number; () for a single robot."""
+        """copies: (number of copies,); () for a single robot."""
         count, steps = _checked(iterations, "iterations"), _checked(steps, "steps")
         states = _states(layout, copies, actuators, steps)
         states.view(np.uint8).fill(255)
@@ -100,7 +100,7 @@ class PreparedBurst(BurstArrays):
         late: LateWord = "reject",
         seen: _core.Observation | _core.Seen | None = None,
     ) -> int:
-        """Sends the targets, with all else that was added, and bursts; fills `rows`.
+        """Sends the targets, with all added commands, and bursts; fills `rows`.
 
         timeout: for the whole burst [s].
         at, late, seen: as in `Frontend.burst`.
@@ -112,14 +112,14 @@ class PreparedBurst(BurstArrays):
 
 
 def _checked(count: int, name: str) -> int:
-    """At least 1. Raises InvalidArgument."""
+    """Returns a count of at least 1. Raises InvalidArgument for others."""
     return whole(count, f"{name} of a burst", 1)
 
 
 def _states(
     layout: Layout, copies: tuple[int, ...], actuators: list[int], steps: int
 ) -> NDArray[Any]:
-    """Memory for targets: in each copy, all steps of the first actuator, then of the second, ..."""
+    """Allocates targets: in each copy, all steps of the first actuator, then of the second, ..."""
     if copies and not actuators:
         return np.empty((*copies, 0, steps))  # it only runs them
     kinds = state_types(actuators, layout)

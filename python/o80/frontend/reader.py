@@ -17,7 +17,7 @@ from o80.rows.history import History, Selection
 from o80.rows.layout import Layout
 
 _MOST = 4096  # native entries of a journal converted at a time
-_NEVER = 2**62  # a number that no entry reaches
+_NEVER = 2**62  # larger than the number of any entry
 
 if TYPE_CHECKING:
     from o80.base.words import LifeWord
@@ -124,7 +124,7 @@ class Reader(_core.Frontend):
         since: number of the first entry to return (None: the oldest that there is). To follow a
             backend, keep an `o80.Journal`, which reads each entry once.
 
-        Also for a read-only frontend, and after the end of the backend. Raises Closed.
+        Works for read-only frontends and after the end of the backend. Raises Closed after `close`.
         """
         return Journal(self, since).read()
 
@@ -222,7 +222,7 @@ class Reader(_core.Frontend):
         from_time: int | None = None,
         to_time: int | None = None,
     ) -> History:
-        """Many observations at once. Without an argument: all observations in the history.
+        """Returns many observations at once; without an argument all in the history.
 
         n: the last n observations.
         seconds: observations of the last seconds before the newest one [s].
@@ -239,7 +239,7 @@ class Reader(_core.Frontend):
         return self._read(first, max(0, last + 1 - first))
 
     def at_time(self, time: int) -> _core.Observation:
-        """The newest observation at or before a time [ns], as in `Observation.time`.
+        """Returns the newest observation at or before a time [ns], as in `Observation.time`.
 
         Raises RowOverwritten if all observations in the history are later.
         """
@@ -254,7 +254,7 @@ class Reader(_core.Frontend):
     def initial_states(self) -> "States":
         """The observed states of row 0, before any command.
 
-        If row 0 was overwritten before this frontend attached: of the oldest row at that time.
+        If row 0 was overwritten before this frontend attached: those of the oldest row then.
         """
         if self._first is None or not len(self._first):
             raise Error(f"'{self.segment}' had no row yet when this frontend attached")
@@ -267,11 +267,11 @@ class Journal:
     since: number of the first entry to read (None: the oldest that there is).
     new: only entries written from now on.
 
-    Used by one thread. Works with read-only frontends, and with those of a backend that has ended.
+    For one thread. Works with read-only frontends, and with backends that have ended.
     """
 
     def __init__(self, frontend: Reader, since: int | None = None, *, new: bool = False) -> None:
-        from o80.rows.journal import EntryDecoder  # late: most processes that attach never ask
+        from o80.rows.journal import EntryDecoder  # late: most processes never need it
 
         self._core = _core.Journal(frontend)
         self._decoder = EntryDecoder(frontend._layout.schema)
@@ -286,7 +286,7 @@ class Journal:
         return self._core.exists
 
     def read(self) -> "list[JournalEntry]":
-        """The entries since the last call."""
+        """Returns the entries since the last call."""
         entries = self._core.read(_MOST)
         found = [self._decoder.entry(entry) for entry in entries]
         while len(entries) == _MOST:

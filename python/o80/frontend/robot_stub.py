@@ -17,7 +17,7 @@ from o80.frontend.reader import Reader
 from o80.rows import history
 from o80.rows.layout import is_plain
 
-# names of a segment are somebody's words: they stand in comments and literals, as their repr
+# names of a segment are chosen by others: they are written in comments and literals, as their repr
 HEAD = '''"""A robot for editors and type checkers: attach() attaches to it.
 
 Make this module again when the robot has changed.
@@ -81,13 +81,13 @@ def attach(
 #: names that the module uses itself
 RESERVED = ("Row", "Rows", "RowStream", "Actuator", "Request", *re.findall(r"\b[A-Z]\w+", HEAD))
 
-#: what a class of the module has in the place of a type of o80
+#: class of the module in place of a type of o80
 ROW = {"_core.Observation": "Row", "History": "Rows", "_core.Stream": "RowStream"}
 PLAIN = {name: f"o80.{name}" for name in ("PreparedBurst", "Preview")}
 
 
 def module_of(schema: dict[str, Any], segment: str | None = None) -> str:
-    """The text of the typed module for a robot with this schema.
+    """Returns the text of the typed module for a robot with this schema.
 
     segment: default segment of the module; None: the robot's name.
     """
@@ -95,7 +95,7 @@ def module_of(schema: dict[str, Any], segment: str | None = None) -> str:
 
 
 def _typed(described: Any) -> Any:
-    """A description without units, helps and offsets, which no type depends on."""
+    """Removes units, helps and offsets from a description: types do not depend on them."""
     if isinstance(described, dict):
         left_out = ("unit", "help", "offset")
         return {name: _typed(each) for name, each in described.items() if name not in left_out}
@@ -103,7 +103,7 @@ def _typed(described: Any) -> Any:
 
 
 def digest_of(schema: dict[str, Any]) -> str:
-    """Changes with the names and types that a typed module has, not with limits or options."""
+    """Returns a hash of the names and types in a typed module, without limits or options."""
     named = [(each["name"], each["group"]) for each in schema["actuators"]]
     parts = [schema["groups"], schema.get("extended"), named]
     requests = [[each["name"], each["type"]] for each in schema["requests"]]
@@ -124,26 +124,26 @@ def check(opened: Frontend, digest: str) -> None:
 
 
 def literal(words: Iterable[str]) -> str:
-    """The type of these words; Never without any."""
+    """Returns the type of these words; Never without any."""
     known = ", ".join(map(repr, words))
     return f"Literal[{known}]" if known else "Never"
 
 
 def number_type(field: Mapping[str, Any]) -> str:
-    """The type of one number."""
+    """Returns the type of one number."""
     kinds = {"b": "bool", "i": "int", "u": "int", "f": "float"}
     return literal(field["labels"]) if field["kind"] == "enum" else kinds[field["kind"][0]]
 
 
 def array_type(field: Mapping[str, Any]) -> str:
-    """The type of an array of numbers."""
+    """Returns the type of an array of numbers."""
     if field["kind"] == "enum":
         return "o80.stub.EnumerationArray"
     return f"NDArray[np.{field['kind']}{'_' if field['kind'] == 'bool' else ''}]"
 
 
 def verbs_of(source: Path, cls: str) -> Iterator[ast.FunctionDef]:
-    """The public methods of a class in a file."""
+    """Yields the public methods of a class in a file."""
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ClassDef) and node.name == cls:
             for inner in node.body:
@@ -157,7 +157,7 @@ def verbs_of(source: Path, cls: str) -> Iterator[ast.FunctionDef]:
 
 
 def changed(node: ast.expr | None, types: Mapping[str, str]) -> str:
-    """The text of an annotation with types of the module."""
+    """Returns the text of an annotation with types of the module."""
     text = node.value if isinstance(node, ast.Constant) else ast.unparse(node) if node else "Any"
     for old, new in {**PLAIN, **types}.items():
         text = re.sub(rf"(?<![\w.]){re.escape(old)}\b", new, str(text))
@@ -181,7 +181,7 @@ class Module:
             self._named.setdefault(actuator["group"], []).append(actuator["name"])
 
     def parts(self, segment: str) -> Iterator[str]:
-        """The text, part by part."""
+        """Yields the text, part by part."""
         base = class_of(self._schema["robot"])
         own = base is not None and base is not Frontend
         yield HEAD.format(
@@ -209,7 +209,7 @@ class Module:
     # ------------------------------------------------------------------ values
 
     def _new_name(self, wanted: str, kind: str, key: str) -> tuple[str, bool]:
-        """The name of a class, and whether it is new."""
+        """Returns the name of a class, and whether it is new."""
         if (kind, key) in self._names:
             return self._names[kind, key], False
         word = re.sub(r"\W", "_", wanted.rpartition("::")[2]) or "State"
@@ -222,7 +222,7 @@ class Module:
         return name + kind, True
 
     def _record(self, described: dict[str, Any], how: str) -> str:
-        """The class of a record of one row, or of many, or of an array of structs."""
+        """Returns the class of a record of one row, of many rows, or of an array of structs."""
         kind = {"one": "", "many": "Rows", "array": "Array"}[how]
         name, new = self._new_name(described["name"], kind, json_text(described))
         if new:
@@ -254,14 +254,14 @@ class Module:
         return "\n".join(lines) + "\n\n"
 
     def _value(self, field: dict[str, Any], how: str) -> str:
-        """The type of a field of a record."""
+        """Returns the type of a field of a record."""
         is_struct = field["kind"] == "struct"
         if is_struct:
             return self._record(field["type"], "array" if field["shape"] else how)
         return number_type(field) if how == "one" and not field["shape"] else array_type(field)
 
     def _states(self, how: str) -> str:
-        """The type of the states of all actuators."""
+        """Returns the type of the states of all actuators."""
         if not self._groups:
             return "o80.Record"
         if len(self._groups) == 1 and not self._groups[0]["name"]:
@@ -305,7 +305,7 @@ class Module:
     # ------------------------------------------------------------------ verbs
 
     def _verbs(self, states: str) -> Iterator[str]:
-        """Lines of the methods of the frontend that the robot changes."""
+        """Yields lines of the frontend's methods whose types depend on the robot."""
         types = {**ROW, "States": states}
         found: dict[str, list[ast.FunctionDef]] = {}
         for cls in (Reader, Commander, Frontend):
@@ -324,7 +324,7 @@ class Module:
                     yield from self._verb(verb, {}, types)
 
     def _uses(self, verb: ast.FunctionDef, takes: set[str]) -> Iterator[dict[str, str]]:
-        """The ways to call a method of actuators: for each the types of its arguments."""
+        """Yields the ways to call a method of actuators: types by argument, for each way."""
         all_of_them = "Actuator | SupportsIndex"
         several = f"{all_of_them} | Sequence[{all_of_them}] | None"
         if verb.args.defaults:  # without a target for it
@@ -342,7 +342,7 @@ class Module:
         yield {actuator: f"Sequence[{all_of_them}] | None", target: "Any"}
 
     def _target(self, described: dict[str, Any]) -> str:
-        """The type of a target."""
+        """Returns the type of a target."""
         fields = described["fields"]
         if is_plain(described):
             return self._given(fields[0])
@@ -355,7 +355,7 @@ class Module:
         return f"{first}{name} | Sequence[Any] | np.void | o80.Record"
 
     def _given(self, field: dict[str, Any]) -> str:
-        """The type of a number that is sent."""
+        """Returns the type of a number that is sent."""
         if field["kind"] == "struct":
             return "Any"
         if field["shape"]:
@@ -383,7 +383,7 @@ class Module:
     def _verb(
         self, verb: ast.FunctionDef, arguments: Mapping[str, str], types: Mapping[str, str]
     ) -> list[str]:
-        """The lines of a method with other types."""
+        """Returns the lines of a method with other types."""
         changes = ast.parse(ast.unparse(verb)).body[0]
         assert isinstance(changes, ast.FunctionDef)
         given = changes.args
@@ -411,7 +411,7 @@ def _help(text: str) -> list[str]:
 
 
 def _overloaded(uses: list[list[str]]) -> Iterator[str]:
-    """The lines of a method that is called in these ways."""
+    """Yields the lines of a method with these overloads."""
     for use in uses:
         yield from ["@overload", *use] if len(uses) > 1 else use
     if len(uses) > 1:

@@ -24,7 +24,7 @@ class Segment:
     started_at: int  #: [s] since 1970
     bytes: int
     epoch: int  #: identifies this run of the backend
-    state: str = "unknown"  #: as texts name it: life, or halted or played while it runs
+    state: str = "unknown"  #: life, or halted or played while it runs, as in texts
     played: bool = False  #: a recording is played into it: it takes no commands
     problem: str = ""  #: reason why it is not readable
 
@@ -35,7 +35,7 @@ class Segment:
 
 
 class Segments(list[Segment]):
-    """Segments, in a notebook as `o80 list` shows them."""
+    """Segments; a notebook shows them like `o80 list`."""
 
     def _repr_html_(self) -> str:
         from o80.base.screen import html  # late: most processes show no table
@@ -50,7 +50,7 @@ class Segments(list[Segment]):
 
 
 def segments() -> list[Segment]:
-    """All segments, alive and dead, sorted by name."""
+    """Lists all segments, alive and dead, sorted by name."""
     names = [field.name for field in fields(Segment) if field.name != "bytes"]
     return Segments(
         Segment(bytes=entry.size, **{name: getattr(entry, name) for name in names})
@@ -69,8 +69,8 @@ def clean(name: str | None = None) -> list[str]:
 
 
 def boot_of(frontend: "Reader") -> str:
-    """Id of the boot on whose clock its rows are; empty: not known, as of a played recording."""
-    from o80.base.machine import this_boot  # late: `o80 list` never asks
+    """Returns the id of the boot to whose clock rows refer; empty: unknown, or a recording."""
+    from o80.base.machine import this_boot  # late: `o80 list` does not need it
 
     real_time = frontend.schema["clock"] == "monotonic" and not frontend.played
     return this_boot() if real_time else ""
@@ -79,8 +79,7 @@ def boot_of(frontend: "Reader") -> str:
 def is_own(frontend: "Reader") -> bool:
     """True for a segment of a robot that this user runs, or ran.
 
-    False for a recording that is played, which may come from a stranger, and for a robot of another
-    user.
+    False for a played recording, which may come from a stranger, and for a robot of another user.
     """
     if frontend.played:
         return False

@@ -23,7 +23,7 @@ def halt(
     """Halts the backend of a segment, also one that is still starting; returns the halt's number.
 
     timeout: how long to wait for the backend [s]. Raises TimeoutError, SegmentError, BackendGone.
-    Other arguments that are wrong are refused after the halt.
+    Wrong arguments raise TypeError only after the halt.
     """
     number = _core.halt(segment, reason, timeout)
     if wrong or unknown:
@@ -84,7 +84,7 @@ def _why_not(entry: Segment) -> str:
 
 
 def _terminate(entry: Segment) -> bool:
-    """Sends SIGTERM to the backend's process; False if that has ended.
+    """Sends SIGTERM to the backend's process; False if the process has ended.
 
     A process id may be reused, or belong to another container: the process must have started when
     the segment says. A descriptor, where there is one, refers to one process all the time.
@@ -107,7 +107,7 @@ def _terminate(entry: Segment) -> bool:
 
 
 def _signal(entry: Segment, process: int | None) -> None:
-    """Raises ProcessLookupError, SegmentError."""
+    """Sends SIGTERM. Raises ProcessLookupError; SegmentError if that is not permitted."""
     try:
         if process is not None:
             signal.pidfd_send_signal(process, signal.SIGTERM)

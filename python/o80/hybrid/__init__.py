@@ -1,4 +1,4 @@
-"""A real or simulated robot in a simulated world, as one experiment: a task is written once.
+"""A real or simulated robot and a simulated world as one experiment: the task is written once.
 
 class Push(o80.hybrid.HybridTask): ...
 

@@ -1,4 +1,4 @@
-"""N robots and their worlds in two inline groups."""
+"""Steps N robots and their worlds in two inline groups."""
 
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager, ExitStack
@@ -24,10 +24,10 @@ Numbers = NDArray[np.intp]
 
 
 class Copies:
-    """Engine of copies in this process: threads of C++ step them."""
+    """Engine of copies in this process, stepped by threads of C++."""
 
     stalled = ""
-    """The text of what made a step impossible: nothing here."""
+    """Reason why a step was impossible: never set here."""
     moved = False
 
     def __init__(self, plan: Plan, home: Home, copies: int, threads: int | None) -> None:
@@ -90,24 +90,24 @@ class Copies:
         return stack.enter_context(group)
 
     def frontend(self, copy: int) -> Frontend:
-        """Frontend of the robot of a copy."""
+        """Returns the frontend of a copy's robot."""
         return self._robots[copy]
 
     def reset(self, copies: Numbers, seeds: Sequence[tuple[int, int]]) -> None:
-        """Robots and worlds to their starts, each world as its robot stands."""
+        """Resets robots and worlds, each world with the positions of its robot."""
         self._starts.begin(copies, [pair[0] for pair in seeds], self.period)
         newest = with_padding(self._robots.latest(copies))
         with_padding(self.robot.rows)[copies] = newest[:, np.newaxis]
         self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot.last[copies])
 
     def mirror(self, copies: Numbers) -> None:
-        """One iteration of these worlds, as the newest rows of their robots say."""
+        """Runs one iteration of these worlds, with the positions of their robots' newest rows."""
         self._worlds.mirror(copies, self.robot.last[copies])
 
     def step(
         self, targets: Any, copies: Index, until_halted: Callable[[], AbstractContextManager[None]]
     ) -> None:
-        """One step of these copies; the worlds of those that halt in it stay."""
+        """Steps these copies; the worlds of copies that halt in the step stay unchanged."""
         chosen = self._all[copies]
         if self._plans:
             for copy, rows in zip(chosen.tolist(), targets, strict=True):
@@ -130,7 +130,7 @@ class Copies:
             self._worlds.follow(chosen, self.robot.rows[chosen], self.period)
 
     def close(self) -> None:
-        """Ends all copies; may be called twice."""
+        """Closes all copies; may be called twice."""
         for plan in self._plans:
             plan.close()
         self._stack.close()

@@ -1,4 +1,4 @@
-"""Rewards and ends of each world, where a robot has several."""
+"""Rewards and ends per world, where a robot has several worlds."""
 
 from typing import Any, Literal
 
@@ -12,13 +12,13 @@ Mask = NDArray[np.bool_]
 
 
 class Endings:
-    """Rewards and ends of the worlds of n robots in their last step: arrays (copies, worlds)."""
+    """Rewards and ends of the worlds of n robots in the last step: arrays (copies, worlds)."""
 
     def __init__(self, copies: int, worlds: int, end: Literal["first", "all"]) -> None:
         self._end, shape = end, (copies, worlds)
         self.running: Mask = np.ones(shape, np.bool_)
         """Worlds whose episode has not ended."""
-        self._has_terminated: Mask = np.zeros(copies, np.bool_)  # the first world of a copy
+        self._has_terminated: Mask = np.zeros(copies, np.bool_)  # by copy, of its first world
         self.arrays: dict[str, NDArray[Any]] = {
             "reward": np.zeros(shape),
             "terminated": np.zeros(shape, np.bool_),
@@ -27,20 +27,20 @@ class Endings:
         }
 
     def begin(self, copies: NDArray[np.intp]) -> None:
-        """Episodes of these copies begin."""
+        """Begins episodes of these copies."""
         self.running[copies], self._has_terminated[copies] = True, False
         self.step(copies)
 
     def step(self, copies: Index) -> None:
-        """A step of these copies begins."""
+        """Begins a step of these copies."""
         for array in self.arrays.values():
             array[copies] = 0
         self.arrays["running"][copies] = self.running[copies]
 
     def take(self, copies: NDArray[np.intp], outcome: Outcome, halted: Mask, late: Mask) -> Outcome:
-        """The outcome of these copies, of what `judge` returned for their worlds.
+        """Combines the outcomes of all worlds, from `judge`, to those of these copies.
 
-        halted, late: (n,) those that ended for that. Raises InvalidArgument.
+        halted, late: (n,) copies that ended so. Raises InvalidArgument for a wrong shape or reward.
         """
         running = self.running[copies]
         reward = np.where(running, _by_world(outcome.reward, running, "reward"), 0.0)

@@ -18,24 +18,24 @@ from o80.recording.recording import Recording
 
 
 class HybridEnvironment(Environment):
-    """The environment of one robot and its world.
+    """Environment of one robot and its world.
 
-    With `record` all rows of both are recorded, and their episodes marked:
+    With `record` all rows of robot and world are recorded, and episodes are marked:
 
     | mark | when | values |
     |---|---|---|
     | `environment` | when it is made | segments of robot and world, options |
     | `episode` | before the first step | number, task, seed, state of the generator, options |
     | `episode_end` | after the last step | actions, rewards, rows, how it ended |
-    | `episode_dropped` | in a reset before it | |
+    | `episode_dropped` | in a reset before the end | |
 
-    Data sets follow from them, see docs/recording.md.
+    Data sets are made from these marks, see docs/recording.md.
     """
 
     task: Any
-    """The HybridTask."""
+    """The HybridTask of this environment."""
     recording: Recording | None = None
-    """The recording, for marks of one's own."""
+    """The recording, to which a program may add its own marks."""
 
     def __init__(
         self,
@@ -45,7 +45,7 @@ class HybridEnvironment(Environment):
         record: str | Path | None = None,
         options: Mapping[str, Any] | None = None,
     ) -> None:
-        """record: a file; options: those of the task, for its mark. Raises RecordingError."""
+        """record: a file; options: options of the task, for a mark. Raises RecordingError."""
         super().__init__(task, render_mode=render_mode)
         self._marks = None if record is None else _Marks(task, record, options or {})
         self.recording = None if self._marks is None else self._marks.recording
@@ -65,7 +65,7 @@ class HybridEnvironment(Environment):
         return observed
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, Info]:
-        """Carries out an action."""
+        """Executes an action."""
         if self._marks is not None:
             self._marks.mark_begin()
         stepped = super().step(action)
@@ -81,7 +81,7 @@ class HybridEnvironment(Environment):
 
 
 class _Marks:
-    """A recording of a robot and its world, and the marks in it."""
+    """Records a robot and its world, and marks the episodes."""
 
     def __init__(self, task: Any, path: str | Path, options: Mapping[str, Any]) -> None:
         if not isinstance(task.engine, Single):
@@ -99,27 +99,27 @@ class _Marks:
         self._flush()
 
     def drop(self) -> None:
-        """Marks an episode that has not ended."""
+        """Marks an unfinished episode as dropped."""
         if self._runs:
             self.recording.mark("episode_dropped")
         self._runs = False
 
     def begin(self, seed: int | None, state: str, options: Mapping[str, Any]) -> None:
-        """An episode begins with its next step; state: of its generator before the reset."""
+        """Prepares the mark of an episode; state: of the generator before the reset."""
         values = {"task": self._task, "seed": seed, "generator": state, "options": _plain(options)}
         self._begins = {"number": self._number, **values}
         self._number += 1
 
     def mark_begin(self) -> None:
         """Marks the begin before the first step: rows before it do not belong to the episode."""
-        if not self._runs and self._begins:
+        if self._begins:
             self.recording.mark("episode", **self._begins)
-            self._actions, self._rewards, self._runs = [], [], True
+            self._actions, self._rewards, self._runs, self._begins = [], [], True, {}
 
     def step(
         self, action: Any, reward: float, terminated: bool, truncated: bool, info: Info
     ) -> None:
-        """A step was taken."""
+        """Notes a step; marks the end of an episode."""
         self._actions.append(np.array(action).tolist())
         self._rewards.append(reward)
         rows = zip(self._members, self._flushed, strict=True)
@@ -127,7 +127,7 @@ class _Marks:
             self._flush()  # before rows are overwritten
         if not (terminated or truncated):
             return
-        self._flush()  # an episode that is marked has its rows
+        self._flush()  # a marked episode must have its rows
         self.recording.mark(
             "episode_end",
             terminated=terminated,
@@ -146,7 +146,7 @@ class _Marks:
 
 
 def _plain(value: Any) -> Any:
-    """Value as JSON can hold it: of a number that is not finite None, of anything else its text."""
+    """Converts a value for JSON: a number that is not finite to None, other types to text."""
     if isinstance(value, Mapping):
         return {str(key): _plain(each) for key, each in value.items()}
     if isinstance(value, (list, tuple)):

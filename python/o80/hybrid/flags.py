@@ -1,4 +1,4 @@
-"""Comparisons of numbers of the newest rows."""
+"""Compares numbers of the newest rows with values."""
 
 import operator
 import re
@@ -24,7 +24,7 @@ _FLAG = re.compile(r"\s*(robot|world)\.(\S+)\s*(<=|>=|==|!=|<|>)\s*(\S+)\s*")
 
 
 class Flags:
-    """Comparisons such as "world.extended.puck_speed < 0.01". Raises InvalidArgument."""
+    """Comparisons such as "world.extended.puck_speed < 0.01". InvalidArgument for a wrong text."""
 
     def __init__(self, texts: Sequence[str], robot: Side, world: Side) -> None:
         if isinstance(texts, str):
@@ -36,7 +36,7 @@ class Flags:
         return len(self._flags)
 
     def raised(self, running: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(copies,) those for which any is true, in any of these worlds (copies, worlds)."""
+        """Returns (copies,) with any true comparison, in any of these worlds (copies, worlds)."""
         raised = np.zeros(len(running), np.bool_)
         for numbers, compare, value in self._flags:
             found = compare(numbers.read(EVERY)[..., 0], value)

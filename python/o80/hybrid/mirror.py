@@ -1,4 +1,4 @@
-"""Numbers of a robot's rows that the joints of a world follow."""
+"""Selects the numbers of a robot's rows that the joints of a world mirror."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -17,9 +17,9 @@ from o80.rows.layout import joined
 
 @dataclass(frozen=True)
 class difference:  # noqa: N801, it reads as a function where a mirror is written
-    """The velocity is the difference of positions over so many rows, divided by their time.
+    """Computes the velocity: the difference of positions over `rows` rows, divided by their time.
 
-    Begun anew at each reset and after each missed row. More rows give less noise, later.
+    Restarts at each reset and after each missed row. More rows reduce noise and add delay.
     """
 
     rows: int = 3
@@ -30,38 +30,38 @@ class difference:  # noqa: N801, it reads as a function where a mirror is writte
 
 @dataclass(frozen=True)
 class Mirror:
-    """Numbers of a robot's rows that the joints of a world follow."""
+    """Selects the numbers of a robot's rows that the joints of a world mirror."""
 
     position: str = "observed"
     """Path of the positions in a row, in the order of the robot's actuators."""
     velocity: str | difference | None = None
-    """Path of their velocities, or `difference(rows=3)`. A world whose joints have velocities needs
-    it: with velocity 0 a moving arm hits things as if it stood still. The velocity of a number that
-    is spread over a joint's range is a difference, unless its own is in 1/s."""
+    """Path of their velocities, or `difference(rows=3)`. Needed for a world whose joints have
+    velocities: with velocity 0 a moving arm would hit things like a fixed one. The velocity of a
+    number that is spread over a joint's range is a difference, unless its unit is 1/s."""
     names: Mapping[str, str | None] | Sequence[str] = field(default_factory=dict)
-    """The joint of the world for an actuator of another name (None: it is not mirrored); or the
-    joints of all numbers at `position`, in their order."""
+    """The world's joint for each actuator whose name differs (None: it is not mirrored); or the
+    joints of all numbers at `position`, in order."""
     fresh: str | None = None
-    """Path of a boolean that is false in a row that brought no reading: the world then holds the
+    """Path of a boolean that is false in a row without a new reading: the world then holds the
     last position, at velocity 0."""
 
 
 @dataclass(frozen=True)
 class Pair:
-    """A number of the robot, and the joint of the world that follows it."""
+    """A number of the robot, and the joint of the world that mirrors it."""
 
     joint: str
     position: Column
     velocity: Column | None
-    """None: the difference of positions."""
+    """None: the difference of positions is used."""
     over: tuple[float, float] | None
-    """The numbers at both ends of the joint's range, if the number is spread over it."""
+    """The numbers at both ends of the joint's range, if the number is spread over this range."""
 
 
 def pairs_of(
     mirror: Mirror, robot: Mapping[str, Any], joints: Mapping[str, str], world: str
 ) -> list[Pair]:
-    """Pairs of numbers and joints. Raises InvalidArgument that names both sides.
+    """Pairs numbers with joints. Raises InvalidArgument, with both names, if they do not match.
 
     robot: schema of the robot. joints: the joints of the world, with their units.
     """
@@ -98,7 +98,7 @@ def pairs_of(
 
 
 def numbers_at(path: str, what: str, robot: Mapping[str, Any]) -> list[Column]:
-    """The numbers at a path; of states with several numbers those that are named `what`."""
+    """Returns the numbers at a path; of states with several numbers those named `what`."""
     columns = columns_at(robot, path)
     if path.partition(".")[0] == "extended":
         return columns
@@ -139,7 +139,7 @@ def _joints_of(
 def _spread(
     column: Column, index: int, robot: Mapping[str, Any], unit: str, joint: str
 ) -> tuple[float, float] | None:
-    """Raises InvalidArgument for units that do not convert."""
+    """Returns limits to spread over a joint's range. Raises InvalidArgument for other units."""
     if column.unit == unit or not column.unit or unit in ("", "rad or m"):
         return None
     limits = robot["actuators"][index]["limits"][0] if index < len(robot["actuators"]) else {}
@@ -153,7 +153,7 @@ def _spread(
 
 
 class Motion:
-    """Positions and velocities of the mirrored numbers of n robots, from row to row."""
+    """Tracks positions and velocities of the mirrored numbers of n robots, from row to row."""
 
     def __init__(self, mirror: Mirror, pairs: Sequence[Pair], copies: int, schema: Any) -> None:
         self._positions = [pair.position for pair in pairs]
@@ -165,31 +165,31 @@ class Motion:
         if self._has_velocity and len(self._named) < len(pairs):
             self._over = mirror.velocity.rows if isinstance(mirror.velocity, difference) else 3
         self.paths: dict[str, str] | None = None
-        """Paths in a row of the numbers that are mirrored as they are; None: some are computed."""
+        """Paths in a row of numbers that are mirrored unchanged; None if some are computed."""
         dropped = isinstance(mirror.names, Mapping) and None in mirror.names.values()
         if not (self._over or self._fresh or dropped):
             self.paths = {"position": mirror.position}
             if isinstance(mirror.velocity, str):
                 self.paths["velocity"] = mirror.velocity
         self._past: FloatArray = np.zeros((copies, self._over + 1, len(pairs)))
-        self._good: NDArray[np.int64] = np.ones(copies, np.int64)  # rows in sequence with a reading
+        self._good: NDArray[np.int64] = np.ones(copies, np.int64)  # consecutive rows with a reading
         self.missed: NDArray[np.int64] = np.zeros(copies, np.int64)
-        """(copies,) rows in sequence that brought no reading."""
+        """(copies,) consecutive rows without a new reading."""
         self.all_missed = 0
-        """Rows of all copies that brought no reading."""
+        """Number of rows of all copies without a new reading."""
 
     def begin(self, copies: NDArray[np.intp], rows: NDArray[Any]) -> None:
-        """Episodes of these copies begin at these rows (n,)."""
+        """Begins episodes of these copies at these rows (n,)."""
         self.missed[copies], self._good[copies] = 0, 1
         self._past[copies, -1] = read(rows, self._positions)
 
     def standing(self, rows: NDArray[Any]) -> tuple[FloatArray, FloatArray | None]:
-        """Positions and velocities (n, 1, joints) of rows (n,) before an episode."""
+        """Returns positions and velocities (n, 1, joints) of rows (n,) before an episode."""
         positions = read(rows, self._positions)[:, np.newaxis]
         return positions, self._read_velocities(rows)[:, np.newaxis] if self._has_velocity else None
 
     def _read_velocities(self, rows: NDArray[Any]) -> FloatArray:
-        """(..., joints) of rows (...): 0 where they are differences."""
+        """Reads velocities (..., joints) from rows (...): 0 where they are differences."""
         velocities = np.zeros((*rows.shape, len(self._positions)))
         velocities[..., self._named] = read(rows, self._velocities)
         return velocities
@@ -197,7 +197,7 @@ class Motion:
     def follow(
         self, copies: NDArray[np.intp], rows: NDArray[Any], period: float
     ) -> tuple[FloatArray, FloatArray | None]:
-        """Positions and velocities (n, iterations, joints) of rows (n, iterations)."""
+        """Returns positions and velocities (n, iterations, joints) of rows (n, iterations)."""
         positions = read(rows, self._positions)
         velocities = self._read_velocities(rows) if self._has_velocity else None
         fresh = None
@@ -229,7 +229,7 @@ class Motion:
             if self._over:
                 span = np.clip(good - 1, 1, self._over)
                 before = past[np.arange(len(copies)), self._over - span]
-                # the first one after missed rows has moved since the last one before them
+                # the first reading after missed rows covers all rows since the last reading
                 span = np.where(good == 1, missed + 1, span)
                 found = (position - before) / (span * period)[:, None]
                 found[:, self._named] = velocities[:, i, self._named]
@@ -241,7 +241,7 @@ class Motion:
 
 
 def read(rows: NDArray[Any], columns: Sequence[Column]) -> FloatArray:
-    """The numbers (..., numbers) of these columns of rows (...), in double precision."""
+    """Reads the numbers (..., numbers) of these columns of rows (...), in double precision."""
     runs = joined((column.dtype, column.offset, 1) for column in columns)
     parts = [rows.getfield(np.dtype((kind, (count,))), at) for kind, at, count in runs]
     if not parts:

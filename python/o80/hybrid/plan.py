@@ -10,11 +10,11 @@ from o80.hybrid.rig import Rig
 
 @dataclass(frozen=True)
 class Plan:
-    """Length of a step of a rig, and form of its actions. Raises InvalidArgument."""
+    """Length of a step of a rig, and form of its actions. InvalidArgument if they do not fit."""
 
     rig: Rig
     folder: Path
-    """Folder in which relative paths of the rig begin."""
+    """Folder to which relative paths of the rig refer."""
     chunk_size: int | None = None
     """Rows of an action, each for `every` iterations; None: an action is one target."""
     action_steps: int = 1
@@ -36,5 +36,5 @@ class Plan:
 
     @property
     def iterations(self) -> int:
-        """Iterations of the robot in a step."""
+        """Iterations of the robot in one step."""
         return self.rig.every * self.action_steps

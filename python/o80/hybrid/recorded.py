@@ -1,4 +1,4 @@
-"""Recorded robots in new worlds: transitions without moving the robot again."""
+"""Replays recorded robots in new worlds: transitions without moving the robot again."""
 
 import json
 import os
@@ -46,19 +46,19 @@ def relive(
     segment: str | None = None,
     **parameters: Any,
 ) -> Iterator[Transitions]:
-    """Mirrors a recorded robot in new worlds, as fast as they go; an item for each episode.
+    """Mirrors a recorded robot in new worlds, without pauses; yields one item for each episode.
 
     task: a class derived from HybridTask.
-    path: a recording of an environment of the task (`record=`): its marks have the episodes, their
-        options and actions, and the parameters of the task. In one without these marks episode
-        follows episode, and the task's `action_of` says what the actions were.
+    path: a recording of an environment of the task (`record=`): its marks hold the episodes with
+        options, actions and parameters. In a recording without these marks episodes follow each
+        other directly, and the task's `action_of` returns the actions.
     worlds: worlds of the robot (None: those of the rig).
-    seed: of new draws; None: as they were drawn for the recording.
-    segment: the robot, in a recording without those marks.
-    parameters: of the task, instead of recorded ones.
+    seed: seed of new draws; None: the draws of the recording.
+    segment: segment of the robot, in a recording without these marks.
+    parameters: parameters of the task, instead of the recorded ones.
 
-    An episode ends with its last world, or where the recorded one ended. Raises InvalidArgument,
-    RecordingError.
+    An episode ends with its last world, or where the recorded episode ended. Raises
+    InvalidArgument for a wrong task or missing rows, RecordingError for an unreadable recording.
     """
     takes = signature(task).parameters.values() if hasattr(task, "_parameters") else ()
     if not any(each.name == "recorded" or each.kind is each.VAR_KEYWORD for each in takes):
@@ -83,15 +83,15 @@ def relive(
 
 @dataclass
 class _Span:
-    """Rows of a recorded episode; or of many, without actions."""
+    """Rows of one recorded episode; or, without actions, of many."""
 
     robot: RecordedSegment
     parameters: Mapping[str, Any]
     options: dict[str, Any]
-    generator: Any  # its state before the reset
+    generator: Any  # state of the generator before the reset
     actions: Sequence[Any] | None
-    reset: int  # the row that the worlds mirrored in the reset
-    first: int  # the newest row when the first step began
+    reset: int  # row that the worlds mirrored in the reset
+    first: int  # newest row at the begin of the first step
     last: int
 
 
@@ -153,14 +153,14 @@ def _played(environment: Environment, span: _Span) -> Iterator[Transitions]:
 def _by_world(
     observed: Any, info: Any, reward: float = 0.0, terminated: bool = False, truncated: bool = False
 ) -> tuple[Any, ...]:
-    """Observation, reward, terminated, truncated, running: (worlds, ...)."""
+    """Returns observation, reward, terminated, truncated, running: (worlds, ...)."""
     if "worlds" in info:
         return tuple(info["worlds"].values())
     return tuple(np.array([each]) for each in (observed, reward, terminated, truncated, True))
 
 
 class Recorded:
-    """Engine of a recorded robot: its rows are read, and worlds in this process mirror them."""
+    """Engine of a recorded robot: worlds in this process mirror its recorded rows."""
 
     stalled, moved, resets, first = "", False, True, ()
 
@@ -183,27 +183,27 @@ class Recorded:
         self.robot = Side(None, rows, schema=schema)
 
     def seek(self, reset: int, first: int) -> None:
-        """The next episode: the row of its reset, and the newest one when its first step began."""
+        """Selects an episode: row of its reset, and newest row at the begin of its first step."""
         self._reset, self._row = reset, first
         self._begins = True
 
     def reset(self, copies: NDArray[np.intp], seeds: Sequence[tuple[int, int]]) -> None:
-        """The worlds to their starts."""
+        """Resets the worlds."""
         self.robot.rows[...] = self._rows(self._reset, 1)
         self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot.last)
 
     def mirror(self, copies: NDArray[np.intp]) -> None:
-        """One iteration of the worlds."""
+        """Runs one iteration of the worlds."""
         self._worlds.mirror(copies, self.robot.last)
 
     def rows_of_step(self) -> NDArray[Any]:
-        """(iterations,) of the robot in the next step."""
+        """Returns the robot's rows (iterations,) of the next step."""
         return self._rows(self._row + 1, self.iterations)
 
     def step(
         self, _targets: Any, _copies: Any, until_halted: Callable[[], AbstractContextManager[None]]
     ) -> None:
-        """One step, as recorded."""
+        """Runs one step, as recorded."""
         if self._begins:
             self._begins = False
             self._worlds.motion.begin(_ONLY, self._rows(self._row, 1))
@@ -213,7 +213,7 @@ class Recorded:
             self._worlds.follow(_ONLY, self.robot.rows, self.period)
 
     def _rows(self, first: int, count: int) -> NDArray[Any]:
-        """Raises InvalidArgument if one is missing."""
+        """Returns `count` rows from `first` on. Raises InvalidArgument if one is missing."""
         begin = int(np.searchsorted(self._all["iteration"], first))
         rows = self._all[begin : begin + count]
         if len(rows) < count or rows["iteration"][[0, -1]].tolist() != [first, first + count - 1]:
@@ -223,5 +223,5 @@ class Recorded:
         return rows
 
     def close(self) -> None:
-        """Ends the worlds; may be called twice."""
+        """Closes the worlds; may be called twice."""
         self._stack.close()

@@ -13,7 +13,7 @@ from o80.hybrid.mirror import Mirror, Pair, pairs_of
 from o80.robots.robot import Robot, load
 
 AnyRobot = str | os.PathLike[str] | type | Robot
-"""A robot by its name or path, its driver class, or loaded."""
+"""A robot: its name, path or driver class, or a loaded one."""
 
 _NUMBERS = count(1)
 
@@ -22,9 +22,9 @@ _NUMBERS = count(1)
 class attach:  # noqa: N801, it reads as a function where a world is given
     """A world that runs in another process: `make(Push, world=attach("tracker"), ...)`.
 
-    segment: one that bursts mirrors the robot, as a world that a rig has started. One with a clock,
-        such as a tracker, is only read: its rows have the names that the task reads, at their own
-        times.
+    segment: a bursting world mirrors the robot, like a world that the rig has started. A world with
+        a clock, such as a tracker, is only read: its rows must have the names that the task reads,
+        and keep their own times.
     """
 
     segment: str
@@ -35,33 +35,33 @@ class Rig:
     """A robot and the world that mirrors it, stepped together.
 
     The iterations of the robot are the only clock: the world makes one iteration for each of them,
-    with its joints where the robot's were. Nothing in the world pushes the robot back.
+    with its joints at the robot's positions. Nothing in the world pushes the robot back.
     """
 
     robot: AnyRobot
     """Any robot of o80."""
     world: AnyRobot | attach
-    """A robot that simulates, or `attach(segment)` of one that runs already. Of a robot that shows
-    a model file, such as "so101_twin", the model is simulated by o80-mujoco; "mujoco" takes it from
-    `world_options`."""
+    """A robot that simulates, or `attach(segment)` for one that runs already. For a robot that
+    shows a model file, such as "so101_twin", o80-mujoco simulates this model; "mujoco" takes the
+    model from `world_options`."""
     mirror: Mirror = field(default_factory=Mirror)
     robot_options: Mapping[str, Any] = field(default_factory=dict)
     world_options: Mapping[str, Any] = field(default_factory=dict)
     """Options of the drivers, and `history` and `lane_blocks` of `Robot.start`. A relative path of
-    `model` begins in the folder of the task's file."""
+    `model` refers to the folder of the task's file."""
     things: str | os.PathLike[str] | None = None
-    """An MJCF file whose bodies are put into the world's model; a relative path as above."""
+    """An MJCF file whose bodies are added to the world's model; a relative path as above."""
     every: int
-    """Iterations of a step."""
+    """Iterations in a step."""
     delay: int = 1
-    """Iterations from the newest row to the first one in which an action acts, less 1. Below
-    `every`, with chunks below `every` x `action_steps`. In real time the time to decide in."""
+    """Iterations from the newest row to the first one in which an action acts, minus 1. Below
+    `every`, with chunks below `every` x `action_steps`. In real time this is the time to decide."""
     worlds: int | None = None
-    """Worlds for each robot, all of which mirror its motion; what tasks return then has their
-    dimension, (copies, worlds, ...). None: one, without that dimension."""
+    """Worlds for each robot, all of which mirror its motion; results of tasks then have this
+    dimension, (copies, worlds, ...). None: one world, without this dimension."""
     end: Literal["first", "all"] = "first"
-    """The episode of a robot ends with that of its first world, or when those of all have ended.
-    A world whose episode has ended mirrors on."""
+    """The episode of a robot ends with the episode of its first world, or after those of all.
+    A world whose episode has ended continues to mirror."""
     frequency: float | None = None
     """Iterations a second [1/s] (None: the robot's own)."""
 
@@ -76,7 +76,7 @@ class Rig:
             raise InvalidArgument(f"mirror must be a Mirror, got {self.mirror!r}")
 
     def beside(self, folder: Path) -> "Rig":
-        """This rig, with robots that are files of a folder (libraries, Python files) there."""
+        """Returns this rig, with robots that are files (libraries, Python) in this folder."""
         robot, world = (_beside(each, folder) for each in (self.robot, self.world))
         return replace(self, robot=robot, world=world)
 
@@ -89,17 +89,17 @@ def _beside(robot: Any, folder: Path) -> Any:
 
 
 def robot_of(robot: AnyRobot) -> Robot:
-    """The robot, loaded. Raises DriverError."""
+    """Loads a robot, unless it is loaded. Raises DriverError if that fails."""
     return robot if isinstance(robot, Robot) else load(robot)
 
 
 def unused_name(robot: Robot) -> str:
-    """A name for its segment that no other rig has."""
+    """Returns a segment name that no other rig uses."""
     return f"{robot.name}-{os.getpid()}-{next(_NUMBERS)}"
 
 
 class World:
-    """The simulation of a rig before it is started: its options, and what follows what."""
+    """The simulation of a rig before its start: its options, and the pairs that it mirrors."""
 
     def __init__(
         self,
@@ -109,10 +109,10 @@ class World:
         name: str,
         schema: Mapping[str, Any] | None = None,
     ) -> None:
-        """folder: in which relative paths begin. robot, name: schema and name of the robot.
+        """folder: base of relative paths. robot, name: schema and name of the robot.
 
-        schema: that of a world that runs already. Raises InvalidArgument for what cannot be
-        mirrored, DriverError.
+        schema: schema of a world that runs already. Raises InvalidArgument if the robot cannot be
+        mirrored, DriverError if the world cannot be loaded.
         """
         if schema is not None:
             given, own = schema, False
@@ -170,20 +170,20 @@ def _simulation(rig: Rig, folder: Path) -> tuple[Robot, dict[str, Any]]:
 
 
 def _of_driver(options: Mapping[str, Any]) -> dict[str, Any]:
-    """Options without those of the backend."""
+    """Returns the options without those of the backend."""
     aside = ("segment", "history", "lanes", "lane_blocks")
     return {name: value for name, value in options.items() if name not in aside}
 
 
 def _entry(pair: Pair) -> str:
-    """As the option `joints` of o80-mujoco has it."""
+    """Formats a pair for the option `joints` of o80-mujoco."""
     if pair.over is None:
         return pair.joint
     return f"{pair.joint}={pair.joint} {pair.over[0]:g} {pair.over[1]:g}"
 
 
 def _unit(schema: Mapping[str, Any], actuator: Mapping[str, Any]) -> str:
-    """Unit of a joint's position."""
+    """Returns the unit of a joint's position."""
     fields = schema["groups"][actuator["group"]]["type"]["fields"]
     return str(next((each["unit"] for each in fields if each["name"] in ("", "position")), ""))
 

@@ -1,4 +1,4 @@
-"""The rows of robots and worlds as a task reads them."""
+"""The rows of robots and worlds, for tasks."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -16,7 +16,7 @@ from o80.rows.columns import columns_at
 
 
 class Side:
-    """The robots of a rig, or their worlds: the rows of the last step, and requests."""
+    """The robots of a rig, or their worlds: rows of the last step, and requests."""
 
     def __init__(
         self,
@@ -27,14 +27,14 @@ class Side:
         schema: Mapping[str, Any] | None = None,
         simulated: bool = True,
     ) -> None:
-        """member: None where rows were recorded. worlds: of each, where numbers have that axis."""
+        """member: None for recorded rows. worlds: per robot, if numbers have this axis."""
         self._member, self._schema = member, schema
         self.worlds = worlds
         self.simulated = simulated
-        """False of a world that is only read: what `begin` places, somebody has to."""
+        """False for a world that is only read: a person must place the things of `begin`."""
         self.rows = rows
-        """Structured (copies, iterations), of worlds (copies, worlds, iterations): each step
-        overwrites them. After a reset all of a copy are its newest row."""
+        """Structured (copies, iterations), or (copies, worlds, iterations): each step overwrites
+        them. After a reset all rows of a copy are its newest row."""
         self.last = rows[..., -1]
         """The newest rows, a view of `rows`."""
 
@@ -47,17 +47,17 @@ class Side:
         return self._schema
 
     def numbers(self, paths: Sequence[str]) -> "Numbers":
-        """Numbers at these paths of the newest rows. Raises InvalidArgument."""
+        """Selects numbers of the newest rows by path. Raises InvalidArgument if one is unknown."""
         return Numbers(self, paths)
 
     def request(self, name: str, at: NDArray[np.intp], /, **fields: Any) -> None:
         """Sends a request to some copies and runs each until it has ended.
 
-        at: numbers of the copies. fields: one value for all, or an array (n, ...) of one for each
-            copy, of worlds also (n, worlds, ...).
+        at: numbers of the copies. fields: one value for all copies, or an array (n, ...) with one
+            for each copy, for worlds also (n, worlds, ...).
         """
         if self._member is None:
-            return  # what it did is in the rows
+            return  # the effect of the request is in the recorded rows
         described = [each for each in self.schema["requests"] if each["name"] == name]
         parts = described[0]["type"]["fields"] if described else []
         dimensions = {part["name"]: len(part["shape"]) for part in parts}
@@ -74,12 +74,12 @@ class Side:
 
 
 def numbers_of_worlds(copies: NDArray[np.intp], each: int) -> NDArray[np.intp]:
-    """Numbers in their group of all worlds of these copies."""
+    """Returns the numbers of all worlds of these copies, within their group."""
     return (np.asarray(copies)[:, np.newaxis] * each + np.arange(each)).ravel()
 
 
 def _of_all(value: Any, shape: tuple[int, ...], each: int, what: str) -> list[Any]:
-    """The entries for all worlds. Raises InvalidArgument."""
+    """Returns an entry for each world. Raises InvalidArgument for a wrong shape."""
     given = np.asarray(value)
     if given.shape[: len(shape)] != shape:
         raise InvalidArgument(f"{what} must begin with the shape {shape}, got {given.shape}")
@@ -89,7 +89,7 @@ def _of_all(value: Any, shape: tuple[int, ...], each: int, what: str) -> list[An
 
 
 class Numbers:
-    """Some numbers of the newest rows of a side."""
+    """Selected numbers of the newest rows of a side."""
 
     def __init__(self, side: Side, paths: Sequence[str]) -> None:
         if isinstance(paths, str):
@@ -103,7 +103,7 @@ class Numbers:
         return len(self._columns)
 
     def read(self, at: Index) -> FloatArray:
-        """(n, numbers) of these copies, or (n, worlds, numbers)."""
+        """Reads (n, numbers) of these copies, or (n, worlds, numbers)."""
         rows = self._side.last[at]
         if self._side.worlds is None and rows.ndim > 1:
             rows = rows[:, 0]
@@ -111,7 +111,7 @@ class Numbers:
 
 
 def desired_of(robot: Frontend) -> FloatArray:
-    """(actuators,) the first number of each desired state, in the newest row."""
+    """Returns (actuators,), the first number of each desired state in the newest row."""
     names = [actuator["name"] for actuator in robot.schema["actuators"]]
     columns = [columns_at(robot.schema, f"desired.{name}")[0] for name in names]
     numbers: FloatArray = read(robot.history(1).rows, columns)[0]
@@ -119,6 +119,6 @@ def desired_of(robot: Frontend) -> FloatArray:
 
 
 def _whole(path: str) -> str:
-    """A path without its part is one of sensor values."""
+    """Completes a path that does not begin with a part of a row: it is a sensor value."""
     named = path.partition(".")[0] in ("desired", "observed", "extended")
     return path if named else f"extended.{path}"

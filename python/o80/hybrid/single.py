@@ -1,4 +1,4 @@
-"""One robot and its world, each with a frontend: inline, in processes, or by the robot's clock."""
+"""Steps one robot and its world by frontends: inline, in processes, or by the robot's clock."""
 
 import time
 from collections.abc import Callable, Sequence
@@ -30,18 +30,18 @@ _ONLY = np.zeros(1, np.intp)
 
 @dataclass
 class Tolerances:
-    """Limits of what an episode by the clock survives."""
+    """Limits for an episode by the clock; beyond one of them the episode ends."""
 
     max_late: int
-    """Rows that the robot may be ahead when a step begins."""
+    """Rows by which the robot may be ahead at the begin of a step."""
     max_drift: float
-    """Time of the robot's rows less that of as many periods, since the episode began [s]."""
+    """Time of the robot's rows minus the time of as many periods, since the episode began [s]."""
     max_missed: int
-    """Rows in sequence that brought no reading."""
+    """Consecutive rows without a reading."""
 
 
 class Single:
-    """Engine of one robot."""
+    """Engine of one robot and its world."""
 
     def __init__(
         self,
@@ -115,12 +115,12 @@ class Single:
         options: dict[str, Any],
         world: bool = False,
     ) -> Frontend:
-        """Starts a robot in the way of this rig, and opens a frontend to it."""
+        """Starts a robot with the pacing of this rig, and opens a frontend to it."""
         segment = options.pop("segment", None) or unused_name(library)
         if pacing == "inline":
             frontend: Frontend = library.inline(segment, frequency=frequency, **options)
             return self._stack.enter_context(frontend)
-        self._stack.callback(_clean, segment)  # that of a process which was killed stays
+        self._stack.callback(_clean, segment)  # a killed process leaves its segment
         bursting = world or not self._clocked
         process = self._stack.enter_context(
             library.start(segment, frequency=frequency, bursting=bursting, **options)
@@ -146,7 +146,7 @@ class Single:
         return Worlds(member, world, motion, plan.iterations, 1, rig.worlds)
 
     def _open_world(self, plan: Plan, pacing: Pacing, world: World) -> InlineGroup | Frontend:
-        """The world in the way of this rig; of several a group in this process."""
+        """Starts the world with the pacing of this rig; several worlds as a group, inline."""
         count = plan.rig.worlds or 1
         if count == 1:
             return self._open(world.robot, pacing, 1 / self.period, world.options, world=True)
@@ -155,19 +155,19 @@ class Single:
             world.robot.inline(copies=count, frequency=1 / self.period, **options)
         )
         name = unused_name(world.robot)
-        for number in range(count):  # recordings find them by their names
+        for number in range(count):  # recordings find the worlds by their names
             group.publish(number, f"{name}-{number}")
             self.frontends.append(self._stack.enter_context(Frontend(f"{name}-{number}")))
         return group
 
     def frontend(self, _copy: int) -> Frontend:
-        """Frontend of the robot."""
+        """Returns the frontend of the robot."""
         return self._robot
 
     # ------------------------------------------------------------------ episodes
 
     def reset(self, _copies: NDArray[np.intp], seeds: Sequence[tuple[int, int]]) -> None:
-        """Robot and world to their starts; the task has brought a robot with a clock home."""
+        """Resets robot and world; the task has moved a robot with a clock home before."""
         ((robot_seed, world_seed),) = seeds
         if self._starts is not None:
             self._starts.begin(_ONLY, [robot_seed], self.period)
@@ -178,21 +178,21 @@ class Single:
 
     @property
     def lateness(self) -> int:
-        """Rows that the robot has made since the newest one that was used."""
+        """Rows of the robot since the newest one that was used."""
         return self._robot.published - self._row
 
     @property
     def span(self) -> tuple[int, int, int]:
-        """Iterations of the robot: of the reset, before the first step, after the last one."""
+        """Iterations of the robot: in the reset, before the first step, after the last step."""
         return self._reset_row, self._began[0], self._row
 
     def mirror(self, _copies: NDArray[np.intp]) -> None:
-        """One iteration of the world, as the newest row of the robot says."""
+        """Runs one iteration of the world, with the positions of the robot's newest row."""
         self._worlds.mirror(_ONLY, self.robot.last, self._seen)
 
     @property
     def _seen(self) -> _core.Seen | None:
-        """The newest row that is used, where robots share a clock."""
+        """The newest row that was used, if robots share a clock."""
         if not self._clocked:
             return None
         row = self.robot.last
@@ -200,7 +200,7 @@ class Single:
         return _core.Seen(self._epoch, iteration, taken, self._robot.schema["clock"])
 
     def begin(self) -> None:
-        """The next step follows the newest row: by a clock the robot has made some since."""
+        """Makes the next step follow the newest row, as a robot with a clock has continued."""
         self._begins, self._planned_until, self.stalled = False, None, ""
         if self._clocked:
             before = self.motion.standing(self.robot.last)[0]
@@ -219,9 +219,9 @@ class Single:
         _copies: Index,
         until_halted: Callable[[], AbstractContextManager[None]],
     ) -> None:
-        """One step, or nothing but a text in `stalled` if the robot has moved on too far.
+        """Runs one step, or only sets `stalled` to a text if the robot is too far ahead.
 
-        targets: (1, actuators), of chunks (1, rows, actuators); None: nothing is sent.
+        targets: (1, actuators), or chunks (1, rows, actuators); None: nothing is sent.
         """
         if self._begins:
             self.begin()
@@ -238,7 +238,7 @@ class Single:
             self._count_late(first + self._delay)
             self._worlds.follow(_ONLY, self.robot.rows, self.period, self._seen)
             done = 2
-        if done == 0:  # a halt has ended it
+        if done == 0:  # a halt has ended the step
             self.robot.rows[...] = self._robot.history(1).rows
             return
         if done == 1:
@@ -282,7 +282,7 @@ class Single:
             self._batch = self._robot.pulse(at=at, late="now", seen=self._seen)
 
     def _rows(self, first: int) -> None:
-        """The robot makes the rows of a step, or has made them by its clock."""
+        """Runs the robot for the rows of a step, or waits for them if it has a clock."""
         last, robot = first + self.iterations - 1, self._robot
         if self._burst is not None:
             self._burst.run(TIMEOUT, at=first + self._delay, late="now")
@@ -300,7 +300,7 @@ class Single:
         elif (chunk := self._chunk) is not None:
             end = time.monotonic() + TIMEOUT
             while not chunk.decided and time.monotonic() < end:
-                with suppress(TimeoutError):  # a rejection is reported after its row
+                with suppress(TimeoutError):  # a rejection is reported after the row of the command
                     self._robot.wait_for(self._robot.published + 1, timeout=0.01)
             rows = self._rows_sent
             self.counts.late_actions += rows if chunk.late is None else chunk.late
@@ -310,7 +310,7 @@ class Single:
                 self._planned_until = at - 1 + self._every * rows
 
     def close(self) -> None:
-        """Ends what was started; may be called twice."""
+        """Closes everything that was started; may be called twice."""
         self._stack.close()
 
 

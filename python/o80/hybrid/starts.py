@@ -1,4 +1,4 @@
-"""Robots that are stepped return to where episodes begin."""
+"""Returns robots that are stepped to the start of an episode."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -17,26 +17,26 @@ from o80.rows.columns import columns_at
 
 Numbers = NDArray[np.intp]
 _BURST = 20
-"""Iterations of a burst on the way home: the same in each way of pacing, for the same bits."""
+"""Iterations of a burst on the way home: equal for each pacing, for equal bits."""
 
 
 @dataclass(frozen=True)
 class Home:
-    """Where episodes begin."""
+    """Start position of episodes."""
 
     place: Sequence[float] | None
-    """Targets of all actuators; None: where a reset leads."""
+    """Targets of all actuators; None: the position after a reset."""
     duration: float
-    """Time to come there [s]."""
+    """Time of the motion to it [s]."""
     tolerance: float
-    """Largest distance then, in the units of the robot."""
+    """Largest distance from it after the motion, in the units of the robot."""
 
 
 class Starts:
-    """Starts of episodes of robots that are stepped.
+    """Begins episodes of robots that are stepped.
 
-    Without a home by the request reset. With one a copy is moved there once; a snapshot brings it
-    back, if it serves that.
+    Without a home the request reset is used. With a home a copy moves there once; later a snapshot
+    restores it, if the robot serves that.
     """
 
     def __init__(self, member: InlineGroup | Frontend, side: Side, copies: int, home: Home) -> None:
@@ -56,7 +56,7 @@ class Starts:
         self._burst.targets[...] = home.place
 
     def begin(self, copies: Numbers, seeds: Sequence[int], period: float) -> None:
-        """Episodes of these copies begin. Raises InvalidArgument if one does not come home."""
+        """Begins episodes of these copies. Raises InvalidArgument if one does not reach home."""
         if self._home.place is None:
             reset(self._side, copies, seeds)
             return
@@ -94,7 +94,7 @@ class Starts:
 
 
 def reset(side: Side, copies: Numbers, seeds: ArrayLike) -> None:
-    """The request reset; nothing for a robot that does not serve it."""
+    """Sends the request reset, if the robot serves it."""
     schema: Mapping[str, Any] = side.schema
     if any(request["name"] == "reset" for request in schema["requests"]):
         side.request("reset", copies, seed=seeds)

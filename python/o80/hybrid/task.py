@@ -37,51 +37,51 @@ PACINGS = ("inline", "processes", "real_time")
 
 
 class HybridTask(Task):
-    """A task on a robot and the world that mirrors it: a class that says what is theirs.
+    """A task on a robot and the world that mirrors it; a derived class defines it.
 
-    The order of a step is, with k the newest row of the robot that was used: the action acts from
+    A step runs in this order; k is the newest row of the robot that was used. The action acts from
     iteration k + 1 + `delay` on; the robot makes the rows k + 1 to k + `every`; the world mirrors
-    exactly these; the task sees the last row of both.
+    exactly these rows; the task reads the last row of both.
 
-    A class sets `rig` and `action_space`, or its objects do before `super().__init__`, and defines
-    `begin`, `targets` and `judge`. Its other attributes without an underscore are parameters:
-    `make(Push, reach=0.1)` sets `reach`.
+    A class sets `rig` and `action_space`, or its objects do so before `super().__init__`, and
+    defines `begin`, `targets` and `judge`. Its other attributes without an underscore are
+    parameters: `make(Push, reach=0.1)` sets `reach`.
     """
 
     rig: Rig
-    """Robot and world that are stepped together."""
+    """Robot and world, which are stepped together."""
     title: str = ""
-    """Name of the task in recordings and data sets, if it is not that of the class."""
+    """Name of the task in recordings and data sets; empty: the name of the class."""
     action_space: Space[Any]
     robot_numbers: Sequence[str] = ()
-    """Paths in a row of the robot, which `observe` reads first."""
+    """Paths in a row of the robot; `observe` returns these numbers first."""
     world_numbers: Sequence[str] = ()
-    """Paths in a row of the world, which follow."""
+    """Paths in a row of the world; `observe` returns these numbers next."""
     flags: Sequence[str] = ()
     """Comparisons such as "world.extended.puck_speed < 0.01": `judge` gets the copies for which one
-    is true in the newest rows; without flags all of them."""
+    is true in the newest rows; without flags it gets all copies."""
     max_steps: int | None = None
     """Steps after which an episode is truncated."""
     chunk_size: int | None = None
-    """An action is a chunk of so many rows, `every` iterations each; None: one target."""
+    """Rows of an action that is a chunk, for `every` iterations each; None: one target."""
     action_steps: int = 1
-    """Rows of a chunk in a step."""
+    """Rows of a chunk that are used in one step."""
     profile: RowsWord = "smooth"
     """Profile of the motion between rows of a chunk: "smooth", "monotone", "linear" or "hold"."""
     max_late: int = 25
-    """In real time: rows that the robot may be ahead when a step begins [rows]."""
+    """In real time: rows by which the robot may be ahead at the begin of a step [rows]."""
     max_drift: float = 0.2
-    """In real time: skipped periods of an episode, together [s]."""
+    """In real time: sum of skipped periods in an episode [s]."""
     max_missed: int = 10
-    """Rows in sequence without a reading (see `Mirror.fresh`)."""
+    """Consecutive rows without a reading (see `Mirror.fresh`)."""
     home: Sequence[float] | None = None
     """Targets of all actuators where episodes begin; None: where the robot starts."""
     home_duration: float = 2.0
-    """Time of the way there, of a robot that is moved between episodes [s]."""
+    """Time of the motion home of a robot that is moved between episodes [s]."""
     home_tolerance: float = 0.05
-    """Largest distance from home then, in the units of the robot."""
+    """Largest distance from home after this motion, in the units of the robot."""
     home_rest: float = 0.3
-    """Time that a robot which is moved between episodes stands there before one begins [s]."""
+    """Time that a robot which is moved between episodes rests at home before one begins [s]."""
 
     def __init__(
         self,
@@ -98,20 +98,20 @@ class HybridTask(Task):
         threads: int | None = None,
         **parameters: Any,
     ) -> None:
-        """copies: N of them, inline; or one.
+        """copies: number of copies, inline; or 1.
 
-        pacing: "inline" in this process, "processes" in bursting ones, "real_time" by the robot's
-            clock.
-        robot, robot_options: instead of those of the rig.
-        attach: the segment of a robot that runs already, as `pacing` says.
-        world, worlds: instead of those of the rig: `o80.hybrid.attach(segment)` is one that runs
+        pacing: "inline" in this process, "processes" in bursting processes, "real_time" by the
+            robot's clock.
+        robot, robot_options: replace those of the rig.
+        attach: segment of a robot that runs already, with this `pacing`.
+        world, worlds: replace those of the rig: `o80.hybrid.attach(segment)` is a world that runs
             already, such as a tracker.
-        recorded: a robot in a recording, of which only the worlds are made; see `relive`.
-        resume: in real time a reset ends halts that the robot caused itself; else it raises them.
-        threads: that step copies, the calling one included (None: one for each processor).
+        recorded: a robot in a recording; only the worlds are started, see `relive`.
+        resume: in real time a reset ends halts that the robot caused itself; if False, it raises.
+        threads: threads that step copies, the calling one included (None: one per processor).
         parameters: attributes of the class.
 
-        Raises InvalidArgument, DriverError.
+        Raises InvalidArgument for options that do not fit, DriverError if a robot fails.
         """
         self._set(parameters)
         rig = self._rig_with(robot, robot_options)
@@ -192,7 +192,7 @@ class HybridTask(Task):
         """Period of the robot [s]."""
         self.robot, self.world = engine.robot, engine.world
         self.generators: list[np.random.Generator] = [np.random.default_rng(0)] * copies
-        """(copies,) of the episodes that run."""
+        """(copies,) true while an episode runs."""
         self._clocked = pacing == "real_time"
         chunk = () if self.chunk_size is None else (self.chunk_size,)
         self._target_shape = *chunk, len(self.robot.schema["actuators"])
@@ -227,11 +227,11 @@ class HybridTask(Task):
 
     @property
     def _first_axes(self) -> tuple[int, ...]:
-        """Leading axes of observations."""
+        """Returns the leading axes of observations."""
         return (self.copies,) if self._endings is None else (self.copies, self.worlds)
 
     def _actions(self, space: Space[Any]) -> Space[Any]:
-        """The space of a chunk has its rows first."""
+        """Returns the space of actions; chunks have their rows first."""
         if self.chunk_size is None or not isinstance(space, spaces.Box):
             return space
         low, high = (np.stack([each] * self.chunk_size) for each in (space.low, space.high))
@@ -246,7 +246,7 @@ class HybridTask(Task):
         record: str | Path | None = None,
         **options: Any,
     ) -> VectorEnv[Any, Any, Any]:
-        """As trainings and evaluations make it; with `record` (see `make`) of one copy."""
+        """Makes environments for training and evaluation; with `record` (see `make`) one copy."""
         if record is None:
             return make_vec(cls, copies, autoreset_mode=autoreset_mode, **options)
         if copies != 1:
@@ -257,30 +257,30 @@ class HybridTask(Task):
     # ------------------------------------------------------------------ what a class defines
 
     def prepare(self) -> None:
-        """Makes the arrays (copies, ...) of the task; called once, when the rig is open."""
+        """Makes the arrays (copies, ...) of the task; called once, after the rig was opened."""
 
     def targets(self, actions: Any, copies: Index) -> Any:
-        """Targets (n, actuators) of the robots, or with chunks (n, rows, actuators).
+        """Returns targets (n, actuators) of the robots, or with chunks (n, rows, actuators).
 
-        By default the actions themselves, clipped into the action space.
+        By default these are the actions themselves, clipped into the action space.
         """
         return self.clipped(actions)
 
     def observe(self, copies: Index) -> Any:
-        """(n, numbers) float32: `robot_numbers`, then `world_numbers`; or (n, worlds, numbers)."""
+        """Reads (n, numbers) float32: `robot_numbers`, `world_numbers`; or (n, worlds, numbers)."""
         robot, world = (each.read(copies) for each in self._numbers)
         if self._endings is not None:
             robot = np.repeat(robot[:, np.newaxis], self.worlds, axis=1)
         return np.concatenate([robot, world], -1, dtype=np.float32)
 
     def action_of(self, rows: NDArray[Any]) -> Any:
-        """The action of a step of a robot that was recorded without actions, by its rows."""
+        """Returns the action of a step, from the rows of a robot recorded without actions."""
         raise InvalidArgument(
             f"the recording has no actions: define {type(self).__name__}.action_of(rows)"
         )
 
     def go_home(self, robot: Frontend) -> None:
-        """Brings a robot that runs in real time, or serves no reset, to where an episode begins.
+        """Moves a robot that runs in real time, or serves no reset, to the start of an episode.
 
         By default to `home`, else to the desired states of its first row. Raises NotReached.
         """
@@ -306,7 +306,7 @@ class HybridTask(Task):
         generators: Sequence[np.random.Generator],
         options: dict[str, Any],
     ) -> None:
-        """Robots and worlds to their starts, `begin`, and one iteration of each world."""
+        """Resets robots and worlds, calls `begin`, and runs an iteration of each world."""
         if not isinstance(self.engine, Recorded) and (
             self._clocked or (self.home is None and not self.engine.resets)
         ):
@@ -323,7 +323,7 @@ class HybridTask(Task):
         self.engine.mirror(copies)
 
     def step(self, actions: Any, copies: Index) -> None:
-        """One step of these copies."""
+        """Runs one step of these copies."""
         targets = self.targets(actions, copies)
         wanted = (len(actions), *self._target_shape)
         if np.shape(targets) != wanted:
@@ -336,14 +336,14 @@ class HybridTask(Task):
         self.engine.step(targets, copies, self.until_halted)
 
     def flagged(self) -> NDArray[np.bool_]:
-        """(copies,) with a flag raised in any world; all of them if there are no flags."""
+        """Returns (copies,) with a flag true in any world; all copies if there are no flags."""
         if not len(self._flags) or self.engine.stalled:
             return np.ones(self.copies, np.bool_)
         one = np.ones((self.copies, 1), np.bool_)
         return self._flags.raised(one if self._endings is None else self._endings.running)
 
     def outcome(self, copies: NDArray[np.intp]) -> Outcome:
-        """Outcome by `judge`, or the end of an episode that the robot's clock gave up."""
+        """Returns the outcome by `judge`, or the end of an episode that the clock has ended."""
         if self.engine.stalled:
             outcome = Outcome(truncated=True, info={"stalled": [self.engine.stalled]})
         else:
@@ -355,7 +355,7 @@ class HybridTask(Task):
         return self._endings.take(copies, outcome, halted, late)
 
     def shown(self, copies: Index) -> tuple[Any, Mapping[str, Any]]:
-        """Observations of the first worlds; `worlds` in the info has what is shown of each."""
+        """Returns observations of the first worlds; info `worlds` has the observations of all."""
         observed, info = super().shown(copies)
         if self._endings is None:
             return observed, info
@@ -366,20 +366,20 @@ class HybridTask(Task):
         return rows(observed, (slice(None), 0)), {**info, "worlds": shown}
 
     def info(self, copies: Index) -> Mapping[str, Any]:
-        """In real time `moved`: the robot moved between the reset and the first step."""
+        """Returns in real time `moved`: the robot moved between the reset and the first step."""
         return {"moved": [self.engine.moved]} if self._clocked else {}
 
     def statistics(self) -> Counts:
-        """Counts since the task was made."""
+        """Returns the counts since the task was made."""
         return self.engine.counts
 
     def close(self) -> None:
-        """Ends robots and worlds that it started; may be called twice."""
+        """Closes robots and worlds that the task started; may be called twice."""
         self.engine.close()
 
 
 def folder_of(cls: type) -> Path:
-    """The folder of the file in which a task is written; where it was typed in: the working one."""
+    """Returns the folder of the file with a task; the working folder for interactive code."""
     for each in cls.__mro__[: cls.__mro__.index(HybridTask)]:
         for value in vars(each).values():
             if isinstance(value, FunctionType):
@@ -395,11 +395,11 @@ def make(
     render_mode: str | None = None,
     **options: Any,
 ) -> HybridEnvironment:
-    """One environment of a task.
+    """Makes one environment of a task.
 
-    record: a file (NAME.mcap) for all rows of robot and world, with marks of the episodes. One that
-        exists is continued.
-    render_mode: one of the task's.
+    record: a file (NAME.mcap) for all rows of robot and world, with marks of the episodes. An
+        existing file is continued.
+    render_mode: a render mode of the task.
     options: of the task, see `HybridTask`: `pacing="real_time"`, among others.
     """
     made = _checked(task)(1, **options)
@@ -418,7 +418,7 @@ def make_vec(
     render_mode: str | None = None,
     **options: Any,
 ) -> VectorEnvironment:
-    """Environments of so many copies, which threads of C++ step together.
+    """Makes environments of `copies` copies, which threads of C++ step together.
 
     autoreset_mode: when the next episode of a copy begins, see `o80.learning.VectorEnvironment`.
     options: of the task, see `HybridTask`.

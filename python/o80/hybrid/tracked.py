@@ -1,4 +1,4 @@
-"""A world that is only read, such as a tracker: the real thing instead of a simulation."""
+"""Reads a real world, such as a tracker, in place of a simulation."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -15,10 +15,10 @@ from o80.hybrid.worlds import TIMEOUT, Counts
 
 
 class Tracked:
-    """The rows of a tracker beside those of a robot: the newest one not later than each of them."""
+    """Selects for each row of a robot the newest row of a tracker that is not later."""
 
     def __init__(self, tracker: Frontend, robot: Frontend, plan: Plan, max_late: int) -> None:
-        """max_late: rows of the robot that the newest row of the tracker may be old."""
+        """max_late: rows of the robot by which the tracker's newest row may be older."""
         clocks = robot.schema["clock"], tracker.schema["clock"]
         if clocks[0] != clocks[1] or tracker.bursting:
             raise InvalidArgument(
@@ -36,24 +36,24 @@ class Tracked:
         self.motion = Motion(plain, pairs, 1, robot.schema)
 
     def reset(self, copies: NDArray[np.intp], _seeds: Sequence[int], rows: NDArray[Any]) -> None:
-        """An episode begins at this row of the robot. Raises BackendGone for a dead tracker."""
+        """Begins an episode at this row of the robot. Raises BackendGone for a dead tracker."""
         self.member.wait_for(self.member.published + 1, timeout=TIMEOUT)
         self.motion.begin(copies, rows)
 
     def feed(self, _rows: NDArray[Any]) -> None:
-        """Nothing: `follow` gets all that it needs."""
+        """Does nothing: `follow` gets all rows."""
 
     def see_newest(self) -> None:
-        """Nothing: the newest row is that of the last step."""
+        """Does nothing: the newest row is that of the last step."""
 
     def mirror(self, _copies: NDArray[np.intp], rows: NDArray[Any], _seen: object = None) -> None:
-        """The row for this one of the robot."""
+        """Selects the row for this row of the robot."""
         self.side.rows[...] = self._beside(rows)[-1]
 
     def follow(
         self, copies: NDArray[np.intp], rows: NDArray[Any], period: float, _seen: object = None
     ) -> None:
-        """The rows for those of a step."""
+        """Selects the rows for those of a step."""
         self.counts.steps += 1
         self.counts.play += rows.size * period
         self.motion.follow(copies, rows, period)

@@ -33,11 +33,11 @@ class Counts:
 
     steps: int = 0
     late_actions: int = 0
-    """Actions that acted later than in their iteration; of chunks, rows that were skipped."""
+    """Actions that acted after their iteration; for chunks, skipped rows."""
     late_steps: int = 0
-    """Steps that began when the robot had made further rows."""
+    """Steps at whose begin the robot had made further rows."""
     missed: int = 0
-    """Rows that brought no reading."""
+    """Rows without a reading."""
     largest_lateness: int = 0
     """[rows]"""
     largest_drift: float = 0.0
@@ -45,7 +45,7 @@ class Counts:
     play: float = 0.0
     """Time of the robots in episodes [s]."""
     world_time: float = 0.0
-    """Mean time that all worlds together take of a step [s]; 0 where C++ passes the rows on."""
+    """Mean time of all worlds together in a step [s]; 0 if C++ passes the rows."""
     summed_lateness: int = 0
     """[rows]"""
     starved: int = 0
@@ -53,10 +53,10 @@ class Counts:
 
 
 class Worlds:
-    """Simulated worlds of n robots: an inline group for all of them, or a frontend for one."""
+    """Simulated worlds of n robots: one inline group, or a frontend for a single world."""
 
     stalled = ""
-    """The text of what made a step impossible: nothing here."""
+    """Reason why a step was impossible: never set here."""
 
     def __init__(
         self,
@@ -67,7 +67,7 @@ class Worlds:
         copies: int,
         each: int | None,
     ) -> None:
-        """each: worlds of a robot; None is one, without a dimension in what tasks return."""
+        """each: worlds of a robot; None: one, without a dimension in results of tasks."""
         self.member = member
         self._each, self._named = each or 1, world.states_have_names
         self._follow: Any = member.prepared_burst(iterations, world.joints, steps=iterations)
@@ -79,21 +79,21 @@ class Worlds:
         self.motion, self.counts = motion, Counts()
 
     def _by_copy(self, array: NDArray[Any]) -> NDArray[Any]:
-        """A view of targets or rows with the shape (copies, worlds, ...)."""
+        """Returns a view of targets or rows with the shape (copies, worlds, ...)."""
         shape = array.shape[1:] if isinstance(self.member, InlineGroup) else array.shape
         return array.reshape(*self._shape, *shape)
 
     def reset(self, copies: Numbers, seeds: Sequence[int], rows: NDArray[Any]) -> None:
-        """The worlds of these copies to their starts; episodes begin at these rows (n,) of robots.
+        """Resets the worlds of these copies; episodes begin at these rows (n,) of robots.
 
-        The seed of world j is that of its copy + j.
+        World j of a copy gets the seed of the copy + j.
         """
         own = (np.array(seeds)[:, np.newaxis] + np.arange(self._each)) % 2**32
         reset(self.side, copies, own)
         self.motion.begin(copies, rows)
 
     def mirror(self, copies: Numbers, rows: NDArray[Any], seen: _core.Seen | None = None) -> None:
-        """One iteration of these worlds, as rows (n,) of their robots say."""
+        """Runs one iteration of these worlds, with the positions in rows (n,) of their robots."""
         self._put(self._one, copies, *self.motion.standing(rows))
         self._run(self._one, copies, seen)
         with_padding(self.side.rows)[copies] = self._first[copies]
@@ -101,7 +101,7 @@ class Worlds:
     def follow(
         self, copies: Numbers, rows: NDArray[Any], period: float, seen: _core.Seen | None = None
     ) -> None:
-        """The iterations of these worlds for rows (n, iterations) of their robots."""
+        """Runs these worlds for rows (n, iterations) of their robots."""
         counts, begun = self.counts, time.monotonic()
         counts.steps += 1
         counts.play += rows.size * period
@@ -114,7 +114,7 @@ class Worlds:
         counts.world_time += (time.monotonic() - begun - counts.world_time) / counts.steps
 
     def feed(self, rows: NDArray[Any]) -> None:
-        """From now on `follow` gets these rows (copies, iterations) of robots, the same memory."""
+        """Makes `follow` read these rows (copies, iterations) of robots, always the same memory."""
         targets = self._by_copy(self._follow.targets)
         feeds: Feeds = []
         with suppress(InvalidArgument):
@@ -126,13 +126,13 @@ class Worlds:
             self._feeds = feeds
 
     def see_newest(self) -> None:
-        """Shows the newest row of the only world: a burst that a halt has ended has none."""
+        """Copies the newest row of a single world: a burst that a halt has ended has no row."""
         if isinstance(self.member, Frontend):
             self.side.rows[...] = self.member.history(1).rows
 
     def after(self, robots: GroupBurst) -> GroupBurst | None:
-        """The burst of the robots, with that of their worlds behind it, in one call; None: what the
-        worlds mirror is computed from rows.
+        """Returns a burst of the robots followed by that of their worlds, in one call; None if the
+        worlds mirror computed numbers.
         """
         paths = self.motion.paths
         if self._each > 1 or paths is None:
@@ -152,7 +152,7 @@ class Worlds:
             targets["velocity"][copies] = velocities[:, np.newaxis]
 
     def _run(self, burst: Any, copies: Numbers, seen: _core.Seen | None) -> None:
-        """Raises CopyFailed with the numbers of the copies."""
+        """Runs a burst. Raises CopyFailed with the numbers of the copies."""
         if isinstance(self.member, Frontend):
             burst.run(TIMEOUT, seen=seen)
             return

@@ -22,7 +22,7 @@ HowWord = Literal["before", "nearest", "linear"]
 
 
 class AlignedHistory(History):
-    """The rows of one source for T times; where there is none its numbers are NaN, or 0."""
+    """Rows of one source at T times; numbers of a missing row are NaN, or 0 if not floats."""
 
     __slots__ = ("age", "found")
 
@@ -34,8 +34,8 @@ class AlignedHistory(History):
         found: NDArray[np.bool_],
     ) -> None:
         super().__init__(decoder, rows)
-        self.age = age  #: (T,) time less that of the row's capture [s]; NaN without a row
-        self.found = found  #: (T,) False where there is no row that is young enough
+        self.age = age  #: (T,) time minus capture time of the row [s]; NaN without a row
+        self.found = found  #: (T,) False where no row is young enough
 
     def __reduce__(self) -> tuple[Any, ...]:
         return AlignedHistory, (self._decoder, self._contiguous, self.age, self.found)
@@ -86,23 +86,23 @@ def align(
 
     sources: frontends, segments of a recording, or a whole one; or a mapping from names to these,
         to runs of a recording, or to histories.
-    by: name of a source; its rows give the times. "seen": the rows of the first source, each with
-        the rows of the others by which it was commanded: of the newest batch that it had taken and
-        that was pulsed with `seen`. Also for clocks that have nothing in common; `age` is NaN then.
-    period: times every so many seconds, while all sources have rows [s].
+    by: name of the source whose rows give the times. "seen": each row of the first source with
+        the rows of the others on which its newest batch that was pulsed with `seen` was based.
+        Also works for unrelated clocks; `age` is NaN then.
+    period: interval of the times, while all sources have rows [s].
     at: times (T,) [ns], on the clock of the rows. Give one of by, period and at.
-    how: "before": the newest row at or before the time, which a program that ran then had;
-        "nearest"; or "linear": floats are interpolated between two rows (each number by itself:
-        not for quaternions), other numbers are those of the older one. May differ by source.
+    how: "before": the newest row at or before the time, as a program running then had it;
+        "nearest"; or "linear": floats are interpolated between two rows (each number separately:
+        not for quaternions), other numbers are those of the older row. May differ by source.
     max_age: rows further away from the time than this count as missing [s].
     seconds: only the last seconds of each source.
-    offsets: added to the times of sources, for clocks that have nothing in common [ns].
+    offsets: added to the times of sources, for unrelated clocks [ns].
 
-    A row is captured at its time. For devices it is the extended field `capture_time` [ns]; rows
-    in which it is 0 hold nothing. Recordings of different computers, or of different starts of one,
+    The capture time of a row is its time; for devices it is the extended field `capture_time` [ns],
+    and rows with 0 there hold nothing. Recordings of different computers, or of different boots,
     are joined on the wall clock. A recording of one run and live segments can be mixed.
 
-    Raises InvalidArgument.
+    Raises InvalidArgument for wrong arguments, or clocks that cannot be compared.
     """
     if by == SEEN and SEEN not in (given := named(sources)):
         if (period, at, how, max_age, offsets) != (None, None, "before", None, None):
@@ -128,7 +128,7 @@ def align(
 
 
 def _by_seen(sources: "Mapping[str, Source]", seconds: float | None) -> Aligned:
-    """The rows of the first source, with those of the others by which it was commanded."""
+    """Joins the rows of the first source with the rows on which its commands were based."""
     name, *others = sources
     run = run_of(name, sources[name])
     if not hasattr(run, "journal") or not others:
@@ -143,7 +143,7 @@ def _by_seen(sources: "Mapping[str, Source]", seconds: float | None) -> Aligned:
         history, _ = opened(other, sources[other], None)
         of_other = taken.epoch == history.epoch
         newest = np.searchsorted(taken.taken[of_other], rows.iteration, side="right") - 1
-        seen = np.append(taken.iteration[of_other], -1)[newest]  # the last one: none yet
+        seen = np.append(taken.iteration[of_other], -1)[newest]  # index -1: no batch yet
         picked = _aligned(other, _counted(history), seen, "before", 0.0)
         same_clock = history.schema["clock"] == rows.schema["clock"]
         captured = capture_times(picked)
@@ -160,12 +160,12 @@ def _by_seen(sources: "Mapping[str, Source]", seconds: float | None) -> Aligned:
 
 
 def _counted(history: History) -> Timed:
-    """Its rows by their iterations instead of times."""
+    """Returns the history with iterations in place of times."""
     return Timed(history, np.arange(len(history)), history.iteration)
 
 
 def _each(found: Mapping[str, Timed], given: Any, name: str) -> dict[str, Any]:
-    """An argument for each source."""
+    """Spreads an argument over all sources. Raises InvalidArgument for an unknown source."""
     if not isinstance(given, Mapping):
         return dict.fromkeys(found, given)
     if unknown := sorted(set(given) - set(found)):

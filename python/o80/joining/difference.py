@@ -1,4 +1,4 @@
-"""The first difference of two histories."""
+"""Finds the first difference of two histories."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -15,7 +15,7 @@ from o80.rows.history import History, columns_in
 OF_THE_CLOCK = ("time", "lateness", "overruns", "skipped")
 """Columns that differ from run to run if the robot runs in real time."""
 COUNT = "starvations"
-"""A count since the start of a run, which a replay may begin later; the masks show what counts."""
+"""Column with a count since the start of a run: a replay may begin later. Masks are compared."""
 
 
 class RobotsDifferError(InvalidArgument):
@@ -24,7 +24,7 @@ class RobotsDifferError(InvalidArgument):
 
 @dataclass(frozen=True)
 class Difference:
-    """Where two histories differ first."""
+    """First difference of two histories."""
 
     iteration: int
     field: str  #: "" if one of them lacks the row
@@ -45,13 +45,13 @@ def first_difference(
     ignore: Sequence[str] = (),
     tolerances: Mapping[str, float] | None = None,
 ) -> Difference | None:
-    """The earliest iteration in which two histories differ, or None.
+    """Finds the earliest iteration in which two histories differ; None if there is none.
 
-    Numbers are compared bit for bit. `starvations` is left out, and so are the fields of the clock:
-    `time`, `lateness`, `overruns` and `skipped` of a robot in real time, and those that its driver
-    marks so.
+    Numbers are compared bit for bit, except `starvations` and the fields of the clock: `time`,
+    `lateness`, `overruns` and `skipped` of a robot in real time, and fields that its driver marks
+    as fields of the clock.
     ignore: columns to leave out, such as "lateness" or "extended" (all sensor values). Only these
-        may be those of one robot alone.
+        may be missing in one history.
     tolerances: by column, likewise, the largest absolute difference that counts as equal.
     Raises InvalidArgument if the robots differ, or a column is unknown.
     """
@@ -94,7 +94,7 @@ def first_difference(
 def _rows_of_both(
     one: NDArray[np.int64], other: NDArray[np.int64]
 ) -> tuple[NDArray[np.intp], NDArray[np.intp], Difference | None]:
-    """Positions of the iterations that both have, and the first that one lacks."""
+    """Returns positions of common iterations in both, and the first that one of them lacks."""
     _, first, second = np.intersect1d(one, other, assume_unique=True, return_indices=True)
     alone = np.setxor1d(one, other, assume_unique=True)
     if not len(alone):
@@ -117,14 +117,14 @@ def _differs(a: NDArray[Any], b: NDArray[Any], tolerance: float | None) -> NDArr
 
 
 def same_bytes(one: History, other: History) -> bool:
-    """True if all rows are equal, but for the fields of the clock and of the world."""
+    """True if all rows are equal, except fields of the clock and of the world."""
     if one.rows.dtype != other.rows.dtype or len(one) != len(other):
         return False
     return bool(np.array_equal(_compared(one), _compared(other)))
 
 
 def _compared(history: History) -> NDArray[Any]:
-    """The bytes of the rows, with zeros where they are not compared."""
+    """Returns the bytes of the rows, with zeros in fields that are not compared."""
     fields = history.rows.dtype.fields
     assert fields is not None
     rows = np.frombuffer(history.rows.tobytes(), np.uint8).reshape(len(history), -1).copy()

@@ -1,4 +1,4 @@
-"""Estimates the delay between two segments that see the same motion."""
+"""Estimates the delay between two segments that record the same motion."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -21,17 +21,17 @@ if TYPE_CHECKING:
     Signal = str | Callable[[History], Any]
 
 
-BLOCKS = 20  # of the jackknife
-WIDTH = 1.5  # of the smoothing, in periods
-STEPS = 4  # in this width
-MIN_WEIGHT = 0.5  # of rows around a time, of that where no row is missing
+BLOCKS = 20  # blocks of the jackknife
+WIDTH = 1.5  # width of the smoothing, in periods
+STEPS = 4  # samples in this width
+MIN_WEIGHT = 0.5  # least weight of rows around a time; 1: no row is missing
 MIN_ROWS = 50
 MIN_CORRELATION = 0.5
 
 
 @dataclass(frozen=True)
 class Latency:
-    """How much later one signal shows a motion than another."""
+    """Delay between two signals of the same motion."""
 
     seconds: float  #: delay of the second signal behind the first [s]; negative if it is ahead
     uncertainty: float
@@ -54,17 +54,17 @@ def latency(
     most: float = 0.5,
     seconds: float | None = None,
 ) -> Latency:
-    """The delay of the second signal behind the first one, by cross-correlation.
+    """Estimates the delay of the second signal behind the first one, by cross-correlation.
 
-    first, second: a source as for `align` and a number of its rows, such as "observed.elbow"; or a
-        function that makes numbers (T,) of a History, such as the speed of a body.
-    most: longest delay to look for, either way [s].
+    first, second: a source as for `align` and the path of a number, such as "observed.elbow"; or a
+        function that computes numbers (T,) from a History, such as the speed of a body.
+    most: longest delay to consider, in both directions [s].
     seconds: only the last seconds of both.
 
     Both signals are smoothed alike, over 1.5 periods of the slower one, and compared by their
     correlation coefficient for each delay. Times at which one of them has no rows are left out.
     The motion must not repeat itself within `most`.
-    Raises InvalidArgument, and Error if the signals show no common motion.
+    Raises InvalidArgument for too few rows or unknown fields, Error without a common motion.
     """
     (one_source, one_signal), (other_source, other_signal) = first, second
     found = timed({"first": one_source, "second": other_source}, seconds=seconds)
@@ -87,12 +87,12 @@ def latency(
 
 
 def _period(one: Timed, other: Timed) -> int:
-    """The larger of both periods [ns]."""
+    """Returns the larger of both periods [ns]."""
     return int(max(np.median(np.diff(source.times)) for source in (one, other)))
 
 
 def _extent(one: Timed, other: Timed, most: float) -> tuple[int, int, float]:
-    """First and last time of both, and the width of the smoothing [ns]."""
+    """Returns the first and the last common time, and the width of the smoothing [ns]."""
     if not 0 < most < 1e6:
         raise InvalidArgument(f"most must be a positive number of seconds, got {most!r}")
     for name, source in (("first", one), ("second", other)):
@@ -106,10 +106,10 @@ def _extent(one: Timed, other: Timed, most: float) -> tuple[int, int, float]:
 
 
 def _smooth(source: Timed, signal: "Signal", begin: int, end: int, width: float) -> FloatArray:
-    """A signal at uniform times, NaN where it has no rows.
+    """Resamples a signal at uniform times, NaN where it has no rows.
 
-    A mean of the rows around, weighted by a Gaussian of this width: so noise has no frequencies
-    for which it matters where between two rows the signal is looked at.
+    Each sample is the mean of the rows around it, weighted by a Gaussian of this width: it removes
+    noise at frequencies for which the place of a sample between two rows would matter.
     """
     values, times = _numbers(source, signal)
     step = width / STEPS
@@ -136,7 +136,7 @@ def _smooth(source: Timed, signal: "Signal", begin: int, end: int, width: float)
 
 
 def _numbers(source: Timed, signal: "Signal") -> tuple[FloatArray, NDArray[np.int64]]:
-    """The numbers of a signal that are finite, and their times [ns]."""
+    """Returns the finite numbers of a signal, and their times [ns]."""
     history = source.history
     if callable(signal):
         values = np.asarray(signal(history), np.float64)
@@ -155,7 +155,7 @@ def _numbers(source: Timed, signal: "Signal") -> tuple[FloatArray, NDArray[np.in
 
 
 def _capture_error(source: Timed) -> float:
-    """How much the times of capture may all be wrong, as the device says [s]."""
+    """Returns the common error of all capture times, as stated by the device [s]."""
     if CAPTURE_ERROR not in source.history.extended:
         return 0.0
     errors = np.asarray(getattr(source.history.extended, CAPTURE_ERROR))[source.rows]
@@ -173,7 +173,7 @@ def _column(history: History, path: str) -> Column:
 
 
 def _estimate(x: FloatArray, y: FloatArray, lags: int, period: float) -> Latency:
-    """y is compared with x from `lags` samples earlier to `lags` later."""
+    """Compares y with x, from `lags` samples earlier to `lags` later."""
     count = len(x) - 2 * lags
     begins = np.linspace(0, count, BLOCKS, endpoint=False).astype(np.intp)
     has_x, has_y = np.isfinite(x)[lags : lags + count], np.isfinite(y)
@@ -205,9 +205,9 @@ def _estimate(x: FloatArray, y: FloatArray, lags: int, period: float) -> Latency
 
 
 def _peak(moments: FloatArray) -> tuple[float, float]:
-    """The largest correlation, and its place, between samples by a parabola.
+    """Returns the largest correlation, and its place, interpolated by a parabola.
 
-    The line that fits each of the two best, at this delay, counts as no motion.
+    At each delay the best-fitting line of each signal is subtracted first: it is no motion.
     """
     n, t, tt, x, tx, y, ty, xx, yy, xy = moments.T
     det = n * tt - t * t
@@ -234,7 +234,7 @@ def _peak(moments: FloatArray) -> tuple[float, float]:
 
 
 def columns_below(history: History, path: str) -> list[Column]:
-    """The number that a path names, or all numbers below it. Raises InvalidArgument for none."""
+    """Returns the columns at or below a path. Raises InvalidArgument if there are none."""
     columns = [*columns_of(history.schema)]
     chosen = [column for column in columns if is_within(column.name, path)]
     if not chosen:
@@ -244,7 +244,7 @@ def columns_below(history: History, path: str) -> list[Column]:
 
 
 def norm_of(path: str) -> Callable[[History], NDArray[np.float64]]:
-    """Makes the Euclidean norm (T,) of all numbers below a path, such as "extended.velocity"."""
+    """Returns a function for the norm (T,) of all numbers below a path ("extended.velocity")."""
 
     def norm(history: History) -> NDArray[np.float64]:
         numbers = numbers_of(history, columns_below(history, path))

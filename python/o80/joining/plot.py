@@ -1,4 +1,4 @@
-"""Curves of histories: desired and observed together, sensor values, halts, ends of commands."""
+"""Draws histories: desired and observed together, sensor values, halts, ends of commands."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 MAX_PANELS = 24
 PANEL = (9.0, 1.9)  # width and height [inch]
 MAX_OF_MARK = 36  # characters that fit in a panel
-MARK_WIDTH = 0.012  # of the text of a mark, as a share of the axis
+MARK_WIDTH = 0.012  # width of the text of a mark, as a share of the axis
 END_STYLES = {"COMPLETED": ("|", "tab:green"), "OVERWRITTEN": ("|", "tab:purple")}
 STYLES = {"desired": "--", "observed": "-", "extended": "-"}
 
@@ -46,17 +46,17 @@ def plot(
     label: str = "time [s]",
     window: bool = False,
 ) -> "Figure":
-    """A figure with a panel for each number; desired and observed share one.
+    """Draws a figure with a panel for each number; desired and observed share one panel.
 
     histories: by name of robot.
     fields: such as "observed.elbow", "elbow" (desired and observed), "extended.force", "extended";
         empty: all states.
-    ends, marks, decided, planned: by name of robot, as `command_ends`, `marks_in`, `decisions` and
-        `planned_by_chunks` give them. Robots of which no decision is known have no such panel.
-    origins: the time of a row [ns] that is 0 on the axis, by name of robot, as `origins` gives it
-        (None: the earliest row of all).
+    ends, marks, decided, planned: by name of robot, as returned by `command_ends`, `marks_in`,
+        `decisions` and `planned_by_chunks`. Robots without known decisions lack their panels.
+    origins: row time [ns] at 0 of the axis, by name of robot, as returned by `origins` (None: the
+        earliest row of all).
     label: of the time axis.
-    window: a figure that `matplotlib.pyplot.show` shows.
+    window: makes a figure for `matplotlib.pyplot.show`.
     Raises InvalidArgument for an unknown field, MissingExtra without matplotlib.
     """
     needed("matplotlib", "plot", "a plot")
@@ -185,7 +185,7 @@ def _mark_ends(
 def _draw_plans(
     ax: "Axes", history: History, times: NDArray[np.float64], plans: Sequence[Planned]
 ) -> None:
-    """Draws what each chunk planned, also where another one took over before."""
+    """Draws the plan of each chunk, also the part that a later chunk replaced."""
     iterations = history.iteration
     for i, (begins, places, _) in enumerate(plans):
         rows = np.arange(begins, begins + len(places))
@@ -205,7 +205,7 @@ def _draw_marks(
     times: NDArray[np.float64],
     marks: Sequence[tuple[str, int]],
 ) -> None:
-    """Lines with a text where the program that recorded made marks; near ones share the text."""
+    """Draws lines with texts at marks of the recording; near marks share one text."""
     iterations = history.iteration
     labels: list[tuple[float, list[str]]] = []
     low, high = ax.get_xlim()
@@ -239,14 +239,14 @@ def _draw_latency(ax: "Axes", history: History, taken: Decisions, zero: int) -> 
 
 
 def _shares(ax: "Axes") -> Any:
-    """Data along x, shares of the panel along y."""
+    """Returns the transform with data along x and shares of the panel along y."""
     return ax.get_xaxis_transform()
 
 
 def _shade(
     ax: "Axes", times: NDArray[np.float64], where: NDArray[np.bool_], color: str, label: str
 ) -> None:
-    """Marks the spans of time in which something held."""
+    """Shades the spans of time in which `where` is true."""
     edges = np.flatnonzero(np.diff(where.astype(np.int8), prepend=0, append=0))
     for i, (begin, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
         last = times[min(end, len(times) - 1)]
@@ -257,18 +257,18 @@ APART = 10_000_000_000  # runs further apart have axes of their own [ns]
 
 
 class Placed(NamedTuple):
-    """A history, and wall-clock time less row time [ns]; None: not known."""
+    """A history, and wall-clock minus row time [ns]; None: not known."""
 
     history: History
     wall_offset: int | None
 
 
 def origins(runs: Mapping[str, Placed]) -> tuple[dict[str, int], int]:
-    """The row time [ns] that is 0 on the axis of each run, and how many axes there are.
+    """Returns the row time [ns] at 0 of each run's axis, and the number of axes.
 
     Runs that overlap on the wall clock, or follow each other within ten seconds, share an axis,
-    which begins with their first row. A run of another day begins at 0 by itself, and so does one
-    whose wall-clock time is not known.
+    which begins with their first row. Other runs, and runs of unknown wall-clock time, begin at 0
+    each.
     """
     known: list[tuple[int, int, str]] = []
     found: dict[str, int] = {}

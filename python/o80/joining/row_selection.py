@@ -1,4 +1,4 @@
-"""For each time of a list the rows of a history around it."""
+"""Selects the rows of a history around each of several times."""
 
 from typing import NamedTuple
 
@@ -18,16 +18,16 @@ class Picked(NamedTuple):
     """Rows for T times."""
 
     rows: NDArray[np.void]  #: (T,)
-    age: NDArray[np.int64]  #: (T,) time less that of the row; NOWHERE without one [ns]
+    age: NDArray[np.int64]  #: (T,) time minus row time; NOWHERE without a row [ns]
 
 
 def before(source: Timed, times: NDArray[np.int64]) -> Picked:
-    """The newest rows captured at or before each time."""
+    """Picks the newest rows captured at or before each time."""
     return _picked(source, times, np.searchsorted(source.times, times, side="right") - 1)
 
 
 def nearest(source: Timed, times: NDArray[np.int64]) -> Picked:
-    """The rows captured nearest to each time; of two as near the older one."""
+    """Picks the rows captured nearest to each time; the older of two equally near rows."""
     if not len(source.times):
         return before(source, times)
     right = np.searchsorted(source.times, times, side="left").clip(max=len(source.times) - 1)
@@ -37,10 +37,10 @@ def nearest(source: Timed, times: NDArray[np.int64]) -> Picked:
 
 
 def linear(source: Timed, times: NDArray[np.int64]) -> Picked:
-    """Between the rows around each time; numbers that are no float are those of the older row.
+    """Interpolates between the rows around each time; numbers other than floats are the older ones.
 
-    The age is that of the newer of the two rows or the older one, whichever is further from the
-    time. There is no row before the first and after the last one.
+    The age is that of the newer or the older row, whichever is further from the time. No row is
+    found before the first and after the last one.
     """
     left = np.searchsorted(source.times, times, side="right") - 1
     inside = (left >= 0) & (left < len(source.times))
@@ -75,13 +75,13 @@ def _picked(source: Timed, times: NDArray[np.int64], places: NDArray[np.intp]) -
 
 
 def _rows(source: Timed, places: NDArray[np.intp]) -> NDArray[np.void]:
-    """A copy of these rows."""
+    """Returns a copy of these rows."""
     rows = source.history.rows
     return with_padding(rows)[source.rows[places]].view(rows.dtype)
 
 
 def blanked(history: History, rows: NDArray[np.void], missing: NDArray[np.bool_]) -> None:
-    """Makes all numbers of rows that are missing NaN, or 0 where there is no NaN."""
+    """Sets all numbers of missing rows to NaN, or to 0 where there is no NaN."""
     if not missing.any():
         return
     raw = rows.view(np.uint8).reshape(len(rows), -1)

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 CAPTURE_TIME = "capture_time"
 """Extended field of a device: when it captured the row, on the clock of the rows [ns]; 0: never."""
 CAPTURE_ERROR = "capture_error"
-"""Extended field of a device: by how much its capture time may be wrong [ns]."""
+"""Extended field of a device: possible error of its capture time [ns]."""
 SAME_CLOCK = (
     5_000_000  # clocks of one boot differ by less, although the wall clock is adjusted [ns]
 )
@@ -31,11 +31,11 @@ SAME_CLOCK = (
 
 @dataclass(frozen=True)
 class Timed:
-    """A history and the times of its rows."""
+    """A history, and the capture times of its rows."""
 
     history: History
-    rows: NDArray[np.intp]  #: (N,) the rows that were captured, in the order of their capture
-    times: NDArray[np.int64]  #: (N,) of their capture, on the common clock [ns]
+    rows: NDArray[np.intp]  #: (N,) indices of captured rows, in the order of their capture
+    times: NDArray[np.int64]  #: (N,) capture times, on the common clock [ns]
 
 
 def timed(
@@ -44,9 +44,9 @@ def timed(
     seconds: float | None = None,
     offsets: Mapping[str, int] | None = None,
 ) -> dict[str, Timed]:
-    """The histories of sources on one clock.
+    """Reads the histories of sources and puts their times on one clock.
 
-    seconds: only the last seconds of each. offsets: see `align`. Raises InvalidArgument.
+    seconds: last seconds of each. offsets: see `align`. Raises InvalidArgument for other clocks.
     """
     given = named(sources)
     found = {name: opened(name, source, seconds) for name, source in given.items()}
@@ -91,9 +91,9 @@ def named(sources: "Sources") -> "Mapping[str, Source]":
 
 
 def run_of(name: str, source: Any) -> Any:
-    """A frontend, history or recorded run as it is; of a recorded segment its only run.
+    """Returns a frontend, history or recorded run as it is; for a recorded segment its only run.
 
-    Raises InvalidArgument.
+    Raises InvalidArgument if a segment has several runs.
     """
     epochs = getattr(source, "epochs", None)
     if epochs is not None:
@@ -107,7 +107,7 @@ def run_of(name: str, source: Any) -> Any:
 
 
 def _boot_of(run: Any) -> str:
-    """Id of the boot on whose clock the rows of a run are; empty: not known."""
+    """Returns the id of the boot to whose clock a run's rows refer; empty: not known."""
     if hasattr(run, "provenance") and not hasattr(run, "wall_offset"):  # a frontend
         return boot_of(run)
     boot: str = getattr(run, "boot", "")
@@ -115,7 +115,7 @@ def _boot_of(run: Any) -> str:
 
 
 def opened(name: str, source: Any, seconds: float | None) -> tuple[History, int | None]:
-    """The history of a source, and wall-clock time less row time [ns]; None: not known."""
+    """Reads the history of a source, and wall-clock minus row time [ns]; None: not known."""
     source = run_of(name, source)
     if isinstance(source, History):
         return source.select(seconds=seconds) if seconds is not None else source, None
@@ -130,7 +130,7 @@ def opened(name: str, source: Any, seconds: float | None) -> tuple[History, int 
 
 
 def shifts_of(found: Mapping[str, tuple[History, int | None]]) -> dict[str, int] | None:
-    """Shifts to add to the row times of each [ns]; None: their clocks have nothing in common."""
+    """Returns shifts to add to the row times of each [ns]; None: their clocks are unrelated."""
     clocks = {history.schema["clock"] for history, _ in found.values()}
     if len(clocks) > 1:
         return None
@@ -144,14 +144,14 @@ def shifts_of(found: Mapping[str, tuple[History, int | None]]) -> dict[str, int]
 
 
 def capture_times(history: History) -> NDArray[np.int64] | None:
-    """When a device captured the rows [ns], at most 0: never; None: when they were published."""
+    """Returns a device's capture times [ns], at most 0 for never; None: rows have no such field."""
     if CAPTURE_TIME not in (history.extended.keys() if len(history) else ()):
         return None
     return np.asarray(getattr(history.extended, CAPTURE_TIME)).astype(np.int64)
 
 
 def _on_clock(history: History, shift: int) -> Timed:
-    """The rows that were captured, in the order of their capture; of equal ones the newest."""
+    """Returns the captured rows in order of capture; of rows with equal times the newest."""
     times = capture_times(history)
     if times is not None:
         captured = np.flatnonzero(times > 0)

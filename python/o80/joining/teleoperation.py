@@ -23,15 +23,15 @@ if TYPE_CHECKING:
     from o80.rows.actuators import Actuator
 
 NEAR = 0.15  #: largest difference of a joint at which the follower begins to follow, in its unit
-HELD = 0.5  #: so long all joints must be near before it does [s]
-SILENCE = 0.2  #: after so long without a row of the leader the follower is halted [s]
+HELD = 0.5  #: time for which all joints must be near before it begins [s]
+SILENCE = 0.2  #: time without a row of the leader after which the follower is halted [s]
 FASTEST = 200.0  # set-points a second
 _JOINT = re.compile(r"([\w.\[\]]+)=(?:([^*=]+)\*)?([\w.\[\]]+?)([+-][\d.]+(?:e[+-]?\d+)?)?")
 
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint of the follower, which goes to scale x the leader's + offset."""
+    """A joint of the follower, whose target is scale x the leader's joint + offset."""
 
     follower: str
     leader: str
@@ -40,7 +40,7 @@ class Joint:
 
     @classmethod
     def parse(cls, text: str) -> Self:
-        """From "elbow", "elbow=lower", "elbow=-1*lower" or "elbow=-1*lower+0.3"."""
+        """Parses "elbow", "elbow=lower", "elbow=-1*lower" or "elbow=-1*lower+0.3"."""
         found = _JOINT.fullmatch(text if "=" in text else f"{text}={text}")
         try:
             if found is None:
@@ -55,16 +55,16 @@ class Joint:
 
 
 class Teleoperation:
-    """One robot, the leader, is moved by hand; the joints of another, the follower, go where it is.
+    """Makes the joints of a robot, the follower, track a robot moved by hand, the leader.
 
-    leader, follower: frontends, both real-time, or both bursting and burst by the caller. It
-        closes neither.
-    joints: those that follow (None: all that both have, by name).
-    near: the follower begins to follow when all its joints have been so near to their targets for
-        0.5 s, in the unit of each.
-    silence: after so long without a row of the leader the follower is halted [s].
+    leader, follower: frontends, both real-time, or both bursting and burst by the caller, who
+        also closes them.
+    joints: joints that follow (None: all that both have, by name).
+    near: the follower begins once each joint has been this near to its target for 0.5 s, in the
+        unit of the joint.
+    silence: time without a row of the leader after which the follower is halted [s].
 
-    Call step() again and again. Used by one thread. Raises InvalidArgument.
+    Call step() repeatedly, from one thread. Raises InvalidArgument for joints that do not match.
     """
 
     def __init__(
@@ -111,26 +111,26 @@ class Teleoperation:
         self._offset = np.array([joint.offset for joint in self.joints])
         self._low = np.array([taken[name].minimum for name in names])
         self._high = np.array([taken[name].maximum for name in names])
-        self._stride = max(1, round(1 / (FASTEST * leader.period)))  # rows of the leader
+        self._stride = max(1, round(1 / (FASTEST * leader.period)))  # leader's rows per step
         self._every = max(self._stride * leader.period, follower.period)
-        self._last = leader.published  # row that was read
-        self._wanted = np.full(len(self.joints), np.nan)  # by that row
+        self._last = leader.published  # iteration of the last row read
+        self._wanted = np.full(len(self.joints), np.nan)  # targets by that row
         self._near_since: int | None = None  # time of a row of the leader [ns]
         self._sent: _core.Batch | None = None
         self.engaged = False  #: whether the follower follows
-        self.why = ""  #: it does not
+        self.why = ""  #: why it does not follow
         self.far: dict[str, tuple[float, float]] = {}
-        """By joint of the follower that is not near: where it should be, and where it is."""
+        """Target and position of each joint of the follower that is not near, by name."""
         self.moves: list[str] = []
         """How to move the leader, in its own numbers: "elbow from 0.50 to 0.00"."""
 
     def step(self) -> bool:
-        """Waits for the next row of the leader and commands by it; whether the follower follows.
+        """Waits for the next row of the leader and commands the follower; True if it follows.
 
-        If the leader is silent or halted while the follower follows, it halts the follower and
-        says why in `why`; it goes on when that was resumed and is near again. If the leader jumps
-        by more than `near` from row to row, the follower stays at its last target until it is.
-        Raises BackendGone, and what pulse raises.
+        If the leader is silent or halted meanwhile, the follower is halted, with the reason in
+        `why`; following continues once it is resumed and near again. If the leader jumps by more
+        than `near` from row to row, the follower stays at its last target until it is near again.
+        Raises BackendGone, and the exceptions of pulse.
         """
         try:
             seen = self._next_row()
@@ -170,7 +170,7 @@ class Teleoperation:
         return self.engaged
 
     def targets(self, seen: _core.Observation) -> NDArray[np.float64]:
-        """Where a row of the leader wants the joints of the follower, within their bounds."""
+        """Returns the follower's targets for a row of the leader, clamped to the joints' bounds."""
         places = _places(seen, self._from)
         targets: NDArray[np.float64] = np.clip(
             self._scale * places + self._offset, self._low, self._high
@@ -178,8 +178,8 @@ class Teleoperation:
         return targets
 
     def delay(self, seconds: float = 30.0) -> "Latency | None":
-        """How much later the follower shows what the leader did in the last seconds, measured at
-        the joint that moved most; None if nothing moved enough.
+        """Estimates the follower's delay behind the leader in the last seconds, at the joint that
+        moved most; None if nothing moved enough.
         """
         from o80.joining.latency import latency
 
@@ -198,8 +198,8 @@ class Teleoperation:
             return None
 
     def _next_row(self) -> _core.Observation:
-        """The newest row; of a fast leader not each of them."""
-        if self.leader.bursting:  # it may stand still
+        """Waits for the newest row; skips rows of a fast leader."""
+        if self.leader.bursting:  # it may be idle
             with contextlib.suppress(TimeoutError):
                 self._wait_for_row(1, 0.01)
         else:
@@ -217,7 +217,7 @@ class Teleoperation:
             self.follower.wait_for(self.follower.published + 1, 0.0)
 
     def _refused(self) -> str:
-        """Why the follower takes no commands; empty if it does."""
+        """Returns why the follower takes no commands; empty if it does."""
         if (halt := self.follower.halted) is not None:
             return f"'{self.follower.segment}' is halted: {halt.text or halt.cause}"
         sent, self._sent = self._sent, None
@@ -253,8 +253,8 @@ class Teleoperation:
         self.why = "" if self.engaged else "both are near since less than half a second"
 
     def _move(self, joint: Joint, leader: float, follower: float) -> str:
-        """From where the leader is to where the follower would be near, in the leader's numbers."""
-        # so many that a rounded place is near, too
+        """Describes the motion of the leader that brings the follower near, in its own numbers."""
+        # enough digits that a rounded place is near, too
         digits = max(2, math.ceil(math.log10(abs(joint.scale) / self.near)))
         target = (follower - joint.offset) / joint.scale + 0.0  # never -0
         places = [
@@ -282,7 +282,7 @@ def _check_units(joint: Joint, leader: "Actuator", follower: "Actuator") -> None
 
 
 def _column(robot: "Frontend", actuator: "Actuator") -> Column:
-    """The observed first number of an actuator."""
+    """Returns the column of an actuator's first observed number."""
     path = ".".join(filter(None, ("observed", actuator.name, actuator.numbers[0].name)))
     return next(column for column in columns_of(robot.schema) if column.name == path)
 

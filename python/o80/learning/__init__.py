@@ -27,9 +27,9 @@ if TYPE_CHECKING:
 def stable_baselines3(
     environments: VectorEnvironment, *, infos: "WhichInfos" = "all"
 ) -> "StableBaselines3Env":
-    """A vector environment in SAME_STEP mode for the learners of Stable-Baselines3.
+    """Makes a vector environment in SAME_STEP mode usable for learners of Stable-Baselines3.
 
-    infos: "all" or "ends": the info of the task in every step, or only of ended episodes.
+    infos: "all" or "ends": include the task's info in every step, or only for ended episodes.
 
     Needs the extra `stable-baselines3`.
     """

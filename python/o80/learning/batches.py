@@ -10,7 +10,7 @@ from o80.learning.task import Index
 
 
 def rows(batch: Any, copies: Any) -> Any:
-    """Entries of the given copies (of one copy for a single number), as new arrays."""
+    """Returns the entries of some copies as new arrays (of one copy for a single number)."""
     if isinstance(batch, dict):
         return {name: rows(each, copies) for name, each in batch.items()}
     if isinstance(batch, tuple):
@@ -20,7 +20,7 @@ def rows(batch: Any, copies: Any) -> Any:
 
 
 def put(batch: Any, copies: Index, values: Any) -> None:
-    """Replaces the entries of some copies."""
+    """Overwrites the entries of some copies."""
     if isinstance(batch, dict):
         for name, each in batch.items():
             put(each, copies, values[name])
@@ -32,7 +32,7 @@ def put(batch: Any, copies: Index, values: Any) -> None:
 
 
 def fresh(space: Space[Any], values: Any) -> Any:
-    """A copy of values in `space`, with its types. Raises InvalidArgument for other shapes."""
+    """Copies values into the types of `space`. Raises InvalidArgument for another shape."""
     if isinstance(space, spaces.Dict):
         return {name: fresh(each, values[name]) for name, each in space.items()}
     if isinstance(space, spaces.Tuple):
@@ -47,7 +47,7 @@ def fresh(space: Space[Any], values: Any) -> Any:
 
 
 def checked_actions(space: Space[Any], actions: Any, copies: int) -> Any:
-    """Actions of all copies, as arrays. Raises InvalidArgument for a wrong shape."""
+    """Converts actions of all copies to arrays. Raises InvalidArgument for a wrong shape."""
     if isinstance(space, spaces.Dict):
         return {name: checked_actions(each, actions[name], copies) for name, each in space.items()}
     if isinstance(space, spaces.Tuple):
@@ -64,7 +64,7 @@ def checked_actions(space: Space[Any], actions: Any, copies: int) -> Any:
 
 
 def batch_of_one(space: Space[Any], action: Any) -> Any:
-    """The action of one copy as a batch. Raises InvalidArgument for a wrong shape."""
+    """Makes a batch of one copy's action. Raises InvalidArgument for a wrong shape."""
     if isinstance(space, spaces.Dict):
         return {name: batch_of_one(each, action[name]) for name, each in space.items()}
     if isinstance(space, spaces.Tuple):

@@ -17,7 +17,7 @@ _ONLY = np.zeros(1, np.intp)
 class Environment(gymnasium.Env[Any, Any]):
     """The environment of a task with one copy.
 
-    Closing it, or leaving its `with` block, closes the task.
+    Closing the environment, or leaving its `with` block, closes the task.
     """
 
     def __init__(self, task: Task, *, render_mode: str | None = None) -> None:
@@ -47,7 +47,7 @@ class Environment(gymnasium.Env[Any, Any]):
         return rows(begun.observations, 0), infos.of_one(begun.info)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, infos.Info]:
-        """Carries out an action."""
+        """Executes an action."""
         if not self._ready:
             raise ResetNeeded("no episode runs: call reset() before step()")
         actions = batch_of_one(self.action_space, action)
@@ -62,7 +62,7 @@ class Environment(gymnasium.Env[Any, Any]):
         return observation, float(stepped.rewards[0]), terminated, truncated, info
 
     def render(self) -> Any:
-        """A picture, if a render mode was chosen."""
+        """Returns a picture, if a render mode was chosen."""
         if self.render_mode is None:
             gymnasium.logger.warn("no render mode was chosen: make it with render_mode=...")
             return None
@@ -74,7 +74,7 @@ class Environment(gymnasium.Env[Any, Any]):
 
 
 def checked_render_mode(task: Task, render_mode: str | None) -> str | None:
-    """Raises InvalidArgument unless the task has this mode."""
+    """Returns the mode. Raises InvalidArgument unless it is None or a mode of the task."""
     modes = task.metadata.get("render_modes", [])
     if render_mode is not None and render_mode not in modes:
         raise InvalidArgument(

@@ -1,4 +1,4 @@
-"""The order of a step and of a reset, which the environments of one copy and of many share."""
+"""Runs the parts of a step and of a reset in order, for one copy and for many."""
 
 from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
@@ -18,7 +18,7 @@ _NOBODY: NDArray[np.intp] = np.zeros(0, np.intp)
 
 @dataclass(slots=True)
 class Begun:
-    """Observations of n copies when their episodes begin."""
+    """Observations of n copies at the begin of their episodes."""
 
     observations: Any  #: (n, ...) a fresh batch
     info: Mapping[str, Any]  #: (n, ...)
@@ -51,7 +51,7 @@ def begin(
 
 
 def step(task: Task, actions: Any, copies: Index) -> Stepped:
-    """A step of some copies."""
+    """Runs a step of some copies."""
     halted = _carried_out(task, actions, copies)
     task.steps[copies] += 1
     rewards = np.zeros(task.copies)
@@ -91,7 +91,7 @@ def step(task: Task, actions: Any, copies: Index) -> Stepped:
 
 
 def no_step(task: Task) -> Stepped:
-    """Result of a step of no copy."""
+    """Returns the result of a step of no copy."""
     nothing = np.zeros(task.copies, np.bool_)
     return Stepped(
         None, {}, np.zeros(task.copies), nothing, nothing.copy(), _NOBODY, {}, _NOBODY, {}
@@ -99,8 +99,8 @@ def no_step(task: Task) -> Stepped:
 
 
 def _carried_out(task: Task, actions: Any, copies: Index) -> NDArray[np.intp]:
-    """Carries out a step; the numbers of its copies that are halted then."""
-    # of one copy: what the step has left out is missing in no other one
+    """Runs a step; returns the numbers of its copies that are halted afterwards."""
+    # with one copy an incomplete step affects no other copy
     with task.until_halted() if task.copies == 1 else nullcontext():
         task.step(actions, copies)
     task.halts = halts = halts_of(task.robots, task.copies)
@@ -113,7 +113,7 @@ def _carried_out(task: Task, actions: Any, copies: Index) -> NDArray[np.intp]:
 def _to_be_judged(
     task: Task, copies: Index, halted: NDArray[np.intp]
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_] | None]:
-    """Numbers of the copies to be judged, and which of all are out of steps (None: no limit)."""
+    """Returns copies to judge, and a mask of copies that are out of steps (None: no limit)."""
     flagged, late = task.flagged(), None
     if halted.size:
         flagged = flagged.copy()

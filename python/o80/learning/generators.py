@@ -1,4 +1,4 @@
-"""The random generators of the copies, seeded as Gymnasium seeds single environments."""
+"""The random generators of the copies, seeded like single environments of Gymnasium."""
 
 from collections.abc import Sequence
 
@@ -12,14 +12,14 @@ Seed = int | Sequence[int | None] | None
 
 
 class Generators:
-    """One generator for each copy; a copy that was never seeded gets a seed of the system."""
+    """One generator for each copy; a copy without a seed gets one from the system."""
 
     def __init__(self, copies: int) -> None:
         self._generators: list[np.random.Generator | None] = [None] * copies
         self._seeds = [-1] * copies
 
     def seed(self, seed: Seed, copies: NDArray[np.intp]) -> None:
-        """Seeds these copies: copy i with seed + i, or with entry i. Raises InvalidArgument."""
+        """Seeds copy i with seed + i, or with entry i. Raises InvalidArgument for a wrong count."""
         if seed is None:
             return
         count = len(self._seeds)
@@ -38,11 +38,11 @@ class Generators:
                 self._generators[copy], self._seeds[copy] = seeding.np_random(int(wanted))
 
     def of(self, copies: NDArray[np.intp]) -> list[np.random.Generator]:
-        """The generators of some copies."""
+        """Returns the generators of some copies."""
         return [self._of(copy) for copy in copies.tolist()]
 
     def seeds_of(self, copies: NDArray[np.intp]) -> list[int]:
-        """The seeds of some copies."""
+        """Returns the seeds of some copies."""
         for copy in copies.tolist():
             self._of(copy)
         return [self._seeds[copy] for copy in copies.tolist()]

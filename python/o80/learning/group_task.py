@@ -17,9 +17,9 @@ from o80.view.pictures import Pictures
 class GroupTask(Task):
     """A task on one inline group: a step sends targets and runs a burst.
 
-    `begin` and `judge` are yours; `targets` turns actions into targets. Observations are the
-    numbers that `seen` gathers, unless you override `observe`. The copies to be judged are those
-    with a flag of `seen` raised, or all if it has no flags.
+    A derived class defines `begin` and `judge`; `targets` turns actions into targets. Observations
+    are the numbers that `seen` gathers, unless `observe` is overridden. Copies with a raised flag
+    of `seen` are judged, or all copies if it has no flags.
 
     The task closes the group.
     """
@@ -34,7 +34,7 @@ class GroupTask(Task):
         action_space: Space[Any],
         max_steps: int | None = None,
     ) -> None:
-        """burst: of a step, from `group.prepared_burst`.
+        """burst: the burst of a step, from `group.prepared_burst`.
 
         seen: observations and flags, from `group.gather`.
         max_steps: steps after which an episode is truncated (None: no limit).
@@ -57,31 +57,31 @@ class GroupTask(Task):
             }
 
     def targets(self, actions: Any) -> Any:
-        """The targets (n, steps, actuators) of a burst, of the actions (n, ...) of n copies.
+        """Converts actions (n, ...) of n copies to targets (n, steps, actuators) of a burst.
 
-        By default the actions themselves, clipped into the action space.
+        By default these are the actions themselves, clipped into the action space.
         """
         return self.clipped(actions).reshape(len(actions), *self.burst.targets.shape[1:])
 
     def step(self, actions: Any, copies: Index) -> None:
-        """Sends the targets of these copies, and runs a burst of them."""
+        """Sends the targets of these copies, and runs a burst of these copies."""
         self.burst.targets[copies] = self.targets(actions)
         with self.until_halted():
             self.burst.run(copies)
 
     def observe(self, copies: Index) -> Any:
-        """(n, numbers) as they are gathered."""
+        """Returns the gathered numbers (n, numbers)."""
         return self.seen.observations[copies]
 
     def flagged(self) -> NDArray[np.bool_]:
-        """(copies,) with a flag raised; all of them if there are no flags."""
+        """Returns (copies,) with a flag raised; all copies if there are no flags."""
         if not self._has_flags:
             return super().flagged()
         raised: NDArray[np.bool_] = np.logical_or.reduce(self.seen.flags, axis=1)
         return raised
 
     def render(self, copy: int) -> Image:
-        """A picture (height, width, 3) of the robot's model as the newest row of a copy says."""
+        """Draws a picture (height, width, 3) of the robot's model in the newest row of a copy."""
         if self._pictures is None:
             self._pictures = Pictures(self.group[copy], model_files=True)
         return self._pictures.draw(self.group[copy].latest())

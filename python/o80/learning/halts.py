@@ -1,4 +1,4 @@
-"""Halts of the robots of a task: they end episodes, and resets end them."""
+"""Halts of a task's robots: a halt ends an episode, and a reset ends the halt."""
 
 from collections.abc import Sequence
 
@@ -14,13 +14,13 @@ Robots = Sequence[InlineGroup | Frontend]
 
 
 _OF_THE_ROBOT = ("driver", "silence", "error", "overruns")
-"""Causes of halts that a reset ends in a process of its own: nobody requested them."""
+"""Causes of halts that a reset ends for a robot in another process: nobody requested them."""
 
 
 def halts_of(robots: Robots, copies: int) -> dict[int, str]:
-    """The text of the halt of each of so many copies that is halted.
+    """Returns the text of the halt of each halted copy.
 
-    A group may have several robots for each of them, in order.
+    A group may have several robots for each of `copies` copies, in order.
     """
     found: dict[int, str] = {}
     for robot in robots:
@@ -36,9 +36,9 @@ def halts_of(robots: Robots, copies: int) -> dict[int, str]:
 def resume(
     robots: Robots, copies: NDArray[np.intp], of: int, resumes: bool = True
 ) -> CopyFailed | None:
-    """Ends the halts of these copies; the failure of those that stay halted.
+    """Ends the halts of these copies; returns the failure of copies that stay halted.
 
-    of: number of all copies. resumes: also those that a robot by its own clock caused itself.
+    of: number of all copies. resumes: also end halts that a robot with a clock caused itself.
     """
     failures: list[CopyFailed] = []
     for robot in robots:
@@ -60,7 +60,7 @@ def resume(
 
 
 def _resume(robot: Frontend, resumes: bool) -> None:
-    """Raises BackendHalted."""
+    """Resumes one robot. Raises BackendHalted if a reset must not end its halt."""
     halt = robot.halted
     if halt is None:
         return
@@ -73,7 +73,7 @@ def _resume(robot: Frontend, resumes: bool) -> None:
             f"A reset does not end this halt: `o80 resume {name} {number}`, in "
             f"Python resume({number}), then reset again"
         )
-    at_rest = not robot.bursting  # by the clock `resume` waits for it
+    at_rest = not robot.bursting  # in real time `resume` waits for rest
     while not at_rest:
         row = robot.latest()
         at_rest = row.halted and not row.braking.any()

@@ -1,6 +1,6 @@
-"""Gymnasium's info of several copies: an array over all copies for each entry, beside a mask.
+"""Makes Gymnasium's info of several copies: for each entry an array over all copies, and a mask.
 
-The same as Gymnasium's `VectorEnv._add_info` makes of the infos of single environments.
+The result equals that of Gymnasium's `VectorEnv._add_info` for infos of single environments.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ Info = dict[str, Any]
 
 
 def add(infos: Info, values: Mapping[str, Any], copies: Index, count: int) -> None:
-    """Adds values (n, ...) of n of `count` copies to what is there of others."""
+    """Adds values (n, ...) of n of `count` copies, and keeps the values of other copies."""
     if not infos and isinstance(copies, slice):
         # the usual case: it happens in every step
         _add_all(infos, values, count)
@@ -38,7 +38,7 @@ def add(infos: Info, values: Mapping[str, Any], copies: Index, count: int) -> No
 
 
 def _add_all(infos: Info, values: Mapping[str, Any], count: int) -> None:
-    """The same of all copies, where nothing is there."""
+    """Adds values of all copies to an empty info."""
     masks = np.ones((len(values), count), np.bool_)
     for mask, (name, value) in zip(masks, values.items(), strict=True):
         if type(value) is np.ndarray and value.dtype.kind != "U" and value.shape[:1] == (count,):
@@ -56,8 +56,8 @@ def _add_all(infos: Info, values: Mapping[str, Any], count: int) -> None:
 def add_split(
     among: Info, others: Info, values: Mapping[str, Any], chosen: NDArray[np.bool_]
 ) -> None:
-    """Adds values (copies, ...) of all copies to two infos in which nothing is there: those of the
-    chosen copies to `among`, those of the others to `others`.
+    """Splits values (copies, ...) of all copies between two empty infos: those of the chosen
+    copies go to `among`, those of the others to `others`.
     """
     count, left = len(chosen), ~chosen
     numbers = chosen.nonzero()[0]
@@ -77,7 +77,7 @@ def add_split(
 
 
 def some(values: Mapping[str, Any], rows: NDArray[Any]) -> Info:
-    """The values of some copies, by an index or a mask of the n that have values."""
+    """Selects values of some copies, by an index or a mask of the n that have values."""
     return {name: _some(value, rows) for name, value in values.items()}
 
 
@@ -90,7 +90,7 @@ def _some(value: Any, rows: NDArray[Any]) -> Any:
 
 
 def of_one(values: Mapping[str, Any]) -> Info:
-    """The info of the only copy."""
+    """Makes the info of a single copy."""
     return {
         name: of_one(value) if isinstance(value, Mapping) else _first(_array(value))
         for name, value in values.items()

@@ -1,4 +1,4 @@
-"""Ids under which Gymnasium makes the environments of a task."""
+"""Registers tasks with Gymnasium, which then makes their environments by id."""
 
 from collections.abc import Callable
 from typing import Any
@@ -11,13 +11,13 @@ from o80.learning.vector_environment import VectorEnvironment
 
 
 def register(name: str, make: Callable[..., Task]) -> None:
-    """Makes a task known to `gymnasium.make` and `gymnasium.make_vec`.
+    """Registers a task for `gymnasium.make` and `gymnasium.make_vec`.
 
     name: the id, such as "mine/Reach-v0".
     make: the class of the task, or a function that makes one: `make(copies=N, **options)`.
 
-    Keyword arguments of `gymnasium.make` and `make_vec` go to `make`, except `render_mode`, and
-    `autoreset_mode` of `make_vec`.
+    Keyword arguments of `gymnasium.make` and `make_vec` are passed to `make`, except `render_mode`
+    and, for `make_vec`, `autoreset_mode`.
     """
 
     def single(*, render_mode: str | None = None, **options: Any) -> Environment:

@@ -1,4 +1,4 @@
-"""A vector environment as Stable-Baselines3 wants it."""
+"""Adapts a vector environment to Stable-Baselines3."""
 
 import time
 from collections.abc import Iterable, Sequence
@@ -21,15 +21,15 @@ WhichInfos = Literal["all", "ends"]
 class StableBaselines3Env(VecEnv):
     """The copies of a vector environment in SAME_STEP mode, for the learners of Stable-Baselines3.
 
-    It does what DummyVecEnv does with single environments in a Monitor. The info of a copy whose
-    episode has ended has `terminal_observation`, `TimeLimit.truncated`, and `episode` with the sum
-    of its rewards `r`, its number of steps `l` and the time since the start `t` [s].
+    It behaves like DummyVecEnv with single environments in a Monitor. The info of a copy whose
+    episode has ended has `terminal_observation`, `TimeLimit.truncated`, and `episode`: sum of
+    rewards `r`, number of steps `l` and time since the start `t` [s].
     """
 
     actions: Any
 
     def __init__(self, environments: VectorEnvironment, *, infos: WhichInfos = "all") -> None:
-        """infos: "all" or "ends": the info of the task in every step, or only of ended episodes."""
+        """infos: "all" or "ends": the task's info in every step, or only for ended episodes."""
         if environments.autoreset_mode is not AutoresetMode.SAME_STEP:
             raise InvalidArgument(
                 "Stable-Baselines3 begins the next episode in the step of an end, and this vector "
@@ -50,7 +50,7 @@ class StableBaselines3Env(VecEnv):
         )
 
     def reset(self) -> Any:
-        """Begins an episode of every copy, with what `seed` and `set_options` have said."""
+        """Begins an episode of every copy, with the seeds and options that were set before."""
         options = self._options[0]
         if any(each != options for each in self._options):
             raise InvalidArgument("all copies must have the same options")
@@ -62,11 +62,11 @@ class StableBaselines3Env(VecEnv):
         return observations
 
     def step_async(self, actions: Any) -> None:
-        """Keeps the actions for `step_wait`."""
+        """Stores the actions for `step_wait`."""
         self.actions = actions
 
     def step_wait(self) -> tuple[Any, NDArray[np.float32], NDArray[np.bool_], list[Info]]:
-        """Carries out the actions."""
+        """Executes the actions."""
         stepped = self.environments.step(self.actions)
         observations, rewards, terminated, truncated, infos = stepped
         self._rewards += rewards
@@ -86,7 +86,7 @@ class StableBaselines3Env(VecEnv):
         return observations, rewards.astype(np.float32), over, found
 
     def _last_info(self, infos: Info, copy: int) -> Info:
-        """Info of a copy after the end of its episode; resets its sums."""
+        """Returns the info of a copy after the end of its episode; resets its sums."""
         info = _of_copy(infos["final_info"], copy)
         info["terminal_observation"] = infos["final_obs"][copy]
         info["episode"] = {
@@ -102,15 +102,15 @@ class StableBaselines3Env(VecEnv):
         self.environments.close()
 
     def get_images(self) -> Sequence[Any]:
-        """A picture of each copy."""
+        """Returns a picture of each copy."""
         return self.environments.render() or [None] * self.num_envs
 
     def get_attr(self, attr_name: str, indices: Indices = None) -> list[Any]:
-        """The attribute of the vector environment or of its task, for each of the copies."""
+        """Returns an attribute of the vector environment or its task, once for each copy."""
         return [self._found(attr_name)] * self._count(indices)
 
     def set_attr(self, attr_name: str, value: Any, indices: Indices = None) -> None:
-        """Sets an attribute of the task, which all copies share. Raises InvalidArgument."""
+        """Sets an attribute of the task for all copies. Raises InvalidArgument for only some."""
         if self._count(indices) != self.num_envs:
             raise InvalidArgument(f"all copies share '{attr_name}': set it for all of them")
         setattr(self.environments.task, attr_name, value)
@@ -118,12 +118,12 @@ class StableBaselines3Env(VecEnv):
     def env_method(
         self, method_name: str, *method_args: Any, indices: Indices = None, **method_kwargs: Any
     ) -> list[Any]:
-        """Calls a method of the vector environment or of its task, once; its result for each."""
+        """Calls a method of the vector environment or its task once; returns a result per copy."""
         result = self._found(method_name)(*method_args, **method_kwargs)
         return [result] * self._count(indices)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Indices = None) -> list[bool]:
-        """Whether it does what this wrapper of single environments does: only Monitor."""
+        """Returns whether it does the work of this wrapper of single environments: only Monitor."""
         from stable_baselines3.common.monitor import Monitor
 
         return [issubclass(Monitor, wrapper_class)] * self._count(indices)
@@ -137,7 +137,7 @@ class StableBaselines3Env(VecEnv):
 
 
 def _of_copy(infos: Info, copy: int) -> Info:
-    """The entries that a copy has."""
+    """Returns the entries that a copy has."""
     return {
         name: _of_copy(value, copy) if isinstance(value, dict) else rows(value, copy)
         for name, value in infos.items()

@@ -1,4 +1,4 @@
-"""A task: actions, observations and rewards of copies of a robot in episodes."""
+"""Tasks: actions, observations and rewards of copies of a robot in episodes."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
@@ -18,41 +18,41 @@ from o80.groups.inline_group import InlineGroup
 from o80.learning.halts import halts_of
 
 Index = slice | NDArray[np.intp]
-"""Some copies, as an index of arrays over all copies: an array of numbers, or `EVERY`."""
+"""Index of some copies in arrays over all copies: an array of numbers, or `EVERY`."""
 EVERY = slice(None)  #: all copies, as an index
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Outcome of a step for the n copies that were judged: an entry for each, or one for all."""
+    """Outcome of a step for the n judged copies: one entry for each, or one for all."""
 
     reward: ArrayLike = 0.0
-    terminated: ArrayLike = False  #: ended by what happened
+    terminated: ArrayLike = False  #: the task ended the episode
     truncated: ArrayLike = False
-    """Ended by something that is not part of the task, such as a time limit."""
+    """Something outside the task ended the episode, such as a time limit."""
     info: Mapping[str, Any] = field(default_factory=dict)
     """Further entries of Gymnasium's info, for these copies only."""
 
 
 class Task(ABC):
-    """Task of `copies` copies of a robot in episodes: for one copy and for many, written once.
+    """Task of `copies` copies of a robot in episodes: written once for one copy and for many.
 
-    `Environment` makes a Gymnasium environment of a task with one copy, `VectorEnvironment` one of
-    a task with any number. Both call, in each step: `step`, `flagged`, `judge` for the flagged
-    copies, `info` and `observe`; and `begin` for the copies that begin an episode.
+    `Environment` makes a Gymnasium environment of a task with one copy, `VectorEnvironment` of a
+    task with any number of copies. Both call, in each step: `step`, `flagged`, `judge` for the
+    flagged copies, `info` and `observe`; and `begin` for copies that begin an episode.
 
-    Copies are independent: what a copy gets may depend only on its own actions, and on random
+    Copies are independent: the results of a copy may depend only on its own actions, and on random
     numbers of its own generator. Then a vector environment equals single ones, bit for bit.
 
     An argument `copies` of a method is an index of arrays over all copies.
     """
 
     robots: Sequence[InlineGroup | Frontend] = ()
-    """Robots that the task moves. A halt of one ends the episode, and the next reset resumes it:
-    see docs/learning.md. A frontend belongs to all copies. Without them a halt is an exception."""
+    """Robots that the task moves. The halt of a robot ends the episode, and the next reset resumes
+    it: see docs/learning.md. A frontend belongs to all copies. Without robots a halt raises."""
     resumes: bool = True  #: whether a reset resumes robots that run by their own clock
     halts: Mapping[int, str] = {}
-    """The copies that are halted after the last step, each with the text of its halt."""
+    """Texts of the halts of copies that are halted after the last step, by copy."""
     metadata: Mapping[str, Any] = {"render_modes": []}
     """Metadata of the environments: modes of rendering, among others."""
 
@@ -64,7 +64,7 @@ class Task(ABC):
         action_space: Space[Any],
         max_steps: int | None = None,
     ) -> None:
-        """observation_space, action_space: of one copy.
+        """observation_space, action_space: spaces of one copy.
 
         max_steps: steps after which an episode is truncated (None: no limit).
         """
@@ -87,15 +87,15 @@ class Task(ABC):
         generators: Sequence[np.random.Generator],
         options: dict[str, Any],
     ) -> None:
-        """Begins episodes for an environment: `begin`, and what a kind of task adds."""
+        """Begins episodes for an environment: calls `begin`; kinds of tasks extend it."""
         self.begin(copies, generators, options)
 
     def outcome(self, copies: NDArray[np.intp]) -> Outcome:
-        """Judges a step for an environment: `judge`, and what a kind of task adds."""
+        """Judges a step for an environment: calls `judge`; kinds of tasks extend it."""
         return self.judge(copies)
 
     def shown(self, copies: Index) -> tuple[Any, Mapping[str, Any]]:
-        """Observations and infos for an environment: `observe`, `info`, and further ones."""
+        """Returns observations and infos for an environment: `observe`, `info`, and further."""
         info = self.info(copies)
         return self.observe(copies), info
 
@@ -108,17 +108,17 @@ class Task(ABC):
     ) -> None:
         """Begins an episode of these copies.
 
-        generators: one for each of them: draw the random numbers of a copy from its own.
-        options: of the call of `reset`, empty in an automatic reset.
+        generators: one per copy; random numbers of a copy must come from its own generator.
+        options: options of the call of `reset`; empty in an automatic reset.
         """
 
     @abstractmethod
     def step(self, actions: Any, copies: Index) -> None:
-        """Carries out the actions (n, ...) of these n copies."""
+        """Executes the actions (n, ...) of these n copies."""
 
     @contextmanager
     def until_halted(self) -> Iterator[None]:
-        """For a burst of a group in `step`: the step continues although it has halted copies."""
+        """Encloses a burst of a group in `step`: the step continues although copies are halted."""
         try:
             yield
         except (BackendHalted, CopyFailed, NotCompleted) as error:
@@ -128,7 +128,7 @@ class Task(ABC):
                 raise
 
     def clipped(self, actions: Any) -> Any:
-        """Actions (n, ...), clipped into the action space. Raises InvalidArgument."""
+        """Clips actions (n, ...) into the action space. Raises InvalidArgument if it is no Box."""
         space = self.action_space
         if not isinstance(space, Box):
             raise InvalidArgument(
@@ -138,28 +138,28 @@ class Task(ABC):
 
     @abstractmethod
     def observe(self, copies: Index) -> Any:
-        """Observations (n, ...) of these n copies; the environment copies them."""
+        """Returns observations (n, ...) of these n copies; the environment copies them."""
 
     def flagged(self) -> NDArray[np.bool_]:
-        """(copies,) the copies that `judge` gets after a step; by default all of them.
+        """Returns (copies,) the copies to pass to `judge` after a step; by default all.
 
-        The others get reward 0, and their episodes continue. Called in every step: keep it cheap.
+        Other copies get reward 0, and their episodes continue. Called in every step: keep it cheap.
         """
         return np.ones(self.copies, np.bool_)
 
     @abstractmethod
     def judge(self, copies: NDArray[np.intp]) -> Outcome:
-        """Judges the step of these copies, which are flagged, in `halts`, or at the end of
-        `max_steps`. The episode of a copy in `halts` terminates whatever this says.
+        """Judges the step of these copies: flagged ones, ones in `halts`, and ones at the end of
+        `max_steps`. The episode of a copy in `halts` terminates in any case.
         """
 
     def info(self, copies: Index) -> Mapping[str, Any]:
-        """Entries of Gymnasium's info in every step and reset: arrays (n, ...), or mappings."""
+        """Returns entries of Gymnasium's info in each step and reset: arrays (n, ...), mappings."""
         return {}
 
     def render(self, copy: int) -> Any:
-        """A picture of one copy."""
+        """Draws a picture of one copy."""
         raise NotImplementedError(f"{type(self).__name__} has no pictures: define render(copy)")
 
     def close(self) -> None:  # noqa: B027
-        """Ends what the task has started; may be called twice."""
+        """Closes everything that the task has started; may be called twice."""

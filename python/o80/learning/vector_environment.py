@@ -27,14 +27,14 @@ _NOBODY: Numbers = np.zeros(0, np.intp)
 class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Closeable):
     """All copies of a task as one vector environment.
 
-    It gives, bit for bit, what Gymnasium's SyncVectorEnv gives of as many single `Environment`s in
-    the same autoreset mode: copy i is seeded with seed + i, and all arrays are fresh. An exception
-    in `step` leaves some copies stepped and others not: call `reset` before the next step.
+    The results equal, bit for bit, those of Gymnasium's SyncVectorEnv with as many single
+    `Environment`s in the same autoreset mode: copy i is seeded with seed + i, and all arrays are
+    fresh. An exception in `step` leaves only some copies stepped: call `reset` before the next one.
 
-    CopyFailed for halts that a reset may not end names the copies that then have no episode. The
-    others are done: they continue when these were reset.
+    CopyFailed for halts that a reset may not end names the copies that then have no episode. All
+    other copies are reset: they continue as soon as the named copies were reset.
 
-    Closing it, or leaving its `with` block, closes the task.
+    Closing the environment, or leaving its `with` block, closes the task.
     """
 
     def __init__(
@@ -70,9 +70,9 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
     def reset(
         self, *, seed: Seed = None, options: dict[str, Any] | None = None
     ) -> tuple[Any, infos.Info]:
-        """Begins an episode of every copy, or of those in `options["reset_mask"]` (copies,).
+        """Begins an episode of every copy, or of copies in `options["reset_mask"]` (copies,).
 
-        seed: that of copy 0, copy i gets seed + i; or one for each copy.
+        seed: seed of copy 0, copy i gets seed + i; or one seed for each copy.
         """
         options = dict(options or {})
         copies = self._everybody
@@ -89,9 +89,9 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
     def _begin(
         self, copies: Numbers, options: dict[str, Any], info: infos.Info, unbegun: Numbers
     ) -> None:
-        """Begins an episode of some copies; adds what they see and their info.
+        """Begins an episode of some copies; stores their observations and adds their info.
 
-        unbegun: other copies that have none. Raises CopyFailed for those that stay halted.
+        unbegun: other copies without an episode. Raises CopyFailed for copies that stay halted.
         """
         failed = halts.resume(self.task.robots, copies, self.num_envs, self.task.resumes)
         if failed:
@@ -108,7 +108,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
     # ------------------------------------------------------------------ step
 
     def step(self, actions: Any) -> StepResult:
-        """Carries out the actions (copies, ...), and resets as the autoreset mode says."""
+        """Executes the actions (copies, ...), and resets copies by the autoreset mode."""
         actions = checked_actions(self.single_action_space, actions, self.num_envs)
         self._refuse_unless_ready()
         beginning, self._ended, self._final = self._ended, _NOBODY, None
@@ -134,7 +134,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
             )
 
     def _after(self, stepped: episodes.Stepped, info: infos.Info) -> StepResult:
-        """The result of a step of all copies; begins new episodes in SAME_STEP mode."""
+        """Returns the result of a step of all copies; begins new episodes in SAME_STEP mode."""
         if not stepped.judged.size:
             infos.add(info, stepped.info, EVERY, self.num_envs)
             return self._result(stepped, info)
@@ -150,7 +150,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
         return self._result(stepped, info)
 
     def _add_finals(self, stepped: episodes.Stepped, over: Mask, info: infos.Info) -> None:
-        """`final_obs` and `final_info` of the copies that ended, the usual info of the others."""
+        """Adds `final_obs` and `final_info` of ended copies, and the usual info of the others."""
         count = self.num_envs
         final_info: infos.Info = {}
         final_obs = np.full(count, None, object)
@@ -169,7 +169,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
         info.update(final_info=final_info, _final_info=over.copy())
 
     def _step_others(self, actions: Any, beginning: Numbers, info: infos.Info) -> StepResult:
-        """A step of all copies but some, which begin an episode instead."""
+        """Steps all copies except some, which begin an episode instead."""
         stepping = np.delete(self._everybody, beginning)
         if stepping.size:
             stepped = episodes.step(self.task, rows(actions, stepping), stepping)
@@ -196,10 +196,10 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
 
     @property
     def final_observations(self) -> Any:
-        """(copies, ...) after the last step, before the resets in it; fresh.
+        """Returns (copies, ...) after the last step, before the resets in it; fresh.
 
-        In SAME_STEP those of a copy that ended are its `final_obs`: `infos["final_obs"]` as one
-        array, as an estimate of the value of final states wants it.
+        In SAME_STEP mode they include `infos["final_obs"]` of ended copies, as one array for all
+        copies, to estimate the value of final states.
         """
         return rows(self._observations if self._final is None else self._final, EVERY)
 
@@ -210,11 +210,11 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The seeds of these."""
+        """The seeds of these generators."""
         return tuple(self._generators.seeds_of(self._everybody))
 
     def render(self) -> tuple[Any, ...] | None:
-        """A picture of each copy, if a render mode was chosen."""
+        """Returns a picture of each copy, if a render mode was chosen."""
         if self.render_mode is None:
             gymnasium.logger.warn("no render mode was chosen: make it with render_mode=...")
             return None
@@ -234,7 +234,7 @@ def _checked_mode(mode: AutoresetMode | str) -> AutoresetMode:
 
 
 def _checked_mask(mask: Any, copies: int) -> Mask:
-    """Raises InvalidArgument unless it names at least one of the copies."""
+    """Returns the mask. Raises InvalidArgument unless it holds at least one of the copies."""
     if not isinstance(mask, np.ndarray) or mask.dtype != np.bool_ or mask.shape != (copies,):
         raise InvalidArgument(f"reset_mask must be an array of {copies} bools, got {mask!r}")
     if not mask.any():

@@ -1,4 +1,4 @@
-"""Parts of an MCAP chunk: many messages of one channel, built as one array; few messages."""
+"""Parts of an MCAP chunk: many messages of one channel as one array, or a few messages."""
 
 import struct
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ class Block:
     def reserved(
         cls, channel: int, log_times: NDArray[np.uint64], sequence: int, size: int
     ) -> "Block":
-        """Records whose messages, `size` bytes each, are not filled yet."""
+        """Makes records with heads but with empty messages of `size` bytes each."""
         records = np.empty((len(log_times), MESSAGE_HEAD.itemsize + size), np.uint8)
         heads = np.zeros(len(log_times), MESSAGE_HEAD)
         heads["opcode"] = MESSAGE
@@ -57,7 +57,7 @@ class Block:
 
     @property
     def count(self) -> int:
-        """Messages."""
+        """Number of messages."""
         return len(self.records)
 
     @property
@@ -66,7 +66,7 @@ class Block:
         return int(self.log_times[0]), int(self.log_times[-1])
 
     def index(self, offset: int) -> bytes:
-        """The message index of this block, which begins at `offset` in its chunk."""
+        """Returns the message index of this block, which begins at `offset` in its chunk."""
         entries = np.empty((len(self.log_times), 2), "<u8")
         entries[:, 0] = self.log_times
         entries[:, 1] = offset + np.arange(len(entries)) * self.records.shape[1]
@@ -110,22 +110,22 @@ MessageBlock = Block | Messages
 
 
 def _index(channel: int, entries: NDArray[np.uint64]) -> bytes:
-    """The message index of a channel: (n, 2), log time and offset in the chunk."""
+    """Encodes the message index of a channel; entries: (n, 2), log time and offset in the chunk."""
     content = entries.tobytes()
     return struct.pack("<BQHI", MESSAGE_INDEX, 6 + len(content), channel, len(content)) + content
 
 
 def stamps_of(times: NDArray[np.uint64]) -> NDArray[np.uint8]:
-    """Times [ns] as the bytes (n, 8) of builtin_interfaces/Time."""
+    """Encodes times [ns] as bytes (n, 8) of builtin_interfaces/Time."""
     parts = np.divmod(times, np.uint64(1_000_000_000))
     return np.stack(parts, axis=1).astype("<u4").view(np.uint8)
 
 
 def messages_in(content: bytes, index: NDArray[np.uint64]) -> NDArray[np.uint8]:
-    """The data of a channel's messages in a chunk: (n, size), a view where they are adjacent.
+    """Returns the data of a channel's messages in a chunk: (n, size), a view if they are adjacent.
 
-    index: (n, 2), the log time and the offset of each. Raises ValueError if their sizes differ or
-    an offset is outside.
+    index: (n, 2), log time and offset of each message. Raises ValueError if the sizes of the
+    messages differ or an offset is outside the chunk.
     """
     data = np.frombuffer(content, np.uint8)
     offsets = index[:, 1].astype(np.int64)

@@ -1,7 +1,7 @@
-"""The recordings below a folder: what each holds, found again quickly.
+"""The recordings below a folder, with an index that makes the next search quick.
 
-What was found is kept in a SQLite file in the folder. It is only a copy: whatever happens to it, it
-is made anew. A recording is read again if its size or its time of change differs.
+The index is a SQLite file in the folder. It is only a copy: if it is damaged or missing, it is made
+anew. A recording is read again if its size or its time of change differs.
 """
 
 import contextlib
@@ -21,8 +21,8 @@ from o80.recording.reader import RecordingFile
 from o80.recording.recorded_epoch import RecordedEpoch
 
 INDEX = ".o80-recordings.sqlite"
-VERSION = 2  # of what the index holds
-MARKS = 200  # that are kept of each recording
+VERSION = 2  # version of the index
+MARKS = 200  # most marks that the index keeps of each recording
 _DAMAGED = (RecordingError, OSError, ValueError, LookupError, TypeError, struct.error)
 
 Progress = Callable[[int, int], None]
@@ -34,25 +34,25 @@ class FoundRun:
     """One run of a robot in a recording."""
 
     segment: str
-    number: int  #: among the runs of the segment in the recording, from 0
+    number: int  #: index among the runs of the segment in the recording
     robot: str
     begin: int  #: wall clock of the first row [ns since 1970]
-    end: int  #: of the last row
+    end: int  #: wall clock of the last row [ns since 1970]
     rows: int
-    missing: int  #: rows, as far as it is known
+    missing: int  #: number of missing rows, as far as it is known
     ended: str  #: as `RecordedEpoch.end`; "missing" if the end of the run is missing
 
 
 @dataclass(frozen=True)
 class FoundRecording:
-    """Contents of a recording, as `o80.recordings` gives them."""
+    """Contents of a recording, as returned by `o80.recordings`."""
 
     path: Path
     size: int  #: [bytes]
-    problem: str  #: why it cannot be read; empty: it can
-    finished: bool  #: its recorder ended in order
+    problem: str  #: why the recording cannot be read; empty if it can
+    finished: bool  #: the recorder ended in order
     runs: tuple[FoundRun, ...]
-    marks: tuple[tuple[str, int, str], ...]  #: name, wall clock [ns], values as JSON; of many some
+    marks: tuple[tuple[str, int, str], ...]  #: name, wall clock [ns], JSON values; at most 200
     mark_count: int
 
     @property
@@ -66,7 +66,7 @@ class FoundRecording:
         return max((run.end for run in self.runs if run.rows), default=0)
 
     def has(self, text: str) -> bool:
-        """Whether its path, a segment, a robot or a mark holds a text; case does not matter."""
+        """True if the path, a segment, a robot or a mark contains a text, in any case."""
         texts = [str(self.path)]
         texts += [each for run in self.runs for each in (run.segment, run.robot)]
         texts += [each for name, _, values in self.marks for each in (name, values)]
@@ -81,14 +81,14 @@ def recordings(
     text: str = "",
     progress: Progress | None = None,
 ) -> list[FoundRecording]:
-    """The recordings in a folder and below it, the oldest first.
+    """Finds the recordings in a folder and below it, the oldest first.
 
-    begin, end: only those with rows between these times. text: only those in whose path, segments,
-        robots or marks it occurs, whatever its case. progress: called with the number of recordings
-        that were read and that must be read.
+    begin, end: only recordings with rows between these times. text: only recordings whose path,
+        segments, robots or marks contain this text, in any case. progress: called with the numbers
+        of recordings that were read and that must be read.
 
-    A recording that cannot be read has a `problem`. Writes a file `.o80-recordings.sqlite` into the
-    folder, with which the next call is quick; where that is not possible, a RuntimeWarning says so.
+    A recording that cannot be read has a `problem`. Writes the index `.o80-recordings.sqlite` into
+    the folder, which makes the next call quick; warns (RuntimeWarning) where that is not possible.
     Raises InvalidArgument if there is no such folder.
     """
     root = Path(folder)
@@ -118,7 +118,7 @@ def recordings(
 
 
 def _nanoseconds(time: datetime) -> int:
-    """Since 1970 [ns]; clamped for years outside the range of `timestamp()`."""
+    """Converts to ns since 1970, clamped for years outside the range of `timestamp()`."""
     try:
         return int(time.timestamp() * 1e9)
     except (ValueError, OverflowError):
@@ -126,7 +126,7 @@ def _nanoseconds(time: datetime) -> int:
 
 
 def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
-    """Path below the root and stamp of each recording; a folder NAME.mcap is one."""
+    """Yields path below the root and stamp of each recording; a folder NAME.mcap counts as one."""
     waiting = [root]
     while waiting:
         folder = waiting.pop()
@@ -155,7 +155,7 @@ def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
 
 
 def _statuses(folder: os.DirEntry[str]) -> Iterator[os.stat_result]:
-    """Sizes and times of its files, without those that a recorder (keep) deletes meanwhile."""
+    """Yields the status of each file, except files that a recorder (keep) deletes meanwhile."""
     for each in os.scandir(folder):
         with contextlib.suppress(FileNotFoundError):
             yield each.stat()
@@ -167,7 +167,7 @@ def _is_readable(path: Path) -> bool:
 
 
 def _summary(path: Path) -> str:
-    """Contents of a recording as JSON."""
+    """Reads a recording and returns its contents as JSON."""
     try:
         recording = RecordingFile(path)
         runs = [
@@ -189,7 +189,7 @@ def _summary(path: Path) -> str:
 
 
 def run_found(segment: str, number: int, epoch: RecordedEpoch) -> FoundRun:
-    """Entry of a run in the catalogue. Raises RecordingError."""
+    """Makes the catalogue's entry of a run. Raises RecordingError if its rows cannot be read."""
     begin, end = epoch.time_range if epoch.rows else (0, 0)
     is_cut = any(gap.last is None for gap in epoch.gaps)
     return FoundRun(
@@ -221,7 +221,7 @@ def _found(path: Path, stamp: Stamp, text: str) -> FoundRecording:
 
 
 def _read(root: Path) -> dict[str, tuple[Stamp, FoundRecording]]:
-    """Contents of the index, by path. One of another version, or a damaged one, is removed."""
+    """Reads the index, by path; removes an index of another version or a damaged one."""
     index = root / INDEX
     if not index.exists():
         return {}
@@ -248,13 +248,13 @@ def _read(root: Path) -> dict[str, tuple[Stamp, FoundRecording]]:
 def _write(root: Path, new: list[tuple[str, int, int, str]], gone: set[str]) -> None:
     try:
         with contextlib.closing(sqlite3.connect(root / INDEX)) as db, db:
-            db.execute("PRAGMA synchronous = OFF")  # it can be made anew
+            db.execute("PRAGMA synchronous = OFF")  # a lost index can be built again
             db.execute(f"PRAGMA user_version = {VERSION}")
             db.execute(
                 "CREATE TABLE IF NOT EXISTS recordings"
                 "(name BLOB PRIMARY KEY, size INTEGER, changed INTEGER, found TEXT)"
             )
-            rows = ((os.fsencode(name), *rest) for name, *rest in new)  # of any bytes
+            rows = ((os.fsencode(name), *rest) for name, *rest in new)  # names may be any bytes
             db.executemany("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", rows)
             names = ((os.fsencode(name),) for name in gone)
             db.executemany("DELETE FROM recordings WHERE name = ?", names)

@@ -13,7 +13,7 @@ class CdrWriter:
         self.data = bytearray(ENCAPSULATION)
 
     def numbers(self, kind: str, *values: float) -> int:
-        """Appends numbers of a kind of the module `struct`; returns their place in the message."""
+        """Appends numbers of one format of `struct`; returns their offset in the message."""
         size = struct.calcsize(kind)
         self.data += bytes((len(ENCAPSULATION) - len(self.data)) % size)
         place = len(self.data)
@@ -32,13 +32,13 @@ class CdrWriter:
             self.text(text)
 
     def stamp(self, time: int) -> int:
-        """Appends a builtin_interfaces/Time [ns]; returns its place."""
+        """Appends a builtin_interfaces/Time [ns]; returns its offset."""
         seconds, nanoseconds = divmod(time, 1_000_000_000)
         return self.numbers("I", seconds, nanoseconds)
 
 
 class CdrReader:
-    """Takes values from a message. Raises struct.error or ValueError if it is damaged."""
+    """Reads values from a message. Raises struct.error or ValueError if the message is damaged."""
 
     def __init__(self, message: bytes) -> None:
         self._message, self._at = message, len(ENCAPSULATION)

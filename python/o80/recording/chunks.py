@@ -1,4 +1,4 @@
-"""Chunk indexes of a file, as the records of its summary: a few bytes each."""
+"""Chunk indexes of a file, kept as the records of its summary: a few bytes each."""
 
 import struct
 from array import array
@@ -10,12 +10,12 @@ from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.records import ChunkIndex, McapRecord
 
 HEAD = struct.Struct("<BQ")
-_BEGIN = struct.Struct("<QQQQI")  # after the head, until the offsets of message indexes
-_OFFSET = 10  # bytes of the place of a message index, which begins with its channel
+_BEGIN = struct.Struct("<QQQQI")  # follows the head, up to the offsets of message indexes
+_OFFSET = 10  # bytes of the offset of a message index, which begins with its channel
 
 
 def bytes_of(*records: McapRecord) -> bytes:
-    """Records as they are in a file."""
+    """Encodes records as in a file."""
     builder: Any = RecordBuilder()
     for record in records:
         record.write(builder)
@@ -26,20 +26,20 @@ class Chunks(Sequence[ChunkIndex]):
     """Chunk indexes in file order, decoded on access: a recording of days has very many."""
 
     def __init__(self) -> None:
-        self.records = bytearray()  #: as in a summary
+        self.records = bytearray()  #: all records, as in a summary
         self.start = 2**64 - 1  #: log time of the first message [ns]
         self.end = 0  #: log time of the last message [ns]
-        self._begins = array("Q")  # of each record
-        self._kinds = array("I")  # of each chunk: which channels it has
-        self._numbers: dict[bytes, int] = {}  # of each kind
-        self._channels: list[frozenset[int]] = []  # of each kind
+        self._begins = array("Q")  # offset of each record
+        self._kinds = array("I")  # kind of each chunk: a number for its set of channels
+        self._numbers: dict[bytes, int] = {}  # kind by the channels as bytes
+        self._channels: list[frozenset[int]] = []  # set of channels of each kind
 
     def append(self, chunk: ChunkIndex) -> None:
         """Adds the index of a chunk."""
         self.append_record(bytes_of(chunk))
 
     def append_record(self, record: bytes) -> None:
-        """Adds a record of a summary. Raises struct.error, ValueError if it is damaged."""
+        """Adds a chunk index of a summary. Raises struct.error, ValueError if it is damaged."""
         start, end, _, _, size = _BEGIN.unpack_from(record, HEAD.size)
         begin = HEAD.size + _BEGIN.size
         low, high = (record[begin + i : begin + size : _OFFSET] for i in (0, 1))
@@ -54,13 +54,13 @@ class Chunks(Sequence[ChunkIndex]):
 
     @property
     def channels(self) -> set[frozenset[int]]:
-        """The sets of channels that chunks have."""
+        """The distinct sets of channels of all chunks."""
         return set(self._channels)
 
     def having(
         self, *channels: int, start: int = 0, end: int = 2**64, newest_first: bool = False
     ) -> Iterator[ChunkIndex]:
-        """Chunks with a message of one of these channels, and with messages of these times [ns]."""
+        """Yields chunks with a message of one of these channels and messages in this time [ns]."""
         wanted = {
             kind for kind, there in enumerate(self._channels) if not there.isdisjoint(channels)
         }

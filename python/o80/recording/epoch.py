@@ -1,4 +1,4 @@
-"""One run of a backend in a recording: its channel, its description, its clock."""
+"""One run of a backend in a recording: metadata of its channel, its gaps, its clock."""
 
 import re
 from collections.abc import Mapping
@@ -13,9 +13,9 @@ from o80.recording.cdr import ENCAPSULATION
 from o80.recording.scan import Scan
 
 DESCRIPTION = "application/x-o80-description"
-"""Media type of the attachment with the description of a robot, as it is in a segment."""
+"""Media type of the attachment with a robot's description, in the format of a segment."""
 GAP = "o80.gap"
-"""Name of the metadata record of rows that are missing, such as those that were overwritten."""
+"""Name of the metadata records of missing rows, for example rows that were overwritten."""
 LATE = "recording began later"
 EARLIER_FILE = "the file before is missing"
 OVERWRITTEN = "overwritten before the recorder read them"
@@ -28,7 +28,7 @@ class Gap(NamedTuple):
     """Rows of a run that a recording lacks."""
 
     first: int  #: iteration
-    last: int | None  #: iteration; None: the last one of the run, which is not known
+    last: int | None  #: iteration; None: the unknown last one of the run
     reason: str
 
     def __str__(self) -> str:
@@ -40,10 +40,10 @@ class Gap(NamedTuple):
 
 
 class Interruption(NamedTuple):
-    """Time before a run in which nothing of its segment was recorded: runs may be missing."""
+    """Time before a run in which this segment was not recorded: runs may be missing."""
 
-    since: int  #: log time of the last row before [ns]
-    until: int  #: of the first row of the run
+    since: int  #: log time of the row before it [ns]
+    until: int  #: log time of the first row of the run [ns]
 
     def __str__(self) -> str:
         begin, end = (datetime.fromtimestamp(each * 1e-9) for each in self)
@@ -55,26 +55,26 @@ class Interruption(NamedTuple):
 
 @dataclass(frozen=True)
 class EpochNote:
-    """Metadata of a channel about its rows."""
+    """Metadata of a channel of rows."""
 
     segment: str
     robot: str
     epoch: int
-    number: int  #: of this run among those of the segment in the file, from 0
+    number: int  #: index of this run among the runs of the segment in the file
     begin: int  #: iteration of the first row to record
     wall_offset: int  #: log time less row time [ns]
     clock: str  #: monotonic or simulated
-    before: str = LATE  #: why rows before `begin` are missing, if they are
-    boot: str = ""  #: of the machine whose monotonic clock the rows have; empty: not known
+    before: str = LATE  #: why rows before `begin` may be missing
+    boot: str = ""  #: id of the boot to whose monotonic clock row times refer; empty: unknown
 
     def texts(self) -> dict[str, str]:
         return {name: str(value) for name, value in vars(self).items()}
 
     @classmethod
     def of(cls, texts: Mapping[str, str]) -> "EpochNote | None":
-        """None for a channel that is not one of rows.
+        """Parses the metadata of a channel; None if the channel holds no rows.
 
-        Raises RecordingError for a name that no segment has: it could lead to other folders.
+        Raises RecordingError for a name that no segment can have: it could lead to other folders.
         """
         name = texts.get("segment", "x")
         if not _NAME.fullmatch(name):
@@ -97,36 +97,36 @@ class EpochNote:
             return None
 
     def run_texts(self) -> dict[str, str]:
-        """Texts that name this run."""
+        """Metadata that identify this run."""
         return {"segment": self.segment, "epoch": str(self.epoch), "number": str(self.number)}
 
     def channel_texts(self, content: str) -> dict[str, str]:
-        """The metadata of a channel of this run that holds something else than its rows."""
+        """Returns metadata for a channel of this run that holds other content than rows."""
         return {"content": content} | self.run_texts()
 
     def record(self, what: str) -> str:
-        """Name of a record of this run: its description (an attachment), its provenance, its end
-        with the last row, or the interruption before it, in which nothing was recorded.
+        """Returns the name of a record of this run: description (an attachment), provenance, end
+        with the last row, or the preceding interruption, in which nothing was recorded.
         """
         return f"{self.segment}/{self.number}/{what}"
 
     def not_before(self, first_time: int, log_time: int) -> "EpochNote":
-        """The same; the log time of a row at `first_time` is later than `log_time`."""
+        """Returns this note, shifted if needed to log `first_time` later than `log_time`."""
         offset = max(self.wall_offset, log_time + 1 - first_time)
         return replace(self, wall_offset=offset)
 
 
 @dataclass
 class WallClock:
-    """Wall-clock times of robots on monotonic clocks: those of one boot keep their distances,
-    although the wall clock was read at the start of each, and may have been set in between.
+    """Places robots on one wall clock: robots on the monotonic clock of one boot keep their exact
+    distances, although each read the wall clock at its start and it may have been set since.
     """
 
     offsets: dict[str, int]  #: log time less row time, by boot [ns]
-    after: int = 0  #: before rows of another boot [ns]
+    after: int = 0  #: log time that rows of a new boot must follow [ns]
 
     def placed(self, note: EpochNote, first_time: int, last_log_time: int) -> EpochNote:
-        """The note with the offset of its boot; a row at `first_time` is after `last_log_time`."""
+        """Returns the note with its boot's offset; `first_time` is placed after `last_log_time`."""
         if note.boot in self.offsets:
             note = replace(note, wall_offset=self.offsets[note.boot])
         elif note.boot:
@@ -138,10 +138,10 @@ class WallClock:
 
 
 def topic_of(segment: str, content: str = "") -> str:
-    """Topic of a segment's rows, or of something else of it, as ROS 2 accepts it.
+    """Returns a topic that ROS 2 accepts, for a segment's rows or for other content.
 
-    All but letters and digits are single underscores between them; a name that begins with a digit
-    gets `x_`. Two names may have one topic; the metadata of the channel have the name itself.
+    Characters other than letters and digits become single underscores; a name that begins with a
+    digit gets `x_`. Two names may share a topic; the channel's metadata have the segment's name.
     """
     plain = re.sub(r"[^A-Za-z0-9]+", "_", segment).strip("_") or "x"
     name = f"x_{plain}" if plain[0].isdigit() else plain
@@ -149,13 +149,13 @@ def topic_of(segment: str, content: str = "") -> str:
 
 
 def iteration_in(message: bytes) -> int:
-    """Iteration of the row that a message holds, its first member."""
+    """Iteration of the row in a message: its first member."""
     begin = len(ENCAPSULATION)
     return int.from_bytes(message[begin : begin + 8], "little", signed=True)
 
 
 def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:
-    """Note about the rows from `begin` on."""
+    """Makes the note for the rows from `begin` on."""
     return EpochNote(
         segment=frontend.segment,
         robot=frontend.robot,
@@ -169,7 +169,7 @@ def note_of(frontend: "Reader", number: int, begin: int) -> EpochNote:
 
 
 def channels_of(found: "Scan", content: str) -> dict[tuple[str, int], int]:
-    """The channels with this content, by segment and number of the run."""
+    """Returns the channels with this content, by segment and number of the run."""
     return {
         (each.metadata["segment"], int(each.metadata["number"])): each.id
         for each in found.channels.values()

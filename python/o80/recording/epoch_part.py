@@ -1,4 +1,4 @@
-"""Part of a run that one file holds."""
+"""Part of a run in one file of a recording."""
 
 import struct
 from collections.abc import Iterator
@@ -21,13 +21,13 @@ UNFINISHED = "the recorder still runs, or was killed"
 
 @dataclass(frozen=True)
 class EpochPart:
-    """Part of a run that one file holds."""
+    """Reads the part of a run that one file holds."""
 
     path: Path
     found: Scan
-    channel: int  #: of the rows
+    channel: int  #: channel of the rows
     note: EpochNote
-    journal: int | None  #: the channel of the journal
+    journal: int | None  #: channel of the journal
 
     @property
     def rows(self) -> int:
@@ -35,9 +35,9 @@ class EpochPart:
         return self.found.counts.get(self.channel, 0)
 
     def records(self, name: str, *numbers: str) -> Iterator[tuple[tuple[int, ...], dict[str, str]]]:
-        """The metadata records of this run with this name: numbers and texts.
+        """Yields this run's metadata records with a name: numbers by key, and all texts.
 
-        Raises RecordingError.
+        Raises RecordingError for a damaged record.
         """
         run = (self.note.segment, str(self.note.number))
         for each in self.found.metadata:
@@ -51,7 +51,7 @@ class EpochPart:
 
     @property
     def every(self) -> int:
-        """Distance of the rows that a thinned recording keeps: 10 is every tenth; 1 is all."""
+        """Row interval of a thinned recording: 10 keeps every tenth row, 1 keeps all."""
         text = self.found.channels[self.channel].metadata.get("every", "")
         return int(text) if text.isdecimal() else 1
 
@@ -66,12 +66,12 @@ class EpochPart:
 
     @property
     def last_chunk(self) -> "ChunkIndex | None":
-        """The last chunk with rows of this run."""
+        """The last chunk with rows of this run, or None."""
         return next(self.found.chunks.having(self.channel, newest_first=True), None)
 
     @property
     def why_cut(self) -> str:
-        """Why the file may lack the end of the run; empty if its recorder ended in order."""
+        """Why the file may lack the end of the run; empty if the recorder ended in order."""
         if not self.found.finished:
             return UNFINISHED
         last = self.last_chunk.chunk_start_offset if self.last_chunk else 0
@@ -94,19 +94,19 @@ class EpochPart:
 
     @property
     def began_at(self) -> int:
-        """When its recording began, on the wall clock [ns since 1970]."""
+        """Wall-clock time at which recording of the run began [ns since 1970]; 0: unknown."""
         place = self._description
         return 0 if place is None else place.create_time
 
     def last_entries(self) -> Entries | None:
-        """The last part of the journal. Raises RecordingError."""
+        """Reads the last part of the journal. Raises RecordingError for a damaged file."""
         if self.journal is None:
             return None
         with self.reading() as file:
             return next(entries_in(file, self.found, self.journal, newest_first=True), None)
 
     def table(self) -> bytes:
-        """The description of the robot. Raises RecordingError."""
+        """Reads the description of the robot. Raises RecordingError if it is missing or damaged."""
         place = self._description
         if place is None:
             raise RecordingError(f"{self.path} lacks the description of '{self.note.segment}'")
@@ -115,7 +115,7 @@ class EpochPart:
 
     @contextmanager
     def reading(self) -> Iterator[IO[bytes]]:
-        """The file; errors in its content are RecordingError and name it."""
+        """Opens the file; turns errors in its content into RecordingError with its path."""
         try:
             with self.found.opened(self.path) as file:
                 yield file
@@ -126,7 +126,7 @@ class EpochPart:
 
 
 def parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:
-    """The parts of runs in a file. Raises RecordingError."""
+    """Yields the parts of runs in a file. Raises RecordingError for damaged metadata."""
     journals = channels_of(found, JOURNAL)
     for channel in found.channels.values():
         try:

@@ -1,7 +1,7 @@
-"""Writes an MCAP file in groups, of which each is whole or not there.
+"""Writes an MCAP file in groups; each group is written whole or not at all.
 
-Whatever kills the writer, the file up to the last group can be read, and a successor continues
-behind it.
+After any death of the writer the file is readable up to the last group, and a successor continues
+behind that group.
 """
 
 import contextlib
@@ -45,10 +45,10 @@ CHUNK_HEAD = struct.Struct("<BQQQQI")
 
 @dataclass(frozen=True)
 class Form:
-    """How rows are written. Raises InvalidArgument."""
+    """Format of written rows. Raises InvalidArgument for an unknown compression."""
 
     compression: str = "zstd"  #: zstd, lz4 or none
-    joint_states: bool = True  #: also as sensor_msgs/JointState, for robots with joints
+    joint_states: bool = True  #: write sensor_msgs/JointState too, for robots with joints
 
     def __post_init__(self) -> None:
         if self.compression not in _COMPRESS:
@@ -61,10 +61,10 @@ USUAL = Form()
 
 
 class FileWriter:
-    """Writes one file. Move-only: close it once; it is not finished unless `finish` was called."""
+    """Writes one file. Move-only: close it once; only `finish` completes it."""
 
     def __init__(self, path: Path, form: Form = USUAL) -> None:
-        """Creates the file. Raises OSError: no new file is left; FileExistsError."""
+        """Creates the file. Raises FileExistsError, or OSError without leaving a new file."""
         self._open(path, form, os.O_CREAT | os.O_EXCL)
         self._found = Scan()
         try:
@@ -78,7 +78,7 @@ class FileWriter:
     def continued(cls, path: Path, form: Form = USUAL) -> "FileWriter":
         """Continues a file after its last whole group.
 
-        Raises RecordingError if it is being written, NotARecordingError, OSError.
+        Raises RecordingError if another process writes it, NotARecordingError, OSError.
         """
         self = cls.__new__(cls)
         self._open(path, form, 0)
@@ -92,7 +92,7 @@ class FileWriter:
     def _continue(self) -> None:
         begun = os.pread(self._file.descriptor, len(_beginning()), 0)
         if len(begun) < len(_beginning()) and _beginning().startswith(begun):
-            os.ftruncate(self._file.descriptor, 0)  # cut before its first group was whole
+            os.ftruncate(self._file.descriptor, 0)  # not even the first group was whole
             self._found = Scan()
             self._append(_beginning())
         self._found = found = scan(self.path)
@@ -113,8 +113,8 @@ class FileWriter:
         self.form = form
         self.size = 0  #: [bytes]
         self.make_room: Callable[[int], None] = lambda length: None
-        """Is called before so many bytes are written, the end of the file included."""
-        self.kept = 0  #: of what was there when it was continued [bytes]
+        """Called before this number of bytes is written, the end of the file included."""
+        self.kept = 0  #: size of the file when it was continued [bytes]
         self._compress = _COMPRESS[form.compression]()
         try:
             self._file: LockedFile = LockedFile(path, flags)
@@ -127,11 +127,11 @@ class FileWriter:
 
     @property
     def found(self) -> Scan:
-        """Contents of the file by now, except messages."""
+        """Contents of the file so far, except messages."""
         return self._found
 
     def add_schema(self, name: str, definition: str, *, encoding: str = "ros2msg") -> int:
-        """Adds a message type, unless the file has it. Returns its number."""
+        """Adds a message type, unless the file has it. Returns the type's number."""
         for schema in self._found.schemas.values():
             if schema.name == name and schema.data == definition.encode():
                 return schema.id
@@ -144,7 +144,7 @@ class FileWriter:
     def add_channel(
         self, topic: str, schema: int, metadata: Mapping[str, str], *, encoding: str = "cdr"
     ) -> int:
-        """Adds a channel. Returns its number."""
+        """Adds a channel. Returns the channel's number."""
         number = 1 + max(self._found.channels, default=0)
         channel = Channel(
             id=number,
@@ -167,7 +167,7 @@ class FileWriter:
     def copy_channel(
         self, channel: Channel, schemas: Mapping[int, Schema], metadata: Mapping[str, str]
     ) -> int:
-        """Adds a channel of another file, with its schema and other metadata."""
+        """Copies another file's channel and schema, with new metadata. Returns the new number."""
         number, schema = 0, schemas.get(channel.schema_id)
         if schema is not None:
             text = schema.data.decode(errors="replace")
@@ -182,7 +182,7 @@ class FileWriter:
         self._append(record)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
-        """Adds a record of texts."""
+        """Adds a metadata record."""
         metadata = Metadata(name, dict(values))
         record = bytes_of(metadata)
         self._found.metadata_places.append(MetadataIndex(self.size, len(record), name))
@@ -190,7 +190,7 @@ class FileWriter:
         self._append(record)
 
     def add_chunk(self, blocks: Sequence[MessageBlock]) -> None:
-        """Adds messages, each channel at most once. Raises OSError: then nothing was added."""
+        """Adds messages, each channel at most once. If it raises OSError, nothing was added."""
         content = b"".join(block.content for block in blocks)
         compressed = self._compress(content)
         compression = "" if self.form.compression == "none" else self.form.compression
@@ -251,9 +251,9 @@ class FileWriter:
     # ------------------------------------------------------------------ the end
 
     def finish(self) -> None:
-        """Writes the summary and closes the file; after it any reader opens the file.
+        """Writes the summary and closes the file, which any reader can then open.
 
-        Raises OSError: then the file is closed, and complete up to its last chunk.
+        If it raises OSError, the file is closed and complete up to its last chunk.
         """
         try:
             self._append(*end_of_file(self._found, self.size), last=True)
@@ -262,9 +262,9 @@ class FileWriter:
             self.close()
 
     def close(self) -> None:
-        """Closes the file as it is; may be called twice."""
+        """Closes the file without a summary; may be called twice."""
         if self._file.descriptor >= 0:
-            os.ftruncate(self._file.descriptor, self.size)  # gives reserved space back
+            os.ftruncate(self._file.descriptor, self.size)  # returns reserved space
             try:
                 if os.fstat(self._file.descriptor).st_nlink == 0:
                     self._write_again()
@@ -272,7 +272,7 @@ class FileWriter:
                 self._file.close()
 
     def moved_to(self) -> str | None:
-        """The name that the open file has now; "": none, it was removed; None: still `path`."""
+        """Current name of the open file; "" if it was removed, None if it is still `path`."""
         is_open = os.fstat(self._file.descriptor)
         with contextlib.suppress(OSError):
             if os.path.samestat(is_open, os.stat(self.path)):
@@ -284,7 +284,7 @@ class FileWriter:
         return f"/proc/self/fd/{self._file.descriptor}"
 
     def _write_again(self) -> None:
-        """Copies a file that was removed to its name, unless that is another file's by now."""
+        """Copies a removed file to its old name, unless another file has this name by now."""
         with (
             contextlib.suppress(FileExistsError),
             open(self._opened, "rb") as removed,
@@ -294,5 +294,5 @@ class FileWriter:
 
 
 def _beginning() -> bytes:
-    """Bytes with which every file begins."""
+    """Returns the bytes with which every file begins."""
     return MAGIC + bytes_of(Header(PROFILE, f"o80 {_core.version()}"))

@@ -1,4 +1,4 @@
-"""Files of o80 that another program has written anew: filtered, merged, compressed, sorted."""
+"""Converts o80 recordings that another program has filtered, merged, compressed or sorted."""
 
 from pathlib import Path
 
@@ -12,13 +12,13 @@ from o80.recording.blocks import Messages
 from o80.recording.file_writer import FileWriter, Form
 from o80.recording.scan import CopiedFile, Scan, scan
 
-BYTES = 1 << 20  # of messages in a chunk
+BYTES = 1 << 20  # size of the messages in a chunk
 
 
 def copied(path: Path) -> Scan:
-    """Scan of a copy in which o80 finds everything: chunks with indexes.
+    """Copies a file into the layout that o80 needs, chunks with indexes, and scans the copy.
 
-    Of a file that was cut it holds what is whole. Raises RecordingError, OSError.
+    Of a truncated file the whole records are copied. Raises RecordingError (damaged), OSError.
     """
     copy = CopiedFile(path.name)
     writer = FileWriter(copy.path, Form("lz4"))
@@ -35,7 +35,7 @@ class _Copier:
     def __init__(self, writer: FileWriter) -> None:
         self._writer = writer
         self._schemas: dict[int, Schema] = {}
-        self._channels: dict[int, int] = {}  # number here of each number there
+        self._channels: dict[int, int] = {}  # channel in the copy by channel in the original
         self._waiting: dict[int, list[tuple[int, bytes]]] = {}
         self._bytes = 0
 
@@ -46,11 +46,11 @@ class _Copier:
             try:
                 for record in StreamReader(file).records:
                     self._take(record)
-                    if not self._waiting:  # some were written
+                    if not self._waiting:  # a chunk was written
                         progress.at(file.tell() / size)
             except EndOfFile:
                 pass
-            except Exception as error:  # each compression has exceptions of its own
+            except Exception as error:  # each compression library has exceptions of its own
                 raise RecordingError(f"{path} is damaged: {error!r:.200}") from error
         self._flush()
 

@@ -54,11 +54,11 @@ class Joints:
     """Where the rows of a robot hold positions, velocities and efforts of its joints."""
 
     names: tuple[str, ...]
-    numbers: dict[str, tuple[Number, ...]]  #: by member of the message; empty if there are none
+    numbers: dict[str, tuple[Number, ...]]  #: by member of the message; empty: not in the rows
 
 
 def joints_of(layout: Layout) -> Joints | None:
-    """The joints of a robot, None if it has none."""
+    """Finds the joints of a robot; None if the robot has none."""
     found = _actuators_that_are_joints(layout)
     if found:
         names = tuple(name for name, _ in found)
@@ -91,7 +91,7 @@ def _actuators_that_are_joints(layout: Layout) -> list[tuple[str, dict[str, Numb
 
 
 def _numbers_of(described: dict[str, Any], offset: int) -> Iterator[tuple[str, Number]]:
-    """The quantities of one state."""
+    """Yields quantity and place of the numbers of one state."""
     for field in described["fields"]:
         if field["kind"] not in FLOATS or field["shape"]:
             continue
@@ -106,7 +106,7 @@ def _numbers_of(described: dict[str, Any], offset: int) -> Iterator[tuple[str, N
 
 
 def _sensor(layout: Layout, quantity: str, length: int | None) -> tuple[Number, ...]:
-    """An array of sensor values of a quantity, with this length; empty if there is none."""
+    """Finds an array of sensor values for a quantity, with this length; empty if there is none."""
     if "extended" not in layout.schema:
         return ()
     plural = {"position": "positions", "velocity": "velocities"}
@@ -128,13 +128,13 @@ def _sensor(layout: Layout, quantity: str, length: int | None) -> tuple[Number, 
 
 
 class JointWriter:
-    """Makes JointState messages of rows, many at once: all have the same length."""
+    """Converts rows to JointState messages, many at once: all have the same length."""
 
     @classmethod
     def added_to(
         cls, file: "FileWriter", layout: Layout, note: EpochNote, channel: int | None
     ) -> "JointWriter | None":
-        """Adds a channel to a file, unless it has this one; None if there is nothing to write."""
+        """Adds a channel for joint states unless it exists; None if there is nothing to write."""
         joints = joints_of(layout) if file.form.joint_states else None
         if joints is None:
             return None
@@ -158,7 +158,7 @@ class JointWriter:
         self._template = cdr.data
 
     def block(self, raw: NDArray[np.uint8], log_times: NDArray[np.uint64], first: int) -> Block:
-        """The messages of rows (n, bytes of a row); first: iteration of the first one."""
+        """Converts rows (n, bytes of a row) to messages; first: iteration of the first row."""
         block = Block.reserved(self.channel, log_times, first, len(self._template))
         messages = block.messages
         messages[:] = np.frombuffer(self._template, np.uint8)
@@ -174,6 +174,6 @@ class JointWriter:
 
 
 def stamped(message: bytes, log_time: int) -> bytes:
-    """A message with another time [ns] in its header, which begins with it."""
+    """Returns a message with another time [ns] in the header at its begin."""
     begin = len(ENCAPSULATION)
     return message[:begin] + struct.pack("<II", *divmod(log_time, 10**9)) + message[begin + 8 :]

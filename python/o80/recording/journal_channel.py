@@ -23,10 +23,10 @@ uint64 next  # number after the last entry
 uint8[] entries  # o80.open decodes them
 """
 CONTENT = "journal"  #: name of this content in the metadata of the channel
-CODEC = "codec"  #: name of the format's version in the metadata
+CODEC = "codec"  #: metadata key of the version of the format
 GAP = "o80.journal_gap"
-"""Name of the metadata record of entries that were overwritten before they were read."""
-MOST = 4 << 20  # bytes that are read at once
+"""Name of the metadata records of entries that were overwritten before they were read."""
+MOST = 4 << 20  # largest size of one read [bytes]
 _HEAD = struct.Struct("<4sQQI")  # encapsulation, first, next, number of bytes
 
 
@@ -40,13 +40,13 @@ class Entries:
     codec: int = _core.JOURNAL_CODEC  #: version of the format of `content`
 
     def message(self) -> bytes:
-        """In CDR."""
+        """Encodes the entries as a CDR message."""
         head = _HEAD.pack(ENCAPSULATION, self.first, self.next, len(self.content))
         return head + self.content
 
     @classmethod
     def of(cls, message: bytes, codec: int) -> "Entries":
-        """Raises ValueError if it is damaged."""
+        """Decodes a CDR message. Raises ValueError if it is damaged."""
         content = message[_HEAD.size :]
         if len(message) >= _HEAD.size:
             _, first, end, length = _HEAD.unpack_from(message)
@@ -56,12 +56,12 @@ class Entries:
 
 
 class JournalRecorder:
-    """Reads the journal of one backend and makes messages of it."""
+    """Reads the journal of one backend and makes messages from its entries."""
 
     def __init__(self, frontend: "Frontend", channel: int | None, first: int) -> None:
         """first: number of the first entry to read, if it is still there; 0: the oldest."""
         self.channel = channel
-        self.begin = 0  #: number of the first entry; of a journal that is continued, 0
+        self.begin = 0  #: number of the first entry; 0 if a journal is continued
         self.drained = False  #: nothing was left at the last read
         self.marks: list[tuple[str, int]] = []  #: text and iteration, in the last read
         self.notable = False  #: the last read has more than batches, bursts and ends of commands
@@ -72,11 +72,11 @@ class JournalRecorder:
 
     @property
     def unread(self) -> float:
-        """Share of the ring that was not read yet, from 0 to 1."""
+        """Unread share of the ring, from 0 to 1."""
         return self._core.unread
 
     def add_channel(self, file: "FileWriter", note: EpochNote) -> None:
-        """Adds a channel to a file, in which the next entries are written."""
+        """Adds a channel for the next entries to a file."""
         schema = file.add_schema(TYPE, DEFINITION)
         self.channel = file.add_channel(
             topic_of(note.segment, CONTENT),
@@ -85,7 +85,7 @@ class JournalRecorder:
         )
 
     def read(self) -> tuple[Entries | None, tuple[int, int] | None]:
-        """The entries since the last call, and the first and last number of a gap before them."""
+        """Returns new entries, and the first and last number of a gap before them, or None."""
         content, first, end, more, self.marks, self.notable = self._core.read(MOST)
         self.drained = not more
         if not content:
@@ -101,7 +101,7 @@ class JournalRecorder:
 
 
 def codec_of(found: Scan, channel: int) -> int:
-    """The version of the format of a journal in a file. Raises ValueError if it is damaged."""
+    """Returns the format version of a file's journal. Raises ValueError if it is damaged."""
     codec = int(found.channels[channel].metadata.get(CODEC, "0"))
     if not 0 <= codec < 2**31:
         raise ValueError(f"the version of the journal's format is damaged: {codec}")
@@ -111,7 +111,7 @@ def codec_of(found: Scan, channel: int) -> int:
 def entries_in(
     file: IO[bytes], found: Scan, channel: int, *, newest_first: bool = False
 ) -> "Iterator[Entries]":
-    """Entries of a journal, chunk by chunk. Raises ValueError for a damaged chunk."""
+    """Yields entries of a journal, chunk by chunk. Raises ValueError for a damaged chunk."""
     codec = codec_of(found, channel)
     for chunk in found.chunks.having(channel, newest_first=newest_first):
         messages = [*messages_of(file, chunk, channel)]

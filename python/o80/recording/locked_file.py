@@ -1,4 +1,4 @@
-"""A file that one process writes: others are refused until it is closed or its process ends."""
+"""A file with one writer: other processes are refused until it is closed or its process ends."""
 
 import contextlib
 import ctypes
@@ -21,7 +21,7 @@ class LockedFile:
     descriptor = -1  #: -1: closed
 
     def __init__(self, path: Path, flags: int) -> None:
-        """flags: of os.open, beside O_RDWR. Raises OSError, BlockingIOError if it is locked."""
+        """flags: of os.open, in addition to O_RDWR. Raises OSError; BlockingIOError if locked."""
         with above_standard():
             self.descriptor = os.open(path, os.O_RDWR | os.O_CLOEXEC | flags, 0o644)
         try:
@@ -34,15 +34,15 @@ class LockedFile:
         _open_here.add(self)
 
     def close(self) -> None:
-        """May be called twice."""
+        """Unlocks and closes the file; may be called twice."""
         if self.descriptor >= 0:
-            # children that were forked in C share the lock
+            # forked children share the lock, if C code forked them
             with contextlib.suppress(OSError):
                 fcntl.flock(self.descriptor, fcntl.LOCK_UN)
             self.leave()
 
     def leave(self) -> None:
-        """Closes this descriptor and leaves the lock to that of the parent process."""
+        """Closes this descriptor without unlocking: the parent process keeps the lock."""
         descriptor, self.descriptor = self.descriptor, -1
         os.close(descriptor)
 
@@ -51,7 +51,7 @@ class LockedFile:
 
 
 def _leave_to_parent() -> None:
-    """In a forked child, which would keep the lock when its parent is killed."""
+    """Closes the files in a forked child, which would keep the lock after its parent's death."""
     for file in _open_here:
         if file.descriptor >= 0:
             file.leave()
@@ -61,13 +61,13 @@ def _leave_to_parent() -> None:
 os.register_at_fork(after_in_child=_leave_to_parent)
 
 
-KEEP_SIZE = 1  # FALLOC_FL_KEEP_SIZE: blocks beyond the end of the file, whose length stays
+KEEP_SIZE = 1  # FALLOC_FL_KEEP_SIZE: reserves blocks beyond the end, the length is unchanged
 
 
 def reserve(descriptor: int, offset: int, length: int) -> None:
-    """Reserves blocks of a file. Raises OSError if there are not so many.
+    """Reserves blocks of a file. Raises OSError if the disk has too few.
 
-    A file system that cannot do this is left as it is.
+    Does nothing on a file system without reservation.
     """
     if _fallocate()(descriptor, KEEP_SIZE, offset, length) == 0:
         return

@@ -1,7 +1,7 @@
-"""The log of a recording: what happened to its robots, in words.
+"""The log of a recording: events of its robots as texts.
 
-Messages are `rcl_interfaces/Log` on `/rosout`, which Foxglove, rqt and other tools show by
-themselves. The journal beside it holds the same exactly.
+Messages are `rcl_interfaces/Log` on `/rosout`, which Foxglove, rqt and other tools show without
+settings. The journal of the recording holds the same events exactly.
 """
 
 from collections import Counter
@@ -37,8 +37,8 @@ string file
 string function
 uint32 line
 {TIME}"""
-MAX_BYTES = 1 << 16  # of a journal between two polls; of more, only notable entries get lines
-MAX_ENDS = 20  # of commands that get a line each in a poll
+MAX_BYTES = 1 << 16  # of a journal per poll; beyond this, only notable entries get lines
+MAX_ENDS = 20  # ends of commands with a line of their own per poll
 _BATCHES = {"taken", "scheduled"}
 _SILENT = {*_BATCHES, "burst", "burst_ended"}
 _LEVELS = {
@@ -65,7 +65,7 @@ class Line:
     text: str
 
     def message(self) -> bytes:
-        """In CDR."""
+        """Encodes the line as a CDR message."""
         cdr = CdrWriter()
         cdr.stamp(self.time)
         cdr.numbers("B", self.level)
@@ -76,34 +76,34 @@ class Line:
 
 
 def added_lines(file: FileWriter, lines: Sequence[Line]) -> Messages:
-    """Messages of lines, at least one."""
+    """Makes messages of lines (at least one) and adds the channel if needed."""
     channel = file.add_topic(TOPIC, TYPE, DEFINITION)
     return Messages(channel, [(each.time, each.message()) for each in lines])
 
 
 class JournalLog:
-    """Makes lines of the entries of a journal while they are recorded."""
+    """Makes log lines from journal entries while they are recorded."""
 
     def __init__(self, frontend: Frontend) -> None:
         self._description = frontend._description
         self._native = _core.RecordedJournal(self._description, 0)
         self._decoder = EntryDecoder(frontend.schema)
-        self._open: dict[tuple[int, int], _core.JournalRecord] = {}  # by lane and id, until the end
+        self._open: dict[tuple[int, int], _core.JournalRecord] = {}  # open commands, by lane and id
 
     def lines(self, entries: Entries, notable: bool) -> list[tuple[int, int, str]]:
-        """Iteration, level and text of each line.
+        """Returns iteration, level and text of each line.
 
-        notable: there are others among the entries than batches, bursts and ends of commands.
+        notable: the entries hold more than batches, bursts and ends of commands.
         """
         many = len(entries.content) > MAX_BYTES
-        if many:  # what it knows of open commands would only grow
+        if many:  # the table of open commands would only grow
             self._native = _core.RecordedJournal(self._description, 0)
             self._open = {}
         if many and not notable:
             return []
         try:
             return self._lines(entries, many)
-        except (Error, LookupError, ValueError) as error:  # of a newer o80, or damaged
+        except (Error, LookupError, ValueError) as error:  # a newer o80 wrote it, or it is damaged
             return [(-1, WARN, f"decisions that cannot be told in words: {error}")]
 
     def _lines(self, entries: Entries, many: bool) -> list[tuple[int, int, str]]:

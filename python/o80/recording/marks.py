@@ -1,7 +1,7 @@
 """Marks: notes in a recording, such as the number of an episode.
 
-A program that records writes them with `mark`; others note them in the journal of a backend
-(`Frontend.mark`, `o80 mark`), from which the recorder takes them.
+The recording program writes marks with `mark`; other programs note them in the journal of a
+backend (`Frontend.mark`, `o80 mark`), from which the recorder copies them.
 """
 
 import json
@@ -32,16 +32,16 @@ string values  # JSON
 
 @dataclass(frozen=True)
 class Mark:
-    """A note of the program that recorded, or of a frontend."""
+    """A note by the recording program or by a frontend."""
 
     name: str
-    time: int  #: wall clock, when it was recorded [ns since 1970]
-    rows: Mapping[str, int]  #: newest iteration of each segment when it was made
+    time: int  #: wall-clock time of recording [ns since 1970]
+    rows: Mapping[str, int]  #: newest iteration of each segment at the time of the mark
     values: Mapping[str, Any] = field(default_factory=dict)
-    row_time: int = field(default=0, compare=False)  #: in a file: log time of its newest row [ns]
+    row_time: int = field(default=0, compare=False)  #: in a file: log time of the newest row [ns]
 
     def message(self) -> bytes:
-        """In CDR. Raises TypeError if a value has no form in JSON."""
+        """Encodes the mark as a CDR message. Raises TypeError if a value has no form in JSON."""
         cdr = CdrWriter()
         cdr.text(self.name)
         cdr.numbers("q", self.time)
@@ -54,7 +54,7 @@ class Mark:
 
     @classmethod
     def of(cls, message: bytes) -> "Mark":
-        """From CDR. Raises ValueError, TypeError, RecursionError, struct.error if it is damaged."""
+        """Decodes CDR. Raises ValueError, TypeError, RecursionError, struct.error if damaged."""
         cdr = CdrReader(message)
         name, (time,), segments = cdr.text(), cdr.numbers("q", 1), cdr.texts()
         (count,) = cdr.numbers("I", 1)
@@ -66,7 +66,7 @@ class Mark:
 
 
 class Marks(list[Mark]):
-    """The marks of a recording, in a notebook as a table."""
+    """The marks of a recording; a notebook shows them as a table."""
 
     def _repr_html_(self) -> str:
         return html(
@@ -84,20 +84,20 @@ class Marks(list[Mark]):
 
 
 def _plain(value: Any) -> Any:
-    """Numbers and lists of what NumPy computed."""
+    """Converts NumPy values to plain numbers and lists, for JSON."""
     if isinstance(value, (np.generic, np.ndarray)):
         return value.tolist()
     raise TypeError(f"a mark must be a value that JSON can hold, got {value!r:.60}")
 
 
 def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Messages:
-    """Messages of marks, at least one, each with its log time: that of its newest row [ns]."""
+    """Makes messages of marks (at least one), each with the log time of its newest row [ns]."""
     channel = file.add_topic(TOPIC, TYPE, DEFINITION)
     return Messages(channel, [(time, mark.message()) for time, mark in marks])
 
 
 def marks_in(file: IO[bytes], found: Scan) -> list[Mark]:
-    """All marks of a file, in their order."""
+    """Reads all marks of a file, in order."""
     channels = [each.id for each in found.channels.values() if each.topic == TOPIC]
     return [
         replace(Mark.of(message), row_time=int(row_time))

@@ -1,8 +1,8 @@
 """Conversion of rows to CDR messages and back, many at once.
 
-CDR (the encoding of ROS 2 messages) has no gaps but those that alignment needs, and its structs
-have no alignment of their own. So the place of each number in a message is fixed for a robot: a
-plan lists which bytes of a row go where, and numbers that lie side by side in both are copied
+CDR (the encoding of ROS 2 messages) has only the gaps that alignment needs, and its structs have no
+alignment of their own. So the offset of each number in a message is fixed for a robot. A plan lists
+where each range of bytes of a row goes; numbers that are adjacent in row and message are copied
 together.
 """
 
@@ -20,7 +20,7 @@ Bytes = NDArray[np.uint8]
 
 
 class Copy(NamedTuple):
-    """Bytes of a row that are at another place in a message."""
+    """A range of bytes of a row with its offset in a message."""
 
     row: int
     message: int
@@ -28,7 +28,7 @@ class Copy(NamedTuple):
 
 
 class Mask(NamedTuple):
-    """Bits of a row that are bytes of 0 or 1 in a message."""
+    """Bits of a row that become bytes of 0 or 1 in a message."""
 
     row: int
     message: int
@@ -36,17 +36,17 @@ class Mask(NamedTuple):
 
 
 class MessagePlan:
-    """Encodes and decodes rows of one robot. Each direction costs one copy per run of bytes."""
+    """Encodes and decodes rows of one robot; both copy each adjacent range of bytes once."""
 
     def __init__(self, message: MessageType, row_size: int) -> None:
         self.row_size = row_size  #: [bytes]
         self._at = 0
         self._masks: list[Mask] = []
         self._copies = _merged(self._walk(message, 0))
-        self.size = len(ENCAPSULATION) + self._at  #: of a message [bytes]
+        self.size = len(ENCAPSULATION) + self._at  #: size of a message [bytes]
 
     def encode(self, rows: Bytes, messages: Bytes) -> None:
-        """Rows (n, row_size) to messages (n, size), which may be a view of something larger."""
+        """Encodes rows (n, row_size) into messages (n, size), which may be a view."""
         messages[:] = 0
         messages[:, : len(ENCAPSULATION)] = np.frombuffer(ENCAPSULATION, np.uint8)
         for copy in self._copies:
@@ -60,7 +60,7 @@ class MessagePlan:
             )
 
     def decode(self, messages: Bytes) -> Bytes:
-        """Messages (n, size) to rows (n, row_size); padding is zero, as in a segment."""
+        """Decodes messages (n, size) to rows (n, row_size); padding is zero, as in a segment."""
         rows = np.zeros((len(messages), self.row_size), np.uint8)
         for copy in self._copies:
             rows[:, copy.row : copy.row + copy.length] = messages[
@@ -89,14 +89,14 @@ class MessagePlan:
                     yield Copy(place, self._reserve(member.size, length), length)
 
     def _reserve(self, alignment: int, length: int) -> int:
-        """The place in a message of the next `length` bytes."""
+        """Reserves `length` aligned bytes of a message and returns their offset."""
         begin = -(-self._at // alignment) * alignment
         self._at = begin + length
         return len(ENCAPSULATION) + begin
 
 
 def plan_of_rows(layout: Layout, size: int) -> MessagePlan:
-    """The plan of a robot's recorded rows, whose messages have `size` bytes. Raises ValueError."""
+    """Plans a robot's recorded rows. Raises ValueError unless messages have `size` bytes."""
     plan = MessagePlan(row_type(layout), layout.size)
     if plan.size != size:
         raise ValueError(f"rows of '{layout.schema['robot']}' have another size")
@@ -104,7 +104,7 @@ def plan_of_rows(layout: Layout, size: int) -> MessagePlan:
 
 
 def _merged(copies: Iterator[Copy]) -> list[Copy]:
-    """The same copies; those that are adjacent in row and message are joined."""
+    """Joins copies that are adjacent in both row and message."""
     result: list[Copy] = []
     for copy in copies:
         if result:

@@ -21,14 +21,14 @@ MSG: builtin_interfaces/Time
 int32 sec
 uint32 nanosec
 """
-"""Definition of a type that others contain."""
+"""Definition of builtin_interfaces/Time, which other types contain."""
 HEADER = f"""\
 {SEPARATOR}
 MSG: std_msgs/Header
 builtin_interfaces/Time stamp
 string frame_id
 {TIME}"""
-"""Definition of std_msgs/Header and of the type in it."""
+"""Definition of std_msgs/Header and of the type that it contains."""
 
 
 @dataclass(frozen=True)
@@ -36,9 +36,9 @@ class Member:
     """One member of a message type."""
 
     name: str
-    kind: str  #: of ROS 2 (float64, bool, ...), or the name of a MessageType
-    size: int  #: of a number [bytes]; of an element in the row
-    offset: int  #: in the row, or in the struct it is part of [bytes]
+    kind: str  #: type in ROS 2 (float64, bool, ...), or the name of a MessageType
+    size: int  #: bytes of a number, or of an element in the row
+    offset: int  #: offset in the row, or in the enclosing struct [bytes]
     count: int | None = None  #: elements of an array; None: no array
     type: "MessageType | None" = None
     #: a mask of the row: one bit per element there, one bool in the message; `type` may name them
@@ -47,7 +47,7 @@ class Member:
 
 @dataclass(frozen=True)
 class MessageType:
-    """A definition, and where its members are in a row."""
+    """A definition, with the offsets of its members in a row."""
 
     name: str
     text: str
@@ -55,13 +55,13 @@ class MessageType:
 
     @property
     def definition(self) -> str:
-        """The text of this type and of all that it contains, as MCAP schemas hold it."""
+        """Text of this type and of all types in it, in the form of MCAP schemas."""
         parts = [self.text]
         parts += [f"{SEPARATOR}\nMSG: {PACKAGE}/{each.name}\n{each.text}" for each in self.inner()]
         return "\n".join(parts)
 
     def inner(self) -> list["MessageType"]:
-        """The types of its members, and of theirs, each once."""
+        """Types of all members, also nested ones, each once."""
         found: dict[str, MessageType] = {}
         for member in self.members:
             if member.type is not None:
@@ -99,7 +99,7 @@ def row_type(layout: Layout) -> MessageType:
 
 
 def _states_members(layout: Layout) -> Member:
-    """The states of all actuators as one member: an array, or a struct of actuators or groups."""
+    """Describes all actuator states as one member: an array, or a struct of actuators or groups."""
     groups = layout.schema["groups"]
     if _has_names(layout):
         described = [(each, groups[each["group"]]["type"]) for each in layout.schema["actuators"]]
@@ -116,7 +116,7 @@ def _states_members(layout: Layout) -> Member:
 
 
 def _has_names(layout: Layout) -> bool:
-    """Whether someone has named the actuators: a group's own ones are `GROUP_0`, `GROUP_1`, ..."""
+    """True if the actuators have own names; the default names are `GROUP_0`, `GROUP_1`, ..."""
     for group in layout.schema["groups"]:
         first = group["first_actuator"]
         for i in range(group["count"] if group["array"] else 0):
@@ -126,7 +126,7 @@ def _has_names(layout: Layout) -> bool:
 
 
 def _mask_type(layout: Layout) -> MessageType | None:
-    """A bool for each actuator, by its name; None: they have none."""
+    """Makes a type with a bool for each actuator, by name; None if actuators have no names."""
     if not _has_names(layout):
         return None
     names = [each["name"] for each in layout.schema["actuators"]]
@@ -141,7 +141,7 @@ def _group_member(group: dict[str, Any]) -> Member:
 def _state_member(
     described: dict[str, Any], name: str, offset: int, count: int | None = None
 ) -> Member:
-    """One state, or an array of `count`."""
+    """Describes one state, or an array of `count` states."""
     if is_plain(described):
         plain = _field_member(described["fields"][0], name)
         inner = plain.count or 1
@@ -176,7 +176,7 @@ def _field_member(described: dict[str, Any], name: str) -> Member:
 
 
 def _constants(described: dict[str, Any]) -> list[str]:
-    """An enumeration's labels, as constants of its number type."""
+    """Returns an enumeration's labels as constants of its number type."""
     if described["kind"] != "enum":
         return []
     kind = dtype_of_field(described).name
@@ -225,13 +225,13 @@ def _with_unique_names(members: list[Member]) -> list[Member]:
 
 
 def _field_name(name: str) -> str:
-    """A valid name of a member: lower case, digits, single underscores, a letter first."""
+    """Makes a valid member name: lower case, digits, single underscores, a letter first."""
     plain = re.sub(r"[^a-z0-9]+", "_", name.lower()).strip("_")
     return plain if plain and plain[0].isalpha() else f"x_{plain}".rstrip("_")
 
 
 def _identifier(name: str, fallback: str) -> str:
-    """The name as a valid type name: letters and digits, upper-case first; or the fallback."""
+    """Makes a valid type name: letters and digits, upper case first; or uses the fallback."""
     words = re.findall(r"[A-Za-z0-9]+", name) or re.findall(r"[A-Za-z0-9]+", fallback)
     joined = "".join(word[0].upper() + word[1:] for word in words) or "Type"
     return joined if joined[0].isalpha() else f"T{joined}"

@@ -1,4 +1,4 @@
-"""Files that a recorder writes: new ones, or those of a predecessor that are continued."""
+"""Opens the files that a recorder writes: new files, or those of a predecessor to continue."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -16,20 +16,20 @@ from o80.recording.scan import NotARecordingError, Scan, has_end, scan
 
 @dataclass(frozen=True)
 class Written:
-    """Part of one epoch that a recording holds already."""
+    """State of one epoch in a recording that is continued."""
 
     note: EpochNote
-    last: int = -1  #: iteration; -1: no row
+    last: int = -1  #: iteration of the last row; -1: no row
     last_log_time: int = 0  #: [ns]
     journal_next: int = 0  #: number after the last entry of the journal
-    has_journal: bool = False  #: in any file
-    channel: int | None = None  #: of the rows in the file that is written now
-    journal: int | None = None  #: the channel of the journal there
-    joints: int | None = None  #: the channel of joint states there
+    has_journal: bool = False  #: True if any file holds a journal of the epoch
+    channel: int | None = None  #: channel of the rows in the file that is written now
+    journal: int | None = None  #: channel of the journal in this file
+    joints: int | None = None  #: channel of the joint states in this file
 
 
 def opened(path: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
-    """Creates a file; proceed: continues an existing one. Raises RecordingError."""
+    """Creates a file or, with `proceed`, continues it. Raises RecordingError if it cannot."""
     try:
         if proceed and path.exists():
             return FileWriter.continued(path, form)
@@ -52,9 +52,9 @@ def opened(path: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
 
 
 def opened_in(folder: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
-    """The first file of a new folder; or, to `proceed`, the last one there.
+    """Opens the first file of a new folder or, with `proceed`, the last file of an old one.
 
-    The files before it are finished. Raises RecordingError.
+    Finishes the files before the last one. Raises RecordingError if it cannot write the folder.
     """
     if folder.exists() and not folder.is_dir():
         raise RecordingError(f"{folder} is a file: choose another name, or leave out --split")
@@ -76,32 +76,32 @@ def opened_in(folder: Path, form: Form = USUAL, *, proceed: bool) -> FileWriter:
 
 
 def all_files_of(path: Path) -> list[Path]:
-    """The files of a recording, also those that were being created. Raises RecordingError."""
+    """Returns the files of a recording, also incomplete ones. Raises RecordingError for none."""
     there = in_order(path) if path.is_dir() else []
     return there if there and all(map(Path.is_file, there)) else files_of(path)
 
 
 def next_file(file: FileWriter) -> FileWriter:
-    """The next file in the folder of a file. Raises OSError."""
+    """Creates the next file in the folder of a file. Raises OSError if that fails."""
     name = f"{int(file.path.stem) + 1:04}.mcap"
     return FileWriter(file.path.with_name(name), file.form)
 
 
 class Predecessor:
-    """Contents of the files of a recording that is continued.
+    """Reads the files of a recording that is continued.
 
-    Reads them from the newest back, each once at most, until the newest epoch of a segment is
-    known: only that one can continue.
+    Reads from the newest file back, each file at most once, until the newest epoch of a segment is
+    known: only that epoch can continue.
     """
 
     def __init__(self, file: FileWriter, before: Sequence[Path]) -> None:
-        """file: the last one, which is continued. before: complete files, in their order."""
+        """file: the last file, which is continued. before: complete files, in order."""
         self._last = file.path
         self._found = [(file.path, file.found)]  # newest first
         self._unread = list(before)
 
     def clock(self) -> WallClock:
-        """The clock of the last file, for its next rows. Raises RecordingError."""
+        """Returns the last file's clock, for the next rows. Raises RecordingError if damaged."""
         path, found = self._found[0]
         clock = WallClock({})
         for part in parts_of(path, found):
@@ -111,7 +111,7 @@ class Predecessor:
         return clock
 
     def written(self, segment: str) -> dict[int, Written]:
-        """Written part of each epoch of a segment; empty: no row. Raises RecordingError."""
+        """Returns the written part of each epoch; empty: no row. Raises RecordingError."""
         epochs: dict[int, Written] = {}
         for path, found in self._files():
             self._add(epochs, path, found, segment)
@@ -149,5 +149,5 @@ class Predecessor:
 
 
 def _is_known(epoch: Written) -> bool:
-    """Whether older files hold nothing more of an epoch."""
+    """True if older files hold nothing more of an epoch."""
     return epoch.last >= 0 and (epoch.journal_next > 0 or not epoch.has_journal)

@@ -1,4 +1,4 @@
-"""Recordings made of others: a stretch of time, some segments, every nth row, several in one."""
+"""Makes recordings from others: cuts times, selects segments, thins rows, merges several."""
 
 import math
 import struct
@@ -31,13 +31,13 @@ Run = tuple[str, int]  # segment and epoch
 
 @dataclass(frozen=True)
 class Selection:
-    """The part of recordings that is kept."""
+    """Selects the part of recordings to keep."""
 
     begin: int = 0  #: log time [ns]
     end: int = 2**63
     segments: frozenset[str] | None = None  #: None: all
-    every: int = 1  #: keep rows whose iteration is a multiple of it; decisions are kept all
-    transforms: float = 0.0  #: messages with poses of the bodies to add [Hz]; 0: none
+    every: int = 1  #: keep rows whose iteration is a multiple of this; all decisions are kept
+    transforms: float = 0.0  #: rate of added messages with poses of the bodies [Hz]; 0: none
 
     def holds(self, time: int) -> bool:
         return self.begin <= time <= self.end
@@ -49,15 +49,15 @@ def write_part(
     selection: Selection,
     poses: Callable[[str, RecordedEpoch], Poses | None] = lambda name, epoch: None,
 ) -> dict[str, tuple[int, int, int]]:
-    """Writes a new file. Returns number, first and last iteration of the rows of each segment.
+    """Writes a new file. Returns number, first and last iteration of each segment's rows.
 
     poses: returns the bodies of a run to add transforms of, or None.
-    Raises RecordingError: then no new file is left.
+    Raises RecordingError for a damaged source or a failed write, without leaving a new file.
     """
     read = [RecordingFile(path) for path in recordings]
     sources = [[each for each in recording.scans if each[1].chunks] for recording in read]
     offsets = _offsets_in(chain.from_iterable(sources))
-    # those of one recording in their order, which may not be that of time: robots have own clocks
+    # files of one recording stay in order, even against time: robots have clocks of their own
     in_order = sorted(
         (each for each in sources if each), key=lambda files: _begin_of(files, offsets)
     )
@@ -105,7 +105,7 @@ def _notes_in(found: Scan) -> Iterator[EpochNote]:
 
 
 def _offsets_in(files: Iterable[tuple[Path, Scan]]) -> dict[str, int]:
-    """Wall clock less row time of each boot [ns]: the largest, because clocks begin in the past."""
+    """Returns wall clock minus row time by boot [ns]: the largest, as clocks begin in the past."""
     offsets: dict[str, int] = {}
     for _, found in files:
         for note in _notes_in(found):
@@ -115,7 +115,7 @@ def _offsets_in(files: Iterable[tuple[Path, Scan]]) -> dict[str, int]:
 
 
 def _shifts(found: Scan, offsets: dict[str, int]) -> dict[Run, int]:
-    """Shift of the log times of the runs of a file [ns], so that those of one boot agree."""
+    """Returns shifts of log times by run [ns], which make the runs of one boot agree."""
     return {
         (note.segment, note.epoch): offsets.get(note.boot, note.wall_offset) - note.wall_offset
         for note in _notes_in(found)
@@ -128,20 +128,20 @@ def _largest(shifts: dict[Run, int]) -> int:
 
 class _PartWriter:
     def __init__(self, file: FileWriter, selection: Selection, offsets: dict[str, int]) -> None:
-        """offsets: of the boots of all recordings; see `_offsets_in`."""
+        """offsets: wall clock minus row time of all boots, from `_offsets_in`."""
         self.rows: dict[str, tuple[int, int, int]] = {}
         self._file, self._selection, self._offsets = file, selection, offsets
         self._channels: dict[object, int] = {}
-        self._numbers: dict[Run, int] = {}  # of runs in the new file
-        self._next: dict[int, int] = {}  # by new channel: what comes next, so nothing comes twice
+        self._numbers: dict[Run, int] = {}  # number of each run in the new file
+        self._next: dict[int, int] = {}  # next row or entry by new channel, to skip duplicates
         self._row_channels: dict[Run, int] = {}
         self._seen: set[tuple[str, int, bytes]] = set()
         self._poses: dict[Run, tuple[RecordedEpoch, Poses]] = {}
         self._transforms: dict[Run, TransformWriter] = {}
-        self._is_over: set[int] = set()  # journals that have what lies behind the end
+        self._is_over: set[int] = set()  # journals that hold all entries up to the end
 
     def add(self, content: IO[bytes], found: Scan) -> None:
-        """Adds what is kept of a file. Raises ValueError if it is damaged."""
+        """Adds the selected part of a file. Raises ValueError if the file is damaged."""
         self._found, self._content = found, content
         self._shifts = _shifts(found, self._offsets)
         for chunk in found.chunks:
@@ -157,7 +157,7 @@ class _PartWriter:
                 self._channel(channel)
 
     def add_poses(self, run: Run, epoch: RecordedEpoch, poses: Poses | None) -> None:
-        """Adds the transforms of a run with its rows; none where `poses` is None."""
+        """Registers the bodies of a run, whose transforms are added with its rows; None: none."""
         if poses is not None and poses.bodies:
             self._poses[run] = epoch, poses
 
@@ -172,9 +172,9 @@ class _PartWriter:
         return self._transforms[run].block(rows)
 
     def add_end(self, run: Run, epoch: RecordedEpoch) -> None:
-        """Adds how a run ended, that its end is missing, or that it was left out."""
+        """Adds the end of a run: how it ended, that its end is missing, or that it was cut."""
         kept = self._next.get(self._row_channels.get(run, 0), 0)
-        if kept == 0 or kept > epoch.next_row:  # nothing is kept, or another recording goes on
+        if kept == 0 or kept > epoch.next_row:  # nothing is kept, or another recording continues
             return
         texts = {"last": str(kept - 1)}
         if epoch.next_row - kept < self._selection.every:
@@ -186,7 +186,7 @@ class _PartWriter:
 
     def _blocks(self, chunk: ChunkIndex) -> Iterator[MessageBlock]:
         found, content = self._found, self._content
-        kept: dict[Run, set[int]] = {}  # log times of rows
+        kept: dict[Run, set[int]] = {}  # log times of kept rows
         transforms: list[Block] = []
         for number in sorted(chunk.message_index_offsets):
             channel = found.channels[number]
@@ -195,7 +195,7 @@ class _PartWriter:
                 continue
             if channel.topic == TRANSFORMS and self._selection.transforms:
                 continue
-            # marks and the log belong to no run: they are of the newest boot of the file
+            # marks and the log belong to no run: they get the shift of the file's newest boot
             shift = _largest(self._shifts) if run is None else self._shifts.get(run, 0)
             times = [int(time) + shift for time in index_of(content, chunk, number)[:, 0]]
             messages: Iterable[tuple[int, bytes]] = zip(
@@ -214,7 +214,7 @@ class _PartWriter:
                     for time, message in messages
                     if time in kept[run]
                 ]
-            else:  # marks and the log; recordings of the same time have them twice
+            else:  # marks and the log, which recordings of the same time hold twice
                 messages = [
                     each
                     for each in messages
@@ -257,13 +257,13 @@ class _PartWriter:
             new = self._channel(channel)
             if new in self._is_over:
                 continue
-            if time > self._selection.end:  # has what was decided before
+            if time > self._selection.end:  # it holds the last decisions before the end
                 self._is_over.add(new)
             entries = Entries.of(message, 0)
             after = self._next.get(new, 0)
             if entries.first >= after:
                 kept.append((time, message))
-            elif entries.next > after:  # two recorders: a message cannot be divided
+            elif entries.next > after:  # of two recorders: a message cannot be divided
                 texts = self._texts(channel) | {
                     "first": str(after),
                     "last": str(entries.next - 1),
@@ -273,7 +273,7 @@ class _PartWriter:
         return kept
 
     def _begin_run(self, note: EpochNote) -> None:
-        """Copies how the run was started, under its number in the new file."""
+        """Copies description and provenance of a run, under its number in the new file."""
         found, content = self._found, self._content
         numbers = [number for (name, _), number in self._numbers.items() if name == note.segment]
         number = self._numbers[note.segment, note.epoch] = len(numbers)
@@ -297,7 +297,7 @@ class _PartWriter:
                 self._file.add_metadata(each.name, each.metadata | {"number": str(number)})
 
     def _channel(self, channel: Channel, begin: int | None = None) -> int:
-        """The channel of the new file; begin: its first row."""
+        """Returns a channel's number in the new file, adds it if needed; begin: its first row."""
         run = _run_of(channel)
         key = channel.topic, run, channel.metadata.get("content"), channel.message_encoding
         if key not in self._channels:
@@ -312,7 +312,7 @@ class _PartWriter:
         return self._channels[key]
 
     def _texts(self, channel: Channel) -> dict[str, str]:
-        """The metadata of a channel of a run, with the number of the run in the new file."""
+        """Returns the metadata of a run's channel, with the run's number in the new file."""
         run = _run_of(channel)
         assert run is not None
         if run not in self._numbers:
@@ -332,7 +332,7 @@ class _PartWriter:
         return math.lcm(self._selection.every, int(text) if text.isdecimal() else 1)
 
     def _reason(self, note: EpochNote, first: int) -> str:
-        """Why rows from this one on are missing in what is merged."""
+        """Returns why rows from `first` on are missing in the merged recordings."""
         for each in self._found.metadata:
             texts = each.metadata
             run = texts.get("segment"), texts.get("number"), texts.get("first")

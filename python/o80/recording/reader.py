@@ -19,9 +19,9 @@ from o80.rows.history import History, Range
 
 
 class RecordingFile:
-    """A recording that was opened with `o80.open`: its segments by name.
+    """A recording that was opened with `o80.open`: a mapping from names to its segments.
 
-    A file that was cut (its recorder was killed, or still runs) is read up to its last whole chunk.
+    A truncated file (its recorder was killed, or still runs) is read up to its last whole chunk.
     A folder of files, which a recorder with `split` writes, is read as one recording.
     """
 
@@ -40,24 +40,24 @@ class RecordingFile:
 
     @property
     def _cut_at(self) -> Path | None:
-        """The last file with rows, if its recorder was killed as it began the next one."""
+        """Returns the last file with rows, if the recorder was killed as it began the next file."""
         files = in_order(self.path) if self.path.is_dir() else []
         begun = [file for file, found in self._files if found.channels]
         return begun[-1] if begun and files and begun[-1] != files[-1] else None
 
     @property
     def finished(self) -> bool:
-        """Its recorder ended in order; else `o80 repair` completes the file for other readers."""
+        """True if the recorder ended in order; else `o80 repair` completes the file for others."""
         return all(found.finished for _, found in self._files)
 
     @property
     def scans(self) -> "list[tuple[Path, Scan]]":
-        """Its files and their contents, in their order."""
+        """Files of the recording and their contents, in order."""
         return self._files
 
     @property
     def time_range(self) -> tuple[int, int]:
-        """First and last time on the wall clock [ns since 1970]. Raises RecordingError: empty."""
+        """First and last wall-clock time [ns since 1970]. Raises RecordingError if it is empty."""
         files = [found.chunks for _, found in self._files if found.chunks]
         if not files:
             raise RecordingError(f"{self.path} holds no message")
@@ -65,12 +65,12 @@ class RecordingFile:
 
     @property
     def size(self) -> int:
-        """Size of its files [bytes]."""
+        """Size of all files [bytes]."""
         return sum(_size(path) for path, _ in self._files)
 
     @cached
     def marks(self) -> list[Mark]:
-        """The notes in the recording, in their order. Raises RecordingError."""
+        """Marks in the recording, in order. Raises RecordingError if a file is damaged."""
         marks = Marks()
         for path, found in self._files:
             try:
@@ -83,7 +83,7 @@ class RecordingFile:
         return marks
 
     def marks_by_run(self, name: str) -> list[list[Mark]]:
-        """The marks of a segment, for each of its runs."""
+        """Returns the marks of a segment, one list for each run."""
         epochs = self.segments[name].epochs
         begins = [epoch.recorded_at for epoch in epochs]
         runs: list[list[Mark]] = [[] for _ in epochs]
@@ -93,7 +93,7 @@ class RecordingFile:
         return runs
 
     def chosen(self, names: Iterable[str] | None = None) -> list[str]:
-        """These segments, or all of them. Raises InvalidArgument for one that is not there."""
+        """Returns these segments, or all. Raises InvalidArgument for a segment that is missing."""
         for name in names or ():
             if name not in self.segments:
                 there = ", ".join(self.segments) or "none"
@@ -120,15 +120,15 @@ class RecordingFile:
 def open(path: str | os.PathLike[str]) -> RecordingFile:
     """Opens a recording: `o80.open("run.mcap")["arm"].history(1000).observed`.
 
-    Raises RecordingError.
+    Raises RecordingError if it does not exist or is damaged.
     """
     return RecordingFile(path)
 
 
 def files_of(path: Path) -> list[Path]:
-    """The files of a recording in their order. Raises RecordingError for a folder without any.
+    """Returns the files of a recording in order. Raises RecordingError for a folder without any.
 
-    A file that was being created when its recorder was killed is left out.
+    Leaves out a file that a killed recorder had only begun to create.
     """
     if not path.is_dir():
         return [path]
@@ -144,7 +144,7 @@ def files_of(path: Path) -> list[Path]:
 
 
 def in_order(folder: Path) -> list[Path]:
-    """The files NAME.mcap of a folder by name; numbered ones by their number, last."""
+    """Returns the files NAME.mcap of a folder by name; numbered files by number, last."""
     return sorted(
         folder.glob("*.mcap"),
         key=lambda file: (int(file.stem) if file.stem.isdecimal() else -1, file.name),
@@ -152,7 +152,7 @@ def in_order(folder: Path) -> list[Path]:
 
 
 def _size(path: Path) -> int:
-    """Size of a file [bytes]; 0: its recorder (keep) has deleted it meanwhile."""
+    """Returns the size of a file [bytes]; 0 if its recorder (keep) has deleted it meanwhile."""
     try:
         return path.stat().st_size
     except FileNotFoundError:
@@ -160,7 +160,7 @@ def _size(path: Path) -> int:
 
 
 def _scans_of(path: Path) -> Iterator[tuple[Path, Scan]]:
-    """The files of a recording, without those that its recorder (keep) deletes meanwhile."""
+    """Scans the files of a recording, except files that its recorder (keep) deletes meanwhile."""
     for file in files_of(path):
         try:
             yield file, _scanned(file)
@@ -177,7 +177,7 @@ def _scanned(path: Path) -> Scan:
 
 @contextmanager
 def errors_explained(path: Path) -> Iterator[None]:
-    """Makes errors of a scan of a file RecordingErrors, which say what to do."""
+    """Turns errors of a scan into RecordingError, with advice."""
     try:
         yield
     except NotARecordingError as error:
@@ -212,9 +212,9 @@ class RecordedSegment:
         self.epochs = epochs
 
     def history(self, n: int | None = None, **selection: Unpack[Range]) -> History:
-        """Rows of the only epoch; the arguments are those of `Frontend.history`.
+        """Returns rows of the only epoch; the arguments are those of `Frontend.history`.
 
-        Raises InvalidArgument if there are several: choose one of `epochs`.
+        Raises InvalidArgument if there are several epochs: choose one of `epochs`.
         """
         if len(self.epochs) != 1:
             raise InvalidArgument(
@@ -225,7 +225,7 @@ class RecordedSegment:
 
     @property
     def schema(self) -> dict[str, Any]:
-        """The description of the robot in its last run."""
+        """Description of the robot in its last run."""
         return self.epochs[-1].schema
 
     def __repr__(self) -> str:

@@ -28,10 +28,10 @@ T = TypeVar("T")
 
 
 class RecordedEpoch:
-    """The rows and the journal of one run of a backend."""
+    """Reads the rows and the journal of one run of a backend."""
 
     def __init__(self, parts: list[EpochPart], lacks_end: str = "") -> None:
-        """parts: in their order, at least one. lacks_end: why, if no record says how it ended."""
+        """parts: in order, at least one. lacks_end: why no record states how the run ended."""
         self._parts = parts
         self._lacks_end = lacks_end
         self._note = parts[0].note
@@ -43,12 +43,12 @@ class RecordedEpoch:
 
     @property
     def wall_offset(self) -> int:
-        """Wall-clock time [ns since 1970] less row time."""
+        """Wall-clock time [ns since 1970] minus row time."""
         return self._note.wall_offset
 
     @property
     def boot(self) -> str:
-        """Names the boot of the machine whose monotonic clock the rows have; empty: not known."""
+        """Id of the boot to whose monotonic clock the row times refer; empty: unknown."""
         return self._note.boot
 
     @property
@@ -58,7 +58,7 @@ class RecordedEpoch:
 
     @property
     def chunk_times(self) -> list[tuple[int, int]]:
-        """First and last time [ns] of each chunk of the files in which this run has rows.
+        """First and last time [ns] of each chunk with rows of this run.
 
         A chunk may also hold rows of other runs, so that the times may lie outside this run.
         """
@@ -72,15 +72,15 @@ class RecordedEpoch:
         ]
 
     def overlaps(self, other: "RecordedEpoch") -> bool:
-        """Whether another run of the same recording was recorded at the same time, by the places
-        of their rows in its files: simulated time says nothing of it.
+        """True if another run of the recording was recorded at the same time, judged by the places
+        of rows in the files, because simulated times of two runs cannot be compared.
         """
         (first, last), (begin, end) = self._places, other._places
         return first <= end and begin <= last
 
     @cached
     def _places(self) -> tuple[tuple[Path, int], tuple[Path, int]]:
-        """Where the first and the last chunk with rows begin: file, and offset in it [bytes]."""
+        """Places of the first and the last chunk with rows: file, and offset in it [bytes]."""
         chunks = [
             (part.path, chunk.chunk_start_offset)
             for part in self._parts
@@ -96,11 +96,11 @@ class RecordedEpoch:
 
     @cached
     def gaps(self) -> list[Gap]:
-        """The rows that are missing, each with the reason: first and last iteration, reason.
+        """Ranges of missing rows: first and last iteration, reason.
 
-        The last is None if the end of the run is missing, and nobody knows which row was its last.
-        Rows behind the end of a recording that was told to end are not missing. Raises
-        RecordingError.
+        The last iteration is None if the end of the run is missing and its last row is unknown.
+        Rows after an ordered end of the recording do not count as missing. Raises RecordingError
+        if the file is damaged.
         """
         found, after = self._before_end
         last, texts = self.end_record
@@ -114,12 +114,12 @@ class RecordedEpoch:
 
     @property
     def next_row(self) -> int:
-        """Iteration after the last row. Raises RecordingError."""
+        """Iteration after the last row. Raises RecordingError if the file is damaged."""
         return self._before_end[1]
 
     @cached
     def _before_end(self) -> tuple[list[Gap], int]:
-        """The gaps before the last row, and the iteration after it."""
+        """The gaps before the last row, and the iteration after that row."""
         found: list[Gap] = []
         after = 0
         for part in self._parts:
@@ -139,16 +139,16 @@ class RecordedEpoch:
 
     @property
     def missing(self) -> int:
-        """Number of rows that are missing, as far as it is known. Raises RecordingError."""
+        """Number of rows known to be missing. Raises RecordingError if the file is damaged."""
         kept = sum(part.rows - 1 for part in self._parts if part.every > 1 and part.rows)
         ranges = ((gap.first, gap.last) for gap in self.gaps if gap.last is not None)
         return sum(last - first + 1 for first, last in ranges) - kept
 
     @property
     def interruption(self) -> Interruption | None:
-        """Time before this run in which nothing of its segment was recorded, if there is one.
+        """Time before this run in which its segment was not recorded, or None.
 
-        Other runs may have come and gone then. Raises RecordingError.
+        Whole runs may be missing in this time. Raises RecordingError if the file is damaged.
         """
         for part in self._parts:
             for (since,), _ in part.records(part.note.record("interruption"), "since"):
@@ -157,7 +157,7 @@ class RecordedEpoch:
 
     @property
     def journal_gaps(self) -> list[tuple[int, int]]:
-        """First and last number of journal entries that were overwritten before they were read."""
+        """First and last number of each range of entries that were overwritten before a read."""
         return [
             (first, last)
             for part in self._parts
@@ -166,7 +166,7 @@ class RecordedEpoch:
 
     @property
     def layout(self) -> Layout:
-        """Where everything lies in a row."""
+        """Offsets and types of all fields of a row."""
         layout: Layout = self._decoder.layout
         return layout
 
@@ -177,12 +177,12 @@ class RecordedEpoch:
 
     @cached
     def provenance(self) -> Provenance:
-        """How the backend was started; as `Frontend.provenance`. Raises RecordingError."""
+        """How the backend was started, as `Frontend.provenance`. RecordingError if unknown."""
         return self._started("json", Provenance.from_json)
 
     @property
     def machine(self) -> Machine:
-        """The machine that recorded it. Raises RecordingError."""
+        """The machine that made the recording. Raises RecordingError if it is unknown."""
         return self._started("machine", Machine.from_json)
 
     def _started(self, key: str, read: Callable[[str], T]) -> T:
@@ -216,15 +216,15 @@ class RecordedEpoch:
     @cached
     def description(self) -> _core.Description:
         """The description of the robot as the compiled library reads it."""
-        self._decoder  # noqa: B018  tells a damaged description
+        self._decoder  # noqa: B018  reports a damaged description
         return _core.Description(self._parts[0].table())
 
     # ------------------------------------------------------------------ rows
 
     def history(self, n: int | None = None, **selection: Unpack[Range]) -> History:
-        """Many observations at once; the arguments are those of `Frontend.history`.
+        """Returns many observations at once; the arguments are those of `Frontend.history`.
 
-        Raises RecordingError if the file is damaged there.
+        Raises RecordingError if this part of the file is damaged.
         """
         wanted = Selection.checked(n, **selection)
         blocks: Iterable[History]
@@ -239,9 +239,9 @@ class RecordedEpoch:
     def blocks(
         self, *, from_time: int | None = None, to_time: int | None = None
     ) -> Iterator[History]:
-        """The rows between two times [ns] in their order, some at a time.
+        """Yields the rows between two times [ns] in order, block by block.
 
-        For recordings larger than the memory. Raises RecordingError if the file is damaged there.
+        For recordings larger than the memory. Raises RecordingError if this part is damaged.
         """
         for block in self._blocks(from_time, to_time):
             history = block.select(from_time=from_time, to_time=to_time)
@@ -259,13 +259,13 @@ class RecordedEpoch:
 
     @property
     def recorded_at(self) -> int:
-        """When its recording began, on the wall clock [ns since 1970]."""
+        """Wall-clock time at which recording of the run began [ns since 1970]."""
         return self._parts[0].began_at
 
     def _blocks(
         self, from_time: int | None, to_time: int | None, *, newest_first: bool = False
     ) -> Iterator[History]:
-        """The rows of each chunk that may have rows of these times."""
+        """Yields the rows of each chunk that may have rows of these times."""
         offset = self.wall_offset
         start = 0 if from_time is None else from_time + offset
         end = 2**64 if to_time is None else to_time + offset
@@ -277,7 +277,7 @@ class RecordedEpoch:
                 yield History(self._decoder, raw.view(self.layout.row).reshape(len(raw)))
 
     def _last_blocks(self, n: int) -> list[History]:
-        """The rows of the last chunks, which have n rows, if there are so many."""
+        """Returns the rows of the last chunks: at least n rows, or all."""
         blocks: list[History] = []
         for block in self._blocks(None, None, newest_first=True):
             if n <= 0:
@@ -287,7 +287,7 @@ class RecordedEpoch:
         return blocks[::-1]
 
     def _decoded_rows(self, part: EpochPart, chunks: "Iterator[ChunkIndex]") -> Iterator[Any]:
-        """The rows (n, bytes) of each of these chunks."""
+        """Yields the rows (n, bytes) of each chunk."""
         plan: MessagePlan | None = None
         with part.reading() as file:
             for chunk in chunks:
@@ -299,21 +299,21 @@ class RecordedEpoch:
 
     @property
     def first_row(self) -> int:
-        """Iteration of the first row that was recorded."""
+        """Iteration of the first recorded row."""
         return self._note.begin
 
     @property
     def end(self) -> str:
-        """How the run ended: "stopped", "killed", "superseded", or "failed: " and why.
+        """How the run ended: "stopped", "killed", "superseded", or "failed: " with the reason.
 
-        Empty: the recording does not say, for example because it was told to end before the run.
-        Raises RecordingError.
+        Empty if the recording lacks the end, for example because recording ended before the run.
+        Raises RecordingError if the file is damaged.
         """
         return self._end_in_journal() or self.end_record[1].get("how", "")
 
     @property
     def end_record(self) -> tuple[int, dict[str, str]]:
-        """Note of the recorder about the end: the last row, -1 for nothing, and texts."""
+        """The recorder's record of the end: last row (-1: none) and texts."""
         found = [
             each for part in self._parts for each in part.records(part.note.record("end"), "last")
         ]
@@ -335,12 +335,12 @@ class RecordedEpoch:
     # ------------------------------------------------------------------ journal
 
     def journal(self, since: int = 0) -> list[JournalEntry]:
-        """Decisions of the backend, oldest first, as `Frontend.journal` gives them.
+        """Returns the decisions of the backend, oldest first, as `Frontend.journal` does.
 
-        It begins with the oldest entry that the segment held when recording began, which may be
-        older than the first row. since: number of the first entry to return.
+        The first entry is the oldest that the segment held when recording began; it may be older
+        than the first row. since: number of the first entry to return.
 
-        Raises RecordingError if the file is damaged there.
+        Raises RecordingError if this part of the file is damaged.
         """
         decoder = EntryDecoder(self.schema)
         return [decoder.entry(entry) for entry in self.native_journal(since)]
@@ -348,18 +348,18 @@ class RecordedEpoch:
     def native_journal(
         self, since: int = 0, *, rests: bool = False
     ) -> Iterator[_core.JournalEntry]:
-        """The same before their conversion to Python, read as they are needed.
+        """Yields the entries of `journal` before their conversion to Python, read on demand.
 
-        rests: with the rows from which on nothing acts, for a replay.
+        rests: include the entries `at_rest`, from which on nothing acts, for a replay.
         """
         native = _core.RecordedJournal(self.description, whole(since, "since", 0), rests)
         for part in self.journal_parts():
             yield from self._decoded(native, part)
 
     def last_entries(self, most: int) -> Iterator[_core.JournalEntry]:
-        """The newest entries, at least this number if there are so many; the newest chunk first.
+        """Yields the newest entries, at least `most` or all of them, the newest chunk first.
 
-        Batches whose records are in two chunks lack them. Raises RecordingError.
+        Batches whose records are split over two chunks come without records. Raises RecordingError.
         """
         for part in self.journal_parts(newest_first=True):
             found = self._decoded(_core.RecordedJournal(self.description, 0), part)
@@ -370,14 +370,14 @@ class RecordedEpoch:
 
     @property
     def has_journal(self) -> bool:
-        """Its backend had a journal, and its recorder wrote it."""
+        """True if the backend had a journal and the recorder wrote it."""
         return any(part.journal is not None for part in self._parts)
 
     @property
     def journal_codec(self) -> int | None:
-        """Version of the format of the journal, the newest of its files; None: no journal.
+        """Version of the journal's format, the newest of all files; None: no journal.
 
-        Raises RecordingError.
+        Raises RecordingError if a version is damaged.
         """
         codecs = []
         for part in self._parts:
@@ -387,9 +387,9 @@ class RecordedEpoch:
         return max(codecs, default=None)
 
     def journal_since_row(self, first: int) -> list[JournalEntry]:
-        """Entries from this iteration on, and recorded batches of all commands that end after it.
+        """Returns entries from `first` on, and earlier batches of commands that end after it.
 
-        Raises RecordingError.
+        Raises RecordingError if this part of the file is damaged.
         """
         decoder = EntryDecoder(self.schema)
         blocks: list[list[JournalEntry]] = []
@@ -408,9 +408,9 @@ class RecordedEpoch:
         return [each for block in reversed(blocks) for each in block]
 
     def journal_parts(self, *, newest_first: bool = False) -> Iterator[Entries]:
-        """The entries of the journal as the files hold them, for `_core.RecordedJournal`.
+        """Yields the journal's entries as stored in the files, for `_core.RecordedJournal`.
 
-        Raises RecordingError if the file is damaged there.
+        Raises RecordingError if this part of the file is damaged.
         """
         for part in reversed(self._parts) if newest_first else self._parts:
             if part.journal is not None:

@@ -25,17 +25,17 @@ from o80.recording.snapshots import interval
 from o80.recording.source import Source
 from o80.recording.summary import room_for_end
 
-BETWEEN_SEARCHES = 0.5  # for segments that match a pattern [s]
-FIRST_SECONDS = 5.0  # in which chunks are short
+BETWEEN_SEARCHES = 0.5  # time between two searches for segments of a pattern [s]
+FIRST_SECONDS = 5.0  # time in which chunks are short
 LONGEST_CHUNK = 2.5  # [s]
 _BYTES = {"k": 1e3, "M": 1e6, "G": 1e9}
 _SECONDS = {"s": 1.0, "min": 60.0, "h": 3600.0}
 
 
 class Recorder:
-    """Reads segments and writes rows and journals; `poll` does a part of the work. One thread."""
+    """Reads segments and writes rows and journals, a chunk in each `poll`. For one thread."""
 
-    between_chunks = 0.1  #: time between two questions whether a chunk is due [s]
+    between_chunks = 0.1  #: time between two checks whether a chunk is due [s]
 
     def __init__(
         self,
@@ -49,13 +49,13 @@ class Recorder:
         snapshots: float | None = None,
         form: Form = USUAL,
     ) -> None:
-        """names: of segments, or patterns such as "arm*". proceed: continue an existing file.
+        """names: segments, or patterns such as "arm*". proceed: continue an existing file.
         from_now: begin with the newest rows instead of the oldest that the segments hold.
 
-        path: ends in .mcap. split: go on in a new file after this size or time, see Split; `path`
-        is a folder of files then. keep: the most that the folder may hold, such as "50G": the
-        oldest files of this recorder that have no mark are deleted. snapshots: ask simulations for
-        one in this time [s]. Raises RecordingError, InvalidArgument: then no new file is left.
+        path: ends in .mcap. split: begin a new file after this size or time, see Split; `path` is
+        then a folder. keep: largest size of this folder, such as "50G": the oldest files of this
+        recorder without marks are deleted. snapshots: interval of snapshot requests to simulations
+        [s]. If it raises RecordingError or InvalidArgument, no new file is left.
         """
         if not names:
             raise InvalidArgument("give the name of at least one segment to record")
@@ -116,14 +116,14 @@ class Recorder:
 
     @property
     def newest(self) -> dict[str, int]:
-        """Iteration of the newest row of each segment; -1 for one that is not there."""
+        """Iteration of the newest row of each segment; -1 for a segment that is not there."""
         return {name: source.newest for name, source in self.sources.items()}
 
     def is_due(self) -> bool:
-        """Whether the next chunk should be written.
+        """True if the next chunk should be written.
 
-        In the first seconds always, then when a quarter of what a segment holds was not read: so a
-        killed recorder's successor misses nothing.
+        Always in the first seconds; later after `LONGEST_CHUNK`, or when a quarter of a segment is
+        unread, so that the successor of a killed recorder misses nothing.
         """
         now = time.monotonic()
         if now - self._polled >= LONGEST_CHUNK or now - self._begun < FIRST_SECONDS:
@@ -134,7 +134,7 @@ class Recorder:
         return any(each.behind or each.is_filled(0.25) for each in self.sources.values())
 
     def poll(self) -> int:
-        """Writes a chunk of what was published since the last call; returns how many messages."""
+        """Writes rows and entries since the last call as a chunk; returns the message count."""
         self._polled = time.monotonic()
         with self.writing():
             if self._is_full():
@@ -161,7 +161,7 @@ class Recorder:
         return count
 
     def _check_name(self) -> None:
-        """Warns once when the file that is written has lost its name."""
+        """Warns once if the file being written was moved or removed."""
         name = self.file.moved_to()
         if name is not None and self._lost is not self.file:
             self._lost = self.file
@@ -174,7 +174,7 @@ class Recorder:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Makes an OSError of its block a RecordingError."""
+        """Turns an OSError of its block into a RecordingError."""
         try:
             yield
         except Error:
@@ -186,7 +186,7 @@ class Recorder:
             ) from error
 
     def mark(self, name: str, /, **values: Any) -> None:
-        """Writes a note with the newest iteration of each segment. Raises TypeError."""
+        """Writes a mark with the newest iterations. Raises TypeError for values without JSON."""
         with self.writing():
             now, newest = time.time_ns(), self.newest
             there = [each for each, row in newest.items() if row >= 0]
@@ -207,7 +207,7 @@ class Recorder:
                 return
 
     def finish(self) -> None:
-        """Finishes the file: after this any MCAP reader opens it."""
+        """Finishes the file, which any MCAP reader can then open."""
         self._close_sources()
         with self.writing():
             self.file.finish()
@@ -217,13 +217,13 @@ class Recorder:
             source.close()
 
     def _is_full(self) -> bool:
-        """Whether the next rows belong in another file."""
+        """True if the next rows belong in another file."""
         if self._split is None or not self.file.found.chunks:
             return False
         return self._split.is_due(self.file.size, self._file_begun)
 
     def _continue_in_next_file(self) -> None:
-        """Another recorder that continues finds one of the two files locked at any moment."""
+        """Switches to the next file; one of the two is always locked against other recorders."""
         full, self.file = self.file, next_file(self.file)
         self._file_begun = time.monotonic()
         not_finished = full.size + room_for_end(full.found)
@@ -240,7 +240,7 @@ class Recorder:
             self._file_is_own = True
 
     def _make_room(self, length: int) -> None:
-        """Deletes files before so many bytes are written, if the folder would become too large."""
+        """Deletes old files if `length` more bytes would make the folder too large."""
         while self.size + length > self._keep:
             if not self._removable:
                 raise RecordingError(
@@ -255,7 +255,7 @@ class Recorder:
             self._bytes_before -= size
 
     def _add(self, name: str, from_now: bool) -> None:
-        """Raises RecordingError for a name that others would take for one that is recorded."""
+        """Adds a source. Raises RecordingError if another recorded segment has its topic."""
         for other in self.sources:
             if topic_of(other) == topic_of(name):
                 raise RecordingError(
@@ -282,12 +282,12 @@ class Recorder:
                 except RecordingError as error:
                     if new:
                         raise
-                    self._left_out.add(segment.name)  # the others go on
+                    self._left_out.add(segment.name)  # the others continue
                     warnings.warn(f"not recorded: {error}", RuntimeWarning, stacklevel=3)
 
 
 def _weakly(make_room: Callable[[int], None]) -> Callable[[int], None]:
-    """Without a circle: a recorder that is dropped gives its file back at once."""
+    """Avoids a reference cycle, so that a dropped recorder releases its file at once."""
     method = weakref.WeakMethod(make_room)
 
     def call(length: int) -> None:
@@ -298,7 +298,7 @@ def _weakly(make_room: Callable[[int], None]) -> Callable[[int], None]:
 
 
 def _most(keep: str, split: "Split | None") -> float:
-    """Bytes of "50G". Raises InvalidArgument."""
+    """Parses a size such as "50G" [bytes]. Raises InvalidArgument if wrong or too small."""
     if split is None:
         raise InvalidArgument("keep needs split: it deletes whole files, such as with --split 1G")
     try:
@@ -316,14 +316,14 @@ def _most(keep: str, split: "Split | None") -> float:
 
 @dataclass(frozen=True)
 class Split:
-    """The most that one file of a recording holds."""
+    """Largest size and duration of one file of a recording."""
 
     bytes: float = math.inf
     seconds: float = math.inf
 
     @classmethod
     def of(cls, text: str) -> "Split":
-        """Split by "500M" or "2G" (bytes), "600s", "10min" or "1h". Raises InvalidArgument."""
+        """Parses "500M" or "2G" (bytes), "600s", "10min" or "1h". Raises InvalidArgument."""
         number = text.rstrip("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ ")
         unit = text[len(number) :].strip()
         try:
@@ -341,5 +341,5 @@ class Split:
         )
 
     def is_due(self, size: int, begun: float) -> bool:
-        """Whether a file of this size [bytes], begun at this monotonic time, is full."""
+        """True if a file of this size [bytes], begun at this monotonic time, is full."""
         return size >= self.bytes or time.monotonic() - begun >= self.seconds

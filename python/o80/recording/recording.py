@@ -25,19 +25,19 @@ class Recording(Closeable):
 
     path: the file, NAME.mcap, which must not exist.
     segments: names, patterns such as "arm*", or frontends. Recording begins with the oldest rows
-        that they still hold.
-    proceed: continue an existing file, also one that was cut.
-    from_now: begin with the newest rows; robots that start later are recorded from their first.
-    split: go on in a new file after a size ("500M", "2G") or a time ("600s", "10min", "1h"): `path`
+        that these segments still hold.
+    proceed: continue an existing file, also a truncated one.
+    from_now: begin with the newest rows; robots that start later are recorded from their first row.
+    split: begin a new file after a size ("500M", "2G") or a time ("600s", "10min", "1h"): `path`
         is then a folder of complete files, which `o80.open` reads as one recording.
-    keep: with `split`, the most that this folder holds ("50G"): the oldest files of this recording
+    keep: with `split`, largest size of this folder ("50G"): the oldest files of this recording
         are deleted, but none with a mark.
-    snapshots: ask simulations for a snapshot in this time [s], from which a replay can begin.
+    snapshots: interval of snapshot requests to simulations [s]; a replay can begin from these.
     compression: "zstd", "lz4" or "none".
     joint_states: whether rows of robots with joints are also written as sensor_msgs/JointState.
 
-    A robot whose history is overwritten before the thread reads it leaves a gap: a program that
-    bursts very many iterations at once calls `flush` between them. Raises RecordingError.
+    Rows that are overwritten before the thread reads them leave a gap: call `flush` between very
+    long bursts. Raises RecordingError if the file cannot be written.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class Recording(Closeable):
         self._failure: Exception | None = None
         self._closed = False
         self._owner = os.getpid()
-        # not bound to this object, which ends when nobody refers to it any more
+        # weak: this object is collected as soon as nothing refers to it
         run = partial(_run, weakref.ref(self), self._end)
         self._thread = threading.Thread(target=run, name="o80-recording", daemon=True)
         self._thread.start()
@@ -84,7 +84,7 @@ class Recording(Closeable):
 
     @property
     def missed(self) -> int:
-        """Rows that were overwritten before they were read: each is in a gap of the file."""
+        """Number of rows overwritten before they were read; the file notes them as gaps."""
         return self._recorder.missed
 
     @property
@@ -93,15 +93,15 @@ class Recording(Closeable):
         return self._recorder.size
 
     def flush(self) -> None:
-        """Returns when every row that was published before the call is in the file."""
+        """Waits until every row that was published before the call is in the file."""
         with self._lock:
             self._check()
             self._recorder.catch_up()
 
     def mark(self, name: str, /, **values: Any) -> None:
-        """Writes a note: a name and values, with the newest iteration of each segment.
+        """Writes a mark: a name and values, with the newest iteration of each segment.
 
-        values: whatever JSON can hold, and NumPy arrays, which become lists. Raises TypeError.
+        values: JSON values, and NumPy arrays, which become lists. Raises TypeError for others.
         """
         with self._lock:
             self._check()
@@ -130,7 +130,7 @@ class Recording(Closeable):
             raise self._failure
 
     def _catch_up(self) -> bool:
-        """False if it failed."""
+        """Records rows if a chunk is due; False if that failed."""
         try:
             with self._lock:
                 if self._recorder.is_due():

@@ -1,7 +1,7 @@
-"""Repairs files of recordings: what is whole in a damaged one goes into a new one.
+"""Repairs recordings: copies the intact records of a damaged file into a new one.
 
-The whole file is searched for records, because a damaged length leads anywhere. Chunks have
-checksums; the message indexes are made anew.
+The whole file is searched for records, because a damaged length can point anywhere. Chunks have
+checksums; the message indexes are rebuilt.
 """
 
 import mmap
@@ -42,23 +42,23 @@ _KEPT: dict[Opcode, Any] = {
     Opcode.METADATA: Metadata,
 }
 _MADE_ANEW = {*Opcode} - _KEPT.keys()
-_HEADS = re.compile(rb"[\x03\x04\x06\x09\x0c].{4}\0{4}", re.DOTALL)  # of records that are kept
+_HEADS = re.compile(rb"[\x03\x04\x06\x09\x0c].{4}\0{4}", re.DOTALL)  # heads of kept records
 _MESSAGE = struct.Struct("<BQHIQQ")
 
 
 class Part(NamedTuple):
-    """A stretch of a file: a whole record that is kept, or damaged bytes."""
+    """A range of a file: an intact record to keep, or damaged bytes."""
 
     begin: int
     end: int
-    opcode: int = 0  #: of the record; 0: damaged
+    opcode: int = 0  #: opcode of the record; 0: damaged
 
 
 def repaired(path: Path, *, is_last: bool) -> list[str]:
-    """Completes or repairs a file; returns what was done, nothing if it is whole.
+    """Completes or repairs a file; returns texts about the changes, none if it is intact.
 
-    is_last: no file of the recording follows it. A damaged file is kept as NAME.mcap.damaged.
-    Raises RecordingError.
+    is_last: no file of the recording follows this one. A damaged file is kept as
+    NAME.mcap.damaged. Raises RecordingError if the file cannot be repaired.
     """
     with errors_explained(path):
         size, found = path.stat().st_size, None
@@ -81,7 +81,7 @@ def repaired(path: Path, *, is_last: bool) -> list[str]:
 
 
 def _has_data_behind(path: Path, found: Scan) -> bool:
-    """Whether data are whole behind the record at which the scan of a file ended."""
+    """True if intact data follow the record at which the scan of a file ended."""
     if found.finished:
         return False
     of_data = (Opcode.CHUNK, Opcode.ATTACHMENT, Opcode.METADATA)  # the summary has others
@@ -100,7 +100,7 @@ def _salvaged(path: Path, found: Scan | None, is_last: bool) -> list[str]:
         raise RecordingError(f"{path} is being written by a recorder: end it first") from None
     except OSError as error:
         raise RecordingError(f"{path} cannot be written: {reason(path, error)}") from error
-    new.unlink(missing_ok=True)  # of a repair that was killed
+    new.unlink(missing_ok=True)  # left by a killed repair
     file = opened(new, proceed=False)
     try:
         with path.open("rb") as old, mmap.mmap(old.fileno(), 0, access=mmap.ACCESS_READ) as data:
@@ -124,13 +124,13 @@ def _salvaged(path: Path, found: Scan | None, is_last: bool) -> list[str]:
 
 
 def _parts(data: mmap.mmap, at: int = len(MAGIC), found: Scan | None = None) -> Iterator[Part]:
-    """Records to keep and damaged stretches of a file, without records that are written anew.
+    """Yields records to keep and damaged ranges of a file, without records that are rebuilt.
 
-    found: has the places of records, if their own heads are damaged.
+    found: gives the offsets of records whose own heads are damaged.
     """
     known = {} if found is None else _places_in(found)
     places = sorted(known, reverse=True)
-    after = at  # of the last record that is kept
+    after = at  # end of the last record to keep
     while True:
         match = _HEADS.search(data, at)
         while places and places[-1] < at:
@@ -152,7 +152,7 @@ def _parts(data: mmap.mmap, at: int = len(MAGIC), found: Scan | None = None) -> 
 
 
 def _places_in(found: Scan) -> dict[int, tuple[Opcode, int]]:
-    """Opcode and length of the chunks, attachments and texts by their places."""
+    """Returns opcode and length of chunks, attachments and metadata, by offset."""
     chunks = {each.chunk_start_offset: each.chunk_length for each in found.chunks}
     attachments = {each.offset: each.length for each in found.attachments}
     texts = {each.offset: each.length for each in found.metadata_places}
@@ -165,7 +165,7 @@ def _places_in(found: Scan) -> dict[int, tuple[Opcode, int]]:
 
 
 def _is_made_anew(data: mmap.mmap, at: int, end: int) -> bool:
-    """Whether a stretch consists of records that follow from others."""
+    """True if a range consists of records that are rebuilt from others."""
     while at + HEAD.size <= end:
         opcode, length = HEAD.unpack_from(data, at)
         if opcode not in _MADE_ANEW:
@@ -175,7 +175,7 @@ def _is_made_anew(data: mmap.mmap, at: int, end: int) -> bool:
 
 
 def _record(opcode: int, content: bytes) -> Any:
-    """A record that is kept, if it is whole."""
+    """Parses a record to keep; None if it is damaged."""
     stream = BytesIO(content)
     try:
         record = _KEPT[Opcode(opcode)].read(ReadDataStream(stream))
@@ -190,7 +190,7 @@ def _record(opcode: int, content: bytes) -> Any:
 
 
 def _messages(chunk: Chunk) -> Iterator[tuple[int, int, bytes]]:
-    """Channel, log time and data of each message. Raises exceptions of many kinds."""
+    """Yields channel, log time and data of each message. Raises any exception if damaged."""
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     content, at = stream.read(length), 0
     while at < length:
@@ -202,7 +202,7 @@ def _messages(chunk: Chunk) -> Iterator[tuple[int, int, bytes]]:
 
 
 def _numbers(record: Metadata, *names: str) -> tuple[int, ...]:
-    """Numbers of a record of texts, which has no checksum; -1: damaged."""
+    """Parses numbers of a metadata record, which has no checksum; -1: damaged."""
     texts = [record.metadata.get(name, "") for name in names]
     return tuple(int(text) if text.isdecimal() else -1 for text in texts)
 
@@ -215,13 +215,13 @@ class _Salvage:
         self._parts = [*_parts(data, found=found)]
         self._channels: dict[int, Channel] = {}
         self._new: dict[int, int] = {}  # number of each channel in the new file
-        self._next: dict[int, int] = {}  # row or journal entry, by channel
+        self._next: dict[int, int] = {}  # next row or journal entry, by channel
         self._last: dict[int, int] = {}  # end of the last chunk, by channel [bytes]
         self.doubtful: list[str] = []  #: damaged attachments: kept, because rows may depend on them
-        self._holes: list[tuple[str, int, int, int]] = []  # name of its record, channel, range
+        self._holes: list[tuple[str, int, int, int]] = []  # name of the record, channel, range
 
     def run(self, is_last: bool, *, was_cut: bool) -> list[Part]:
-        """Writes everything but the summary. Returns what is damaged."""
+        """Writes everything but the summary. Returns the damaged ranges."""
         self._add_channels()
         seen = set()
         for part in self._parts:
@@ -248,7 +248,7 @@ class _Salvage:
         return damaged
 
     def _add_channels(self) -> None:
-        """Adds the last copy of each: the one in the summary, which has a checksum."""
+        """Adds the last copy of each channel: the one in the summary, which has a checksum."""
         schemas: dict[int, Schema] = {}
         for begin, end, opcode in self._parts:
             if opcode in (Opcode.SCHEMA, Opcode.CHANNEL):
@@ -268,7 +268,7 @@ class _Salvage:
             self._file.add_chunk(blocks)
 
     def _is_next(self, number: int, message: bytes) -> bool:
-        """False: a row or entries that a later one was written before. Notes a hole before it."""
+        """False if later rows or entries were written already. Notes a hole before the message."""
         texts = self._channels[number].metadata
         note = EpochNote.of(texts)
         if note is not None:
@@ -289,7 +289,7 @@ class _Salvage:
         return first >= expected
 
     def _note_ends(self, damage_end: int) -> None:
-        """Runs whose last rows were damaged: the row is known only if the end was recorded."""
+        """Notes damaged ends of runs: the last row is known only if the end was recorded."""
         ends = {each.name: each for each in self._file.found.metadata}
         for number, channel in self._channels.items():
             note = EpochNote.of(channel.metadata)

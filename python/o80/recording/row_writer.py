@@ -1,4 +1,4 @@
-"""Messages of the rows of one run of a backend."""
+"""Converts the rows of one run of a backend to messages."""
 
 import time
 
@@ -17,7 +17,7 @@ from o80.rows.layout import Layout
 
 
 class RowWriter:
-    """Makes messages of the rows of one epoch."""
+    """Converts the rows of one epoch to messages."""
 
     def __init__(
         self, layout: "Layout", note: EpochNote, channel: int, joints: JointWriter | None
@@ -44,7 +44,7 @@ class RowWriter:
         return cls(layout, note, channel, JointWriter.added_to(file, layout, note, None))
 
     def blocks(self, rows: NDArray[np.void]) -> list[Block]:
-        """The messages of consecutive rows; of a robot with joints, also their states."""
+        """Encodes consecutive rows; for a robot with joints, also as joint states."""
         raw = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
         log_times = (rows["time"] + self.note.wall_offset).astype(np.uint64)
         first = int(rows["iteration"][0])

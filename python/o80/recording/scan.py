@@ -1,9 +1,9 @@
-"""Contents of an MCAP file, also of one that was cut off in the middle.
+"""Reads the contents of an MCAP file, also of a truncated one.
 
 A file of o80 is a sequence of groups, each written by one call: a schema, a channel, an attachment,
-a metadata record, or a chunk with the message indexes that follow it. A finished file has all of it
-again in its summary. Of a file without one a scan reads every record, and ends before the first
-group that is not whole.
+a metadata record, or a chunk with the message indexes that follow it. The summary of a finished
+file repeats all groups. Without a summary a scan reads every record, and ends before the first
+incomplete group.
 """
 
 import os
@@ -45,16 +45,16 @@ from o80.recording.chunks import HEAD, Chunks
 
 MAGIC = b"\x89MCAP0\r\n"
 CUT = "o80.cut"
-"""Name of the metadata record behind the last whole chunk that a killed recorder has left."""
+"""Name of the metadata record behind the last whole chunk of a killed recorder."""
 CHUNK_HEAD = struct.Struct("<QQQIL")
 FOOTER_LENGTH = HEAD.size + 20 + len(MAGIC)
 DATA_END_LENGTH = HEAD.size + 4
-BETWEEN_FIGURES = 5000  # records that are scanned
+BETWEEN_FIGURES = 5000  # records between two reports of progress
 _DAMAGED = (EndOfFile, ValueError, OverflowError, LookupError, MemoryError, struct.error)
 
 
 class NotARecordingError(ValueError):
-    """The file does not begin as an MCAP file does."""
+    """The file does not begin like an MCAP file."""
 
 
 @dataclass
@@ -67,14 +67,14 @@ class Scan:
     attachments: list[AttachmentIndex] = field(default_factory=list)
     metadata: list[Metadata] = field(default_factory=list)
     metadata_places: list[MetadataIndex] = field(default_factory=list)
-    counts: dict[int, int] = field(default_factory=dict)  #: messages, by channel
-    end: int = 0  #: of the last whole group [bytes]
-    finished: bool = False  #: with a summary and a footer
+    counts: dict[int, int] = field(default_factory=dict)  #: number of messages, by channel
+    end: int = 0  #: end of the last whole group [bytes]
+    finished: bool = False  #: the file has a summary and a footer
     library: str = ""
     #: messages outside of chunks, chunks without indexes or with channels of their own: another
     #: program has written them
     foreign: bool = False
-    copy: "CopiedFile | None" = None  #: of a foreign file, in the form of o80: what was scanned
+    copy: "CopiedFile | None" = None  #: copy of a foreign file in the form of o80, scanned instead
 
     def take(self, opcode: int, stream: ReadDataStream) -> None:
         """Notes a header, a schema or a channel; nothing else."""
@@ -88,7 +88,7 @@ class Scan:
             self.channels[channel.id] = channel
 
     def opened(self, path: Path) -> IO[bytes]:
-        """The file that this is a scan of. Raises OSError."""
+        """Opens the scanned file. Raises OSError if it cannot."""
         return (path if self.copy is None else self.copy.path).open("rb")
 
 
@@ -121,7 +121,7 @@ def scan(path: str | os.PathLike[str]) -> Scan:
 
 
 def unreadable(path: Path, error: OSError) -> str:
-    """Text of an error about a file of a recording."""
+    """Returns the text of an error about a file of a recording."""
     if isinstance(error, FileNotFoundError):
         return f"{path} was deleted after it had been opened: open the recording again"
     return f"{path} cannot be read: {error.strerror}"
@@ -140,7 +140,7 @@ def has_summary(path: str | os.PathLike[str]) -> bool:
 
 
 def _footer(file: IO[bytes], size: int) -> Footer | None:
-    """The footer, if there is a summary."""
+    """Reads the footer; None if the file has no summary."""
     file.seek(max(0, size - FOOTER_LENGTH))
     data = file.read()
     if len(data) != FOOTER_LENGTH or not data.endswith(MAGIC) or data[0] != Opcode.FOOTER:
@@ -153,7 +153,7 @@ def _by_summary(file: IO[bytes], size: int) -> Scan | None:
     """Scan from the file's summary; None if that is missing or incomplete."""
     try:
         return _summary(file, size)
-    except _DAMAGED:  # a scan of all records says where
+    except _DAMAGED:  # a scan of all records reports where
         return None
 
 
@@ -167,7 +167,7 @@ def _scanned(file: IO[bytes], size: int, path: str | os.PathLike[str]) -> Scan:
 
 
 def damage_in(path: Path, found: Scan) -> Iterator[str]:
-    """Texts about wrong checksums, and about message indexes with wrong places."""
+    """Yields texts about wrong checksums, and about message indexes with wrong offsets."""
     with found.opened(path) as file:
         for chunk in found.chunks:
             try:
@@ -203,7 +203,7 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
     end = footer.summary_start - DATA_END_LENGTH
     file.seek(max(end, 0))
     data = file.read(size)
-    behind = len(data) - len(MAGIC) - 4  # of what the checksum covers
+    behind = len(data) - len(MAGIC) - 4  # end of the data that the checksum covers
     if end < 0 or len(data) < DATA_END_LENGTH or data[0] != Opcode.DATA_END:
         return None
     if zlib.crc32(data[DATA_END_LENGTH:behind]) != footer.summary_crc:
@@ -251,7 +251,7 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
 
 
 def content_of(file: IO[bytes], chunk: ChunkIndex) -> bytes:
-    """The decompressed content of a chunk. Raises ValueError if it is damaged."""
+    """Decompresses the content of a chunk. Raises ValueError if it is damaged."""
     file.seek(chunk.chunk_start_offset + HEAD.size)
     try:
         record = Chunk.read(ReadDataStream(file))
@@ -263,14 +263,14 @@ def content_of(file: IO[bytes], chunk: ChunkIndex) -> bytes:
 
 
 def index_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> NDArray[np.uint64]:
-    """The message index of a channel: (n, 2), log time [ns] and offset in the chunk."""
+    """Reads the message index of a channel: (n, 2), log time [ns] and offset in the chunk."""
     file.seek(chunk.message_index_offsets[channel] + HEAD.size + 2)
     (length,) = struct.unpack("<I", file.read(4))
     return np.frombuffer(file.read(length), "<u8").reshape(-1, 2)
 
 
 def messages_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> Iterator[bytes]:
-    """The data of a channel's messages in a chunk, of any size. Raises ValueError."""
+    """Yields the data of a channel's messages, of any size. Raises ValueError if damaged."""
     content = content_of(file, chunk)
     for _, offset in index_of(file, chunk, channel):
         begin = int(offset)
@@ -281,7 +281,7 @@ def messages_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> Iterator[by
 
 
 def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:
-    """An attachment with its data. Raises ValueError if it is damaged."""
+    """Reads an attachment with its data. Raises ValueError if it is damaged."""
     file.seek(place.offset + HEAD.size)
     try:
         stream = ReadDataStream(BytesIO(file.read(place.length - HEAD.size)))
@@ -292,7 +292,7 @@ def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:
 
 
 def place_of(attachment: Attachment, offset: int, length: int) -> AttachmentIndex:
-    """The entry of the summary for an attachment, whose record is there [bytes]."""
+    """Makes the summary's entry of an attachment whose record is at `offset` [bytes]."""
     return AttachmentIndex(
         offset,
         length,
@@ -308,7 +308,7 @@ class _Scanner:
     def __init__(self, file: IO[bytes], size: int, path: str | os.PathLike[str]) -> None:
         self._file, self._size, self._path = file, size, path
         self._scan = Scan(end=len(MAGIC))
-        self._chunk: ChunkIndex | None = None  # whose message indexes are being read
+        self._chunk: ChunkIndex | None = None  # the chunk whose message indexes are being read
 
     def run(self) -> Scan:
         progress = Progress(
@@ -404,7 +404,7 @@ class _Scanner:
         self._scan.end = chunk.chunk_start_offset + chunk.chunk_length + chunk.message_index_length
 
     def _whole_at_the_end(self) -> bool:
-        """Whether the last chunk has all its message indexes."""
+        """True if the last chunk has all its message indexes."""
         chunk = self._chunk
         if chunk is None or self._scan.finished:
             return True

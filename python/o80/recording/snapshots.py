@@ -1,4 +1,4 @@
-"""Asks simulations for snapshots while they are recorded, so that a replay can begin late."""
+"""Requests snapshots from simulations while they are recorded: a replay can begin at each."""
 
 import math
 import warnings
@@ -10,18 +10,18 @@ from o80.base.words import Status
 from o80.frontend.frontend import Frontend
 from o80.rows.journal import ENDS
 
-SLOT = 7  #: the last of the slots that simulations have: the recorder's
+SLOT = 7  #: slot of the recorder: the last one that simulations have
 
 
 def interval(seconds: float) -> float:
-    """Checks the time between two snapshots [s]. Raises InvalidArgument."""
+    """Checks the time between two snapshots [s]. Raises InvalidArgument unless positive."""
     if not 0 < seconds < math.inf:
         raise InvalidArgument(f"snapshots must be a positive number of seconds, got {seconds:g}")
     return seconds
 
 
 class SnapshotRequests:
-    """Sends `snapshot` to a segment again and again, and does not wait for the answer."""
+    """Sends `snapshot` to a segment periodically, without waiting for the result."""
 
     def __init__(self, seconds: float) -> None:
         self._seconds = seconds
@@ -30,7 +30,7 @@ class SnapshotRequests:
         self._said = False
 
     def poll(self, reader: Frontend) -> None:
-        """Sends one if it is due and nothing moves: others begin no replay."""
+        """Sends a request if it is due and nothing moves: a replay can begin only at rest."""
         if self._sent is not None:
             self._look(*self._sent)
         elif monotonic() >= self._at and reader.alive:
@@ -42,7 +42,7 @@ class SnapshotRequests:
                 self._say(f"'{reader.segment}' moved whenever one was due")
 
     def close(self) -> None:
-        """Gives the lane back."""
+        """Releases the lane."""
         if self._sent is not None:
             self._sent[0].close()
         self._sent = None
@@ -72,7 +72,7 @@ class SnapshotRequests:
         self._at = monotonic() + self._seconds
 
     def _say(self, why: str) -> None:
-        """Warns, once."""
+        """Warns once that no snapshot is recorded."""
         self._at = monotonic() + self._seconds
         if not self._said:
             self._said = True

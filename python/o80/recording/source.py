@@ -1,4 +1,4 @@
-"""One segment that is recorded: rows and journal in order, through restarts of its backend."""
+"""Reads one recorded segment: rows and journal in order, across restarts of its backend."""
 
 from collections.abc import Mapping
 from dataclasses import replace
@@ -18,12 +18,12 @@ from o80.recording.output import Written
 from o80.recording.row_writer import RowWriter
 from o80.recording.snapshots import SnapshotRequests
 
-LARGEST_BLOCK = 4 << 20  # of the rows read at once [bytes]
-BETWEEN_ATTEMPTS = 0.05  # for a backend that is not there [s]
+LARGEST_BLOCK = 4 << 20  # largest size of the rows of one read [bytes]
+BETWEEN_ATTEMPTS = 0.05  # time between two attempts to attach to an absent backend [s]
 
 
 class Source:
-    """Reads rows and journal of a segment by name. Not for several threads."""
+    """Reads rows and journal of a segment by name. For one thread."""
 
     def __init__(
         self,
@@ -36,15 +36,15 @@ class Source:
         snapshots: float | None = None,
     ) -> None:
         """written: by epoch, at least the newest. clock: of the recording. from_now: begin with
-        the newest row. snapshots: ask for one in this time [s].
+        the newest row. snapshots: interval of snapshot requests [s].
         """
         self.name = name
-        self.rows = 0  #: recorded so far
-        self.missed = 0  #: overwritten before they were read
-        self.behind = 0  #: published and not read, at the last look
+        self.rows = 0  #: rows recorded so far
+        self.missed = 0  #: rows overwritten before they were read
+        self.behind = 0  #: rows published but unread at the last poll
         #: Marks of frontends that were read and not written yet: text and iteration.
         self.marks: list[tuple[str, int]] = []
-        self.log: list[Line] = []  #: what was not written yet
+        self.log: list[Line] = []  #: lines that were not written yet
         self._file = file
         self._written = dict(written)
         self._clock = clock
@@ -68,9 +68,9 @@ class Source:
         return (-1 if self._frontend is None else self._frontend.epoch), self.newest
 
     def has_read(self, position: tuple[int, int]) -> bool:
-        """Whether the row at an earlier `position` and the decisions until then were read.
+        """True if the row at an earlier `position` and the decisions up to it were read.
 
-        Also if they were lost with their backend.
+        True also if they were lost with their backend.
         """
         epoch, iteration = position
         drained = self._journal is None or self._journal.drained
@@ -83,12 +83,12 @@ class Source:
 
     @property
     def frontend(self) -> Frontend | None:
-        """The frontend of the backend that is read; None if there is none."""
+        """Frontend of the current backend; None if there is none."""
         return self._frontend
 
     @property
     def begin(self) -> int:
-        """The first row of this run in the recording."""
+        """First row of this run in the recording; -1: no run."""
         return -1 if self._frontend is None else self._written[self._frontend.epoch].note.begin
 
     @property
@@ -104,7 +104,7 @@ class Source:
         return None if self._journal is None else self._journal.begin
 
     def close(self) -> None:
-        """Detaches."""
+        """Detaches from the backend."""
         if self._snapshots is not None:
             self._snapshots.close()
         if self._frontend is not None:
@@ -112,7 +112,7 @@ class Source:
             self._frontend = None
 
     def is_filled(self, share: float) -> bool:
-        """Whether so much of a ring was not read yet, or there may be something to attach to."""
+        """True if this share of a ring is unread, or if there may be a backend to attach to."""
         frontend = self._frontend
         if frontend is None or not frontend.alive:
             return True
@@ -122,7 +122,7 @@ class Source:
         return self._journal is not None and self._journal.unread >= share
 
     def poll(self) -> list[MessageBlock]:
-        """The rows and decisions since the last call; at most LARGEST_BLOCK bytes of rows."""
+        """Returns rows and decisions since the last call; rows of at most LARGEST_BLOCK bytes."""
         if self._frontend is None and not self._attach():
             return []
         assert self._frontend is not None
@@ -130,7 +130,7 @@ class Source:
         if self._snapshots is not None:
             self._snapshots.poll(self._frontend)
         if not self._frontend.alive:
-            blocks = blocks or self._read(self._frontend)  # what was published just before its end
+            blocks = blocks or self._read(self._frontend)  # rows published just before its end
             if self.has_read(self.position):
                 self._note_end(self._frontend)
             if not blocks and self._attach():
@@ -138,7 +138,7 @@ class Source:
         return blocks
 
     def _read(self, frontend: Frontend) -> list[MessageBlock]:
-        """Rows, then the journal, which so has the decisions of all these rows."""
+        """Reads rows, then the journal, so that it has the decisions of all these rows."""
         blocks: list[MessageBlock] = [*self._read_rows(frontend)]
         journal = self._read_journal()
         return blocks if journal is None else [*blocks, journal]
@@ -146,7 +146,7 @@ class Source:
     # ------------------------------------------------------------------ which backend
 
     def _attach(self) -> bool:
-        """Attaches to a backend that is not the one that was read. False: there is none."""
+        """Attaches to a backend other than the one that was read; False if there is none."""
         now = monotonic()
         if now < self._attempt_at:
             return False
@@ -186,7 +186,7 @@ class Source:
             if known.journal is None:
                 self._journal.add_channel(self._file, note)
         self._end_noted = False
-        if self._was_interrupted and known.last < 0:  # other runs may have come between
+        if self._was_interrupted and known.last < 0:  # runs may be missing in between
             texts = note.run_texts() | {"since": str(self._last_log_time)}
             self._file.add_metadata(note.record("interruption"), texts)
         self._was_interrupted = False
@@ -196,7 +196,7 @@ class Source:
             )
 
     def _refuse_other_format(self, known: Written) -> None:
-        """A journal is continued in the format in which it was begun."""
+        """Raises RecordingError if the journal was begun in another format."""
         if known.journal is None:
             return
         codec = codec_of(self._file.found, known.journal)
@@ -207,7 +207,7 @@ class Source:
             )
 
     def continue_in(self, file: FileWriter) -> None:
-        """Writes what follows into another file."""
+        """Writes all further rows and entries into another file."""
         self._file = file
         if self._frontend is None or self._writer is None:
             return
@@ -217,13 +217,13 @@ class Source:
             self._journal.add_channel(file, note)
 
     def _first_time(self, frontend: Frontend) -> Written:
-        """Note for an epoch that is not in the recording yet."""
+        """Makes the note of an epoch that is not in the recording yet."""
         first = frontend.published
         if not self._from_now or self._written:
             first = min(first, _oldest_safe(frontend))
         number = 1 + max((each.note.number for each in self._written.values()), default=-1)
         times = frontend.history(since=first, until=first).time
-        first_time = int(times[0]) if len(times) else 2**62  # it was overwritten meanwhile
+        first_time = int(times[0]) if len(times) else 2**62  # the row was overwritten meanwhile
         note = note_of(frontend, number, first)
         return Written(self._clock.placed(note, first_time, self._last_log_time))
 
@@ -268,7 +268,7 @@ class Source:
         return Messages(self._journal.channel, [(time, entries.message())])
 
     def _note_end(self, frontend: Frontend) -> None:
-        """A backend that was killed could not write its end into the journal."""
+        """Records the end of a run: a killed backend could not write it into the journal."""
         if self._end_noted or self._writer is None:
             return
         self._end_noted = True
@@ -284,7 +284,7 @@ class Source:
         self.log.append(Line(self.name, self.log_time(iteration), level, said))
 
     def log_time(self, iteration: int) -> int:
-        """Log time of a row [ns]; if it is not there any more, that of the newest one read."""
+        """Returns the log time of a row [ns]; if the row is gone, that of the newest row read."""
         if self._frontend is not None and self._writer is not None:
             rows = self._frontend.history(since=iteration, until=iteration)
             if len(rows):
@@ -298,7 +298,7 @@ class Source:
 
 
 def _oldest_safe(frontend: Frontend) -> int:
-    """The oldest row to read; of a living backend that overwrites rows, 2 % of them later."""
+    """Returns the oldest row to read; 2 % later if a living backend overwrites rows."""
     oldest = frontend.oldest
     if oldest == 0 or not frontend.alive:
         return oldest

@@ -1,4 +1,4 @@
-"""The end of an MCAP file: a summary, with which readers find everything without reading it all."""
+"""Writes the end of an MCAP file: a summary, so that readers need not read the whole file."""
 
 import struct
 import zlib
@@ -10,12 +10,12 @@ from mcap.records import DataEnd, Statistics, SummaryOffset
 from o80.recording.chunks import HEAD, bytes_of
 from o80.recording.scan import MAGIC, Scan
 
-OF_A_CHUNK = 128  # most bytes of the summary that a chunk adds, with one channel
+OF_A_CHUNK = 128  # most bytes that a chunk with one channel adds to the summary
 OF_THE_REST = 65536
 
 
 def end_of_file(found: Scan, size: int) -> Iterator[bytes | bytearray]:
-    """All that follows the data of a file, which has this size [bytes], in pieces."""
+    """Yields the end of a file, in pieces; size: bytes of the data before it."""
     data_end = bytes_of(DataEnd(0))
     yield data_end
     at = begin = size + len(data_end)
@@ -32,7 +32,7 @@ def end_of_file(found: Scan, size: int) -> Iterator[bytes | bytearray]:
 
 
 def room_for_end(found: Scan) -> int:
-    """More bytes than the end takes after one more chunk."""
+    """Returns an upper bound of the size of the end after one more chunk [bytes]."""
     texts = sum(len(each.data) for each in found.schemas.values())
     rest = 512 * len(found.channels) + 256 * (len(found.metadata) + len(found.attachments))
     next_chunk = OF_A_CHUNK + 10 * len(found.channels)

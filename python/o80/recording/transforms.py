@@ -15,7 +15,7 @@ from o80.rows.layout import Layout
 
 TOPIC = "/tf"
 TYPE = "tf2_msgs/msg/TFMessage"
-WORLD = "world"  #: frame of the models' world, in which all poses are
+WORLD = "world"  #: frame of the models' world, to which all poses refer
 DEFINITION = f"""\
 geometry_msgs/TransformStamped[] transforms
 {SEPARATOR}
@@ -43,22 +43,22 @@ _XYZ_THEN_XYZW = [0, 1, 2, 4, 5, 6, 3]  # MuJoCo begins a quaternion with w
 
 
 class Poses(Protocol):
-    """Bodies of a robot that move, and where they are in a row."""
+    """Moving bodies of a robot, and where their poses are in a row."""
 
     @property
     def bodies(self) -> Sequence[str]: ...
 
     def observed(self, row: bytes) -> NDArray[np.float64]:
-        """Positions [m] and quaternions that begin with w (bodies, 7), in the world."""
+        """Returns positions [m] and quaternions (w first) in the world: (bodies, 7)."""
 
 
 class TransformWriter:
-    """Makes a message of one row in each period."""
+    """Writes one message in each period."""
 
     def __init__(
         self, file: FileWriter, segment: str, layout: Layout, poses: Poses, rate: float
     ) -> None:
-        """Rate: of messages [Hz]."""
+        """rate: frequency of the messages [Hz]."""
         self._poses, self._rate = poses, rate
         self._layout = layout
         self._last = -1.0  # number of the period of the last message
@@ -75,7 +75,7 @@ class TransformWriter:
         self._template = cdr.data
 
     def block(self, rows: Sequence[tuple[int, bytes]]) -> Block | None:
-        """The messages of rows, given by log time [ns] and message; None if none is due."""
+        """Encodes the due ones of rows (log time [ns], message); None if no message is due."""
         chosen = []
         for time, message in rows:
             period = time * self._rate // 1_000_000_000

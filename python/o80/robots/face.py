@@ -26,9 +26,9 @@ _BEGIN = "face:"
 
 
 def described(of: Any, load: Callable[[Any], Any]) -> Mapping[str, Any]:
-    """The schema of a robot, a segment, a recording, a file, or of what these names stand for.
+    """Returns the schema of a robot, a segment, a recording or a file, or of one given by name.
 
-    load: loads a robot. Raises InvalidArgument, DriverError, RecordingError.
+    load: loads a robot. Raises InvalidArgument, DriverError, RecordingError if `of` has no schema.
     """
     if isinstance(of, (str, os.PathLike)):
         of = _named(os.fspath(of), load)
@@ -77,7 +77,7 @@ def _only(recording: Any) -> Any:
 
 
 def compared(schema: Mapping[str, Any]) -> dict[str, Any]:
-    """The part of a schema that programs see: without helps, offsets, and OF_SIMULATIONS."""
+    """Returns the part of a schema that affects programs: no helps, offsets, OF_SIMULATIONS."""
 
     def part(value: Any) -> Any:
         if isinstance(value, Mapping):
@@ -95,7 +95,7 @@ def compared(schema: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def text_of_face(schema: Mapping[str, Any]) -> str:
-    """The text of a description that include/o80/describe/face.hpp reads."""
+    """Encodes a description as a text that include/o80/describe/face.hpp reads."""
     try:
         builder, period = _built(schema), int(schema.get("period", 0))
     except InvalidArgument:
@@ -109,12 +109,12 @@ def text_of_face(schema: Mapping[str, Any]) -> str:
 
 
 def is_text_of_face(text: object) -> bool:
-    """True for what `text_of_face` gives."""
+    """True for a text made by `text_of_face`."""
     return isinstance(text, str) and text.startswith(_BEGIN)
 
 
 def _built(schema: Mapping[str, Any]) -> _core.SchemaBuilder:
-    """The description as the tables that segments hold."""
+    """Builds the tables of a description, as segments hold them."""
     builder = _core.SchemaBuilder(schema.get("robot", ""))
     for group in schema["groups"]:
         index = _add_type(builder, group["type"])
@@ -148,7 +148,7 @@ def _set_limit(builder: _core.SchemaBuilder, index: int, limit: Mapping[str, Any
 
 
 def _add_type(builder: _core.SchemaBuilder, described: Mapping[str, Any]) -> int:
-    """Adds a type, after those in it; returns its index."""
+    """Adds a type, after its inner types; returns its index."""
     fields = [
         {**field, "index": _add_type(builder, field["type"])} if "type" in field else {**field}
         for field in described["fields"]

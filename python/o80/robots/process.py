@@ -32,9 +32,9 @@ BAD_OPTIONS = 2  # exit code
 class Process(lifecycle.Managed):
     """A robot's process. Leaving a `with` block stops it; it also ends when this process does.
 
-    The robot stops in order when this process ends in any way, also by a kill. Start it with
-    `o80 run` if it must continue. If it is garbage collected while it runs, it is stopped with a
-    ResourceWarning. May be used from several threads; a forked child may call only `frontend`.
+    The robot stops in order when this process ends in any way, also by a kill. Start a robot with
+    `o80 run` if it must continue. Garbage collection stops a running robot with a ResourceWarning.
+    May be used from several threads; a forked child may call only `frontend`.
     """
 
     _owner = 0  # an interrupt may come before it is set
@@ -58,7 +58,7 @@ class Process(lifecycle.Managed):
 
     @property
     def output(self) -> str:
-        """Everything it has printed so far."""
+        """Everything that the process has printed so far."""
         self._check_process()
         printed = self._output.fileno()
         text = b""
@@ -68,7 +68,7 @@ class Process(lifecycle.Managed):
         return text.decode(errors="replace")
 
     def frontend(self, timeout: float | None = 5.0, **options: Any) -> Frontend:
-        """A frontend attached to the robot; takes the arguments of Frontend."""
+        """Attaches a frontend to the robot; takes the arguments of Frontend."""
         return Frontend(self.segment, timeout, **options)
 
     def wait(self, timeout: float | None = None) -> int:
@@ -141,8 +141,8 @@ def start_process(
     timeout: float | None,
     environment: Mapping[str, str] | None = None,
 ) -> Process:
-    """Starts the program of a robot and waits until it runs. environment: None: as here."""
-    import tempfile  # here, for it takes a tenth of the time to import o80
+    """Starts a robot's program and waits until it runs. environment: None: this process's."""
+    import tempfile  # here, because it takes a tenth of the time to import o80
 
     _refuse_in_import()
     with above_standard():

@@ -50,9 +50,9 @@ class Option:
 
 
 def list() -> builtins.list[RobotFile]:
-    """All robots with a name: in O80_ROBOT_PATH, bundled with o80, and in Python packages.
+    """Lists all robots with a name: in O80_ROBOT_PATH, bundled with o80, and in Python packages.
 
-    A robot whose package fails, or needs one that is not installed, is left out: `load` says why.
+    A robot whose package fails, or needs a missing one, is left out: `load` raises the reason.
     """
     found = {name: Path(path) for name, path in _core.find_robots()}
     for name, point in announced(GROUP).items():
@@ -63,7 +63,7 @@ def list() -> builtins.list[RobotFile]:
 
 
 def path_of(name_or_path: str | os.PathLike[str]) -> Path:
-    """The library of a robot, given its name or a path.
+    """Returns the library of a robot, given its name or a path.
 
     Raises DriverError for an unknown name, with the known robots in its text.
     """
@@ -80,9 +80,9 @@ def path_of(name_or_path: str | os.PathLike[str]) -> Path:
 
 
 def load(name_or_path: str | os.PathLike[str] | type[Any]) -> "Robot":
-    """Loads a robot: by its name, by the path of its library, or a driver class in Python.
+    """Loads a robot by its name, by the path of its library, or by a driver class in Python.
 
-    A class is given itself, or as "module:Class" or "file.py:Class", which imports the module.
+    A class is given as such, or as "module:Class" or "file.py:Class", which imports the module.
     Raises DriverError with the known robots in its text.
     """
     if isinstance(name_or_path, type):
@@ -100,7 +100,7 @@ def load(name_or_path: str | os.PathLike[str] | type[Any]) -> "Robot":
 
 
 def face(of: Any) -> dict[str, Any]:
-    """The face of a robot: what a program sees of it, as plain data to compare and to save.
+    """Returns the face of a robot: the properties that programs rely on, as plain data.
 
     Groups, actuators with their limits, sensor values and requests, without those of simulations
     (reset, snapshot, restore). A script that runs on one robot runs on each with an equal face.
@@ -108,13 +108,13 @@ def face(of: Any) -> dict[str, Any]:
     of: a Robot, a frontend, a recorded segment, or the name of a running segment, of a robot, of a
         recording (FILE.mcap, FILE.mcap:SEGMENT) or of a JSON file.
 
-    Raises InvalidArgument, DriverError, RecordingError.
+    Raises InvalidArgument, DriverError, RecordingError if `of` is unknown or unusable.
     """
     return compared(described(of, load))
 
 
 def face_text(of: Any) -> str:
-    """The text of an option that takes a face; such a text, and an empty one, stay as they are."""
+    """Returns the text of an option that takes a face; keeps such a text, and an empty one."""
     return of if of == "" or is_text_of_face(of) else text_of_face(described(of, load))
 
 
@@ -125,7 +125,7 @@ def is_place(text: str) -> bool:
 
 
 def place_of(robot: str) -> str | None:
-    """Where the driver class of a robot is found, if it is in Python: "module:Class"."""
+    """Returns the place of a robot's driver class in Python: "module:Class"; None for others."""
     if is_place(robot):
         return robot
     driver = _announced_class(robot)
@@ -133,32 +133,32 @@ def place_of(robot: str) -> str | None:
 
 
 def preset_of(name: str) -> tuple[str, dict[str, Any]] | None:
-    """The robot and the options for which a package announces a name; None for other names.
+    """Returns robot and options that a package announces under a name; None for other names.
 
-    Raises DriverError if the options are not to be had here, with the reason.
+    Raises DriverError with the reason if the options are not available here.
     """
     value = _announced(name)
     return (value[0], value[1]()) if isinstance(value, tuple) else None
 
 
 def _announced_class(name: str) -> type[Any] | None:
-    """The driver class that a Python package announces under a name."""
+    """Returns the driver class that a Python package announces under a name, or None."""
     value = _announced(name)
     return value if isinstance(value, type) else None
 
 
 def _announced(name: str) -> Any:
-    """Value of the entry point of a robot, unless a bundled one has its name; None: there is none.
+    """Returns the value of a robot's entry point; None without one, or for a bundled robot's name.
 
-    Raises DriverError.
+    Raises DriverError if the package fails.
     """
     point = announced(GROUP).get(name)
     return None if point is None or name in dict(_core.find_robots()) else _value_of(point)
 
 
 def _value_of(point: "EntryPoint") -> Any:
-    """Value of an entry point: a driver class, a path, the name of a robot with a function that
-    gives options of it, or the result of a function that gives one of these.
+    """Loads an entry point: a driver class, a path, the name of a robot with a function that
+    returns options for it, or a function that returns one of these.
     """
     package = point.dist.name if point.dist is not None else point.module
     try:
@@ -195,7 +195,7 @@ class Robot:
 
     @property
     def name(self) -> str:
-        """Name of the robot (from O80_ROBOT), or of this robot with options (from a package)."""
+        """Name of the robot (O80_ROBOT), or a package's name for this robot with options."""
         return self._announced or self._library.name
 
     @property
@@ -205,7 +205,7 @@ class Robot:
 
     @property
     def built_with(self) -> str:
-        """Versions of o80 and of the libraries it links."""
+        """Versions of o80 and of the libraries that the robot links."""
         return self._library.built_with
 
     @property
@@ -218,9 +218,9 @@ class Robot:
         ]
 
     def describe(self, **config: Any) -> dict[str, Any]:
-        """The description that its segment would have (`Frontend.schema`), without a start.
+        """Returns the description of its segment (`Frontend.schema`) without starting the robot.
 
-        config: the robot's own options, see `options`. Raises DriverError, InvalidArgument.
+        config: the robot's own options, see `options`. Raises InvalidArgument for wrong ones.
         """
         return self._library.describe(self._config(config, ())).schema()
 
@@ -231,7 +231,7 @@ class Robot:
 
     @property
     def _environment(self) -> dict[str, str] | None:
-        """Environment variables of the robot's process; None: those of this one."""
+        """Environment variables of the robot's process; None: those of this process."""
         return None
 
     def start(
@@ -278,7 +278,7 @@ class Robot:
         gap: a longer time between two iterations halts the robot [s]; 0: none does; None: 20
             periods and at least 0.1 s for robots of the world, none for simulations, or less if
             the driver describes it.
-        accept_reading: start where the robot is read to be, even if it cannot have come there.
+        accept_reading: start at the read position, even if the robot cannot have reached it.
         resume: start without a halt even if the previous process was halted, or was killed while
             commands acted.
         policy, priority, cpus, lock_memory: real-time scheduling; settings that the machine refuses
@@ -355,15 +355,15 @@ class Robot:
 
         segment: name of its segment, to which others may attach (None: an unused name).
         frequency, history, lanes, lane_blocks, journal, permission, stale, silence: as for `start`.
-        copies: start so many of them as an InlineGroup, which steps them together. Their segments
+        copies: start this number of copies as an InlineGroup, which steps them all. Their segments
             have no names. Copies keep 64 rows, two lanes of 256 blocks and no journal, unless these
             options say otherwise.
         threads: threads that step the copies, the calling one included (None: one for each
             processor); or another group, whose threads are used: call the two in turn.
         config: the robot's own options, see `options`.
 
-        Closing the frontend or the group stops the robot. Raises DriverError, SegmentTaken,
-        InvalidArgument.
+        Closing the frontend or the group stops the robot. Raises DriverError with the driver's
+        fault, SegmentTaken, InvalidArgument.
         """
         known = names_of("inline")
         texts = loop_texts(locals(), known)
@@ -408,7 +408,7 @@ class Robot:
     def _config(
         self, config: Mapping[str, Any], loop: Sequence[str]
     ) -> builtins.list[tuple[str, str]]:
-        """Names and texts of the robot's own options. loop: other names, for the nearest one."""
+        """Converts the robot's own options to texts. loop: other known names, for suggestions."""
         kinds = {option.name: option.kind for option in self.options}
         texts = []
         for name, value in {**self._given, **config}.items():
@@ -434,7 +434,7 @@ class PythonRobot(Robot):
     """A driver class in Python. Its process is a Python program."""
 
     def __init__(self, driver: str | type[Any]) -> None:
-        """driver: the class, or where it is found. Raises DriverError."""
+        """driver: the class, or its place ("module:Class"). Raises DriverError if unusable."""
         from o80.drivers.driver_class import found, library_of
 
         self._class = found(driver) if isinstance(driver, str) else driver
@@ -457,7 +457,7 @@ class PythonRobot(Robot):
 
     @property
     def _environment(self) -> dict[str, str]:
-        """With the folders in which modules are found here."""
+        """Environment of this process, with its import folders in PYTHONPATH."""
         folders = [folder or os.getcwd() for folder in sys.path]
         return {**os.environ, "PYTHONPATH": os.pathsep.join(folders)}
 

@@ -15,16 +15,16 @@ ACTUATOR_HEADS = ("", "actuator", "state", "limits", "idle")
 
 @dataclass(frozen=True)
 class IntegralBounds:
-    """Bounds of what a number moves: a velocity moves the observed position of its actuator.
+    """Bounds of the integral of a number: a velocity moves the observed position of its actuator.
 
-    o80 brakes the velocity in time, and lets it move inward only where the position is outside. The
+    o80 brakes the velocity in time, and lets it only move inward while the position is outside. The
     velocity rests at 0 and has no limit of jerk.
     """
 
-    field: str  #: of the observed state; of an array, the element of the same index
+    field: str  #: field of the observed state; of an array, the element of the same index
     minimum: float = -math.inf
     maximum: float = math.inf
-    reaction: float = 0.0  #: time from the desired velocity to the observed one [s]
+    reaction: float = 0.0  #: delay of the observed velocity behind the desired one [s]
 
     def __post_init__(self) -> None:
         argument_checks.text(self.field, "field of o80.IntegralBounds")
@@ -54,7 +54,7 @@ class Limits:
     jerk: float = math.inf  #: [unit/s^3]
     error: float = math.inf  #: a larger difference of desired and observed halts the backend
     noise: float = 0.0  #: largest difference of two readings at rest; 0: a tenth of `error`
-    integral: IntegralBounds | None = None  #: what the number moves, if it is a velocity
+    integral: IntegralBounds | None = None  #: bounds of the position, if the number is a velocity
 
     def __post_init__(self) -> None:
         for name in NUMBERS:
@@ -67,7 +67,7 @@ class Limits:
 
     @classmethod
     def of(cls, given: "Limits | Sequence[float | None]") -> "Limits":
-        """Limits from Limits, or from (minimum, maximum, ...) in the order of the fields."""
+        """Makes limits from Limits, or from (minimum, maximum, ...) in the order of the fields."""
         if isinstance(given, Limits):
             return given
         if not isinstance(given, (tuple, list)) or len(given) > len(NUMBERS):
@@ -78,7 +78,7 @@ class Limits:
         return cls(**{name: value for name, value in pairs if value is not None})
 
     def numbers(self) -> tuple[float, ...]:
-        """All limits but those of the integral, in the order of the fields."""
+        """Returns all limits except the integral's, in the order of the fields."""
         return tuple(getattr(self, name) for name in NUMBERS)
 
 
@@ -93,7 +93,7 @@ class Number:
     unit: str
     help: str
     limits: Limits
-    rest: float | None  #: value to which it goes without a command; None: it holds or follows
+    rest: float | None  #: value that it approaches without a command; None: it holds or follows
 
     @property
     def minimum(self) -> float:
@@ -119,7 +119,7 @@ class Actuator:
     name: str
     group: str  #: empty if the robot is one array of actuators
     when_idle: str  #: "hold" or "follow"
-    numbers: tuple[Number, ...]  #: of its state, in order
+    numbers: tuple[Number, ...]  #: numbers of its state, in order
 
     @property
     def paths(self) -> list[str]:
@@ -154,7 +154,7 @@ class Actuator:
 
 
 def _limits(described: dict[str, Any], paths: list[str]) -> Limits:
-    """The limits of one number. paths: names of all numbers of the state."""
+    """Makes the limits of one number. paths: names of all numbers of the state."""
     given = {key: described[key] for key in LIMITS if described.get(key) is not None}
     if integral := described.get("integral"):
         known = {key: value for key, value in integral.items() if value is not None}
@@ -192,7 +192,7 @@ def actuators_of(schema: dict[str, Any]) -> list[Actuator]:
 
 
 class Actuators(list[Actuator]):
-    """The actuators of a robot, in a notebook as `o80 info` shows them."""
+    """The actuators of a robot; a notebook shows them like `o80 info`."""
 
     def __init__(self, actuators: Iterable[Actuator], schema: dict[str, Any]) -> None:
         super().__init__(actuators)
@@ -205,7 +205,7 @@ class Actuators(list[Actuator]):
 
 
 def actuator_rows(schema: dict[str, Any]) -> list[list[str]]:
-    """A row of ACTUATOR_HEADS for each actuator."""
+    """Makes a row with the columns ACTUATOR_HEADS for each actuator."""
     return [
         [
             str(index),
@@ -219,7 +219,7 @@ def actuator_rows(schema: dict[str, Any]) -> list[list[str]]:
 
 
 def field_text(field: dict[str, Any]) -> str:
-    """Name, shape and unit of a field."""
+    """Formats name, shape and unit of a field."""
     unit = f" [{field['unit']}]" if field["unit"] else ""
     shape = f"({', '.join(str(n) for n in field['shape'])})" if field["shape"] else ""
     return f"{field['name'] or field['kind']}{shape}{unit}"

@@ -17,9 +17,9 @@ class Column(NamedTuple):
 
     name: str
     dtype: np.dtype[Any]
-    offset: int  #: in the row
-    labels: dict[str, int] | None  #: of an enumeration
-    origin: str = "robot"  #: or "clock" or "world", from which its value comes (docs/drivers.md)
+    offset: int  #: offset in the row [bytes]
+    labels: dict[str, int] | None  #: labels of an enumeration; None: none
+    origin: str = "robot"  #: source of the value: "robot", "clock" or "world" (docs/drivers.md)
     unit: str = ""
     help: str = ""
 
@@ -47,7 +47,7 @@ def columns_of_part(schema: Mapping[str, Any], part: str) -> list[Column]:
 def numbers_below(
     described: Mapping[str, Any], path: str = "", start: int = 0, outer: str = "robot"
 ) -> Iterator[Column]:
-    """The numbers of a described type, in order. outer: origin of the field that holds it."""
+    """Yields the numbers of a described type, in order. outer: origin of the enclosing field."""
     for field in described["fields"]:
         origin = field.get("origin", outer)
         inner = ".".join(filter(None, (path, field["name"])))
@@ -66,7 +66,7 @@ def numbers_below(
 
 
 def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:
-    """The numbers at a path: "observed", "observed.elbow", "extended.force[2]", or of a group.
+    """Returns the numbers at a path: "observed", "observed.elbow", "extended.force[2]", a group.
 
     Raises InvalidArgument if there is none.
     """
@@ -86,7 +86,7 @@ def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:
 
 
 def _group_path(column: Column, schema: Mapping[str, Any]) -> str:
-    """The path of the group of a state: "observed.joints"."""
+    """Returns the path of the group of a state: "observed.joints"; empty: no state."""
     part, _, rest = column.name.partition(".")
     for actuator in schema["actuators"] if part != "extended" else ():
         if is_within(rest, actuator["name"]):
@@ -95,28 +95,28 @@ def _group_path(column: Column, schema: Mapping[str, Any]) -> str:
 
 
 def value_of(row: Any, column: Column) -> Any:
-    """The number of a column in an observation."""
+    """Returns the number of a column in an observation."""
     return np.ndarray((), column.dtype, row, column.offset)[()]
 
 
 def numbers_in(row: Any, layout: Layout, path: str) -> Any:
-    """The numbers of an observation at a path: one, or (n,). Raises InvalidArgument."""
+    """Returns numbers of an observation: one, or (n,). InvalidArgument for an unknown path."""
     values = [value_of(row, column) for column in layout.columns_at(path, columns_at)]
     return values[0] if len(values) == 1 else np.array(values)
 
 
 def is_within(column: str, path: str) -> bool:
-    """Whether a path names a column, or what it is part of."""
+    """True if a path names a column, or a field that contains it."""
     return column == path or column.startswith((path + ".", path + "["))
 
 
 def is_part(column: str, field: str) -> bool:
-    """Whether a field such as "observed.elbow", "elbow" or "extended" names or holds a column."""
+    """True if a field such as "observed.elbow", "elbow" or "extended" is or contains a column."""
     return is_within(column, field) or is_within(column.partition(".")[2], field)
 
 
 def chosen(robot: str, columns: Sequence[str], fields: Sequence[str]) -> list[str]:
-    """The columns that some field names. Raises InvalidArgument for a field that names none."""
+    """Returns the columns in some field. Raises InvalidArgument for a field without columns."""
     for field in fields:
         if not any(is_part(column, field) for column in columns):
             outer = {column.partition("[")[0] for column in columns}

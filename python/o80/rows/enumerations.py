@@ -1,4 +1,4 @@
-"""Enumerations of a robot: numbers that know their labels, in rows and in arrays of rows."""
+"""Enumerations of a robot: numbers with labels, in rows and in arrays of rows."""
 
 import copyreg
 from collections.abc import Iterator, Mapping
@@ -20,9 +20,9 @@ class EnumerationType(EnumType):
 class Enumeration(IntEnum, metaclass=EnumerationType):
     """A value of an enumerated field: equal to its label and to its number, printed as its label.
 
-    A comparison with a text that is no label raises InvalidArgument, a ValueError. Its hash is that
-    of its number: sets and dictionaries find it by number, not by label. A number without a label
-    is possible, because a driver may publish any number.
+    A comparison with a text that is no label raises InvalidArgument, a ValueError. The hash is that
+    of the number: sets and dictionaries find a value by number, not by label. A number without a
+    label is possible, because a driver may publish any number.
     """
 
     _labels_: ClassVar[dict[str, int]]
@@ -30,7 +30,7 @@ class Enumeration(IntEnum, metaclass=EnumerationType):
 
     @classmethod
     def _missing_(cls, value: object) -> "Enumeration | None":
-        """The value for a label, or for a number without one."""
+        """Makes the value for a label, or for a number without a label."""
         if isinstance(value, str):
             return cls(number_of(cls, value))
         if not isinstance(value, int):
@@ -68,7 +68,7 @@ Labels: TypeAlias = type[Enumeration] | Mapping[str, Any]
 
 @lru_cache(maxsize=1024)
 def enumeration_of(name: str, labels: tuple[tuple[str, int], ...]) -> type[Enumeration]:
-    """The enumeration with these labels and numbers, the same object for each call."""
+    """Makes the enumeration with these labels and numbers, once."""
     members = {_member_name(label): number for label, number in labels}
     make: Any = Enumeration
     made: type[Enumeration] = make(name, members, module=__name__)
@@ -78,7 +78,7 @@ def enumeration_of(name: str, labels: tuple[tuple[str, int], ...]) -> type[Enume
 
 
 def _member_name(label: str) -> str:
-    """The attribute for a label: the label itself, unless Python reserves it."""
+    """Returns the attribute of a label: the label itself, unless Python reserves it."""
     reserved = label in ("", "mro") or (label.startswith("_") and label.endswith("_"))
     return f"{label}_" if reserved else label
 
@@ -93,7 +93,7 @@ copyreg.pickle(EnumerationType, _reduced)  # type: ignore[arg-type]
 
 
 def number_of(enumeration: type[Enumeration], label: str) -> int:
-    """The number of a label. Raises InvalidArgument with the known labels."""
+    """Returns the number of a label. Raises InvalidArgument with the known labels."""
     number = enumeration._labels_.get(label)
     if number is None:
         instead = _core.names_instead(label, list(enumeration._labels_))
@@ -102,7 +102,7 @@ def number_of(enumeration: type[Enumeration], label: str) -> int:
 
 
 def numbers_of(labels: Labels | None, value: Any) -> Any:
-    """The value with numbers in the place of labels. Raises InvalidArgument for unknown labels."""
+    """Replaces labels in a value by numbers. Raises InvalidArgument for unknown labels."""
     if not isinstance(labels, type):
         return value
     if isinstance(value, str):
@@ -118,7 +118,7 @@ def numbers_of(labels: Labels | None, value: Any) -> Any:
 
 
 def _each(enumeration: type[Enumeration], numbers: Any) -> Any:
-    """The value of each number in nested lists."""
+    """Converts each number in nested lists to its value."""
     if isinstance(numbers, list):
         return [_each(enumeration, number) for number in numbers]
     return enumeration(numbers)
@@ -137,14 +137,14 @@ class EnumerationArray(np.ndarray[Any, np.dtype[Any]]):
         self._labels = getattr(made_from, "_labels", None)
 
     def labels(self) -> NDArray[Any]:
-        """The label of each element, as texts; the number in decimal where there is no label."""
+        """Returns the label of each element as text; the decimal number if there is no label."""
         if not isinstance(self._labels, type):
             raise InvalidArgument("an array of structs has no labels: choose a field of it")
         texts = [str(value) for value in self.ravel().tolist()]
         return np.array(texts, np.str_).reshape(self.shape)
 
     def tolist(self) -> Any:
-        """A list of Enumerations, nested like the array; of structs a list of their numbers."""
+        """Returns a list of Enumerations, nested like the array; for structs a list of numbers."""
         numbers = super().tolist()
         return _each(self._labels, numbers) if isinstance(self._labels, type) else numbers
 
@@ -246,7 +246,7 @@ class EnumerationRow(np.void):  # type: ignore[misc]
 
 
 def labelled(array: NDArray[Any], labels: Labels | None) -> Any:
-    """The same array as an EnumerationArray, if it has labels."""
+    """Returns the same array as an EnumerationArray, if it has labels."""
     if not labels:
         return array
     view = array.view(EnumerationArray)
@@ -255,7 +255,7 @@ def labelled(array: NDArray[Any], labels: Labels | None) -> Any:
 
 
 def _row_of(array: NDArray[Any], labels: Mapping[str, Any]) -> Any:
-    """A struct that knows its labels, in the memory of an array ()."""
+    """Makes a struct with labels, in the memory of an array ()."""
     row: Any = array.view(np.dtype((EnumerationRow, array.dtype)))[()]
     row._labels = labels
     return row

@@ -1,4 +1,4 @@
-"""The numbers of several actuators that rows of targets give."""
+"""Selects the numbers of several actuators that rows of targets contain."""
 
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
@@ -21,9 +21,9 @@ class _Number(NamedTuple):
 
 
 class GivenNumbers:
-    """Numbers in the states of several actuators: all, or those with a bit in a mask.
+    """Numbers in the states of several actuators: all numbers, or those with a bit in a mask.
 
-    masks: words of each actuator, one after the other, as those of `states_of`; empty for all.
+    masks: words of each actuator in turn, as returned by `states_of`; empty: all numbers.
     """
 
     def __init__(self, actuators: Sequence[int], masks: Sequence[int], layout: Layout) -> None:
@@ -70,16 +70,16 @@ class GivenNumbers:
             yield np.ndarray((rows,), kind, states.data, at, (self._sizes[place],))
 
     def values(self, states: NDArray[np.uint8], rows: int) -> NDArray[np.float64]:
-        """(rows, numbers) in the states of `states_of`."""
+        """Reads the numbers (rows, numbers) from the states of `states_of`."""
         columns = [each.astype(np.float64) for each in self._columns(states, rows)]
         return np.array(columns, np.float64).reshape(len(columns), rows).T
 
     def put(self, values: NDArray[np.float64], states: NDArray[np.uint8]) -> None:
-        """Writes (rows, numbers) to such states."""
+        """Writes numbers (rows, numbers) to such states."""
         for column, new in zip(self._columns(states, len(values)), values.T, strict=True):
             column[...] = np.rint(new) if column.dtype.kind in "iub" else new
 
     def desired(self, row: Any) -> NDArray[np.float64]:
-        """(numbers,) the desired values in an observation, read from its memory."""
+        """Reads the desired values (numbers,) from the memory of an observation."""
         numbers = zip(self._numbers, self._in_row, strict=True)
         return np.array([np.ndarray((), each.kind, row, at) for each, at in numbers], np.float64)

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 LONGEST = 2.0**62  # duration [ns], 146 years
 _HEAD = ("iteration", "time", "lateness", "overruns", "skipped", "fresh", "halted", "starvations")
 _ENDS = 5  # rows of each end of a history that a notebook shows
-_COLUMNS = 16  # most numbers of its rows
+_COLUMNS = 16  # most numbers of a row that a notebook shows
 
 
 class Range(TypedDict, total=False):
@@ -37,12 +37,12 @@ class Range(TypedDict, total=False):
 
 @dataclass(frozen=True)
 class Selection:
-    """Observations by number, by the last seconds, or by iterations and times."""
+    """Selects observations by count, by the last seconds, or by iterations and times."""
 
     n: int | None
     since: int | None
     until: int | None
-    duration: int | None  #: before the newest observation [ns]
+    duration: int | None  #: time before the newest observation [ns]
     from_time: int | None  #: [ns]
     to_time: int | None  #: [ns]
 
@@ -56,7 +56,7 @@ class Selection:
         from_time: int | None = None,
         to_time: int | None = None,
     ) -> Self:
-        """Makes a selection from the arguments of a call. Raises InvalidArgument."""
+        """Makes a selection from the arguments of a call. Raises InvalidArgument for wrong ones."""
         ends = since, until, from_time, to_time
         if (n is not None) + (seconds is not None) + any(end is not None for end in ends) > 1:
             raise InvalidArgument(
@@ -78,7 +78,7 @@ class Selection:
         iteration_at: Callable[[int], int],
         newest_time: Callable[[], int],
     ) -> tuple[int, int]:
-        """First and last iteration between oldest and newest; empty if first is above last.
+        """Returns first and last iteration between oldest and newest; empty if first is above last.
 
         iteration_at: returns the newest iteration at or before a time, `oldest - 1` if there is
             none.
@@ -104,15 +104,15 @@ class Selection:
 class History:
     """Consecutive observations, oldest first: arrays with a first dimension (T,).
 
-    Its arrays are views of one copy, `rows`, which does not change. It may hold fewer rows than
-    requested, but every row is complete. It can be pickled, and given to `numpy.save`,
+    All arrays are views of one copy, `rows`, which does not change. A history may hold fewer rows
+    than requested, but every row is complete. It can be pickled, and passed to `numpy.save`,
     `numpy.savez` and h5py, which store `rows`; for pandas there is `to_frame()`.
     """
 
     __slots__ = ("_decoder", "_layout", "rows")
 
     def __init__(self, decoder: _core.Decoder, rows: NDArray[Any]) -> None:
-        """Raises InvalidArgument if the rows do not lie as the description says."""
+        """Raises InvalidArgument if the rows have another layout than described."""
         decoder.layout.check(rows)
         self._decoder = decoder
         self._layout: Layout = decoder.layout
@@ -120,7 +120,7 @@ class History:
 
     @classmethod
     def _joined(cls, decoder: _core.Decoder, parts: Iterable["History"]) -> "History":
-        """One history of consecutive ones."""
+        """Joins consecutive histories."""
         nothing = np.empty(0, decoder.layout.row)
         each = [with_padding(rows) for rows in (nothing, *(part.rows for part in parts))]
         return cls(decoder, np.concatenate(each).view(nothing.dtype))
@@ -148,7 +148,7 @@ class History:
         To find observations by iteration or time use `at_iteration`, `at_time`, `select`.
         """
         if isinstance(index, str):
-            from o80.rows.columns import columns_at  # late: most processes that attach never ask
+            from o80.rows.columns import columns_at  # late: most processes never need it
 
             values = [values_of(self, each) for each in self._layout.columns_at(index, columns_at)]
             return values[0] if len(values) == 1 else np.stack(values, axis=1)
@@ -165,7 +165,7 @@ class History:
         return (self[i] for i in range(len(self)))
 
     def at_iteration(self, iteration: int) -> _core.Observation:
-        """The observation of an iteration. Raises RowOverwritten if it is not in this history."""
+        """Returns the observation of an iteration. Raises RowOverwritten if it is not in here."""
         iteration = whole(iteration, "iteration")
         place = int(np.searchsorted(self.iteration, iteration))
         if place == len(self) or self.iteration[place] != iteration:
@@ -173,7 +173,7 @@ class History:
         return self[place]
 
     def at_time(self, time: int) -> _core.Observation:
-        """The newest observation at or before a time [ns].
+        """Returns the newest observation at or before a time [ns].
 
         Raises RowOverwritten if all observations of this history are later.
         """
@@ -195,7 +195,7 @@ class History:
         from_time: int | None = None,
         to_time: int | None = None,
     ) -> "History":
-        """A part of this history, without a copy. The arguments are those of `Frontend.history`."""
+        """Returns a part of this history, without a copy; arguments as for `Frontend.history`."""
         selection = Selection.checked(n, since, until, seconds, from_time, to_time)
         if not len(self):
             return self
@@ -212,11 +212,11 @@ class History:
         return self[begin : max(begin, end)]
 
     def _place_of(self, time: int) -> int:
-        """Position of the newest observation at or before a time; -1 if all are later."""
+        """Returns the position of the newest observation at or before a time; -1: all are later."""
         return int(np.searchsorted(self.time, time, side="right")) - 1
 
     def _iteration_at(self, time: int) -> int:
-        """Iteration of that observation; one before the first if all are later."""
+        """Returns the iteration of that observation; one before the first if all are later."""
         place = self._place_of(time)
         return int(self.iteration[place]) if place >= 0 else int(self.iteration[0]) - 1
 
@@ -230,9 +230,9 @@ class History:
         )
 
     def to_frame(self) -> "pandas.DataFrame":
-        """A pandas data frame: a row for each observation, a column for each number.
+        """Converts to a pandas data frame: a row for each observation, a column for each number.
 
-        Its index is the iteration. Columns are named after part, actuator and field, such as
+        The index is the iteration. Columns are named after part, actuator and field, such as
         "observed.elbow", "desired.joints[0].position" or "extended.force[2]"; times are in
         nanoseconds. Enumerations are categories.
 
@@ -251,7 +251,7 @@ class History:
 
     @property
     def iteration(self) -> NDArray[np.int64]:
-        """Iterations: (T,), each one more than the one before."""
+        """Iterations: (T,), in steps of 1."""
         return self._part("iteration")
 
     @property
@@ -332,9 +332,9 @@ class History:
 
     @property
     def off_plan(self) -> NDArray[np.float32]:
-        """How far the desired states are from what commands ask for, where limits change them.
+        """Distance of the desired states from those that commands request, where limits act.
 
-        (T, actuators), the most of the numbers of each actuator, in their units.
+        (T, actuators), the largest of the numbers of each actuator, in their units.
         """
         if not self._layout.actuators:
             return np.zeros((len(self), 0), np.float32)
@@ -350,7 +350,7 @@ class History:
 
     @property
     def epoch(self) -> int:
-        """The number of the run that published them; 0: not known."""
+        """Number of the run that published the rows; 0: not known."""
         return self._decoder.epoch
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -358,11 +358,11 @@ class History:
 
     @property
     def _contiguous(self) -> NDArray[Any]:
-        """The rows without rows between them, which a slice may leave out."""
+        """Returns the rows without gaps between them, which a slice may leave."""
         return np.ascontiguousarray(with_padding(self.rows)).view(self.rows.dtype)
 
     def _repr_html_(self) -> str:
-        """As a table of a notebook: the first and the last rows."""
+        """Makes a table for a notebook: the first and the last rows."""
         from o80.base.screen import html  # late: most processes show no table
         from o80.rows.columns import columns_of
 
@@ -396,13 +396,13 @@ class History:
 
 
 def values_of(history: History, column: "Column") -> NDArray[Any]:
-    """The numbers of a column as a contiguous copy: (T,)."""
+    """Copies the numbers of a column to a contiguous array (T,)."""
     values: NDArray[Any] = history.rows.getfield(column.dtype, column.offset).copy()
     return values
 
 
 def numbers_of(history: History, columns: Sequence["Column"]) -> NDArray[np.float64]:
-    """The numbers of columns: (T, columns)."""
+    """Copies the numbers of columns to an array (T, columns)."""
     numbers = np.empty((len(history), len(columns)))
     for i, column in enumerate(columns):
         numbers[:, i] = values_of(history, column)
@@ -410,8 +410,8 @@ def numbers_of(history: History, columns: Sequence["Column"]) -> NDArray[np.floa
 
 
 def columns_in(history: History) -> dict[str, NDArray[Any]]:
-    """All numbers of all rows, by name, as in `History.to_frame`; enumerations as numbers."""
-    from o80.rows.columns import columns_of  # late: most processes that attach never ask
+    """Returns all numbers of all rows by name, as `History.to_frame`; enumerations as numbers."""
+    from o80.rows.columns import columns_of  # late: most processes that attach never need it
 
     columns = {name: np.ascontiguousarray(getattr(history, name)) for name in _HEAD}
     for column in columns_of(history.schema):
@@ -424,7 +424,7 @@ def columns_in(history: History) -> dict[str, NDArray[Any]]:
 
 
 def _categories(pandas: Any, values: NDArray[Any], labels: dict[str, int]) -> Any:
-    """Labels of an enumeration as categories; other values become missing values."""
+    """Converts an enumeration's numbers to categories; unknown numbers become missing values."""
     codes = np.full(len(values), -1)
     for code, value in enumerate(labels.values()):
         codes[values == value] = code

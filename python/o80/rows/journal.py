@@ -1,4 +1,4 @@
-"""The journal of a backend: what it decided, in its order."""
+"""The journal of a backend: its decisions, in order."""
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -29,23 +29,23 @@ ENDS = frozenset(
 
 @dataclass(frozen=True)
 class JournalCommand:
-    """A command, a request or an order of a batch, as its frontend sent it."""
+    """A command, a request or an order of a batch, in the form in which its frontend sent it."""
 
     #: command, purge, request, take_control, release_control, resume, mark, close_plan or unknown
     kind: str
-    id: int  #: the id that its `status` entries have
-    actuators: tuple[str, ...] = ()  #: of a command or a purge; of a purge of all: none
+    id: int  #: the id in its `status` entries
+    actuators: tuple[str, ...] = ()  #: of a command or a purge; empty for a purge of all
     #: For each actuator its target: a number, or a dictionary of the fields that were given. For a
     #: trajectory arrays, with a row for each waypoint.
     targets: tuple[Any, ...] = ()
     pace: str = ""  #: direct, duration, speed, until, iterations, fastest or chunk
-    amount: float | None = None  #: duration [s], iterations, the iteration of until, or the speed
+    amount: float | None = None  #: duration [s], iterations, iteration of until, or speed
     mode: str = ""
     profile: str = ""
     start: str = ""
     times: tuple[float, ...] = ()  #: of a trajectory with its own times [s]
-    #: Of a chunk: the iteration of the observation that it answers, when each row is due if the
-    #: actuators do not stand still, the iterations of its take-over (None: those that its limits
+    #: Of a chunk: the iteration of the observation that it is based on, when each row is due if the
+    #: actuators do not stand still, the iterations of its take-over (None: as many as its limits
     #: need), the first row that is played.
     anchor: int | None = None
     due: tuple[int, ...] = ()
@@ -55,7 +55,7 @@ class JournalCommand:
     final: bool = False  #: no chunk of its plan follows
     only_own: bool = False  #: of a purge: only commands of its frontend
     request: str = ""  #: the name of the request
-    fields: dict[str, Any] | None = None  #: its values
+    fields: dict[str, Any] | None = None  #: values of the request's fields
     halt: int | None = None  #: of a resume
     text: str = ""  #: of a mark
     unknown: str = ""  #: of kind unknown: what a newer o80 has recorded, such as "record kind 10"
@@ -73,20 +73,20 @@ class JournalEntry:
     iteration: int
     missed: int = 0  #: entries before this one that were overwritten before they were read
     lane: int | None = None  #: the lane of the frontend that caused it
-    sender: str = ""  #: its process, or that of the halt; empty if unknown
+    sender: str = ""  #: process of this frontend, or of the halt; empty if unknown
     id: int | None = None  #: of the batch; of `status` and chunk_begun: of the command
     ticket: int | None = None  #: place of a batch in the order of all pulses
-    at: int | None = None  #: the iteration that a batch was sent for, if it is another one
+    at: int | None = None  #: iteration that a batch was sent for, if it is another one
     burst: int | None = None  #: iterations that a burst may run; -1 until its batch has ended
-    seen: _core.Seen | None = None  #: by which row a batch was decided, as its sender says
-    cut: bool = False  #: of burst_ended: it ended early
+    seen: _core.Seen | None = None  #: row on which a batch is based, as reported by its sender
+    cut: bool = False  #: of burst_ended: the burst ended early
     follows: bool = False  #: of fresh_start: idle actuators follow from there on
     commands: tuple[JournalCommand, ...] = ()
-    commands_lost: bool = False  #: they were overwritten before they were read
-    clipped: int = 0  #: numbers of its targets that `clip` has put inside their bounds
-    #: Of chunk_begun: the row that is reached first, by how many iterations its rows are later than
-    #: they were sent for, and for each number ("elbow", "elbow.position") place, slope
-    #: [1/iteration] and curvature in the iteration before. They and the rows make the plan.
+    commands_lost: bool = False  #: the commands were overwritten before they were read
+    clipped: int = 0  #: numbers of its targets that `clip` has moved inside their bounds
+    #: Of chunk_begun: the row that is reached first, the iterations by which its rows are later
+    #: than sent for, and for each number ("elbow", "elbow.position") place, slope [1/iteration]
+    #: and curvature in the previous iteration. These and the rows define the plan.
     row: int | None = None
     shift: int | None = None
     starts: dict[str, tuple[float, float, float]] | None = None
@@ -95,15 +95,15 @@ class JournalEntry:
     halt: int | None = None  #: number of a halt
     cause: str = ""  #: of a halt
     text: str = ""  #: the reason of a halt, or of the end of the backend
-    actuator: str = ""  #: that the driver interrupted
-    slot: int | None = None  #: in which the driver keeps a snapshot
+    actuator: str = ""  #: actuator that the driver interrupted
+    slot: int | None = None  #: slot in which the driver keeps a snapshot
     #: Parts of the entry or its commands that this o80 does not know, such as "entry kind 30" (the
     #: kind is "none" then): a newer one has recorded it.
     unknown: str = ""
 
 
 def marks_in(entries: Iterable[JournalEntry]) -> list[tuple[str, int]]:
-    """Text and iteration of the marks that were taken."""
+    """Returns text and iteration of the marks that were taken."""
     return [
         (command.text, entry.iteration)
         for entry in entries
@@ -116,20 +116,20 @@ def marks_in(entries: Iterable[JournalEntry]) -> list[tuple[str, int]]:
 class Decisions(NamedTuple):
     """The N taken batches with a `seen` row, oldest first."""
 
-    taken: NDArray[np.int64]  #: (N,) the iteration that took it
+    taken: NDArray[np.int64]  #: (N,) iteration in which the batch was taken
     epoch: NDArray[np.uint64]  #: (N,) the run that published the row
-    iteration: NDArray[np.int64]  #: (N,) of the row
+    iteration: NDArray[np.int64]  #: (N,) iteration of the row
     since: NDArray[np.int64]  #: (N,) iteration of the commanded robot then; -1: not known
 
     @property
     def latency(self) -> NDArray[np.int64]:
-        """(M,) the decision latencies that are known [iterations]."""
+        """(M,) the known decision latencies [iterations]."""
         latency: NDArray[np.int64] = (self.taken - self.since)[self.since >= 0]
         return latency
 
 
 def decisions(entries: Iterable[JournalEntry | _core.JournalEntry]) -> Decisions:
-    """Which of the batches were decided by which rows."""
+    """Relates batches to the rows on which they are based."""
     found = [
         (each.iteration, seen.epoch, seen.iteration, -1 if seen.since is None else seen.since)
         for each in entries
@@ -145,16 +145,14 @@ def decisions(entries: Iterable[JournalEntry | _core.JournalEntry]) -> Decisions
 
 
 def latencies_of(entries: Iterable[JournalEntry | _core.JournalEntry]) -> list[int]:
-    """The decision latency of each batch that says what it was decided by [iterations]; -1: not
-    known.
-    """
+    """Returns the decision latency of each batch with a `seen` row [iterations]; -1: not known."""
     taken = decisions(entries)
     latencies: list[int] = np.where(taken.since < 0, -1, taken.taken - taken.since).tolist()
     return latencies
 
 
 def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:
-    """The ends of all commands whose batch is among the entries, in their order."""
+    """Returns the ends of all commands whose batch is among the entries, in order."""
     actuators: dict[tuple[int | None, int], tuple[str, ...]] = {}
     ends = []
     for entry in entries:
@@ -271,7 +269,7 @@ class EntryDecoder:
         )
 
     def _target(self, native: _core.JournalTarget, rows: int) -> Any:
-        """The rows of one actuator; of a struct the fields that were given."""
+        """Returns the rows of one actuator; for a struct the given fields."""
         described = self._types[native.actuator]
         states = np.frombuffer(native.states, dtype_of_type(described), rows)
         known = labelled(states, labels_of_type(described))
@@ -289,7 +287,7 @@ class EntryDecoder:
 
 
 def _plain(value: Any) -> Any:
-    """A value of a record without NumPy; an enumerated one knows its label."""
+    """Converts a value of a record to plain Python; an enumerated value keeps its label."""
     value = np.asarray(value) if isinstance(value, Record) else value
     return value.tolist() if isinstance(value, (np.ndarray, np.generic)) else value
 
@@ -308,7 +306,7 @@ def _bits(words: list[int]) -> Iterator[bool]:
 
 
 def _numbers(field: dict[str, Any]) -> int:
-    """Numbers in a described field, as a mask counts them."""
+    """Counts the numbers in a described field, like a mask."""
     count = int(np.prod(field["shape"], dtype=int)) if field["shape"] else 1
     if field["kind"] == "struct":
         return count * sum(_numbers(part) for part in field["type"]["fields"])

@@ -1,4 +1,4 @@
-"""Decisions of a backend in words."""
+"""Describes decisions of a backend in words."""
 
 from collections.abc import Callable
 from typing import Any
@@ -19,12 +19,12 @@ class JournalText:
     """Describes entries in words; keeps commands that have not ended, to name them at their end."""
 
     def __init__(self, style: Callable[[str, str], str] = _without_style) -> None:
-        """style: marks a text as in `o80.base.screen.style`."""
+        """style: formats a text, as `o80.base.screen.style`."""
         self._style = style
         self._open: dict[tuple[int | None, int], str] = {}
 
     def text(self, entry: JournalEntry) -> str:
-        """One decision in words."""
+        """Describes one decision in words."""
         if entry.kind in ("taken", "scheduled", "rejected"):
             return self._batch(entry)
         if entry.kind == "status":
@@ -93,7 +93,7 @@ class JournalText:
 
 
 def status_text(entry: JournalEntry, command: str | None) -> str:
-    """A status of a command in words; None: the command is not known."""
+    """Describes the status of a command in words; None: the command is not known."""
     what = command or f"command {entry.id} of lane {entry.lane}"
     status = "begins" if entry.status == "active" else str(entry.status)
     reason = f" ({entry.reason})" if entry.reason not in (None, "none") else ""
@@ -101,7 +101,7 @@ def status_text(entry: JournalEntry, command: str | None) -> str:
 
 
 def _seen(entry: JournalEntry) -> str:
-    """By which row a batch was decided: ", decided 12 iterations before"."""
+    """Describes the row on which a batch is based: ", decided 12 iterations before"."""
     if entry.seen is None:
         return ""
     if entry.kind == "taken" and entry.seen.since is not None:
@@ -114,7 +114,7 @@ def _sender(entry: JournalEntry) -> str:
 
 
 def command_text(command: JournalCommand) -> str:
-    """A command in words: "elbow to 0.5 in 2 s"."""
+    """Describes a command in words: "elbow to 0.5 in 2 s"."""
     if command.kind == "purge":
         own = "own commands of " if command.only_own else ""
         return f"purge {own}{', '.join(command.actuators) or 'all'}"

@@ -1,4 +1,4 @@
-"""Conversion of a robot's rows to NumPy arrays."""
+"""Converts a robot's rows to NumPy arrays."""
 
 from collections.abc import Callable, Iterator, Mapping
 from functools import lru_cache, partialmethod
@@ -27,7 +27,7 @@ MASKS = ("active", "clamped", "braking", "starved")  #: parts of a row with a bi
 
 
 def dtype_of_field(field: dict[str, Any]) -> np.dtype[Any]:
-    """The dtype of one element of a described field."""
+    """Returns the dtype of one element of a described field."""
     kind = field["kind"]
     if kind == "struct":
         return dtype_of_type(field["type"])
@@ -44,7 +44,7 @@ def is_plain(described: dict[str, Any]) -> bool:
 
 
 def dtype_of_type(described: dict[str, Any]) -> np.dtype[Any]:
-    """The dtype of a described struct or plain number."""
+    """Returns the dtype of a described struct or plain number."""
     fields = described["fields"]
     if is_plain(described):
         return np.dtype((dtype_of_field(fields[0]), tuple(fields[0]["shape"])))
@@ -59,7 +59,7 @@ def dtype_of_type(described: dict[str, Any]) -> np.dtype[Any]:
 
 
 def labels_of_type(described: dict[str, Any]) -> Any:
-    """The enumeration of a plain field; of a struct those of its fields, by name."""
+    """Returns the enumeration of a plain field; for a struct those of its fields, by name."""
     if is_plain(described):
         return labels_of_field(described["fields"][0], described["name"])
     found = {field["name"]: labels_of_field(field) for field in described["fields"]}
@@ -67,7 +67,7 @@ def labels_of_type(described: dict[str, Any]) -> Any:
 
 
 def labels_of_field(field: dict[str, Any], otherwise: str = "") -> Any:
-    """The labels of a field, empty or None without enumerations. otherwise: name for no name."""
+    """Returns the labels of a field, empty or None without. otherwise: name if it has none."""
     if field["kind"] == "struct":
         return labels_of_type(field["type"])
     if field["kind"] != "enum":
@@ -82,12 +82,12 @@ def labels_of_field(field: dict[str, Any], otherwise: str = "") -> Any:
 
 
 def request_fields(described: dict[str, Any], buffer: Any) -> Fields:
-    """The fields of a request in the memory of a buffer."""
+    """Makes the fields of a request in the memory of a buffer."""
     return Fields(np.ndarray((), dtype_of_type(described), buffer), labels_of_type(described))
 
 
 def dtype_of_block(groups: list[dict[str, Any]], size: int) -> np.dtype[Any]:
-    """The dtype of all states of a robot."""
+    """Returns the dtype of all states of a robot."""
     formats = [
         (dtype_of_type(group["type"]), (group["count"],) if group["array"] else ())
         for group in groups
@@ -105,7 +105,7 @@ def dtype_of_block(groups: list[dict[str, Any]], size: int) -> np.dtype[Any]:
 
 
 def fields_of(described: dict[str, Any]) -> Iterator[tuple[dict[str, Any], dict[str, Any]]]:
-    """Every field of a described type, also nested ones, with its struct."""
+    """Yields every field of a described type, also nested ones, with its struct."""
     for field in described["fields"]:
         yield described, field
         if field["kind"] == "struct":
@@ -113,7 +113,7 @@ def fields_of(described: dict[str, Any]) -> Iterator[tuple[dict[str, Any], dict[
 
 
 def runs_of(dtype: np.dtype[Any], offset: int) -> Iterator[tuple[np.dtype[Any], int, int]]:
-    """The numbers of a dtype in order: (kind, offset, how many)."""
+    """Yields the numbers of a dtype in order: (kind, offset, count)."""
     if dtype.subdtype is not None:
         element, shape = dtype.subdtype
         count = int(np.prod(shape))
@@ -134,7 +134,7 @@ def runs_of(dtype: np.dtype[Any], offset: int) -> Iterator[tuple[np.dtype[Any], 
 def joined(
     runs: Iterator[tuple[np.dtype[Any], int, int]],
 ) -> list[tuple[np.dtype[Any], int, int]]:
-    """The same runs; adjacent runs of one kind are joined."""
+    """Joins adjacent runs of one kind."""
     result: list[tuple[np.dtype[Any], int, int]] = []
     for kind, offset, count in runs:
         if result:
@@ -147,9 +147,9 @@ def joined(
 
 
 def field_view(rows: NDArray[Any], *paths: str) -> NDArray[Any]:
-    """View (..., n) of the numbers of a field of rows (...), such as "extended.joint_positions".
+    """Returns a view (..., n) of a field's numbers in rows (...): "extended.joint_positions".
 
-    paths: of one field, or of several that lie side by side.
+    paths: path of one field, or of several adjacent fields.
 
     Raises InvalidArgument if a field is missing, or if their numbers do not make one array.
     """
@@ -163,9 +163,9 @@ def field_view(rows: NDArray[Any], *paths: str) -> NDArray[Any]:
 def field_at(
     dtype: np.dtype[Any], path: str, what: str = "path in a row"
 ) -> tuple[np.dtype[Any], int]:
-    """The dtype and offset [bytes] of a field below others, named with dots.
+    """Returns dtype and offset [bytes] of a field, named by a path with dots.
 
-    Raises InvalidArgument: there is no `what` of that name.
+    Raises InvalidArgument if there is no `what` of that name.
     """
     offset = 0
     for name in path.split("."):
@@ -179,9 +179,9 @@ def field_at(
 
 
 def with_padding(rows: NDArray[Any]) -> NDArray[Any]:
-    """A view of rows as items without fields: its copies have the padding of the rows too.
+    """Returns a view of rows as items without fields, whose copies include the padding of the rows.
 
-    NumPy copies rows field by field. It leaves out the padding, or leaves it undefined.
+    NumPy copies rows field by field, which leaves out the padding or leaves it undefined.
     """
     return rows.view(np.dtype((np.void, rows.itemsize)))
 
@@ -211,7 +211,7 @@ class Layout:
         self._columns: dict[str, list[Any]] = {}
 
     def columns_at(self, path: str, find: Callable[[dict[str, Any], str], list[Any]]) -> list[Any]:
-        """Columns at a path, found by `o80.rows.columns.columns_at` once."""
+        """Returns the columns at a path; caches the results of `o80.rows.columns.columns_at`."""
         if not isinstance(path, str):
             raise InvalidArgument(f"a path of numbers must be a text, got {path!r}")
         found = self._columns.get(path)
@@ -240,7 +240,7 @@ class Layout:
 
     @cached
     def runs(self) -> list[tuple[np.dtype[Any], int, int]]:
-        """All numbers of observed, then of extended: (kind, offset in the row, how many)."""
+        """All numbers of observed, then of extended: (kind, offset in the row, count)."""
         return joined(
             run
             for dtype, offset in (
@@ -252,7 +252,7 @@ class Layout:
 
     @cached
     def enums(self) -> dict[str, type[Enumeration]]:
-        """An enum for each enumerated field: by its name, and by "Type.field".
+        """Enumerations of all enumerated fields: by field name, and by "Type.field".
 
         If a state is a plain enum, its enum is named after the group, or "state".
         """
@@ -275,23 +275,23 @@ class Layout:
         return {name: values for name, values in found.items() if name not in ambiguous}
 
     def of_states(self, states: NDArray[Any]) -> Any:
-        """States as an array, or as a record of groups; they know their labels."""
+        """Returns states as an array, or as a record of groups, with their labels."""
         if self._is_plain_array:
             return states
         return labelled(states, self.labels[""]) if self._is_array else Record(states, self.labels)
 
     def states_in(self, buffer: Any, offset: int = 0) -> NDArray[Any]:
-        """The states of all actuators in a buffer, a view."""
+        """Returns a view of the states of all actuators in a buffer."""
         return np.ndarray(self._shape, self._element, buffer, offset)
 
     def labelled_states(self, buffer: Any) -> NDArray[Any]:
-        """The states in a buffer as an array to write: it takes labels."""
+        """Returns the states in a buffer as an array to write, which accepts labels."""
         labels = self.labels.get("") if self._is_array else self.labels
         array: NDArray[Any] = labelled(self.states_in(buffer), labels)
         return array
 
     def labelled_extras(self, buffer: Any) -> NDArray[Any]:
-        """The sensor values in a buffer as an array to write: it takes labels."""
+        """Returns the sensor values in a buffer as an array to write, which accepts labels."""
         array: NDArray[Any] = labelled(np.ndarray((), self.extras, buffer), self.extended_labels)
         return array
 
@@ -307,7 +307,7 @@ class Layout:
         return Record(np.ndarray((), self.extras, row, self._at["extended"]), self.extended_labels)
 
     def mask_in(self, buffer: Any, offset: int = 0) -> NDArray[np.bool_]:
-        """(actuators,) the mask in a buffer, a bit for each actuator."""
+        """Reads a mask (actuators,) from a buffer with one bit for each actuator."""
         bits = np.ndarray((self._mask_bytes,), np.uint8, buffer, offset)
         return np.unpackbits(bits, count=self.actuators, bitorder="little").view(np.bool_)
 
@@ -342,7 +342,7 @@ class Layout:
     # many rows, as an array of `row` => views with a first dimension
 
     def check(self, rows: NDArray[Any]) -> None:
-        """Raises InvalidArgument if rows do not lie as the description says."""
+        """Raises InvalidArgument if rows have another layout than described."""
         if rows.dtype is self.row or rows.dtype == self.row:
             return
         raise InvalidArgument(
@@ -352,13 +352,13 @@ class Layout:
         )
 
     def many(self, rows: NDArray[Any], part: str) -> States:
-        """The states of an array of rows: (T, actuators), or a record of groups."""
+        """Returns the states of an array of rows: (T, actuators), or a record of groups."""
         nothing: Any = Record(np.empty(len(rows), np.dtype([])))
         states: States = self.of_states(rows[part]) if self.actuators else nothing
         return states
 
     def many_extras(self, rows: NDArray[Any]) -> Record:
-        """The extended values of an array of rows."""
+        """Returns the extended values of an array of rows."""
         if not self.extras.itemsize:
             return Record(np.empty(len(rows), np.dtype([])))
         return Record(rows["extended"], self.extended_labels)
@@ -369,7 +369,7 @@ class Layout:
         return self._description.model()
 
     def many_masks(self, rows: NDArray[Any], part: str) -> NDArray[np.bool_]:
-        """A mask of an array of rows: bool (T, actuators)."""
+        """Reads a mask of an array of rows: bool (T, actuators)."""
         if not self.actuators:
             return np.zeros((len(rows), 0), np.bool_)
         bits = np.ascontiguousarray(rows[part])
@@ -377,7 +377,7 @@ class Layout:
         return unpacked.view(np.bool_)
 
     def many_flat(self, rows: NDArray[Any], dtype: Any = None) -> NDArray[Any]:
-        """All observed numbers, then all extended ones: (T, numbers)."""
+        """Returns all observed numbers, then all extended ones: (T, numbers)."""
         kind = np.dtype(np.float32 if dtype is None else dtype)
         columns = sum(count for _, _, count in self.runs)
         result = np.empty((len(rows), columns), kind)
@@ -391,9 +391,9 @@ class Layout:
 
 @lru_cache(maxsize=64)
 def decoder_of(table: bytes, epoch: int = 0) -> _core.Decoder:
-    """The decoder of pickled or recorded rows.
+    """Makes the decoder of pickled or recorded rows.
 
-    table: the description in the format of a segment. epoch: of the run that published them.
+    table: the description in the format of a segment. epoch: number of the publishing run.
     """
     description = _core.Description(table, epoch)
     return _core.Decoder(description, Layout(description))

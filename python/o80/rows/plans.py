@@ -15,7 +15,7 @@ from o80.rows.columns import columns_of
 from o80.rows.history import History
 from o80.rows.journal import JournalCommand, JournalEntry
 
-MOST_AHEAD = 20_000  # of the newest row [iterations]
+MOST_AHEAD = 20_000  # iterations beyond the newest row
 
 #: places, slopes [1/iteration] and curvatures, of (actuators,) or (iterations, actuators)
 Moment = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
@@ -23,18 +23,18 @@ Moment = tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]
 
 @dataclass(frozen=True)
 class ChunkRows:
-    """Rows of a chunk, as they were sent."""
+    """Rows of a chunk, in the form in which they were sent."""
 
     anchor: int
     due: NDArray[np.int64]  #: iterations after the anchor
-    ease: int  #: iterations of the take-over; 0: those that the loop chooses
+    ease: int  #: iterations of the take-over; 0: chosen by the loop
     first: int
     rows: NDArray[np.float64]  #: (rows, actuators)
 
 
 @dataclass(frozen=True)
 class Decision:
-    """The outcome of a chunk that was taken."""
+    """The result of a chunk that was taken."""
 
     shift: int
     begins: int
@@ -42,7 +42,7 @@ class Decision:
 
 
 def decide(sent: ChunkRows, taken: int, shift: int, stood: bool) -> Decision:
-    """The decision of the loop (src/control/receiving/chunk_rows.cpp), from a chunk's status."""
+    """Repeats the loop's decision (src/control/receiving/chunk_rows.cpp) from a chunk's status."""
     anchor = sent.anchor + shift
     first = 0 if stood else sent.first
     begins = max(taken, anchor + (int(sent.due[first - 1]) if first else 0) + 1)
@@ -50,15 +50,15 @@ def decide(sent: ChunkRows, taken: int, shift: int, stood: bool) -> Decision:
 
 
 class NumberLimits(NamedTuple):
-    """Limits of one number, as the loop has them."""
+    """Limits of one number, in the form of the loop."""
 
     low: float
     high: float
-    rates: tuple[float, float, float]  #: of speed, acceleration and jerk, per iteration
+    rates: tuple[float, float, float]  #: speed, acceleration and jerk, per iteration
 
 
 def limits_of(number: Number, kind: Any, schema: dict[str, Any]) -> NumberLimits:
-    """The limits of a number of an actuator's state, which is of this type."""
+    """Converts the limits of a number whose type is `kind`."""
     limits = number.limits
     period = schema["period"] / 1e9
     low, high = _range_of(np.dtype(kind))
@@ -80,7 +80,7 @@ def _range_of(kind: np.dtype[Any]) -> tuple[float, float]:
 class ChunkWay:
     """The way of a chunk from its begin to its last row.
 
-    limits: of each number. switches: which of them are not interpolated: rows are held.
+    limits: of each number. switches: numbers that are not interpolated: they hold each row.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class ChunkWay:
         self._switches = switches or [False] * len(limits)
         self._profile = profile
         self._begins = self.begins - sent.anchor - decision.shift  # iterations after the anchor
-        # the last iteration of the way to each row, counted from the begin
+        # last iteration of the way to each row, counted from the begin
         self._ends = sent.due - self._begins + 1
         last = int(self._ends[-1])
         if sent.ease and self._first_row(None) == len(sent.rows) - 1:
@@ -107,8 +107,8 @@ class ChunkWay:
         self.last = self.begins + last - 1
 
     def _first_row(self, start: Moment | None) -> int:
-        """The first row that is reached: by a given `ease`, or from `start`."""
-        # by those that are interpolated
+        """Returns the first row that is reached: by a given `ease`, or from `start`."""
+        # only interpolated numbers decide
         starts = [] if start is None else np.array(start, np.float64).T.tolist()
         moves = [not each for each in self._switches]
         starts = [*compress(starts, moves)]
@@ -119,10 +119,10 @@ class ChunkWay:
         return row
 
     def places(self, start: Moment, most: int | None = None, row: int | None = None) -> Moment:
-        """Places and derivatives (iterations, actuators) from its begin to its last row, at most
-        so many.
+        """Returns places and derivatives (iterations, actuators) from the begin to the last row, at
+        most `most` iterations.
 
-        start: of the iteration before. row: the first that is reached, if that is known.
+        start: state in the previous iteration. row: first row that is reached, if it is known.
         """
         row = self._first_row(start) if row is None else row
         held = min(int(np.searchsorted(self._ends, 1)), len(self.rows) - 1)
@@ -150,15 +150,15 @@ class ChunkWay:
 
 
 class Planned(NamedTuple):
-    """The plan of a chunk for one number, whatever came of it."""
+    """The plan of a chunk for one number, whether it was carried out or not."""
 
-    begins: int  #: the first iteration
+    begins: int  #: first iteration
     places: NDArray[np.float64]  #: (iterations,)
     derivatives: NDArray[np.float64]  #: (2, iterations): slopes [1/iteration] and curvatures
 
 
 class ChunkEntries:
-    """Entries of a journal that plans of chunks depend on; at most the newest `most`."""
+    """Journal entries that plans of chunks depend on; at most the newest `most`."""
 
     def __init__(self, most: int | None = None) -> None:
         self.entries: deque[JournalEntry] = deque(maxlen=most)
@@ -174,16 +174,16 @@ class ChunkEntries:
 def planned_by_chunks(
     entries: Iterable[JournalEntry], history: History
 ) -> dict[str, list[Planned]]:
-    """The plans of the chunks that began in these rows, by number: "elbow", "elbow.position".
+    """Returns plans of the chunks that began in these rows, by number: "elbow", "elbow.position".
 
-    Chunks that began before the oldest row are left out, and iterations far ahead of the newest.
+    Leaves out chunks that began before the oldest row, and iterations far beyond the newest row.
     """
     found: dict[str, list[Planned]] = {}
     if not len(history):
         return found
     columns = {each.name for each in columns_of(history.schema)}
     oldest, newest = int(history.iteration[0]), int(history.iteration[-1])
-    # no plan is known of states that interpolate by themselves
+    # states that interpolate by themselves have no known plan
     types = [each["type"] for each in history.schema["groups"]]
     blending = {
         each["name"] for each in history.schema["actuators"] if "blends" in types[each["group"]]
@@ -228,7 +228,7 @@ def planned_by_chunks(
 def _numbers(
     command: JournalCommand, blending: set[str]
 ) -> Iterable[tuple[str, NDArray[np.generic]]]:
-    """Each number that it gives rows of, with the rows (rows,), but for these actuators."""
+    """Yields each number with its rows (rows,) in a command, except for blending actuators."""
     for actuator, target in zip(command.actuators, command.targets, strict=True):
         if actuator in blending:
             continue

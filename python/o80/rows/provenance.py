@@ -12,49 +12,49 @@ _TEXTS = ("robot", "version", "source_hash", "library", "library_sha256", "built
 
 @dataclass(frozen=True)
 class ProvenanceFile:
-    """A file that an option of a robot names."""
+    """A file that is named by an option of a robot."""
 
     option: str
     path: str  #: absolute
-    sha256: str  #: of its content, as ``sha256sum`` prints it; empty: not read
+    sha256: str  #: SHA-256 of its content, in the form of ``sha256sum``; empty: not read
 
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """How a backend was started: what is needed to start the same robot again.
+    """How a backend was started: all that is needed to start the same robot again.
 
-    Texts of options are those that ``o80 run`` takes.
+    Texts of options have the form of flags of ``o80 run``.
     """
 
-    robot: str  #: name, as `o80.robots.load` takes it
+    robot: str  #: name, for `o80.robots.load`
     options: dict[str, str]  #: of the robot, with defaults and drawn seeds
     run_options: dict[str, str]  #: of the backend and its loop, with defaults
     version: str  #: of o80
-    source_hash: str  #: of the sources of the o80 that ran it
+    source_hash: str  #: hash of the sources of the o80 that ran it
     #: A row's time plus this is wall-clock time, in ns since 1970. As of the start: the clocks may
     #: drift apart, or be set, while the backend runs.
     wall_clock_offset: int
     library: str = ""  #: absolute path of the robot's library, program or FILE.py:Class
-    library_sha256: str = ""  #: of its content
-    built_with: str = ""  #: versions of what the robot was built with
-    files: tuple[ProvenanceFile, ...] = ()  #: that the robot's options name
-    #: Version of the rules that make desired states of commands; see `o80 replay`. Recordings that
-    #: do not say it were made under version 1.
+    library_sha256: str = ""  #: SHA-256 of the library
+    built_with: str = ""  #: versions of the libraries that the robot was built with
+    files: tuple[ProvenanceFile, ...] = ()  #: files that are named by the robot's options
+    #: Version of the rules that compute desired states from commands; see `o80 replay`. Recordings
+    #: without a version were made under version 1.
     motion_rules: int = 1
 
     def _repr_html_(self) -> str:
-        """As a table of a notebook."""
+        """Makes a table for a notebook."""
         lines = [line.partition(" ") for line in started_with(self)]
         return html(("started with", ""), [(what, text.strip()) for what, _, text in lines])
 
     def as_json(self) -> str:
-        """As one line of JSON, which `from_json` reads. Pure ASCII."""
+        """Converts to one line of JSON, which `from_json` reads. Pure ASCII."""
 
         return json_text(asdict(self), sort_keys=True)
 
     @classmethod
     def from_json(cls, text: str) -> Self:
-        """The provenance that `as_json` has written; fields of later versions are left out.
+        """Parses the text of `as_json`; ignores fields of later versions.
 
         Raises ValueError, TypeError, KeyError, RecursionError if it is damaged.
         """
@@ -85,7 +85,7 @@ class Provenance:
 
     @classmethod
     def from_fields(cls, given: Mapping[str, Any]) -> Self:
-        """From a mapping of its fields; `files` as mappings or as sequences."""
+        """Makes a provenance from a mapping of its fields; `files` as mappings or sequences."""
         files = tuple(
             ProvenanceFile(**file) if isinstance(file, Mapping) else ProvenanceFile(*file)
             for file in given.get("files", ())
@@ -94,7 +94,7 @@ class Provenance:
 
 
 def started_with(provenance: Provenance) -> list[str]:
-    """Library, options and versions, in lines."""
+    """Formats library, options and versions as lines."""
     lines = []
     if provenance.library:
         built = f"  {style(plain(provenance.built_with), 'dim')}" if provenance.built_with else ""
@@ -113,7 +113,7 @@ def started_with(provenance: Provenance) -> list[str]:
 
 
 def _assignments(options: dict[str, str]) -> str:
-    """Names and texts; of a text with several lines, as that of a face, the first one."""
+    """Formats names and texts; of a text with several lines, as that of a face, only the first."""
     lines = {name: text.partition("\n") for name, text in options.items()}
     return ", ".join(
         f"{plain(name)}={plain(' '.join(first.split()) if more else first)}{'...' if more else ''}"

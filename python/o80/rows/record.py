@@ -1,4 +1,4 @@
-"""Values with names, read as attributes or by key, and the type of a robot's states."""
+"""Named values, read as attributes or by key, and the type of a robot's states."""
 
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -81,7 +81,7 @@ class Record:
 
 
 class Fields(Record):
-    """The fields of a request: their numbers are Python's, which any library takes."""
+    """The fields of a request; their numbers are Python's, which any library accepts."""
 
     __slots__ = ()
 

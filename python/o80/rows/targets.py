@@ -21,9 +21,9 @@ def states_of(
     single: bool,
     layout: Layout,
 ) -> tuple[NDArray[np.uint8], int, list[int]]:
-    """Bytes of all rows of the first actuator, then of the second, and so on; number of rows;
-    words with a bit for each number of a state that is given, one actuator after the other, empty
-    if all are.
+    """Returns bytes of all rows of the first actuator, then of the second, and so on; number of
+    rows; words with a bit for each number of a state that is given, actuator by actuator, or no
+    words if all numbers are given.
     """
     kinds = state_types(actuators, layout)
     fields = kinds[0].names or ()
@@ -55,7 +55,7 @@ def states_of(
 def _states_of_parts(
     targets: Rows, actuators: Sequence[int], kinds: list[np.dtype[Any]], layout: Layout
 ) -> tuple[NDArray[np.uint8], int, list[int]]:
-    """The same for actuators whose types differ, or from a mapping of their names."""
+    """Does the same for actuators of different types, or for a mapping of their names."""
     parts = _Parts(actuators, kinds, layout)
     if isinstance(targets, Mapping):
         for key, values in targets.items():
@@ -77,11 +77,11 @@ class _Parts:
         rows = [schema["actuators"][each] for each in actuators]
         self._names = [each["name"] for each in rows]
         self._groups = [schema["groups"][each["group"]]["name"] for each in rows]
-        # of each actuator: values (T, ...) by field; of a whole state by ""
+        # for each actuator: values (T, ...) by field; a whole state by ""
         self._columns: list[dict[str, NDArray[Any]]] = [{} for _ in actuators]
 
     def add(self, key: str, values: Any) -> None:
-        """Targets by the name of an actuator, a group or a field, or by a path."""
+        """Adds targets by the name of an actuator, a group or a field, or by a path."""
         name, _, field = key.partition(".")
         places = self._named(key) or (self._named(name) if field else [])
         inner: str | None = None if self._named(key) else field or None
@@ -103,7 +103,7 @@ class _Parts:
         return [i for i, each in enumerate(names) if each == name and name]
 
     def fill(self, places: list[int], field: str | None, values: Any) -> None:
-        """The same field of these actuators (None: the first) from (T, actuators), or (T,)."""
+        """Sets a field of these actuators (None: the first field) from (T, actuators), or (T,)."""
         array = np.asarray(values)
         if array.dtype.kind in "OUT":  # not as texts: numbers may stand beside labels
             array = np.asarray(values, object)
@@ -132,7 +132,7 @@ class _Parts:
             self._columns[place][named] = _cast(numbers_of(known, column), target)
 
     def states(self) -> tuple[NDArray[np.uint8], int, list[int]]:
-        """As states_of()."""
+        """Returns the results of states_of()."""
         left_out = [n for n, each in zip(self._names, self._columns, strict=True) if not each]
         if left_out:
             raise InvalidArgument(
@@ -163,7 +163,7 @@ def _field_of(kind: np.dtype[Any], name: str) -> np.dtype[Any]:
 
 
 def _cast(column: Any, kind: np.dtype[Any]) -> NDArray[Any]:
-    """Numbers as those of a field; rounded where that is an integer or a truth value."""
+    """Converts numbers to the type of a field; rounds them for an integer or a truth value."""
     base = kind.base
     try:
         array = np.asarray(column)
@@ -181,9 +181,9 @@ def _cast(column: Any, kind: np.dtype[Any]) -> NDArray[Any]:
 
 
 def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
-    """An array of states. Raises InvalidArgument, also for numbers where a state has several.
+    """Makes an array of states. Raises InvalidArgument, also for numbers of states with fields.
 
-    NumPy would give each field of a state the same number.
+    NumPy would set each field of a state to the same number.
     """
     try:
         array = np.asarray(targets, kind)
@@ -203,7 +203,7 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
 
 
 def _are_first_fields(targets: ArrayLike, kind: np.dtype[Any]) -> bool:
-    """True for numbers, or labels, where a state has several fields: each is the first one."""
+    """True for numbers, or labels, of states with several fields: each is the first field."""
     if kind.names is None or _numbers_in(kind) == 1:
         return False
     try:
@@ -221,7 +221,7 @@ def _numbers_in(kind: np.dtype[Any]) -> int:
 
 
 def _mask_of(given: Sequence[str], kind: np.dtype[Any]) -> list[int]:
-    """A bit for each number of a state that is given, in words of 64; empty for all."""
+    """Returns a bit for each given number of a state, in words of 64; empty: all are given."""
     if set(given) == set(kind.names or ()):
         return []
     assert kind.fields is not None
@@ -239,14 +239,14 @@ def _words(bits: int, count: int) -> list[int]:
 
 
 def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]:
-    """The state type of each of these actuators. Raises InvalidArgument if there are none."""
+    """Returns the state type of each of these actuators. Raises InvalidArgument for none."""
     if not actuators:
         raise InvalidArgument("targets need an actuator")
     return [dtype_of_type(_type_of(actuator, layout)) for actuator in actuators]
 
 
 def first_fields(actuators: Sequence[int], layout: Layout) -> list[int]:
-    """Mask of the numbers that an array of targets gives, as `states_of` returns it."""
+    """Returns the mask of the numbers in an array of targets, like `states_of`."""
     kinds = state_types(actuators, layout)
     masks = [_mask_of(kind.names[:1], kind) if kind.names else [] for kind in kinds]
     if not any(masks):
@@ -257,12 +257,12 @@ def first_fields(actuators: Sequence[int], layout: Layout) -> list[int]:
 
 
 def labels_of(actuator: int, layout: Layout) -> Any:
-    """The enumerations in the state of an actuator."""
+    """Returns the enumerations in the state of an actuator."""
     return labels_of_type(_type_of(actuator, layout))
 
 
 def _type_of(actuator: int, layout: Layout) -> dict[str, Any]:
-    """The described type of an actuator's state."""
+    """Returns the described type of an actuator's state."""
     schema = layout.schema
     described: dict[str, Any] = schema["groups"][schema["actuators"][actuator]["group"]]["type"]
     return described
@@ -271,7 +271,7 @@ def _type_of(actuator: int, layout: Layout) -> dict[str, Any]:
 def _from_fields(
     targets: Mapping[str, ArrayLike], kind: np.dtype[Any], labels: Any
 ) -> NDArray[Any]:
-    """One structured array from an array for each field; 0 in fields that are left out."""
+    """Makes a structured array from an array for each field; 0 in fields that are left out."""
     names = kind.names or ()
     if not targets or not set(targets) <= set(names):
         there = ", ".join(names) or "none, it is a plain number"
@@ -293,7 +293,7 @@ def _from_fields(
 
 
 def times_of(times: ArrayLike) -> NDArray[np.int64]:
-    """[s] => [ns]"""
+    """Converts times [s] to [ns]. Raises InvalidArgument for others than finite times (T,)."""
     try:
         seconds = np.asarray(times, np.float64)
     except (TypeError, ValueError):

@@ -1,4 +1,4 @@
-"""The process of an `o80.View`: prints its address, or why there is none, as a line of JSON."""
+"""Process of an `o80.View`: prints the address of the page, or an error, as a line of JSON."""
 
 import json
 import sys
@@ -10,7 +10,7 @@ from o80.view.serve import page_server, wait_for_end
 
 
 def main() -> int:
-    """The options of `page_server` are the argument, as JSON."""
+    """Serves a page; the program's argument holds the options of `page_server`, as JSON."""
     keep_printing()
     try:
         with page_server(**json.loads(sys.argv[1])) as server:

@@ -22,14 +22,14 @@ from o80.view.source_list import SourceList
 from o80.view.world import Standing
 
 LONGEST_WINDOW = 60.0  # [s]
-LONGEST_REASON = 80  # of a halt
-MAX_MARKS = 50  # in a chart
+LONGEST_REASON = 80  # most characters of the reason of a halt
+MAX_MARKS = 50  # newest marks in a chart
 MAKERS = 2  # threads that read models
-SLACK = 1_000_000_000  # a robot is drawn so long before its first and after its last row [ns]
+SLACK = 1_000_000_000  # a robot is drawn for this time before its first and after its last row [ns]
 
 
 class Answers:
-    """Answers requests from several threads. Keeps nothing about pages."""
+    """Answers requests from several threads, without state of pages."""
 
     def __init__(self, sources: SourceList, *, control: bool) -> None:
         self._sources = sources
@@ -39,7 +39,7 @@ class Answers:
         self._lock = threading.Lock()
 
     def look(self, query: dict[str, Any]) -> dict[str, Any]:
-        """The list of segments, and what is asked about one of them at one time."""
+        """Returns the list of segments, and the requested data of one of them at one time."""
         sources = self._sources.now()
         of_world = sorted(sources, key=lambda source: not source.alive)
         answer: dict[str, Any] = {
@@ -60,7 +60,7 @@ class Answers:
         return answer
 
     def _row_of(self, source: Source, query: dict[str, Any]) -> tuple[Observation, int | None]:
-        """The row that is shown, and the time that is asked for [ns]; None: now."""
+        """Returns the row to show, and the requested time [ns]; None: now."""
         at = _time_query(source, query)
         if at is None and not source.live and query.get("key") != source.key:
             at = source.extent()[0]  # a page begins at the begin of a recording
@@ -75,11 +75,11 @@ class Answers:
         *,
         now: bool,
     ) -> dict[str, Any]:
-        """By other source: whether it shares the world of the chosen one, and the poses of its
-        bodies when the chosen one published a row; or those of now.
+        """Returns by other source whether it shares the world of the chosen one, and the poses of
+        its bodies, at the time of the chosen one's row or now.
 
-        The query says which of them the user wants to see or not (`seen`), and which scenes the
-        page knows (`known`: keys). A scene that is not ready is made meanwhile.
+        The query lists sources that the user has chosen to show or hide (`seen`), and scenes that
+        the page has (`known`: keys). A scene that is not ready is made in the background.
         """
         wanted, known = _mapping(query, "seen"), _mapping(query, "known")
         found: dict[str, Any] = {}
@@ -123,8 +123,8 @@ class Answers:
         return answer
 
     def _shown_of(self, source: Source, *, wait: bool = True) -> "Shown | None":
-        """None: not ready, and not to be waited for."""
-        schema = source.schema  # NothingToShow, if there is no row
+        """Returns the prepared data of a source; None if they are not ready and `wait` is False."""
+        schema = source.schema  # raises NothingToShow if there is no row
         with self._lock:
             key, made = self._shown.get(source.label, ("", None))
             if made is None or key != source.key:
@@ -151,7 +151,7 @@ class Answers:
         return {}
 
     def _live(self, query: dict[str, Any]) -> Source:
-        """The view halts and resumes nothing that it does not show."""
+        """Finds a live source by segment. Raises InvalidArgument if the view does not show it."""
         for source in self._sources.now():
             if source.live and source.name == query.get("segment"):
                 return source
@@ -159,7 +159,7 @@ class Answers:
 
 
 class Shown:
-    """Results that are worked out once for a run of a robot."""
+    """Data that are computed once for each run of a robot."""
 
     def __init__(self, source: Source, schema: dict[str, Any]) -> None:
         self.panels = Panels(schema)
@@ -173,7 +173,7 @@ class Shown:
                 self.no_scene = str(error)
 
     def introduction(self, source: Source) -> dict[str, Any]:
-        """Data that a page needs once."""
+        """Returns data that a page needs once."""
         schema = source.schema
         return {
             "robot": schema["robot"],
@@ -189,7 +189,7 @@ class Shown:
     def curves(
         self, source: Source, panels: list[str], window: float, at: int | None
     ) -> dict[str, Any]:
-        """Curves of the last seconds, or around a time; shared by pages that ask the same."""
+        """Returns curves of the last seconds, or around a time; equal requests share them."""
 
         def read() -> dict[str, Any]:
             first, last = source.extent()
@@ -213,7 +213,7 @@ class Shown:
 
 
 def _marks_in(rows: History, marks: Sequence[tuple[str, int]], begin: int) -> list[Any]:
-    """Seconds from `begin` [ns] and text of the last marks among these rows."""
+    """Returns seconds from `begin` [ns] and text of the last marks among these rows."""
     iterations = rows.iteration
     return [
         [(int(rows.time[np.searchsorted(iterations, iteration)]) - begin) * 1e-9, text]
@@ -230,7 +230,7 @@ def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
 
 
 def first_of(sources: Sequence[Source]) -> Source | None:
-    """The source that a page shows first: with a fixed model, else with any model, else any."""
+    """Returns the source to show first: with a fixed model, else with any model, else any."""
     models = [source for source in sources if source.drawn is not None]
     standing = [source for source in models if source.drawn and not source.drawn.standing.floats]
     return next(iter([*standing, *models, *sources]), None)
@@ -242,11 +242,11 @@ _ANY = Standing(floats=True)
 def others_of(
     chosen: Source, sources: Sequence[Source], of_chosen: Observation, *, now: bool
 ) -> Iterator[tuple[Source, Observation, bool]]:
-    """Other sources with a model, their rows when the chosen one published its row, or of now, and
-    whether they stand in its world.
+    """Yields other sources with a model, their rows at the time of the chosen one's row or now, and
+    whether they stand in the same world.
 
-    The world is that of the first model that stands; robots with the same model are copies, of
-    which the world has one: the chosen one, else the first.
+    The world is that of the first fixed model. Robots with the same model are copies, and the world
+    has one of them: the chosen one, else the first.
     """
     others = [source for source in sources if source is not chosen]
     rows: list[tuple[Source, Observation | None]] = [(chosen, None)]
@@ -265,7 +265,7 @@ def others_of(
 def _row_with(
     source: Source, chosen: Source, of_chosen: Observation, *, now: bool
 ) -> Observation | None:
-    """The row of a source when another one published its row, or of now; None: there is none."""
+    """Returns a source's row at the time of another source's row, or now; None: no row."""
     try:
         if now and source.live and chosen.live:
             return source.row(None)
@@ -302,13 +302,13 @@ def _window(query: dict[str, Any]) -> float:
 
 
 SHARED_FOR = 0.08  # [s], less than the time between two requests of a page
-LOAD = 10.0  # an answer that took long is kept this many times as long
+LOAD = 10.0  # an answer is kept this many times as long as it took
 MOST = 64
 
 
 class AnswerCache:
-    """Answers by what was asked. Many pages, long rows and long windows cost at most a tenth of a
-    processor, because what took long is kept longer."""
+    """Caches answers by query, ten times as long as they took: so many pages, long rows and long
+    windows cost at most a tenth of a processor."""
 
     def __init__(self) -> None:
         self._answers: dict[Hashable, tuple[float, Any]] = {}

@@ -7,12 +7,12 @@ import numpy as np
 
 
 def packed(numbers: Any) -> str:
-    """Numbers as text; the page unpacks them to a Float32Array."""
+    """Encodes numbers as text, which the page unpacks to a Float32Array."""
     with np.errstate(over="ignore"):
         array = np.ascontiguousarray(numbers, np.float32)
     return base64.b64encode(array.tobytes()).decode()
 
 
 def packed_indices(numbers: Any) -> str:
-    """Indices as text; the page unpacks them to a Uint32Array."""
+    """Encodes indices as text, which the page unpacks to a Uint32Array."""
     return base64.b64encode(np.ascontiguousarray(numbers, np.uint32).tobytes()).decode()

@@ -6,7 +6,7 @@ import threading
 import webbrowser
 from pathlib import Path
 
-KEPT = 30.0  # [s] until the browser has surely read the file
+KEPT = 30.0  # time after which the browser has certainly read the file [s]
 
 
 def has_screen() -> bool:
@@ -17,8 +17,8 @@ def has_screen() -> bool:
 def open_browser(url: str) -> bool:
     """Opens an address that holds a token; False if there is no browser.
 
-    The browser is given a file that leads there, which only this user can read: others can see the
-    arguments of every process.
+    The browser opens a file that redirects there and that only this user can read, because others
+    can see the arguments of every process.
     """
     descriptor, name = tempfile.mkstemp(prefix="o80-view-", suffix=".html")
     with os.fdopen(descriptor, "w") as file:

@@ -13,15 +13,15 @@ from o80.rows.history import History, values_of
 from o80.rows.plans import Planned
 from o80.view.base64_arrays import packed
 
-STRETCHES = 400  # of a curve, about one for each pixel of its width
+STRETCHES = 400  # stretches of a curve, about one for each pixel of its width
 MAX_PANELS = 12
-MAX_PLANS = 30  # of chunks, the newest ones
+MAX_PLANS = 30  # newest plans of chunks in a panel
 EXACT = 2**53  # integers below are exact in a browser
 FIRST_PANELS = 3  # shown before the user chooses
 
 
 class Panels:
-    """Panels that can be drawn of a robot: for each its columns, by part of the row."""
+    """The possible panels of a robot: columns of each panel, by part of the row."""
 
     def __init__(self, schema: dict[str, Any]) -> None:
         self.columns: dict[str, dict[str, Column]] = {}
@@ -49,9 +49,9 @@ class Panels:
     def curves(
         self, rows: History, panels: list[str], begin: int
     ) -> dict[str, dict[str, list[str]]]:
-        """By panel and part: seconds from `begin` [ns] and values of rows, in their order.
+        """Returns seconds from `begin` [ns] and values of rows in order, by panel and part.
 
-        They draw the curve of all rows: of each stretch its first, lowest, highest and last row.
+        The rows draw the whole curve: first, lowest, highest and last row of each stretch.
         """
         found: dict[str, dict[str, list[str]]] = {}
         if not len(rows):
@@ -72,8 +72,8 @@ class Panels:
         rows: History,
         begin: int,
     ) -> int:
-        """Adds what chunks planned to curves() of these rows, each behind a gap; the time [ns] at
-        which the last one ends.
+        """Adds the plans of chunks to curves() of these rows, each behind a gap; returns the time
+        [ns] at which the last plan ends.
         """
         last = 0
         for panel, of in plans.items():
@@ -104,7 +104,7 @@ class Panels:
 
     @property
     def labels(self) -> dict[str, dict[int, str]]:
-        """The words for the numbers of each panel that has them."""
+        """Labels by number, for each panel of an enumeration."""
         labels = {panel: next(iter(of.values())).labels for panel, of in self.columns.items()}
         return {
             panel: {number: label for label, number in of.items()}
@@ -113,7 +113,7 @@ class Panels:
         }
 
     def values(self, row: Observation, panels: list[str]) -> dict[str, dict[str, float | str]]:
-        """The numbers of one row, by panel and part; as text, what JSON cannot hold as a number."""
+        """Returns a row's numbers by panel and part; numbers that JSON cannot hold are texts."""
         return {
             panel: {
                 part: _value(value_of(row, column), column)
@@ -125,7 +125,7 @@ class Panels:
 
 
 def drawn_rows(values: NDArray[np.float64]) -> NDArray[np.intp]:
-    """Indices of the rows that draw a curve: (n,), rising; NaN in a stretch is one of them."""
+    """Returns indices of the rows that draw a curve: (n,), rising; NaN in a stretch included."""
     step = -(-len(values) // STRETCHES)
     if step <= 4:
         return np.arange(len(values))

@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 from o80.base.errors import Error
 
 TIMEOUT = 20.0  # [s]
-LARGEST = 256 << 20  # of a compiled model [bytes]
+LARGEST = 256 << 20  # largest compiled model [bytes]
 DEEPEST = 200  # bodies inside each other
 
 # stdin: a model; stdout: the same, compiled
@@ -37,7 +37,7 @@ sys.stdout.buffer.write(content.tobytes())
 
 @lru_cache(maxsize=8)
 def compiled(mjcf: str, mujoco: Any) -> Any:
-    """The model, which nobody changes. Raises Error."""
+    """Compiles a model, which must not be changed. Raises Error if it is invalid or names files."""
     text = without_files(mjcf)
     try:
         done = subprocess.run(
@@ -59,7 +59,7 @@ def compiled(mjcf: str, mujoco: Any) -> Any:
 
 
 def without_files(mjcf: str) -> str:
-    """The same model, if it names no file. Raises Error."""
+    """Returns the model unchanged. Raises Error if it names a file or cannot be parsed."""
     if "<!" in mjcf.replace("<!--", "").replace("<![CDATA[", ""):
         raise _unreadable("it has a document type")  # which may define entities
     try:

@@ -1,10 +1,10 @@
-"""The connections of the server: who is let in, and who must go.
+"""The connections of the server: which are accepted, and which are dropped.
 
-A halt must come through whatever else connects. So one thread, which never waits for a connection,
+A halt must get through whatever else connects. So one thread, which never waits for a connection,
 reads the heads of all requests. A connection is a stranger until it has sent a head with the token.
 Then it is a holder, and a thread reads the body and sends the answer. Each kind has a budget of
-its own: too many strangers cost the oldest stranger its connection, never a holder. Each round
-reads all holders, then lets a few new connections in, then reads a few strangers.
+its own: too many strangers drop the oldest stranger, never a holder. Each round reads all holders,
+then accepts a few new connections, then reads a few strangers.
 """
 
 import contextlib
@@ -26,12 +26,12 @@ MAX_HOLDERS = 100
 ACCEPTED_AT_ONCE = 16  # in a round
 READ_AT_ONCE = 8  # strangers, in a round
 
-HEAD_WITHIN = 5.0  # all of it, however its bytes are spread [s]
+HEAD_WITHIN = 5.0  # timeout of the whole head [s]
 BODY_WITHIN = 10.0  # [s]
 SENT_WITHIN = 30.0  # an answer [s]
 IDLE = 30.0  # until an unused connection of a holder is closed [s]
-REFUSED_AFTER = 1.0  # so that a client that asks again and again costs little [s]
-CLOSED_AFTER = 2.0  # once it was told, if its client does not close it [s]
+REFUSED_AFTER = 1.0  # delay of a refusal, so that a client that retries costs little [s]
+CLOSED_AFTER = 2.0  # time after a refusal, if the client does not close the connection [s]
 TICK = 0.1  # [s]
 
 CONTINUE = b"HTTP/1.1 100 Continue\r\n\r\n"
@@ -41,7 +41,7 @@ NO_MORE = (errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM)
 class Gate:
     """Serves the connections of one listening socket.
 
-    refusal: why a request is refused, by its head; empty if it is not.
+    refusal: returns why a request is refused, by its head; empty if it is not.
     reply: answers a request with the token, in a thread.
     """
 
@@ -71,12 +71,12 @@ class Gate:
             watched.setblocking(False)
         self._selector.register(listener, selectors.EVENT_READ)
         self._selector.register(self._woken, selectors.EVENT_READ)
-        self._ready_strangers = select.epoll()  # the kernel gives them in turn
+        self._ready_strangers = select.epoll()  # the kernel returns them in turn
         self._selector.register(self._ready_strangers, selectors.EVENT_READ)
         self._watched_strangers: dict[int, _Connection] = {}  # by descriptor
 
     def serve(self) -> None:
-        """Returns after `close`, which another thread calls."""
+        """Serves until another thread calls `close`."""
         expired_at = 0.0
         while not self._closed:
             ready = [key for key, _ in self._selector.select(TICK)]
@@ -86,7 +86,7 @@ class Gate:
             self._take_back()
             self._accept()
             for descriptor, _ in self._ready_strangers.poll(0, READ_AT_ONCE):
-                if descriptor in self._watched_strangers:  # still
+                if descriptor in self._watched_strangers:  # still watched
                     self._read(self._watched_strangers[descriptor])
             now = time.monotonic()
             if now >= expired_at + TICK:
@@ -120,7 +120,7 @@ class Gate:
             self._drop_oldest()
 
     def _free_one(self) -> None:
-        """The process has no descriptor left."""
+        """Frees a descriptor, because the process has none left."""
         if self._strangers:
             self._drop_oldest()
         else:
@@ -137,13 +137,13 @@ class Gate:
             if connection.until > now or connection.busy:
                 continue
             if connection.refusal:
-                self._tell(connection, now)
+                self._send_refusal(connection, now)
             else:
                 self._drop(connection)
 
     def _read(self, connection: "_Connection") -> None:
         if connection.busy or connection.closed:
-            return  # since the selector named it
+            return  # since the selector reported it
         try:
             data = connection.socket.recv(LARGEST_HEAD)
         except BlockingIOError:
@@ -152,7 +152,7 @@ class Gate:
         except OSError:
             data = b""
         if not data and connection in self._strangers and not connection.refused:
-            connection.refused = True  # closed later, as one that is told why
+            connection.refused = True  # closed later, like a connection that gets a reason
             connection.until = time.monotonic() + REFUSED_AFTER
             self._unwatch(connection)
         elif not data:
@@ -165,10 +165,10 @@ class Gate:
             if connection in self._holders and not connection.received:
                 connection.until = time.monotonic() + HEAD_WITHIN
             connection.received += data
-            self._consider(connection)
+            self._take_request(connection)
 
-    def _consider(self, connection: "_Connection") -> None:
-        """Obeys or refuses what was received, if it is a whole head."""
+    def _take_request(self, connection: "_Connection") -> None:
+        """Serves or refuses a request as soon as its whole head was received."""
         try:
             head = take_head(connection.received, connection.checked)
             connection.checked = 0 if head else len(connection.received)
@@ -180,7 +180,7 @@ class Gate:
                 self._begin(connection, head)
         except Refused as refused:
             self._refuse(connection, refused)
-        except Exception:  # such as no thread: it costs this connection, not the others
+        except Exception:  # for example no thread: it costs this connection, not the others
             self._drop(connection)
 
     def _refuse(self, connection: "_Connection", refused: Refused) -> None:
@@ -190,8 +190,8 @@ class Gate:
         connection.until = time.monotonic() + REFUSED_AFTER
         self._try_to_watch(connection)
 
-    def _tell(self, connection: "_Connection", now: float) -> None:
-        """Says why it is refused. Closed later: with unread bytes the answer would be lost."""
+    def _send_refusal(self, connection: "_Connection", now: float) -> None:
+        """Sends the reason of a refusal. Closed later: unread bytes would lose the answer."""
         try:
             connection.socket.send(connection.refusal)
             connection.socket.shutdown(socket.SHUT_WR)
@@ -211,8 +211,8 @@ class Gate:
         connection.busy = True
 
     def _answer(self, connection: "_Connection", head: Head) -> None:
-        """In a thread of its own."""
-        connection.last = head.last or head.method == "HEAD"  # an answer to that has no body
+        """Answers a request, in a thread of its own."""
+        connection.last = head.last or head.method == "HEAD"  # an answer to HEAD has no body
         try:
             if "expect" in head.headers:
                 connection.send(CONTINUE)
@@ -220,7 +220,7 @@ class Gate:
             reply = self._reply(head, body)
             connection.skip(head.length - len(body))  # with unread bytes the answer would be lost
             connection.send(reply.as_bytes(last=connection.last))
-        except Exception:  # its client went or was too slow, or the answer failed
+        except Exception:  # the client left or was too slow, or the answer failed
             connection.last = True
         with self._closing:
             if self._closed:
@@ -230,7 +230,7 @@ class Gate:
         self._notify()
 
     def _take_back(self) -> None:
-        """Connections whose request is answered."""
+        """Takes back connections whose request is answered."""
         with contextlib.suppress(BlockingIOError):
             self._woken.recv(1 << 12)
         while self._answered:
@@ -241,7 +241,7 @@ class Gate:
                 continue
             connection.socket.setblocking(False)
             connection.until = time.monotonic() + (HEAD_WITHIN if connection.received else IDLE)
-            self._consider(connection)
+            self._take_request(connection)
 
     def _watch(self, connection: "_Connection") -> None:
         if connection.watched:
@@ -254,7 +254,7 @@ class Gate:
         connection.watched = True
 
     def _try_to_watch(self, connection: "_Connection") -> None:
-        """Drops it if the user may watch no more: that costs this connection, not the others."""
+        """Watches a connection; drops it if the user's limit of watches is reached."""
         try:
             self._watch(connection)
         except OSError:
@@ -279,7 +279,7 @@ class Gate:
             connection.close()
 
     def _notify(self) -> None:
-        with contextlib.suppress(OSError):  # full: it is awake anyway
+        with contextlib.suppress(OSError):  # full: the gate is awake anyway
             self._wake.send(b"\0")
 
     def _end(self) -> None:
@@ -295,22 +295,22 @@ class Gate:
 
 
 class _Connection:
-    """Belongs to the thread of the gate, while it is busy to the thread that answers."""
+    """Owned by the gate's thread, or by the answering thread while it is busy."""
 
     def __init__(self, accepted: socket.socket, until: float) -> None:
         self.socket = accepted
         self.socket.setblocking(False)
         with contextlib.suppress(OSError):
             self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self.until = until  # it is closed then, if it is not busy [s]
+        self.until = until  # time to close it, if it is not busy [s]
         self.received = bytearray()
-        self.checked = 0  # so many received bytes are no whole head
-        self.refusal = b""  # still to be sent
-        self.ignored = 0  # bytes after it was refused
+        self.checked = 0  # received bytes that are known to hold no whole head
+        self.refusal = b""  # reason still to be sent
+        self.ignored = 0  # bytes received after it was refused
         self.busy = self.refused = self.last = self.watched = self.closed = False
 
     def body(self, length: int) -> bytes:
-        """Waits for the rest of a request. Raises OSError."""
+        """Waits for the rest of a request. Raises OSError if it does not arrive in time."""
         end = time.monotonic() + BODY_WITHIN
         while len(self.received) < length:
             self.received += self._more(length - len(self.received), end)
@@ -319,7 +319,7 @@ class _Connection:
         return body
 
     def skip(self, length: int) -> None:
-        """Waits for more of a request, and drops it. Raises OSError."""
+        """Waits for more bytes of a request, drops them. Raises OSError if they do not arrive."""
         end = time.monotonic() + BODY_WITHIN
         here = min(length, len(self.received))
         del self.received[:here]
@@ -338,12 +338,12 @@ class _Connection:
         return data
 
     def send(self, data: bytes) -> None:
-        """Waits until all is sent. Raises OSError."""
+        """Waits until all data are sent. Raises OSError if the client does not take them."""
         self.socket.settimeout(SENT_WITHIN)  # for all of it
         self.socket.sendall(data)
 
     def interrupt(self) -> None:
-        """Makes its thread end; from another one."""
+        """Makes its thread end; another thread calls it."""
         with contextlib.suppress(OSError):
             self.socket.shutdown(socket.SHUT_RDWR)
 

@@ -21,7 +21,7 @@ class Guard:
         self._token = token.encode()
 
     def refusal(self, query: str, headers: Mapping[str, str]) -> str:
-        """Why a request is refused; empty if it is not. headers: by name in lower case."""
+        """Returns why a request is refused; empty: it is not. headers: by name in lower case."""
         host = headers.get("host", "").lower()
         if self._hosts is not None and host not in self._hosts:
             return "the header Host names another server"

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from o80.base.errors import Error
 
 LARGEST_HEAD = 1 << 14  # [bytes]
-LARGEST_REQUEST = 1 << 16  # the body [bytes]; of a longer halt this much is read
+LARGEST_REQUEST = 1 << 16  # of the body [bytes]; a longer halt is read up to here
 HALT = "/halt"
 
 TOO_LARGE = f"the request is larger than {LARGEST_REQUEST} bytes"
@@ -20,11 +20,11 @@ _CONTROL = re.compile(rb"[\0-\x08\x0b\x0c\x0e-\x1f\x7f]")
 _FIRST_LINE = re.compile(r"([A-Z]{1,20}) (/[!-~]*) HTTP/1\.([01])")
 _NAME = re.compile(r"[\w!#$%&'*+.^`|~-]+", re.ASCII)
 _LENGTH = re.compile(r"[0-9]+")
-_MOST_DIGITS = 15  # of the length of a halt
+_MOST_DIGITS = 15  # of the content length of a halt
 
 
 class Refused(Error):  # noqa: N818
-    """A head that is not obeyed."""
+    """A request is refused because of its head."""
 
     def __init__(self, code: int, why: str) -> None:
         super().__init__(why)
@@ -39,14 +39,14 @@ class Head:
     path: str
     query: str
     headers: dict[str, str]  #: by name in lower case
-    length: int  #: of the body [bytes]
+    length: int  #: length of the body [bytes]
     last: bool  #: the connection is closed after the answer
 
 
 def take_head(received: bytearray, checked: int) -> Head | None:
-    """Takes a head from the begin of what was received; None while it is incomplete.
+    """Removes a head from the begin of the received bytes; None while it is incomplete.
 
-    checked: so many bytes were looked at before. Raises Refused, also for an incomplete head.
+    checked: bytes that were searched before. Raises Refused for an invalid head, also incomplete.
     """
     end = received.find(_END, max(0, checked - len(_END) + 1))
     stop = min(len(received) if end < 0 else end + len(_END), LARGEST_HEAD)
@@ -69,7 +69,7 @@ def take_head(received: bytearray, checked: int) -> Head | None:
 
 
 def _lines_end_well(received: bytearray, checked: int, stop: int) -> bool:
-    """Each CR has its LF, and the reverse; the last CR may still wait for it."""
+    """True if each CR has its LF, and the reverse; the last CR may still lack its LF."""
     before = max(0, checked - 1)
     both = received.count(b"\r\n", before, stop)
     return (

@@ -17,13 +17,13 @@ from o80.rows.plans import ChunkEntries, Planned, planned_by_chunks
 from o80.view.source import NothingToShow, Source
 
 GUARD_ROWS = 16  # the oldest rows may be overwritten while they are read
-JOURNAL_BYTES = 1 << 20  # that are read at once
-MAX_MARKS = 1000  # the newest ones
-MAX_DECISIONS = 500  # about chunks, the newest ones
+JOURNAL_BYTES = 1 << 20  # bytes of the journal read at once
+MAX_MARKS = 1000  # newest marks to keep
+MAX_DECISIONS = 500  # newest decisions about chunks to keep
 
 
 class LiveSource(Source):
-    """Follows the segment of a name through restarts of its backend. Reads only."""
+    """Follows a segment by name across restarts of its backend. Read-only."""
 
     live = True
 
@@ -111,7 +111,7 @@ class LiveSource(Source):
             return None
         if self.schema["clock"] == other.schema["clock"] == "monotonic":
             return row.time
-        # of simulated time only that of now is known: both are taken to have run alike
+        # of simulated times only the present ones are known: both are assumed to run alike
         return self.extent()[1] - (other.extent()[1] - row.time)
 
     def marks(self) -> Sequence[tuple[str, int]]:
@@ -124,7 +124,7 @@ class LiveSource(Source):
             return list(self._marks)
 
     def plans(self, rows: History) -> dict[str, list[Planned]]:
-        """Plans of the chunks that were sent since the view looks at this run."""
+        """Returns the plans of chunks that were sent since the view attached to this run."""
         with self._lock:
             if self._decisions is not None:
                 self._of_chunks.add(self._decisions.read())

@@ -1,7 +1,7 @@
-"""A recording as one file that any browser opens from disk, without o80 and without a network.
+"""Writes a recording as one file that any browser opens from disk, without o80 or a network.
 
-It is the page of `o80 view` with what it would ask for: poses 60 times a second, of each curve and
-sixtieth of a second the first, lowest and highest row, as float32; and what chunks planned.
+It is the page of `o80 view` with all data that the page would request: poses 60 times a second; the
+first, lowest and highest row of each curve in each sixtieth, as float32; and plans of chunks.
 """
 
 import base64
@@ -24,8 +24,8 @@ from o80.view.server import page_text
 from o80.view.source import Source
 from o80.view.source_list import SourceList
 
-RATE = 60  # of what is drawn [Hz]
-LARGEST = 100e6  # of a file [bytes]
+RATE = 60  # rate of drawn poses [Hz]
+LARGEST = 100e6  # largest file [bytes]
 BYTES_PER_NUMBER = 2.8  # in the file, as measured: compressed, as text
 MOVED = 14  # numbers of the pose of a body and of its ghost
 MAX_TRIANGLES = 4000  # of a mesh
@@ -37,8 +37,8 @@ def write_page(names: Sequence[str], path: Path, *, model_files: bool = False) -
     """Writes a page of recordings into a new file. Returns its size [bytes].
 
     model_files: read the files (meshes) that the models of the recordings name.
-    Raises InvalidArgument for a name that is no recording, a file that exists, and a recording that
-    is too long; RecordingError.
+    Raises InvalidArgument for a name that is no recording, an existing file, and a recording that
+    is too long; RecordingError for an unreadable recording.
     """
     for name in names:
         if not (name.endswith(".mcap") or Path(name).is_dir()):
@@ -82,7 +82,7 @@ def _has_rows(source: Source) -> bool:
 
 
 def _expected(source: Source) -> float:
-    """Size in the file [bytes]."""
+    """Estimates the size of a source in the file [bytes]."""
     first, last = source.extent()
     drawn = min((last - first) * SECONDS * RATE, (last - first) / source.schema["period"])
     moving = 0 if source.drawn is None else len(source.drawn.described["values"])
@@ -91,7 +91,7 @@ def _expected(source: Source) -> float:
 
 
 class _Numbers:
-    """Arrays behind each other, which JSON names by their place."""
+    """Arrays one behind the other; JSON refers to each by its offset."""
 
     def __init__(self) -> None:
         self.content = bytearray()
@@ -130,7 +130,7 @@ class _Recorded:
         self.times: NDArray[np.int64] = self.rows.time[self.ticks]
 
     def described(self, numbers: _Numbers, everything: "dict[str, _Recorded]") -> dict[str, Any]:
-        """All that a page may ask about it, and the numbers."""
+        """Returns all data that a page may request about the run, and adds their numbers."""
         source, rows = self.source, self.rows
         first, last = source.extent()
         micro = np.round((rows.time - first) / 1000).astype(np.int64)
@@ -177,7 +177,7 @@ class _Recorded:
         }
 
     def _columns(self, numbers: _Numbers) -> dict[str, Any]:
-        """By panel and part: places of the rows that are kept, each after the last, and values."""
+        """Returns by panel and part: kept rows, each relative to the previous one, and values."""
         found: dict[str, Any] = {}
         for panel, parts in self.shown.panels.columns.items():
             found[panel] = {}
@@ -192,8 +192,8 @@ class _Recorded:
         return found
 
     def _planned(self, numbers: _Numbers) -> dict[str, Any]:
-        """By panel: the first point of each plan, each after the last one, and the points: times
-        [s] and places.
+        """Returns by panel: first point of each plan, relative to the previous one, and the points:
+        times [s] and places.
         """
         rows = self.rows[-MOST_ROWS_OF_PLANS:]
         period = self.source.schema["period"]
@@ -223,8 +223,8 @@ class _Recorded:
         return found
 
     def _kept(self, values: NDArray[Any]) -> NDArray[np.intp]:
-        """Places of the rows that draw a curve: of each stretch the first one, and the first that
-        is lowest, that is highest, and that is not a number; and the last row of all.
+        """Returns indices of the rows that draw a curve: of each stretch the first row, and the
+        first lowest, highest and NaN row; and the last row of all.
         """
         lengths = np.diff(self.ticks, append=len(values))
         wanted = [
@@ -240,7 +240,7 @@ class _Recorded:
         return np.unique(np.concatenate(kept))
 
     def _others(self, numbers: _Numbers, everything: "dict[str, _Recorded]") -> dict[str, Any]:
-        """By other run: whether it shares the world, and its tick at each tick; -1: none."""
+        """Returns by other run whether it shares the world, and its tick at each tick; -1: none."""
         found: dict[str, Any] = {}
         sources = [each.source for each in everything.values()]
         for label, other in everything.items():
@@ -263,7 +263,7 @@ class _Recorded:
 
 
 def _thinned(meshes: dict[int, dict[str, str]]) -> dict[int, dict[str, str]]:
-    """Meshes with fewer triangles: points that lie near to each other become one."""
+    """Reduces the triangles of meshes: joins points that are near to each other."""
     from o80.view.base64_arrays import packed, packed_indices
 
     found = {}

@@ -28,12 +28,12 @@ SHADOWS = 1024
 
 
 class Pictures(Closeable):
-    """Draws rows of a robot as its model looks, without a screen.
+    """Draws rows of a robot by its model, without a screen.
 
     robot: a frontend, or a run of a recording (`o80.open(file)["arm"].epochs[0]`).
     size: width and height [pixels].
-    camera: name or number of one of the model's; -1: from outside (None: the first one that stands
-        in the world, or from outside).
+    camera: name or number of a camera of the model; -1: from outside (None: the first camera that
+        is fixed in the world, or from outside).
     model_files: read the files (meshes) that the model names. Only for models that you trust.
 
     Needs the extra `rendering`, and EGL or OSMesa; MUJOCO_GL chooses between them. Raises
@@ -67,23 +67,23 @@ class Pictures(Closeable):
         self._renderer = mujoco.Renderer(model, size[1], size[0])
 
     def draw(self, row: _core.Observation) -> Image:
-        """A fresh picture (height, width, 3) of where a row observed the robot."""
+        """Draws a fresh picture (height, width, 3) of the observed positions in a row."""
         if self._renderer is None:
             raise InvalidArgument("these pictures were closed; make new ones")
         return self._scene.picture(row, self._renderer, self._camera)
 
     def close(self) -> None:
-        """Gives the renderer back; may be called twice."""
+        """Releases the renderer; may be called twice."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
 
 
 def renderer_of_mujoco() -> Any:
-    """The module mujoco, drawing with EGL if that is there, else with OSMesa: without a screen.
+    """Returns the module mujoco, which draws without a screen: with EGL if it exists, else OSMesa.
 
-    MuJoCo looks at the variable when it is first imported; if that is past, its choice is replaced.
-    Raises o80.MissingExtra.
+    MuJoCo reads the variable MUJOCO_GL at its first import; after that, its choice is replaced.
+    Raises o80.MissingExtra without OpenGL or mujoco.
     """
     needed("OpenGL", "rendering", "a picture")
     usual = "egl" if ctypes.util.find_library("EGL") else "osmesa"

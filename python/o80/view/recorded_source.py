@@ -16,7 +16,7 @@ from o80.rows.history import History
 from o80.rows.plans import ChunkEntries, Planned, planned_by_chunks
 from o80.view.source import NothingToShow, Source
 
-AHEAD = 3_000_000_000  # [ns]: rows before and after the ones that are asked for
+AHEAD = 3_000_000_000  # time before and after a request for which rows are read [ns]
 MOST_ROWS_OF_PLANS = 100_000
 SAME_CLOCK = 500_000_000  # offsets to the wall clock that differ by less are of one clock [ns]
 
@@ -24,7 +24,7 @@ Moment = tuple[str, int]  # name of a mark, and how many of this name came befor
 
 
 class RecordedSource(Source):
-    """Reads the rows around the time that is shown; keeps them for the next request."""
+    """Reads the rows around the shown time, and keeps them for the next request."""
 
     live = False
 
@@ -53,7 +53,7 @@ class RecordedSource(Source):
         self._chunks = epoch.chunk_times
         self._lock = threading.Lock()
         self._kept: tuple[int, int, History] | None = None
-        self._decisions: tuple[int, ChunkEntries] | None = None  # from an iteration on
+        self._decisions: tuple[int, ChunkEntries] | None = None  # first iteration, entries from it
         self._problem = ""
         self._extent: tuple[int, int] | None = None
         try:
@@ -85,7 +85,7 @@ class RecordedSource(Source):
         return self._epoch.model
 
     def refresh(self) -> None:
-        """A recording does not change."""
+        """Does nothing: a recording does not change."""
 
     def extent(self) -> tuple[int, int]:
         if self._extent is None:
@@ -102,7 +102,7 @@ class RecordedSource(Source):
         return self._before(at)
 
     def _before(self, time: int) -> Observation:
-        """The newest row before a gap."""
+        """Returns the newest row before a gap."""
         for begin, end in reversed(self._chunks):
             if begin <= time:
                 found = self._epoch.history(from_time=begin, to_time=min(end, time))
@@ -117,7 +117,7 @@ class RecordedSource(Source):
         shift = other._epoch.wall_offset - self._epoch.wall_offset
         if clocks == ("monotonic", "monotonic"):
             return row.time if abs(shift) < SAME_CLOCK else row.time + shift
-        # simulated time passes while its robot is burst; marks of both say when that was
+        # simulated time passes only in bursts: marks of both relate the times
         both = [(other._moments[each][0], each) for each in self._moments if each in other._moments]
         both.sort()
         past = bisect(both, row.iteration, key=lambda each: each[0])
@@ -129,7 +129,7 @@ class RecordedSource(Source):
         return min(found, self._time_of(both[past][1])) if past < len(both) else found
 
     def _time_of(self, moment: Moment) -> int:
-        """The time [ns] of the row that a mark names."""
+        """Returns the time [ns] of the row of a mark."""
         iteration, wall = self._moments[moment]
         if self.schema["clock"] == "simulated":
             return iteration * int(self.schema["period"])
@@ -147,7 +147,7 @@ class RecordedSource(Source):
         return self._around(begin, end).select(from_time=begin, to_time=end)
 
     def plans(self, rows: History) -> dict[str, list[Planned]]:
-        """Plans of chunks; none far before the end of a long run, whose journal takes long."""
+        """Returns plans of chunks; none far before the end of a long run: its journal is slow."""
         if not len(rows) or not self._epoch.has_journal:
             return {}
         first = int(rows.iteration[0])

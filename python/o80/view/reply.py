@@ -21,11 +21,11 @@ class Reply:
 
     @classmethod
     def json(cls, code: int, body: dict[str, Any]) -> "Reply":
-        """A reply whose body is JSON."""
+        """Makes a reply whose body is JSON."""
         return cls(code, json_text(body, say=complain_once).encode(), "application/json")
 
     def as_bytes(self, *, last: bool) -> bytes:
-        """Head and body. last: the connection is closed after it."""
+        """Encodes head and body. last: the connection is closed after this reply."""
         lines = [
             f"HTTP/1.1 {self.code} {HTTPStatus(self.code).phrase}",
             "Server: o80",

@@ -1,4 +1,4 @@
-"""The bodies of a MuJoCo model, and where they are in a row."""
+"""The bodies of a MuJoCo model, and their poses in a row."""
 
 import threading
 from dataclasses import dataclass
@@ -42,7 +42,7 @@ class Scene:
         ]
         weld = self._model.body_weldid
         self._moving = [body for body in range(self._model.nbody) if weld[body] != 0]
-        # bodies that float are there only while a row says where, as a ball that is tracked
+        # floating bodies, such as a tracked ball, exist only while a row has their pose
         self._floats = not any(weld[body] == 0 for body in self._model.geom_bodyid)
         self._has_ghost = any(value["from"] == "states" for value in described["values"])
         self.geometry = self._geometry()
@@ -59,7 +59,7 @@ class Scene:
             raise Error(f"the model of the robot cannot be read: {error}") from error
 
     def _place(self, value: dict[str, Any], schema: dict[str, Any]) -> "_Place | None":
-        """None if the model has no such joint or body."""
+        """Finds where a value goes; None if the model has no such joint or body."""
         kind = self._mujoco.mjtObj
         joint = value["what"] == "joint"
         if joint:
@@ -88,7 +88,7 @@ class Scene:
         )
 
     def poses(self, row: Observation) -> dict[str, Any]:
-        """Positions and quaternions of the moving bodies (bodies, 7), observed and desired."""
+        """Returns positions and quaternions of moving bodies (bodies, 7), observed and desired."""
         found: dict[str, Any] = {"pose": None, "ghost": None, "not_finite": []}
         with self._lock:
             observed = [place.observed for place in self._places]
@@ -102,7 +102,7 @@ class Scene:
 
     @property
     def bodies(self) -> list[str]:
-        """Names of the moving bodies; of one without a name, its number."""
+        """Names of the moving bodies; numbers of bodies without a name."""
         names = (self._model.body(body).name for body in self._moving)
         return [name or f"body_{body}" for name, body in zip(names, self._moving, strict=True)]
 
@@ -112,7 +112,7 @@ class Scene:
         return self._model
 
     def picture(self, row: Observation, renderer: Any, camera: str | int) -> Image:
-        """A fresh picture (height, width, 3) of the observed positions."""
+        """Draws a fresh picture (height, width, 3) of the observed positions."""
         with self._lock:
             self._pose(row, [place.observed for place in self._places], [])
             self._mujoco.mj_camlight(self._model, self._data)
@@ -121,7 +121,7 @@ class Scene:
             return picture
 
     def observed(self, row: bytes) -> NDArray[np.float64]:
-        """Observed positions and quaternions of the moving bodies (bodies, 7)."""
+        """Returns observed positions and quaternions of the moving bodies (bodies, 7)."""
         with self._lock:
             return self._pose(row, [place.observed for place in self._places], [])
 
@@ -203,7 +203,7 @@ class Scene:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where a value lies in a row, and where it goes in qpos."""
+    """Place of a value in a row, and in qpos."""
 
     name: str
     body: int
@@ -211,18 +211,18 @@ class _Place:
     count: int
     observed: int
     desired: int
-    follows: int | None  #: the actuator, if without a command it follows what is observed
-    factor: float  #: from the numbers to those in qpos
+    follows: int | None  #: the actuator, if it follows its observed state without a command
+    factor: float  #: from the numbers of the row to those in qpos
     shift: float
 
     def wanted(self, active: NDArray[np.bool_]) -> int:
-        """Where the desired value lies; what only follows has no desired value of its own."""
+        """Returns where the desired value is: at the observed one while the actuator follows."""
         idle = self.follows is not None and not bool(active[self.follows])
         return self.observed if idle else self.desired
 
 
 def _following(schema: dict[str, Any], offset: int) -> int | None:
-    """The actuator of a value in the states, if it follows."""
+    """Returns the actuator of a value in the states, if it follows when idle."""
     found = None
     for index, actuator in enumerate(schema["actuators"]):
         if actuator["offset"] <= offset:
@@ -231,7 +231,7 @@ def _following(schema: dict[str, Any], offset: int) -> int | None:
 
 
 def _share(schema: dict[str, Any], offset: int) -> tuple[float, float] | None:
-    """The bounds of an actuator whose state is a number without unit, as that of a gripper."""
+    """Returns the bounds of an actuator whose state has no unit, such as a gripper, or None."""
     for actuator in schema["actuators"]:
         fields = schema["groups"][actuator["group"]]["type"]["fields"]
         low, high = actuator["limits"][0]["minimum"], actuator["limits"][0]["maximum"]

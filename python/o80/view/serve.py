@@ -15,7 +15,7 @@ from o80.view.server import PageServer
 from o80.view.source_list import SourceList
 
 HOST = "127.0.0.1"
-DESCRIPTORS = 4096  # so that many strangers are no problem; the usual limit is 1024
+DESCRIPTORS = 4096  # enough for many strangers; the usual limit is 1024
 
 
 @contextmanager
@@ -27,7 +27,7 @@ def page_server(
     control: bool = False,
     model_files: bool = False,
 ) -> Iterator[PageServer]:
-    """A server that listens, and serves in threads of its own until the block ends.
+    """Runs a server in threads of its own until the block ends.
 
     Raises o80.Error if the port is taken, RecordingError if a file cannot be read.
     """
@@ -51,11 +51,11 @@ def page_server(
     finally:
         server.close()
         thread.join()
-        preparing.join()  # what it imports must not outlive the interpreter
+        preparing.join()  # its imports must not outlive the interpreter
 
 
 def allow_descriptors(wanted: int) -> None:
-    """Raises the limit of this process as far as its user may."""
+    """Raises the descriptor limit of this process to `wanted`, as far as its user may."""
     now, most = resource.getrlimit(resource.RLIMIT_NOFILE)
     allowed = wanted if most == resource.RLIM_INFINITY else min(wanted, most)
     if now != resource.RLIM_INFINITY and now < allowed:

@@ -1,7 +1,7 @@
-"""The HTTP server of the page. Pages ask for what they show; nothing is sent unasked.
+"""The HTTP server of the page. Pages request their data; the server pushes nothing.
 
-A page sends its next request after it has shown the answer to the last one. So a page that stalls
-finds one old answer at most, however long it stalled, and a slow page costs the server less.
+A page sends its next request after it has shown the previous answer. So after a stall a page has
+one old answer at most, however long it stalled, and a slow page costs the server less.
 """
 
 import base64
@@ -88,7 +88,7 @@ class PageServer:
 
 
 def _unreadable_halt(body: bytes) -> dict[str, Any]:
-    """Fields of a request for a halt that is no JSON object, the segment at least."""
+    """Recovers the fields, at least the segment, of a halt request that is no JSON object."""
     text = body.decode(errors="replace")
     with contextlib.suppress(ValueError, RecursionError):
         query = json.loads(text)
@@ -138,7 +138,7 @@ class Page:
 
 @cache
 def page_text(recording: str = "") -> Page:
-    """The page of `o80 view`; or, with a recording, a page that needs no server."""
+    """Makes the page of `o80 view`; or, with a recording, a page that needs no server."""
     folder = files("o80.view") / "page"
     script = "".join((folder / name).read_text() for name in SCRIPTS)
     script = f'"use strict";\n{script}'

@@ -18,10 +18,10 @@ class NothingToShow(Error):  # noqa: N818
 
 
 class Source(ABC):
-    """Rows by time. Times are in seconds since `zero`, the time of the first row that was there."""
+    """Provides rows by time. Seconds count from `zero`, the time of the first row found."""
 
-    name: str  #: of the segment
-    label: str  #: for the list of a page
+    name: str  #: name of the segment
+    label: str  #: label in the list of a page
     live: bool
     key: str = ""  #: changes when another run takes the name
     zero: int = 0  #: [ns]
@@ -37,7 +37,7 @@ class Source(ABC):
     @property
     @abstractmethod
     def schema(self) -> dict[str, Any]:
-        """The description of the robot. Raises NothingToShow."""
+        """The description of the robot. Raises NothingToShow if there is no row."""
 
     @property
     @abstractmethod
@@ -46,7 +46,7 @@ class Source(ABC):
 
     @property
     def drawn(self) -> Drawn | None:
-        """The model with what moves it; None: there is none."""
+        """The model, with the values that move it; None: no model."""
         key, found = self._drawn
         if key != self.key or not key:
             try:
@@ -62,42 +62,42 @@ class Source(ABC):
 
     @abstractmethod
     def extent(self) -> tuple[int, int]:
-        """Times of the first and last row [ns]. Raises NothingToShow."""
+        """Returns times of the first and last row [ns]. Raises NothingToShow if there is no row."""
 
     @abstractmethod
     def row(self, time: int | None) -> Observation:
-        """The newest row at or before a time [ns], else the first; None: the newest row.
+        """Returns the newest row at or before a time [ns], else the first; None: the newest row.
 
-        Raises NothingToShow.
+        Raises NothingToShow if there is no row.
         """
 
     @abstractmethod
     def rows(self, begin: int, end: int) -> History:
-        """Rows from one time to another [ns]. Raises NothingToShow."""
+        """Returns rows from one time to another [ns]. Raises NothingToShow if there is no row."""
 
     @abstractmethod
     def marks(self) -> Sequence[tuple[str, int]]:
-        """Text and iteration of the marks of this run, in their order."""
+        """Returns text and iteration of the marks of this run, in order."""
 
     def plans(self, rows: History) -> dict[str, list[Planned]]:
-        """Plans of chunks that began among these rows, by panel, as far as they are known."""
+        """Returns the known plans of chunks that began among these rows, by panel."""
         return {}
 
     @abstractmethod
     def time_with(self, other: "Source", row: Observation) -> int | None:
-        """The time [ns] of this source when another published a row; None: they never ran together.
+        """Converts the time of another source's row to this source's time [ns]; None: unrelated.
 
-        Raises NothingToShow.
+        Raises NothingToShow if there is no row.
         """
 
     @abstractmethod
     def state(self) -> dict[str, Any]:
-        """Entry of this source in the segment list: state, rate, overruns, age of the last row."""
+        """Makes this source's entry in the segment list: state, rate, overruns, age of last row."""
 
     def seconds(self, time: int) -> float:
-        """A time [ns] as the page shows it [s]."""
+        """Converts a time [ns] to seconds of the page [s]."""
         return (time - self.zero) / NANOSECONDS
 
     def nanoseconds(self, seconds: float) -> int:
-        """The reverse."""
+        """Converts seconds of the page [s] to a time [ns]."""
         return self.zero + round(seconds * NANOSECONDS)

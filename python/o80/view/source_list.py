@@ -12,7 +12,7 @@ from o80.frontend.segments import segments as all_segments
 from o80.view.live_source import LiveSource
 from o80.view.source import Source
 
-BETWEEN_LOOKS = 0.25  # for new segments and restarts [s]
+BETWEEN_LOOKS = 0.25  # interval of searches for new segments and restarts [s]
 
 
 class SourceList:
@@ -23,7 +23,7 @@ class SourceList:
             them); none: all segments.
         model_files: read the files that models of recordings and of other users' robots name.
 
-        Raises RecordingError.
+        Raises RecordingError if a recording cannot be read.
         """
         self._model_files = model_files
         self._recorded: list[Source] = []
@@ -50,7 +50,7 @@ class SourceList:
 
     @property
     def waiting(self) -> str:
-        """Text of a page while there is nothing to show."""
+        """Text for a page while there is nothing to show."""
         if self._patterns == ["*"]:
             return (
                 _core.directory_problem()
@@ -59,7 +59,7 @@ class SourceList:
         return f"No segment matches {', '.join(self._patterns)} yet."
 
     def now(self) -> list[Source]:
-        """All sources; live ones are attached to the backend of now."""
+        """Returns all sources; live sources are attached to the current backend."""
         with self._lock:
             if time.monotonic() >= self._look_at:
                 self._look()

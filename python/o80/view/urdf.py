@@ -1,6 +1,6 @@
-"""A robot's model as URDF, which rviz and MoveIt read, and places of its links.
+"""Converts a robot's model to URDF, for rviz and MoveIt, and computes poses of its links.
 
-One link for each body that moves, `ROBOT/BODY`, as frames of ROS name them; what stands is drawn in
+Each body that moves is a link, `ROBOT/BODY`, named as in frames of ROS; fixed bodies are drawn in
 the world. Meshes are drawn as boxes around them.
 """
 
@@ -27,29 +27,29 @@ Place = tuple[str, Numbers, Numbers]
 
 
 class Links:
-    """The links of a robot: its bodies that move."""
+    """The links of a robot: its moving bodies."""
 
     @classmethod
     def of(cls, frontend: "Frontend", robot: str) -> "Links | None":
-        """None if the robot names no model. Raises Error if it cannot be read."""
+        """Makes links; None if the robot names no model. Raises Error if it cannot be read."""
         if "model" not in frontend.schema:
             return None
         found = drawn(frontend.schema, frontend.model, trusted=is_own(frontend))
         return None if found is None else cls(Scene(frontend.schema, found), robot)
 
     def __init__(self, scene: Scene, robot: str) -> None:
-        """robot: name before the names of links."""
+        """robot: prefix of the names of links."""
         self._scene, self._robot = scene, robot
         self._names = [f"{robot}/{body}" for body in scene.bodies]
 
     def places(self, row: bytes) -> Iterator[Place]:
-        """Where links are observed in a row; without those whose place is not known."""
+        """Yields observed poses of links in a row, without links whose pose is not known."""
         for name, pose in zip(self._names, self._scene.observed(row), strict=True):
             if np.isfinite(pose).all():
                 yield name, pose[:3], pose[[4, 5, 6, 3]]  # MuJoCo begins with w
 
     def urdf(self, schema: Mapping[str, Any], names: Mapping[int, str]) -> str:
-        """The model as URDF. names: of joints, by the place of their position in a row [bytes]."""
+        """Converts the model to URDF. names: joints by their position's offset in a row [bytes]."""
         begins = {"states": schema["row"]["observed"], "extended": schema["row"]["extended"]}
         values = schema["model"]["values"]
         places = {each["name"]: begins[each["from"]] + each["offset"] for each in values}
@@ -60,7 +60,7 @@ class Links:
 class _Urdf:
     """Converts a compiled model of MuJoCo.
 
-    robot: name before the links. joints: other names for joints of the model.
+    robot: prefix of the links. joints: other names for joints of the model.
     """
 
     def __init__(self, model: Any, robot: str, joints: Mapping[str, str]) -> None:
@@ -78,11 +78,11 @@ class _Urdf:
             self._add_joints(int(body))
 
     def text(self) -> str:
-        """The URDF."""
+        """Returns the URDF as text."""
         return tostring(self._element, encoding="unicode")
 
     def _standing(self, body: int) -> Numbers:
-        """Where a body is in its link (4, 4)."""
+        """Returns the pose of a body in its link (4, 4)."""
         found = np.eye(4)
         while body and not self._model.body_weldid[body]:
             found = _placed(self._model.body_pos[body], self._model.body_quat[body]) @ found
@@ -90,10 +90,10 @@ class _Urdf:
         return found
 
     def _add_joints(self, body: int) -> None:
-        """The joints of a body one after the other, with links between them."""
+        """Adds the joints of a body one after the other, with links between them."""
         model, frame = self._model, self._frames[body]
         parent = int(model.body_parentid[body])
-        link, at = self._frames[parent], np.zeros(3)  # at: of the link, in the body
+        link, at = self._frames[parent], np.zeros(3)  # at: position of the link, in the body
         origin = self._standing(parent) @ _placed(model.body_pos[body], model.body_quat[body])
         first = int(model.body_jntadr[body])
         for joint in range(first, first + int(model.body_jntnum[body])):
@@ -150,7 +150,7 @@ def _add_origin(element: Element, m: Numbers) -> None:
 
 
 def _placed(position: Numbers, turn: Any = (1, 0, 0, 0)) -> Numbers:
-    """The matrix (4, 4) of a position and a quaternion that begins with w."""
+    """Returns the matrix (4, 4) of a position and a quaternion (w first)."""
     found, (w, x, y, z) = np.eye(4), turn
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     found[:3, :3] += 2 * (w * cross + cross @ cross)

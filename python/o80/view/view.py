@@ -36,8 +36,8 @@ class View(Closeable):
     open_browser: also opens the page.
     model_files: read the files (meshes) that models of recordings and of other users' robots name.
 
-    The server is a process of its own, so that it takes no time of this one. It ends with `close`,
-    with the `with` block, and with this process. Raises Error if the port is taken, RecordingError.
+    The server is a process of its own, to cost this process no time. It ends with `close`, the
+    `with` block or this process. Raises Error for a taken port, RecordingError for a bad file.
     """
 
     def __init__(
@@ -69,8 +69,8 @@ class View(Closeable):
         if "error" in said:
             self.close()
             raise Error(said["error"])
-        self.url: str = said["url"]  #: address of the page, with its token: whoever has it may halt
-        self.port: int = said["port"]  #: the one that is bound
+        self.url: str = said["url"]  #: address of the page; its token permits to halt robots
+        self.port: int = said["port"]  #: the bound port
         if open_browser:
             open_in_browser(self.url)
 
@@ -80,7 +80,7 @@ class View(Closeable):
         return self._popen.poll() is None
 
     def close(self) -> None:
-        """Ends the server; pages say so. May be called twice; does nothing in a forked child."""
+        """Ends the server, as pages then show. May be called twice; no effect in a forked child."""
         if self._owner != os.getpid():
             return
         end_child(self._popen, GRACE)

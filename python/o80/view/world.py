@@ -1,4 +1,4 @@
-"""The models that draw segments, and which of them share one world."""
+"""The models that draw segments, and the rule by which they share one world."""
 
 from dataclasses import dataclass
 from functools import lru_cache
@@ -19,14 +19,14 @@ class Drawn:
     """The model of a segment."""
 
     mjcf: str
-    described: dict[str, Any]  #: what moves it, as in a schema
+    described: dict[str, Any]  #: the values that move it, as in a schema
     trusted: bool  #: the files that it names may be read
     standing: "Standing"
 
 
 def drawn(schema: dict[str, Any], mjcf: str, *, trusted: bool) -> Drawn | None:
-    """The model of a robot. A sensor without one is drawn as balls at the places that it measures:
-    each three numbers `position` in metres among its sensor values. None: there is none.
+    """Returns the model of a robot, or None. A sensor without a model is drawn as balls at its
+    measured positions: each three numbers `position` in metres among its sensor values.
     """
     if "model" in schema:
         return Drawn(mjcf, schema["model"], trusted, standing(mjcf))
@@ -55,16 +55,16 @@ class Standing:
 
     #: name and position [mm] of the bodies and shapes that the world carries
     places: frozenset[tuple[str, int, int, int]] = frozenset()
-    floats: bool = False  #: nothing of it stands: a tracked ball, subjects of motion capture
+    floats: bool = False  #: no body of it is fixed: a tracked ball, subjects of motion capture
 
     def shares(self, other: "Standing") -> bool:
-        """Whether both are in one world: they have a named thing at the same place."""
+        """True if both share a world: one floats, or both have a named thing at the same place."""
         return self.floats or other.floats or not self.places.isdisjoint(other.places)
 
 
 @lru_cache(maxsize=64)
 def standing(mjcf: str) -> Standing:
-    """The places of a model (MJCF); of text that cannot be read: none."""
+    """Finds the fixed places of a model (MJCF); none in a text that cannot be parsed."""
     if "<!DOCTYPE" in mjcf or "<!ENTITY" in mjcf:  # it may come from a stranger
         return Standing()
     try:

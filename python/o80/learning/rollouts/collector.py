@@ -1,4 +1,4 @@
-"""Collects rollouts: plays policies in a vector environment."""
+"""Collects rollouts: runs policies in a vector environment."""
 
 from collections.abc import Callable, Sequence
 from typing import Any, Protocol
@@ -20,12 +20,12 @@ Make = Callable[[], "VectorEnv[Any, Any, Any]"]
 
 
 class Policy(Protocol):
-    """Weights, and how to act with them."""
+    """A policy that can be run: it draws actions."""
 
     def sample(
         self, observations: NDArray[Any], generator: np.random.Generator
     ) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Actions (N, ...) after observations (N, ...), and their log-probabilities (N,).
+        """Draws actions (N, ...) for observations (N, ...); returns log-probabilities (N,) too.
 
         All random numbers must come from `generator`.
         """
@@ -35,11 +35,11 @@ class Policy(Protocol):
 class Collector(Closeable):
     """Collects the rollouts of one vector environment.
 
-    All random numbers follow from (seed, number, iteration): those of the environments from the
-    iteration in which they began, those of the policy from the iteration of the rollout. So the
-    same seed and policies give the same rollouts, bit for bit, in any process.
+    All random numbers follow from (seed, number, iteration): for the environments from the
+    iteration in which they began, for the policy from the iteration of the rollout. So equal seeds
+    and policies give equal rollouts, bit for bit, in any process.
 
-    After an exception in `collect` the next one begins anew, and repeats the iteration.
+    After an exception in `collect` the next call makes new environments and repeats the iteration.
     """
 
     def __init__(
@@ -51,11 +51,11 @@ class Collector(Closeable):
         iteration: int = 0,
         infos: Sequence[str] = (),
     ) -> None:
-        """make: the vector environment, in autoreset mode SameStep.
+        """make: makes the vector environment, in autoreset mode SameStep.
 
-        seed: of all random numbers. number: tells collectors of the same seed apart.
-        iteration: the first one; a training that resumes gives the one it has come to.
-        infos: entries of Gymnasium's info that `Rollout.ends` keeps of each episode.
+        seed: seed of all random numbers. number: distinguishes collectors with the same seed.
+        iteration: the first one; a resumed training gives the iteration that it has reached.
+        infos: entries of Gymnasium's info that `Rollout.ends` keeps for each episode.
         """
         self.seed = whole(seed, "seed", 0)
         self.number = whole(number, "number", 0)
@@ -66,7 +66,7 @@ class Collector(Closeable):
         self._begin()
 
     def collect(self, policy: Policy, *, steps: int) -> Rollout:
-        """So many steps of all copies, from where they are; then the next iteration begins."""
+        """Runs `steps` steps of all copies, from their current states; ends the iteration."""
         steps = whole(steps, "steps", 1)
         self._refuse_if_closed()
         if self._interrupted:
@@ -78,7 +78,7 @@ class Collector(Closeable):
         return rollout
 
     def restart(self, iteration: int) -> None:
-        """Begins anew, in `iteration`, with new environments."""
+        """Restarts with new environments, in `iteration`."""
         self._refuse_if_closed()
         self.iteration = whole(iteration, "iteration", 0)
         self._interrupted = True
@@ -139,14 +139,14 @@ class Collector(Closeable):
 
 
 def environment_seeds(seed: int, number: int, iteration: int, copies: int) -> list[int]:
-    """Seeds of the copies of a collector that begins in `iteration`."""
+    """Returns the seeds of the copies of a collector that begins in `iteration`."""
     sequence = np.random.SeedSequence((seed, number, iteration, 0))
     words: list[int] = sequence.generate_state(copies, np.uint64).tolist()
     return [word >> 1 for word in words]
 
 
 def policy_generator(seed: int, number: int, iteration: int) -> np.random.Generator:
-    """Random generator of the policy in the rollout of `iteration`."""
+    """Makes the random generator of the policy in the rollout of `iteration`."""
     return np.random.default_rng((seed, number, iteration, 1))
 
 
@@ -157,7 +157,7 @@ def _inside(space: Any, actions: NDArray[Any]) -> NDArray[Any]:
 
 
 def _refuse_unless_collectable(environments: VectorEnv[Any, Any, Any]) -> None:
-    """Raises InvalidArgument."""
+    """Raises InvalidArgument for another autoreset mode, or spaces other than arrays."""
     mode = environments.metadata.get("autoreset_mode")
     if mode != AutoresetMode.SAME_STEP:
         raise InvalidArgument(

@@ -1,4 +1,4 @@
-"""A policy with NumPy alone: a network gives the mean of the actions, and noise is added."""
+"""A policy with NumPy alone: a network computes the mean of the actions, and noise is added."""
 
 import math
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ class GaussianPolicy:
     last layer gives the means of the actions. The actions are not clipped.
     """
 
-    mean: Float32Array  #: (M,) taken off the observations
-    scale: Float32Array  #: (M,) then multiplied with them
+    mean: Float32Array  #: (M,) subtracted from the observations
+    scale: Float32Array  #: (M,) factor of the observations after that
     weights: tuple[Float32Array, ...]  #: weights of each layer (out, in)
     biases: tuple[Float32Array, ...]  #: biases of each layer (out,)
     log_std: Float32Array  #: (A,) logarithm of the standard deviation of each action
@@ -49,7 +49,7 @@ class GaussianPolicy:
         log_std: float = 0.0,
         seed: int = 0,
     ) -> "GaussianPolicy":
-        """One that knows nothing: random weights, and means of 0."""
+        """Makes an untrained policy: random weights, and means of 0."""
         generator = np.random.default_rng(seed)
         sizes = [inputs, *hidden, outputs]
         weights = [
@@ -66,7 +66,7 @@ class GaussianPolicy:
         )
 
     def means(self, observations: NDArray[np.floating]) -> Float32Array:
-        """(N, A)"""
+        """Computes the means of the actions (N, A)."""
         seen = (np.asarray(observations, np.float32) - self.mean) * self.scale
         hidden: Float32Array = np.clip(seen, -self.clip, self.clip)
         last = len(self.weights) - 1
@@ -79,7 +79,7 @@ class GaussianPolicy:
     def sample(
         self, observations: NDArray[np.floating], generator: np.random.Generator
     ) -> tuple[Float32Array, NDArray[np.float64]]:
-        """Actions (N, A), and the logarithms of their probability densities (N,)."""
+        """Draws actions (N, A); returns the logarithms of their densities (N,) too."""
         means = self.means(observations)
         noise = generator.standard_normal(means.shape, np.float32)
         log_std = self.log_std.astype(np.float64)

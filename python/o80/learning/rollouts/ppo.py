@@ -1,4 +1,4 @@
-"""Stable-Baselines3's PPO, which learns from the rollouts of a Collector.
+"""PPO of Stable-Baselines3, trained on the rollouts of a Collector.
 
 with Collector(make, seed=1) as collector:
     model = RolloutPPO("MlpPolicy", VecNormalize(CollectorEnv(collector), norm_reward=False))
@@ -34,7 +34,7 @@ ALONE = "a collector steps its copies itself: give CollectorEnv to a RolloutPPO 
 
 
 class CollectorEnv(VecEnv):
-    """The copies of a collector as environment of a RolloutPPO, which cannot step them."""
+    """The copies of a collector as the environment of a RolloutPPO; it cannot step them."""
 
     def __init__(self, collector: Collector) -> None:
         self.collector = collector
@@ -42,7 +42,7 @@ class CollectorEnv(VecEnv):
         super().__init__(collector.copies, collector.observation_space, collector.action_space)
 
     def reset(self) -> Any:
-        """Zeros: a rollout begins with the observations of the collector."""
+        """Returns zeros: a rollout begins with the observations of the collector."""
         space = self.observation_space
         return np.zeros((self.num_envs, *(space.shape or ())), space.dtype)
 
@@ -59,7 +59,7 @@ class CollectorEnv(VecEnv):
         self.collector.close()
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
-        """An attribute of this object, for each copy."""
+        """Returns an attribute of this object, once for each copy."""
         return [getattr(self, attr_name)] * len(list(self._get_indices(indices)))
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
@@ -71,26 +71,26 @@ class CollectorEnv(VecEnv):
         raise InvalidArgument(f"'{method_name}' cannot be called in a collector's environments")
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
-        """Whether ends have the info `episode`, as those of a Monitor."""
+        """Returns whether ends have the info `episode`, like ends in a Monitor."""
         from stable_baselines3.common.monitor import Monitor
 
         return [issubclass(Monitor, wrapper_class)] * len(list(self._get_indices(indices)))
 
 
 class RolloutPPO(PPO):
-    """PPO whose rollouts a collector collects, with the weights of the last update.
+    """PPO with rollouts of a collector, collected with the weights of the last update.
 
-    Its environment is a CollectorEnv, or a VecNormalize of one without `norm_reward`. Statistics
-    of observations are updated after each rollout, not in each step. The iteration is the number
-    of updates; a model that was loaded makes the collector begin anew there.
+    The environment must be a CollectorEnv, or a VecNormalize of one without `norm_reward`.
+    Statistics of observations are updated after each rollout, not in each step. The iteration is
+    the number of updates; for a loaded model the collector restarts in its iteration.
     """
 
     def __init__(
         self, *arguments: Any, visible: NDArray[Any] | None = None, **options: Any
     ) -> None:
-        """visible: (M,) 0 for numbers of an observation that the policy must not see, else 1.
+        """visible: (M,) 0 for numbers of an observation that are hidden from the policy, else 1.
 
-        The others: those of PPO.
+        Other arguments: those of PPO.
         """
         self._visible = visible
         super().__init__(*arguments, **options)
@@ -110,7 +110,7 @@ class RolloutPPO(PPO):
         return [*super()._excluded_save_params(), "_collector"]
 
     def _setup_learn(self, *arguments: Any, **options: Any) -> Any:
-        """Without the zeros of CollectorEnv.reset in the statistics."""
+        """Sets up learning without the zeros of CollectorEnv.reset in the statistics."""
         normalisation = self._vec_normalize_env
         if normalisation is None:
             return super()._setup_learn(*arguments, **options)
@@ -132,7 +132,7 @@ class RolloutPPO(PPO):
         rollout_buffer.reset()
         callback.on_rollout_start()
         rollout = _Visible(self._collected(n_rollout_steps), self._visible)
-        steps = len(rollout.rewards)  # more than were asked for, if the collector ends episodes
+        steps = len(rollout.rewards)  # more than requested, if the collector ends episodes
         if steps != rollout_buffer.buffer_size:
             rollout_buffer.buffer_size = steps
             rollout_buffer.reset()
@@ -166,7 +166,7 @@ class RolloutPPO(PPO):
         return True
 
     def _collected(self, steps: int) -> Rollout:
-        """The rollout of the iteration that this model has come to."""
+        """Collects the rollout of this model's iteration."""
         iteration = self.num_timesteps // (steps * self.n_envs)
         if self._collector.iteration != iteration:
             self._collector.restart(iteration)
@@ -180,8 +180,8 @@ class RolloutPPO(PPO):
         return normalised  # type: ignore[no-any-return]
 
     def _valued(self, rollout: "_Visible") -> tuple[NDArray[Any], Any, Any]:
-        """Rewards (T, N) with the values that truncated episodes still had, values (T + 1, N), and
-        log-probabilities (T, N): of torch, with which the update compares its own.
+        """Returns rewards (T, N), with the values of the last states of truncated episodes added;
+        values (T + 1, N); and log-probabilities (T, N) by torch, to compare with the update's own.
         """
         steps, count = rollout.rewards.shape
         rewards = rollout.rewards.copy()
@@ -196,7 +196,7 @@ class RolloutPPO(PPO):
         return rewards, values, log_probabilities.reshape(steps, count)
 
     def _values(self, observations: NDArray[Any]) -> torch.Tensor:
-        """Values of the states (..., M), as (n,)."""
+        """Computes the values of the states (..., M), as (n,)."""
         seen = self._tensor(self._normalised(observations))
         values: torch.Tensor = self.policy.predict_values(seen.flatten(0, -2)).flatten().cpu()
         return values
@@ -206,7 +206,7 @@ class RolloutPPO(PPO):
 
 
 class _Visible:
-    """A rollout as the learner sees it: without the numbers that must not be seen."""
+    """A rollout without the numbers that are hidden from the learner."""
 
     def __init__(self, rollout: Rollout, visible: NDArray[Any] | None) -> None:
         self._rollout, self._visible = rollout, visible
@@ -218,12 +218,12 @@ class _Visible:
             self._infos.setdefault(step, {})[copy] = info
 
     def infos(self, step: int) -> list[Info]:
-        """Infos of all copies, for Stable-Baselines3: with entries where an episode ended."""
+        """Returns infos of all copies for Stable-Baselines3, with entries for ended episodes."""
         ended = self._infos.get(step, {})
         return [ended.get(copy, {}) for copy in range(self.rewards.shape[1])]
 
     def cut_off(self) -> tuple[tuple[list[int], list[int]], NDArray[Any]]:
-        """Index (steps, copies) and last observations of the episodes that were only truncated."""
+        """Returns index (steps, copies) and last observations of merely truncated episodes."""
         found = [
             (step, copy, info["terminal_observation"])
             for step, copy, info in self._ends()

@@ -14,19 +14,19 @@ Numbers = NDArray[np.int64]
 
 
 class EpisodeSums:
-    """Reward and length so far of the episode of each copy, kept from rollout to rollout."""
+    """Reward and length so far of each copy's episode, kept across rollouts."""
 
     def __init__(self, copies: int) -> None:
         self.rewards, self.lengths = np.zeros(copies), np.zeros(copies, np.int64)
 
     def restart(self, copies: Numbers) -> None:
-        """Begins new sums for copies after the ends of their episodes."""
+        """Begins new sums for copies whose episodes ended."""
         self.rewards[copies] = 0.0
         self.lengths[copies] = 0
 
 
 class Recorder:
-    """Recorder of one rollout."""
+    """Records one rollout."""
 
     def __init__(
         self, environments: VectorEnv[Any, Any, Any], steps: int, infos: Sequence[str]
@@ -54,7 +54,7 @@ class Recorder:
         actions: NDArray[Any],
         log_probabilities: NDArray[Any],
     ) -> None:
-        """Takes what was seen before a step, and what the policy drew."""
+        """Stores observations before a step, and the actions that the policy drew."""
         self._observations[step] = observations
         self._actions[step] = actions
         self._log_probabilities[step] = log_probabilities
@@ -65,7 +65,7 @@ class Recorder:
         result: tuple[Any, Any, Any, Any, Mapping[str, Any]],
         sums: EpisodeSums,
     ) -> None:
-        """Takes what the environments returned; adds it to the sums."""
+        """Stores the environments' results of a step, and adds them to the sums."""
         _, self._rewards[step], self._terminated[step], self._truncated[step], infos = result
         sums.rewards += self._rewards[step]
         sums.lengths += 1
@@ -83,7 +83,7 @@ class Recorder:
         sums.restart(over)
 
     def rollout(self, observations: NDArray[Any]) -> Rollout:
-        """The rollout; `observations` are those after its last step."""
+        """Returns the rollout; `observations`: observations after its last step."""
         self._observations[-1] = observations
         steps, copies, rewards, lengths, last = (
             np.concatenate(column) for column in zip(*self._ends, strict=True)

@@ -1,4 +1,4 @@
-"""A rollout: what copies of an environment did under one policy, as arrays."""
+"""A rollout: data of several copies of an environment under one policy, as arrays."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields
@@ -10,17 +10,17 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True, eq=False)
 class Ends:
-    """The E episodes that ended in a rollout, in the order of their steps, then of their copies."""
+    """The E episodes that ended in a rollout, sorted by step, then by copy."""
 
     steps: NDArray[np.int64]  #: (E,) the step of the rollout in which the episode ended
-    copies: NDArray[np.int64]  #: (E,)
+    copies: NDArray[np.int64]  #: (E,) the copy
     rewards: NDArray[np.float64]  #: (E,) sum over the episode, earlier rollouts included
     lengths: NDArray[np.int64]  #: (E,) steps of the episode, earlier rollouts included
     observations: NDArray[Any]
-    """(E, ...) the last of the episode, before the reset: a learner bootstraps truncated episodes
-    from it."""
+    """(E, ...) last observation of the episode, before the reset: a learner bootstraps truncated
+    episodes from it."""
     infos: Mapping[str, NDArray[Any]]
-    """(E, ...) the entries of Gymnasium's info that were asked for."""
+    """(E, ...) the requested entries of Gymnasium's info."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,16 +30,16 @@ class Rollout:
     observations: NDArray[Any]
     """(T + 1, N, ...) before each step; the next rollout begins with the last ones."""
     actions: NDArray[Any]
-    """(T, N, ...) as the policy drew them: before they were clipped into the action space."""
+    """(T, N, ...) as drawn by the policy, before they were clipped into the action space."""
     log_probabilities: NDArray[np.float64]  #: (T, N) of the actions, under the policy
     rewards: NDArray[np.float64]  #: (T, N)
-    terminated: NDArray[np.bool_]  #: (T, N) the episode ended in this step, by what happened
-    truncated: NDArray[np.bool_]  #: (T, N) the episode was cut off after this step
+    terminated: NDArray[np.bool_]  #: (T, N) the task ended the episode in this step
+    truncated: NDArray[np.bool_]  #: (T, N) the episode was truncated after this step
     ends: Ends
 
 
 def arrays_of(value: Any, name: str = "") -> Iterator[tuple[str, NDArray[Any]]]:
-    """All arrays of a rollout with their names, such as "ends.rewards"."""
+    """Yields all arrays of a rollout with their names, such as "ends.rewards"."""
     if isinstance(value, np.ndarray):
         yield name, value
     elif isinstance(value, Rollout | Ends):

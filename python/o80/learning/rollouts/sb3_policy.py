@@ -1,4 +1,4 @@
-"""The policy of Stable-Baselines3 as one of NumPy."""
+"""Converts a policy of Stable-Baselines3 to NumPy."""
 
 from typing import Any
 
@@ -14,7 +14,7 @@ def gaussian_policy(
 ) -> GaussianPolicy:
     """policy: of a PPO; normalisation: its VecNormalize, or None; visible: as in RolloutPPO.
 
-    Raises InvalidArgument for a policy that GaussianPolicy cannot be.
+    Raises InvalidArgument for a policy that GaussianPolicy cannot represent.
     """
     import torch
     from stable_baselines3.common.distributions import DiagGaussianDistribution

@@ -1,4 +1,4 @@
-"""Collectors of a training: of copies, which can be repeated, and of episodes on the clock."""
+"""Collectors of a training: of several copies, repeatable, or of whole episodes of one copy."""
 
 import time
 from collections.abc import Sequence
@@ -17,7 +17,7 @@ from o80.learning.training.tasks import spread
 
 
 class Scaled(VectorActionWrapper[Any, Any, Any, Any]):
-    """Environments whose actions in [-1, 1] are spread over the limits of their action space."""
+    """Spreads actions in [-1, 1] over the limits of the environments' action space."""
 
     def __init__(self, environments: VectorEnv[Any, Any, Any]) -> None:
         super().__init__(environments)
@@ -31,13 +31,13 @@ class Scaled(VectorActionWrapper[Any, Any, Any, Any]):
 
 
 class RepeatableCollector(Collector):
-    """Keeps the actions since its environments began, so that another one can repeat them."""
+    """Stores the actions since its environments began, so that another one can repeat them."""
 
     def __init__(self, make: Make, **options: Any) -> None:
         self.seconds = 0.0
         """Time spent in collecting [s]."""
         self.resetting = 0.0
-        """Part of it that was spent in resets, as far as they are known [s]."""
+        """Part of it that was spent in resets, as far as known [s]."""
         super().__init__(make, **options)
 
     def _begin(self) -> None:
@@ -45,14 +45,14 @@ class RepeatableCollector(Collector):
         self.keep_nothing()
 
     def keep_nothing(self) -> None:
-        """The environments have begun in this iteration."""
+        """Clears the stored actions: the environments have begun in this iteration."""
         self.begun = self.iteration
         """Iteration in which the environments began."""
         self.played: list[NDArray[Any]] = []
         """Actions (T, N, A) of each rollout since then."""
 
     def collect(self, policy: Policy, *, steps: int) -> Rollout:
-        """As that of every collector."""
+        """Collects a rollout and stores its actions."""
         since = time.monotonic()
         rollout = super().collect(policy, steps=steps)
         self.seconds += time.monotonic() - since
@@ -60,14 +60,14 @@ class RepeatableCollector(Collector):
         return rollout
 
     def repeat(self, played: Sequence[NDArray[Any]]) -> None:
-        """Collects again what another collector did after it began in the same iteration."""
+        """Repeats the rollouts of another collector that began in the same iteration."""
         for actions in played:
             self.collect(_Played(actions), steps=len(actions))
         self.seconds = 0.0
 
 
 class _Played:
-    """Policy that repeats actions (T, N, A)."""
+    """Repeats actions (T, N, A)."""
 
     def __init__(self, actions: NDArray[Any]) -> None:
         self._rows = iter(actions)
@@ -79,7 +79,7 @@ class _Played:
 class EpisodeCollector(RepeatableCollector):
     """Collects whole episodes of one copy: a rollout begins with a reset and ends with an episode.
 
-    So what happens between two rollouts lies between two episodes. Needs an environment in
+    Everything between two rollouts thus happens between two episodes. Needs an environment in
     autoreset mode Disabled.
     """
 
@@ -88,7 +88,7 @@ class EpisodeCollector(RepeatableCollector):
         self.keep_nothing()
 
     def collect(self, policy: Policy, *, steps: int) -> Rollout:
-        """At least so many steps."""
+        """Collects whole episodes of at least `steps` steps together."""
         rollout = super().collect(policy, steps=steps)
         self.keep_nothing()
         return rollout

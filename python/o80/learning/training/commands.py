@@ -22,7 +22,7 @@ from o80.learning.training.settings import TrainingSettings
 from o80.learning.training.tasks import SUCCESS, NamedTask
 
 BETWEEN = 5.0
-"""Time between two lines about a training [s]."""
+"""Time between two printed lines about a training [s]."""
 app = typer.Typer(
     name="python -m o80.learning",
     no_args_is_help=True,
@@ -35,8 +35,8 @@ Options = Annotated[list[str] | None, _OPTION]
 
 
 def main() -> None:
-    """Entry point. Exceptions of o80 become one line; SIGTERM and the end of the terminal act as
-    Ctrl-C does.
+    """Entry point. Prints exceptions of o80 in one line; SIGTERM and the end of the terminal act
+    like Ctrl-C.
     """
     keep_printing()
     by = 0
@@ -47,7 +47,7 @@ def main() -> None:
         raise KeyboardInterrupt
 
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
-        if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup has it
+        if signal.getsignal(number) is not signal.SIG_IGN:  # as set by nohup
             signal.signal(number, interrupt)
     code: str | int | None = 0
     try:
@@ -55,7 +55,7 @@ def main() -> None:
     except Error as error:
         complain(str(error))
         code = 1
-    except (KeyboardInterrupt, SystemExit) as end:  # typer makes SystemExit of the first
+    except (KeyboardInterrupt, SystemExit) as end:  # typer turns KeyboardInterrupt into SystemExit
         code = 128 + by if by else getattr(end, "code", 130)
     sys.exit(code or unprinted())
 
@@ -165,7 +165,7 @@ def evaluate_(
     seed: Annotated[int, typer.Option(help="Of the first episode.")] = SEED,
     copies: Annotated[int | None, typer.Option(help="If not as in the training.")] = None,
 ) -> None:
-    """Play the same episodes with each policy, and compare."""
+    """Run the same episodes with each policy, and compare."""
     learned = next((name for name in policies if name not in BASELINES), None)
     if task is None and learned is None:
         raise InvalidArgument("nothing and random play any task: name it with --task")
@@ -210,7 +210,7 @@ def policy(
     place: Annotated[Path, typer.Argument(help="Folder of a training, or file of a policy.")],
     out: Annotated[Path | None, typer.Option(help="Name of a copy of its two files.")] = None,
 ) -> None:
-    """Print what a policy plays and how it was learned."""
+    """Print the task of a policy and how it was learned."""
     loaded = LearnedPolicy.load(place)
     if out is not None:
         loaded.save(out)
@@ -232,7 +232,7 @@ def _texts(option: str, texts: list[str] | None) -> dict[str, str]:
 
 
 def _values(option: str, texts: list[str] | None) -> dict[str, Any]:
-    """Numbers, true, false and lists as in JSON; all else is text."""
+    """Parses numbers, true, false and lists as JSON; all other values are text."""
     found: dict[str, Any] = {}
     for name, text in _texts(option, texts).items():
         try:

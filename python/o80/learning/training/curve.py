@@ -1,4 +1,4 @@
-"""The learning curve: a row for each update, of the last episodes; its file and its picture."""
+"""The learning curve: a row of means before each update; its file and its picture."""
 
 import csv
 import os
@@ -15,7 +15,7 @@ from o80.base.extras import needed
 from o80.learning.rollouts.rollout import Ends
 
 LAST = 1000
-"""Episodes of which the means are taken."""
+"""Number of last episodes in the means."""
 CURVE = "curve.csv"
 """The file in the folder of a training."""
 ALONG = {
@@ -28,47 +28,47 @@ Point = TypeVar("Point")
 
 @dataclass(frozen=True)
 class CurvePoint:
-    """How the training stood before an update. Means are those of the last 1000 episodes."""
+    """State of the training before an update. Means are over the last 1000 episodes."""
 
     decisions: int
     """Decisions of all copies."""
     episodes: int
     play_hours: float
-    """Time on the clock in which rollouts were collected, without the next column [h]."""
+    """Clock time of collecting rollouts, without `reset_hours` [h]."""
     reset_hours: float
-    """Time on the clock in resets [h]; 0 with several copies, which reset within their steps."""
+    """Clock time of resets [h]; 0 with several copies, which reset within their steps."""
     minutes: float
-    """Time on the clock of the whole training [min]."""
+    """Clock time of the whole training [min]."""
     success: float
-    """Share of the episodes, with the noise of exploration; NaN if their info does not say."""
+    """Share of successes, with the noise of exploration; NaN if the info does not report it."""
     reward: float
-    """Mean sum over an episode."""
+    """Mean sum of rewards over an episode."""
     length: float
-    """Mean steps of an episode."""
+    """Mean number of steps of an episode."""
     exploration: float
     """Mean standard deviation of the actions in [-1, 1]."""
 
 
 class EpisodeWindow:
-    """Success, reward and length of the last episodes; a checkpoint keeps them."""
+    """Success, reward and length of the last episodes; a checkpoint stores the window."""
 
     def __init__(self, episodes: int = 0, rows: FloatArray | None = None) -> None:
-        """episodes, rows: of a window that was saved."""
+        """episodes, rows: of a saved window."""
         self.episodes = episodes
-        """Ended so far."""
+        """Number of episodes that ended so far."""
         self.rows: FloatArray = np.zeros((0, 3)) if rows is None else rows
-        """(n, 3) success (NaN: the info did not say), sum of the rewards, steps of each of the last
+        """(n, 3) success (NaN: not in the info), sum of rewards, and steps of each of the last
         episodes; at most `LAST`."""
 
     def add(self, ends: Ends, success: str) -> None:
-        """Adds the episodes of a rollout; success: the entry of their info."""
+        """Adds the episodes of a rollout; success: the entry of the info with success."""
         successes = ends.infos[success].astype(np.float64)  # NaN for None
         rows = np.column_stack([successes, ends.rewards, ends.lengths])
         self.episodes += len(rows)
         self.rows = np.concatenate([self.rows, rows])[-LAST:]
 
     def means(self) -> tuple[float, float, float]:
-        """Share of successes, mean reward, mean length; NaN without an episode."""
+        """Returns share of successes, mean reward and mean length; NaN without an episode."""
         if not len(self.rows):
             return np.nan, np.nan, np.nan
         success, (_, reward, length) = success_share(self.rows[:, 0]), self.rows.mean(axis=0)
@@ -76,20 +76,20 @@ class EpisodeWindow:
 
 
 def success_share(successes: FloatArray) -> float:
-    """Share of (n,) successes; NaN if none of them is known, else unknown ones count as failures:
-    some tasks say it of successes only.
+    """Returns the share of (n,) successes; NaN if all are unknown. If only some are unknown, they
+    count as failures, because some tasks report only successes.
     """
     known = not np.isnan(successes).all()
     return float(np.nan_to_num(successes).mean()) if known else np.nan
 
 
 def names_of(kind: type[Any]) -> list[str]:
-    """Names of the numeric fields of a dataclass of points."""
+    """Returns the names of the numeric fields of a dataclass of points."""
     return [each.name for each in fields(kind)]
 
 
 def append(path: Path, point: Any) -> None:
-    """Adds a row; a file that does not exist begins with the names."""
+    """Appends a row to a file; writes the names first if the file is new."""
     new = not path.exists()
     with path.open("a", newline="") as file:
         writer = csv.writer(file)
@@ -101,7 +101,7 @@ def append(path: Path, point: Any) -> None:
 
 
 def points(path: Path, kind: type[Point]) -> list[Point]:
-    """All rows of a file of such points, but one that a kill has cut short.
+    """Reads all rows of a file of points, except one that a kill has truncated.
 
     Raises InvalidArgument for a file of another version.
     """
@@ -118,9 +118,9 @@ def points(path: Path, kind: type[Point]) -> list[Point]:
 
 
 def cut(path: Path, kind: type[Any], decisions: int) -> None:
-    """Drops the rows after so many decisions: a training resumes there."""
+    """Drops the rows after this number of decisions, where a training resumes."""
     if not path.exists():
-        return  # it was stopped before its first update
+        return  # the training was stopped before its first update
     kept = [point for point in points(path, kind) if point.decisions <= decisions]
     new = path.with_name(f"{path.name}.new")
     new.unlink(missing_ok=True)
@@ -133,7 +133,7 @@ def cut(path: Path, kind: type[Any], decisions: int) -> None:
 
 
 def draw(path: Path, curves: Mapping[str, Sequence[CurvePoint]]) -> None:
-    """Draws success and reward of trainings by their names. Needs the extra `plot`."""
+    """Draws success and reward of trainings by name. Needs the extra `plot`."""
     needed("matplotlib", "plot", "the picture of a learning curve")
     from matplotlib.figure import Figure
 

@@ -1,4 +1,4 @@
-"""How well policies play a task: the same episodes for each of them."""
+"""Evaluates policies on a task, with the same episodes for each policy."""
 
 import math
 import os
@@ -22,43 +22,43 @@ NORMAL_95 = 1.959963984540054
 """Standard deviations within which 95 % of a normal distribution lie."""
 
 SEED = 7_000_001
-"""Seed of the first episode, far from those of trainings."""
+"""Seed of the first episode, far from the seeds of trainings."""
 BASELINES = ("nothing", "random")
-"""Policies that need no training: the action 0 (or the nearest), and uniformly drawn ones."""
+"""Policies without training: the action 0 (or the nearest one), and uniformly drawn actions."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
-    """Episodes of one policy; number i of each policy began with the same seed."""
+    """Episodes of one policy; episode i of each policy began with the same seed."""
 
     name: str
     successes: FloatArray
-    """(E,) 1, 0, or NaN where the info does not say."""
+    """(E,) 1, 0, or NaN if the info does not report success."""
     rewards: FloatArray
-    """(E,) sums over the episodes."""
+    """(E,) sums of rewards over the episodes."""
     lengths: FloatArray
-    """(E,) steps."""
+    """(E,) steps of the episodes."""
 
     @property
     def success(self) -> float:
-        """Share of the episodes; NaN if the task does not say."""
+        """Share of successes; NaN if the task does not report success."""
         return success_share(self.successes)
 
     @property
     def interval(self) -> tuple[float, float]:
-        """Wilson's interval of that share, 95 %."""
+        """Wilson's interval of the share of successes, 95 %."""
         return wilson(int(np.nansum(self.successes)), len(self.successes))
 
     def gain(self, other: "Evaluation") -> tuple[float, float]:
-        """Reward more than the other's in the same episodes: its mean, and half of its interval
-        (95 %).
+        """Returns the mean reward gain over the other policy in the same episodes, and half of its
+        interval (95 %).
         """
         more = self.rewards - other.rewards
         spread = float(more.std(ddof=1)) if len(more) > 1 else np.nan
         return float(more.mean()), NORMAL_95 * spread / np.sqrt(len(more))
 
     def only_here(self, other: "Evaluation") -> int:
-        """Episodes that were a success here, and not with the other policy."""
+        """Counts episodes that were a success here, but not with the other policy."""
         return int(((self.successes == 1) & (other.successes != 1)).sum())
 
 
@@ -70,14 +70,14 @@ def evaluate(
     seed: int = SEED,
     copies: int | None = None,
 ) -> list[Evaluation]:
-    """Each policy plays the same episodes of a task, without exploration.
+    """Evaluates each policy in the same episodes of a task, without exploration.
 
-    policies: "nothing", "random", or files or folders of learned ones.
-    task: by default that of the first learned policy.
-    seed: of the first episode, the next one has the next seed.
-    copies: that are stepped together; by default those of its training, at most one an episode.
+    policies: "nothing", "random", or files or folders of learned policies.
+    task: by default the task of the first learned policy.
+    seed: seed of the first episode; each next episode has the next seed.
+    copies: copies to step together; by default those of the training, at most one per episode.
 
-    Raises InvalidArgument.
+    Raises InvalidArgument for an unknown policy or task.
     """
     episodes, seed = whole(episodes, "episodes", 1), whole(seed, "seed", 0)
     names = [str(each) for each in policies]
@@ -118,7 +118,7 @@ def _played(
                 f"has {seen} and {space.shape[0]}"
             )
     copies = environments.num_envs
-    current = np.arange(copies)  # the episode of each copy; those from `episodes` on do not count
+    current = np.arange(copies)  # episode of each copy; episodes from `episodes` on do not count
     observations, _ = environments.reset(seed=seed)  # copy i: seed + i
     generators = [np.random.default_rng((seed, number)) for number in range(copies)]
     rewards, lengths, told = np.zeros(copies), np.zeros(copies), np.full((episodes, 3), np.nan)
@@ -152,7 +152,7 @@ def _actions(
     space: Any,
     generators: Sequence[np.random.Generator],
 ) -> NDArray[Any]:
-    """(N, A)"""
+    """Returns the actions (N, A) of a policy."""
     if isinstance(policy, LearnedPolicy):
         return policy.act(observations)
     if policy == "nothing":
@@ -163,10 +163,10 @@ def _actions(
 
 
 def wilson(successes: int, count: int) -> tuple[float, float]:
-    """Wilson's interval of a share, which holds the true one in 95 % of all cases.
+    """Returns Wilson's interval of a share, which holds the true share in 95 % of all cases.
 
-    (0, 1) of nothing counted. Unlike the plus or minus of a standard deviation it stays within
-    0 and 1, and has a width where all or none succeeded.
+    It is (0, 1) for no episode. Unlike a standard deviation it stays within 0 and 1, and has a
+    width if all or none succeeded.
     """
     if not 0 <= successes <= count:
         raise InvalidArgument(f"successes must lie between 0 and {count}, got {successes}")

@@ -1,4 +1,4 @@
-"""Stable-Baselines3's PPO for any task, all of it that a checkpoint holds, and its file."""
+"""PPO of Stable-Baselines3 for any task, with its whole state as a checkpoint file."""
 
 import json
 import os
@@ -24,16 +24,16 @@ from o80.learning.training.collectors import RepeatableCollector
 from o80.learning.training.settings import TrainingSettings
 
 CHECKPOINT = "checkpoint.pt"
-"""The file in the folder of a training: numbers, texts and tensors."""
+"""Checkpoint file in the folder of a training: numbers, texts and tensors."""
 _FORMAT = 1
 _OURS = ("rollout", "hidden", "log_std", "reward_scale", "last_rate", "learning_rate")
 
 
 class Learner(RolloutPPO):
-    """PPO that learns from the rollouts of a collector, in whatever iteration that is."""
+    """PPO that learns from the rollouts of a collector, whatever the collector's iteration."""
 
     reward_scale = 1.0
-    """Factor of the rewards that it learns from."""
+    """Factor of the rewards before learning."""
     on_rollout: Callable[[Rollout], None]
     """Called with each rollout."""
 
@@ -43,11 +43,11 @@ class Learner(RolloutPPO):
         return replace(rollout, rewards=self.reward_scale * rollout.rewards)
 
     def network(self) -> GaussianPolicy:
-        """The policy as it is now."""
+        """Returns the current policy."""
         return gaussian_policy(self.policy, self._vec_normalize_env, None)
 
     def state(self) -> dict[str, Any]:
-        """Copy of all that decides how it goes on: numbers, texts and tensors."""
+        """Copies all state that decides the further training: numbers, texts and tensors."""
         numpy_state: Any = np.random.get_state()  # noqa: NPY002 - PPO draws its batches from it
         statistics: Any = self._vec_normalize_env.obs_rms  # type: ignore[union-attr]
         return {
@@ -63,7 +63,7 @@ class Learner(RolloutPPO):
         }
 
     def restore(self, state: dict[str, Any]) -> None:
-        """Puts such a state into this learner, and into the generators of this process."""
+        """Restores a state of this learner and of the random generators of this process."""
         self.num_timesteps = state["decisions"]
         self.policy.load_state_dict(state["weights"])
         self.policy.optimizer.load_state_dict(state["optimiser"])
@@ -77,7 +77,7 @@ class Learner(RolloutPPO):
 
 
 def new_learner(settings: TrainingSettings, collector: RepeatableCollector) -> Learner:
-    """A learner that knows nothing; the same seed gives the same one."""
+    """Makes an untrained learner; equal seeds make equal learners."""
     ppo = settings.ppo
     first, last = ppo["learning_rate"], ppo["last_rate"]
     theirs: Any = {name: value for name, value in ppo.items() if name not in _OURS}
@@ -113,7 +113,7 @@ def save(folder: Path, settings: TrainingSettings, state: dict[str, Any]) -> Non
 
 
 def load(folder: Path) -> tuple[TrainingSettings, dict[str, Any]]:
-    """Settings and state of a checkpoint; runs no code of the file. Raises InvalidArgument."""
+    """Reads a checkpoint without running its code. Raises InvalidArgument if it is unusable."""
     path = folder / CHECKPOINT
     if not path.is_file():
         raise InvalidArgument(f"{folder} has no checkpoint of a training ({CHECKPOINT})")
@@ -123,7 +123,7 @@ def load(folder: Path) -> tuple[TrainingSettings, dict[str, Any]]:
             raise ValueError(f"format {held['format']} is not {_FORMAT}")
         return TrainingSettings.of_json(json.loads(held["settings"])), held["state"]
     except InvalidArgument:
-        raise  # of the settings: a rule that cannot be imported
+        raise  # about the settings: a rule that cannot be imported
     except (pickle.UnpicklingError, RuntimeError, LookupError, TypeError, ValueError) as error:
         text = str(error).partition("\n")[0]
         raise InvalidArgument(f"{path}: not a checkpoint of this version: {text}") from error

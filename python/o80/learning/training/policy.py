@@ -1,4 +1,4 @@
-"""A learned policy, played with NumPy alone: a network (.npz), and what it plays (.json)."""
+"""A learned policy that needs only NumPy: a network (.npz), and its task (.json)."""
 
 import json
 import os
@@ -17,7 +17,7 @@ from o80.learning.rollouts import GaussianPolicy
 from o80.learning.training.tasks import NamedTask, spread
 
 POLICY = "policy.npz"
-"""The file in the folder of a training."""
+"""Policy file in the folder of a training."""
 _FORMAT = 1
 
 
@@ -26,21 +26,21 @@ class LearnedPolicy:
     """Observations (..., M) => actions (..., A) of the action space."""
 
     network: GaussianPolicy
-    """Its means are the actions, from -1 to 1."""
+    """Its means are the actions, in [-1, 1]."""
     action_space: Box
     """(A,) limits and type of the actions."""
     task: NamedTask
-    """The task that it was trained for."""
+    """The task of its training."""
     training: Mapping[str, Any] = field(default_factory=dict)
-    """How it was learned (seed, copies, decisions, episodes): for people."""
+    """Facts about the training (seed, copies, decisions, episodes), for people."""
 
     def act(self, observations: NDArray[Any]) -> NDArray[Any]:
-        """The actions (..., A) after observations (..., M), without exploration."""
+        """Returns the actions (..., A) for observations (..., M), without exploration."""
         actions: NDArray[Any] = spread(self.network.means(observations), self.action_space)
         return actions
 
     def save(self, path: str | os.PathLike[str]) -> None:
-        """Writes `path`.npz and `path`.json, each as a whole."""
+        """Writes `path`.npz and `path`.json, each atomically."""
         stem, network, space = _stem(path), self.network, self.action_space
         arrays: dict[str, Any] = {name: getattr(network, name) for name in _ARRAYS}
         arrays |= {"low": space.low, "high": space.high, "clip": np.array(network.clip)}
@@ -57,7 +57,7 @@ class LearnedPolicy:
     def load(cls, path: str | os.PathLike[str]) -> "LearnedPolicy":
         """Loads both files; `path` names one of them, or the folder of a training.
 
-        Raises InvalidArgument.
+        Raises InvalidArgument for missing or damaged files.
         """
         stem = _stem(path)
         for suffix in (".npz", ".json"):

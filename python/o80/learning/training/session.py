@@ -1,4 +1,4 @@
-"""A training from its first decision to its last: updates, checkpoints, curve, policy."""
+"""A whole training: updates, checkpoints, curve and policy."""
 
 import os
 import time
@@ -19,17 +19,17 @@ from o80.learning.training.policy import POLICY, LearnedPolicy
 from o80.learning.training.settings import TrainingSettings
 
 RENEWED = 50
-"""Updates after which the environments begin anew: a resumed training repeats at most so many
-rollouts, to get to the state in which it was interrupted."""
+"""Updates after which the environments restart: a resumed training repeats at most this number
+of rollouts, to reach the state in which it was interrupted."""
 SAVED = 30.0
 """Time between two checkpoints [s]."""
 
 
 class Training(Closeable):
-    """Learns in a folder, or resumes there. Close it.
+    """Trains a policy in a folder, or resumes a training there. Close it.
 
-    An interrupted and resumed training learns, bit for bit, what an uninterrupted one does, if
-    the environments follow from their seeds. torch runs on one thread meanwhile.
+    An interrupted and resumed training has, bit for bit, the result of an uninterrupted one, if the
+    environments depend only on their seeds. torch runs on one thread meanwhile.
     """
 
     def __init__(
@@ -39,10 +39,10 @@ class Training(Closeable):
         *,
         resume: bool = False,
     ) -> None:
-        """settings: None for those with which the folder was trained.
+        """settings: None for the settings of the training in the folder.
 
-        Raises InvalidArgument, before anything is written, if the folder holds a training and
-        should not, or one with other settings, or none to resume.
+        Raises InvalidArgument, before anything is written, if the folder holds a training but
+        `resume` is false, holds one with other settings, or holds none to resume.
         """
         self.folder = Path(folder)
         saved: dict[str, Any] | None = None
@@ -104,14 +104,14 @@ class Training(Closeable):
         self.window.add(rollout.ends, self.settings.task.success)
 
     def close(self) -> None:
-        """Ends the environments; may be called twice."""
+        """Closes the environments; may be called twice."""
         self.collector.close()
 
     def run(self, report: Callable[[CurvePoint], object] = lambda point: None) -> LearnedPolicy:
         """Learns until the decisions of the settings are made; returns the policy.
 
-        report: called before each update. Checkpoint and policy are saved also when an exception
-        ends the training, such as KeyboardInterrupt: as they were before the rollout under way.
+        report: called before each update. If an exception such as KeyboardInterrupt ends the
+        training, checkpoint and policy are saved as they were before the unfinished rollout.
         """
         if self._ran:
             raise Closed("this training has ended: resume its folder with a new one")
@@ -136,7 +136,7 @@ class Training(Closeable):
         self._saved_at = time.monotonic()
 
     def point(self) -> CurvePoint:
-        """The curve here."""
+        """Returns the current point of the learning curve."""
         policy: Any = self.learner.policy
         spent = self._spent_now()
         return CurvePoint(
@@ -150,7 +150,7 @@ class Training(Closeable):
         )
 
     def before_rollout(self) -> None:
-        """Begins the environments anew now and then, and saves."""
+        """Restarts the environments after `RENEWED` updates, and saves periodically."""
         renewed = len(self.collector.played) >= RENEWED
         if renewed:
             self.collector.restart(self.collector.iteration)
@@ -159,7 +159,7 @@ class Training(Closeable):
             self.save()
 
     def _keep(self) -> None:
-        """Keeps state and policy: between two updates."""
+        """Copies state and policy between two updates, for the next save."""
         window, collector = self.window, self.collector
         self._state = {
             "learner": self.learner.state(),
@@ -177,10 +177,10 @@ class Training(Closeable):
         }
         task = self.settings.task
         self.policy = LearnedPolicy(self.learner.network(), self._space, task, training)
-        """The policy without exploration, as of the last update."""
+        """The policy without exploration, after the last update."""
 
     def _spent_now(self) -> dict[str, float]:
-        """Times so far [s]."""
+        """Returns the times so far [s]."""
         collector, reset = self.collector, self.collector.resetting
         now = {
             "play": collector.seconds - reset,
@@ -191,7 +191,7 @@ class Training(Closeable):
 
 
 class _Updates(BaseCallback):
-    """Callback for all that is not learning."""
+    """Connects the updates of PPO to a training: report, curve and saving."""
 
     def __init__(self, training: Training, report: Callable[[CurvePoint], object]) -> None:
         super().__init__()

@@ -1,4 +1,4 @@
-"""Settings of a training: frozen values, which its checkpoint holds."""
+"""Settings of a training: frozen values, which the checkpoint stores."""
 
 import json
 import math
@@ -16,9 +16,9 @@ PPO: Mapping[str, float] = {
     "rollout": 2048,  # decisions of all copies between two updates; on the clock the least number
     "hidden": 64,  # units of each of two hidden layers, of the policy and of the value
     "log_std": -0.5,  # logarithm of the exploration in actions of [-1, 1] at the start
-    "reward_scale": 1.0,  # factor of the rewards that it learns from: returns of 1 to 10 are best
+    "reward_scale": 1.0,  # factor of the rewards before learning: returns of 1 to 10 are best
     "last_rate": 0.05,  # share of the learning rate at the end, to which it falls linearly
-    # by their names in Stable-Baselines3
+    # names of Stable-Baselines3
     "batch_size": 512,
     "n_epochs": 5,
     "learning_rate": 1e-3,
@@ -34,18 +34,18 @@ PPO: Mapping[str, float] = {
 
 @dataclass(frozen=True)
 class TrainingSettings:
-    """A whole training. Raises InvalidArgument."""
+    """Settings of a whole training. Raises InvalidArgument for wrong ones."""
 
     task: Any
     """A NamedTask, or anything that `make_vec` takes."""
     seed: int = 1
     copies: int = 32
-    """Copies that are stepped together. One: rollouts are of whole episodes, and updates run
-    between two episodes, as a robot on the clock needs it."""
+    """Copies to step together. With one copy rollouts are whole episodes, and updates run between
+    two episodes, as needed for a robot with a clock."""
     decisions: int = 1_000_000
-    """Decisions of all copies after which it ends."""
+    """Decisions of all copies after which the training ends."""
     ppo: Mapping[str, float] = field(default_factory=dict)
-    """Other values than those of `PPO`."""
+    """Values that replace those of `PPO`."""
 
     def __post_init__(self) -> None:
         for name, least in (("seed", 0), ("copies", 1), ("decisions", 1)):
@@ -59,21 +59,21 @@ class TrainingSettings:
         object.__setattr__(self, "ppo", {**PPO, **self.ppo})
         if not isinstance(self.task, NamedTask):
             object.__setattr__(self, "task", NamedTask(self.task))
-        self.task.objects()  # an error before anything is trained
+        self.task.objects()  # raises an error before the training starts
 
     @property
     def on_the_clock(self) -> bool:
-        """Whether rollouts are of whole episodes."""
+        """Whether rollouts are whole episodes."""
         return self.copies == 1
 
     @classmethod
     def of_json(cls, values: dict[str, Any]) -> "TrainingSettings":
-        """From what `asdict` has made. Raises TypeError for values of another version."""
+        """Makes settings from `asdict` values. Raises TypeError for values of another version."""
         return cls(**{**values, "task": NamedTask(**values["task"])})
 
     @classmethod
     def of_file(cls, name: str) -> "TrainingSettings":
-        """From FILE.json, or module:FILE.json of a package. Raises InvalidArgument."""
+        """Reads FILE.json, or module:FILE.json of a package. Raises InvalidArgument if it fails."""
         package, _, file = name.rpartition(":")
         try:
             path = files(package) / file if package else Path(file)
@@ -82,9 +82,9 @@ class TrainingSettings:
             raise InvalidArgument(f"{name}: not settings of a training: {error}") from error
 
     def refuse_unless_same(self, saved: "TrainingSettings", where: object) -> None:
-        """Raises InvalidArgument, which names the settings in which a saved training differs.
+        """Raises InvalidArgument with the names of settings that differ from a saved training.
 
-        It may differ in `decisions`: a training may be made longer.
+        `decisions` may differ, to make a training longer.
         """
         ours, theirs = _flat(self), _flat(replace(saved, decisions=self.decisions))
         differ = [

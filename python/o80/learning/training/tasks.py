@@ -1,4 +1,4 @@
-"""Tasks by name: the one place that finds a task and makes its vector environment."""
+"""Finds tasks by name and makes their vector environments; no other place does."""
 
 import importlib
 import inspect
@@ -36,7 +36,7 @@ def make_vec(
     autoreset_mode: AutoresetMode | str = AutoresetMode.SAME_STEP,
     **options: Any,
 ) -> VectorEnv[Any, Any, Any]:
-    """The vector environment of so many copies of a task.
+    """Makes the vector environment of `copies` copies of a task.
 
     task: one of these, or its name ("module:Class", "file.py:Class"):
       - a class with a class method `make_vec(copies, *, autoreset_mode, **options)`
@@ -45,7 +45,7 @@ def make_vec(
         Task or a vector environment
     options: parameters of the task.
 
-    Raises InvalidArgument, which names the task.
+    Raises InvalidArgument with the name of the task if it cannot be made.
     """
     name = name_of(task)
     copies, mode = whole(copies, "copies", 1), AutoresetMode(autoreset_mode)
@@ -85,7 +85,7 @@ def _made(task: Any, copies: int, mode: AutoresetMode, options: Mapping[str, Any
 def _registered(
     name: str, copies: int, mode: AutoresetMode, options: Mapping[str, Any]
 ) -> VectorEnv[Any, Any, Any]:
-    """By the entry point for vectors if that takes the mode: Gymnasium's own do not."""
+    """Uses the entry point for vectors if it takes the mode; those of Gymnasium do not."""
     module, _, name = name.rpartition(":")
     if module:
         importlib.import_module(module)
@@ -103,9 +103,9 @@ def _is_id(name: str) -> bool:
 
 
 def name_of(task: Any) -> str:
-    """The name under which another program finds a task, a rule or a function.
+    """Returns the name by which another program finds a task, a rule or a function.
 
-    Names of files become absolute. Raises InvalidArgument.
+    Names of files become absolute. Raises InvalidArgument if there is no such name.
     """
     if isinstance(task, str):
         where, colon, name = task.rpartition(":")
@@ -126,17 +126,17 @@ def name_of(task: Any) -> str:
 
 @dataclass(frozen=True)
 class NamedTask:
-    """A task that another program can make again. Raises InvalidArgument."""
+    """A task that another program can make again. Raises InvalidArgument for other tasks."""
 
     name: Any
-    """Anything that `make_vec` takes; kept as its name."""
+    """Any task for `make_vec`; stored as its name."""
     options: Mapping[str, Any] = field(default_factory=dict)
-    """Parameters of the task: numbers, texts, and lists and mappings of them."""
+    """Parameters of the task: numbers, texts, and lists and mappings of these."""
     imported: Mapping[str, Any] = field(default_factory=dict)
-    """Parameters that are objects of your own (a reward rule, say), by name: functions, or classes
+    """Parameters that are user-defined objects (a reward rule, say), by name: functions, or classes
     without arguments, of which one object is made."""
     success: str = SUCCESS
-    """Entry of an episode's last info: true if it was a success."""
+    """Entry of an episode's last info that is true for a success."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "name", name_of(self.name))
@@ -154,7 +154,7 @@ class NamedTask:
         text(self.success, "success")
 
     def objects(self) -> dict[str, Any]:
-        """The parameters that are `imported`. Raises InvalidArgument."""
+        """Imports the parameters in `imported`. Raises InvalidArgument if one fails."""
         made = {}
         for option, name in self.imported.items():
             found = imported(name, option, InvalidArgument, *_KINDS)
@@ -167,7 +167,7 @@ class NamedTask:
         return made
 
     def make_vec(self, copies: int, mode: AutoresetMode) -> VectorEnv[Any, Any, Any]:
-        """Copies that a policy network can play. Raises InvalidArgument."""
+        """Makes copies for a policy network. Raises InvalidArgument for other spaces or modes."""
         options = {**self.options, **self.objects()}
         made = make_vec(self.name, copies, autoreset_mode=mode, **options)
         seen, acted = made.single_observation_space, made.single_action_space
@@ -186,7 +186,7 @@ class NamedTask:
 
 
 def spread(actions: Any, space: Any) -> Any:
-    """Actions (..., A), clipped into [-1, 1], spread over the limits of a Box, with its type."""
+    """Clips actions (..., A) into [-1, 1] and spreads them over the limits of a Box."""
     share = (np.clip(actions, -1.0, 1.0).astype(np.float64) + 1.0) / 2.0
     spanned = space.low + share * (space.high.astype(np.float64) - space.low)
     return np.clip(spanned, space.low, space.high).astype(space.dtype)

@@ -1,1 +1,1 @@
-"""Doctor of a computer: whether it can serve a robot at a given rate, and what is in the way."""
+"""Checks whether this computer can serve a robot at a given rate, and finds causes of delays."""

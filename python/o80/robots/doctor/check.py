@@ -1,4 +1,4 @@
-"""A check, what it finds, and the evidence by which it judges."""
+"""A check, its findings, and the evidence that it evaluates."""
 
 import re
 from collections.abc import Iterator
@@ -8,22 +8,22 @@ from typing import ClassVar
 from o80.robots.doctor.computer import SYS_NICE, Computer, Sample
 
 PRIORITY = 81  # of `o80 run` without --priority, and one more for the helper thread
-BUSY = 0.25  # share of a processor from which a thread is a neighbour to name
-MATTERS = 0.1  # share of a period from which a delay is worth a finding
+BUSY = 0.25  # least share of a processor for a thread to be reported
+MATTERS = 0.1  # least share of a period for a delay to be reported
 SHORTEST = 0.2  # [s] between samples: the kernel counts in ticks of 10 ms
 
 
 @dataclass(frozen=True)
 class Finding:
-    """A thing that delays a loop on this computer."""
+    """A cause of delays of a loop on this computer."""
 
     name: str
-    seen: str  #: the figure
+    seen: str  #: the measured figure
     effect: str
     cure: str  #: a command, or a sentence if there is none
     undo: str  #: a command; empty: nothing was changed
-    delay: float  #: of an iteration, when it happens [s]
-    remark: bool  #: it happens only under conditions that `effect` names, so it does not count
+    delay: float  #: delay of an iteration when it happens [s]
+    remark: bool  #: it happens only under conditions in `effect`, so it does not count
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Evidence:
 
     @property
     def seconds(self) -> float:
-        """Time between the samples; 0 if it is too short for figures a second."""
+        """Time between the samples [s]; 0 if it is too short to compute rates."""
         passed = self.after.uptime - self.before.uptime
         return passed if passed >= SHORTEST else 0.0
 
@@ -51,13 +51,13 @@ class Evidence:
             if then is None or not self.seconds:
                 continue
             share = (now.ticks - then.ticks) / 100 / self.seconds
-            # the thread of an interrupt goes where the interrupt goes
+            # the thread of an interrupt runs where the interrupt occurs
             if share >= BUSY and not now.name.startswith("irq/"):
                 found.append((share, number, now.processor, now.name))
         return sorted(found, reverse=True)
 
     def interrupts(self) -> Iterator[tuple[float, int, str, str]]:
-        """Interrupts of devices: a second, processor, number, device."""
+        """Yields interrupts of devices: rate [1/s], processor, number, device."""
         columns = self.computer.processors
         for number, now in self.after.interrupts.items():
             then = self.before.interrupts.get(number)
@@ -70,7 +70,7 @@ class Evidence:
 
     @property
     def realtime_kit(self) -> str:
-        """Answer of RealtimeKit to the measured robot; empty: it was not asked."""
+        """Answer of RealtimeKit to the measured robot; empty: no request."""
         found = re.search(r"RealtimeKit granted .*?(?=\. Allow|$)", "\n".join(self.refused), re.M)
         return found[0] if found else ""
 
@@ -88,17 +88,17 @@ class Evidence:
 
 
 class Check:
-    """A thing that may delay a loop."""
+    """Checks for one possible cause of delays."""
 
     name: ClassVar[str]
-    delay: ClassVar[float]  #: it may add to an iteration [s]
+    delay: ClassVar[float]  #: delay that it may add to an iteration [s]
     effect: ClassVar[str]
     cure: ClassVar[str] = ""
     undo: ClassVar[str] = ""
     of_host: ClassVar[bool] = True  #: in a container, the host has to be changed
 
     def look(self, at: Evidence) -> Iterator[Finding]:
-        """Findings on a computer, whatever the rate of the loop."""
+        """Yields findings on a computer, for any rate of the loop."""
         raise NotImplementedError
 
     def found(
@@ -113,7 +113,7 @@ class Check:
         undo: str | None = None,
         **values: object,
     ) -> Finding:
-        """Finding with the texts of this check, filled with `values`, unless others are given."""
+        """Makes a finding; texts that are not given are this check's, filled with `values`."""
         cure = self.cure.format(**values) if cure is None else cure
         undo = self.undo.format(**values) if undo is None else undo
         if self.of_host and at.computer.container:
@@ -130,14 +130,14 @@ class Check:
 
 
 def in_container(kind: str, flags: str) -> str:
-    """Command that starts a container with these flags of docker, or a sentence that says so."""
+    """Returns a command that starts a container with these docker flags, or a sentence."""
     if kind in ("docker", "podman"):
         return f"{kind} run {flags} ..."
     return f"start the container ({kind}) with what `docker run {flags}` would give it"
 
 
 def on_host(commands: str) -> str:
-    """Commands with the remark that they are for the host of a container."""
+    """Adds to commands the remark that they are for the host of a container."""
     first, newline, rest = commands.partition("\n")
     remark = ", on the container's host" if "  # " in first else "  # on the container's host"
     return commands and first + remark + newline + rest

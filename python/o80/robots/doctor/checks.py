@@ -1,6 +1,6 @@
-"""Checks: each knows one thing that delays a loop, how it is seen, cured and restored.
+"""Checks: each detects one cause of delays, and has commands to remove and to restore it.
 
-To add one: derive a class from Check, give its texts, and yield from `look` what is found.
+To add a check: derive a class from Check, set its texts, and yield findings from `look`.
 """
 
 import os
@@ -127,7 +127,7 @@ class Preemption(Check):
         "arch": ("pacman -S linux-rt", "pacman -R linux-rt"),
         "suse": ("zypper install kernel-rt", "zypper remove kernel-rt"),
     }
-    # by the model of the kernel
+    # by preemption model of the kernel [s]
     LONGEST: ClassVar = {"none": 5e-3, "voluntary": 2e-3}
 
     def look(self, at: Evidence) -> Iterator[Finding]:
@@ -161,7 +161,7 @@ class Preemption(Check):
         return "full" if re.search(r"^CONFIG_PREEMPT=y", built, re.MULTILINE) else ""
 
     def kernel(self, computer: Computer) -> tuple[str, str]:
-        """Commands that install a kernel with PREEMPT_RT, and remove it."""
+        """Returns commands that install and remove a kernel with PREEMPT_RT."""
         machine = {"x86_64": "amd64", "aarch64": "arm64"}.get(os.uname().machine, "amd64")
         for name in computer.distributions:
             for known, commands in self.KERNELS.items():
@@ -468,7 +468,7 @@ class Autogroup(Check):
 
 
 def boot_words(computer: Computer, words: str) -> tuple[str, str]:
-    """Commands that add words to the kernel's command line and take them away."""
+    """Returns commands that add words to the kernel's command line and remove them."""
     if computer.exists("usr/sbin/grubby"):
         change = 'sudo grubby --update-kernel=ALL --{}="{}"  # then restart'
         return change.format("args", words), change.format("remove-args", words)

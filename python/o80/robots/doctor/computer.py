@@ -1,4 +1,4 @@
-"""Computer as the files of its kernel describe it, below a root folder that tests replace."""
+"""Reads properties of a computer from kernel files below a root folder, which tests replace."""
 
 import os
 import re
@@ -25,7 +25,7 @@ class Thread:
 
 @dataclass(frozen=True)
 class Interrupt:
-    """A source of interrupts, and how many each processor had so far."""
+    """A source of interrupts, with the counts of each processor so far."""
 
     number: str
     device: str
@@ -39,19 +39,19 @@ class Sample:
     uptime: float = 0.0  #: [s]
     threads: dict[int, Thread] = field(default_factory=dict)
     interrupts: dict[str, Interrupt] = field(default_factory=dict)
-    stolen: int = 0  #: by the host of a virtual machine [ticks]
+    stolen: int = 0  #: time stolen by the host of a virtual machine [ticks]
     passed: int = 0  #: all time of all processors [ticks]
 
 
 class Computer:
-    """Files below `root`. No method raises: what cannot be read counts as empty, and is noted."""
+    """Reads files below `root`. No method raises: unreadable files are noted and count as empty."""
 
     def __init__(self, root: Path = Path("/")) -> None:
         self.root = root
         self.unread: dict[str, str] = {}  #: path and reason
 
     def text(self, path: str, *, needed: bool = False) -> str:
-        """Text of a file, without spaces around it. needed: every kernel has it."""
+        """Reads the stripped text of a file. needed: every kernel has it, so note its absence."""
         try:
             # a pipe in its place would block, a device never end
             descriptor = os.open(self.root / path, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
@@ -83,7 +83,7 @@ class Computer:
             self.unread.setdefault("/" + path, reason)
 
     def number(self, path: str, *, needed: bool = False) -> int | None:
-        """Number that is all of a file; None if there is none."""
+        """Reads a file with one number; None if there is none."""
         text = self.text(path, needed=needed)
         if not text:
             return None
@@ -93,7 +93,7 @@ class Computer:
         return int(text)
 
     def paths(self, pattern: str) -> list[str]:
-        """Paths that match, without the root, in their order."""
+        """Returns matching paths below the root, in order."""
         try:
             found = [str(path.relative_to(self.root)) for path in self.root.glob(pattern)]
         except OSError:
@@ -108,7 +108,7 @@ class Computer:
             return False
 
     def processor_list(self, path: str) -> list[int]:
-        """Processors of a file such as "0-3,8"."""
+        """Reads a file with a list of processors such as "0-3,8"."""
         text = self.text(path)
         found = processors_of(text)
         if text and not found and text != "(null)":
@@ -133,7 +133,7 @@ class Computer:
 
     @cached_property
     def words(self) -> dict[str, str]:
-        """Words of the kernel's command line."""
+        """Options of the kernel's command line."""
         parts = (word.partition("=") for word in self.text("proc/cmdline").split())
         return {name: value for name, _, value in parts}
 
@@ -150,7 +150,7 @@ class Computer:
 
     @cached_property
     def distributions(self) -> list[str]:
-        """Distribution, and those that it descends from."""
+        """The distribution and its parents."""
         return [self.release.get("ID", ""), *self.release.get("ID_LIKE", "").split()]
 
     @cached_property
@@ -182,7 +182,7 @@ class Computer:
         return self.text("sys/hypervisor/type") or ("unknown maker" if guest else "")
 
     def limit(self, name: str) -> int | None:
-        """Soft limit of this process; None: unlimited, or unknown."""
+        """Reads a soft limit of this process; None: unlimited, or unknown."""
         found = re.search(
             rf"^{name} +(\d+|unlimited) ", self.text("proc/self/limits", needed=True), re.MULTILINE
         )
@@ -203,7 +203,7 @@ class Computer:
         return found is not None and bool(int(found[1], 16) >> capability & 1)
 
     def control_group(self, controller: str) -> list[str]:
-        """Folders of this process's control group and of those around it, inner first."""
+        """Returns the folders of this process's control group and its parents, inner first."""
         folders = []
         for line in self.text("proc/self/cgroup").splitlines():
             _, _, rest = line.partition(":")
@@ -217,7 +217,7 @@ class Computer:
         return folders
 
     def sample(self) -> Sample:
-        """Counters now."""
+        """Samples the counters."""
         uptime = re.match(r"\d{1,12}(\.\d+)?", self.text("proc/uptime", needed=True))
         total = re.match(r"cpu +([\d ]+)", self.text("proc/stat", needed=True))
         ticks = [int(word[:19]) for word in total[1].split()[:8]] if total else []
@@ -243,7 +243,7 @@ class Computer:
         return found
 
     def _interrupts(self) -> dict[str, Interrupt]:
-        """Interrupts of devices, without timers of processors and signals between them."""
+        """Reads interrupts of devices, without timers and signals between processors."""
         heads, *lines = self.text("proc/interrupts", needed=True).splitlines() or [""]
         count = len(heads.split())
         found = {}
@@ -258,7 +258,7 @@ class Computer:
 
 
 def processors_of(text: str) -> list[int]:
-    """Processors of a list such as "0-3,8"; empty if it is none."""
+    """Parses a list of processors such as "0-3,8"; empty if it is invalid."""
     found: list[int] = []
     for part in text.split(",") if text else []:
         match = re.fullmatch(r"(\d{1,4})(?:-(\d{1,4}))?", part.strip())
@@ -269,7 +269,7 @@ def processors_of(text: str) -> list[int]:
 
 
 def list_of(processors: list[int]) -> str:
-    """Text such as "0-3,8"."""
+    """Formats processors as text such as "0-3,8"."""
     parts: list[list[int]] = []
     for each in sorted(processors):
         if parts and each == parts[-1][-1] + 1:

@@ -1,4 +1,4 @@
-"""Report of the doctor: verdict, findings sorted by weight, what was measured and not read."""
+"""Report of the doctor: verdict, sorted findings, measurements and unreadable files."""
 
 import os
 from collections.abc import Callable
@@ -13,7 +13,7 @@ from o80.robots.doctor.wake_ups import WakeUps
 
 @dataclass(frozen=True)
 class Report:
-    """Answer to the question whether a computer can serve a robot at a frequency."""
+    """Whether a computer can serve a robot at a frequency, with findings and measurements."""
 
     frequency: float
     findings: tuple[Finding, ...]  #: remarks last, else by their delay
@@ -24,12 +24,12 @@ class Report:
 
     @property
     def culprits(self) -> list[Finding]:
-        """Findings that count."""
+        """Findings that are no remarks."""
         return [finding for finding in self.findings if not finding.remark]
 
     @property
     def serves(self) -> bool:
-        """Whether nothing is in the way, and no period was missed while it was measured."""
+        """True if there is no culprit, and no period was missed during the measurement."""
         failed = self.measured is not None and self.measured.failed
         return not failed and not self._missed and not self.culprits
 
@@ -46,7 +46,7 @@ class Report:
 
     @property
     def verdict(self) -> str:
-        """One sentence."""
+        """The verdict in one sentence."""
         rate = f"{self.frequency:g} Hz"
         culprits = self.culprits
         if self.measured is not None and self.measured.failed:
@@ -71,7 +71,7 @@ class Report:
         return f"This computer can serve a robot at {rate}{known}."
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON: see docs/real_time.md."""
+        """Converts to JSON: see docs/real_time.md."""
         return {
             "serves": self.serves,
             "verdict": self.verdict,
@@ -92,7 +92,7 @@ def examine(
 ) -> Report:
     """Samples a computer before and after a measurement, then measures beside a load.
 
-    None of the first: it was not measured.
+    measure: returns None for a computer that is not measured.
     """
     before = computer.sample()
     measured = measure(computer)
@@ -101,7 +101,7 @@ def examine(
     refused = () if measured is None else measured.refused
     evidence = Evidence(computer, frequency, before, after, refused, free_memory(computer))
     found = [finding for check in CHECKS for finding in check.look(evidence)]
-    # nothing that does not matter at this rate
+    # drop delays that do not matter at this rate
     found = [finding for finding in found if finding.delay * frequency >= MATTERS]
     found.sort(key=lambda finding: (finding.remark, -finding.delay))
     kind = about(computer)  # reads files too
@@ -109,7 +109,7 @@ def examine(
 
 
 def free_memory(computer: Computer) -> int | None:
-    """Free bytes of /dev/shm; None: this is a recorded computer."""
+    """Returns free bytes of /dev/shm; None for a recorded computer."""
     if str(computer.root) != "/":
         return None
     try:
@@ -120,7 +120,7 @@ def free_memory(computer: Computer) -> int | None:
 
 
 def about(computer: Computer) -> dict[str, Any]:
-    """Kind of computer."""
+    """Describes the computer."""
     return {
         "system": computer.release.get("PRETTY_NAME", ""),
         "kernel": computer.kernel,
@@ -132,5 +132,5 @@ def about(computer: Computer) -> dict[str, Any]:
 
 
 def time_text(seconds: float) -> str:
-    """Time with its unit: "0.5 ms"."""
+    """Formats a time with its unit: "0.5 ms"."""
     return f"{seconds * 1e3:g} ms" if seconds >= 1e-3 else f"{seconds * 1e6:.0f} us"

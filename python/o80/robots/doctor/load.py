@@ -1,4 +1,4 @@
-"""Load beside which the doctor measures: every processor computes and moves memory."""
+"""Load during a measurement of the doctor: every processor computes and moves memory."""
 
 import os
 import subprocess
@@ -16,7 +16,7 @@ GRACE = 5.0  # [s] for the load to end
 
 @contextmanager
 def load() -> Iterator[int]:
-    """Process id of a load with a busy thread for each processor. Raises OSError without one."""
+    """Runs a busy thread for each processor; yields the process id. Raises OSError if it fails."""
     child = start_child([sys.executable, "-m", __name__], stdout=subprocess.PIPE)
     try:
         assert child.stdout is not None

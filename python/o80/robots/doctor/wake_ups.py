@@ -1,4 +1,4 @@
-"""Measurement: how late a robot's loop and its reader wake on this computer, for a short time."""
+"""Measures how late a robot's loop and its reader wake on this computer, for a short time."""
 
 import os
 import time
@@ -17,21 +17,21 @@ Spread = tuple[float, float, float]  # median, 99 %, largest [s]
 
 @dataclass(frozen=True)
 class WakeUps:
-    """Loop of a bundled robot, run as `o80 run` runs it, and a reader that waits for its rows."""
+    """Delays of a bundled robot's loop, run as by `o80 run`, and of a reader of its rows."""
 
     frequency: float
     seconds: float
     iterations: int = 0
-    policy: str = "other"  #: which the kernel granted
+    policy: str = "other"  #: policy that the kernel granted
     lateness: Spread = (0.0, 0.0, 0.0)
     reader: Spread = (0.0, 0.0, 0.0)  #: time from a row until the reader has it
     overruns: int = 0
     skipped: int = 0
-    refused: tuple[str, ...] = ()  #: what the machine refused
+    refused: tuple[str, ...] = ()  #: texts about settings that the machine refused
     failed: str = ""  #: why nothing was measured
 
     def as_dict(self) -> dict[str, Any]:
-        """For JSON."""
+        """Converts to a dictionary for JSON."""
         return asdict(self)
 
     def __str__(self) -> str:
@@ -46,9 +46,9 @@ class WakeUps:
 
 
 def measure(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
-    """Runs a simulated robot for so long. If that fails, the result says why.
+    """Runs a simulated robot for `seconds`. If that fails, `failed` has the reason.
 
-    processors: where its loop runs; empty: anywhere.
+    processors: processors of its loop; empty: any.
     """
     from o80.robots.robot import load as load_robot
 
@@ -82,7 +82,7 @@ def measure(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
 
 
 def measure_beside_load(frequency: float, seconds: float, processors: list[int]) -> WakeUps:
-    """Measures while all processors compute, unless a robot runs here, which that would disturb."""
+    """Measures beside a load, unless a robot runs here, which the load would disturb."""
     # a segment that this user may not read counts too
     for entry in segments():
         if entry.alive or entry.life == "unknown":
@@ -97,7 +97,7 @@ def measure_beside_load(frequency: float, seconds: float, processors: list[int])
 
 
 def _read(frontend: Frontend, seconds: float) -> list[int]:
-    """Ages of the rows for which this thread waits, when it has them [ns]."""
+    """Waits for rows and returns their ages on arrival [ns]."""
     ages = []
     end = time.monotonic() + seconds
     while (left := end - time.monotonic()) > 0:
