@@ -1,4 +1,4 @@
-"""Signals that end a program in order: the stack unwinds, and no process or segment remains."""
+"""Ends a program cleanly on signals: the stack unwinds, and no process or segment remains."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ _came: list[int] = []
 
 @contextmanager
 def ends_in_order() -> Iterator[None]:
-    """Within it Ctrl-C, SIGTERM and SIGHUP raise SystemExit, once: the second one is ignored."""
+    """Makes Ctrl-C, SIGTERM and SIGHUP raise SystemExit in the block; ignores a second signal."""
 
     def end(number: int, _frame: FrameType | None) -> None:
         for each in before:
@@ -22,7 +22,7 @@ def ends_in_order() -> Iterator[None]:
         sys.exit(128 + number)
 
     numbers = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # ignored under nohup
         numbers.append(signal.SIGHUP)
     before = {number: signal.signal(number, end) for number in numbers}
     try:
@@ -33,6 +33,6 @@ def ends_in_order() -> Iterator[None]:
 
 
 def raise_if_ended() -> None:
-    """Raises SystemExit again: one that was raised while a destructor ran is lost."""
+    """Raises SystemExit again after a signal, because it is lost if raised in a destructor."""
     if _came:
         sys.exit(128 + _came[0])

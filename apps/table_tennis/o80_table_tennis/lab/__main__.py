@@ -20,9 +20,9 @@ from .processes import PartEndedError, Processes, Watched
 from .report import write_report
 
 STARTS_WITHIN = 60.0
-"""All processes, on a busy machine [s]."""
+"""Timeout of the start of all processes, long enough for a busy machine [s]."""
 POLL = 0.5
-"""Between two readings of the row of the environment [s]."""
+"""Interval of reading the environment's row [s]."""
 CLASSES = {os.SCHED_OTHER: "other", os.SCHED_FIFO: "fifo", os.SCHED_RR: "rr"}
 
 
@@ -52,7 +52,7 @@ def main(
 
 
 def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str, str]:
-    """Plays all balls. Returns the scheduling class of each process. Raises PartEndedError."""
+    """Plays all balls; returns each process's scheduling class. Raises PartEndedError."""
     settings.recording.unlink(missing_ok=True)
     folder = settings.folder / "processes"
     console.print(f"starts nine processes; what they print is in {folder}")
@@ -81,7 +81,7 @@ def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str,
 
 
 def scheduling(pid: int) -> str:
-    """Scheduling class of a process, and its priority if it has one."""
+    """Returns a process's scheduling class, and its priority if any."""
     kind, priority = os.sched_getscheduler(pid), os.sched_getparam(pid).sched_priority
     return f"{CLASSES.get(kind, kind)} {priority or ''}".rstrip()
 
