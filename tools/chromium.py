@@ -104,10 +104,10 @@ class Page:
         self._calls += 1
         self._socket.send(json.dumps({"id": self._calls, "method": method, "params": parameters}))
         while True:
-            said = json.loads(self._socket.recv(TIMEOUT))
-            if said.get("id") == self._calls:
-                assert "error" not in said, said
-                found: dict[str, Any] = said["result"]
+            message = json.loads(self._socket.recv(TIMEOUT))
+            if message.get("id") == self._calls:
+                assert "error" not in message, message
+                found: dict[str, Any] = message["result"]
                 return found
 
     def value(self, script: str) -> Any:

@@ -188,9 +188,9 @@ def killer(tree: Path, number: str, command: str, timeout: float) -> str:
     done = subprocess.run(limited, cwd=tree, env=mutated, capture_output=True)
     if done.returncode == 0:
         return ""
-    said = (done.stdout + done.stderr).decode(errors="replace")
-    failed = re.findall(r"^(?:FAILED|ERROR|\[  FAILED  \]) ([^\s,]+)", said, re.M)
-    began = re.findall(r"^\[ RUN +\] (\S+)", said, re.M)
+    output = (done.stdout + done.stderr).decode(errors="replace")
+    failed = re.findall(r"^(?:FAILED|ERROR|\[  FAILED  \]) ([^\s,]+)", output, re.M)
+    began = re.findall(r"^\[ RUN +\] (\S+)", output, re.M)
     return failed[0] if failed else f"ended with {done.returncode}: {(began or [command[:60]])[-1]}"
 
 

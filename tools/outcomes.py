@@ -28,12 +28,12 @@ class Outcomes:
                 name = f"{file.stem}.{name}"
             skipped = case.find("skipped")
             if skipped is not None:
-                told = skipped.get("message", "")
+                reason = skipped.get("message", "")
                 if of_program:
-                    told = " ".join(told.split()[1:])  # drops file and line
+                    reason = " ".join(reason.split()[1:])  # drops file and line
                 elif of_ctest:
-                    told = _googletest_reason(case.findtext("system-out") or "")
-                self.skipped[name] = told
+                    reason = _googletest_reason(case.findtext("system-out") or "")
+                self.skipped[name] = reason
             elif all(case.find(kind) is None for kind in ("failure", "error")):
                 self.passed.add(name)
             else:
@@ -41,10 +41,10 @@ class Outcomes:
 
     def read_log(self, step: str, log: Path) -> bool:
         """Adds a skipped step if its log has a line `skipped: why`; returns whether it does."""
-        said = re.search(r"^skipped: (.*)", log.read_text(errors="replace"), re.MULTILINE)
-        if said:
-            self.skipped[step] = said[1]
-        return said is not None
+        match = re.search(r"^skipped: (.*)", log.read_text(errors="replace"), re.MULTILINE)
+        if match:
+            self.skipped[step] = match[1]
+        return match is not None
 
     def gaps(self) -> dict[str, str]:
         """Returns the tests that were skipped and passed in no run, with the reasons."""
@@ -56,5 +56,5 @@ class Outcomes:
 
 
 def _googletest_reason(printed: str) -> str:
-    said = re.search(r": Skipped\n(.*(?:\n(?!\n|\[).*)*)", printed)
-    return " ".join(said[1].split()) if said else "it does not say why"
+    match = re.search(r": Skipped\n(.*(?:\n(?!\n|\[).*)*)", printed)
+    return " ".join(match[1].split()) if match else "it does not say why"

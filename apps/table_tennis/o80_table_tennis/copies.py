@@ -105,13 +105,13 @@ class TableTennisCopies(HybridTask):
             threads=1 if copies == 1 else threads,
         )
         try:
-            self._see()
+            self._create_views()
         except BaseException:
             self.close()
             raise
         self.action_space = spaces.Box(-1.0, 1.0, settings.action_shape, np.float32)
 
-    def _see(self) -> None:
+    def _create_views(self) -> None:
         """Creates named views of the rows, and the arrays of the task."""
         engine: Any = self.engine
         arms, self._worlds = engine.members
@@ -193,7 +193,7 @@ class TableTennisCopies(HybridTask):
         balls = np.arange(len(self._ends))[self._balls_of(copies)]
         self.state.goal[balls] = np.repeat([draw.goal for draw in draws], self.worlds, axis=0)
         self._ends[balls] = End.RUNNING
-        self._look()
+        self._update_state()
         if not self._gathered:
             seeds = [each for each in generators for _ in range(self.worlds)]
             state = self.state.at(balls)
@@ -248,7 +248,7 @@ class TableTennisCopies(HybridTask):
             asked = rows[settings.steps - 1]  # the next chunk continues from here
         self._asked[copies] = asked
         self._ends[self._balls_of(copies)], self._some_ended = End.RUNNING, False
-        self._look()
+        self._update_state()
         if settings.fly_out and np.count_nonzero(self.state.record.touched):
             touched = np.zeros(self.copies, np.bool_)
             touched[copies] = np.asarray(self.state.record.touched)[copies]
@@ -277,9 +277,9 @@ class TableTennisCopies(HybridTask):
             fields = fly_out_fields(every=every, passed_y=self.settings.end.passed_y)
             self.world.request("fly_out", flying, **fields)
             self.engine.mirror(flying)
-            self._look()
+            self._update_state()
 
-    def _look(self) -> None:
+    def _update_state(self) -> None:
         """Updates the parts of the state that are not views of the newest rows."""
         self.range.normalised(self.rows.observed, out=self._pressures)
         state, rows = self.state, self.rows
@@ -368,9 +368,9 @@ class TableTennisCopies(HybridTask):
             info = self.info(copies)
             return self.observe(copies), info
         observed, info = super().shown(copies)
-        told = self.task.info(self._of(copies))
-        names = told.keys() & {"touched", "returned"}
-        more = {name: self._by_world(told[name]) for name in names}
+        task_info = self.task.info(self._of(copies))
+        names = task_info.keys() & {"touched", "returned"}
+        more = {name: self._by_world(task_info[name]) for name in names}
         return observed, {**info, "worlds": info["worlds"] | more}
 
     def render(self, copy: int) -> Any:

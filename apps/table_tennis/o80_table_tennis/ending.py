@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_came: list[int] = []
+_received: list[int] = []
 
 
 @contextmanager
@@ -18,7 +18,7 @@ def ends_in_order() -> Iterator[None]:
     def end(number: int, _frame: FrameType | None) -> None:
         for each in before:
             signal.signal(each, signal.SIG_IGN)
-        _came.append(number)
+        _received.append(number)
         sys.exit(128 + number)
 
     numbers = [signal.SIGINT, signal.SIGTERM]
@@ -34,5 +34,5 @@ def ends_in_order() -> Iterator[None]:
 
 def raise_if_ended() -> None:
     """Raises SystemExit again after a signal, because it is lost if raised in a destructor."""
-    if _came:
-        sys.exit(128 + _came[0])
+    if _received:
+        sys.exit(128 + _received[0])

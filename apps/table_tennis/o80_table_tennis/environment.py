@@ -63,8 +63,8 @@ class TableTennisEnvironment(HybridEnvironment):
         self._number, self._summary = -1, None
         its_rig = made.rig_settings
         try:
-            told = settings_mark(its_rig, made.settings, [each.epoch for each in frontends])
-            super().__init__(made, record=record, options=told)
+            mark_values = settings_mark(its_rig, made.settings, [each.epoch for each in frontends])
+            super().__init__(made, record=record, options=mark_values)
             self.metadata, self.render_mode = type(self).metadata, render_mode
             if render_mode == "human":
                 step = 0.0 if its_rig.pacing.real_time else its_rig.step

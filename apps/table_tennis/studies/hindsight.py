@@ -39,8 +39,8 @@ def store(buffer: Any, before: Any, action: Any, info: dict[str, Any]) -> None:
     for old, new, reward, terminated, truncated in zip(
         *(column[each["running"]] for column in columns), strict=True
     ):
-        told = [{"TimeLimit.truncated": bool(truncated)}]
-        buffer.add(old, new, action, np.array([reward]), np.array([terminated | truncated]), told)
+        infos = [{"TimeLimit.truncated": bool(truncated)}]
+        buffer.add(old, new, action, np.array([reward]), np.array([terminated | truncated]), infos)
 
 
 def trained(worlds: int, updates: int, balls: int, seed: int) -> list[tuple[float, bool, bool]]:

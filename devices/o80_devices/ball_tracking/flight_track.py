@@ -91,14 +91,14 @@ class FlightTrack:
 
     def expected(self, time: int) -> tuple[FloatArray | None, float]:
         """Predicts the ball's place and standard deviation [m]; None: no ball is tracked."""
-        self._go_to(time)
+        self._predict_to(time)
         if self._last is None:
             return None, 0.0
         spread = float(np.sqrt(np.max(np.diag(self._filter.covariance)[:3])))
         return self._filter.position, spread
 
     def lost(self, time: int, reason: Reason) -> Tracked:
-        self._go_to(time)
+        self._predict_to(time)
         return Tracked(time, reason)
 
     def seen(
@@ -115,7 +115,7 @@ class FlightTrack:
 
         may_surprise: whether enough cameras agree to accept a hit or another ball.
         """
-        self._go_to(time)
+        self._predict_to(time)
         point = Point(time, place, covariance)
         reason = self._take(point, may_surprise)
         if reason != Reason.seen:
@@ -164,7 +164,7 @@ class FlightTrack:
         self._filter.begin(point.place, point.covariance, velocity, spread)
         self._surprise = None
 
-    def _go_to(self, time: int) -> None:
+    def _predict_to(self, time: int) -> None:
         """Predicts the filter to a time; drops a ball that was not seen for too long."""
         last = self._last
         gone = last is not None and not 0 <= (time - last.time) * NANOSECOND <= self._longest

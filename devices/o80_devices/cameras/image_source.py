@@ -34,7 +34,7 @@ class CameraSegment:
         self.name = name
         self._frontend: o80.Frontend | None = None
         self._iteration = -1
-        self._tried: float | None = None
+        self._last_try: float | None = None
         self.images: list[Image | None] = []
         self.time = 0
         self.error = 0
@@ -94,9 +94,9 @@ class CameraSegment:
         self._frontend = None
 
     def _attached_again(self, now: float) -> bool:
-        if self._tried is not None and 0 <= now - self._tried < RETRY:
+        if self._last_try is not None and 0 <= now - self._last_try < RETRY:
             return False
-        self._tried = now
+        self._last_try = now
         try:
             self.attach(timeout=0.0)
         except o80.Error:

@@ -72,9 +72,9 @@ class NewestFrame:
         """Returns the kernel's capture time, else the arrival time, and its error [ns]."""
         now = time.monotonic_ns()
         between, self._last = now - self._last, now
-        said = int(1e6 * float(capture.get(self._cv2.CAP_PROP_POS_MSEC)))
-        if 0 <= now - said < 1_000_000_000:
-            return said, KERNEL_ERROR
+        stamp = int(1e6 * float(capture.get(self._cv2.CAP_PROP_POS_MSEC)))
+        if 0 <= now - stamp < 1_000_000_000:
+            return stamp, KERNEL_ERROR
         return now, min(between, 1_000_000_000)
 
     def _keep(self, frame: Image, when: int, error: int) -> None:

@@ -156,8 +156,8 @@ class ClockMap:
             return False
         behind = (self._last - stamp) * self._tick
         if stamp == self._last or behind < REORDERED:
-            goes_on = self._old_in_a_row == 0 or stamp > self._last_old
-            self._old_in_a_row = self._old_in_a_row + 1 if goes_on else 1
+            continues = self._old_in_a_row == 0 or stamp > self._last_old
+            self._old_in_a_row = self._old_in_a_row + 1 if continues else 1
             self._last_old = stamp
             return self._old_in_a_row < OLD_IN_A_ROW
         return False

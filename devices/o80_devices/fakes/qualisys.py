@@ -112,7 +112,7 @@ class FakeQualisys:
 
     def __exit__(self, *_: object) -> None:
         self._stopping.set()
-        self._hang_up()
+        self._close_connections()
         for thread in self._threads:
             thread.join(2.0)
         self._listener.close()
@@ -120,9 +120,9 @@ class FakeQualisys:
 
     def restart(self) -> None:
         self._begin = time.monotonic()
-        self._hang_up()
+        self._close_connections()
 
-    def _hang_up(self) -> None:
+    def _close_connections(self) -> None:
         with self._lock:
             for each in self._connected:
                 with contextlib.suppress(OSError):  # the client closed first

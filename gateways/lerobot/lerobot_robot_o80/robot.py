@@ -61,7 +61,7 @@ class O80(Robot):
         self._held = contextlib.ExitStack()  # control, cameras
         #: Row of the last observation.
         self.seen: o80.Observation | None = None
-        self._stood: dict[str, float] = {}
+        self._rest_places: dict[str, float] = {}
 
     @property
     def observation_features(self) -> dict[str, Any]:
@@ -102,7 +102,7 @@ class O80(Robot):
             if self.config.at_stop != "hold" and "relax" not in arm.requests:
                 raise o80.InvalidArgument(f"'{arm.segment}' cannot be relaxed: take at_stop=hold")
             stack.enter_context(arm.control(self.config.timeout))
-            self.seen, self._stood = self.segment.read()
+            self.seen, self._rest_places = self.segment.read()
             for camera in self.cameras.values():
                 camera.connect()
                 stack.callback(camera.disconnect)
@@ -142,7 +142,7 @@ class O80(Robot):
                 numbers = self.segment.numbers("desired")
                 places = {
                     name: _within(numbers[name], place)
-                    for name, place in self._stood.items()
+                    for name, place in self._rest_places.items()
                     if name in numbers
                 }
                 self._add(arm, places, speed=HOMEWARD, mode="overwrite")

@@ -45,7 +45,7 @@ class Commands:
                 ("trajectory_msgs.msg.JointTrajectory", "joint_trajectory", self._trajectory, 1000),
                 ("std_msgs.msg.Float64MultiArray", "commands", self._set_points, 1),
             ):
-                taken = partial(self._tried, name, partial(self._read, ros.of(kind), take))
+                taken = partial(self._attempt, name, partial(self._read, ros.of(kind), take))
                 self._make(shared.node, "subscription", kind, name, taken, depth, raw=True)
             self._trigger("halt", lambda: f"halt {halt()} is requested", shared.node)
             ended = ("there was no halt", "the halt has ended")
@@ -74,7 +74,7 @@ class Commands:
             with suppress(Error):
                 self._arm.keep_alive()
 
-    def _tried(self, what: str, run: Callable[..., str | None], *given: Any) -> tuple[bool, str]:
+    def _attempt(self, what: str, run: Callable[..., str | None], *given: Any) -> tuple[bool, str]:
         """Calls `run`; returns True and the text, or False and the reason of a refusal."""
         try:
             return True, run(*given) or ""
@@ -161,7 +161,7 @@ class Commands:
 
     def _trigger(self, name: str, run: Callable[[], str], node: Any) -> None:
         def serve(_: Any, answer: Any) -> Any:
-            answer.success, answer.message = self._tried(name, run)
+            answer.success, answer.message = self._attempt(name, run)
             return answer
 
         self._make(node, "service", "std_srvs.srv.Trigger", name, serve)
@@ -176,7 +176,7 @@ class Commands:
                 self._arm.request(request, timeout=PATIENCE, **fields)
                 return f"{request} has ended"
 
-            answer.result.successful, answer.result.reason = self._tried(path, run)
+            answer.result.successful, answer.result.reason = self._attempt(path, run)
             return answer
 
         kind = "rcl_interfaces.srv.SetParametersAtomically"

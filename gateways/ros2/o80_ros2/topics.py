@@ -87,7 +87,7 @@ class Topics:
         raw = rows.view(np.uint8).reshape(len(rows), rows.itemsize)
         kind = ros.of(STATE)
         for publisher, names, members in self._states:
-            values = {name: _gathered(raw, each) for name, each in members.items() if each}
+            values = {name: _numbers_of(raw, each) for name, each in members.items() if each}
             for i, time in enumerate(times):
                 message = kind(header=self._header(time), name=names)
                 for member, numbers in values.items():
@@ -97,7 +97,7 @@ class Topics:
             holds = bool(captured[i]) or not captures
             for sensor, publisher in self._sensors if holds else ():
                 last, is_image = i == len(rows) - 1, sensor.kind == "image"
-                if is_image and not (last and self._wants(sensor, publisher, times[i])):
+                if is_image and not (last and self._is_image_due(sensor, publisher, times[i])):
                     continue
                 if (found := sensor.values(row)) is not None:
                     publisher.publish(_message(sensor.kind, self._header(times[i]), found))
@@ -117,7 +117,7 @@ class Topics:
         stamp = ros.of("builtin_interfaces.msg.Time")(sec=seconds, nanosec=rest)
         return ros.of("std_msgs.msg.Header")(stamp=stamp, frame_id=WORLD)
 
-    def _wants(self, sensor: Sensor, publisher: Any, time: int) -> bool:
+    def _is_image_due(self, sensor: Sensor, publisher: Any, time: int) -> bool:
         """Whether an image is due: it has a subscriber, and the last one is old enough."""
         before = self._images.get(sensor.name, time - BETWEEN_IMAGES)
         if not publisher.get_subscription_count() or 0 <= time - before < BETWEEN_IMAGES:
@@ -151,7 +151,7 @@ def _message(kind: str, header: Any, values: Sequence[NDArray[Any]], frame: str 
     return message
 
 
-def _gathered(raw: NDArray[np.uint8], numbers: Iterable[Number]) -> NDArray[np.float64]:
+def _numbers_of(raw: NDArray[np.uint8], numbers: Iterable[Number]) -> NDArray[np.float64]:
     """Reads numbers from raw rows: (n, bytes of a row) => (n, numbers)."""
     columns = [np.ndarray((len(raw),), n.kind, raw, n.offset, raw.strides[:1]) for n in numbers]
     return np.stack(columns, axis=1).astype(float)

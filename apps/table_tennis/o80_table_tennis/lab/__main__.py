@@ -73,9 +73,9 @@ def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str,
             row = environment.latest().extended
             played, touched, returned, _ = (row[count] for count in COUNTS)
             missing = "".join(f"; {name} is missing" for name in row.missing if row.missing[name])
-            said = f"{played} balls, {touched} touched, {returned} returned{missing}"
-            if said != shown:
-                console.print(shown := said)
+            line = f"{played} balls, {touched} touched, {returned} returned{missing}"
+            if line != shown:
+                console.print(shown := line)
             if row.phase == Phase.over:
                 return {name: scheduling(each.pid) for name, each in processes.running.items()}
 

@@ -95,7 +95,7 @@ def _latency(rows: o80.History, field: str) -> Figures | None:
     return spread((rows.time - then)[then > 0] * 1e-6)
 
 
-def _off(places: Any, at: Any, times: Any, true: Any, which: Any) -> Figures | None:
+def _errors(places: Any, at: Any, times: Any, true: Any, which: Any) -> Figures | None:
     """Distances [mm] of `places[which]` from true places, interpolated at the times `at`."""
     axes = [np.interp(at, times, axis, left=np.nan, right=np.nan) for axis in np.asarray(true).T]
     off = np.linalg.norm(np.asarray(places) - np.stack(axes, axis=1), axis=1)
@@ -116,8 +116,8 @@ def _tracking_error(rows: Rows) -> Figures | None:
     # an observation is published with the next row of the environment
     observed = environment.observed_ball, environment.observed_at
     return {
-        "at the time of the images": _off(tracker.position, images, *true, images > 0),
-        "as observed, flown on to the row of the arm": _off(*observed, *true, seen),
+        "at the time of the images": _errors(tracker.position, images, *true, images > 0),
+        "as observed, flown on to the row of the arm": _errors(*observed, *true, seen),
         "share of the rows with a ball that was seen": round(float(seen[playing].mean()), 4),
     }
 
@@ -129,7 +129,7 @@ def _motion_capture_error(rows: Rows) -> Figures | None:
     system, arm = rows[MOTION_CAPTURE].extended, rows[ARM]
     true = arm.time, arm.extended.racket_position
     racket = system.racket
-    return _off(racket.position, system.capture_time, *true, np.asarray(racket.visible))
+    return _errors(racket.position, system.capture_time, *true, np.asarray(racket.visible))
 
 
 def _wanted(processes: Mapping[str, Figures]) -> Figures:

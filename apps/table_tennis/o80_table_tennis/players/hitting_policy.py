@@ -163,7 +163,7 @@ class HittingPolicy:
     def reset(self) -> None:
         """Begins a new episode."""
         self._planner.forget()
-        self._lacking = np.zeros(JOINTS)
+        self._integral = np.zeros(JOINTS)
         self._swing: Swing | None = None
         self._ball: ComingBall | None = None
         self._steps = 0
@@ -261,8 +261,8 @@ class HittingPolicy:
         acceleration = wanted.ddq + control.stiffness * q_error + control.damping * dq_error
         torque = s.arm.torque(wanted.q, wanted.dq, acceleration)
         torque[WRIST] += control.wrist_stiffness * q_error[WRIST]
-        self._lacking += STEP * np.array(control.learning) * (start.q - q)
-        torque += self._lacking
+        self._integral += STEP * np.array(control.learning) * (start.q - q)
+        torque += self._integral
         in_muscles = s.muscles.pressures(torque, wanted.q, control.mean_pressure).ravel()
         begin = s.lag.after(pressures, self._actions.commanded, control.begin)
         return self._actions.towards(s.lag.asking(begin, in_muscles, control.settling))

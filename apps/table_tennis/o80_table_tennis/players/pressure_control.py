@@ -111,8 +111,8 @@ class PressureActions:
     def towards(self, wanted: FloatArray) -> NDArray[np.float32]:
         """Computes the action (8,) in [-1, 1] that moves the commands nearest to `wanted` (8,)."""
         delta = np.clip(np.clip(wanted, 0.0, 1.0) - self.commanded, -0.49, 0.49)
-        wished = 2.0 * np.arctanh(2.0 * delta) / self._factor
-        action: NDArray[np.float32] = np.clip(wished, -1.0, 1.0).astype(np.float32)
+        unclamped = 2.0 * np.arctanh(2.0 * delta) / self._factor
+        action: NDArray[np.float32] = np.clip(unclamped, -1.0, 1.0).astype(np.float32)
         taken = action.astype(np.float64)
         self.commanded = changed_pressures(self.commanded, taken, factor=self._factor)
         return action

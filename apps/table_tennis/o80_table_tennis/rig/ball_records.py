@@ -91,8 +91,8 @@ class BallRecords:
         racket, table, net = records["racket"], records["table"], records["net"]
         self._landed_at, self._net_at = table["iteration"], net["iteration"]
         self._landed, self._met_net = flags["landed"], flags["met_net"]
-        self._nobody = np.zeros(len(records), np.bool_)
-        self._nobody.flags.writeable = False
+        self._all_false = np.zeros(len(records), np.bool_)
+        self._all_false.flags.writeable = False
         self._record = BallRecord(
             racket["smallest_distance"],
             flags["touched"],
@@ -100,7 +100,7 @@ class BallRecords:
             racket["largest_speed"],
             flags["landed"],
             table["position"],
-            self._nobody,
+            self._all_false,
             flags["touched_floor"],
             net["position"],
             records["floor"]["position"],
@@ -115,5 +115,5 @@ class BallRecords:
             late = self._landed & (self._landed_at < self._net_at)
             record.touched_net = self._met_net & ~late
         else:
-            record.touched_net = self._nobody
+            record.touched_net = self._all_false
         return record

@@ -78,8 +78,8 @@ class RigRows:
             paths += [f"observed.{name}" for name in self._muscles]
             offsets = [0.0] * (2 * JOINTS) + self.range.least.tolist()
             scales = [1.0] * (2 * JOINTS) + self.range.scale.tolist()
-            its = zip(paths, offsets, scales, clips[: PRESSURES.stop], strict=True)
-            gathered.append(arms.gather([o80.Gathered(*each) for each in its]).observations)
+            columns = zip(paths, offsets, scales, clips[: PRESSURES.stop], strict=True)
+            gathered.append(arms.gather([o80.Gathered(*each) for each in columns]).observations)
             parts = ("position", "velocity")
             paths = [f"observed.{self.ball}.{part}[{axis}]" for part in parts for axis in range(3)]
             ball = zip(paths, clips[BALL_POSITION.start : SIZE], strict=True)

@@ -85,7 +85,7 @@ class NoisyPerception(Perception):
         self._at[which] = 0
         if self._delay is not None:
             self._delay.begin(state.ball, which)
-        return self._look(state, which)
+        return self._perceived(state, which)
 
     def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
         """Returns the perception with the next noise."""
@@ -96,9 +96,9 @@ class NoisyPerception(Perception):
         self._at[chosen] = at
         for copy in chosen[at == 0].tolist():
             self._draw(copy)
-        return self._look(state, chosen)
+        return self._perceived(state, chosen)
 
-    def _look(self, state: State, which: IntArray) -> Perceived:
+    def _perceived(self, state: State, which: IntArray) -> Perceived:
         at = self._at[which]
         ball = state.ball if self._delay is None else self._delay.delayed(which)
         noise, missed = self._normal[which, at], self._missed[which, at]

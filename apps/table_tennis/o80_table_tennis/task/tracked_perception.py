@@ -40,7 +40,7 @@ class TrackedPerception(Perception):
 
     def __init__(self, tracker: Callable[[], o80.Frontend | None], now: Callable[[], int]) -> None:
         self._tracker, self._now = tracker, now
-        self._used, self._seen_yet = 0, False
+        self._used, self._was_seen = 0, False
         self.ball: FloatArray = np.zeros(6)
         """Last perceived or guessed ball."""
         self.at = 0
@@ -50,7 +50,7 @@ class TrackedPerception(Perception):
 
     def begin(self, state: State, _generators: object, _which: object) -> Perceived:
         """Returns the guess for a ball that no image shows yet."""
-        self._used, self._seen_yet = self._now(), False
+        self._used, self._was_seen = self._now(), False
         self.ball = np.array([*WIDE.position, *WIDE.velocity])
         return self._perceived(state, None)
 
@@ -68,7 +68,7 @@ class TrackedPerception(Perception):
         self._used = self.ball_time = int(row.capture_time)
         late = max(0.0, (self.at - self.ball_time) * 1e-9)
         self.ball = flight_nodes(row.position, row.velocity, row.spin, late, step=STEP)[-1, STATE]
-        first, self._seen_yet = not self._seen_yet, True
+        first, self._was_seen = not self._was_seen, True
         return Perceived(self.ball[np.newaxis], np.array([False]), state.pressures, first)
 
     def _is_new(self, row: Any) -> bool:

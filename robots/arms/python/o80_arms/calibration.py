@@ -105,8 +105,8 @@ def read(file: Path) -> dict[str, Calibration]:
         joints = {joint: Calibration(*(content[joint][each] for each in KEYS)) for joint in JOINTS}
         for joint, each in joints.items():
             numbers = each.offset, each.smallest, each.largest
-            whole = all(isinstance(number, int) for number in numbers)
-            if not whole or not 0 <= each.smallest < each.largest < TURN:
+            are_integers = all(isinstance(number, int) for number in numbers)
+            if not are_integers or not 0 <= each.smallest < each.largest < TURN:
                 raise ValueError(f"{joint} has {each}")
         return joints
     except (OSError, ValueError, KeyError, TypeError) as error:

@@ -92,7 +92,7 @@ int ServoArm::goal_of(std::size_t servo, const ArmState& desired) const noexcept
   const Calibration& range = calibration_[servo];
   double steps = 0.0;
   if (servo == kGripper) {
-    // limits the goal of a gripper that has closed on an object
+    // limits the force on an object by a goal near the position
     const double stands = range.share(servos_[servo].position);
     steps = range.steps_of_share(std::clamp(desired.gripper, stands - kReach, stands + kReach));
   } else {
