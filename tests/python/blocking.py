@@ -1,7 +1,6 @@
 """Every call that can wait forever, and a fixture in which each of them does."""
 
 import contextlib
-import importlib
 import inspect
 import os
 import re
