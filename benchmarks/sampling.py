@@ -1,4 +1,4 @@
-"""Parts that the measuring programs in Python share with those in C++."""
+"""Common parts of the measuring programs in Python."""
 
 import os
 import sys
@@ -8,9 +8,9 @@ from pathlib import Path
 
 
 def take_priority() -> None:
-    """Keeps ordinary processes out of short measurements, where that is allowed.
+    """Takes real-time priority for short measurements, where permitted.
 
-    Processes started from here on inherit it.
+    Processes started afterwards inherit the priority.
     """
     try:
         os.sched_setscheduler(0, os.SCHED_RR, os.sched_param(20))
@@ -23,7 +23,7 @@ def sample(name: str, unit: str, value: float) -> None:
 
 
 def seconds(call: Callable[[], object]) -> float:
-    """Time a call takes [s]."""
+    """Measures the duration of a call [s]."""
     begin = time.perf_counter()
     call()
     return time.perf_counter() - begin
@@ -34,5 +34,5 @@ def rounds() -> int:
 
 
 def built() -> Path:
-    """Where the programs and robots were built."""
+    """Returns the folder of the built programs and robots."""
     return Path(sys.argv[2])

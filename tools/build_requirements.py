@@ -1,7 +1,7 @@
-"""Prints what the packages of this repository need from elsewhere, one requirement a line.
+"""Prints the external requirements of this repository's packages, one a line.
 
-With `build`, what building them needs; with `run`, what running them needs. Extras follow: those of
-all packages that have one of the name.
+`build`: requirements of a build. `run`: requirements at run time. Further words name extras, which
+are read from all packages that define them.
 """
 
 import sys
@@ -20,11 +20,11 @@ PACKAGES = (
     "gateways/ros2",
 )
 ELSEWHERE = ("o80=", "o80-", "o80[", "lerobot>")
-"""Begins of requirements that are not listed: each other, and LeRobot (tools/lerobot.txt)."""
+"""Prefixes of omitted requirements: the packages themselves, and LeRobot (tools/lerobot.txt)."""
 
 
 def requirements(kind: str, extras: list[str]) -> list[str]:
-    """Requirements of all packages, without ELSEWHERE."""
+    """Collects the requirements of all packages, without ELSEWHERE."""
     found: set[str] = set()
     for package in PACKAGES:
         pyproject = tomllib.loads((ROOT / package / "pyproject.toml").read_text())

@@ -1,7 +1,7 @@
-"""Checks what `make test` leaves: slow tests, and what needs tools of its own.
+"""Runs the checks that `make test` omits: slow tests, and checks with tools of their own.
 
-A test that was skipped, here or by `make test`, and passed in no other step fails the check;
---allow-skips only tells of it.
+The check fails if a test was skipped, here or by `make test`, and passed in no other step;
+--allow-skips only reports it.
 """
 
 import argparse
@@ -33,7 +33,7 @@ PACKAGES = (
     "lerobot_robot_o80",
     "o80_ros2",
 )
-TYPED = (  # beside the packages: folders of which no two have a module of the same name
+TYPED = (  # folders beside the packages, grouped so that module names are unique
     "conftest.py tools benchmarks examples tests/processes tests/tools robots/pam/tests"
     " simulators/mujoco/tests apps/table_tennis/studies apps/table_tennis/tests",
     "tests/proofs tests/python tests/consumer",
@@ -69,9 +69,9 @@ STEPS: dict[str, list[list[str]]] = {
     "rt": [[*PROOF, "real_time", "--short"]],
     "arm64": [*build("arm64"), ctest("arm64", "arm64")],
 }
-ON_DEMAND = {"arm64"}  # an emulator's minutes
-# Two chains of steps run at the same time: many steps wait, or keep one processor busy. Those of a
-# chain use the same build folder. The longest come first.
+ON_DEMAND = {"arm64"}  # minutes in an emulator
+# Two chains of steps run at the same time: many steps wait, or keep one processor busy. The steps
+# of a chain share a build folder. The longest chains are first.
 QUICK = ("format", "ruff", "workflow")
 CHAINS = (
     ("python",),
@@ -85,11 +85,11 @@ CHAINS = (
     ("arm64",),
 )
 LANES = 2
-NEED_DEV = {"cpp", "python"}  # they use what the preset dev built, each in a chain of its own
+NEED_DEV = {"cpp", "python"}  # steps that use the build of the preset dev
 
 
 def run_all(names: list[str], *, keep_going: bool) -> set[str]:
-    """Runs these steps; the names of those that failed."""
+    """Runs these steps; returns the names of failed ones."""
     steps = {name: Step(name, STEPS[name]) for name in names}
     first = [steps[name] for name in QUICK if name in steps]
     if NEED_DEV & set(steps):
@@ -102,7 +102,7 @@ def run_all(names: list[str], *, keep_going: bool) -> set[str]:
 
 
 def outcomes(names: list[str]) -> Outcomes:
-    """Outcomes of these steps, and of the last `make test`."""
+    """Reads the outcomes of these steps and of the last `make test`."""
     found = Outcomes()
     for name in ("test_cpp", "test_python", *names):
         if (report := LOGS / f"{name}.xml").exists():
@@ -137,7 +137,7 @@ def main() -> int:
     found = outcomes(names)
     found.tell()
     gaps = len(found.gaps())
-    # some steps alone cannot know what the others pass
+    # a selection of steps cannot know which tests the others pass
     if gaps and not arguments.steps and not arguments.allow_skips:
         cure = 'make test first, install what is missing, or ARGS="--allow-skips"'
         print(f"failed: {gaps} skipped; {cure}")

@@ -25,18 +25,18 @@ FLAGS = (
     "--no-first-run",
     "--remote-debugging-port=0",
 )
-TIMEOUT = 60.0  # [s] for a slow machine
+TIMEOUT = 60.0  # long enough for a slow machine [s]
 
 
 class Chromium:
-    """A browser; each `page` is a tab of its own."""
+    """A browser; `page` opens a tab."""
 
     def __init__(self) -> None:
         program = shutil.which("chromium")
         assert program is not None, "install Debian's package chromium"
         self._folder = tempfile.mkdtemp(prefix="o80-chromium-")
         home = {**os.environ, "HOME": self._folder}
-        # it ends with this program, however that ends
+        # the browser ends with this program
         command = ["setpriv", "--pdeathsig=KILL", program, *FLAGS]
         command += [f"--user-data-dir={self._folder}", "about:blank"]
         quiet = subprocess.DEVNULL
@@ -60,7 +60,7 @@ class Chromium:
         raise TimeoutError("Chromium did not start")
 
     def page(self, url: str, width: int = 1280, height: int = 760, dark: bool = False) -> "Page":
-        """Opens an address in a tab."""
+        """Opens an address in a new tab."""
         target = f"http://127.0.0.1:{self._port}/json/new?about:blank"
         with urllib.request.urlopen(urllib.request.Request(target, method="PUT")) as answer:
             address: str = json.load(answer)["webSocketDebuggerUrl"]
@@ -100,18 +100,18 @@ class Page:
         self._calls = 0
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
-        """One call of the protocol; its answer."""
+        """Sends a request of the protocol; returns the answer."""
         self._calls += 1
         self._socket.send(json.dumps({"id": self._calls, "method": method, "params": parameters}))
         while True:
-            said = json.loads(self._socket.recv(TIMEOUT))
-            if said.get("id") == self._calls:
-                assert "error" not in said, said
-                found: dict[str, Any] = said["result"]
+            message = json.loads(self._socket.recv(TIMEOUT))
+            if message.get("id") == self._calls:
+                assert "error" not in message, message
+                found: dict[str, Any] = message["result"]
                 return found
 
     def value(self, script: str) -> Any:
-        """The value of an expression in the page."""
+        """Evaluates an expression in the page."""
         answer = self.call(
             "Runtime.evaluate", expression=script, returnByValue=True, awaitPromise=True
         )
@@ -119,7 +119,7 @@ class Page:
         return answer["result"].get("value")
 
     def wait_for(self, script: str, timeout: float = TIMEOUT) -> Any:
-        """Waits until an expression is true, and returns it."""
+        """Waits until an expression is true, and returns its value."""
         end = time.monotonic() + timeout
         while time.monotonic() < end:
             found = self.value(f"(() => {{ try {{ return {script} }} catch {{ return null }} }})()")
@@ -129,16 +129,16 @@ class Page:
         raise AssertionError(f"not in {timeout} s: {script}; the page says: {self.text()}")
 
     def wait_for_text(self, text: str) -> None:
-        """Waits until this stands on the page."""
+        """Waits until the page contains a text."""
         self.wait_for(f"document.body.innerText.includes({json.dumps(text)})")
 
     def text(self) -> str:
-        """All visible text."""
+        """Returns all visible text."""
         found: str = self.value("document.body.innerText")
         return found
 
     def picture(self) -> bytes:
-        """A screenshot as PNG."""
+        """Takes a screenshot as PNG."""
         return base64.b64decode(self.call("Page.captureScreenshot")["data"])
 
     def close(self) -> None:

@@ -1,4 +1,4 @@
-"""Formats the tree; with --check only says what is not formatted."""
+"""Formats the tree; with --check, only lists unformatted files."""
 
 import argparse
 import re
@@ -13,7 +13,7 @@ def format_cpp() -> bool:
 
 
 def check_cpp() -> bool:
-    """Names the files that clang-format would change."""
+    """Lists the files that clang-format would change."""
     result = subprocess.run(
         ["clang-format", "--dry-run", *cpp_files()], cwd=ROOT, capture_output=True, text=True
     )

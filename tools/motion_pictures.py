@@ -24,7 +24,7 @@ EVERY = 0.02  # [s]
 
 
 class Joints:
-    """One joint without limits, two with; all are where they were asked to be."""
+    """One joint without limits, two with; observed positions equal the desired ones."""
 
     actuators = ("free", "limited", "fast")
     limits = {"limited": LIMITS, "fast": FAST}  # noqa: RUF012
@@ -41,7 +41,7 @@ class Joints:
 
 
 def draw_paces(path: Path) -> None:
-    """Each pace to the same target, without and with limits."""
+    """Draws each pace to the same target, without and with limits."""
     figure = Figure(figsize=(11, 4.6), layout="constrained")
     axes = figure.subplots(2, len(PACES), sharex=True, sharey="row")
     for column, (title, options) in enumerate(PACES.items()):
@@ -74,7 +74,7 @@ def draw_paces(path: Path) -> None:
 
 
 def streamed(actuator: str, sent: list[float], **options: Any) -> np.ndarray:
-    """Desired positions while a target comes every 0.02 s, and as long again after the last one."""
+    """Returns desired positions during a stream of targets, and as long again after its end."""
     with o80.robots.load(Joints).inline(frequency=FREQUENCY) as arm:
         step = round(EVERY * FREQUENCY)
         for target in sent:
@@ -86,7 +86,7 @@ def streamed(actuator: str, sent: list[float], **options: Any) -> np.ndarray:
 
 
 def draw_streaming(path: Path) -> None:
-    """A policy that sends set-points and then stops, to an arm and to one with wider limits."""
+    """Draws a stream of set-points that stops, for an arm with narrow and with wide limits."""
     sent_at = np.arange(0.0, 0.6, EVERY)
     sent = [0.1 * (1.0 - np.cos(7.0 * time)) for time in sent_at]
     figure = Figure(figsize=(10, 4.6), layout="constrained")

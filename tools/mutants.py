@@ -1,4 +1,4 @@
-"""Measures what the tests notice: random faults in the sources, one active in each run.
+"""Measures the tests by random faults in the sources, one active in each run.
 
     python tools/mutants.py TREE --count 60 --seed 1                  # edits a copy of the tree
     python tools/mutants.py TREE --table TABLE --cpp 'build/dev/bin/o80_test_control' \\
@@ -53,9 +53,9 @@ class Mutant(NamedTuple):
     file: str
     line: int
     function: str
-    begin: int  # of the edited text, in bytes
+    begin: int  # bytes of the edited text
     end: int
-    text: str  # in its place; `#` stands for the number
+    text: str  # replacement; `#` becomes the number
     what: str
 
 
@@ -148,7 +148,7 @@ def in_python(file: str, source: str) -> Iterator[Mutant]:
 
 
 def write(tree: Path, count: int, seed: int, without: list[int]) -> None:
-    """Draws mutants that do not overlap, and edits the tree."""
+    """Draws mutants without overlaps, and edits the tree."""
     sites = {".cpp": in_cpp, ".hpp": in_cpp, ".py": in_python}
     found: list[Mutant] = []
     for path in sorted(x for place in PLACES for x in (tree / place).rglob("*")):
@@ -174,7 +174,7 @@ def write(tree: Path, count: int, seed: int, without: list[int]) -> None:
 
 
 def likely_first(tree: Path, one: Mutant) -> str:
-    """Files of tests/python, those first that name the module or the function of the mutant."""
+    """Sorts tests/python: first the files that name the mutant's module or function most."""
     words = re.compile(rf"\b_?(?:{Path(one.file).stem.strip('_')}|{one.function.strip('_')})\b")
     files = sorted((tree / "tests/python").rglob("test_*.py"))
     files.sort(key=lambda file: -len(words.findall(file.read_text())))
@@ -182,15 +182,15 @@ def likely_first(tree: Path, one: Mutant) -> str:
 
 
 def killer(tree: Path, number: str, command: str, timeout: float) -> str:
-    """The test of a command that fails, or nothing."""
+    """Runs a command; returns the failed test, or nothing."""
     limited = ["timeout", "--signal=KILL", str(timeout), "sh", "-c", command]
     mutated = {**os.environ, "O80_MUTANT": number, "GTEST_FAIL_FAST": "1"}
     done = subprocess.run(limited, cwd=tree, env=mutated, capture_output=True)
     if done.returncode == 0:
         return ""
-    said = (done.stdout + done.stderr).decode(errors="replace")
-    failed = re.findall(r"^(?:FAILED|ERROR|\[  FAILED  \]) ([^\s,]+)", said, re.M)
-    began = re.findall(r"^\[ RUN +\] (\S+)", said, re.M)
+    output = (done.stdout + done.stderr).decode(errors="replace")
+    failed = re.findall(r"^(?:FAILED|ERROR|\[  FAILED  \]) ([^\s,]+)", output, re.M)
+    began = re.findall(r"^\[ RUN +\] (\S+)", output, re.M)
     return failed[0] if failed else f"ended with {done.returncode}: {(began or [command[:60]])[-1]}"
 
 

@@ -1,6 +1,6 @@
-"""Reports of test runners: which tests passed, and which were skipped for which reason.
+"""Reads reports of test runners: passed, failed and skipped tests, with reasons of skips.
 
-ctest names a test `folder.Suite.Test`, and so does the real-time machine: a test that is skipped in
+ctest and the real-time machine both name a test `folder.Suite.Test`: a test that is skipped in
 one build and passes in another one has the same name in both.
 """
 
@@ -10,15 +10,15 @@ from pathlib import Path
 
 
 class Outcomes:
-    """Outcomes of several runs together."""
+    """Merged outcomes of several runs."""
 
     def __init__(self) -> None:
         self.passed: set[str] = set()
-        self.skipped: dict[str, str] = {}  # by name: the reason
+        self.skipped: dict[str, str] = {}  # reasons by name
         self.failed: list[str] = []
 
     def read_report(self, file: Path) -> None:
-        """Adds what ctest, pytest, or a program of tests in C++, named as its report, wrote."""
+        """Adds a report of ctest, of pytest, or of a C++ test program with the report's name."""
         for case in ET.parse(file).getroot().iter("testcase"):
             name = case.get("name", "")
             of_ctest, of_program = case.get("status"), case.get("result")
@@ -28,26 +28,26 @@ class Outcomes:
                 name = f"{file.stem}.{name}"
             skipped = case.find("skipped")
             if skipped is not None:
-                told = skipped.get("message", "")
+                reason = skipped.get("message", "")
                 if of_program:
-                    told = " ".join(told.split()[1:])  # after the place
+                    reason = " ".join(reason.split()[1:])  # drops file and line
                 elif of_ctest:
-                    told = _googletest_reason(case.findtext("system-out") or "")
-                self.skipped[name] = told
+                    reason = _googletest_reason(case.findtext("system-out") or "")
+                self.skipped[name] = reason
             elif all(case.find(kind) is None for kind in ("failure", "error")):
                 self.passed.add(name)
             else:
                 self.failed.append(name)
 
     def read_log(self, step: str, log: Path) -> bool:
-        """Adds a step if a line `skipped: why` in its log says that it could not be run."""
-        said = re.search(r"^skipped: (.*)", log.read_text(errors="replace"), re.MULTILINE)
-        if said:
-            self.skipped[step] = said[1]
-        return said is not None
+        """Adds a skipped step if its log has a line `skipped: why`; returns whether it does."""
+        match = re.search(r"^skipped: (.*)", log.read_text(errors="replace"), re.MULTILINE)
+        if match:
+            self.skipped[step] = match[1]
+        return match is not None
 
     def gaps(self) -> dict[str, str]:
-        """Tests that were skipped and passed in no run, with the reasons."""
+        """Returns the tests that were skipped and passed in no run, with the reasons."""
         return {name: why for name, why in self.skipped.items() if name not in self.passed}
 
     def tell(self) -> None:
@@ -56,5 +56,5 @@ class Outcomes:
 
 
 def _googletest_reason(printed: str) -> str:
-    said = re.search(r": Skipped\n(.*(?:\n(?!\n|\[).*)*)", printed)
-    return " ".join(said[1].split()) if said else "it does not say why"
+    match = re.search(r": Skipped\n(.*(?:\n(?!\n|\[).*)*)", printed)
+    return " ".join(match[1].split()) if match else "it does not say why"

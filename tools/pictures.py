@@ -1,4 +1,4 @@
-"""Draws the pictures of docs anew: docs/pictures/*.png. Needs tools of make check.
+"""Redraws the pictures of docs: docs/pictures/*.png. Needs tools of make check.
 
 python tools/pictures.py
 """
@@ -20,7 +20,7 @@ VIEW_SIZE = (1180, 700)
 
 
 def draw_so101(path: Path) -> None:
-    """The simulated SO-101, in the middle of a large picture."""
+    """Draws the simulated SO-101 in the middle of a large picture."""
     twin = o80.robots.load("so101_twin")
     with twin.inline() as arm, o80.Pictures(arm, size=(1600, 1000), model_files=True) as pictures:
         for joint, place in {"shoulder_pan": 0.7, "shoulder_lift": 0.2, "elbow_flex": -0.5}.items():
@@ -31,7 +31,7 @@ def draw_so101(path: Path) -> None:
 
 
 def draw_recording(path: Path) -> None:
-    """A motion that a halt interrupts."""
+    """Draws the recording of a motion with a halt."""
     with o80.robots.load("two_joints").inline() as arm:
         arm.add_command("elbow", 0.5, duration=0.2)
         arm.add_command("shoulder", 0.4, duration=0.3, profile="minimum_jerk")
@@ -47,7 +47,7 @@ def draw_recording(path: Path) -> None:
 
 
 def draw_view(path: Path) -> None:
-    """The page of o80 view: an arm that swings beside flying balls."""
+    """Draws the page of o80 view: a swinging arm beside flying balls."""
     options: dict[str, Any] = {
         "model": str(MODEL),
         "balls": "ball",

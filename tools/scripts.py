@@ -1,6 +1,6 @@
 """Plays random scripts on every processor (CONTRIBUTING.md).
 
-Each script is a robot and a list of what happens to it, made from a seed. A script that breaks a
+Each script is a robot and a list of events, generated from a seed. A script that breaks a
 promise is shrunk and printed with its seed.
 """
 
@@ -15,7 +15,7 @@ PROGRAM = ROOT / "build" / "dev" / "bin" / "o80_test_scripts"
 
 
 def start(test: str, **variables: object) -> "subprocess.Popen[bytes]":
-    """The test program with variables in its environment."""
+    """Starts the test program with environment variables."""
     environment = {**os.environ, **{name: str(value) for name, value in variables.items()}}
     command = [str(PROGRAM), f"--gtest_filter={test}", "--gtest_brief=1"]
     return subprocess.Popen(command, env=environment)

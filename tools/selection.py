@@ -1,4 +1,4 @@
-"""Which tests the words of `make test ARGS="..."` mean."""
+"""Maps the words of `make test ARGS="..."` to tests."""
 
 import difflib
 import re
@@ -15,7 +15,7 @@ PACKAGES = {
 CPP = {folder.name: folder for folder in ROOT.glob("tests/cpp/*/")} | {
     name: tests / "cpp" for name, tests in PACKAGES.items() if (tests / "cpp").is_dir()
 }
-#: Folders of tests by the words that stand for them.
+#: Folders of tests by word.
 NAMED = {file.parent.name: [file.parent] for file in ROOT.glob("tests/*/test_*.py")}
 NAMED |= {name: [folder] for name, folder in (CPP | PACKAGES).items()} | {"cpp": [*CPP.values()]}
 LEROBOT = "gateways/lerobot"
@@ -23,19 +23,19 @@ SUITE = re.compile(r"^(?:TYPED_)?TEST(?:_F|_P)?\((\w+),", re.MULTILINE)
 
 
 class NoSuchTestsError(Exception):
-    """A word that names no tests."""
+    """A word names no tests."""
 
 
 @dataclass
 class Selection:
-    """The suites chosen in C++ by folder, and paths for pytest: `lerobot` for LeRobot's Python."""
+    """Chosen C++ suites by folder, and paths for pytest; `lerobot`: for LeRobot's Python."""
 
     cpp: dict[str, set[str]] = field(default_factory=dict)
     python: list[str] = field(default_factory=list)
     lerobot: list[str] = field(default_factory=list)
 
     def cpp_pattern(self) -> str:
-        """Pattern for ctest of the names of these tests."""
+        """Returns a pattern of test names for ctest."""
         each = (
             f"{folder}[.]([^.]*/)?({'|'.join(sorted(suites))})[./]"
             for folder, suites in self.cpp.items()
@@ -43,11 +43,11 @@ class Selection:
         return f"^({'|'.join(each)})"
 
     def files(self) -> list[Path]:
-        """The files in Python among what was asked for."""
+        """Returns the chosen Python files."""
         return [ROOT / path.partition("::")[0] for path in self.python if ".py" in path]
 
     def add(self, place: Path, word: str) -> bool:
-        """Adds the tests of a file or folder; whether there are any."""
+        """Adds the tests of a file or folder; returns whether there are any."""
         files = [*place.rglob("*.*")] if place.is_dir() else [place]
         suites = {
             name: {suite for file in inside for suite in SUITE.findall(file.read_text())}
@@ -66,7 +66,7 @@ class Selection:
 
 
 def select(words: Iterable[str]) -> Selection:
-    """Folders by name, folders and files by path, and single tests as pytest names them."""
+    """Selects folders by name, folders and files by path, single tests by pytest's names."""
     chosen = Selection()
     for word in words:
         path = (ROOT / word.partition("::")[0]).resolve()

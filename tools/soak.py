@@ -1,6 +1,6 @@
-"""Runs what `make test` runs, again and again, under conditions that a hostile machine could have.
+"""Repeats the tests of `make test` under conditions of a hostile machine.
 
-Each round draws its conditions from the seed. A test that failed even once is printed with the
+Each round draws its conditions from the seed. Each failed test is printed with the
 round and its conditions: `--seed S --first ROUND --rounds 1` repeats them. Logs: build/soak.
 """
 
@@ -26,7 +26,7 @@ from steps import JOBS, PYTHON, Step, build, ctest, pytest, run, use_tools
 FOLDER = ROOT / "build" / "soak"
 GROUPS = Path("/sys/fs/cgroup")
 NOBODY = ["setpriv", "--reuid=65534", "--regid=65534", "--clear-groups"]
-# a program that a user's own program starts: `setpriv` itself may start one that no user may read
+# a grandchild tests the user's rights: `setpriv` may start a program that no user may read
 STARTS = "import subprocess, sys; subprocess.run([sys.executable, '-c', ''], check=True)"
 BURN = [sys.executable, "-c", "while True: pass"]
 WRITE = """
@@ -41,11 +41,11 @@ while True:
 
 @dataclass
 class Round:
-    """How the tests of a round are started."""
+    """Start options of a round's tests."""
 
     random: random.Random
     folder: Path
-    prefix: list[str] = field(default_factory=list)  # of each command
+    prefix: list[str] = field(default_factory=list)  # words before each command
     environment: dict[str, str] = field(default_factory=dict)
     shuffled: bool = False
     runners: list[subprocess.Popen[bytes]] = field(default_factory=list)
@@ -56,7 +56,7 @@ Condition = Callable[[Round], contextlib.AbstractContextManager[None]]
 
 @contextlib.contextmanager
 def programs(*commands: list[str]) -> Iterator[None]:
-    """Runs programs beside the block."""
+    """Runs programs during the block."""
     running = [subprocess.Popen(command) for command in commands]
     try:
         yield
@@ -79,7 +79,7 @@ def busy(_: Round) -> contextlib.AbstractContextManager[None]:
 
 @contextlib.contextmanager
 def quota(this: Round) -> Iterator[None]:
-    """30 % of each processor."""
+    """Limits the tests to 30 % of each processor."""
     group = processor_groups() / f"o80-soak-{os.getpid()}"
     group.mkdir()
     try:
@@ -100,7 +100,7 @@ def quota(this: Round) -> Iterator[None]:
 
 
 def processor_groups() -> Path:
-    """Where control groups of the processor are made."""
+    """Returns the folder of the processor's control groups."""
     return next((each for each in (GROUPS / "cpu", GROUPS) if each.is_dir()), GROUPS)
 
 
@@ -112,7 +112,7 @@ def order(this: Round) -> Iterator[None]:
 
 @contextlib.contextmanager
 def user(this: Round) -> Iterator[None]:
-    """Runs as an ordinary user, who owns the folders that the runners write."""
+    """Runs the tests as an ordinary user, who owns the folders written by the runners."""
     this.prefix += NOBODY
     home = tempfile.mkdtemp(prefix="soak-home-")
     this.environment |= {"HOME": home, "PYTHONPYCACHEPREFIX": home}
@@ -136,7 +136,7 @@ def user(this: Round) -> Iterator[None]:
 
 @contextlib.contextmanager
 def zone(this: Round) -> Iterator[None]:
-    """Another time zone, and a language that writes 0,5, where it is installed."""
+    """Sets another time zone, and a language with decimal commas if one is installed."""
     listed = subprocess.run(["locale", "-a"], capture_output=True, text=True, check=False).stdout
     others = [each for each in listed.split() if each.startswith(("de_", "fr_", "tr_"))]
     this.environment |= {"TZ": "Asia/Kathmandu", "LC_ALL": others[0] if others else "C"}
@@ -144,13 +144,13 @@ def zone(this: Round) -> Iterator[None]:
 
 
 def disk(this: Round) -> contextlib.AbstractContextManager[None]:
-    """A disk that another program keeps busy."""
+    """Keeps the disk busy."""
     return programs([sys.executable, "-c", WRITE, str(this.folder / "busy")])
 
 
 @contextlib.contextmanager
 def memory(this: Round) -> Iterator[None]:
-    """A small /dev/shm, which no other program sees."""
+    """Mounts a small private /dev/shm."""
     mount = 'mount -t tmpfs -o size=512M tmpfs /dev/shm && exec "$0" "$@"'
     this.prefix[:0] = ["unshare", "-m", "sh", "-c", mount]
     yield
@@ -158,7 +158,7 @@ def memory(this: Round) -> Iterator[None]:
 
 @contextlib.contextmanager
 def stops(this: Round) -> Iterator[None]:
-    """Single test processes are stopped for up to three seconds."""
+    """Stops random test processes for up to three seconds each."""
     end = threading.Event()
 
     def stop_some() -> None:
@@ -183,7 +183,7 @@ def stops(this: Round) -> Iterator[None]:
 
 
 def test_processes(parent: int) -> list[int]:
-    """The processes below `parent` that run tests: not what the tests have started."""
+    """Lists the test processes below `parent`, without the processes started by tests."""
     found = []
     children = Path(f"/proc/{parent}/task/{parent}/children")
     with contextlib.suppress(OSError):
@@ -210,7 +210,7 @@ CONDITIONS: dict[str, Condition] = {
 
 
 def available() -> list[str]:
-    """The conditions that this machine can have."""
+    """Lists the conditions that are possible on this machine."""
     root = os.geteuid() == 0
     trial = processor_groups() / "o80-soak-try"
     with contextlib.suppress(OSError):
@@ -227,7 +227,7 @@ def available() -> list[str]:
 
 
 def python_files(mark: str) -> list[str]:
-    """Files with tests of this mark."""
+    """Lists the files with tests of this mark."""
     listed = subprocess.run(
         [*PYTHON, "pytest", "--collect-only", "-qq", "-m", mark],
         cwd=ROOT,
@@ -240,7 +240,7 @@ def python_files(mark: str) -> list[str]:
 
 
 def commands_of(this: Round, chosen: argparse.Namespace) -> dict[str, list[str]]:
-    """The two runners, by name."""
+    """Builds the commands of the runners, by name."""
     mark = "check" if chosen.check else "not check"
     labels = ["-L" if chosen.check else "-LE", "^check$"]
     cpp = ctest(str(this.folder / "cpp"), "dev", *labels)
@@ -258,13 +258,13 @@ def commands_of(this: Round, chosen: argparse.Namespace) -> dict[str, list[str]]
         cpp += ["--schedule-random"]
         this.random.shuffle(files)
     runners = {"cpp": cpp, "python": [*python, *files]}
-    if bool(chosen.cpp) != bool(chosen.python):  # only the tests that were named
+    if bool(chosen.cpp) != bool(chosen.python):  # runs only the named tests
         del runners["python" if chosen.cpp else "cpp"]
     return {name: [*this.prefix, *command] for name, command in runners.items()}
 
 
 def play(this: Round, names: list[str], chosen: argparse.Namespace) -> list[str]:
-    """Runs the tests under these conditions; what failed."""
+    """Runs the tests under these conditions; returns the failures."""
     with contextlib.ExitStack() as stack:
         for name in names:
             stack.enter_context(CONDITIONS[name](this))
@@ -305,8 +305,8 @@ def main() -> int:
     if not 0.0 < chosen.share <= 1.0:
         parser.error(f"--share must lie above 0 and be at most 1, got {chosen.share:g}")
     use_tools()
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # and what runs beside the tests ends
-    # ctest lists the tests, which an ordinary user may not write
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))  # also ends the programs beside the tests
+    # ctest lists the tests in a file that an ordinary user may not write
     if not run(Step("build", [*build("dev"), ["ctest", "--preset", "dev", "-N"]])):
         return 1
     can = available()

@@ -1,4 +1,4 @@
-"""Which files of the tree are ours to format and to check."""
+"""Lists the files of the tree to format and check."""
 
 import re
 from pathlib import Path
@@ -7,7 +7,7 @@ ROOT = Path(__file__).resolve().parent.parent
 
 
 def cpp_files() -> list[str]:
-    """All C++ files, relative to the root."""
+    """Lists all C++ files, relative to the root."""
     folders = (folder for folder in ROOT.glob("[!.]*/") if folder.name != "build")
     return sorted(
         str(file.relative_to(ROOT)) for folder in folders for file in folder.rglob("*.[hc]pp")
@@ -15,5 +15,5 @@ def cpp_files() -> list[str]:
 
 
 def all_left_to_check(tests: Path) -> bool:
-    """True if all tests of a Python file are marked `check`; `make test` does not import it."""
+    """Whether all tests of a Python file are marked `check`; `make test` skips such files."""
     return re.search(r"^pytestmark = \[?pytest\.mark\.check\b", tests.read_text(), re.M) is not None

@@ -1,4 +1,4 @@
-"""Steps of `make test` and `make check`: commands, their logs, and what to show of them."""
+"""Steps of `make test` and `make check`: commands, logs and summaries."""
 
 import os
 import re
@@ -17,7 +17,7 @@ BEGIN = time.monotonic()
 JOBS = len(os.sched_getaffinity(0))
 LOGS = ROOT / "build" / "test"
 PYTHON = [sys.executable, "-m"]
-CLOSING = re.compile(  # lines with which ctest and pytest end
+CLOSING = re.compile(  # closing lines of ctest and pytest
     r"^\d+% tests passed|^Total Test time|^left to make check|^left out"
     r"|^=+ .*\b(passed|skipped|deselected)\b.* =+$"
 )
@@ -25,7 +25,7 @@ CLOSING = re.compile(  # lines with which ctest and pytest end
 
 @dataclass(frozen=True)
 class Step:
-    """Commands that are run one after the other until one fails."""
+    """Commands of a step, run in order until one fails."""
 
     name: str
     commands: list[list[str]]
@@ -35,7 +35,7 @@ class Step:
         return LOGS / f"{self.name}.log"
 
     def lines(self) -> list[str]:
-        """The closing lines of ctest or pytest in its log, otherwise the last line."""
+        """Returns the closing lines of ctest or pytest in the log, else the last line."""
         with self.log.open(errors="replace") as text:
             return [line for line in text if CLOSING.search(line)] or self.last_lines(1)
 
@@ -45,26 +45,26 @@ class Step:
 
 
 def use_tools() -> None:
-    """Makes the tools of the environment the first that are found, and the folder of logs."""
+    """Puts the environment's tools first in the path, and creates the folder of logs."""
     tools = Path(sys.executable).parent
     os.environ["PATH"] = f"{tools}{os.pathsep}{os.environ['PATH']}"
     os.environ.setdefault("CCACHE_DIR", str(ROOT / "build" / "ccache"))
-    # presets share what they compile alike
+    # presets share equal compilations
     os.environ.setdefault("CCACHE_NOHASHDIR", "1")
     os.environ.setdefault("CCACHE_BASEDIR", str(ROOT))
-    os.environ.setdefault("CCACHE_ABSSTDERR", "1")  # paths in errors stay whole
+    os.environ.setdefault("CCACHE_ABSSTDERR", "1")  # errors show absolute paths
     LOGS.mkdir(parents=True, exist_ok=True)
 
 
 def times() -> str:
-    """Time since the beginning, and processor time of all programs that were run and have ended."""
+    """Text of the time since the start, and of the processor time of all ended programs."""
     used = os.times()
     processor = used.children_user + used.children_system
     return f"{time.monotonic() - BEGIN:.0f} s ({processor:.0f} s of processor time)"
 
 
 def run(step: Step) -> bool:
-    """Runs a step; shows its closing lines, or most of its log when it fails."""
+    """Runs a step; prints its closing lines, or most of its log after a failure."""
     begin, used = time.monotonic(), 0.0
     print(f"== {begin - BEGIN:3.0f} s: {step.name}", flush=True)
     returned = 0
@@ -86,7 +86,7 @@ def run(step: Step) -> bool:
 
 
 def run_beside(chains: Iterable[list[Step]], lanes: int, *, keep_going: bool = False) -> set[str]:
-    """Runs chains of steps, as many of them at the same time as there are lanes; what failed.
+    """Runs up to `lanes` chains of steps at the same time; returns the names of failed steps.
 
     The steps of a chain run one after the other. After a failure no further step begins, unless
     `keep_going` is set.
@@ -111,7 +111,7 @@ def run_beside(chains: Iterable[list[Step]], lanes: int, *, keep_going: bool = F
 
 
 def build(preset: str, *targets: str) -> list[list[str]]:
-    """Commands that build a preset, or some targets of it."""
+    """Returns the commands that build a preset, or some of its targets."""
     chosen = ["--target", *targets] if targets else []
     return [
         ["cmake", "--preset", preset],
@@ -120,21 +120,21 @@ def build(preset: str, *targets: str) -> list[list[str]]:
 
 
 def ctest(step: str, preset: str, *options: str) -> list[str]:
-    """Command that runs the tests of a preset that is built, and writes the report of a step."""
+    """Returns the command that runs the tests of a built preset and writes a report."""
     report = ["--output-junit", str(LOGS / f"{step}.xml")]
     return ["ctest", "--preset", preset, "-j", str(JOBS), *report, *options]
 
 
 def pytest(step: str, *options: str, processes: int = JOBS + 1) -> list[str]:
-    """Command that runs tests in Python, each file in one process, and writes the report of a step.
+    """Returns the command that runs Python tests, each file in one process, with a report.
 
-    Many tests wait: one process more than there are processors keeps these busy.
+    Many tests wait: one process more than processors keeps all processors busy.
     """
     several = ["-n", str(processes), "--dist", "loadfile"] if processes > 1 else []
     return [*PYTHON, "pytest", *several, f"--junit-xml={LOGS / f'{step}.xml'}", *options]
 
 
 def pytest_of_lerobot(*options: str) -> list[str]:
-    """The same with LeRobot's Python, which also sees what is installed in .venv."""
+    """Returns the same command with LeRobot's Python, which also uses the packages of .venv."""
     python = str(ROOT / "build/lerobot/bin/python")
     return [python, *pytest("lerobot", *options, processes=2)[1:]]

@@ -1,7 +1,7 @@
-"""Runs the tests that a change can break: all of them, or those that the arguments name.
+"""Runs all tests, or the tests that the arguments name.
 
-What runs prints into build/test/<step>.log; its closing lines are shown, and most of it when it
-fails. Tests marked `check` are left to `make check`, unless their file is named.
+Each step writes build/test/<step>.log, and prints its closing lines, or most of the log after a
+failure. Tests marked `check` are left to `make check`, unless their file is named.
 """
 
 import argparse
@@ -24,11 +24,11 @@ from steps import (
     use_tools,
 )
 
-NEED_PROGRAMS = ("tests/processes", "tests/consumer")  # of the preset dev
+NEED_PROGRAMS = ("tests/processes", "tests/consumer")  # tests that run programs of the preset dev
 
 
 def set_up(chosen: Selection, *, everything: bool) -> bool:
-    """Installs what these tests need: packages for Python, all tools for those marked `check`."""
+    """Installs Python packages for these tests, and all tools for tests marked `check`."""
     purpose = "test" if everything or chosen.python else "tools"
     if not everything and (chosen.lerobot or any(map(all_left_to_check, chosen.files()))):
         purpose = "check"
@@ -36,7 +36,7 @@ def set_up(chosen: Selection, *, everything: bool) -> bool:
 
 
 def all_steps() -> tuple[list[list[str]], list[Step]]:
-    """Commands that build, and the tests in C++ and in Python."""
+    """Returns the build commands, and the steps of the C++ and Python tests."""
     return build("dev"), [
         Step("test_cpp", [ctest("test_cpp", "dev", "-LE", "^check$")]),
         Step("test_python", [pytest("test_python", "-m", "not check")]),
@@ -44,7 +44,7 @@ def all_steps() -> tuple[list[list[str]], list[Step]]:
 
 
 def some_steps(chosen: Selection, keyword: str | None) -> tuple[list[list[str]], list[Step]]:
-    """As all_steps(), but builds and runs no more than what was asked for."""
+    """Same as all_steps(), but builds and runs only the chosen tests."""
     needs_programs = any(path.startswith(NEED_PROGRAMS) for path in chosen.python)
     targets = [] if needs_programs else [f"o80_test_{folder}" for folder in chosen.cpp]
     tests = []
@@ -64,7 +64,7 @@ def some_steps(chosen: Selection, keyword: str | None) -> tuple[list[list[str]],
 
 
 def left_to_check() -> int:
-    """How many tests in C++ only `make check` runs; pytest tells its own number."""
+    """Counts the C++ tests that only `make check` runs; pytest reports its own number."""
     command = ["ctest", "--preset", "dev", "-N", "-L", "^check$"]
     listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     return int(listed.stdout.rpartition("Total Tests:")[2].strip() or 0)
@@ -87,7 +87,7 @@ def main() -> int:
     if not set_up(chosen, everything=everything):
         return 1
     commands, tests = all_steps() if everything else some_steps(chosen, arguments.keyword)
-    # the tests in C++ run beside those in Python: both wait a lot
+    # C++ and Python tests run at the same time: both wait a lot
     chains = [[step] for step in tests]
     if (commands and not run(Step("build", commands))) or run_beside(chains, len(chains)):
         return 1

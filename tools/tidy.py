@@ -1,8 +1,8 @@
 """Runs clang-tidy over the sources of a build folder, in parallel.
 
-The sources of a folder that are compiled alike are read as one, so that what they all include is
-read once. What passed is not looked at again until its preprocessed text, the configuration or the
-version of clang-tidy changes.
+Sources of a folder with equal compile options are checked as one unit, so that common headers are
+read once. A unit that passed is checked again only after a change of its preprocessed text, of the
+configuration or of clang-tidy's version.
 """
 
 import argparse
@@ -20,7 +20,7 @@ from sources import ROOT
 
 CHECKED = ("src", "robots", "simulators", "devices")
 BUILD = ROOT / "build" / "tidy"
-# the static analyzer looks into what is included too; what it finds it finds early
+# the static analyzer also checks included headers; it finds most within few nodes
 ANALYZER = [
     word
     for option in ("-analyzer-opt-analyze-headers", "-analyzer-config", "max-nodes=30000")
@@ -29,7 +29,7 @@ ANALYZER = [
 
 
 def compile_options(command: str) -> tuple[str, ...]:
-    """Options that decide how a file is read: directories, definitions, language."""
+    """Extracts the options that affect parsing: directories, definitions, language."""
     words = shlex.split(command)
     kept = ("-I", "-D", "-std=", "-isystem")
     options: list[str] = []
@@ -40,7 +40,7 @@ def compile_options(command: str) -> tuple[str, ...]:
 
 
 def units_of(build: Path) -> dict[Path, tuple[str, ...]]:
-    """One file for each folder and way to compile it; it includes them all."""
+    """Writes a file for each folder and set of options, which includes the folder's sources."""
     commands = json.loads((build / "compile_commands.json").read_text())
     together: dict[tuple[str, tuple[str, ...]], set[Path]] = defaultdict(set)
     for file, options in sources_of(commands).items():
@@ -54,9 +54,9 @@ def units_of(build: Path) -> dict[Path, tuple[str, ...]]:
 
 
 def sources_of(commands: list[dict[str, str]]) -> dict[Path, tuple[str, ...]]:
-    """The checked files, those inside a unity source among them, each compiled as shipped."""
+    """Lists the checked files, also those inside unity sources, with the shipped options."""
     found: dict[Path, tuple[str, ...]] = {}
-    tests = f"{os.sep}tests{os.sep}"  # of the packages; they are not shipped
+    tests = f"{os.sep}tests{os.sep}"  # tests of the packages, which are not shipped
     folders = tuple(f"{ROOT / folder}{os.sep}" for folder in CHECKED)
     for command in commands:
         file = Path(command["file"])
@@ -68,13 +68,13 @@ def sources_of(commands: list[dict[str, str]]) -> dict[Path, tuple[str, ...]]:
         for name in files:
             if not name.startswith(folders) or tests in name.removeprefix(str(ROOT)):
                 continue
-            # test builds define more
+            # test builds have more definitions: the shortest options are the shipped ones
             found[Path(name)] = min(found.get(Path(name), options), options, key=len)
     return found
 
 
 def digest(unit: Path, options: tuple[str, ...], settings: bytes) -> str:
-    """Hash of all that the verdict on a unit depends on."""
+    """Hashes all inputs of a unit's check."""
     words = ["clang++-19", *options, "-E", "-CC", str(unit)]
     text = subprocess.run(words, capture_output=True, check=True).stdout
     return hashlib.sha256(settings + text).hexdigest()

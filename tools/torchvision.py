@@ -1,7 +1,7 @@
 """Stand-in for torchvision, whose wheel does not fit PyTorch's CPU build.
 
-tools/setup.sh copies it into LeRobot's environment. Every module and every class can be imported;
-nothing can be used.
+tools/setup.sh copies it into LeRobot's environment. Every module and class can be imported,
+none can be used.
 """
 
 import importlib.machinery

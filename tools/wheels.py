@@ -1,7 +1,7 @@
 """Builds wheels and source distributions of all packages into build/wheels and build/sdists.
 
-Compiled wheels are repaired to run on other machines of the platform: they bring the libraries that
-are not on every machine, except MuJoCo, which has a wheel of its own. Compiles only what
+Compiled wheels are repaired to run on other machines of the platform: they include all libraries
+that may be missing there, except MuJoCo, which has its own wheel. Compiles only what
 tools/setup.sh has not compiled yet.
 """
 
@@ -21,14 +21,14 @@ PIP = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
 
 
 def run(*command: str | Path) -> None:
-    """Runs a command; one that fails ends this program with its output."""
+    """Runs a command; a failure ends this program with the command's output."""
     done = subprocess.run(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT)
     if done.returncode != 0:
         sys.exit(f"failed: {' '.join(map(str, command))}\n{done.stdout.decode()}")
 
 
 def build_wheel(folder: str, target: Path) -> Path:
-    """The wheel of a package, repaired if it is compiled."""
+    """Builds the wheel of a package, repaired if compiled."""
     name = tomllib.loads((ROOT / folder / "pyproject.toml").read_text())["project"]["name"]
     plain = ROOT / "build" / "plain_wheels" / name
     shutil.rmtree(plain, ignore_errors=True)
@@ -45,7 +45,7 @@ def build_wheel(folder: str, target: Path) -> Path:
 
 
 def build_sdist(folder: str, target: Path) -> Path:
-    """The source distribution of a package."""
+    """Builds the source distribution of a package."""
     before = set(target.iterdir())
     run(sys.executable, "-m", "build", "--sdist", "--no-isolation", f"-o{target}", ROOT / folder)
     (made,) = set(target.iterdir()) - before
@@ -58,7 +58,7 @@ def main() -> None:
     output = parser.parse_args().output.absolute()
     for kind, build in (("wheels", build_wheel), ("sdists", build_sdist)):
         target = output / kind
-        shutil.rmtree(target, ignore_errors=True)  # files of older sources have the same names
+        shutil.rmtree(target, ignore_errors=True)  # older files would have the same names
         target.mkdir(parents=True)
         for folder in PACKAGES:
             made = build(folder, target)

@@ -1,4 +1,4 @@
-"""The package pyzmq, imported when a device needs it."""
+"""Imports the package pyzmq when a device needs it."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from o80.errors import DriverError
 
 
 def required() -> Any:
-    """The module `zmq`. Raises DriverError if it is not installed."""
+    """Returns the module `zmq`. Raises DriverError if it is not installed."""
     try:
         import zmq
     except ImportError as error:

@@ -1,4 +1,4 @@
-"""An SO-101 pushes a puck that is not there: learned on its simulation, played by the arm.
+"""An SO-101 pushes a simulated puck: a task for training in simulation and for the real arm.
 
 python -m o80.learning train examples/hybrid_push/push.py:Push --decisions 300000
 """
@@ -10,7 +10,7 @@ from gymnasium.spaces import Box
 
 from o80.hybrid import HybridTask, Index, Mirror, Outcome, Rig
 
-# three joints [rad] that hold the tip 20 mm above the floor, by its distance from the base [m]
+# three joints [rad] with the tip 20 mm above the floor, by the tip's distance to the base [m]
 REACH = [0.17, 0.20, 0.23, 0.26, 0.29, 0.32, 0.35]
 ARM = np.array(
     [
@@ -34,11 +34,11 @@ class Push(HybridTask):
         every=3,  # 50 actions a second
         delay=1,
     )
-    action_space = Box(-1, 1, (2,), np.float32)  # of the fingers: towards the goal, and to the left
+    action_space = Box(-1, 1, (2,), np.float32)  # of the fingers: to the goal, to the left
     world_numbers = ("tip", "puck_place", "puck_velocity")
     home = (0.0, *ARM[:, 0], *FORK)
     max_steps = 150
-    displaced = 0.0  # the puck jumps so far in a random step [m]
+    displaced = 0.0  # distance by which the puck jumps in a random step [m]
 
     def prepare(self) -> None:
         self.asked, self.goal, self.way, self.jump = np.zeros((4, self.copies), complex)
@@ -71,7 +71,7 @@ class Push(HybridTask):
     def seen(self, copies: Index) -> tuple[Any, ...]:
         x, y, _, puck_x, puck_y, _, speed_x, speed_y, _ = self.measured(copies).T
         fingers, puck = x + 1j * y, puck_x + 1j * puck_y
-        fingers += 0.016j * np.exp(1j * np.angle(fingers))  # from the site to between them
+        fingers += 0.016j * np.exp(1j * np.angle(fingers))  # from the site to their middle
         return fingers, puck, speed_x + 1j * speed_y, self.goal[copies] - puck
 
     def observe(self, copies: Index) -> Any:

@@ -1,7 +1,7 @@
-"""The learned push with a tracker in the world's place.
+"""The learned push with a tracker instead of the simulated world.
 
-`Tracker` stands for cameras over a table. Its puck is on no table either: a world of its own
-mirrors the arm. What it publishes is late and noisy, as that of cameras.
+`Tracker` replaces cameras over a table, and its puck is simulated, too: a separate world
+mirrors the arm. Its rows are late and noisy like a camera's.
 
 o80 run so101_twin --segment arm
 o80 run examples/hybrid_push/tracked.py:Tracker --segment tracker --frequency 100
@@ -25,23 +25,23 @@ sys.path.insert(0, str(Path(__file__).parent))
 from push import Push
 
 NOISE = {"tip": 0.001, "puck_place": 0.001, "puck_velocity": 0.005}  # [m], [m], [m/s]
-LATE = 1  # rows of the arm, beside up to a row of the tracker
+LATE = 1  # delay in rows of the arm; up to a row of the tracker is added
 JAW = (-0.1745, 1.7453)  # closed, open [rad]
 
 
 def noisy(row: Any, random: np.random.Generator) -> dict[str, Any]:
-    """Places of a row, or of several (n,), with the noise of a tracker."""
+    """Adds a tracker's noise to the places of a row, or of rows (n,)."""
     return {name: random.normal(row[name], noise) for name, noise in NOISE.items()}
 
 
 class Body(IntEnum):
-    """Things that can be put somewhere."""
+    """Bodies that can be placed."""
 
     puck = 0
 
 
 class Tracker:
-    """Where the puck that the arm of a segment pushes would be seen; a row each 10 ms."""
+    """Publishes simulated sightings of the puck that a segment's arm pushes, a row each 10 ms."""
 
     extended: ClassVar[Any] = dict.fromkeys(NOISE, (float, 3))
     requests: ClassVar[Any] = {"place": {"body": Body, "position": (float, 3)}}
@@ -76,7 +76,7 @@ class Tracker:
         reading.extended = noisy(late, self.random)
 
     def on_place(self, fields: o80.Record) -> o80.StartAfresh:
-        """Puts the puck there: what a person does between two episodes."""
+        """Places the puck, as a person does between two episodes."""
         self.world.request("place", body="puck", position=fields.position, velocity=(0, 0, 0))
         self.world.burst(LATE + 1)
         return o80.StartAfresh()
@@ -87,16 +87,16 @@ class Tracker:
 
 
 class Tracked(Push):
-    """The same task, its puck seen by the tracker."""
+    """The push task with the puck's places from the tracker."""
 
     rig = replace(Push.rig, world=attach("tracker"), things=None)
 
 
 class Noisy(Push):
-    """The same task in a simulated world, seen as the tracker sees: 13 ms late, with its noise."""
+    """The push task in a simulated world, with the tracker's noise and delay of 13 ms."""
 
     def measured(self, copies: Index) -> Any:
-        """The first of the three rows of a step."""
+        """Reads the first of the three rows of a step, with noise."""
         seen = noisy(self.world.rows[copies, 0, 0]["extended"], self.random)
         return np.concatenate([seen[name] for name in self.world_numbers], axis=-1)
 

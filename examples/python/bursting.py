@@ -19,7 +19,7 @@ with robot.inline() as simulation:
     inside = simulation.burst(10)
 print("the same to the last bit:", np.array_equal(separate.observed, inside.observed))
 
-# a group: all bursts start first, then all are waited for
+# a group: starts all bursts first, then waits for all
 with (
     robot.start(bursting=True, segment="left") as a,
     robot.start(bursting=True, segment="right") as b,

@@ -1,4 +1,4 @@
-"""The tool of an arm goes round a circle: inverse kinematics on its model, sent by chunks.
+"""Moves the tool of an arm in a circle: inverse kinematics on a model, sent in chunks.
 
 The arm is a MuJoCo model, or with --twin the simulated SO-101; a real arm takes the same rows.
 """
@@ -13,11 +13,11 @@ import numpy as np
 import o80
 
 MODEL = Path(__file__).parent / "models" / "three_joints.xml"
-AHEAD, TURN, RADIUS = np.arange(1, 26) / 25, 4.0, 0.04  # of a chunk's rows [s], a turn [s]; [m]
+AHEAD, TURN, RADIUS = np.arange(1, 26) / 25, 4.0, 0.04  # a chunk's times [s], period [s], [m]
 
 
 class Tool:
-    """A site of a model whose joints move it."""
+    """Site of a model, and the joints that move the site."""
 
     def __init__(self, file: str, site: str, joints: list[str]) -> None:
         self._model = model = mujoco.MjModel.from_xml_path(file)
@@ -27,21 +27,21 @@ class Tool:
         self._low, self._high = model.jnt_range[[model.joint(each).id for each in joints]].T
 
     def place(self, joints: np.ndarray) -> np.ndarray:
-        """Where it is with these joint positions [m]."""
+        """Place of the site for these joint positions [m]."""
         self._data.qpos[self._at] = joints
         mujoco.mj_kinematics(self._model, self._data)
         mujoco.mj_comPos(self._model, self._data)
         return np.array(self._data.site_xpos[self._site])
 
     def joints_for(self, places: np.ndarray, joints: np.ndarray) -> np.ndarray:
-        """Joint positions (n, joints) for places (n, 3), each near those before, first `joints`."""
+        """Joint positions (n, joints) for places (n, 3), each near the last, first `joints`."""
         rows, jacobian = np.empty((len(places), len(joints))), np.zeros((3, self._model.nv))
         for row, goal in zip(rows, places, strict=True):
             for _ in range(20):
                 away = goal - self.place(joints)
                 mujoco.mj_jacSite(self._model, self._data, jacobian, None, self._site)
                 moves = jacobian[:, self._moves]
-                damped = moves @ moves.T + 1e-6 * np.eye(3)  # where it is singular, too
+                damped = moves @ moves.T + 1e-6 * np.eye(3)  # damped against singularities
                 joints = joints + moves.T @ np.linalg.solve(damped, away)
                 joints = np.clip(joints, self._low, self._high)
             row[:] = joints
@@ -64,7 +64,7 @@ def main() -> None:
         begin, center = arm.published, tool.place(home) - [0.0, 0.0, RADIUS]
         with arm.chunks(joints, step=AHEAD[0] / arm.period, clip=True) as plan:
             while (seen := plan.wait(lead=0.5)).iteration < begin + 2 * TURN / arm.period:
-                at = [*plan.planned(seen, 1), home][0]  # the inverse begins where the arm will be
+                at = [*plan.planned(seen, 1), home][0]  # next positions of the arm
                 turned = ((seen.iteration - begin) * arm.period + AHEAD) * 2 * np.pi / TURN
                 turned -= np.sin(np.minimum(turned, np.pi))  # from rest
                 circle = np.column_stack([0 * turned, np.sin(turned), np.cos(turned)])

@@ -1,4 +1,4 @@
-"""Put a backend into a Python program with a loop of its own; any frontend may command it."""
+"""Put a backend into a Python program with its own loop; any frontend may send commands."""
 
 import threading
 import time
@@ -11,7 +11,7 @@ MOTOR = np.dtype([("position", float), ("velocity", float)])
 
 
 def command() -> None:
-    """Commands that another process would send."""
+    """Sends commands, as another process would."""
     with o80.Frontend("gripper") as frontend:
         frontend.add_command("left", {"position": 0.02, "velocity": 0.0}, iterations=50)
         frontend.add_command("right", {"position": -0.02}, iterations=50)

@@ -9,7 +9,7 @@ import o80
 
 
 def learn(world_ends: Callable[[], None]) -> None:
-    """Learner, as it would run in another process."""
+    """Steps the simulation, as a learner in another process would."""
     with o80.Frontend("pendulum") as world:
         for step in range(3):
             world.add_command("torque", 0.5 * step)

@@ -1,4 +1,4 @@
-"""Records marked episodes and makes a data set for learning of them.
+"""Records marked episodes and exports them as a data set for learning.
 
 Needs the extras `record` and `export` (pip install "o80[record,export]").
 """

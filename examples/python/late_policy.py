@@ -1,8 +1,8 @@
 """A learned policy answers with 16 actions, 150 ms late, while the arm moves.
 
-A small network imitates a teacher that turns around a circle. An answer takes longer than a policy
-at 50 Hz may think: it is about what was seen 75 iterations ago. Its rows are for fixed iterations,
-so it does not matter how late they come: late ones are skipped, the others shown where they belong.
+A small network imitates a teacher that follows a circle. An answer takes longer than a period of
+50 Hz: it is computed from an observation 75 iterations ago. Its rows are for fixed iterations:
+late rows are skipped, and all others are executed in their own iterations.
 """
 
 import time
@@ -21,7 +21,7 @@ THINKS = 0.15  # [s]
 
 
 def teacher(places: Places) -> Places:
-    """Next actions from each place (n, 2): around the circle and back to it; (n, actions, 2)."""
+    """Returns the next actions (n, actions, 2) from places (n, 2): to the circle, and along it."""
     angle, radius = np.arctan2(places[:, 1], places[:, 0]), np.hypot(*places.T)
     ahead = np.arange(1, ACTIONS + 1)
     angles = angle[:, None] + TURN * STEP / 500 * ahead
@@ -44,7 +44,7 @@ class Network:
         return hidden
 
     def __call__(self, seen: Places) -> Places:
-        time.sleep(THINKS)  # as a large one would
+        time.sleep(THINKS)  # as slow as a large network
         actions: Places = self.hidden(seen[None]) @ self.outer
         return actions.reshape(ACTIONS, 2)
 
@@ -60,7 +60,7 @@ with (
         with arm.chunks(step=STEP, ensemble=ensemble) as plan:
             answers = []
             for _ in range(10):
-                seen = plan.wait(lead=100, grid=True)  # 0.2 s are left: time to think again
+                seen = plan.wait(lead=100, grid=True)  # 0.2 s are left for the next answer
                 answers.append(plan.send(policy(seen.desired), seen=seen))
             plan.wait()
         print(f"{name}: {sum(each.late or 0 for each in answers)} late rows were skipped")

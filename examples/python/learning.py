@@ -1,4 +1,4 @@
-"""A learning task on two joints, written once: one environment, and sixteen in one call."""
+"""A learning task on two joints, run as one environment and as sixteen in one call."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -12,7 +12,7 @@ from o80.learning import GroupTask, Index, Outcome, register
 
 
 class Reach(GroupTask):
-    """Bring both joints to goals that are drawn for each episode."""
+    """Bring both joints to random goals of an episode."""
 
     def __init__(self, copies: int, gain: float = 30.0) -> None:
         group = o80.robots.load("two_joints").inline(copies=copies, gain=gain)

@@ -15,7 +15,7 @@ with o80.robots.load("mujoco").inline(
     # the ball stays at its commanded position as long as the command is active
     robot.add_command("ball", {"position": [0.0, 0.0, 1.2], "velocity": [0.0, 0.0, 0.0]})
     robot.burst(1)
-    # the paddle meets it on its way down
+    # the paddle hits the falling ball
     robot.add_command("lift", {"position": 0.2, "velocity": 0.0}, duration=0.3)
     observation = robot.burst(1000)
 

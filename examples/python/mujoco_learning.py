@@ -41,7 +41,7 @@ class Balance(GroupTask):
         self.burst.targets[copies, 0, 0] = [each.uniform(-5, 5) for each in generators]
         self.burst.run(copies)
 
-    def judge(self, copies: Any) -> Outcome:  # only of a flag, or at the end
+    def judge(self, copies: Any) -> Outcome:  # of the flag only, or of the end
         return Outcome(terminated=self.seen.flags[copies].any(axis=1))
 
 

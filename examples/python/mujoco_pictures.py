@@ -1,4 +1,4 @@
-"""Draw pictures of what a MuJoCo robot did, from its history.
+"""Draw pictures of a MuJoCo robot's motion from its history.
 
 Needs `pip install "o80[rendering]"`, and EGL or OSMesa (Debian: libegl1 or libosmesa6).
 """

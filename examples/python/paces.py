@@ -7,7 +7,7 @@ import o80
 with o80.robots.load("two_joints").inline(frequency=1000) as arm:
 
     def took(**pace: Any) -> int:
-        """How many iterations a command to 1 rad takes; then goes back to 0 at once."""
+        """Counts the iterations of a command to 1 rad, and returns to 0 at once."""
         arm.add_command("shoulder", 1.0, **pace)
         batch = arm.pulse()
         while not batch.ended:

@@ -1,4 +1,4 @@
-"""Plays a recording: a program that reads a robot reads the recording, unchanged.
+"""Plays a recording: a program for a robot reads the recording without a change.
 
 Needs the extra `record` (pip install "o80[record]").
 """
@@ -10,7 +10,7 @@ import o80
 
 
 def highest_elbow(segment: str) -> float:
-    """Reads a robot to its end; it does not know whether the robot runs or is played."""
+    """Reads a robot to its end; the same code serves a running robot and a recording."""
     highest = 0.0
     with o80.Frontend(segment) as arm:
         try:

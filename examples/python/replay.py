@@ -1,4 +1,4 @@
-"""Records a run, repeats it bit for bit, and finds where a changed robot differs first.
+"""Records a run, repeats it bit for bit, and finds the first difference of a changed robot.
 
 Needs the extra `record` (pip install "o80[record]").
 """

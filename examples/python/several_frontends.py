@@ -1,4 +1,4 @@
-"""Command one arm from two frontends; a third one, in a process of its own, logs every row."""
+"""Command one arm from two frontends; a third one, in another process, logs every row."""
 
 import multiprocessing
 
@@ -6,7 +6,7 @@ import o80
 
 
 def log(segment: str, rows: int, ready: "multiprocessing.synchronize.Event", report: str) -> None:
-    """Reads `rows` rows in order and reports how many it missed."""
+    """Reads `rows` rows in order and reports the number of missed ones."""
     missed = 0
     with o80.Frontend(segment, read_only=True) as reader, open(report, "w") as out:
         ready.set()

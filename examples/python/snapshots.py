@@ -1,4 +1,4 @@
-"""Keep a state of a simulator, go on, restore it, and repeat the motion bit for bit."""
+"""Save a state of a simulator, continue, restore the state, and repeat the motion bit for bit."""
 
 from typing import Any
 

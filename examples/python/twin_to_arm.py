@@ -1,9 +1,9 @@
-"""A policy learns on the simulated SO-101 and plays the arm, here fake servos: one code for both.
+"""A policy learns on the simulated SO-101 and moves the arm, here with fake servos: same code.
 
 Task: bring the tip of the gripper within 10 mm of a point in front of the arm in a second, and
-keep it there for half a second. The policy sees joint positions and the point, and answers with
-the next 16 set-points, 50 a second. It learns from what the simulation did: a motion to anywhere
-shows how to get to where it ended.
+keep it there for half a second. The policy observes joint positions and the point, and returns
+the next 16 set-points, 50 a second. It learns from simulated motions: each one demonstrates the
+way to its own end point.
 """
 
 import argparse
@@ -22,16 +22,16 @@ from o80_arms import fakes
 
 Array = NDArray[np.float64]
 
-JOINTS = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex"]  # the first of the arm
+JOINTS = ["shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex"]  # the first four of the arm
 HOME = [0.0, -0.6, 0.4, 0.9, 0.0, 0.2]  # of all actuators
-RATE, STEP, ROWS = 150, 3, 16  # iterations a second; from row to row; rows of an answer
-LOW, HIGH = np.array([0.18, -0.12, 0.08]), np.array([0.30, 0.12, 0.20])  # where points are [m]
+RATE, STEP, ROWS = 150, 3, 16  # iterations a second, iterations a row, rows of an answer
+LOW, HIGH = np.array([0.18, -0.12, 0.08]), np.array([0.30, 0.12, 0.20])  # bounds of the points [m]
 NEAR = 0.01  # [m]
-TRY, LAST = 225, 75  # iterations of a try, and those at its end in which the tip must be near
+TRY, LAST = 225, 75  # iterations of a try; at its end those with the tip near
 
 
 class Tip:
-    """Place of the tip of the gripper [m], by the model of the arm."""
+    """Computes the place of the gripper's tip from the arm's model [m]."""
 
     def __init__(self, twin: o80.robots.Robot) -> None:
         self._model = mujoco.MjModel.from_xml_path(twin.describe()["model"]["file"])
@@ -39,7 +39,7 @@ class Tip:
         self._at = [self._model.joint(joint).qposadr[0] for joint in JOINTS]
 
     def __call__(self, joints: Array) -> Array:
-        """Places of rows of positions: (n, joints) => (n, 3)."""
+        """Returns the places for joint positions: (n, joints) => (n, 3)."""
         places = np.empty((len(joints), 3))
         for place, row in zip(places, joints, strict=True):
             self._data.qpos[self._at] = row[: len(JOINTS)]
@@ -49,7 +49,7 @@ class Tip:
 
 
 def postures(tip: Tip, random: np.random.Generator, count: int) -> Array:
-    """Random joint positions: the gripper points downwards, its tip is where points may be."""
+    """Draws joint positions with the gripper downwards and the tip within the bounds."""
     found = np.empty((0, len(JOINTS)))
     while len(found) < count:
         drawn = random.uniform([-0.9, -1.6, -1.3], [0.9, 0.7, 1.5], (4000, 3))
@@ -64,7 +64,7 @@ def postures(tip: Tip, random: np.random.Generator, count: int) -> Array:
 def demonstrations(
     twin: o80.robots.Robot, tip: Tip, random: np.random.Generator, motions: int
 ) -> tuple[Array, Array]:
-    """Eight moments of each motion: what was seen and where it ended; the rows that led there."""
+    """Draws eight moments of each motion: observation and end point, and the following rows."""
     seen, answers = [], []
     with twin.inline(copies=8, history=256) as copies:
         burst = copies.prepared_burst(200, JOINTS)
@@ -88,7 +88,7 @@ class Policy:
     inner: Array
     bias: Array
     outer: Array
-    low: Array  # of the joint positions that were seen
+    low: Array  # range of demonstrated positions
     high: Array
 
     @classmethod
@@ -102,7 +102,7 @@ class Policy:
         return cls(inner, bias, outer, joints.min(axis=0), joints.max(axis=0))
 
     def __call__(self, joints: Array, goal: Array) -> Array:
-        """Next set-points (rows, joints), none where no demonstration was."""
+        """Next set-points (rows, joints), clamped to the demonstrated range."""
         joints = joints[: len(JOINTS)]
         hidden = np.tanh(np.concatenate([joints, goal]) @ self.inner + self.bias)
         rows: Array = joints + (hidden @ self.outer).reshape(ROWS, len(JOINTS))
@@ -110,7 +110,7 @@ class Policy:
 
 
 def play(arm: o80.Frontend, policy: Policy, goals: Array, tip: Tip) -> Array:
-    """Largest distance of the tip in the last half second of each try [m]."""
+    """Runs a try for each goal; returns its largest final distance of the tip [m]."""
     arm.add_command(None, HOME, duration=3.0)
     arm.pulse_and_wait(timeout=20.0)
     apart = []

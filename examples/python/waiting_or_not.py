@@ -1,4 +1,4 @@
-"""Wait for a pulse, or look at its status later."""
+"""Wait for a pulse, or poll its status later."""
 
 import o80
 

@@ -13,14 +13,14 @@
 #include "o80/robot.hpp"
 #include "two_joints_model.hpp"
 
-/// A request that takes time: the robot moves by itself until its joints are at 0.
+/// Request that takes time: the robot moves by itself until its joints are at 0.
 struct Home {
   static constexpr std::string_view kHelp = "moves the joints to 0, one after the other";
   double speed = 1.0;
 };
 O80_DESCRIBE(Home, (speed, "[rad/s]"));
 
-/// The tutorial robot: two simulated joints, each of which follows what is asked with a lag.
+/// Tutorial robot: two simulated joints, which follow the desired states with a lag.
 class TwoJoints {
  public:
   struct Config {
@@ -28,7 +28,7 @@ class TwoJoints {
     double reach = 3.0;
   };
   struct Sensors {
-    bool homing;  // its padding is in every test that uses this robot
+    bool homing;  // its padding is part of every test with this robot
     std::array<double, 2> effort;
   };
   using Actuators = std::array<double, 2>;  // positions [rad]
@@ -67,9 +67,9 @@ class TwoJoints {
     reading.observed = now_.position;
     reading.extended.effort = now_.effort;
     tell_of_home(reading);
-    if (reading.fresh()) now_.mode = Mode::follows;  // what is asked begins where it is
+    if (reading.fresh()) now_.mode = Mode::follows;  // desired states begin at the observed ones
     reading.extended.homing = now_.mode == Mode::homes;
-    reading.go_on_from(now_.desired);  // heard after a reset or a restore only
+    reading.go_on_from(now_.desired);  // has an effect after a reset or a restore only
   }
 
   o80::Served on(const o80::Reset&) {
@@ -110,9 +110,9 @@ class TwoJoints {
 
  private:
   enum class Mode : std::uint8_t {
-    follows,  // what is asked
+    follows,  // desired positions
     homes,    // moves by itself
-    stays     // where it has moved by itself, until it starts afresh
+    stays     // position reached by homing, until a fresh start
   };
   struct State {
     std::array<double, 2> position{};
@@ -138,7 +138,7 @@ class TwoJoints {
   void tell_of_home(o80::Reading<TwoJoints>& reading) {
     const bool is_home = now_.position == std::array<double, 2>{};
     if (!reading.runs<Home>()) {
-      if (now_.mode == Mode::homes) stay();  // a halt has ended it
+      if (now_.mode == Mode::homes) stay();  // ended by a halt
     } else if (now_.mode != Mode::homes) {
       reading.ended<Home>(o80::Served::rejected("a reset or a restore has ended it"));
     } else if (is_home) {

@@ -2,7 +2,7 @@
 
 #include <string_view>
 
-/// What `o80 view` draws: two links in a plane.
+/// Model for `o80 view`: two links in a plane.
 inline constexpr std::string_view kTwoJointsModel = R"(<mujoco model="two_joints">
   <statistic center="0 0 0.3" extent="1.2"/>
   <default>

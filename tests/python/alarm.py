@@ -1,4 +1,4 @@
-"""Signals inside a block."""
+"""Sends signals inside a block."""
 
 import contextlib
 import signal
@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 
 @contextlib.contextmanager
 def handling(number: int, handler: Callable[..., object]) -> Iterator[None]:
-    """The handler of a signal, in the block."""
+    """Installs a signal handler for the block."""
     before = signal.signal(number, handler)
     try:
         yield
@@ -18,7 +18,7 @@ def handling(number: int, handler: Callable[..., object]) -> Iterator[None]:
 
 @contextlib.contextmanager
 def alarm_in(seconds: float) -> Iterator[None]:
-    """The signal comes in the block; on a slow machine before its first call."""
+    """Sends SIGALRM during the block; on a slow machine before its first call."""
     signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield

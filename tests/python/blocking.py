@@ -1,4 +1,4 @@
-"""Every call that waits, and a place where each of them waits until somebody ends it."""
+"""Every call that can wait forever, and a fixture in which each of them does."""
 
 import contextlib
 import inspect
@@ -13,23 +13,23 @@ from typing import Any
 import o80
 from o80.robots.process import start_process
 
-# what calls import when they are first used: an interrupt during `exec` of a text, of which
-# dataclasses are made, makes Python end with the status of an interrupt that nobody caught, and
-# one as an import gives back its lock is lost
+# imports all lazily loaded names: an interrupt during `exec`, which creates dataclasses, makes
+# Python end with the status of an uncaught interrupt, and an interrupt while an import releases
+# its lock is lost
 for _name in o80.__all__:
     getattr(o80, _name)
 
 
 @dataclass(frozen=True)
 class Call:
-    """Source of a call that waits for ever, of what another thread ends it by, and how it ends."""
+    """Source of a call that waits forever, source of the call that ends it, and its result."""
 
     source: str
     closing: str
-    raises: str = "Closed"  # what of o80 it raises then; "" for a result
+    raises: str = "Closed"  # name of the raised o80 exception; "": returns a result
 
 
-# by the name of the method; what it is called on stands in a Place
+# by method name; the objects are attributes of a Place
 CALLS = {
     "Frontend": Call("o80.Frontend(late, None)", "begin(late)", ""),
     "Frontend.wait_for": Call("silent.wait_for(10**12)", "silent.close()"),
@@ -76,12 +76,12 @@ CALLS = {
     ),
 }
 
-# their copies run in the calling thread and threads of its own: nobody else could let them wait
+# their copies run in this process: no other process can delay them
 COMPUTING = {"GroupBurst.run", "GroupRequest.run", "InlineGroup.request", "InlineGroup.resume"}
 
 
 def waiting_methods() -> set[str]:
-    """All that is public, takes a timeout, and waits for somebody."""
+    """Names all public functions and methods with a timeout that can wait."""
     found = set()
     for name in [*vars(o80)["__all__"], "robots.Robot", "robots.Process"]:
         thing: Any = o80
@@ -103,7 +103,7 @@ def waiting_methods() -> set[str]:
 
 
 def signature_of(thing: Any) -> str:
-    """The names of its arguments, whether it is of Python or compiled."""
+    """Returns the signature of a Python or compiled function."""
     try:
         return str(inspect.signature(thing))
     except (TypeError, ValueError):
@@ -111,9 +111,9 @@ def signature_of(thing: Any) -> str:
 
 
 class Place:
-    """Backends that never iterate, a robot's processes, and frontends of all of them.
+    """Backends that never iterate, a robot's processes, and their frontends.
 
-    Who is called `name`s its segments. Its attributes are the names in the sources above.
+    `name` is the prefix of the segments. The sources above use the attributes' names.
     """
 
     def __init__(self, name: str, folder: Path, lanes: int = 32) -> None:
@@ -154,19 +154,19 @@ class Place:
         return self._stack.enter_context(owner)
 
     def open_frontends(self) -> None:
-        """Opens frontends of the caller's own."""
+        """Opens new frontends for the caller."""
         self.silent = self._enter(o80.Frontend(self.silent_backend.segment))
         self.reader = self._enter(o80.Frontend(self.silent_backend.segment, read_only=True))
         self.standing = self._enter(o80.Frontend(self.standing_backend.segment))
 
     def begin(self, segment: str) -> None:
-        """Starts the backend that somebody waits for, once."""
+        """Starts the awaited backend, once."""
         if segment not in self.begun:
             self.begun.add(segment)
             self._enter(o80.Backend(segment, ["a"])).publish([0.0])
 
     def names(self) -> dict[str, Any]:
-        """For a source; frontends are those opened last."""
+        """Returns the names for a source, with the frontends that were opened last."""
         tools = {
             "o80": o80,
             "os": os,
@@ -188,7 +188,7 @@ class Place:
 
 @contextlib.contextmanager
 def place(name: str, folder: Path) -> Iterator[Place]:
-    """A place that is left in order."""
+    """Opens a place, and closes it after the block."""
     made = Place(name, folder)
     try:
         yield made

@@ -1,4 +1,4 @@
-"""A cart as a driver in Python, in a file of its own."""
+"""Source of a driver in Python, a cart, to be written to a file."""
 
 from pathlib import Path
 
@@ -46,7 +46,7 @@ class Cart:
 
 
 def written(folder: Path, name: str, *changes: tuple[str, str]) -> str:
-    """Place of the cart with some of its text replaced, in a file of this name."""
+    """Writes the cart to a file, with replaced texts; returns its place for `load`."""
     text = CART
     for old, new in changes:
         assert old in text

@@ -1,4 +1,4 @@
-"""Robots and segment names of their own for the tests of the package."""
+"""Fixtures: robots, and unique segment names."""
 
 import itertools
 import json
@@ -15,7 +15,7 @@ _count = itertools.count()
 
 @pytest.fixture
 def segment() -> Iterator[str]:
-    """A name that no other test uses; what is left of it is removed."""
+    """Returns a unique name, and removes a leftover segment afterwards."""
     name = f"test-{os.getpid()}-{next(_count)}"
     yield name
     if any(entry.name == name and not entry.alive for entry in o80.segments()):
@@ -24,7 +24,7 @@ def segment() -> Iterator[str]:
 
 @pytest.fixture
 def forged(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
-    """Provenance that recordings made in this test give instead of the truth."""
+    """Fields that replace the provenance in this test's recordings."""
     given: dict[str, Any] = {}
     as_json = o80.Provenance.as_json
     monkeypatch.setattr(
@@ -42,13 +42,13 @@ def arm(segment: str) -> Iterator[o80.Frontend]:
 
 @pytest.fixture
 def process(segment: str) -> Iterator[o80.robots.Process]:
-    """Two joints in a process of their own, 1000 times a second."""
+    """Two joints in another process, 1000 iterations a second."""
     with o80.robots.load("two_joints").start(segment) as started:
         yield started
 
 
 @pytest.fixture
 def bursting(segment: str) -> Iterator[o80.robots.Process]:
-    """Two joints in a process of their own, which stand still until they are burst."""
+    """Two joints in another process, in bursting mode."""
     with o80.robots.load("two_joints").start(segment, bursting=True) as started:
         yield started

@@ -1,4 +1,4 @@
-"""A recorded run with a wrong bit, and the command that replays recordings."""
+"""A recorded run with a flipped bit, and the command `o80 replay`."""
 
 import subprocess
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ from o80.replaying.recorded_run import FileRun
 
 @dataclass(frozen=True)
 class Flipped:
-    """A recorded run in which one bit of a row is changed."""
+    """Recorded run in which one bit of a row is flipped."""
 
     run: FileRun
     row: int

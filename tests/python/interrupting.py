@@ -1,4 +1,4 @@
-"""Interrupts at every moment at which Python can raise one."""
+"""Interrupts a call at every moment at which Python can raise one."""
 
 import dis
 import itertools
@@ -12,10 +12,10 @@ from typing import Any
 
 @cache
 def moments_of(code: CodeType) -> frozenset[int]:
-    """Instructions before which Python looks for signals: after a call, at the begin of a loop.
+    """Offsets before which Python checks for signals: after a call, at the begin of a loop.
 
-    Elsewhere an interrupt may leave what a signal cannot, such as an exception that is handled for
-    ever.
+    Elsewhere an interrupt can cause states that a signal cannot, such as an exception that stays
+    handled.
     """
     looked = set()
     after = False
@@ -29,11 +29,11 @@ def moments_of(code: CodeType) -> frozenset[int]:
 
 
 def interrupted(block: Callable[[], object], moment: int) -> BaseException | None:
-    """Calls it, interrupted at the moment of that number; None if it ended before.
+    """Calls `block` with an interrupt at this moment; returns the error, None if it ended before.
 
-    Python's own modules may raise another exception instead, such as a lock that is not locked.
-    Not in `threading`: between the last instruction of a `with` and its end, where no signal is
-    handled, an interrupt would leave the lock of all threads taken.
+    Python's modules may raise another exception instead, for example of an unlocked lock.
+    `threading` is left out: between the last instruction of a `with` and its end, where no signal
+    is handled, an interrupt would leave the lock of all threads taken.
     """
     left = moment
 
@@ -59,10 +59,10 @@ def interrupted(block: Callable[[], object], moment: int) -> BaseException | Non
 
 
 def at_every_moment(block: Callable[[], object], step: int = 1) -> Iterator[BaseException | None]:
-    """The interrupts of calls of it, each so many moments later than the last."""
-    block()  # imports what it needs, for an interrupted import leaves Python's lock of it taken
+    """Calls `block` again and again, each time interrupted `step` moments later."""
+    block()  # a first call imports all: an interrupted import would leave its lock taken
     for moment in itertools.count(1, step):
-        errors = [interrupted(block, moment)]  # not a variable, which would keep the exception
+        errors = [interrupted(block, moment)]  # a variable would keep the exception
         if errors[0] is None:
             return
         yield errors.pop()

@@ -1,4 +1,4 @@
-"""Tasks that use every part of o80.learning, for its tests."""
+"""Tasks for the tests of o80.learning, which use every part of it."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,7 +12,7 @@ from o80.learning import GroupTask, Index, Outcome
 
 
 class Reach(GroupTask):
-    """Two joints reach a drawn goal, noisily observed; flags, infos of all kinds, pictures."""
+    """Two joints reach a random goal; noisy observations, flags, all kinds of infos, pictures."""
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
 
@@ -71,7 +71,7 @@ class Reach(GroupTask):
 
 
 class Goal(Reach):
-    """The same with a dict of observations, discrete actions and no flags."""
+    """Reach with a dict of observations, discrete actions and no flags."""
 
     def __init__(self, copies: int = 1, threads: int | None = None) -> None:
         super().__init__(copies, threads, max_steps=5)

@@ -1,4 +1,4 @@
-"""A backend that a test iterates itself."""
+"""Backend that a test iterates."""
 
 from typing import Any, Self
 
@@ -9,7 +9,7 @@ import o80
 
 
 class ManualBackend:
-    """A backend and a frontend of it; its robot is at once where it is desired, at first at 0."""
+    """A backend and its frontend; observed states equal the desired ones, at first 0."""
 
     def __init__(self, segment: str, *described: Any, **options: Any) -> None:
         self.backend = o80.Backend(segment, *described, **options)
@@ -17,7 +17,7 @@ class ManualBackend:
         self.frontend = o80.Frontend(segment)
 
     def run(self, iterations: int = 1) -> Any:
-        """Iterates, bursting if it has to; the last desired states."""
+        """Iterates, by bursts if necessary; returns the last desired states."""
         if self.frontend.bursting:
             self.frontend.burst(iterations, wait=False)
         for _ in range(iterations):
@@ -26,7 +26,7 @@ class ManualBackend:
         return desired
 
     def desired(self, actuator: int | str | list[str], target: object) -> Any:
-        """Desired states of the iteration that takes a set-point."""
+        """Sends a set-point; returns the desired states of its iteration."""
         self.frontend.add_command(actuator, target)
         self.frontend.pulse()
         return self.run()

@@ -1,4 +1,4 @@
-"""Robots whose states and sensors are of any described type, drawn at random."""
+"""Draws robots with states and sensors of random types."""
 
 import itertools
 import os
@@ -48,7 +48,7 @@ def is_enum(described: Any) -> bool:
 
 
 def fill(random: np.random.Generator, array: np.ndarray[Any, np.dtype[Any]]) -> None:
-    """Random numbers in every field: those that every type can hold, and Mode has labels for."""
+    """Fills every field at random with 0 or 3, which all types hold, and Mode has labels for."""
     if array.dtype.names is None:
         array[...] = random.choice([0, 3], array.shape).astype(array.dtype)
         return
@@ -60,7 +60,7 @@ _names = (f"test-mixed-{os.getpid()}-{i}" for i in itertools.count())
 
 
 def recorded(groups: Any, sensors: Any, seed: int, rows: int = 5) -> o80.History:
-    """Rows that a robot of these types published."""
+    """Returns rows published by a robot of these types."""
     random = np.random.default_rng(seed)
     name = next(_names)
     options: Any = {"extended": sensors, "bursting": True}
@@ -88,7 +88,7 @@ def _random(random: np.random.Generator, like: Any) -> Any:
     return array
 
 
-# each example starts a backend: shrinking would take longer than a test may
+# each example starts a backend: shrinking would exceed a test's timeout
 ROBOTS = settings(
     max_examples=12,
     deadline=None,

@@ -1,4 +1,4 @@
-"""Programs of the pages in docs/."""
+"""Runs the programs of the pages in docs/."""
 
 import re
 from pathlib import Path
@@ -7,13 +7,13 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def programs(page: str) -> list[str]:
-    """The blocks of Python in a page."""
+    """Returns the Python blocks of a page."""
     text = (DOCS / page).read_text()
     return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 
 def run_programs(page: str, **names: object) -> int:
-    """Runs them one after the other in one module; their number."""
+    """Runs a page's programs in one module; returns their number."""
     blocks = programs(page)
     for program in blocks:
         exec(compile(program, page, "exec"), names)

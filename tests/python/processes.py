@@ -1,4 +1,4 @@
-"""The program o80, and processes that are not our children."""
+"""Runs the program o80, and waits for processes that are not children."""
 
 import os
 import select
@@ -7,14 +7,14 @@ import sys
 from pathlib import Path
 from typing import Any
 
-WAIT = 60.0  # [s] longer than any end should take
+WAIT = 60.0  # longer than any end may take [s]
 O80 = str(Path(sys.executable).parent / "o80")
 
 
 def run_program(
     *words: object, code: int | None = 0, timeout: float = WAIT, **options: Any
 ) -> "subprocess.CompletedProcess[str]":
-    """Runs a program, which must end with this code; None: with any."""
+    """Runs a program, which must end with this code; None: any code."""
     command = [*map(str, words)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=timeout, **options)
     assert code in (None, done.returncode), done.stdout + done.stderr
@@ -34,7 +34,7 @@ def run_o80(*words: object, **options: Any) -> "subprocess.CompletedProcess[str]
 
 
 def end_of(process: int) -> None:
-    """Waits until a process that is not our child has ended."""
+    """Waits for the end of a process that is not a child."""
     try:
         descriptor = os.pidfd_open(process)
     except ProcessLookupError:

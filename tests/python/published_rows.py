@@ -1,6 +1,6 @@
-"""Rows that a robot published, and a check of everything that reads them.
+"""Random rows of a robot, and a check of all their readers.
 
-The expected numbers are made without offsets: from nested values and the names of their fields.
+The expected numbers come from nested values and field names, without any offsets.
 """
 
 import json
@@ -36,14 +36,14 @@ Columns = dict[str, NDArray[Any]]
 
 
 def drawn(random: np.random.Generator, described: Any, lead: tuple[int, ...] = ()) -> Any:
-    """Random values of a type: a mapping for a struct, an array (*lead, ...) otherwise."""
+    """Draws values of a type: a mapping for a struct, an array (*lead, ...) otherwise."""
     if isinstance(described, Mapping):
         return {name: drawn(random, inner, lead) for name, inner in described.items()}
     if is_enum(described):
         return random.choice([*described], lead).astype(np.int64)
     element, shape = np.dtype(described).subdtype or (np.dtype(described), ())
     if element.names is not None:
-        kinds = [(name, element.fields[name][0]) for name in element.names]  # without its gaps
+        kinds = [(name, element.fields[name][0]) for name in element.names]  # without padding
         values = np.zeros((*lead, *shape), kinds)
         for name, kind in kinds:
             values[name] = drawn(random, kind, values.shape)
@@ -56,7 +56,7 @@ def drawn(random: np.random.Generator, described: Any, lead: tuple[int, ...] = (
 
 
 def numbers(path: str, value: Any) -> Iterator[tuple[str, Any]]:
-    """The numbers of a value, each with the name of its column."""
+    """Lists the numbers of a value, each with its column name."""
     if isinstance(value, Mapping):
         for name in value:
             yield from numbers(f"{path}.{name}", value[name])
@@ -71,19 +71,19 @@ def numbers(path: str, value: Any) -> Iterator[tuple[str, Any]]:
 
 
 def element(value: Any, index: int) -> Any:
-    """Values of one actuator, from those of several."""
+    """Selects one actuator from the values of several."""
     if isinstance(value, Mapping):
         return {name: element(inner, index) for name, inner in value.items()}
     return value[index]
 
 
 def many(members: Any) -> tuple[Any, tuple[int, ...]]:
-    """The type of a group, and (how many,); () if it is a single actuator."""
+    """Returns a group's type and (count,), or () for a single actuator."""
     return (members[0], (members[1],)) if isinstance(members, tuple) else (members, ())
 
 
 class Published:
-    """The rows that a robot of described types publishes: an endless list of them."""
+    """Endless list of random rows of a robot with described types."""
 
     def __init__(self, groups: Mapping[str, Any], sensors: Any, seed: int) -> None:
         self.groups, self.sensors = groups, sensors
@@ -91,7 +91,7 @@ class Published:
         self._rows: list[tuple[Any, Any]] = []
 
     def row(self, number: int) -> tuple[Any, Any]:
-        """States and sensor values, for `Backend.publish`."""
+        """Returns states and sensor values of a row, for `Backend.publish`."""
         while len(self._rows) <= number:
             states = {
                 name: drawn(self._random, *many(members)) for name, members in self.groups.items()
@@ -101,12 +101,12 @@ class Published:
         return self._rows[number]
 
     def swap(self, one: int, other: int) -> None:
-        """Publishes two rows each in the place of the other."""
+        """Swaps two rows."""
         states = [self.row(one), self.row(other)]
         self._rows[other], self._rows[one] = states
 
     def columns(self, rows: int) -> Columns:
-        """All numbers: (rows,) each. Without commands the desired states stay those of row 0."""
+        """Returns all columns (rows,). Without commands, desired states equal the ones of row 0."""
         each = [dict(self._numbers(row)) for row in range(rows)]
         return {name: np.array([row[name] for row in each]) for name in each[0]}
 
@@ -132,16 +132,16 @@ def check_every_reader(
     expect: Callable[[int], Columns],
     folder: Path,
 ) -> None:
-    """Records a robot that stands at row 0, and compares everything that shows its rows.
+    """Records a robot at row 0, and compares the output of all readers.
 
-    iterate: makes the robot publish one row more. expect: all numbers of so many rows.
+    iterate: publishes a row. expect: returns the expected columns of a number of rows.
     """
     path, marked = folder / "run.mcap", folder / "marked.mcap"
     with o80.Recording(path, frontend) as recording, o80.Recording(marked, frontend) as episode:
         episode.mark("episode")
         for _ in range(3):
             iterate()
-        recording.flush()  # a chunk of its own
+        recording.flush()  # begins a new chunk
         for _ in range(4):
             iterate()
         episode.mark("episode_end")
@@ -168,7 +168,7 @@ def check_every_reader(
 
 @dataclass
 class Readers:
-    """Readers of one history."""
+    """Checks of a history's readers."""
 
     history: o80.History
     expected: Columns
@@ -182,7 +182,7 @@ class Readers:
         self.page()
 
     def rows(self) -> None:
-        """Rows one by one, by name and as flat numbers."""
+        """Checks single rows, by name and as flat numbers."""
         seen = [name for name in self.expected if not name.startswith("desired.")]
         flat = np.array([self.expected[name].astype(np.float64) for name in seen]).T
         assert np.array_equal(self.history.flat(np.float64), flat)
@@ -195,7 +195,7 @@ class Readers:
         assert str(self.history[-1]) == str(self.history[2:][-1])
 
     def derived(self) -> None:
-        """Histories that are made of this one, and files of them."""
+        """Checks slices, pickles and data frames of the history."""
         for history, values in (
             (self.history, self.expected),
             (self.history[1::2], part(self.expected, slice(1, None, 2))),
@@ -223,7 +223,7 @@ class Readers:
                 assert np.isnan(values).all() if values.dtype.kind == "f" else not values.any()
 
     def difference(self) -> None:
-        """Rows that are swapped are found at the first number that differs."""
+        """Checks that a changed row is found at the first different number."""
         rows = self.history.rows.copy()
         part = "extended" if "extended" in (rows.dtype.names or ()) else "observed"
         rows[5][part] = self.history.rows[2][part]
@@ -248,7 +248,7 @@ class Readers:
             assert np.array_equal(curve, self.expected[name]), name
 
     def page(self) -> None:
-        """The numbers and curves of `o80 view`."""
+        """Checks the numbers and curves of `o80 view`."""
         panels = Panels(self.history.schema)
         labels = {(str(number), label) for label, number in labels_of(self.history).items()}
         for name in panels.names[:12]:
@@ -285,7 +285,7 @@ def same(expected: Columns, found: Mapping[str, Any]) -> None:
 
 
 def labels_of(history: o80.History) -> dict[str, int]:
-    """The numbers of all labels of enumerations."""
+    """Maps all labels of enumerations to numbers."""
     return {each.name: each.value for enum in history._layout.enums.values() for each in enum}
 
 
@@ -304,7 +304,7 @@ def played(path: Path, segment: str, expected: Columns) -> None:
 
 
 def messages(path: Path, segment: str, expected: Columns) -> None:
-    """Messages as the libraries of mcap and rosbags read them."""
+    """Checks the messages with the libraries mcap and rosbags."""
     topic = topic_of(segment)
     with AnyReader([path]) as reader:
         found = [(each, raw) for each, _, raw in reader.messages() if each.topic == topic]
@@ -318,7 +318,7 @@ def messages(path: Path, segment: str, expected: Columns) -> None:
 
 
 def leaves(value: Any) -> list[Any]:
-    """All numbers of a decoded message, in their order."""
+    """Lists all numbers of a decoded message, in order."""
     if isinstance(value, np.ndarray):
         return value.ravel().tolist()
     if isinstance(value, list):
@@ -341,7 +341,7 @@ def files(history: o80.History, folder: Path, expected: Columns) -> None:
 
 
 def data_sets(path: Path, folder: Path, expected: Columns) -> None:
-    """Episodes for learning."""
+    """Checks episodes for learning."""
     parts = {
         part: np.array([v for name, v in expected.items() if name.startswith(part)], np.float64).T
         for part in ("desired.", "observed.", "extended.")

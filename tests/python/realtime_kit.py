@@ -1,4 +1,4 @@
-"""A system bus with a RealtimeKit on it, in a thread of this process, by the protocol of D-Bus."""
+"""Fake system bus with a RealtimeKit, in a thread, by the D-Bus protocol."""
 
 import itertools
 import os
@@ -10,17 +10,17 @@ from collections.abc import Iterator
 from typing import Self
 
 _count = itertools.count()
-LONGEST = 200_000  # time that a thread may run without sleep [us]
+LONGEST = 200_000  # longest time of a thread without sleep [us]
 ERROR = "org.freedesktop.DBus.Error."
 METHOD_RETURN, METHOD_ERROR = 2, 3
 ERROR_NAME, REPLY_TO, SIGNATURE = 4, 5, 8  # fields of a message's head
 
 
 class RealtimeKit:
-    """Answers as told by `mood`, and keeps what it was asked.
+    """Answers according to `mood`, and stores the requests.
 
-    The moods: grants, agrees (and changes nothing), refuses, absent (the bus knows no such
-    service), late (no answer about a thread), silent (no answer at all), rude (closes at once).
+    Moods: grants, agrees (and changes nothing), refuses, absent (no such service on the
+    bus), late (no answer about a thread), silent (no answer at all), rude (closes at once).
     """
 
     def __init__(self, mood: str = "grants") -> None:
@@ -63,12 +63,12 @@ class RealtimeKit:
         text = b""
         while b"BEGIN\r\n" not in text:
             text += caller.recv(1)
-        # older libraries send who they are with AUTH, newer ones when they are asked
+        # older libraries send their identity with AUTH, newer ones on request
         asks = b"DATA\r\n" if b"EXTERNAL\r\n" in text else b""
         caller.sendall(asks + b"OK 0123456789abcdef0123456789abcdef\r\nERROR\r\n")
 
     def _messages(self, caller: socket.socket) -> Iterator[tuple[int, str, bytes]]:
-        """Serial number, member, body of each call."""
+        """Reads calls: serial number, member and body of each."""
         while len(head := caller.recv(16, socket.MSG_WAITALL)) == 16:
             size, serial, fields = struct.unpack("<III", head[4:])
             rest = caller.recv(fields + -fields % 8 + size, socket.MSG_WAITALL)
@@ -77,7 +77,7 @@ class RealtimeKit:
             yield serial, member[1].decode(), rest[fields + -fields % 8 :]
 
     def _answer(self, member: str, body: bytes) -> tuple[str, str, bytes] | None:
-        """Name of an error or nothing, signature, body; None: no answer."""
+        """Returns error name or "", signature and body; None: no answer."""
         if member == "Hello":
             return "", "s", string(":1.1")
         if self.mood == "absent":
@@ -104,7 +104,7 @@ def string(text: str) -> bytes:
 
 
 def message(serial: int, error: str, signature: str, body: bytes) -> bytes:
-    """Answer to the call with this serial number."""
+    """Encodes the answer to the call with this serial number."""
     fields = bytes([REPLY_TO, 1, ord("u"), 0]) + struct.pack("<I", serial)
     if error:
         fields += bytes([ERROR_NAME, 1, ord("s"), 0]) + string(error)

@@ -27,7 +27,7 @@ def model_of(collector: Collector, *, steps: int, batch: int = 80, **options: An
 
 
 class copied:  # noqa: N801 - a verb
-    """A model as it was: weights, optimiser, statistics, generators."""
+    """Copy of a model's state: weights, optimiser, statistics, generators."""
 
     def __init__(self, model: PPO) -> None:
         normalisation = model.get_vec_normalize_env()
@@ -43,7 +43,7 @@ class copied:  # noqa: N801 - a verb
         return b"".join(each.numpy().tobytes() for each in self._state.values())
 
     def values(self, observations: Any) -> Any:
-        """Values of observations (..., M), as (...)."""
+        """Predicts the values (...) of observations (..., M)."""
         statistics: Any = self.statistics
         seen = (observations - statistics.mean) / np.sqrt(statistics.var + self._epsilon)
         tensor = torch.as_tensor(np.clip(seen, -self._clip, self._clip), dtype=torch.float32)

@@ -19,7 +19,7 @@ INFOS = ("apart", "why")
 
 
 class Failing(Reach):
-    """Raises in the third step after a file has appeared; once."""
+    """Raises once, in the third step after a file was created."""
 
     def __init__(self, copies: int, folder: Path) -> None:
         super().__init__(copies, threads=1)
@@ -44,7 +44,7 @@ def maker(folder: Path) -> Make:
 
 
 def policies(count: int) -> Sequence[GaussianPolicy]:
-    """With a network of some size, whose numbers all differ."""
+    """Creates policies with a small network and random numbers."""
     first = GaussianPolicy.new(6, 4, hidden=(32, 16), log_std=-0.7, seed=4)
     random = np.random.default_rng(8)
     return [
@@ -61,6 +61,6 @@ def policies(count: int) -> Sequence[GaussianPolicy]:
 
 
 def assert_same_rollouts(some: Sequence[Rollout], others: Sequence[Rollout]) -> None:
-    """All numbers, types and shapes, bit for bit."""
+    """Compares numbers, types and shapes, bit for bit."""
     for place, (one, other) in enumerate(zip(some, others, strict=True)):
         assert_same(dict(arrays_of(one)), dict(arrays_of(other)), f"rollout {place}")

@@ -1,4 +1,4 @@
-"""Drivers in Python, for tests: a module that other processes import too."""
+"""Python drivers for tests, in a module that other processes also import."""
 
 import os
 from dataclasses import dataclass, field
@@ -131,7 +131,7 @@ class Joint:
 
 
 class Paced:
-    """Has a clock of its own, which runs as fast as it is asked."""
+    """Paces the loop with `wait`."""
 
     extended = {"due": np.int64}  # noqa: RUF012
     frequency = 250.0
@@ -163,7 +163,7 @@ class Forks:
 
 
 class Spins:
-    """Computes in iteration 3, without sleep, as long as its thread has a real-time priority."""
+    """Spins in iteration 3 until the thread has lost its real-time priority."""
 
     extended = {"policy": np.int64}  # noqa: RUF012
 

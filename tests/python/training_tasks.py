@@ -16,11 +16,11 @@ from o80.learning import GroupTask, Outcome, Task, register
 events: list[str] = []
 """Calls of the task OnTheClock."""
 interruptions: Iterator[bool] = iter(())
-"""Whether the next steps of Guess are interrupted."""
+"""Flags: whether each next step of Guess is interrupted."""
 
 
 class Guess(gymnasium.Env[Any, Any]):
-    """Episodes of three steps: the action must be 5 more than twice the number that is observed."""
+    """Episodes of three steps: the action must be 5 plus twice the observed number."""
 
     observation_space = Box(-1, 1, (1,), np.float32)
     action_space = Box(0, 10, (1,), np.float32)
@@ -49,28 +49,28 @@ class Guess(gymnasium.Env[Any, Any]):
 
 
 class Squared:
-    """A rule of one's own."""
+    """User-defined reward rule."""
 
     def __call__(self, apart: float) -> float:
         return -(apart**2)
 
 
 class NeedsMore:
-    """No rule: it is not made without arguments."""
+    """Invalid rule: its constructor needs an argument."""
 
     def __init__(self, more: int) -> None:
         self.more = more
 
 
 class Words(gymnasium.Env[Any, Any]):
-    """Actions that no Gaussian policy has."""
+    """Task with discrete actions, which no Gaussian policy supports."""
 
     observation_space = Box(-1, 1, (1,), np.float32)
     action_space = gymnasium.spaces.Discrete(2)
 
 
 class OfItsOwn:
-    """A class that makes its vector environment itself."""
+    """Class with a `make_vec` method."""
 
     @classmethod
     def make_vec(cls, copies: int, *, autoreset_mode: Any, **options: Any) -> Any:
@@ -78,12 +78,12 @@ class OfItsOwn:
 
 
 def three(copies: int, **options: Any) -> Any:
-    """Always as many copies."""
+    """Makes three copies, whatever the number requested."""
     return OfItsOwn.make_vec(3, autoreset_mode="SameStep", **options)
 
 
 class Near(GroupTask):
-    """Two joints in copies: both should be at 0.5 rad."""
+    """Copies of two joints, which should both be at 0.5 rad."""
 
     def __init__(self, copies: int, max_steps: int = 8) -> None:
         group = o80.robots.load("two_joints").inline(copies=copies)
@@ -107,7 +107,7 @@ register("training_tasks/Near-v0", Near)
 
 
 class OnTheClock(Task):
-    """Two joints in a process of their own, in real time: a step is 20 iterations of it."""
+    """Two joints in another process, in real time: a step takes 20 iterations."""
 
     def __init__(self, copies: int, segment: str = "") -> None:
         space = Box(-1, 1, (2,), np.float32)

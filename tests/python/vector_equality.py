@@ -1,4 +1,4 @@
-"""Runs a vector environment beside Gymnasium's SyncVectorEnv of single ones and compares all."""
+"""Compares a vector environment with Gymnasium's SyncVectorEnv of single environments."""
 
 from collections.abc import Callable
 from operator import methodcaller
@@ -10,7 +10,7 @@ from gymnasium.vector import AutoresetMode, SyncVectorEnv, VectorEnv
 
 MODES = list(AutoresetMode)
 Policy = Callable[[Any, int], Any]
-"""Actions of all copies, from their observations and the number of the step."""
+"""Maps all copies' observations and the step number to actions."""
 
 
 def beside(
@@ -21,7 +21,7 @@ def beside(
     steps: int,
     seed: Any,
 ) -> int:
-    """Steps both, resets ended copies in DISABLED mode, and returns how many episodes ended."""
+    """Steps both, resets ended copies in DISABLED mode; returns the number of ended episodes."""
     mode = vector.metadata["autoreset_mode"]
     singles: Any = SyncVectorEnv([make] * vector.num_envs, autoreset_mode=mode)
     try:
@@ -47,7 +47,7 @@ def beside(
 
 
 def both(vector: Any, singles: Any, call: Callable[[Any], Any]) -> Any:
-    """The results of a call of both, which are the same."""
+    """Calls both, asserts equal results, and returns them."""
     results, others = call(vector), call(singles)
     assert_same(results, others, "results")
     return results
@@ -67,7 +67,7 @@ def assert_same_spaces(vector: Any, singles: Any) -> None:
 
 
 def assert_final_observations(vector: Any, results: Any, mode: AutoresetMode) -> None:
-    """The dense final observations are those of Gymnasium, or of the result itself."""
+    """Asserts that final observations equal Gymnasium's, or the result's."""
     dense, infos = vector.final_observations, results[4]
     if mode is not AutoresetMode.SAME_STEP:
         assert_same(dense, results[0], "final observations")
@@ -83,7 +83,7 @@ def row(batch: Any, copy: int) -> Any:
 
 
 def assert_same(one: Any, other: Any, where: str) -> None:
-    """Same types, keys, shapes, dtypes and bits."""
+    """Asserts equal types, keys, shapes, dtypes and bits."""
     assert type(one) is type(other), f"{where}: {type(one)}, {type(other)}"
     if isinstance(one, dict):
         assert one.keys() == other.keys(), where

@@ -1,6 +1,6 @@
 """Table tennis with a pneumatic arm: real robot, simulated ball.
 
-Importing it makes `o80/TableTennis-v0` and `o80/TableTennisRealTime-v0` known to Gymnasium.
+An import registers `o80/TableTennis-v0` and `o80/TableTennisRealTime-v0` with Gymnasium.
 """
 
 from .registration import ACCELERATED, REAL_TIME, register_environments

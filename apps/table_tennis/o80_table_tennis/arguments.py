@@ -1,4 +1,4 @@
-"""Checks of the users' arguments: Gymnasium passes any keyword on to the environment."""
+"""Checks the users' arguments, because Gymnasium passes any keyword to the environment."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ import numpy as np
 from .settings import Pacing, RigSettings, TaskSettings
 
 OPTIONS = ("ball", "flight")
-"""Options that `reset` knows."""
+"""Options of `reset`."""
 
 
 def refuse_wrong_arguments(
     rig: object, task: object, render_mode: str | None, modes: list[str]
 ) -> None:
-    """Raises TypeError or ValueError with the arguments to give instead."""
+    """Raises TypeError or ValueError for wrong arguments; the text names valid ones."""
     for name, given, wanted in (("rig", rig, RigSettings), ("task", task, TaskSettings)):
         if given is None or isinstance(given, wanted):
             continue
@@ -31,7 +31,7 @@ def refuse_wrong_arguments(
 
 
 def refuse_wrong_balls(rig: RigSettings, task: TaskSettings) -> None:
-    """Raises ValueError for other worlds beside a ball that flies out."""
+    """Raises ValueError if several worlds are combined with `fly_out`."""
     if task.fly_out and (rig.worlds or 1) > 1:
         raise ValueError(
             "fly_out ends an episode at the first touch of the played ball, while the balls of "
@@ -40,7 +40,7 @@ def refuse_wrong_balls(rig: RigSettings, task: TaskSettings) -> None:
 
 
 def refuse_unless_for_copies(rig: RigSettings, task: TaskSettings) -> None:
-    """Raises ValueError for a rig or a task that a vector environment cannot have."""
+    """Raises ValueError for a rig or task that a vector environment does not support."""
     wanted = {"pacing": Pacing.INLINE, "attach": False}
     given = {name: getattr(rig, name) for name in wanted} | {"chunk_size": task.chunk_size}
     for name, value in (wanted | {"chunk_size": None}).items():
@@ -52,7 +52,7 @@ def refuse_unless_for_copies(rig: RigSettings, task: TaskSettings) -> None:
 
 
 def refuse_wrong_options(options: Mapping[str, Any], *, period: float) -> None:
-    """Raises ValueError for options of `reset`; `period` is that of the worlds [s]."""
+    """Raises ValueError for wrong options of `reset`. period: of the worlds [s]."""
     unknown = [name for name in options if name not in OPTIONS]
     if unknown:
         raise ValueError(f"unknown options: {', '.join(unknown)}; reset knows {', '.join(OPTIONS)}")

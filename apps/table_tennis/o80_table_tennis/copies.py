@@ -1,9 +1,9 @@
-"""Table tennis as a task of o80.hybrid: one arm as its settings say, or N copies inline.
+"""Table tennis as a task of o80.hybrid: one arm with any pacing, or N copies inline.
 
-One step, with the arm's iterations as the only clock; k is its newest row used:
-1. actions => eight pressures of each arm, sent for iteration k + 1 + delay (by the clock, too late:
-   taken at once, counted); with chunks row j for the five iterations from k + 1 + delay + 5 j on
-   (too late: skipped, counted);
+One step, with the arm's iterations as the only clock; k is the newest row used:
+1. actions => eight pressures of each arm, sent for iteration k + 1 + delay (late ones in real time
+are executed at once, and counted); of a chunk, row j is for the five iterations from
+k + 1 + delay + 5 j on (late rows are skipped, and counted);
 2. by the clock: wait for row k + 5; else all arms burst by 5;
 3. the arm's rows k + 1 to k + 5 are replayed to its worlds, which all burst by 5 at once;
 4. the arm's row k + 5 and the world's row of the same instant => observation, contact, reward.
@@ -45,16 +45,16 @@ Numbers = NDArray[np.intp]
 PICTURE = (640, 480)
 """Width and height of pictures [pixels]."""
 TEXTS = np.array([end.text for end in End], object)
-"""Texts of the ends, by their numbers."""
+"""Texts of `End`, by number."""
 BALL_STATE = np.dtype([(name, np.float64, (3,)) for name in ("position", "velocity", "spin")])
-"""State of a ball that is sent to its world."""
+"""State of a ball, as sent to a world."""
 
 
 class TableTennisCopies(HybridTask):
     """Arms with simulated balls, stepped together.
 
-    With `RigSettings(worlds=n)` n balls fly beside each arm, each in a world of its own; arrays of
-    all balls have the worlds of copy 0 first.
+    With `RigSettings(worlds=n)`, n balls fly beside each arm, each in its own world; arrays of
+    all balls begin with the worlds of copy 0.
     """
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 100}  # noqa: RUF012
@@ -70,9 +70,9 @@ class TableTennisCopies(HybridTask):
         threads: int | None = None,
         camera: str = "side",
     ) -> None:
-        """copies: N of them, inline; None: one, as `rig` says.
+        """copies: N inline copies; None: one arm with the pacing of `rig`.
 
-        threads: that step N copies, the calling one included (None: one for each processor).
+        threads: number of threads that step, the caller included (None: one for each processor).
         """
         settings, rig = task or TaskSettings(), rig or RigSettings()
         if copies is not None:
@@ -83,7 +83,7 @@ class TableTennisCopies(HybridTask):
         self.title = settings.title
         count, each = copies or 1, rig.worlds or 1
         self.observer = settings.observer(self.task, rig.step, count * each)
-        """Observer that makes observations of states."""
+        """Observer: converts states to observations."""
         self.observation_space = self.observer.space
         self.action_space = spaces.Box(-1.0, 1.0, (MUSCLES,), np.float32)
         self.rig = rig_of(rig, delay=settings.delay, group=copies is not None or each > 1)
@@ -97,7 +97,7 @@ class TableTennisCopies(HybridTask):
         )
         self._camera = camera
         self._pictures: Pictures | None = None
-        pacing: Any = rig.pacing.name.lower()  # as o80.hybrid names it
+        pacing: Any = rig.pacing.name.lower()  # name in o80.hybrid
         super().__init__(
             count,
             pacing=pacing,
@@ -105,14 +105,14 @@ class TableTennisCopies(HybridTask):
             threads=1 if copies == 1 else threads,
         )
         try:
-            self._see()
+            self._create_views()
         except BaseException:
             self.close()
             raise
         self.action_space = spaces.Box(-1.0, 1.0, settings.action_shape, np.float32)
 
-    def _see(self) -> None:
-        """Names the numbers in rows, and makes the arrays of the task."""
+    def _create_views(self) -> None:
+        """Creates named views of the rows, and the arrays of the task."""
         engine: Any = self.engine
         arms, self._worlds = engine.members
         self.arm: o80.Frontend = engine.frontend(0)
@@ -140,11 +140,11 @@ class TableTennisCopies(HybridTask):
         )
         """State of all balls after the last step."""
         self.draws: list[EpisodeDraw] = []
-        """Draws of the episodes that were begun last."""
+        """Draws of the episodes of the last `restart`."""
         self.twin_row = 0
-        """Iteration of the first world that was used last."""
+        """Last used iteration of the first world."""
         self.returns_at_reset = True
-        """By the clock a reset first brings the arm back; False: the caller has done so."""
+        """Whether a reset in real time first brings the arm back; False: the caller does."""
         self.after_step: Callable[[], None] | None = None
         """Called after each step of 10 ms, with the newest rows of arm and world."""
         self._observations = np.zeros((total, self.observer.size), np.float32)
@@ -155,7 +155,7 @@ class TableTennisCopies(HybridTask):
 
     @property
     def single(self) -> Single:
-        """Engine of one arm, which runs in the way of its settings."""
+        """Engine of one arm."""
         assert isinstance(self.engine, Single)
         return self.engine
 
@@ -174,7 +174,7 @@ class TableTennisCopies(HybridTask):
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
     ) -> None:
-        """Arms and worlds to the start, with drawn balls, or that of `options`."""
+        """Resets arms and worlds, with drawn balls, or with the ball of `options`."""
         refuse_wrong_options(options, period=self.rig_settings.period)
         extra = self.worlds - 1
         self.draws = draws = [
@@ -193,7 +193,7 @@ class TableTennisCopies(HybridTask):
         balls = np.arange(len(self._ends))[self._balls_of(copies)]
         self.state.goal[balls] = np.repeat([draw.goal for draw in draws], self.worlds, axis=0)
         self._ends[balls] = End.RUNNING
-        self._look()
+        self._update_state()
         if not self._gathered:
             seeds = [each for each in generators for _ in range(self.worlds)]
             state = self.state.at(balls)
@@ -206,27 +206,27 @@ class TableTennisCopies(HybridTask):
         generators: Sequence[np.random.Generator],
         options: Mapping[str, Any],
     ) -> None:
-        """The balls fly from the next iteration on."""
+        """Sends the balls, which fly from the next iteration on."""
         for copy, draw in zip(copies.tolist(), self.draws, strict=True):
             for number, flight in enumerate(draw.flights):
                 world, states = self.world_of(copy, number), flight.states.view(BALL_STATE)[:, 0]
-                if len(states) == 1:  # the usual case, ten times as fast
+                if len(states) == 1:  # the common case, ten times as fast
                     world.add_command(self.rows.ball, states[0], iterations=1)
                 else:
                     world.add_trajectory(states, self.rows.ball)
                 world.pulse()
 
     def commanded(self, copies: Index = EVERY) -> FloatArray:
-        """Normalised pressures (n, 8) asked for in the last rows, a fresh array."""
+        """Normalised desired pressures (n, 8) of the last rows, a fresh array."""
         return self.range.normalised(self.rows.desired[copies])
 
     # ------------------------------------------------------------------ steps
 
     def step(self, actions: Any, copies: Index) -> None:
-        """`repeat` times five iterations of these arms and of their worlds, with chunks for each of
+        """Runs `repeat` times five iterations of these arms and worlds, with chunks for each of
         the `action_steps`.
 
-        Nothing if the arm has moved on too far for the world to follow: the episode is given up.
+        Does nothing if the arm is too far ahead for the world to follow: the episode has stalled.
         """
         settings, asked = self.settings, self._asked[copies]
         if self._endings is not None:
@@ -245,10 +245,10 @@ class TableTennisCopies(HybridTask):
             self._move(self.range.raw(np.stack(rows, 1)), copies)
             if self.engine.stalled:
                 return
-            asked = rows[settings.steps - 1]  # the next chunk goes on from what is over by then
+            asked = rows[settings.steps - 1]  # the next chunk continues from here
         self._asked[copies] = asked
         self._ends[self._balls_of(copies)], self._some_ended = End.RUNNING, False
-        self._look()
+        self._update_state()
         if settings.fly_out and np.count_nonzero(self.state.record.touched):
             touched = np.zeros(self.copies, np.bool_)
             touched[copies] = np.asarray(self.state.record.touched)[copies]
@@ -256,20 +256,20 @@ class TableTennisCopies(HybridTask):
         self._unobserved = True
 
     def _move(self, targets: FloatArray | None, copies: Index) -> None:
-        """A step of the rig; None: nothing is sent."""
+        """Runs a step of the rig; targets None: sends nothing."""
         self.engine.step(targets, copies, self.until_halted)
         self.twin_row = self.rows.iteration
         if self.after_step is not None and not self.engine.stalled:
             self.after_step()
 
     def idle(self) -> None:
-        """10 ms in which nothing is asked of the arm, by its clock."""
+        """Runs 10 ms of the arm's clock without commands."""
         if self.single.stalled or self.single.lateness > self.max_late:
             self.single.begin()
         self._move(None, EVERY)
 
     def _fly(self, touched: Numbers) -> None:
-        """The touched balls of these copies fly to their ends, unless they are there."""
+        """Lets the touched balls of these copies fly to the end, unless their episodes are over."""
         state = self.state.at(touched)
         flying = touched[state.record.touched & ~terminated(self.task.end(state))]
         if flying.size:
@@ -277,10 +277,10 @@ class TableTennisCopies(HybridTask):
             fields = fly_out_fields(every=every, passed_y=self.settings.end.passed_y)
             self.world.request("fly_out", flying, **fields)
             self.engine.mirror(flying)
-            self._look()
+            self._update_state()
 
-    def _look(self) -> None:
-        """Updates the parts of the state that are no views of the newest rows."""
+    def _update_state(self) -> None:
+        """Updates the parts of the state that are not views of the newest rows."""
         self.range.normalised(self.rows.observed, out=self._pressures)
         state, rows = self.state, self.rows
         state.record = rows.read_records()
@@ -290,7 +290,7 @@ class TableTennisCopies(HybridTask):
             state.steps, state.motion, state.pressures, state.asked, state.racket = each
 
     def _balls_of(self, copies: Index) -> Index:
-        """Numbers of the balls of these copies."""
+        """Indices of these copies' balls."""
         if self.worlds == 1:
             return copies
         numbers = np.arange(self.copies * self.worlds).reshape(self.copies, self.worlds)
@@ -300,7 +300,7 @@ class TableTennisCopies(HybridTask):
         return self.state if isinstance(copies, slice) else self.state.at(self._balls_of(copies))
 
     def _by_world(self, values: Any) -> Any:
-        """Values of balls (n * worlds, ...), where there are several (n, worlds, ...)."""
+        """Reshapes values of balls (n * worlds, ...) to (n, worlds, ...) for several worlds."""
         values = np.asarray(values)
         if self._endings is None:
             return values
@@ -309,7 +309,7 @@ class TableTennisCopies(HybridTask):
     # ------------------------------------------------------------------ results
 
     def flagged(self) -> NDArray[np.bool_]:
-        """(copies,) whose episode may have ended, or whose step is paid."""
+        """Flags (copies,) of copies whose episode may have ended, or whose step has a reward."""
         if self.engine.stalled:
             return super().flagged()
         flags: NDArray[np.bool_] = self.task.eventful(self.state)
@@ -318,17 +318,17 @@ class TableTennisCopies(HybridTask):
         return flags
 
     def outcome(self, copies: Numbers) -> Outcome:
-        """Ends and rewards of these."""
+        """Returns ends and rewards of these copies."""
         self._some_ended = True
         if not self.engine.stalled:
             return super().outcome(copies)
-        self.steps[copies] -= 1  # nothing was done
+        self.steps[copies] -= 1  # the step was not executed
         self._ends[self._balls_of(copies)] = End.STALLED
         outcome = super().outcome(copies)
         return Outcome(outcome.reward, outcome.terminated, outcome.truncated)
 
     def judge(self, copies: Numbers) -> Outcome:
-        """Ends and rewards of the balls of these."""
+        """Returns ends and rewards of these copies' balls."""
         state, balls = self._of(copies), self._balls_of(copies)
         ends = self.task.end(state)
         by_event = terminated(ends)
@@ -338,7 +338,7 @@ class TableTennisCopies(HybridTask):
         return Outcome(*map(self._by_world, (self.task.reward(state), by_event, cut)))
 
     def observe(self, copies: Index) -> Any:
-        """(n, M); those that have been stepped are observed once, when first asked for."""
+        """Returns observations (n, M); computes them once after each step, on demand."""
         if self._gathered:
             parts = self._gathered
             if not isinstance(copies, slice):
@@ -351,7 +351,7 @@ class TableTennisCopies(HybridTask):
         return self._by_world(self._observations[balls])
 
     def info(self, copies: Index) -> Mapping[str, Any]:
-        """Entries of the task, and how the episode stands: see `environment`."""
+        """Returns the task's entries, and the state of the episode, see `environment`."""
         info = self.task.info(self._of(copies))
         if self.worlds > 1:
             info = {name: np.asarray(value)[:: self.worlds] for name, value in info.items()}
@@ -363,18 +363,18 @@ class TableTennisCopies(HybridTask):
         return info
 
     def shown(self, copies: Index) -> tuple[Any, Mapping[str, Any]]:
-        """Observations and infos; `worlds` also says which balls were touched and returned."""
+        """Returns observations and infos; `worlds` flags the touched and returned balls."""
         if self._endings is None:
             info = self.info(copies)
             return self.observe(copies), info
         observed, info = super().shown(copies)
-        told = self.task.info(self._of(copies))
-        names = told.keys() & {"touched", "returned"}
-        more = {name: self._by_world(told[name]) for name in names}
+        task_info = self.task.info(self._of(copies))
+        names = task_info.keys() & {"touched", "returned"}
+        more = {name: self._by_world(task_info[name]) for name in names}
         return observed, {**info, "worlds": info["worlds"] | more}
 
     def render(self, copy: int) -> Any:
-        """A picture (480, 640, 3) of one copy."""
+        """Draws a picture (480, 640, 3) of one copy."""
         world = self.world_of(copy)
         if self._pictures is None:
             self._pictures = Pictures(world, size=PICTURE, camera=self._camera)

@@ -1,7 +1,7 @@
 """The experiment from end to end: the program `o80-table-tennis`.
 
-Starts the arm in real time (500 Hz, a process of its own), its simulated twin (bursting, another
-one) and an environment between them, plays episodes, then plays accelerated, as processes and
+Starts the arm in real time (500 Hz, in its own process), its simulated twin (bursting, in another
+one) and an environment between them, and plays episodes; then plays accelerated, as processes and
 inline. Prints rates, lateness and returns; writes recordings and a report.
 """
 
@@ -42,12 +42,12 @@ COLUMNS = (
     TextColumn("{task.fields[returns]}"),
     TimeElapsedColumn(),
 )
-"""Columns of the progress of a demo."""
+"""Columns of the progress bar."""
 
 
 @dataclass(frozen=True)
 class Demo:
-    """Plays all modes and policies, with the first balls each."""
+    """Plays all modes and policies, each with the same first balls."""
 
     task: TaskSettings
     seed: int
@@ -56,7 +56,7 @@ class Demo:
     def play(
         self, name: str, policy: Policy, rig: RigSettings, episodes: int, **settings: Any
     ) -> Played:
-        """Episodes of a policy. settings: `record`, and a `task` instead of the demo's."""
+        """Plays episodes with a policy. settings: `record`, and a `task` instead of the demo's."""
         bar = self.progress.add_task(name, total=episodes, returns="0 returned")
         task, returns = settings.pop("task", self.task), 0
 
@@ -74,7 +74,7 @@ class Demo:
     def play_modes(
         self, muscle: str, episodes: int, real_time_episodes: int, record: Path
     ) -> dict[Pacing, Played]:
-        """The scripted policy in three ways, added to a recording."""
+        """Plays the scripted policy with each pacing, and appends to a recording."""
         modes = {}
         for pacing in (Pacing.REAL_TIME, Pacing.PROCESSES, Pacing.INLINE):
             if count := real_time_episodes if pacing.real_time else episodes:
@@ -84,9 +84,9 @@ class Demo:
         return modes
 
     def play_policies(self, scripted: Played, muscle: str, record: Path) -> dict[str, Played]:
-        """All policies and the baselines on the same balls, as fast as they can.
+        """Plays all policies and baselines on the same balls, accelerated.
 
-        The learned policy plays on the arm and in the noise that it knows, in a recording.
+        The learned policy plays with the arm and noise of its training, in a recording.
         """
         learned, count = shipped_policy(), len(scripted.episodes)
         rig = learned.conditions.rig()
@@ -152,9 +152,9 @@ def main(
 
 
 def command_of_o80() -> str:
-    """The path of the program `o80` beside this Python, as one types it in this folder.
+    """Returns the path of this Python's program `o80`, relative to this folder if inside it.
 
-    Its name alone is not enough: `make` finds programs that the terminal does not.
+    The name alone is not enough: `make` finds programs outside of the terminal's path.
     """
     program = Path(sys.executable).with_name("o80")
     inside = program.is_relative_to(Path.cwd())
@@ -162,7 +162,7 @@ def command_of_o80() -> str:
 
 
 def _written(path: Path, of_learned: Path) -> tuple[str, ...]:
-    """Lines that say what was written, and how to look at it."""
+    """Lists the written files, and commands to view them."""
     recording, command = shlex.quote(str(path)), command_of_o80()
     arm = next(iter(o80.open(path)))
     return (

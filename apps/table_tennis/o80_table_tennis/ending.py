@@ -1,4 +1,4 @@
-"""Signals that end a program in order: the stack unwinds, and no process or segment remains."""
+"""Ends a program cleanly on signals: the stack unwinds, and no process or segment remains."""
 
 from __future__ import annotations
 
@@ -8,21 +8,21 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-_came: list[int] = []
+_received: list[int] = []
 
 
 @contextmanager
 def ends_in_order() -> Iterator[None]:
-    """Within it Ctrl-C, SIGTERM and SIGHUP raise SystemExit, once: the second one is ignored."""
+    """Makes Ctrl-C, SIGTERM and SIGHUP raise SystemExit in the block; ignores a second signal."""
 
     def end(number: int, _frame: FrameType | None) -> None:
         for each in before:
             signal.signal(each, signal.SIG_IGN)
-        _came.append(number)
+        _received.append(number)
         sys.exit(128 + number)
 
     numbers = [signal.SIGINT, signal.SIGTERM]
-    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # as nohup has it
+    if signal.getsignal(signal.SIGHUP) is not signal.SIG_IGN:  # ignored under nohup
         numbers.append(signal.SIGHUP)
     before = {number: signal.signal(number, end) for number in numbers}
     try:
@@ -33,6 +33,6 @@ def ends_in_order() -> Iterator[None]:
 
 
 def raise_if_ended() -> None:
-    """Raises SystemExit again: one that was raised while a destructor ran is lost."""
-    if _came:
-        sys.exit(128 + _came[0])
+    """Raises SystemExit again after a signal, because it is lost if raised in a destructor."""
+    if _received:
+        sys.exit(128 + _received[0])

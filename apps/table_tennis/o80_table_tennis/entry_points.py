@@ -1,4 +1,4 @@
-"""The functions that Gymnasium calls to make the environments by their ids."""
+"""Functions by which Gymnasium makes the environments."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .settings import Pacing, RigSettings, TaskSettings
 
 
 def _made(rig: RigSettings | None, pacing: Pacing, rest: dict[str, Any]) -> TableTennisEnvironment:
-    """An environment with this pacing. Raises TypeError for anything but settings."""
+    """Makes an environment with this pacing. Raises TypeError for wrong types."""
     refuse_wrong_arguments(rig, None, None, [])
     return TableTennisEnvironment(rig=replace(rig or RigSettings(), pacing=pacing), **rest)
 
@@ -24,12 +24,12 @@ def _made(rig: RigSettings | None, pacing: Pacing, rest: dict[str, Any]) -> Tabl
 def accelerated_environment(
     *, processes: bool = False, rig: RigSettings | None = None, **rest: Any
 ) -> TableTennisEnvironment:
-    """`o80/TableTennis-v0`: inline, or with arm and twins in processes of their own."""
+    """Makes `o80/TableTennis-v0`: inline, or with arm and twins in separate processes."""
     return _made(rig, Pacing.PROCESSES if processes else Pacing.INLINE, rest)
 
 
 def real_time_environment(*, rig: RigSettings | None = None, **rest: Any) -> TableTennisEnvironment:
-    """`o80/TableTennisRealTime-v0`: the arm runs by the clock."""
+    """Makes `o80/TableTennisRealTime-v0`: the arm runs by the clock."""
     return _made(rig, Pacing.REAL_TIME, rest)
 
 
@@ -42,7 +42,7 @@ def vector_environment(
     render_mode: str | None = None,
     **rest: Any,
 ) -> VectorEnvironment:
-    """Copies of `o80/TableTennis-v0` in this process, stepped together by threads of C++.
+    """Makes copies of `o80/TableTennis-v0` in this process, stepped together by C++ threads.
 
     rest: `threads` and `camera` of `TableTennisCopies`.
     """

@@ -1,4 +1,4 @@
-"""The Gymnasium environment of one arm and its worlds, see `copies` for what a step does."""
+"""Gymnasium environment of one arm and its worlds; `copies` describes a step."""
 
 from __future__ import annotations
 
@@ -29,16 +29,16 @@ Outcome = tuple[NDArray[np.float32], float, bool, bool, Info]
 class TableTennisEnvironment(HybridEnvironment):
     """Real arm, simulated ball: 100 steps a second of eight pressure changes, or fewer longer ones.
 
-    Actions: Box(-1, 1, (8,)), changes of the normalised pressures; with `chunk_size=n` chunks of
-    them, Box(-1, 1, (n, 8)). The task (`TaskSettings.task`) defines observation, reward and its
-    part of `info`, to which come `stalled`, `end` (a number of `End`), `end_text`, and with
-    `RigSettings(worlds=n)` what is shown of each ball: `worlds`. The README says more.
+    Actions: Box(-1, 1, (8,)), changes of the normalised pressures; with `chunk_size=n`, chunks
+    Box(-1, 1, (n, 8)). The task (`TaskSettings.task`) defines observation, reward and its part of
+    `info`. The environment adds `stalled`, `end` (a number of `End`), `end_text`, and with
+    `RigSettings(worlds=n)` the results of each ball, `worlds`. The README has the details.
 
-    `options` of `reset`: `ball`, the number of the ball to be played (else drawn from the seed), or
-    `flight`, a SampledFlight of the caller's own.
+    `options` of `reset`: `ball`, the number of the ball (else drawn from the seed), or
+    `flight`, a SampledFlight.
 
-    `record="run.mcap"` records every row of arm and worlds, and marks the episodes; a file that
-    exists is continued. `report.recorded_episodes` reads it, see also `o80.open`.
+    `record="run.mcap"` records every row of arm and worlds, and marks the episodes; an existing
+    file is continued. `report.recorded_episodes` reads it, see also `o80.open`.
     """
 
     metadata: dict[str, Any] = {"render_modes": RENDER_MODES, "render_fps": 100}  # noqa: RUF012
@@ -59,12 +59,12 @@ class TableTennisEnvironment(HybridEnvironment):
         self.task = made = TableTennisCopies(None, rig=rig, task=task, camera=camera)
         self._page, its_rig = None, made.rig_settings
         self.arm, *self.twins = frontends = made.single.frontends
-        """Frontends of the arm, and of the worlds; the ball of the first one is played."""
+        """Frontends of the arm, and of the worlds; the first world's ball is played."""
         self._counts = EpisodeCounts()
         self._number, self._summary = -1, None
         try:
-            told = settings_mark(its_rig, made.settings, [each.epoch for each in frontends])
-            super().__init__(made, record=record, options=told)
+            mark_values = settings_mark(its_rig, made.settings, [each.epoch for each in frontends])
+            super().__init__(made, record=record, options=mark_values)
             self.metadata, self.render_mode = type(self).metadata, render_mode
             if render_mode == "human":
                 step = 0.0 if its_rig.pacing.real_time else its_rig.step
@@ -76,7 +76,7 @@ class TableTennisEnvironment(HybridEnvironment):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[NDArray[np.float32], Info]:
-        """Arm and worlds to the start; the ball flies from the first step on."""
+        """Resets arm and worlds; the ball flies from the first step on."""
         observation, info = super().reset(seed=seed, options=options)
         self._twin_first, self._number = self.task.twin_row, self._number + 1
         self._paid, self._begun_at = 0.0, math.nan
@@ -84,7 +84,7 @@ class TableTennisEnvironment(HybridEnvironment):
         return observation, _plain(info)
 
     def step(self, action: Action) -> Outcome:
-        """Five iterations of the arm and of every world, times `repeat`, times `action_steps`."""
+        """Runs five iterations of arm and worlds, times `repeat`, times `action_steps`."""
         called = time.monotonic()
         observation, reward, terminated, truncated, info = super().step(action)
         if math.isnan(self._begun_at):  # an episode begins with its first step
@@ -101,7 +101,7 @@ class TableTennisEnvironment(HybridEnvironment):
         return observation, reward, terminated, truncated, _plain(info)
 
     def _finish(self, end: End) -> None:
-        """The episode is over: its summary, its mark in the recording."""
+        """Summarises an ended episode, and marks it in the recording."""
         self._counts.episodes += 1
         self._counts.stalled_episodes += end is End.STALLED
         self._counts.seconds += time.monotonic() - self._begun_at
@@ -135,7 +135,7 @@ class TableTennisEnvironment(HybridEnvironment):
 
     @property
     def summary(self) -> EpisodeSummary:
-        """Summary of the episode that has just ended."""
+        """Summary of the last episode."""
         if self._summary is None:
             raise RuntimeError("there is no summary yet: the episode is not over")
         return self._summary
@@ -147,11 +147,11 @@ class TableTennisEnvironment(HybridEnvironment):
         return statistics_of(self._counts, of_rig, self.arm, step_seconds=step, rows=rows)
 
     def render(self) -> Any:
-        """`rgb_array`: a picture (480, 640, 3) of the newest rows; `human`: None, see `Page`."""
+        """Draws the newest rows (480, 640, 3) for `rgb_array`; None for `human`, see `Page`."""
         return None if self._page is not None else super().render()
 
     def close(self) -> None:
-        """Ends everything that was started; may be called twice."""
+        """Ends all started processes and recordings; may be called twice."""
         try:
             if self._page is not None:
                 self._page.close()
@@ -160,7 +160,7 @@ class TableTennisEnvironment(HybridEnvironment):
 
 
 def _plain(info: Info) -> Info:
-    """Info with plain numbers."""
+    """Converts the arrays of an info to plain numbers."""
     return {
         name: value.item() if isinstance(value, np.generic) else value
         for name, value in info.items()

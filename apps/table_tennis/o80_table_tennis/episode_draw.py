@@ -1,4 +1,4 @@
-"""Random draws for an episode, in a fixed order: the same generator, the same episode."""
+"""Random draws of an episode, in a fixed order: the same generator gives the same episode."""
 
 from __future__ import annotations
 
@@ -14,12 +14,12 @@ from .task.ball_play import ReturnTask
 
 SEEDS = 2**32
 USERS_OWN = -1
-"""Number of a ball that is in no source."""
+"""Number of a ball outside of the source."""
 
 
 @dataclass(frozen=True)
 class EpisodeDraw:
-    """All that is random in an episode."""
+    """Random values of an episode."""
 
     numbers: list[int]
     """Numbers of the balls in their source: the played one, then the extra ones."""
@@ -40,13 +40,13 @@ def drawn_episode(
     ball: int | None = None,
     flight: SampledFlight | None = None,
 ) -> EpisodeDraw:
-    """One played ball and `extra` others, all different ones if the source has so many.
+    """Draws the played ball and `extra` others, all different if the source has enough balls.
 
-    The played one is number `ball` of the source, or a `flight` of the caller's own, if given; the
-    generator draws as often all the same. Raises IndexError for a number that the source lacks.
+    `ball`, a number of the source, or `flight` replaces the played ball, without a change of the
+    number of draws. Raises IndexError for a number that is not in the source.
     """
     numbers = _drawn(rng, len(source), 1 + extra)
-    if ball is not None and ball in numbers:  # then the ball that was drawn flies in its place
+    if ball is not None and ball in numbers:  # the drawn ball takes the place of the given one
         numbers[numbers.index(ball)] = numbers[0]
     if ball is not None:
         numbers[0] = int(ball)
@@ -58,7 +58,7 @@ def drawn_episode(
 
 
 def _drawn(rng: np.random.Generator, available: int, wanted: int) -> list[int]:
-    """So many numbers below `available`; with repetition only if there are too few."""
+    """Draws `wanted` numbers below `available`, without repetition if there are enough."""
     if wanted == 1:
         return [int(rng.integers(available))]
     drawn = rng.choice(available, wanted, replace=wanted > available)

@@ -1,6 +1,6 @@
-"""How well policies play: `python -m o80_table_tennis.evaluate learned scripted --balls wide`.
+"""Evaluates policies: `python -m o80_table_tennis.evaluate learned scripted --balls wide`.
 
-Every policy plays the same balls. Prints a table and draws where the balls landed.
+Every policy plays the same balls. Prints a table and draws the landings.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ def main(
         print(f"o80: {error}", file=sys.stderr)
         raise typer.Exit(1) from error
     paired: dict[str, Paired] = {}
-    if real_time:  # each policy played accelerated, then in real time
+    if real_time:  # pairs: each policy accelerated, then in real time
         each_way = iter(played.values())
         paired = {name: Paired.of(next(each_way), next(each_way)) for name in policies}
     figures: dict[str, Any] = {label: each.as_json() for label, each in played.items()}
@@ -101,9 +101,9 @@ def main(
 
 
 def named_policy(name: str, **changed: str) -> tuple[Policy, Conditions]:
-    """The policy of a name or of a training; it plays in its own conditions, but for `changed`.
+    """Loads a policy by name or training folder; returns its conditions, too, with `changed`.
 
-    Raises ValueError, o80.InvalidArgument.
+    Raises ValueError or o80.InvalidArgument for an unknown policy.
     """
     conditions = Conditions()
     policy: Policy = RandomPolicy() if name == "random" else StillPolicy()

@@ -1,4 +1,4 @@
-"""Playing episodes with a policy, and how well it plays numbered balls."""
+"""Plays episodes with a policy, and evaluates policies on numbered balls."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .report.statistics import Played
 from .settings import Pacing
 
 VERDICT_SEED = 7_000_001
-"""Seed of the shots and of the noise of a verdict."""
+"""Seed of shots and noise of an evaluation."""
 VERDICT_BALLS = 400
 
 
@@ -29,7 +29,7 @@ def play(
     seed: int = 0,
     after_each: Callable[[EpisodeSummary], None] = lambda _: None,
 ) -> Played:
-    """Plays one episode for each number of a ball; `seed` is that of the first reset."""
+    """Plays an episode for each ball number. seed: of the first reset."""
     inner = environment.unwrapped
     if not isinstance(inner, TableTennisEnvironment):
         raise TypeError(f"only the table-tennis environments can be played, not {inner}")
@@ -60,7 +60,7 @@ def evaluate(
     pacing: Pacing = Pacing.INLINE,
     after_each: Callable[[EpisodeSummary], None] = lambda _: None,
 ) -> Played:
-    """Plays the first `balls` of the conditions' balls, each once; None: all of a recording."""
+    """Plays the first `balls` of the conditions' balls, each once; None: all of them."""
     task = conditions.task(ball_seed=seed)
     available = len(balls_from(task.balls, seed))
     count = available if balls is None else min(balls, available)

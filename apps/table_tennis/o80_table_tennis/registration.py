@@ -1,19 +1,19 @@
-"""The ids under which Gymnasium makes the environments."""
+"""Gymnasium ids of the environments."""
 
 from __future__ import annotations
 
 from o80.base.extras import needed
 
 ACCELERATED = "o80/TableTennis-v0"
-"""Runs as fast as the machine can; the same seed gives the same episode, bit for bit."""
+"""Accelerated environment; the same seed gives the same episode, bit for bit."""
 REAL_TIME = "o80/TableTennisRealTime-v0"
-"""The arm runs by the clock."""
+"""Environment whose arm runs by the clock."""
 
 
 def register_environments() -> None:
-    """Makes both ids known; may be called twice.
+    """Registers both ids; may be called twice.
 
-    The environments count steps and check their arguments themselves, without Gymnasium's wrappers.
+    The environments count steps and check arguments without Gymnasium's wrappers.
     Raises o80.MissingExtra if the package of a robot is not installed.
     """
     for robot in ("mujoco", "pam"):

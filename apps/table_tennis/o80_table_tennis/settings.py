@@ -1,4 +1,4 @@
-"""Settings of rig and task: frozen values with the published defaults."""
+"""Settings of rig and task: frozen dataclasses with the published defaults."""
 
 from __future__ import annotations
 
@@ -23,10 +23,10 @@ from .world.timing import ITERATIONS, PERIOD
 
 
 class Pacing(Enum):
-    """How arm and twins run."""
+    """Pacing of arm and twins."""
 
     REAL_TIME = "real time"
-    """The arm by its own clock in its own process, each twin bursting in its own process."""
+    """Arm by its own clock in its own process, each twin bursting in its own process."""
     PROCESSES = "processes"
     """Arm and twins all bursting, each in its own process."""
     INLINE = "inline"
@@ -34,39 +34,39 @@ class Pacing(Enum):
 
     @property
     def real_time(self) -> bool:
-        """The arm has a clock of its own."""
+        """Whether the arm runs by its own clock."""
         return self is Pacing.REAL_TIME
 
 
 @dataclass(frozen=True)
 class RigSettings:
-    """The arm and its worlds. Raises ValueError or TypeError."""
+    """Settings of the arm and its worlds. Raises ValueError or TypeError for wrong values."""
 
     pacing: Pacing = Pacing.INLINE
     arm_segment: str | None = None
     """Name of the arm's segment; None: an unused one."""
     attach: bool = False
-    """The arm runs already, in another process, as `arm_segment`: only the world is started."""
+    """Attach to the running arm `arm_segment`; only the world is started."""
     twin_segment: str | None = None
-    """The world runs already, bursting, in another process under this name; None: it is started
-    too. `rig.rig.world_options` has its options."""
+    """Name of a running bursting world; None: the world is started.
+    `rig.rig.world_options` returns its options."""
     worlds: int | None = None
-    """Worlds that mirror the arm, each with a ball of its own; the ball of the first one is played.
+    """Number of worlds that mirror the arm, each with its own ball; the first one is played.
     None: one."""
     preset: str = "standard"
-    """Numbers of the simulated arm: standard, identified (as the real arm) or published_simulation.
-    The default policy is made for the standard ones."""
+    """Preset of the simulated arm: standard, identified (real arm) or published_simulation.
+    The default policy is tuned for the standard arm."""
     muscle: str = "of_preset"
     """Model of the muscles of the simulated arm, instead of the preset's: linear or hill."""
     ranges: str = "of_preset"
     """Pressure ranges of the arm, instead of the preset's: simulated or real."""
     start_noise: float = 0.0
-    """On each joint of the simulated arm at a reset, uniform in plus or minus this [rad]."""
+    """Largest deviation of each simulated joint at a reset, either way, uniform [rad]."""
     frequency: float = 1.0 / PERIOD
     """Frequency of arm and worlds [1/s]."""
     history: int | None = None
-    """Rows that arm and worlds keep; None: as many as fit into o80's usual history, of copies a few
-    steps."""
+    """Number of rows in the histories; None: as many as fit into o80's usual history, a few steps
+    for copies."""
 
     def __post_init__(self) -> None:
         if self.pacing not in tuple(Pacing):
@@ -92,48 +92,48 @@ class RigSettings:
 
 @dataclass(frozen=True)
 class TaskSettings:
-    """The task, its balls and its rules. Raises ValueError or TypeError.
+    """Settings of task, balls and rules. Raises ValueError or TypeError for wrong values.
 
-    A delay or a chunk that o80.hybrid cannot have is refused when an environment is made.
+    A delay or chunk that o80.hybrid does not support is refused when an environment is made.
     """
 
     task: str | ReturnTask = "return"
-    """return or smash; or an object of your own, see `task.ball_play.ReturnTask`."""
+    """return, smash, or your own object, see `task.ball_play.ReturnTask`."""
     balls: str | None = None
-    """Simulated shots: "narrow" (like those of the recorded ball gun), "wide", or "launcher" (those
-    of the ball launcher, needs o80-devices). Or the path of a recording, or of a folder of them.
+    """Simulated shots: "narrow" (like the recorded ball gun's), "wide", or "launcher" (needs
+    o80-devices). Or the path of a recording, or of a folder of recordings.
     None: narrow."""
     ball_seed: int = 0
-    """Seed of the simulated shots: each seed has its own."""
+    """Seed of the simulated shots."""
     ball_count: int | None = None
-    """How many simulated shots there are; None: no end of them, each episode draws a new one."""
+    """Number of simulated shots; None: unlimited, each episode draws a new one."""
     factor: float = FINE
     """Factor of the actions: 0.05 fine, 1 coarse."""
     repeat: int = 1
-    """How often an action is carried out, for 10 ms each time, before the next observation."""
+    """Number of times an action is executed, for 10 ms each, before the next observation."""
     chunk_size: int | None = None
-    """Rows of an action chunk: an action is (chunk_size, 8), each row carried out like an action
-    (8,), one after the other, in iterations of its own. None: single actions (8,)."""
+    """Number of rows of an action chunk (chunk_size, 8); each row is executed like an action
+    (8,), in its own iterations. None: single actions (8,)."""
     action_steps: int = 1
-    """Rows of a chunk that are over when the policy sees again; the others act if it is late."""
+    """Chunk rows before the next observation; the others act if the policy is late."""
     delay: int = 1
-    """Iterations the policy has to think, real time: an action acts from row k + 1 + delay."""
+    """Iterations for the policy's computation, real time: an action acts from row k + 1 + delay."""
     observation: str | FullObservation = "published"
-    """published (22 numbers), or full: with what was asked lately and a filtered ball, see
-    `task.full_observation`; the latter of tasks without an `observe` of their own."""
+    """published (22 numbers), or full: with recent commands and a filtered ball, see
+    `task.full_observation`; full is for tasks without their own `observe`."""
     noise: NoiseSettings = NO_NOISE
-    """Noise of the observations; `NoiseSettings.tracker()` is that of a real camera system."""
+    """Noise of the observations; `NoiseSettings.tracker()`: noise of a real camera system."""
     bounds: ObservationBounds = field(default_factory=ObservationBounds)
     """Bounds of the published observation of the named tasks."""
     end: EndRule = field(default_factory=EndRule)
     """End of an episode of the named tasks."""
     reward: str | RewardRule = "ordered"
-    """Reward of the named tasks: ordered, published, or a rule of `task.rewards`."""
+    """Reward of the named tasks: ordered, published, or an object as in `task.rewards`."""
     fly_out: bool = False
-    """After the first touch nobody is asked any more: in the same step the ball flies to its end,
-    and the episode ends. A second touch of the racket then does not happen."""
+    """After the first touch, no more actions: the ball flies to its end in the same step,
+    and the episode ends, without a second touch of the racket."""
     max_late: int = 20
-    """Rows of lateness, with chunks beyond their last row, above which an episode is given up as
+    """Largest lateness in rows (with chunks: beyond their last row), above which an episode has
     stalled, real time."""
 
     def __post_init__(self) -> None:
@@ -179,18 +179,18 @@ class TaskSettings:
 
     @property
     def steps(self) -> int:
-        """Steps of 10 ms from one observation to the next."""
+        """Number of steps of 10 ms between observations."""
         return self.repeat * self.action_steps
 
     @property
     def planned(self) -> int:
-        """Iterations after an observation for which the chunk before it has rows."""
+        """Number of iterations after an observation for which the previous chunk has rows."""
         if self.chunk_size is None:
             return 0
         return self.delay + ITERATIONS * (self.chunk_size * self.repeat - self.steps)
 
     def observer(self, task: ReturnTask, step: float, count: int) -> Observer:
-        """Observer of `count` episodes, whose steps without repetition take `step` [s]."""
+        """Makes the observer of `count` episodes. step: duration without repetition [s]."""
         return Observer(
             task,
             count,
@@ -201,7 +201,7 @@ class TaskSettings:
         )
 
     def start_of(self, rig: RigSettings) -> RigSettings:
-        """The rig, whose arm starts as the noise of this task says."""
+        """Returns the rig with the start noise of this task."""
         posture = self.noise.start_posture
         return replace(rig, start_noise=posture) if posture > 0 else rig
 
@@ -211,7 +211,7 @@ class TaskSettings:
         return self.task if isinstance(self.task, str) else type(self.task).__name__
 
     def made(self) -> ReturnTask:
-        """The task itself."""
+        """Makes the task."""
         return TASKS[self.task](self) if isinstance(self.task, str) else self.task
 
 
@@ -219,4 +219,4 @@ TASKS: Mapping[str, Callable[[TaskSettings], ReturnTask]] = {
     "return": lambda s: ReturnTask(s.bounds, s.end, reward_rule(s.reward)),
     "smash": lambda s: SmashTask(s.bounds, s.end, reward_rule(s.reward)),
 }
-"""The tasks with a name."""
+"""Named tasks."""

@@ -1,8 +1,8 @@
-"""Lift and grip, fitted to what recorded bounces did to the balls.
+"""Fits lift and grip to recorded bounces.
 
-The spin of a recorded ball is not seen, only how far it turns the flight. Lift (how much a spin
-turns a flight) and grip (what a spin does at the bounce) are therefore fitted together: to the
-velocity along the table after each bounce and, more weakly, to how the flight turns after it.
+The spin of a recorded ball is not measured, only its effect on the flight. Lift (effect of the
+spin on the flight) and grip (effect of the spin at the bounce) are therefore fitted together: to
+the velocity along the table after each bounce and, with less weight, to the turn after it.
 """
 
 from __future__ import annotations
@@ -23,21 +23,21 @@ SPEED_ERROR = 0.1
 TURN_ERROR = 0.1
 """Expected error of a turn after a bounce [1/s]."""
 LONG_FLIGHT = 30
-"""Rows after a bounce from which a flight says how it turns."""
+"""Least number of rows after a bounce that determine the turn."""
 ROLLING = 0.4
-"""Grip of a hollow ball that rolls when it leaves."""
+"""Grip of a hollow ball that leaves the table rolling."""
 GRIP_ERROR = 0.03
-"""Expected difference of the grip from that."""
+"""Expected deviation of the grip from ROLLING."""
 BOUNDS = np.array([[0.2, 0.0, 0.2], [3.0, 3.0, 0.6]])
-"""Bounds of lift coefficient, lift saturation and grip. With more saturation a turn would say
-little about the spin."""
+"""Bounds of lift coefficient, lift saturation and grip. With more saturation, a turn would
+hardly determine the spin."""
 STARTS = [(lift, saturation, 0.43) for lift in (0.5, 1.0, 1.5) for saturation in (0.5, 2.7)]
 MAX_ROUNDS = 60
 
 
 @dataclass(frozen=True, eq=False)
 class RecordedBounce:
-    """A bounce, and the flights before and after it."""
+    """Recorded bounce, with the flights before and after."""
 
     before: FloatArray
     """(3,) velocity [m/s]"""
@@ -48,12 +48,12 @@ class RecordedBounce:
     turn_after: FloatArray
     """(3,) [1/s]"""
     speed_after: float
-    """Mean of the flight after it [m/s]."""
+    """Mean speed of the flight after the bounce [m/s]."""
     rows_after: int
 
     @classmethod
     def of(cls, fit: FlightFit, stamps: FloatArray) -> RecordedBounce | None:
-        """The first bounce of a fitted flight; None if there is none."""
+        """Extracts the first bounce of a fitted flight; None if there is none."""
         if len(fit.bounce_times) == 0:
             return None
         at = fit.bounce_times[:1]
@@ -71,14 +71,14 @@ class RecordedBounce:
 
 @dataclass(frozen=True)
 class Law:
-    """Air and table with which a bounce is predicted."""
+    """Parameters of air and table for predictions."""
 
     air: Aerodynamics = AERODYNAMICS
     table: Table = TABLE
 
     @classmethod
     def of(cls, numbers: FloatArray) -> Law:
-        """With another lift coefficient, lift saturation and grip (3,)."""
+        """Makes a law with these lift coefficient, lift saturation and grip (3,)."""
         lift, saturation, grip = numbers.tolist()
         return cls(
             replace(AERODYNAMICS, lift_coefficient=lift, lift_saturation=saturation),
@@ -86,24 +86,24 @@ class Law:
         )
 
     def spin(self, bounce: RecordedBounce) -> FloatArray:
-        """Spin of the ball before the bounce (3,) [rad/s]."""
+        """Computes the ball's spin before the bounce (3,) [rad/s]."""
         speed = np.array([np.linalg.norm(bounce.before)])
         spin: FloatArray = self.air.spins(bounce.turn_before, speed)[0]
         return spin
 
     def predicted(self, bounce: RecordedBounce) -> tuple[FloatArray, FloatArray]:
-        """Velocity [m/s] and turn [1/s] after the bounce, each (3,)."""
+        """Predicts velocity [m/s] and turn [1/s] after the bounce, each (3,)."""
         after = bounced(bounce.before, self.spin(bounce), self.table)
         return after.velocity, self.air.turn(after.spin, bounce.speed_after)
 
 
 def errors(law: Law, bounces: Sequence[RecordedBounce]) -> FloatArray:
-    """Predicted less recorded velocity along the table (N,) [m/s]."""
+    """Computes predicted minus recorded velocity along the table (N,) [m/s]."""
     return np.array([law.predicted(bounce)[0][1] - bounce.after[1] for bounce in bounces])
 
 
 def fitted(bounces: Sequence[RecordedBounce]) -> FloatArray:
-    """Lift coefficient, lift saturation and grip (3,) that explain the bounces best."""
+    """Fits lift coefficient, lift saturation and grip (3,) to the bounces."""
 
     def misses(numbers: FloatArray) -> FloatArray:
         law = Law.of(numbers)
@@ -122,7 +122,7 @@ def fitted(bounces: Sequence[RecordedBounce]) -> FloatArray:
 def _least_squares(
     misses: Callable[[FloatArray], FloatArray], numbers: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Levenberg and Marquardt's search within the bounds, and the sum of squares at its end."""
+    """Minimises by Levenberg-Marquardt within the bounds; also returns the sum of squares."""
     damping, error = 1e-2, misses(numbers)
     for _ in range(MAX_ROUNDS):
         slopes = np.column_stack([(misses(numbers + 1e-5 * e) - error) / 1e-5 for e in np.eye(3)])

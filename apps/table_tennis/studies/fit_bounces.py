@@ -1,8 +1,8 @@
 """Fits lift and grip to recorded bounces: `python fit_bounces.py SET...`.
 
-Each set is a recording or a folder of them. The table shows how well the velocity along the table
-after each bounce is predicted: without spin, by the constants of the application, and by constants
-fitted to the other sets.
+Each set is a recording or a folder of recordings. The printed table compares predictions of the
+velocity along the table after each bounce: without spin, with the application's constants, and
+with constants fitted to the other sets.
 """
 
 from __future__ import annotations
@@ -26,13 +26,13 @@ SPINLESS = Law(
     air=replace(AERODYNAMICS, lift_coefficient=1e9, lift_saturation=0.0),
     table=replace(TABLE, tangential_restitution=0.70),
 )
-"""Every ball keeps 0.70 of its horizontal velocity: what the twins did before spin was a part of
-the bounce."""
+"""Law without spin: every ball keeps 0.70 of its horizontal velocity, as in earlier
+twins."""
 
 
 @dataclass(frozen=True, eq=False)
 class BounceSet:
-    """The bounces of one recording."""
+    """Bounces of one recording."""
 
     name: str
     shots: int
@@ -40,13 +40,13 @@ class BounceSet:
 
 
 def bounce_set(name: str, shots: Sequence[BallTrajectory]) -> BounceSet:
-    """The first bounce of each shot that has one."""
+    """Collects the first bounce of each shot with one."""
     found = [RecordedBounce.of(shot.fit, shot.stamps) for shot in shots]
     return BounceSet(name, len(shots), [bounce for bounce in found if bounce is not None])
 
 
 def rms(values: FloatArray) -> float:
-    """Root mean square."""
+    """Computes the root mean square."""
     return float(np.sqrt(np.mean(values**2)))
 
 

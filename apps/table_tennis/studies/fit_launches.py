@@ -1,7 +1,7 @@
 """Fits the launches of recorded shots: `python fit_launches.py SET [OTHER...]`.
 
-The distribution is fitted to one half of the first set. Shots drawn from it are compared with the
-other half, and with the other sets, number by number.
+The distribution is fitted to one half of the first set. Shots drawn from the distribution are
+compared with the other half, and with the other sets, number by number.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from o80_table_tennis.balls.recordings import load_trajectories
 from o80_table_tennis.balls.simulated_shots import drawn_launch
 
 DRAWN = 300
-"""Simulated shots that are compared."""
+"""Number of compared simulated shots."""
 
 app = typer.Typer(add_completion=False)
 

@@ -1,10 +1,10 @@
-"""Hindsight from many worlds: how many balls an arm has to play until it touches and returns them.
+"""Hindsight from many worlds: number of played balls until a learner touches and returns them.
 
 python hindsight.py --balls 300 --seeds 2
 
-Soft actor-critic plays one ball after the other. In 20 worlds further balls meet the same motion of
-the arm, and the learner gets their transitions too. Three curves: one world; one world with as many
-gradient steps as 20 worlds; 20 worlds. Writes hindsight.png and hindsight.json.
+Soft actor-critic plays one ball after the other. In 20 worlds, other balls meet the same motion of
+the arm, and the learner also receives their transitions. Three curves: one world; one world with
+as many gradient steps as 20 worlds; 20 worlds. Writes hindsight.png and hindsight.json.
 """
 
 import argparse
@@ -24,27 +24,27 @@ from o80_table_tennis.environment import TableTennisEnvironment
 from o80_table_tennis.settings import RigSettings, TaskSettings
 
 WAYS = {"one world": (1, 1), "one world, more steps": (1, 4), "20 worlds": (20, 4)}
-"""Worlds, and gradient steps for each decision."""
+"""Number of worlds, and of gradient steps for each decision."""
 TASK = TaskSettings(balls="narrow", observation="full", factor=0.6, repeat=5)
 RANDOM = 20
-"""Balls that are played at random first."""
+"""Number of initial balls played at random."""
 WINDOW = 25
-"""Balls over which curves are means."""
+"""Number of balls in the moving mean of a curve."""
 
 
 def store(buffer: Any, before: Any, action: Any, info: dict[str, Any]) -> None:
-    """Adds the transitions of all worlds whose episode runs."""
+    """Adds the transitions of all worlds with a running episode."""
     each = info["worlds"]
     columns = (before, each["observation"], each["reward"], each["terminated"], each["truncated"])
     for old, new, reward, terminated, truncated in zip(
         *(column[each["running"]] for column in columns), strict=True
     ):
-        told = [{"TimeLimit.truncated": bool(truncated)}]
-        buffer.add(old, new, action, np.array([reward]), np.array([terminated | truncated]), told)
+        infos = [{"TimeLimit.truncated": bool(truncated)}]
+        buffer.add(old, new, action, np.array([reward]), np.array([terminated | truncated]), infos)
 
 
 def trained(worlds: int, updates: int, balls: int, seed: int) -> list[tuple[float, bool, bool]]:
-    """Trains while it plays `balls` balls; for each ball its reward, touched, returned."""
+    """Trains on `balls` balls; returns reward, touched and returned of each."""
     played = []
     with closing(TableTennisEnvironment(rig=RigSettings(worlds=worlds), task=TASK)) as environment:
         network: dict[str, Any] = {"net_arch": [64, 64]}
@@ -69,7 +69,7 @@ def trained(worlds: int, updates: int, balls: int, seed: int) -> list[tuple[floa
 
 
 def draw(path: Path, found: Mapping[str, Sequence[Any]]) -> None:
-    """Share of touched balls against the number of played ones: mean and span of the seeds."""
+    """Draws the share of touched balls over played ones: mean and range of the seeds."""
     figure = Figure(figsize=(6, 3.6), layout="constrained")
     axes = figure.subplots()
     for name, runs in found.items():

@@ -1,8 +1,8 @@
-"""The distribution of recorded launches, and how simulated shots compare with recorded ones.
+"""Fits a distribution to recorded launches, and compares simulated with recorded shots.
 
-A shot is 9 numbers at its first row (position, velocity, spin) and 9 more: time and place of its
-bounce, and time, place and velocity at the plane of the racket. A distribution is fitted to the
-launches of one half of a set and compared with the other half, number by number.
+A shot is 9 numbers at the first row (position, velocity, spin) and 9 more: time and place of the
+bounce, and time, place and velocity at the racket's plane. A distribution is fitted to the
+launches of one half of a set, and compared with the other half, number by number.
 """
 
 from __future__ import annotations
@@ -18,9 +18,9 @@ from o80_table_tennis.balls.trajectories import BallTrajectory
 from o80_table_tennis.physics.prediction import predict
 
 PLANE = 0.3
-"""y of the plane that the racket reaches [m]."""
+"""y of the racket's plane [m]."""
 STEP = 0.001
-"""Between two rows of a flight [s]."""
+"""Interval of a flight's rows [s]."""
 NAMES = (
     *("x", "y", "z", "vx", "vy", "vz", "wx", "wy", "wz"),
     *("bounce time", "bounce x", "bounce y"),
@@ -28,28 +28,28 @@ NAMES = (
     *("crossing vx", "crossing vy", "crossing vz"),
 )
 LAUNCH = slice(0, 9)
-"""The numbers of the launch."""
+"""Columns of the launch."""
 
 
 def halves(count: int) -> tuple[FloatArray, FloatArray]:
-    """Numbers of the shots to fit, and of those to test: drawn once and for all."""
+    """Splits shot numbers, in a fixed random order, into those to fit and those to test."""
     shuffled = np.random.default_rng(0).permutation(count)
     return np.sort(shuffled[: count // 2]), np.sort(shuffled[count // 2 :])
 
 
 def fitted(launches: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Mean (9,) and covariance (9, 9) of launches (N, 9)."""
+    """Computes mean (9,) and covariance (9, 9) of launches (N, 9)."""
     return launches.mean(axis=0), np.cov(launches.T)
 
 
 def recorded_numbers(shots: Sequence[BallTrajectory]) -> FloatArray:
-    """(N, 18) of the shots that bounce and then reach the plane, as they were recorded."""
+    """Returns the numbers (N, 18) of recorded shots that bounce and then reach the plane."""
     rows = [_recorded(shot.fit) for shot in shots]
     return np.array([row for row in rows if row is not None])
 
 
 def simulated_numbers(launches: Sequence[Launch]) -> FloatArray:
-    """(N, 18) of launches, as they are predicted to fly."""
+    """Returns the numbers (N, 18) of predicted flights from launches."""
     return np.array([_predicted(launch) for launch in launches])
 
 
@@ -85,7 +85,7 @@ def _predicted(launch: Launch) -> list[float]:
 
 
 def probability_of_same(one: FloatArray, other: FloatArray) -> float:
-    """p-value of the two-sample Kolmogorov-Smirnov test for samples (N,) and (M,)."""
+    """Computes the p-value of the two-sample Kolmogorov-Smirnov test of samples (N,) and (M,)."""
     one, other = np.sort(one), np.sort(other)
     places = np.concatenate([one, other])
     below = [np.searchsorted(each, places, side="right") / len(each) for each in (one, other)]

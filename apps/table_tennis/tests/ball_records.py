@@ -1,4 +1,4 @@
-"""Records of balls for the tests of what they are worth: one by one, and many as one."""
+"""Records of balls for the tests of rewards: single ones, and many stacked."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -26,7 +26,7 @@ def stacked_records(records: Sequence[BallRecord]) -> BallRecord:
 
 
 def stacked(states: Sequence[State]) -> State:
-    """Many states as one."""
+    """Stacks many states to one."""
     names = ("steps", "motion", "pressures", "asked", "racket", "ball", "goal")
     columns: dict[str, Any] = {
         name: np.array([getattr(one, name) for one in states]) for name in names
@@ -50,7 +50,7 @@ landing = st.tuples(
 
 @st.composite
 def records(draw: st.DrawFn) -> BallRecord:
-    """Any record that an episode may end or go on with."""
+    """Strategy: any record of a running or ended episode."""
     touched = draw(st.booleans())
     return BallRecord(
         draw(st.floats(0.0, 5.0)) if not touched else 0.0,
@@ -67,6 +67,6 @@ def records(draw: st.DrawFn) -> BallRecord:
 
 @st.composite
 def states(draw: st.DrawFn) -> State:
-    """Any state of a ball."""
+    """Strategy: any state of a ball."""
     ball = (*draw(place), *draw(place))
     return state_of(draw(records()), ball, draw(st.integers(1, 300)))

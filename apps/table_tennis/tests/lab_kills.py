@@ -1,4 +1,4 @@
-"""Kills each process of a running lab, and checks what the others say: see the table of parts."""
+"""Kills each process of a running lab, and checks the others' reactions by the table of parts."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ from o80_table_tennis.lab.processes import Processes
 
 SUPERVISOR = "supervisor"
 WITHIN = 60.0
-"""For what takes a fraction of a second on a quiet machine [s]."""
+"""Timeout of reactions that take a fraction of a second on a quiet machine [s]."""
 SAYS_WITHIN = 0.2
-"""From the last row of the killed process to the first one that says that it is missing [s]."""
+"""Longest time from the killed process's last row to the first report of its absence [s]."""
 ROWS_ON = 20
-"""Rows that every surviving process must still publish."""
+"""Number of rows that every surviving process must still publish."""
 Rows = Callable[[o80.History], NDArray[np.bool_]]
 
 
@@ -49,13 +49,13 @@ def _no_racket(rows: o80.History) -> NDArray[np.bool_]:
     return np.asarray((seen.reason == CaptureReason.SEEN) & ~seen.racket.visible)
 
 
-# the cameras mark images of a world that stands still, or is gone, by a capture time of 0
+# the cameras mark images of a stopped or ended world by a capture time of 0
 SAID: dict[str, Rows] = {
     NO_IMAGE: lambda rows: np.asarray(rows.extended.reason == TrackerReason.no_image),
     NO_RACKET: _no_racket,
     **{f"`missing.{part}`": _missing(part) for part in RATES | {WORLD: 0.0}},
 }
-"""Selects the rows that say so, by the words of the table."""
+"""Selects the rows that report an absence, by the texts of the table."""
 
 
 class Killer:
@@ -70,9 +70,9 @@ class Killer:
         }
 
     def kill(self, name: str) -> list[str]:
-        """Kills a process, checks the others, starts it again and waits until nobody misses it.
+        """Kills a process, checks the others, restarts it and waits until no part misses it.
 
-        Returns the parts that said too late that it was missing. Raises AssertionError.
+        Returns the parts that reported its absence too late. Raises AssertionError.
         """
         lab, part = self._lab, self._lab.parts[name]
         wait_until(lambda: self._nobody_misses(part), f"{name} is there before it is killed")
@@ -88,7 +88,7 @@ class Killer:
             late = [
                 by
                 for by, says in part.missed.items()
-                # by its own rows: on a machine that is too slow fewer of them come
+                # counted in the part's own rows, which are fewer on a slow machine
                 if rows_until_said(by, says, seen[by], last, ended_at)
                 > SAYS_WITHIN * RATES.get(by, np.inf)
             ]
@@ -96,13 +96,13 @@ class Killer:
         size = self._recording.stat().st_size
         lab.start(name)
         lab.wait_until_running(WITHIN)
-        if name == RECORDER:  # a lab that ends before would end it, too
+        if name == RECORDER:  # an earlier end of the lab would end the process, too
             wait_until(lambda: self._recording.stat().st_size > size, "the recorder goes on")
         wait_until(lambda: self._nobody_misses(part), f"{name} is missed no more")
         return late
 
     def _check_others(self, part: Part, seen: dict[str, o80.Frontend]) -> None:
-        """Rows of those that go on come; none of those that stand still."""
+        """Checks that continuing parts publish rows, and stopped ones none."""
         still = {name: seen[name].published for name in part.halts}
         on = [name for name in self._lab.running if name not in (COUNTERPARTS, *part.halts)]
         assert len(on) == 8 - len(still)
@@ -118,7 +118,7 @@ class Killer:
         return o80.Frontend(self._segments[name], timeout=WITHIN, read_only=True)
 
     def _nobody_misses(self, part: Part) -> bool:
-        """The newest rows of those that would say so do not."""
+        """Whether no newest row reports the absence of a part."""
         for by, says in part.missed.items():
             if says in SAID:
                 with self._observer(by) as observer:
@@ -127,7 +127,7 @@ class Killer:
         return all(self._lab.runs(name) for name in (part.name, ENVIRONMENT))
 
     def wait_for_a_ball(self) -> None:
-        """Until the environment has played another ball, from its launch to its end."""
+        """Waits until the environment has played another ball, from launch to end."""
         with self._observer(ENVIRONMENT) as environment:
             played = environment.latest().extended.balls_played
             wait_until(
@@ -164,7 +164,7 @@ def _first(says: str, observer: o80.Frontend, last: int) -> list[int]:
 
 
 def wait_until(holds: Callable[[], bool], what: str) -> None:
-    """Polls. Raises AssertionError after a long time."""
+    """Polls until `holds` is true. Raises AssertionError after a long time."""
     end = time.monotonic() + WITHIN
     while not holds():
         assert time.monotonic() < end, f"after {WITHIN:g} s this has not happened: {what}"
@@ -172,7 +172,7 @@ def wait_until(holds: Callable[[], bool], what: str) -> None:
 
 
 def started(settings: LabSettings) -> Processes:
-    """The running lab. Raises PartEndedError, o80.TimeoutError."""
+    """Starts a lab. Raises PartEndedError or o80.TimeoutError if a part does not run."""
     settings.recording.unlink(missing_ok=True)
     processes = Processes(lab_parts(settings).values(), settings.folder / "processes")
     try:

@@ -1,4 +1,4 @@
-"""Environments for the tests of them."""
+"""Opens environments for tests."""
 
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from o80_table_tennis.world.arm import MUSCLES
 STILL = np.zeros(MUSCLES, dtype=np.float32)
 PUSH = np.array([1, -1, 0, 0, 0, 0, 0, 0], dtype=np.float32)
 ALL_MODES = list(Pacing)
-PATIENT = TaskSettings(factor=COARSE, max_late=1_000_000)  # however slow the machine is
+PATIENT = TaskSettings(factor=COARSE, max_late=1_000_000)  # independent of the machine's speed
 WAITING = 10.0  # [s]
 
 
@@ -29,7 +29,7 @@ def opened(
 
 
 def played_out(environment: TableTennisEnvironment, action: np.ndarray = STILL) -> list[Any]:
-    """All steps of an episode."""
+    """Plays all steps of an episode."""
     steps: list[Any] = []
     while not steps or not (steps[-1][2] or steps[-1][3]):
         steps.append(environment.step(action))

@@ -1,4 +1,4 @@
-"""Rows as the vision system would record them, files of them, and the recorded ones."""
+"""Simulated rows of the vision system, files with them, and recorded rows."""
 
 import json
 import os
@@ -20,19 +20,19 @@ DATA = Path(os.environ.get("O80_DATA", ROOT.parent / "shared" / "data"))
 
 @cache
 def ball_gun_shots() -> list[BallTrajectory]:
-    """All recorded shots of the ball gun; their fits are made once."""
+    """Loads all recorded shots of the ball gun, and fits them once."""
     return load_trajectories(DATA / "ball_gun_2019")
 
 
 def simulated_shot(rng: np.random.Generator) -> BallTrajectory:
-    """A drawn shot, as cameras would see it."""
+    """Draws a shot, as seen by cameras."""
     return drawn_launch(rng).seen()
 
 
 def crossing(
     position: Numbers, velocity: Numbers, *, axis: int, at: float, spin: Numbers
 ) -> tuple[float, np.ndarray, np.ndarray]:
-    """Time, position and velocity with which a ball first goes through a plane."""
+    """Computes time, position and velocity of a ball's first crossing of a plane."""
     flight = predict(position, velocity, 2.0, spin=spin, period=0.0005)
     rows = np.column_stack([flight.stamps, flight.positions, flight.velocities])
     off = rows[:, 1 + axis] - at
@@ -42,14 +42,14 @@ def crossing(
 
 
 def frames_of_a_reader(rng: np.random.Generator, duration: float) -> np.ndarray:
-    """The newest frame every 10 ms: one or two apart."""
+    """Returns the newest frame every 10 ms: frames are one or two apart."""
     times = 0.010 * np.arange(int(duration / 0.010)) + rng.uniform(0, FRAME_PERIOD)
     frames: np.ndarray = np.floor(times / FRAME_PERIOD).astype(np.int64)
     return frames
 
 
 def frames_at_random(rng: np.random.Generator, duration: float) -> np.ndarray:
-    """One or two apart with equal chance, faster than the usual reader."""
+    """Returns frames one or two apart with equal probability, faster than the usual reader."""
     frames = np.cumsum(rng.integers(1, 3, int(duration / FRAME_PERIOD)))
     return frames[frames * FRAME_PERIOD < duration]
 
@@ -57,7 +57,7 @@ def frames_at_random(rng: np.random.Generator, duration: float) -> np.ndarray:
 def rows_seen(
     rng: np.random.Generator, frames: np.ndarray, *, noise: float, lag: float
 ) -> np.ndarray:
-    """Rows (N, 6) of a simulated shot at `frames`: noisy positions, late and noisy velocities."""
+    """Simulates rows (N, 6) of a shot at `frames`: noisy positions, late and noisy velocities."""
     shot = simulated_shot(rng).resample(0.0005)
     times = np.arange(len(shot.positions)) * shot.period
     at = (frames - frames[0]) * FRAME_PERIOD

@@ -45,9 +45,9 @@ class Options:
 
 
 class BallLauncher:
-    """A launcher of balls that is served over ZeroMQ.
+    """Drives a ball launcher over ZeroMQ.
 
-    Its motors stand still until they are commanded, during a halt, and after the end.
+    The motors are at rest until the first command, during a halt, and after the end.
     """
 
     Config = Options
@@ -99,7 +99,7 @@ class BallLauncher:
     # ------------------------------------------------------------------ verbs
 
     def start(self) -> None:
-        Request(Kind.LAUNCH_BALL).encoded()  # a missing protobuf is told now
+        Request(Kind.LAUNCH_BALL).encoded()  # reports a missing protobuf at the start
         self._zmq = zeromq.required()
         self._context = self._zmq.Context()
         config = self._config
@@ -157,7 +157,7 @@ class BallLauncher:
         self._wanted = State(self._wanted.phi, self._wanted.theta)
 
     def resume(self) -> None:
-        """The actuators go on from the observed state, in which the motors stand still."""
+        """Continues from the observed state, in which the motors are at rest."""
         self._known = self._wanted
 
     def stop(self) -> None:
@@ -179,7 +179,7 @@ class BallLauncher:
             self._warn(f"did not confirm within {seconds:g} s that its motors stop")
 
     def _motors_stop(self, end: int) -> bool:
-        """Whether the launcher confirms it until a time [ns]."""
+        """Whether the launcher confirms stopped motors before `end` [ns]."""
         now = time.monotonic_ns()
         state = State(self._wanted.phi, self._wanted.theta)
         last = self.exchange(Request(Kind.SET_STATE, state), end, max(0, end - now))

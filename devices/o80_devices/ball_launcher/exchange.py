@@ -9,11 +9,11 @@ from o80.base.descriptors import above_standard
 from o80_devices.ball_launcher.messages import DONE, REFUSED, Request
 
 DELIVERED_WITHIN = 1000
-"""The kernel gives up bytes that the launcher has not acknowledged for so long [ms]."""
+"""Timeout after which the kernel drops bytes that were not acknowledged [ms]."""
 
 
 class Outcome(Enum):
-    """How an exchange stands."""
+    """State of an exchange."""
 
     pending = "pending"
     done = "done"
@@ -28,8 +28,8 @@ class Exchange:
     """Sends one request at most once.
 
     A ZeroMQ socket of the usual kind keeps a request for a launcher that appears later. This one
-    accepts it only with a connection (IMMEDIATE), makes no second connection, drops what is unsent
-    when it is closed (LINGER), and does not let the kernel deliver it after a pulled cable is back
+    accepts a request only with a connection (IMMEDIATE), never reconnects, drops unsent bytes when
+    closed (LINGER), and stops the kernel from delivering them after a pulled cable is back
     (TCP_MAXRT). It serves one exchange.
     """
 
@@ -37,7 +37,7 @@ class Exchange:
     def __init__(
         self, zmq: Any, context: Any, address: str, request: Request, deliver_by: int, wait: int
     ) -> None:
-        """deliver_by: when to give up connecting [ns]. wait: for the reply [ns]."""
+        """deliver_by: deadline of the connection [ns]. wait: timeout of the reply [ns]."""
         self._zmq = zmq
         self._content = request.encoded()
         self._deliver_by, self._wait = deliver_by, wait
@@ -56,7 +56,7 @@ class Exchange:
         return self._answer_by is not None
 
     def poll(self, now: int) -> Outcome:
-        """Goes on as far as it can without waiting. now: [ns]"""
+        """Advances the exchange without blocking, and returns the outcome. now: [ns]"""
         if self.outcome is Outcome.pending:
             self.outcome = self._progress(now)
             if self.outcome is not Outcome.pending:
@@ -64,7 +64,7 @@ class Exchange:
         return self.outcome
 
     def close(self) -> None:
-        """Ends the exchange: what was not sent is not sent any more."""
+        """Closes the socket; an unsent request is dropped."""
         if not self._socket.closed:
             self._socket.disable_monitor()
             self._monitor.close(linger=0)
@@ -74,7 +74,7 @@ class Exchange:
         if self._answer_by is None and not self._send(now):
             return Outcome.pending if now < self._deliver_by else Outcome.not_delivered
         assert self._answer_by is not None
-        lost = self._monitor.poll(0) > 0  # asked first: a reply may precede the loss
+        lost = self._monitor.poll(0) > 0  # polled first: a reply may precede the loss
         try:
             reply = self._socket.recv(self._zmq.NOBLOCK)
         except self._zmq.Again:

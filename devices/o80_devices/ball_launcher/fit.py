@@ -1,12 +1,12 @@
 """Fits the launch model to recorded shots: `python -m o80_devices.ball_launcher.fit FILES`.
 
-Nine numbers are found by damped least squares: the flights of the model's mean balls, with their
-bounces on the table, come as near as possible to all recorded positions. They are fitted to one
+Damped least squares fits nine numbers of the model: the simulated flights, bounces included, must
+be as close as possible to all recorded positions. The numbers are fitted to one
 half of the shots and tested on the other half. For the scatter, each shot is then fitted alone by
 its speed, azimuth, altitude and spin.
 
-The constants of `LAUNCH_MODEL` are those of the 25 published shots (`mn5008_no_spin`,
-`mn5008_topspin`), the scatter rounded. Its ranges of the angles are assumed.
+The constants of `LAUNCH_MODEL` are fitted to the 25 published shots (`mn5008_no_spin`,
+`mn5008_topspin`); the scatter is rounded. The ranges of the angles are assumed.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from o80_devices.ball_launcher.recorded_shots import Setting, Shot, recorded_sho
 from o80_devices.cameras.rig import Rig, Table
 
 TABLE = Table(middle=(1.38, 0.0, 0.742), half=(1.37, 0.7625))
-"""In the frame of the launcher; its height is that of the recorded bounces."""
+"""Table in the frame of the launcher; the height is read from the recorded bounces."""
 SCALES = {
     "y": 0.01,
     "z": 0.01,
@@ -42,7 +42,7 @@ SCALES = {
     "spin": 10.0,
     "spin_gain": 0.01,
 }
-"""The fitted numbers, `y` and `z` of the muzzle among them, with their typical sizes."""
+"""Fitted numbers and their typical sizes; `y` and `z` are the place of the muzzle."""
 START = LaunchModel(
     muzzle=(0.0, 0.0, 1.0),
     azimuth=0.0,
@@ -53,7 +53,7 @@ START = LaunchModel(
     spin=0.0,
     spin_gain=0.0,
 )
-"""A rough guess."""
+"""Rough initial guess of the fit."""
 ALONE = np.array([0.05, 0.01, 0.01, 10.0, 10.0, 10.0])
 """Typical changes from shot to shot: speed [m/s], azimuth, altitude [rad], spin [rad/s]. The value
 for the spin is also a prior, because a short flight says little about the spin."""
@@ -61,22 +61,22 @@ NOISE = 0.005
 """Noise of a recorded position [m]."""
 SCATTERS = ("speed_scatter", "azimuth_scatter", "altitude_scatter", "spin_scatter")
 LOW = 0.05
-"""Rows up to the first one so near to the table are surely before the bounce [m]."""
+"""Rows before the first one below this height above the table precede the bounce [m]."""
 PERIOD = 0.001
 """Period of the computed flights [s]."""
 LEAD = 0.2
-"""The first row of a shot is at most so long after the launch [s]."""
+"""Longest time from the launch to the first row of a shot [s]."""
 FIRST_ROWS = 10
-"""By which the time of the launch is found."""
+"""Number of rows from which the time of the launch is estimated."""
 SLOPE_SHARE = 0.05
-"""Change of a number for a difference, as a share of its scale."""
+"""Step of the numeric derivatives, as a share of a number's scale."""
 CLOSE_ENOUGH = 1e-3
-"""The search ends when no number moves by more than this share of its scale."""
+"""Convergence limit: largest change of a number, as a share of its scale."""
 MAX_ROUNDS = 30
 
 
 def fitted(shots: Sequence[Shot], start: LaunchModel = START) -> LaunchModel:
-    """The model whose balls fly as near as possible to the shots. Raises InvalidArgument."""
+    """Fits the model to shots. Raises InvalidArgument if their motor settings are too few."""
     speeds = np.array([shot.setting.speeds for shot in shots])
     faster = speeds[:, :2].mean(axis=1) - speeds[:, 2]  # the upper motors
     if np.ptp(faster) == 0.0 or np.linalg.matrix_rank(speeds @ [[1, 0], [1, 0], [0, 1]]) < 2:
@@ -84,7 +84,7 @@ def fitted(shots: Sequence[Shot], start: LaunchModel = START) -> LaunchModel:
             "the shots must have at least two settings of the motors, which differ in the speed of "
             "the upper ones relative to the lower one"
         )
-    # a bounce slides or grips, which makes local minima: first without it
+    # a bounce slides or grips, which causes local minima: the first fit leaves it out
     before = [_before_bounce(shot) for shot in shots]
     return _improved(_improved(start, before, None), shots, TABLE)
 
@@ -106,14 +106,14 @@ def _improved(start: LaunchModel, shots: Sequence[Shot], table: Table | None) ->
 
 
 def scatter(model: LaunchModel, shots: Sequence[Shot]) -> FloatArray:
-    """(4,) Standard deviations from shot to shot, in the order of SCATTERS."""
+    """Returns the standard deviations from shot to shot (4,), in the order of SCATTERS."""
     found = np.array([_solved(partial(_missed_alone, model, shot), ALONE) for shot in shots])
     spin = np.sqrt(found[:, 3:].var(axis=0).mean())
     return np.array([*found[:, :3].std(axis=0), spin])
 
 
 def _missed_alone(model: LaunchModel, shot: Shot, moves: FloatArray) -> FloatArray:
-    """Errors of a shot whose launch differs from the mean by `moves`, in standard deviations."""
+    """Residuals in standard deviations, for a launch that differs from the mean by `moves`."""
     ball = model.launch(shot.setting.phi, shot.setting.theta, shot.setting.speeds)
     x, y, z = ball.velocity
     speed = float(np.linalg.norm(ball.velocity))
@@ -128,7 +128,7 @@ def _missed_alone(model: LaunchModel, shot: Shot, moves: FloatArray) -> FloatArr
 
 
 def _solved(missed: Callable[[FloatArray], FloatArray], scales: FloatArray) -> FloatArray:
-    """The numbers (n,) for which the sum of the squares of `missed` is smallest, from 0 on."""
+    """Returns the numbers (n,) with the least sum of squares of `missed`, starting from 0."""
     numbers = np.zeros(len(scales))
     misses = missed(numbers)
     damping = 1.0
@@ -137,7 +137,7 @@ def _solved(missed: Callable[[FloatArray], FloatArray], scales: FloatArray) -> F
         slopes = [(missed(each) - misses) / SLOPE_SHARE for each in changed]
         matrix = np.stack(slopes, axis=1)
         square, right = matrix.T @ matrix, -matrix.T @ misses
-        # less damping after each better step, more until there is one
+        # less damping after an improving step, more damping until one is found
         while damping < 1e12:
             step = np.linalg.solve(square + damping * np.diag(np.diag(square)), right)
             tried = numbers + scales * step
@@ -154,14 +154,14 @@ def _solved(missed: Callable[[FloatArray], FloatArray], scales: FloatArray) -> F
 
 
 def halves(shots: Sequence[Shot]) -> tuple[list[Shot], list[Shot]]:
-    """The shots to fit and those to test, in an order drawn once and for all."""
+    """Splits the shots, in a fixed random order, into those to fit and those to test."""
     order = np.random.default_rng(0).permutation(len(shots))
     middle = (len(shots) + 1) // 2
     return [shots[i] for i in order[:middle]], [shots[i] for i in order[middle:]]
 
 
 def distances(model: LaunchModel, shots: Sequence[Shot]) -> list[FloatArray]:
-    """For each shot the distance of its rows (N,) from the flight of the model's mean ball [m]."""
+    """Distances of each shot's rows (N,) from the mean flight of the model [m]."""
     rows = np.linalg.norm(_misses(model, shots).reshape(-1, 3), axis=1)
     return np.split(rows, np.cumsum([len(shot.stamps) for shot in shots])[:-1])
 
@@ -178,7 +178,7 @@ def _model(start: LaunchModel, numbers: FloatArray) -> LaunchModel:
 
 
 def _misses(model: LaunchModel, shots: Sequence[Shot], table: Table | None = TABLE) -> FloatArray:
-    """From all recorded positions to the flights, one after the other [m]."""
+    """Concatenates the differences of all shots, flight minus recorded position [m]."""
     flights: dict[Setting, FloatArray] = {}
     for setting in {shot.setting for shot in shots}:
         mine = [shot for shot in shots if shot.setting == setting]
@@ -188,7 +188,7 @@ def _misses(model: LaunchModel, shots: Sequence[Shot], table: Table | None = TAB
 
 
 def _flight(ball: Launch, duration: float, table: Table | None = TABLE) -> FloatArray:
-    """Positions (T, 3) of a ball, one each PERIOD [m]."""
+    """Computes the positions (T, 3) of a ball, one for each PERIOD [m]."""
     law = Rig(cameras=(), table=table).law()
     position, velocity, spin = ball.position, ball.velocity, ball.spin
     positions = [position]
@@ -199,7 +199,7 @@ def _flight(ball: Launch, duration: float, table: Table | None = TABLE) -> Float
 
 
 def _missed(flight: FloatArray, shot: Shot) -> FloatArray:
-    """From each position (N, 3) to the flight, whose begin is found by the first rows."""
+    """Returns flight minus position for each row (N, 3); the first rows give the launch time."""
     times = PERIOD * np.arange(len(flight))
 
     def at(moments: FloatArray) -> FloatArray:
@@ -216,7 +216,7 @@ def _missed(flight: FloatArray, shot: Shot) -> FloatArray:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
+    """Runs the command line."""
     parser = argparse.ArgumentParser(
         prog="python -m o80_devices.ball_launcher.fit",
         description="Fits the launch model to recorded shots.",

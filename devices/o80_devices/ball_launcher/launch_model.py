@@ -1,10 +1,10 @@
-"""How a ball leaves the launcher: place, velocity and spin, from angles and motor speeds.
+"""Model of the launcher: position, velocity and spin of a ball from angles and motor speeds.
 
 In the frame of the launcher: the origin below the muzzle on the ground plane of the recording, x
-forward, y to the left, z up. The wheels touch the ball at 120 degrees. Their speeds give its speed,
-their differences its spin. The numbers are fitted to 13 of 25 recorded shots (see fit.py), of two
-settings of the wheels and one of the angles. How far the angles turn the launcher is not in the
-recordings, see `LaunchModel.azimuth_range`.
+forward, y to the left, z up. The wheels touch the ball at 120 degrees. The sum of the
+wheel speeds sets the ball's speed, their differences the spin. The numbers are fitted to 13 of 25
+recorded shots (see fit.py) with two wheel settings and one setting of the angles. The recordings
+do not show the range of the angles, see `LaunchModel.azimuth_range`.
 """
 
 from __future__ import annotations
@@ -17,12 +17,12 @@ import numpy as np
 from o80.base.arrays import FloatArray
 
 HALF_CHORD = math.sin(math.radians(60.0))
-"""How far the upper wheels touch the ball to the side, in radii of the ball."""
+"""Sideways distance of the upper wheels' contact points, in radii of the ball."""
 
 
 @dataclass(frozen=True, eq=False)
 class Launch:
-    """A ball as it leaves the launcher."""
+    """State of a ball at the muzzle."""
 
     position: FloatArray
     """(3,) [m]"""
@@ -32,7 +32,7 @@ class Launch:
     """(3,) [rad/s]"""
 
     def placed(self, position: tuple[float, float, float], yaw: float) -> Launch:
-        """In a world where the launcher stands at `position` [m] and is turned by `yaw` [rad]."""
+        """Transforms the launch to the world frame. position: [m]. yaw: [rad]."""
         c, s = math.cos(yaw), math.sin(yaw)
         turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
         return Launch(
@@ -42,36 +42,36 @@ class Launch:
 
 @dataclass(frozen=True)
 class LaunchModel:
-    """The launcher, by numbers."""
+    """Parameters of the launcher."""
 
     muzzle: tuple[float, float, float] = (0.0, -0.001, 1.057)
     """[m]"""
     azimuth: float = 0.0116
-    """With phi = 0.5 [rad]."""
+    """Azimuth at phi = 0.5 [rad]."""
     altitude: float = 0.3557
-    """With theta = 0.5 and equal wheels [rad]."""
+    """Altitude at theta = 0.5 with equal wheel speeds [rad]."""
     lift: float = 3.0e-5
-    """Altitude for each revolution a minute that the upper wheels are faster [rad min]."""
+    """Altitude per excess speed of the upper wheels [rad min]."""
     top_gain: float = 1.595e-3
-    """Speed of the ball for that of each upper wheel [m/s min]."""
+    """Ball speed per speed of each upper wheel [m/s min]."""
     bottom_gain: float = 1.148e-3
-    """Speed of the ball for that of the lower wheel [m/s min]."""
+    """Ball speed per speed of the lower wheel [m/s min]."""
     spin: float = 69.0
-    """Top spin with equal wheels [rad/s]."""
+    """Top spin at equal wheel speeds [rad/s]."""
     spin_gain: float = 0.0787
-    """Spin for a difference of the wheels [rad/s min]."""
+    """Spin per difference of the wheel speeds [rad/s min]."""
     azimuth_range: float = 0.5
-    """Between phi = 0 and 1: assumed, not fitted [rad]."""
+    """Range of the azimuth from phi = 0 to 1: assumed, not fitted [rad]."""
     altitude_range: float = 0.5
-    """Between theta = 0 and 1: assumed, not fitted [rad]."""
+    """Range of the altitude from theta = 0 to 1: assumed, not fitted [rad]."""
     speed_scatter: float = 0.03
-    """Standard deviation from shot to shot, as the next ones [m/s]."""
+    """Standard deviation of the speed from shot to shot [m/s]."""
     azimuth_scatter: float = 0.005
     """[rad]"""
     altitude_scatter: float = 0.006
     """[rad]"""
     spin_scatter: float = 10.0
-    """About each axis [rad/s]."""
+    """Standard deviation of the spin about each axis [rad/s]."""
 
     def launch(
         self,
@@ -80,8 +80,8 @@ class LaunchModel:
         speeds: tuple[float, float, float],
         rng: np.random.Generator | None = None,
     ) -> Launch:
-        """A ball. speeds: of the motors top left, top right, bottom [1/min]. rng: of the scatter,
-        None for the mean ball."""
+        """Computes a launch. speeds: motors top left, top right, bottom [1/min]. rng: source of
+        the scatter; None: no scatter."""
         scatter = np.zeros(6) if rng is None else rng.standard_normal(6)
         left, right, bottom = speeds
         upper = (left + right) / 2
@@ -92,7 +92,7 @@ class LaunchModel:
         speed = self.top_gain * (left + right) + self.bottom_gain * bottom
         speed += self.speed_scatter * scatter.item(2) if speed > 0.0 else 0.0
 
-        # a ball that is thrown forward with top spin turns about +y, to the left with it about +z
+        # top spin turns a forward ball about +y; spin about +z turns it to the left
         forward = np.array([math.cos(azimuth), math.sin(azimuth), 0.0])
         left_of = np.array([-forward[1], forward[0], 0.0])
         up = np.array([0.0, 0.0, 1.0])
@@ -106,4 +106,4 @@ class LaunchModel:
 
 
 LAUNCH_MODEL = LaunchModel()
-"""Fitted to the recorded shots."""
+"""Model fitted to the recorded shots."""

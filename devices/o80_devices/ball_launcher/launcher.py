@@ -1,10 +1,10 @@
-"""The protocol of the launcher as a state machine that its user steps; it never blocks.
+"""Protocol of the launcher as a state machine that the caller steps; no call blocks.
 
-One exchange runs at a time. A launch is sent only after the launcher has confirmed the state, and
-at most once. If the outcome of a launch is unknown, no other launch is sent for the longest time
-that a launch takes, nor before two states have been confirmed after that time. One confirmation
-would not suffice: the server takes requests of several connections in turn, so only at the second
-reply does it hold no older request. New states are sent also in that time: a halt must stop the
+One exchange runs at a time. A launch is sent at most once, and only after the launcher has
+confirmed the state. If the outcome of a launch is unknown, the next launch waits for the longest
+duration of a launch, and then for two confirmed states. One confirmation does not suffice: the
+server serves several connections in turn, and only its second reply proves that no older request
+is queued. New states are sent during that wait, too, because a halt must stop the
 motors.
 """
 
@@ -19,7 +19,7 @@ from o80_devices.ball_launcher.exchange import Exchange, Outcome
 from o80_devices.ball_launcher.messages import Kind, Request, State
 
 SECOND = 1_000_000_000  # [ns]
-CONFIRMATIONS = 2  # of the state, after which no older request can be waiting
+CONFIRMATIONS = 2  # confirmed states after which no older request can be queued
 
 
 class Status(IntEnum):
@@ -33,16 +33,16 @@ class Status(IntEnum):
     unknown = 4
     """A launch was not answered: it may still be under way."""
     refused = 5
-    """It has refused the state, which is sent again."""
+    """The launcher has refused the state, which is sent again."""
 
 
 class LastLaunch(IntEnum):
-    """How the last launch ended."""
+    """Outcome of the last launch."""
 
     none = 0
     completed = 1
     rejected = 2
-    """By the launcher: no ball, for example."""
+    """Refused by the launcher, for example because it has no ball."""
     not_sent = 3
     timed_out = 4
     """Sent and not answered: a ball may have been launched."""
@@ -50,26 +50,26 @@ class LastLaunch(IntEnum):
 
 @dataclass(frozen=True)
 class Timing:
-    """How long things may take [ns]."""
+    """Timeouts and intervals [ns]."""
 
     deliver: int = SECOND // 2
-    """Until a connection is there for a request."""
+    """Timeout of the connection for a request."""
     state: int = 5 * SECOND
-    """A change of state."""
+    """Timeout of a change of state."""
     launch: int = 15 * SECOND
-    """The longest that a launch takes."""
+    """Longest duration of a launch."""
     retry: int = SECOND
-    """Between attempts to set a state that was refused or not answered."""
+    """Interval between attempts to set a state that was refused or not answered."""
 
 
 class Wire(Protocol):
-    """Where exchanges begin."""
+    """Opens exchanges with the launcher."""
 
     def exchange(self, request: Request, deliver_by: int, wait: int) -> Exchange: ...
 
 
 class Launcher:
-    """Keeps the launcher in the wanted state, and launches when asked."""
+    """Keeps the launcher in the wanted state, and launches on request."""
 
     def __init__(self, wire: Wire, timing: Timing = Timing()) -> None:
         self._wire = wire
@@ -81,14 +81,14 @@ class Launcher:
         self._to_confirm = CONFIRMATIONS
         self._connected = self._began_unknown = False
         self._requested = False
-        self._frozen: State | None = None  # the wanted state when the launch was asked for
+        self._frozen: State | None = None  # the wanted state when the launch was sent
         self._retry_at = self._unknown_until = 0
         self._refused: State | None = None
         self._end: tuple[LastLaunch, str] | None = None
         self.last_launch = LastLaunch.none
         self.counts = dict.fromkeys(LastLaunch, 0)
         self.launched_at = 0
-        """When the last launch was confirmed [ns]."""
+        """Time at which the last launch was confirmed [ns]."""
 
     # ------------------------------------------------------------------ what is known
 
@@ -106,11 +106,11 @@ class Launcher:
 
     @property
     def confirmed(self) -> State | None:
-        """The state that the launcher has; None: not known."""
+        """Confirmed state of the launcher; None: unknown."""
         return self._confirmed if self._connected else None
 
     def unknown_for(self, now: int) -> int:
-        """How long no launch will be sent [ns]."""
+        """Time until the next launch may be sent [ns]."""
         return max(0, self._unknown_until - now)
 
     def _is_confirmed(self) -> bool:
@@ -119,7 +119,7 @@ class Launcher:
     # ------------------------------------------------------------------ launches
 
     def ask(self, now: int) -> None:
-        """Asks for a launch. Raises RequestRejected if a launch is impossible now."""
+        """Requests a launch. Raises RequestRejected if a launch is impossible now."""
         status = self.status(now)
         if self._requested or status is Status.launching:
             raise RequestRejected("a launch is under way: wait until it has ended")
@@ -135,12 +135,12 @@ class Launcher:
         self._requested, self._frozen, self._end = True, None, None
 
     def cancel(self) -> None:
-        """Cancels a launch that was not sent yet; a launch that was sent goes on."""
+        """Cancels a launch that was not sent yet; a launch that was sent continues."""
         if self._requested and not self._is_launching():
             self._requested = False
 
     def ended(self) -> tuple[LastLaunch, str] | None:
-        """How the launch that was asked for ended, once."""
+        """Returns the outcome of the requested launch, once; None: it has not ended."""
         end, self._end = self._end, None
         return end
 
@@ -155,7 +155,7 @@ class Launcher:
     # ------------------------------------------------------------------ a step
 
     def step(self, now: int, connected: bool, wanted: State) -> None:
-        """Goes on with what is under way, and begins what comes next. now: [ns]"""
+        """Polls the open exchange, and begins the next one when it has ended. now: [ns]"""
         if not connected:
             self._forget_state()
         self._connected, self._wanted = connected, wanted.rounded()
@@ -175,7 +175,7 @@ class Launcher:
         return is_sent or self._to_confirm == CONFIRMATIONS
 
     def close(self) -> None:
-        """Ends what is under way."""
+        """Closes the open exchange."""
         if self._exchange is not None:
             self._exchange.close()
             self._exchange = None

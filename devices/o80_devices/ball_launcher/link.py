@@ -1,4 +1,4 @@
-"""Whether the launcher is connected: a connection of its own that carries heartbeats only."""
+"""Detects whether the launcher is connected, over a separate connection for heartbeats."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ RECONNECT = 50  # [ms]
 
 
 class Link:
-    """Watches the connection. A pulled cable shows as missing heartbeats."""
+    """Monitors the connection. Missing heartbeats reveal a pulled cable."""
 
     def __init__(self, zmq: Any, context: Any, address: str, timeout: float) -> None:
-        """timeout: without a heartbeat [s]; 0: no heartbeats, for servers older than ZMTP 3.1."""
+        """timeout: longest heartbeat gap [s]; 0: no heartbeats, for servers older than ZMTP 3.1."""
         self._zmq = zmq
         self._up = False
         self._socket = context.socket(zmq.REQ)
@@ -36,10 +36,10 @@ class Link:
             ) from None
 
     def is_up(self) -> bool:
-        """Whether the launcher is connected, and was at every moment since the last call.
+        """Whether the launcher has been connected without a break since the last call.
 
-        A launcher that has started again between two calls has lost its state, so that one call
-        must return False although the connection stands.
+        A launcher that restarted between two calls has lost its state: one call must then return
+        False although the connection is up again.
         """
         from zmq.utils.monitor import recv_monitor_message
 

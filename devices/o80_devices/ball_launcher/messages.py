@@ -46,7 +46,7 @@ class State:
     bottom_motor: float = 0.0
 
     def rounded(self) -> State:
-        """As the protocol carries it: in floats of 32 bits."""
+        """Rounds all numbers to 32-bit floats, as the protocol does."""
         return State(*(float(np.float32(value)) for value in astuple(self)))
 
 
@@ -58,7 +58,7 @@ class Request:
     state: State | None = None
 
     def encoded(self) -> bytes:
-        """The bytes of the message."""
+        """Encodes the message."""
         message = _types()["Request"]()
         message.request = int(self.kind)
         if self.state is not None:
@@ -69,7 +69,7 @@ class Request:
 
     @classmethod
     def decoded(cls, content: bytes) -> Request:
-        """The message of these bytes. Raises ValueError if they are none."""
+        """Decodes a message. Raises ValueError if the bytes are no message."""
         from google.protobuf.message import DecodeError
 
         message = _types()["Request"]()

@@ -34,17 +34,17 @@ class Shot:
     name: str
     setting: Setting
     stamps: NDArray[np.float64]
-    """(N,) since the first row [s]; the time of the launch is not recorded."""
+    """(N,) time since the first row [s]; the time of the launch is not recorded."""
     positions: NDArray[np.float64]
     """(N, 3) [m]"""
 
 
 def recorded_shots(paths: Sequence[Path]) -> list[Shot]:
-    """The shots of files, and of all files in folders, in the order of their names.
+    """Reads the shots of files, and of all files in folders, sorted by name.
 
     A file has groups originals/<i>/{launch_param (5,), positions (N, 3), time_stamps (N,)}; the
-    launch parameters are phi, theta and the three motor speeds. Raises InvalidArgument or
-    o80.MissingExtra.
+    launch parameters are phi, theta and the three motor speeds. Raises InvalidArgument if a
+    file cannot be read or no shot is found, o80.MissingExtra without h5py.
     """
     h5py = needed("h5py", "recordings", "reading recorded shots", package="o80-devices")
     shots = [shot for path in paths for file in _files(path) for shot in _read(h5py, file)]

@@ -1,4 +1,4 @@
-"""From the actuation of a motor to its speed and back, by the nominal table of the launcher."""
+"""Converts the actuation of a motor to its speed and back, by the launcher's nominal table."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def speed_of(actuation: float) -> float:
 
 
 def actuation_of(speed: float) -> float:
-    """Actuation that gives a speed [1/min]. Raises ValueError for one that no actuation gives."""
+    """Actuation for a speed [1/min]. Raises ValueError for a speed out of range."""
     if not 0.0 <= speed <= SPEEDS[-1]:
         raise ValueError(f"the speed must be between 0 and {SPEEDS[-1]:g} 1/min, got {speed:g}")
     return float(np.interp(speed, SPEEDS, ACTUATIONS))

@@ -9,18 +9,18 @@ import numpy as np
 
 
 class Reason(IntEnum):
-    """Why a row has no ball."""
+    """Reason why a row has no ball."""
 
     seen = 0
     """The row has a ball."""
     no_image = 1
-    """No new images came: the cameras stand still, are late, or are gone."""
+    """No new images: the cameras are stopped, late, or disconnected."""
     not_found = 2
-    """Fewer than two cameras see anything like a ball."""
+    """Fewer than two cameras detect a ball."""
     no_agreement = 3
-    """Cameras see something, but not at one place in the world."""
+    """The detections of the cameras do not agree on a place."""
     unexpected = 4
-    """The sighting does not continue the flight; once more, and it is a hit or another ball."""
+    """The sighting does not continue the flight; a second one means a hit or another ball."""
 
 
 EXTENDED: dict[str, Any] = {

@@ -17,14 +17,14 @@ from o80_devices.ball_tracking.tracker import Tracker, TrackerOptions
 from o80_devices.cameras.image_source import ImageSource
 from o80_devices.cameras.rig import Rig, four_cameras
 
-MAX_AHEAD = 4  # periods by which images may come before they are due, in all
+MAX_AHEAD = 4  # limit of the accumulated time by which images come early [periods]
 
 
 class BallTracker:
-    """Follows the ball that the cameras of a rig see: one row for each moment with images.
+    """Tracks the ball in the images of a rig; publishes one row for each moment with images.
 
-    A row without a ball has capture_time 0, NaN for numbers, and the reason. After the request
-    `forget` the next ball is another one, as where a simulation puts its ball somewhere else.
+    A row without a ball has capture_time 0, NaN for numbers, and the reason. The request
+    `forget` starts a new ball, for example after a simulation has teleported its ball.
     """
 
     extended = EXTENDED
@@ -55,13 +55,13 @@ class BallTracker:
         self._source.attach(self._config.timeout)
 
     def wait(self, due: int) -> None:
-        """Until new images are there, or are late by a quarter of a period."""
+        """Waits for new images, at most until a quarter of a period after `due` [ns]."""
         now = time.monotonic_ns()
         self._period = max(self._period, due - now)
         self._source.wait(max(0, due + self._period // 4 - now) * 1e-9)
         now = time.monotonic_ns()
-        # cameras that make up for lost time would drive the loop ahead of its clock, which is a
-        # fault: it then waits for its own clock, and takes the newest images
+        # cameras that catch up would drive the loop ahead of its clock, which is a fault: the
+        # loop then waits for its own clock, and reads the newest images
         self._ahead = max(0, self._ahead + due - now)
         if self._ahead > MAX_AHEAD * self._period and due > now:
             time.sleep((due - now) * 1e-9)
@@ -84,7 +84,7 @@ class BallTracker:
 
 
 def fill(reading: Reading, ball: Tracked, image_time: int, error: int = 0) -> None:
-    """Writes the row. image_time: 0 without images [ns]. error: of this time [ns]."""
+    """Writes the row. image_time: 0 without images [ns]. error: uncertainty of image_time [ns]."""
     row = reading.extended
     row["capture_error"] = error if ball.seen else 0
     row["capture_time"] = ball.time if ball.seen else 0

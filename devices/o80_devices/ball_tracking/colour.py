@@ -1,4 +1,4 @@
-"""The probability that a colour is that of the ball: a table over 32 x 32 x 32 colours."""
+"""Probability that a pixel of a colour shows the ball: a table of 32 x 32 x 32 colours."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ColourTable = NDArray[np.uint8]
 
 
 def _levels() -> NDArray[np.float64]:
-    """(32, 32, 32, 3) The colours of the table, each value 0 to 1."""
+    """Returns the colours of the table (32, 32, 32, 3), from 0 to 1."""
     middle = (np.arange(LEVELS) + 0.5) / LEVELS
     return np.stack(np.meshgrid(middle, middle, middle, indexing="ij"), axis=-1)
 
@@ -23,10 +23,10 @@ def _levels() -> NDArray[np.float64]:
 def of_hue(
     hue: float = 28.0, width: float = 16.0, saturation: float = 0.45, value: float = 0.3
 ) -> ColourTable:
-    """The table of a saturated colour: by default the orange of a table-tennis ball.
+    """Builds the table of a saturated colour; the default is the orange of a table-tennis ball.
 
-    hue, width: its middle, and how far from it the probability is one half [degrees].
-    saturation, value: the least that a ball has.
+    hue, width: hue of the ball, and difference at which the probability is one half [degrees].
+    saturation, value: least values of a ball.
     """
     rgb = _levels()
     largest, smallest = rgb.max(-1), rgb.min(-1)
@@ -48,10 +48,10 @@ def of_hue(
 def of_examples(
     ball: NDArray[np.uint8], others: NDArray[np.uint8], share: float = 0.1
 ) -> ColourTable:
-    """Table from example pixels: (n, 3) of balls, and (m, 3) of everything else.
+    """Builds the table from example pixels: (n, 3) of balls, (m, 3) of everything else.
 
-    share: fraction of ball pixels where the tracker searches. Colours near to the examples count
-    as well, so that a few hundred pixels are enough. Raises InvalidArgument without pixels.
+    share: fraction of ball pixels in a searched region. Similar colours count, too, so
+    that a few hundred pixels are enough. Raises InvalidArgument without pixels.
     """
     if len(ball) == 0 or len(others) == 0:
         raise InvalidArgument(
@@ -64,7 +64,7 @@ def of_examples(
 
 
 def _density(pixels: NDArray[np.uint8]) -> NDArray[np.float64]:
-    """Share of each colour, spread over its neighbours."""
+    """Frequency of each colour, smoothed over neighbouring colours."""
     index = (np.asarray(pixels, np.uint8).reshape(-1, 3) >> 3).astype(np.intp)
     count = np.zeros((LEVELS,) * 3)
     np.add.at(count, tuple(index.T), 1.0)
@@ -74,7 +74,7 @@ def _density(pixels: NDArray[np.uint8]) -> NDArray[np.float64]:
             padded = np.pad(count, [(1, 1) if i == axis else (0, 0) for i in range(3)], "edge")
             parts = [np.take(padded, range(k, k + LEVELS), axis) for k in range(3)]
             count = sum(w * part for w, part in zip(kernel, parts, strict=True))
-    # what no example shows is most likely not the ball
+    # colours without an example are most likely not the ball
     density: NDArray[np.float64] = (count + 1e-6) / count.sum()
     return density
 
@@ -84,7 +84,7 @@ def save(table: ColourTable, path: Path | str) -> None:
 
 
 def load(path: Path | str) -> ColourTable:
-    """Raises InvalidArgument."""
+    """Reads a table. Raises InvalidArgument if the file holds none."""
     try:
         table: ColourTable = np.load(path, allow_pickle=False)
     except (OSError, ValueError) as error:

@@ -1,7 +1,7 @@
-"""Where to look in each image, and what is found there.
+"""Search regions in the images of all cameras, and detections inside them.
 
-While a ball is followed, each camera looks around the place where the ball will be. Otherwise it
-looks around what it saw before, and one camera at a time searches its whole image, at every
+While a ball is tracked, the expected place of the ball is searched in each image. Otherwise the
+earlier detections are searched, and one camera at a time searches the whole image at every
 third pixel of every third row.
 """
 
@@ -19,15 +19,15 @@ from o80_devices.cameras.rig import Rig
 STEP = 3
 """Step of a search of a whole image [px]."""
 AROUND = 24
-"""Half the side of a region, besides what the ball's size and uncertainty ask for [px]."""
+"""Margin around a region, added for the ball's size and uncertainty [px]."""
 LARGEST = 120
-"""Most that half a side grows to [px]."""
+"""Limit of half a region's side [px]."""
 MAX_PLACES = 3
-"""Places in an image that are looked at again."""
+"""Largest number of places that are searched again in the next image."""
 
 
 class Detector:
-    """Finds what may be the ball in the images of all cameras."""
+    """Finds candidates of the ball in the images of all cameras."""
 
     def __init__(self, rig: Rig, colours: NDArray[np.uint8]) -> None:
         self._cameras = rig.models()
@@ -42,7 +42,7 @@ class Detector:
     def detect(
         self, images: Sequence[Image | None], expected: FloatArray | None, spread: float
     ) -> FloatArray:
-        """(n, 4): camera, x and y [px], area [px^2]. spread: of the expected place [m]."""
+        """Returns (n, 4): camera, x and y [px], area [px^2]. spread: error of `expected` [m]."""
         searching = self._next if expected is None else None
         if expected is None:
             self._next = (self._next + 1) % len(self._cameras)
@@ -84,7 +84,7 @@ class Detector:
         if searches:
             coarse = self._finder.find(image, step=STEP, min_area=1.0)
             places = [(x, y) for x, y, *_ in coarse[:MAX_PLACES]] + places
-        # a place once, though the search and the image before found it
+        # drops places that both the search and the previous image found
         kept: list[tuple[float, float]] = []
         for x, y in places:
             if all(abs(x - a) + abs(y - b) > AROUND for a, b in kept):
@@ -94,7 +94,7 @@ class Detector:
     def _blobs(
         self, image: Image, regions: list[tuple[int, int, int, int]]
     ) -> list[tuple[float, float, float, float]]:
-        """Weight, x, y and area of blobs, the largest weight first, each once."""
+        """Returns weight, x, y and area of the blobs, largest weight first, without duplicates."""
         found: list[tuple[float, float, float, float]] = []
         for region in regions:
             for x, y, area, weight, cut in self._finder.find(image, region).tolist():

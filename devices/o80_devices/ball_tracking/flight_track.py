@@ -1,4 +1,4 @@
-"""Number and flight of the ball: the filter, and what to do with unexpected positions."""
+"""Filters the flight of the ball, and decides whether an unexpected position is a new ball."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from o80_devices.ball_tracking.ball_row import Reason
 
 NANOSECOND = 1e-9
 FASTEST = 20.0
-"""No ball moves faster [m/s]."""
+"""Upper limit of a ball's speed [m/s]."""
 SLACK = 0.05
-"""Added to how far a ball can have come [m]."""
+"""Tolerance added to the distance that a ball can have travelled [m]."""
 
 
 def _nothing() -> FloatArray:
@@ -23,25 +23,25 @@ def _nothing() -> FloatArray:
 
 @dataclass(frozen=True)
 class Tracked:
-    """The ball at a time, or why there is none; numbers are then NaN."""
+    """State of the ball, or the reason why there is none; numbers are then NaN."""
 
     time: int
     """[ns]"""
     reason: Reason
     ball: int = 0
-    """Number of the ball, from 1; another ball has another number. 0: none."""
+    """Number of the ball, from 1; 0: none."""
     position: FloatArray = field(default_factory=_nothing)
-    """(3,) by the filter [m]."""
+    """(3,) filtered [m]."""
     velocity: FloatArray = field(default_factory=_nothing)
     """(3,) [m/s]"""
     spin: FloatArray = field(default_factory=_nothing)
-    """(3,) [rad/s]; the covariance tells whether it is known."""
+    """(3,) [rad/s]; a large covariance means unknown."""
     covariance: FloatArray = field(default_factory=lambda: np.full((9, 9), np.nan))
-    """(9, 9) of position, velocity and spin."""
+    """(9, 9) covariance of position, velocity and spin."""
     measured: FloatArray = field(default_factory=_nothing)
-    """(3,) The place on which the cameras agree at this moment, not filtered [m]."""
+    """(3,) Unfiltered place on which the cameras agree [m]."""
     cameras: int = 0
-    """Bits, of those that agree."""
+    """Bit mask of the cameras that agree."""
     residual: float = float("nan")
     """[px]"""
 
@@ -51,34 +51,34 @@ class Tracked:
 
     @property
     def error(self) -> float:
-        """Standard deviation of the position, of all three numbers together [m]."""
+        """Standard deviation of the position, over all three axes [m]."""
         return float(np.sqrt(np.trace(self.covariance[:3, :3])))
 
 
 @dataclass(frozen=True)
 class Point:
-    """Where the cameras agree, in one moment."""
+    """Place on which the cameras agree at one time."""
 
     time: int
     place: FloatArray
     covariance: FloatArray
 
     def reaches(self, other: Point) -> bool:
-        """Whether a ball can have come from here to the other place."""
+        """Whether a ball can have travelled from this point to the other one."""
         way = float(np.linalg.norm(other.place - self.place))
         return way <= FASTEST * (other.time - self.time) * NANOSECOND + SLACK
 
 
 class FlightTrack:
-    """Follows one ball. Two unexpected positions that agree are a hit, or another ball."""
+    """Tracks one ball. Two unexpected positions that agree mean a hit or another ball."""
 
     def __init__(self, law: _vision.FlightLaw, forget: float) -> None:
         self._law = law
         self._longest = forget
         self._filter = _vision.BallFilter(law)
-        self._last: Point | None = None  # where the ball was seen last
+        self._last: Point | None = None  # the last sighting of the ball
         self._surprise: Point | None = None
-        self._time = 0  # of the filter [ns]
+        self._time = 0  # time of the filter [ns]
         self._balls = 0
 
     @property
@@ -86,19 +86,19 @@ class FlightTrack:
         return self._last is not None
 
     def forget(self) -> None:
-        """Forgets the ball: the next sighting is another one."""
+        """Forgets the ball: the next sighting starts a new one."""
         self._last = self._surprise = None
 
     def expected(self, time: int) -> tuple[FloatArray | None, float]:
-        """Where the ball will be, and the standard deviation of that [m]. None: nowhere known."""
-        self._go_to(time)
+        """Predicts the ball's place and standard deviation [m]; None: no ball is tracked."""
+        self._predict_to(time)
         if self._last is None:
             return None, 0.0
         spread = float(np.sqrt(np.max(np.diag(self._filter.covariance)[:3])))
         return self._filter.position, spread
 
     def lost(self, time: int, reason: Reason) -> Tracked:
-        self._go_to(time)
+        self._predict_to(time)
         return Tracked(time, reason)
 
     def seen(
@@ -111,11 +111,11 @@ class FlightTrack:
         *,
         may_surprise: bool,
     ) -> Tracked:
-        """Takes the place on which cameras agree.
+        """Updates the track with the place on which the cameras agree.
 
-        may_surprise: enough of them to believe that the ball was hit, or that it is another one.
+        may_surprise: whether enough cameras agree to accept a hit or another ball.
         """
-        self._go_to(time)
+        self._predict_to(time)
         point = Point(time, place, covariance)
         reason = self._take(point, may_surprise)
         if reason != Reason.seen:
@@ -164,8 +164,8 @@ class FlightTrack:
         self._filter.begin(point.place, point.covariance, velocity, spread)
         self._surprise = None
 
-    def _go_to(self, time: int) -> None:
-        """Moves the filter to a time; a ball not seen for too long is given up."""
+    def _predict_to(self, time: int) -> None:
+        """Predicts the filter to a time; drops a ball that was not seen for too long."""
         last = self._last
         gone = last is not None and not 0 <= (time - last.time) * NANOSECOND <= self._longest
         if gone:

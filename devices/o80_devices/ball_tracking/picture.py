@@ -1,4 +1,4 @@
-"""Draws what four synthetic cameras see of a throw, and what the tracker makes of it.
+"""Draws a throw in the images of four synthetic cameras, and the flight that the tracker finds.
 
 python -m o80_devices.ball_tracking.picture tracking.png
 """
@@ -22,7 +22,7 @@ SHOWN = 0.55  # the moment whose images are drawn [s]
 
 
 def draw(path: str) -> None:
-    """Writes the picture. Raises MissingExtra."""
+    """Writes the picture. Raises MissingExtra without matplotlib."""
     purpose = "a picture"
     matplotlib: Any = needed("matplotlib", "plot", purpose)
     matplotlib.use("Agg")

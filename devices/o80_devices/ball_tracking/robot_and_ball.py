@@ -1,8 +1,8 @@
 """Recordings of a robot beside a tracked ball, as the tracking server would have sent the ball.
 
 A line is a tuple `((ball, unix time [ns], position, velocity), (steady time [ns], q, dq))`, at
-250 Hz. The ball is that of the newest message, which repeats; ball -1: it was not seen, and the
-position is an old one. The two times are of two clocks.
+250 Hz. A line repeats the newest message of the tracker; ball -1: not seen, and the
+position is an old one. The two times are of different clocks.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ class RobotAndBall:
     ball: IntArray
     """(N,) number of the ball; -1: not seen."""
     stamp: IntArray
-    """(N,) of the tracker, unix time [ns]."""
+    """(N,) stamp of the tracker, unix time [ns]."""
     position: FloatArray
     """(N, 3) [m]"""
     velocity: FloatArray
-    """(N, 3), as it was recorded [m/s]."""
+    """(N, 3) as recorded [m/s]."""
     time: IntArray
-    """(N,) of the robot, steady clock [ns]."""
+    """(N,) time of the robot, steady clock [ns]."""
     q: FloatArray
     """(N, 4) [rad]"""
     dq: FloatArray
@@ -42,7 +42,7 @@ class RobotAndBall:
 
     @classmethod
     def load(cls, path: str | Path) -> RobotAndBall:
-        """A file. Raises InvalidArgument, naming file and line."""
+        """Reads a file. Raises InvalidArgument, which names file and line."""
         rows = []
         for number, line in enumerate(Path(path).read_text().splitlines(), start=1):
             try:
@@ -60,15 +60,15 @@ class RobotAndBall:
         return cls(*(np.array(column) for column in zip(*rows, strict=True)))
 
     def first_rows(self) -> IntArray:
-        """The rows in which a message of the tracker shows for the first time."""
+        """Numbers of the rows that hold a message of the tracker for the first time."""
         new = np.diff(self.stamp, prepend=self.stamp[0] - 1) > 0
         return np.flatnonzero(new & (self.ball != UNSEEN))
 
     def messages(self) -> list[tuple[int, Message]]:
-        """When each message came, on the clock of the robot [ns], and the message.
+        """Returns each message with its arrival on the robot's clock [ns].
 
-        While the ball was not seen, one without a ball for each row of the robot, with the stamp
-        that the tracker's clock had then.
+        While the ball was not seen, each row of the robot gives a message without a ball, stamped
+        by the tracker's clock.
         """
         shown = set(self.first_rows().tolist())
         ahead = self._clock_ahead()
@@ -81,7 +81,7 @@ class RobotAndBall:
         return _rising(sent)
 
     def capture_times(self) -> tuple[IntArray, IntArray]:
-        """Rows with a new ball, and when it was captured on the clock of the robot [ns]."""
+        """Returns the rows with a new ball, and their capture times on the robot's clock [ns]."""
         clock, rows, times = ClockMap(), [], []
         for row in self.first_rows().tolist():
             capture = clock.capture(int(self.stamp[row]), int(self.time[row]))
@@ -91,13 +91,13 @@ class RobotAndBall:
         return np.array(rows, np.int64), np.array(times, np.int64)
 
     def _clock_ahead(self) -> int:
-        """The tracker's clock less the robot's, by the message that came fastest [ns]."""
+        """Offset of the tracker's clock from the robot's, by the fastest message [ns]."""
         rows = self.first_rows()
         return int((self.stamp - self.time)[rows].max()) if len(rows) else 0
 
 
 def _rising(sent: list[tuple[int, Message]]) -> list[tuple[int, Message]]:
-    """Without the messages that carry no ball and would be sent after a later one."""
+    """Drops messages without a ball that are out of order."""
     seen = [message.stamp for _, message in sent if message.place is not None]
     next_seen = iter([*seen, None])
     following, newest, kept = next(next_seen), None, []

@@ -1,4 +1,4 @@
-"""From the messages of a tracking server to the ball: JSON, clock, frame, flight.
+"""Converts the messages of a tracking server to a tracked ball: JSON, clock, frame, flight.
 
 A message is `{"time": <int, ns>, "obs": [x, y, z]}` in metres in the frame of the tracker, or
 `"obs": null` without a ball.
@@ -24,24 +24,24 @@ from o80_devices.clock import Capture, ClockMap
 SECOND = 1_000_000_000  # [ns]
 LARGEST_STAMP = 2**62
 LARGEST_MESSAGE = 1 << 16
-"""Size above which a message is of another publisher; it is not parsed [bytes]."""
+"""Larger messages are of another publisher, and are not parsed [bytes]."""
 FARTHEST = 1e3
-"""A ball further away than this is no ball [m]."""
+"""Limit of a coordinate; larger ones are invalid [m]."""
 
 
 class ServerReason(IntEnum):
-    """Why a row has no ball."""
+    """Reason why a row has no ball."""
 
     seen = 0
-    """The row has a ball, of a message that no row had before."""
+    """The row has the ball of a new message."""
     no_new_message = 1
-    """None has come since the last row; the next one may be on its way."""
+    """No message since the last row; the next one is not late yet."""
     silent = 2
     """No message for longer than `timeout`: the server, the network or the cable."""
     not_seen = 3
     """The server says that it sees no ball."""
     unexpected = 4
-    """The place does not continue the flight; once more, and it is a hit or another ball."""
+    """The place does not continue the flight; a second one means a hit or another ball."""
     late = 5
     """The message is older than `max_age`."""
     invalid = 6
@@ -53,13 +53,13 @@ class Message:
     """Message of the server about one frame."""
 
     stamp: int
-    """On its own clock [ns]."""
+    """Time on the server's clock [ns]."""
     place: FloatArray | None
     """(3,) in the frame of the tracker [m]."""
 
     @classmethod
     def decoded(cls, content: bytes) -> Message:
-        """Raises ValueError if the bytes are no message."""
+        """Decodes a message. Raises ValueError if the bytes are no message."""
         if len(content) > LARGEST_MESSAGE:
             raise ValueError(f"a message of {len(content)} bytes is not of a tracking server")
         try:
@@ -90,7 +90,7 @@ def _is_length(value: Any) -> bool:
 
 @dataclass(frozen=True)
 class Seen:
-    """A row: the ball, or the reason why there is none."""
+    """Values of a row: the ball, or the reason why there is none."""
 
     reason: ServerReason
     ball: Tracked
@@ -100,7 +100,7 @@ class Seen:
 
 @dataclass(frozen=True)
 class Place:
-    """The frame of the tracker in the world."""
+    """Pose of the tracker's frame in the world."""
 
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     """[m]"""
@@ -108,7 +108,7 @@ class Place:
     """Roll, pitch and yaw: about the axes x, y and z of the world, in this order [rad]."""
 
     def in_world(self, point: FloatArray) -> FloatArray:
-        """(3,) [m]"""
+        """Transforms a point (3,) from the tracker's frame to the world [m]."""
         turned = point
         for axis, angle in enumerate(self.rotation):
             c, s = math.cos(angle), math.sin(angle)
@@ -122,7 +122,7 @@ class Place:
 
 
 class ServerTrack:
-    """Follows the ball by the messages; time is given by the caller."""
+    """Tracks the ball from messages; the caller passes the time."""
 
     def __init__(
         self,
@@ -134,7 +134,7 @@ class ServerTrack:
         max_age: float = 0.1,
         forget: float = 0.3,
     ) -> None:
-        """noise: standard deviation of a place [m]. Others in [s]."""
+        """noise: standard deviation of a place [m]; all others in [s]."""
         self._place = place
         self._covariance = noise**2 * np.eye(3)
         self._clock = ClockMap(latency=latency)
@@ -143,13 +143,13 @@ class ServerTrack:
         self._newest: int | None = None  # arrival [ns]
 
     def silent(self, now: int) -> Seen:
-        """A row without a message."""
+        """Returns the row for a time [ns] without a new message."""
         gone = self._newest is None or now - self._newest > self._timeout
         reason = ServerReason.silent if gone else ServerReason.no_new_message
         return Seen(reason, Tracked(now, Reason.no_image))
 
     def take(self, content: bytes, now: int) -> Seen:
-        """A row with a message that arrived `now` [ns]."""
+        """Returns the row for a message that arrived at `now` [ns]."""
         try:
             message = Message.decoded(content)
         except ValueError:

@@ -1,4 +1,4 @@
-"""From the images of one moment to the ball: detection, place, flight. Without o80 and clocks."""
+"""Tracks the ball from the images of one moment: detection, place, flight. No o80, no clock."""
 
 from __future__ import annotations
 
@@ -19,22 +19,22 @@ from o80_devices.cameras.rig import Rig
 
 @dataclass(frozen=True)
 class TrackerOptions:
-    """How the tracker sees and follows."""
+    """Options of the tracker."""
 
     tolerance: float = 3.0
     """Largest distance between a detection and the common place, as seen in the image [px]."""
     noise: float = 0.3
     """Standard deviation of a detection [px]."""
     least: int = 2
-    """Cameras that must agree while a ball is followed."""
+    """Cameras that must agree while a ball is tracked."""
     least_to_begin: int = 3
     """Cameras that must agree on a new ball or on a hit, if the rig has so many."""
     forget: float = 0.3
-    """A ball that was not seen for so long is gone; what is seen then is another one [s]."""
+    """Time without a sighting after which the next sighting starts a new ball [s]."""
 
 
 class Tracker:
-    """Follows one ball at a time."""
+    """Tracks one ball at a time."""
 
     def __init__(
         self,
@@ -52,11 +52,11 @@ class Tracker:
         """Sightings in the last images: camera, x and y [px], area [px^2]."""
 
     def forget(self) -> None:
-        """Forgets the ball: the next sighting is another one."""
+        """Forgets the ball: the next sighting starts a new one."""
         self._track.forget()
 
     def track(self, images: Sequence[Image | None], time: int) -> Tracked:
-        """The ball in images that were taken at one time [ns]; None: a camera has no image."""
+        """Finds the ball in images taken at one time [ns]; None: a camera has no image."""
         if len(images) != len(self.cameras):
             raise ValueError(f"{len(self.cameras)} images are needed, got {len(images)}")
         expected, spread = self._track.expected(time)
@@ -64,7 +64,7 @@ class Tracker:
         return self.place(self.sightings, time)
 
     def place(self, sightings: FloatArray, time: int) -> Tracked:
-        """The ball of detections (n, 4): camera, x and y [px], area [px^2] (0: unknown)."""
+        """Finds the ball from detections (n, 4): camera, x and y [px], area [px^2] (0: unknown)."""
         options = self.options
         to_begin = min(options.least_to_begin, len(self.cameras))
         expected, _ = self._track.expected(time)

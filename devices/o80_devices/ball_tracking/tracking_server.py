@@ -1,4 +1,4 @@
-"""The driver of a ball tracker that is a server of its own and publishes over ZeroMQ."""
+"""Driver for a separate ball-tracking server that publishes over ZeroMQ."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Options:
 
 
 class TrackingServer:
-    """Takes the newest message for each row; a row without a new one has no ball, and says why."""
+    """Reads the newest message for each row; a row without a new one carries the reason."""
 
     Config = Options
     frequency = 200.0
@@ -88,7 +88,7 @@ class TrackingServer:
         self._zmq = zmq = zeromq.required()
         self._context = zmq.Context()
         self._socket = self._context.socket(zmq.SUB)
-        self._socket.setsockopt(zmq.CONFLATE, 1)  # the newest message, and then none
+        self._socket.setsockopt(zmq.CONFLATE, 1)  # a queue of one, the newest message
         self._socket.setsockopt(zmq.LINGER, 0)
         self._socket.setsockopt(zmq.RECONNECT_IVL, 50)  # [ms]
         self._socket.setsockopt(zmq.SUBSCRIBE, b"")

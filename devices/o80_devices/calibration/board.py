@@ -1,4 +1,4 @@
-"""Pictures of a chessboard, and the lens that they give. Needs the extra `cameras`."""
+"""Calibrates a lens from pictures of a chessboard. Needs the extra `cameras`."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ from o80_devices.cameras.rig import RigCamera
 
 PURPOSE = "the calibration of cameras"
 MIN_PICTURES = 8
-"""Pictures in which the board is found, for one lens."""
+"""Least number of pictures with the board to calibrate a lens."""
 LARGEST_UNCERTAINTY = 0.02
-"""Largest uncertainty of a focal length, as a share of it."""
+"""Largest relative uncertainty of a focal length."""
 MIN_TILT = 0.1
-"""Root mean square of the angles between boards and images [rad]; boards that all face the camera
-do not tell a long lens from a near board."""
+"""Least root mean square of the boards' tilt [rad]: boards that all face the camera do not
+distinguish a long lens from a near board."""
 SUFFIXES = (".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".ppm", ".pgm")
 
 
@@ -31,9 +31,9 @@ class Board:
     """A printed chessboard."""
 
     inner_corners: tuple[int, int]
-    """Along a row and along a column, without those on the border."""
+    """Numbers of corners along a row and along a column, without the border."""
     square: float
-    """Length of a side [m]."""
+    """Side of a square [m]."""
 
     def __post_init__(self) -> None:
         if min(self.inner_corners) < 3:
@@ -51,7 +51,7 @@ class Board:
         return points
 
     def found(self, image: Image) -> FloatArray | None:
-        """(n, 2) Where an image shows the inner corners [px]; None: it does not show them all."""
+        """Finds the inner corners in an image (n, 2) [px]; None if it does not show them all."""
         cv2 = opencv()
         pixels = np.asarray(image)
         grey = np.ascontiguousarray(pixels.mean(-1).astype(np.uint8) if pixels.ndim > 2 else pixels)
@@ -64,16 +64,16 @@ class Board:
 
 
 def opencv() -> Any:
-    """The module `cv2`. Raises MissingExtra."""
+    """Imports and returns `cv2`. Raises MissingExtra if it is not installed."""
     return needed("cv2", "cameras", PURPOSE, package="o80-devices")
 
 
 def lens_of(
     name: str, size: tuple[int, int], boards: Sequence[FloatArray], board: Board
 ) -> tuple[RigCamera, float]:
-    """The lens, and how well it fits [px]. size: of the images. boards: (n, 2) each, as found.
+    """Fits a lens; returns it and its residual [px]. size: of the images. boards: corners (n, 2).
 
-    Raises InvalidArgument if the boards do not determine it.
+    Raises InvalidArgument if the boards do not determine the focal length.
     """
     points = [board.points()] * len(boards)
     corners = [each.astype(np.float32).reshape(-1, 1, 2) for each in boards]
@@ -100,13 +100,13 @@ def lens_of(
 
 
 def _tilt(turns: Sequence[FloatArray]) -> float:
-    """Root mean square of the angles between the normals of boards and the axis of the camera."""
+    """Root mean square angle between the board normals and the camera axis [rad]."""
     ahead = [abs(float(opencv().Rodrigues(turn)[0][2, 2])) for turn in turns]
     return float(np.sqrt(np.mean(np.arccos(np.minimum(ahead, 1.0)) ** 2)))
 
 
 def board_reprojection(lens: RigCamera, boards: Sequence[FloatArray], board: Board) -> float:
-    """Root mean square over boards that the lens was not fitted to; each is placed first [px]."""
+    """Residual of a lens on boards that were not used in its fit; fits their poses [px]."""
     cv2, points = opencv(), board.points()
     matrix = np.array(
         [[lens.focal[0], 0, lens.centre[0]], [0, lens.focal[1], lens.centre[1]], [0, 0, 1]]
@@ -120,7 +120,7 @@ def board_reprojection(lens: RigCamera, boards: Sequence[FloatArray], board: Boa
 
 
 def pictures_of(folder: Path) -> dict[str, list[Path]]:
-    """The pictures of each camera, a folder for each. Raises InvalidArgument."""
+    """Lists the pictures of each camera's folder. Raises InvalidArgument if there are none."""
     if not folder.is_dir():
         raise InvalidArgument(
             f"{folder} is not a folder: give one that holds a folder of pictures for each camera"
@@ -140,7 +140,7 @@ def pictures_of(folder: Path) -> dict[str, list[Path]]:
 
 
 def picture(file: Path) -> Image:
-    """Red first. Raises InvalidArgument."""
+    """Reads a picture, red first. Raises InvalidArgument if that fails."""
     image = opencv().imread(str(file))
     if image is None:
         raise InvalidArgument(f"the picture {file} cannot be read")

@@ -1,4 +1,4 @@
-"""Places of cameras from what they see together, up to a common motion and size."""
+"""Estimates camera places from common sightings, up to a common motion and scale."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from o80_devices.calibration.board import PURPOSE
 from o80_devices.cameras.rig import RigCamera
 
 MIN_SHARED = 20
-"""Moments in which two cameras must see the waved ball together."""
+"""Least number of moments in which two cameras see the waved ball together."""
 
 
 def first_places(lenses: Sequence[RigCamera], waved: FloatArray) -> list[RigCamera]:
-    """Rough places, in the frame of the camera that shares most with the others.
+    """Estimates rough places, in the frame of the first camera that is placed.
 
-    The first two cameras come by their essential matrix, every other one by the points that these
-    have found (perspective of n points).
+    The two cameras with most common moments are placed by their essential matrix, each other
+    one by the points triangulated so far (perspective of n points).
     """
     cv2: Any = needed("cv2", "cameras", PURPOSE, package="o80-devices")
     flat = [without_place(lens) for lens in lenses]
@@ -67,14 +67,14 @@ def _enough(lenses: Sequence[RigCamera], a: int, b: int, count: int) -> None:
 
 
 def _plane(lens: RigCamera, pixels: FloatArray) -> FloatArray:
-    """(n, 2) The pixels on the plane at distance 1, without distortion."""
+    """Projects pixels to the plane at distance 1, without distortion (n, 2)."""
     directions = lens.model().directions(np.ascontiguousarray(pixels))
     plane: FloatArray = np.ascontiguousarray(directions[:, :2] / directions[:, 2:])
     return plane
 
 
 def adjusted(cameras: Sequence[RigCamera], waved: FloatArray) -> list[RigCamera]:
-    """The places of cameras and ball that fit best in all images (bundle adjustment)."""
+    """Fits the places of cameras and ball to all images (bundle adjustment)."""
     optimize: Any = needed("scipy.optimize", "cameras", PURPOSE, package="o80-devices")
     sparse: Any = needed("scipy.sparse", "cameras", PURPOSE, package="o80-devices")
     rotations: Any = needed(
@@ -121,7 +121,7 @@ def adjusted(cameras: Sequence[RigCamera], waved: FloatArray) -> list[RigCamera]
 
 
 def triangulated(cameras: Sequence[RigCamera], pixels: FloatArray) -> FloatArray:
-    """(n, cameras, 2) [px] => (n, 3) [m]; NaN where fewer than two cameras see the point."""
+    """Triangulates points: (n, cameras, 2) [px] => (n, 3) [m]; NaN if seen by fewer than two."""
     models = [camera.model() for camera in cameras]
     points = np.full((len(pixels), 3), np.nan)
     for i, row in enumerate(pixels):
@@ -135,5 +135,5 @@ def triangulated(cameras: Sequence[RigCamera], pixels: FloatArray) -> FloatArray
 
 
 def without_place(camera: RigCamera) -> RigCamera:
-    """The lens alone."""
+    """Returns the camera at the origin, unturned."""
     return replace(camera, rotation=tuple(np.eye(3).ravel().tolist()), translation=(0.0, 0.0, 0.0))

@@ -30,9 +30,9 @@ from o80_devices.cameras.image_source import ImageSource
 from o80_devices.cameras.rig import Rig, RigCamera
 
 ATTACHING = 10.0
-"""For the segment of the cameras to appear [s]."""
+"""Timeout of the attachment to the cameras' segment [s]."""
 SKEW = 0.002
-"""Between images that count as taken together [s]."""
+"""Longest time between images that count as simultaneous [s]."""
 
 
 def progress(text: str) -> None:
@@ -40,7 +40,7 @@ def progress(text: str) -> None:
 
 
 def source_of(segments: str, cameras: Sequence[RigCamera]) -> ImageSource:
-    """The images of running cameras. Raises TimeoutError, InvalidArgument."""
+    """Attaches to running cameras. Raises TimeoutError, or InvalidArgument without a segment."""
     names = [name.strip() for name in segments.split(",") if name.strip()]
     if not names:
         raise InvalidArgument("name the segments of the cameras: --segment video_cameras")
@@ -193,7 +193,7 @@ def tell_corners(cameras: Sequence[RigCamera], known: FloatArray, pixels: FloatA
 
 
 def two_numbers(text: str) -> tuple[int, int]:
-    """Two numbers from a text such as 9x6."""
+    """Parses two numbers from a text such as 9x6."""
     first, _, second = text.partition("x")
     if not (first.isdecimal() and second.isdecimal()):
         raise argparse.ArgumentTypeError(f"two numbers such as 9x6 are needed, got '{text}'")

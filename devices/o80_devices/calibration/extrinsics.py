@@ -1,8 +1,8 @@
-"""Calibration of a rig: places from a waved ball. lenses.py has the lenses.
+"""Calibrates the places of cameras from a waved ball. lenses.py has the lenses.
 
-A ball waved through the room, seen by all cameras at the same moments, tells where the cameras are
-relative to each other, except for the size of everything. The corners of the table, marked in the
-images, then give the size and the frame of the world. Needs the extra `cameras`.
+Simultaneous images of a ball waved through the room determine the relative places of the cameras,
+up to a scale. The corners of the table, marked in the
+images, then determine the scale and the world frame. Needs the extra `cameras`.
 """
 
 from __future__ import annotations
@@ -21,16 +21,16 @@ from o80_devices.calibration.world_frame import in_world
 from o80_devices.cameras.rig import RigCamera
 
 MIN_DEPTH = 0.02
-"""Extent of the waved ball's places in their thinnest direction, as a share of the widest."""
+"""Least ratio of the smallest extent of the ball's places to the largest one."""
 
 
 @dataclass(frozen=True)
 class Calibrated:
-    """Cameras, and how well they fit what they were made from."""
+    """Calibrated cameras and their residual."""
 
     cameras: tuple[RigCamera, ...]
     residual: float
-    """Root mean square in the images [px]."""
+    """Root mean square reprojection error [px]."""
 
 
 def places_from_ball(
@@ -39,13 +39,13 @@ def places_from_ball(
     corners: FloatArray,
     corner_pixels: FloatArray,
 ) -> Calibrated:
-    """The places of cameras whose lenses are known.
+    """Calibrates the places of cameras with known lenses.
 
-    waved: (moments, cameras, 2) where each saw the ball [px]; NaN: not at all.
+    waved: (moments, cameras, 2) the ball in each image [px]; NaN: not seen.
     corners: (n, 3) in the world [m], at least 3, not in one line.
-    corner_pixels: (cameras, n, 2) where each sees them [px]; NaN: not at all. Each corner that
-        counts is seen by at least two cameras.
-    Raises InvalidArgument, MissingExtra.
+    corner_pixels: (cameras, n, 2) the corners in each image [px]; NaN: not seen. Only corners
+    seen by at least two cameras count.
+    Raises InvalidArgument for too little motion or wrong corners, MissingExtra.
     """
     waved = np.asarray(waved, float)
     if waved.shape[1:] != (len(lenses), 2):
@@ -64,7 +64,7 @@ def places_from_ball(
 
 
 def _check_depth(cameras: Sequence[RigCamera], waved: FloatArray) -> None:
-    """A ball that stays in a plane leaves the places of the cameras ambiguous."""
+    """Raises InvalidArgument if the ball stayed in a plane: places are then ambiguous."""
     points = triangulated(cameras, waved)
     points = points[np.isfinite(points).all(1)]
     extents = np.linalg.svd(points - points.mean(0), compute_uv=False) if len(points) > 3 else None
@@ -93,7 +93,7 @@ def _check_corners(
 
 
 def reprojection(cameras: Sequence[RigCamera], pixels: FloatArray) -> float:
-    """Root mean square of the distances in the images [px], of points seen by two or more."""
+    """Root mean square reprojection error of points that two cameras or more see [px]."""
     points = triangulated(cameras, pixels)
     squares = []
     for k, camera in enumerate(cameras):
@@ -104,9 +104,9 @@ def reprojection(cameras: Sequence[RigCamera], pixels: FloatArray) -> float:
 
 
 def left_out_distances(cameras: Sequence[RigCamera], pixels: FloatArray) -> FloatArray:
-    """How far a place moves if one of the cameras that see it is left out [m].
+    """Distances by which the triangulated points move when one camera is left out [m].
 
-    Of all places seen by three cameras or more, and each of their cameras.
+    Covers each point that three cameras or more see, once for each of them.
     """
     whole = triangulated(cameras, pixels)
     moved = []

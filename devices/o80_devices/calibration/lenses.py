@@ -1,4 +1,4 @@
-"""The lenses of several cameras, from pictures of a board, and the file that keeps them."""
+"""Calibrates the lenses of several cameras from pictures of a board, and stores them in a file."""
 
 from __future__ import annotations
 
@@ -28,20 +28,20 @@ FORMAT = "o80-ball-lenses-1"
 EVERY = 4
 """Every fourth picture is held out."""
 MIN_FOUND = 11
-"""Pictures in which the board is found: 8 to fit, and those that are held out."""
+"""Least number of pictures with the board: 8 to fit, the others held out."""
 NEW_PLACE = 0.015
-"""How far the corners have moved, as a share of the image, when a picture is counted again."""
+"""Least mean motion of the corners between two counted pictures, as a share of the image."""
 
 
 @dataclass(frozen=True)
 class Lens:
-    """A camera without its place, and how good it is."""
+    """A camera without a place, and its residuals."""
 
     camera: RigCamera
     fitted: float
-    """Root mean square in the pictures that it was fitted to [px]."""
+    """Root mean square residual in the fitted pictures [px]."""
     held_out: float
-    """The same in those that it was not fitted to [px]."""
+    """Root mean square residual in the held-out pictures [px]."""
     pictures: int
     """Number of pictures in which the board was found."""
 
@@ -49,7 +49,7 @@ class Lens:
 def lens_from_boards(
     name: str, size: tuple[int, int], boards: Sequence[FloatArray], board: Board, of: int
 ) -> Lens:
-    """of: pictures that were looked at. Raises InvalidArgument."""
+    """Fits a lens. of: number of searched pictures. Raises InvalidArgument for too few boards."""
     if len(boards) < MIN_FOUND:
         columns, rows = board.inner_corners
         raise InvalidArgument(
@@ -64,7 +64,7 @@ def lens_from_boards(
 
 
 def lens_from_files(name: str, files: Sequence[Path], board: Board) -> Lens:
-    """Raises InvalidArgument."""
+    """Fits a lens to pictures. Raises InvalidArgument if size or boards do not allow it."""
     boards, size = [], None
     for file in files:
         image = picture(file)
@@ -92,9 +92,9 @@ def boards_from_segments(
     patience: float = 60.0,
     say: Callable[[str], None] = lambda text: None,
 ) -> list[list[FloatArray]]:
-    """For each camera, boards at `count` different places.
+    """Collects boards at `count` different places for each camera.
 
-    patience: for the next one [s]. say: is told what has been found. Raises TimeoutError.
+    patience: timeout of the next board [s]. say: receives progress texts. Raises TimeoutError.
     """
     boards: list[list[FloatArray]] = [[] for _ in cameras]
     last = time.monotonic()
@@ -133,7 +133,7 @@ def save(lenses: Sequence[Lens], path: Path | str) -> None:
 
 
 def load(path: Path | str) -> list[RigCamera]:
-    """Raises InvalidArgument."""
+    """Reads the lenses of a file. Raises InvalidArgument if it holds none."""
     try:
         content = json.loads(Path(path).read_text())
         if not isinstance(content, dict) or content.get("format") != FORMAT:

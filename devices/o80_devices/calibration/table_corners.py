@@ -1,4 +1,4 @@
-"""Where each camera sees the corners of the table, marked by hand in one picture of each."""
+"""Corners of the table in the images, marked by hand in one picture of each camera."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class TableCorners:
 
     table: Table
     pixels: dict[str, FloatArray]
-    """By the name of the camera: (4, 2) [px], in the order of `Table.corners`; NaN: not seen."""
+    """Corners by camera name: (4, 2) [px], in the order of `Table.corners`; NaN: not seen."""
 
     @classmethod
     def load(cls, path: Path | str) -> TableCorners:
-        """Raises InvalidArgument."""
+        """Reads a file. Raises InvalidArgument if it holds no corners."""
         try:
             content = json.loads(Path(path).read_text())
             table = _table(**content.get("table", {}))
@@ -42,7 +42,7 @@ class TableCorners:
         return cls(table, pixels)
 
     def of(self, names: Sequence[str]) -> FloatArray:
-        """(cameras, 4, 2) In this order; NaN for a camera without marks. Raises InvalidArgument."""
+        """(cameras, 4, 2) [px], NaN without marks. Raises InvalidArgument for other names."""
         unknown = [name for name in self.pixels if name not in names]
         if unknown:
             raise InvalidArgument(

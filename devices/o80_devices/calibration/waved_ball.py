@@ -1,4 +1,4 @@
-"""Where each camera sees a ball that is waved through the room."""
+"""Records the pixels at which each camera sees a ball that is waved through the room."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from o80_devices.cameras.image_source import ImageSource
 from o80_devices.cameras.rig import RigCamera
 
 NEW_PLACE = 6.0
-"""How far the ball has moved in some image when it is counted again [px]."""
+"""Least motion of the ball in one image between two counted moments [px]."""
 SECOND_BEST = 0.5
-"""A blob of this share of the largest one makes an image ambiguous; it does not count."""
+"""An image is ambiguous, and not counted, if its second blob has this share of the first's area."""
 MIN_SPAN = 0.15
-"""Share of the width and of the height of an image that the ball must cross."""
+"""Least share of an image's width and height that the ball must cross."""
 EVERY = 4
 """Every fourth moment is held out."""
 
@@ -43,7 +43,7 @@ class WavedBall:
 
     @classmethod
     def load(cls, path: Path | str) -> WavedBall:
-        """Raises InvalidArgument."""
+        """Reads a recording. Raises InvalidArgument if the file holds none."""
         try:
             with np.load(path, allow_pickle=False) as content:
                 names = tuple(str(name) for name in content["names"])
@@ -58,7 +58,7 @@ class WavedBall:
         return cls(names, pixels)
 
     def of(self, names: Sequence[str]) -> WavedBall:
-        """The same, with the cameras in this order. Raises InvalidArgument."""
+        """Selects cameras, in this order. Raises InvalidArgument if one is missing."""
         missing = [name for name in names if name not in self.names]
         if missing:
             raise InvalidArgument(
@@ -68,7 +68,7 @@ class WavedBall:
         return WavedBall(tuple(names), self.pixels[:, order])
 
     def parts(self) -> tuple[FloatArray, FloatArray]:
-        """Moments to fit, and every fourth one, which is held out."""
+        """Splits the moments: those to fit, and every fourth one, which is held out."""
         out = np.arange(len(self.pixels)) % EVERY == EVERY - 1
         return self.pixels[~out], self.pixels[out]
 
@@ -93,14 +93,14 @@ def check_motion(lenses: Sequence[RigCamera], waved: FloatArray) -> None:
 
 
 class BallFinder:
-    """Finds the one ball of an image, anywhere in it."""
+    """Finds the only ball in a whole image."""
 
     def __init__(self, colours: NDArray[np.uint8] | None = None) -> None:
         table = colour.of_hue() if colours is None else colours
         self._finder = _vision.BlobFinder(np.ascontiguousarray(table))
 
     def find(self, image: Image | None) -> tuple[float, float]:
-        """x, y [px]; NaN if there is none, or if there are two."""
+        """Returns x and y [px]; NaN without a ball, or with two."""
         nowhere = (float("nan"), float("nan"))
         if image is None:
             return nowhere
@@ -121,10 +121,10 @@ def collected(
     patience: float = 30.0,
     say: Callable[[int], None] = lambda count: None,
 ) -> WavedBall:
-    """Moments from segments with images, until there are so many.
+    """Records `moments` moments from segments with images.
 
-    patience: for the next moment in which two cameras see the ball at a new place [s].
-    say: is told how many there are. Raises TimeoutError.
+    patience: timeout of the next moment in which two cameras see the ball at a new place [s].
+    say: receives the number of moments so far. Raises TimeoutError.
     """
     kept: list[FloatArray] = []
     last = time.monotonic()

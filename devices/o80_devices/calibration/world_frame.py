@@ -1,4 +1,4 @@
-"""Size, direction and origin of a rig, from points whose places in the world are known."""
+"""Estimates scale, direction and origin of a rig from points with known places in the world."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from o80.errors import InvalidArgument
 from o80_devices.cameras.rig import RigCamera
 
 WORST_FIT = 0.02
-"""Distance of a point from where it is known to be, as a share of the size of all points."""
+"""Largest distance of a point from its known place, as a share of the extent of all points."""
 FLAT = 1e-6
-"""Points that lie in a plane have a third extent below this share of the first."""
+"""Points are in a plane if their third extent is below this share of the first."""
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Similarity:
 
     @classmethod
     def between(cls, seen: FloatArray, known: FloatArray) -> Similarity:
-        """The one that takes seen points (n, 3) to known ones best (Umeyama, 1991).
+        """Fits the similarity from seen points (n, 3) to known ones (Umeyama, 1991).
 
         Raises InvalidArgument for points on a line.
         """
@@ -36,7 +36,7 @@ class Similarity:
         left, sizes, right = np.linalg.svd(wanted.T @ apart)
         if not sizes[1] > FLAT * sizes[0]:
             raise InvalidArgument("the corners lie in one line: they give no frame of the world")
-        # a reflection would fit as well where the points lie in a plane
+        # points in a plane fit a reflection equally well
         mirror = np.array([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
         rotation = left @ np.diag(mirror) @ right
         scale = float((sizes * mirror).sum() / (apart**2).sum())
@@ -54,7 +54,7 @@ class Similarity:
 def in_world(
     cameras: Sequence[RigCamera], seen: FloatArray, known: FloatArray
 ) -> tuple[RigCamera, ...]:
-    """Cameras moved, turned and scaled so that seen points come to the known ones.
+    """Moves, turns and scales the cameras so that the seen points match the known ones.
 
     Raises InvalidArgument if the points do not fit, or if they are mirrored.
     """
@@ -87,9 +87,9 @@ def _check_not_mirrored(cameras: Sequence[RigCamera], known: FloatArray) -> None
 
 
 def left_out_errors(seen: FloatArray, known: FloatArray) -> FloatArray:
-    """(n,) How far each point is off if the others alone give the frame [m]; four points at least.
+    """Error of each point (n,) when the frame is fitted to the other points [m].
 
-    Empty for fewer points.
+    Empty for fewer than four points.
     """
     if len(seen) < 4:
         return np.empty(0)

@@ -28,7 +28,7 @@ from o80.errors import DriverError
 
 LIBRARIES = ("libaravis-0.8.so.0", "libgobject-2.0.so.0", "libglib-2.0.so.0")
 BUFFERS = 8
-"""Images that may wait; more arrivals are underruns."""
+"""Number of queued images; more arrivals are underruns."""
 SUCCESS = 0
 STATUS = {
     1: "cleared",
@@ -38,7 +38,7 @@ STATUS = {
     5: "a packet is larger than the image",
     7: "aborted",
 }
-"""Texts of the states of buffers, ArvBufferStatus."""
+"""Texts of the buffer states (ArvBufferStatus)."""
 
 
 class _Error(ctypes.Structure):
@@ -46,7 +46,7 @@ class _Error(ctypes.Structure):
 
 
 class CameraError(OSError):
-    """A camera does not do what it was asked to."""
+    """A request to a camera failed."""
 
 
 @cache
@@ -66,14 +66,14 @@ def _libraries() -> tuple[Any, Any, Any]:
 
 @cache
 def function(name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
-    """A function of the library. Raises DriverError if it cannot be loaded."""
+    """Returns a function of the library. Raises DriverError if aravis cannot be loaded."""
     found = getattr(_libraries()[0], name)
     found.restype, found.argtypes = result, arguments
     return found  # type: ignore[no-any-return]
 
 
 def checked(name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
-    """A function whose last argument is a GError**; the call raises CameraError."""
+    """Wraps a function whose last argument is a GError**: a failed call raises CameraError."""
     called = function(name, result, *arguments, POINTER(POINTER(_Error)))
 
     def call(*values: Any) -> Any:
@@ -89,7 +89,7 @@ def checked(name: str, result: Any, *arguments: Any) -> Callable[..., Any]:
 
 
 def found() -> list[str]:
-    """Names of the cameras that answer. Raises DriverError."""
+    """Lists the names of the cameras that answer. Raises DriverError without aravis."""
     function("arv_update_device_list", None)()
     count = function("arv_get_n_devices", c_uint)()
     name = function("arv_get_device_id", c_char_p, c_uint)
@@ -98,27 +98,27 @@ def found() -> list[str]:
 
 @dataclass(frozen=True)
 class Settings:
-    """Settings of a camera; 0 and empty: as it is."""
+    """Settings of a camera; 0 and empty values leave the camera unchanged."""
 
     pixel_format: str
     region: tuple[int, int, int, int]
     """x, y, width, height [px]"""
     rate: float = 0.0
-    """[1/s]"""
+    """Frame rate [1/s]."""
     exposure: float = 0.0
-    """[s]"""
+    """Exposure time [s]."""
     trigger: str = ""
 
 
 @dataclass(frozen=True)
 class Buffer:
-    """Buffer that came from the camera."""
+    """Buffer received from the camera."""
 
     status: int
     number: int
-    """Number of the frame; GigE Vision counts from 1 to 65535, and again."""
+    """Number of the frame; GigE Vision wraps from 65535 to 1."""
     stamp: int
-    """Stamp of the camera [ns]; 0: it gives none."""
+    """Stamp of the camera [ns]; 0: none."""
     content: Image
     """Bytes of the image; empty if it is damaged."""
     size: tuple[int, int]
@@ -129,7 +129,7 @@ class Camera:
     """An open camera that sends images. Owns the connection: close it."""
 
     def __init__(self, name: str, settings: Settings) -> None:
-        """name: one of `found()`, an address, or Fake_1. Raises CameraError, DriverError."""
+        """Opens a camera. name: one of `found()`, an address, or Fake_1. Raises CameraError."""
         self._stream: int | None = None
         if name.startswith("Fake"):
             function("arv_enable_interface", None, c_char_p)(b"Fake")
@@ -142,7 +142,7 @@ class Camera:
             raise
 
     def pop(self, timeout: float) -> Buffer | None:
-        """The next image; None: none came within this time [s]."""
+        """Returns the next image; None if none arrives within `timeout` [s]."""
         pop = function("arv_stream_timeout_pop_buffer", c_void_p, c_void_p, c_uint64)
         buffer = pop(self._stream, round(1e6 * timeout))
         if buffer is None:
@@ -163,7 +163,7 @@ class Camera:
         self.abandon()
 
     def abandon(self) -> None:
-        """Closes a camera that does not answer; that takes up to 8 s, for each step is retried."""
+        """Closes a camera that does not answer; aravis retries each step, for up to 8 s."""
         camera, stream, self._camera, self._stream = self._camera, self._stream, None, None
         for each in (stream, camera):
             if each is not None:
@@ -191,7 +191,7 @@ class Camera:
         push = function("arv_stream_push_buffer", None, c_void_p, c_void_p)
         for _ in range(BUFFERS):
             made = function("arv_buffer_new_allocate", c_void_p, c_size_t)(size)
-            push(self._stream, made)  # owns it from now on
+            push(self._stream, made)  # the stream now owns the buffer
         checked("arv_camera_start_acquisition", None, c_void_p)(self._camera)
 
 

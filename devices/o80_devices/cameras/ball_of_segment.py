@@ -1,4 +1,4 @@
-"""The ball of another segment, a simulated world for example, at any time that its rows cover."""
+"""Reads the ball of another segment, for example a simulated world, at given times."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import o80
 from o80_devices.cameras.throws import FlyingBall
 
 RETRY = 50_000_000
-"""Between two attempts to attach [ns]."""
+"""Interval between attempts to attach [ns]."""
 KEPT = 32
-"""Pairs of a row and its time."""
+"""Number of stored pairs of a row and its time."""
 GAP = 3.0
-"""Periods between a time and the rows around it above which the ball is unknown."""
+"""Longest time before a row with a known time, in multiples of KEPT periods."""
 
 
 class Attached:
-    """An observer of a segment that may end and come back."""
+    """Frontend of a segment that may end and restart."""
 
     def __init__(self, segment: str, *, read_only: bool = True) -> None:
         self._segment, self._read_only = segment, read_only
@@ -27,7 +27,7 @@ class Attached:
         self._next_try: int | None = None
 
     def frontend(self, now: int) -> tuple[o80.Frontend | None, bool]:
-        """Frontend of the living backend, or None; and whether it is new since the last call."""
+        """Returns the frontend (None: no backend), and whether it is new since the last call."""
         if self._frontend is not None and not self._frontend.alive:
             self.close()
         if self._frontend is not None:
@@ -50,10 +50,10 @@ class Attached:
 class BallOfSegment:
     """Reads the ball of a segment at given times, between two rows.
 
-    field: where the ball is, as "observed.balls": a record (of several, the first one) with
-        position and velocity.
-    times: a segment whose rows say when rows of the other one were: `world_row` (iteration) and
-        `arm_time` [ns]. Without it the times of the rows themselves count.
+    field: path of the ball in a row, such as "observed.balls": a record with position and
+    velocity; of several records, the first one.
+    times: segment whose rows map rows of the first one to times: `world_row` (iteration) and
+    `arm_time` [ns]. Without it, the times of the rows count.
     """
 
     def __init__(self, segment: str, field: str, times: str) -> None:
@@ -62,10 +62,10 @@ class BallOfSegment:
         self._path = field.split(".")
         self._pairs: deque[tuple[int, int]] = deque(maxlen=KEPT)
         self._read = -1
-        """Iteration of the last row with a pair."""
+        """Iteration of the last row that was searched for a pair."""
 
     def at(self, time: int, now: int) -> FlyingBall | None:
-        """The ball at a time [ns]; None: no rows cover it. now: of the clock [ns]."""
+        """Returns the ball at a time [ns]; None if no rows cover that. now: current time [ns]."""
         frontend, is_new = self._ball.frontend(now)
         if is_new:
             self._pairs.clear()
@@ -99,7 +99,7 @@ class BallOfSegment:
     def _between(
         self, frontend: o80.Frontend, row: int, when: int, time: int, period: int
     ) -> FlyingBall | None:
-        """At a time before that of a row, from the rows around it."""
+        """Interpolates the ball at `time`, before `when`, the time of a row."""
         back, rest = divmod(when - time, period)
         if not 0 <= back < KEPT * GAP:
             return None
@@ -119,7 +119,7 @@ class BallOfSegment:
         return FlyingBall(1, position, velocity, np.array(spin))
 
     def _balls(self, rows: o80.History) -> Any:
-        """(rows,) records."""
+        """Returns the record of the ball in each row (rows,)."""
         values: Any = rows.rows
         for name in self._path:
             values = values[name]

@@ -19,10 +19,10 @@ SECOND = 1_000_000_000  # [ns]
 
 
 class GenicamCameras:
-    """The images of several cameras, in one segment; recorded only if it is named.
+    """Publishes the images of several cameras in one segment; recorded only if named.
 
-    A row waits until each camera that runs has a new image, but not for longer than a quarter of a
-    period. `valid` tells which camera has a new one, `reasons` why another one has none.
+    A row waits until each camera has a new image, at most for a quarter of a
+    period. `valid` marks the cameras with a new image, `reasons` says why the others have none.
     """
 
     units: ClassVar = {
@@ -88,7 +88,7 @@ class GenicamCameras:
 
     def start(self) -> None:
         config = self._config
-        aravis.function("arv_get_n_devices", int)  # a missing library ends the start
+        aravis.function("arv_get_n_devices", int)  # raises if the library is missing
         settings = aravis.Settings(
             pixel_format=config.pixel_format,
             region=(config.left, config.top, config.width, config.height),

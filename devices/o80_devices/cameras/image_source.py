@@ -1,4 +1,4 @@
-"""The images of all cameras of a rig from the segments that hold them, taken at one time."""
+"""Reads simultaneous images of all cameras of a rig from their segments."""
 
 from __future__ import annotations
 
@@ -13,34 +13,34 @@ from o80.base.arrays import Image
 from o80_devices.cameras.rig import Rig, RigCamera
 
 RETRY = 0.1
-"""Between two attempts to attach to a segment that is not there [s]."""
+"""Interval between attempts to attach to a missing segment [s]."""
 
 
 @dataclass(frozen=True)
 class Images:
-    """One moment: an image for each camera of the rig, None where there is none."""
+    """Images of one moment, one for each camera of the rig; None: no image."""
 
     images: list[Image | None]
     time: int
     """Time of capture [ns]."""
     error: int = 0
-    """Estimated error of this time, the largest of all cameras with an image [ns]; 0 if exact."""
+    """Estimated error of `time`, the largest of all cameras with an image [ns]; 0 if exact."""
 
 
 class CameraSegment:
-    """One segment with images: of one camera, or of several that capture at the same time."""
+    """Segment with the images of one camera, or of several that capture simultaneously."""
 
     def __init__(self, name: str) -> None:
         self.name = name
         self._frontend: o80.Frontend | None = None
         self._iteration = -1
-        self._tried: float | None = None
+        self._last_try: float | None = None
         self.images: list[Image | None] = []
         self.time = 0
         self.error = 0
 
     def attach(self, timeout: float) -> None:
-        """Raises TimeoutError, InvalidArgument if the segment holds no images."""
+        """Attaches. Raises TimeoutError, or InvalidArgument if the segment holds no images."""
         self._frontend = o80.Frontend(self.name, timeout=timeout, read_only=True)
         self._iteration = -1
         fields = self._frontend.latest().extended
@@ -51,7 +51,7 @@ class CameraSegment:
             )
 
     def wait(self, timeout: float) -> bool:
-        """Waits for images that were not read yet, at most so long [s]. False: none came."""
+        """Waits for unread images. timeout: [s]. Returns False if none arrived."""
         if self._frontend is None:
             return False
         try:
@@ -65,7 +65,7 @@ class CameraSegment:
         return True
 
     def read(self, now: float) -> bool:
-        """Takes the newest row. False: there is none since the last one. now: any clock [s]."""
+        """Reads the newest row. Returns False if none is new. now: of any clock [s]."""
         if self._frontend is None and not self._attached_again(now):
             return False
         assert self._frontend is not None
@@ -77,7 +77,7 @@ class CameraSegment:
         row = self._frontend.latest()
         self._iteration = row.iteration
         capture = int(row.extended["capture_time"])
-        if capture == 0:  # the cameras themselves have nothing
+        if capture == 0:  # a row without images
             return False
         images = np.asarray(row.extended["images"])
         self.images, self.time = list(np.atleast_2d(images)), capture
@@ -94,9 +94,9 @@ class CameraSegment:
         self._frontend = None
 
     def _attached_again(self, now: float) -> bool:
-        if self._tried is not None and 0 <= now - self._tried < RETRY:
+        if self._last_try is not None and 0 <= now - self._last_try < RETRY:
             return False
-        self._tried = now
+        self._last_try = now
         try:
             self.attach(timeout=0.0)
         except o80.Error:
@@ -105,9 +105,9 @@ class CameraSegment:
 
 
 class ImageSource:
-    """The newest images of all segments; only those taken at the same time as the newest count.
+    """Reads the newest images of all segments; older ones than the newest are dropped.
 
-    skew: how far apart in time images may be that count as taken together [s].
+    skew: longest time between images that count as simultaneous [s].
     """
 
     def __init__(self, segments: Sequence[str], rig: Rig, skew: float) -> None:
@@ -116,18 +116,18 @@ class ImageSource:
         self._skew = round(skew * 1e9)
 
     def attach(self, timeout: float) -> None:
-        """Waits for all segments. Raises TimeoutError, InvalidArgument."""
+        """Attaches to all segments. Raises TimeoutError, or InvalidArgument without images."""
         for each in self._segments:
             each.attach(timeout)
 
     def wait(self, timeout: float) -> None:
-        """Waits for images of the first segment, at most so long [s], and not much less."""
+        """Waits for images of the first segment, or until the timeout [s] has passed."""
         end = time.monotonic() + timeout
         if not self._segments[0].wait(timeout):
             time.sleep(max(0.0, end - time.monotonic()))
 
     def read(self, now: float) -> Images | None:
-        """Images not read before; None: there are none. Raises InvalidArgument."""
+        """Returns unread images, or None. Raises InvalidArgument if they do not match the rig."""
         came = [each.read(now) for each in self._segments]
         if not any(came):
             return None

@@ -1,4 +1,4 @@
-"""The newest image of a GenICam camera, received by a thread."""
+"""Receives the newest image of a GenICam camera in a thread."""
 
 from __future__ import annotations
 
@@ -15,29 +15,29 @@ from o80_devices.clock import Capture, ClockMap
 from o80_devices.trouble import Trouble
 
 WAIT = 0.05
-"""For an image, before the thread looks whether it is to stop [s]."""
+"""Timeout of one wait for an image; then the stop flag is checked [s]."""
 SILENCE = 1.0
-"""Without an image, after which a camera without a trigger is opened again [s]."""
+"""Time without an image after which a camera without a trigger is reopened [s]."""
 RETRY = 0.3
-"""Between two attempts to open a camera [s]."""
+"""Interval between attempts to open a camera [s]."""
 FRAME_NUMBERS = 65535
-"""GigE Vision counts frames from 1 to this."""
+"""Largest frame number of GigE Vision, which counts from 1."""
 
 
 class CameraReason(IntEnum):
-    """Why a camera has no image in a row."""
+    """Reason why a camera has no image in a row."""
 
     seen = 0
     """The row has its image."""
     no_new_image = 1
-    """None has come since the last row; the next one is not late yet."""
+    """No image since the last row; the next one is not late yet."""
     silent = 2
-    """None for longer than the option silent_after: the cable, the trigger, or the camera."""
+    """No image for longer than the option silent_after: check cable, trigger and camera."""
     damaged = 3
-    """Parts of the image were lost on the way."""
+    """Parts of the image were lost in transmission."""
     connecting = 4
     disconnected = 5
-    """It was not found, is used by another program, or is gone."""
+    """The camera was not found, is used by another program, or was disconnected."""
 
 
 @dataclass(frozen=True)
@@ -50,16 +50,16 @@ class Taken:
 
 
 class Arrivals:
-    """Lets the loop wait for the threads of all cameras."""
+    """Condition by which the loop waits for the threads of all cameras."""
 
     def __init__(self) -> None:
         self.changed = threading.Condition()
 
 
 class NewestImage:
-    """The newest image of one camera.
+    """Holds the newest image of one camera.
 
-    Writer: its thread, which opens the camera again whenever it fails.
+    Writer: a thread, which reopens the camera after each failure.
     Reader: the loop, which never waits for the camera.
     """
 
@@ -74,7 +74,7 @@ class NewestImage:
         self._last_number: int | None = None
         self._trouble = Trouble(f"camera {name}")
         self.lost = 0
-        """Frames that the camera counted and that did not arrive whole."""
+        """Number of frames that were missing or damaged."""
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, name=f"camera {name}", daemon=True)
         self._thread.start()
@@ -84,7 +84,7 @@ class NewestImage:
         return self._newest is not None
 
     def take(self, now: int, gap: int) -> tuple[Taken | None, CameraReason]:
-        """The image, once. now: on the monotonic clock [ns]. gap: that is silence [ns]."""
+        """Returns an image once. now: monotonic time [ns]. gap: limit of silence [ns]."""
         with self._arrivals.changed:
             newest, self._newest = self._newest, None
             state, last = self._state, self._last
@@ -95,7 +95,7 @@ class NewestImage:
         return None, state
 
     def end(self) -> None:
-        """Asks the thread to end; `close` waits for it."""
+        """Requests the thread to end; `close` waits for the end."""
         self._ends.set()
 
     def close(self) -> None:
@@ -112,14 +112,14 @@ class NewestImage:
                 try:
                     self._receive_from(camera)
                 except BaseException:
-                    self._say(CameraReason.disconnected)
+                    self._set_state(CameraReason.disconnected)
                     camera.abandon()
                     raise
                 camera.close()
             except Exception as error:
-                # whatever a camera does wrong: it is opened again
+                # any failure: the camera is reopened
                 self._trouble.tell(str(error) or type(error).__name__)
-            self._say(CameraReason.disconnected)
+            self._set_state(CameraReason.disconnected)
             self._ends.wait(RETRY)
 
     def _receive_from(self, camera: aravis.Camera) -> None:
@@ -134,14 +134,14 @@ class NewestImage:
             elif time.monotonic() - last > SILENCE:
                 if not self._settings.trigger:
                     raise TimeoutError(f"it has sent no image for {SILENCE:g} s")
-                camera.check()  # it may wait for its trigger
+                camera.check()  # the camera may be waiting for a trigger
                 last = time.monotonic()
 
     def _keep(self, buffer: aravis.Buffer, arrival: int) -> None:
         self._count(buffer.number)
         if buffer.status != aravis.SUCCESS:
             self.lost += 1
-            self._say(CameraReason.damaged)
+            self._set_state(CameraReason.damaged)
             why = aravis.STATUS.get(buffer.status, f"status {buffer.status}")
             self._trouble.tell(f"an image is damaged: {why}")
             return
@@ -161,7 +161,7 @@ class NewestImage:
             self._arrivals.changed.notify_all()
 
     def _count(self, number: int) -> None:
-        """Frames that are missing between the last number and this one."""
+        """Adds the frames that are missing between the last number and this one to `lost`."""
         before, self._last_number = self._last_number, number
         if before is None:
             return
@@ -171,6 +171,6 @@ class NewestImage:
         if 0 < missing < FRAME_NUMBERS // 2:
             self.lost += missing
 
-    def _say(self, state: CameraReason) -> None:
+    def _set_state(self, state: CameraReason) -> None:
         with self._arrivals.changed:
             self._state = state

@@ -1,4 +1,4 @@
-"""Images of GenICam cameras as red, green and blue bytes."""
+"""Converts images of GenICam cameras to red, green and blue bytes."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ PATTERNS = {"BayerRG8": "RGGB", "BayerGB8": "GBRG", "BayerGR8": "GRBG", "BayerBG
 
 
 def channels_of(pixel_format: PixelFormat) -> int:
-    """Bytes of a pixel."""
+    """Number of bytes of a pixel."""
     return 3 if pixel_format in ("RGB8", "BGR8") else 1
 
 
 def rgb_of(content: Image, size: tuple[int, int], pixel_format: PixelFormat) -> Image:
-    """(height, width, 3) From the bytes of an image. Raises ValueError, MissingExtra."""
+    """Decodes an image (height, width, 3). Raises ValueError for a wrong size, MissingExtra."""
     width, height = size
     channels = channels_of(pixel_format)
     if content.size < width * height * channels:

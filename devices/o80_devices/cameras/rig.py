@@ -1,7 +1,7 @@
-"""The rig: cameras with their lenses and places, the ball, and the table, in a file of JSON.
+"""The rig in a JSON file: cameras with lenses and places, the ball, and the table.
 
-The frame of the world: z up, lengths in metres. A camera's own frame is that of OpenCV: x to the
-right of its image, y down, z ahead. `point_in_camera = rotation @ point + translation`.
+World frame: z up, lengths in metres. The frame of a camera follows OpenCV: x to the
+right of the image, y down, z ahead. `point_in_camera = rotation @ point + translation`.
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class RigCamera:
     """World to camera [m]."""
 
     def model(self) -> _vision.Camera:
-        """The compiled camera. Raises InvalidArgument."""
+        """Builds the compiled camera. Raises InvalidArgument if the numbers are no camera."""
         try:
             return _vision.Camera(
                 self.size, self.focal, self.centre, self.distortion, self.rotation, self.translation
@@ -52,13 +52,13 @@ class RigCamera:
 
     @property
     def place(self) -> FloatArray:
-        """(3,) in the world [m]."""
+        """Place (3,) of the camera in the world [m]."""
         rotation = np.reshape(self.rotation, (3, 3))
         place: FloatArray = -rotation.T @ self.translation
         return place
 
     def moved(self, rotation: FloatArray, translation: FloatArray) -> RigCamera:
-        """The same camera elsewhere."""
+        """Returns the camera with another pose."""
         return replace(
             self,
             rotation=tuple(float(x) for x in np.ravel(rotation)),
@@ -70,7 +70,7 @@ class RigCamera:
 class Flight:
     """Forces of air and gravity on the ball; src/vision/flight.hpp has the formulas.
 
-    The numbers are those of the balls of the table-tennis application.
+    The defaults match the balls of the table-tennis application.
     """
 
     radius: float = 0.02
@@ -91,16 +91,16 @@ class Table:
     """A table on which the ball bounces; its edges are parallel to the axes of the world."""
 
     middle: Vector = (0.4, 1.57, 0.775)
-    """Middle of its surface [m]."""
+    """Middle of the surface [m]."""
     half: tuple[float, float] = (0.7625, 1.37)
-    """Half its width along x and half its length along y [m]."""
+    """Half the width along x and half the length along y [m]."""
     kept_normal: float = 0.92
     kept_tangential: float = 0.505
     friction: float = 0.25
 
     @property
     def corners(self) -> FloatArray:
-        """(4, 3) of its surface [m], counter-clockwise from the smallest x and y."""
+        """Corners (4, 3) of the surface [m], counter-clockwise from the smallest x and y."""
         signs = np.array([(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)])
         corners: FloatArray = np.asarray(self.middle) + signs * (*self.half, 0.0)
         return corners
@@ -108,7 +108,7 @@ class Table:
 
 @dataclass(frozen=True)
 class Rig:
-    """The cameras and what they look at."""
+    """Cameras, ball and table."""
 
     cameras: tuple[RigCamera, ...]
     flight: Flight = field(default_factory=Flight)
@@ -137,7 +137,7 @@ class Rig:
 
     @staticmethod
     def load(path: Path | str) -> Rig:
-        """Reads a rig. Raises InvalidArgument, which names the file and what is wrong in it."""
+        """Reads a rig. Raises InvalidArgument, which names the file and the fault."""
         try:
             read = json.loads(Path(path).read_text())
             if not isinstance(read, dict) or read.pop("format", None) != FORMAT:
@@ -155,7 +155,7 @@ class Rig:
         return rig
 
     def check(self) -> None:
-        """Raises InvalidArgument for a rig that cannot be used."""
+        """Raises InvalidArgument for a wrong number of cameras, equal names or invalid values."""
         if not 2 <= len(self.cameras) <= 16:
             raise InvalidArgument(f"a rig has 2 to 16 cameras, got {len(self.cameras)}")
         names = [camera.name for camera in self.cameras]
@@ -178,7 +178,7 @@ def vector(values: FloatArray | Sequence[float]) -> Vector:
 
 
 def looking(place: Sequence[float], at: Sequence[float]) -> tuple[FloatArray, FloatArray]:
-    """Rotation (3, 3) and translation (3,) of a camera that stands upright and looks at a point."""
+    """Rotation (3, 3) and translation (3,) of an upright camera that faces the point `at`."""
     ahead = np.subtract(at, place) / np.linalg.norm(np.subtract(at, place))
     right = np.cross(ahead, (0.0, 0.0, 1.0))
     right /= np.linalg.norm(right)

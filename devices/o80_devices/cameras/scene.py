@@ -1,7 +1,7 @@
-"""Images of the cameras of a rig: a room with the table, and a ball, through the lens.
+"""Renders a room with the table and a ball through the lenses of a rig's cameras.
 
-The ball is drawn as it is during the exposure: a fast one is a streak, a boundary lies between
-pixels, the lens bends it, light comes from above. The background with its noise is prepared.
+The ball is integrated over the exposure, so that a fast one is a streak; its edge is antialiased,
+distorted by the lens, and lit from above. Backgrounds with noise are rendered in advance.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ LINE = np.array([225.0, 226.0, 228.0])
 LINE_WIDTH = 0.02  # [m]
 TILE = 0.5  # [m]
 LIGHT = np.array([0.2, -0.1, 0.97])
-MOMENTS = 6  # of an exposure
+MOMENTS = 6  # samples of an exposure
 
 
 class Scene:
-    """The images of all cameras of a rig.
+    """Renders the images of all cameras of a rig.
 
-    exposure: how long the shutter is open; images are of the middle of it [s].
-    noise: standard deviation of a value of a pixel, of 255.
-    variations: prepared noises of a background, used in turn.
+    exposure: duration, with the time of the image in the middle [s].
+    noise: standard deviation of a pixel value, out of 255.
+    variations: number of noisy copies of a background, used in turn.
     """
 
     def __init__(
@@ -60,7 +60,7 @@ class Scene:
         velocity: FloatArray | None = None,
         into: Image | None = None,
     ) -> Image:
-        """Image of a camera; position None: no ball. into: (height, width, 3), to be filled."""
+        """Renders an image. position: None: no ball. into: (height, width, 3), to be filled."""
         backgrounds = self._backgrounds[camera]
         self._images += 1
         prepared = backgrounds[self._images % len(backgrounds)]
@@ -73,7 +73,7 @@ class Scene:
         return into
 
     def _directions(self, camera: int) -> FloatArray:
-        """(height, width, 3) Where each pixel looks; NaN: nowhere."""
+        """Returns the viewing direction of each pixel (height, width, 3); NaN: none."""
         width, height = self._sizes[camera]
         x, y = np.meshgrid(np.arange(width, dtype=float), np.arange(height, dtype=float))
         pixels = np.stack([x.ravel(), y.ravel()], axis=1)
@@ -105,7 +105,7 @@ class Scene:
         return noises
 
     def _draw(self, camera: int, image: Image, position: FloatArray, velocity: FloatArray) -> None:
-        """Draws the ball into the rectangle that it crosses during the exposure."""
+        """Draws the ball into the rectangle of its motion during the exposure."""
         share = (np.arange(MOMENTS) + 0.5) / MOMENTS - 0.5
         places = position + np.outer(share * self._exposure, velocity)
         seen = self._cameras[camera].project(np.ascontiguousarray(places))
@@ -120,7 +120,7 @@ class Scene:
         if patch.size == 0:
             return
 
-        # ray of each pixel, ball in each moment => share of the pixel that it covers, its light
+        # ray of each pixel, ball at each sample => covered share of the pixel, light
         towards = (places - self._cameras[camera].place).T
         along = rays @ towards
         size = (towards**2).sum(0)

@@ -1,4 +1,4 @@
-"""A driver that plays all cameras of a rig, which see balls that are thrown, or that of a world."""
+"""Driver that simulates all cameras of a rig, with thrown balls or the ball of a segment."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from o80_devices.cameras.throws import Throws
 
 
 class SyntheticCameras:
-    """The images of all cameras, taken at the same time, and the true ball beside them.
+    """Publishes simultaneous images of all cameras, and the true ball beside them.
 
-    With the ball of another segment the images are older than their rows by `latency`, so that the
-    rows around their time are there. An image whose rows never came has capture_time 0.
+    With the ball of another segment, images are older than their rows by `latency`, so that the
+    segment's rows around that time exist. An image without such rows has capture_time 0.
 
-    Start it with a short history (`--history 4`): a row of four cameras takes 3.7 MB.
+    Use a short history (`--history 4`): a row of four cameras takes 3.7 MB.
     """
 
     simulated = True
@@ -39,7 +39,7 @@ class SyntheticCameras:
 
     def __init__(self, config: Config) -> None:
         self._config = config
-        self.simulated = not config.ball  # a replay has no world to look at
+        self.simulated = not config.ball  # a replay has no world segment
         self.rig = Rig.load(config.rig) if config.rig else four_cameras()
         sizes = {camera.size for camera in self.rig.cameras}
         if len(sizes) > 1:

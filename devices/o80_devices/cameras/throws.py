@@ -1,4 +1,4 @@
-"""Flights of balls for a synthetic camera: thrown over the table, one after the other."""
+"""Simulates balls thrown over the table, one after the other, for synthetic cameras."""
 
 from __future__ import annotations
 
@@ -10,26 +10,26 @@ from o80.base.arrays import FloatArray
 from o80_devices.cameras.rig import Rig, Table
 
 FLIGHT = 1.1
-"""How long a ball is in the air [s]."""
+"""Duration of a flight [s]."""
 PAUSE = 0.4
-"""Between two balls; longer than the tracker takes to forget one [s]."""
+"""Time between two balls, longer than the tracker's forget time [s]."""
 
 
 @dataclass(frozen=True)
 class FlyingBall:
-    """A ball at a time."""
+    """State of a ball."""
 
     number: int
-    """From 1; 0: no ball is in the air, and the rest is meaningless."""
+    """Number from 1; 0: no ball is in the air, all other fields are meaningless."""
     position: FloatArray
     velocity: FloatArray
     spin: FloatArray
 
 
 class Throws:
-    """Every ball starts above the far end of the table and bounces once on the near half.
+    """Throws balls from above the far end of the table; each bounces once on the near half.
 
-    The balls of one seed are the same at the same times, in whatever steps they are asked for.
+    The state at a time depends on the seed only, not on earlier calls.
     """
 
     def __init__(self, rig: Rig, seed: int = 0) -> None:
@@ -38,7 +38,7 @@ class Throws:
         self._seed = seed
 
     def at(self, time: float) -> FlyingBall:
-        """The ball at a time from the start [s]."""
+        """Returns the ball at a time since the start [s]."""
         index, since = divmod(time, FLIGHT + PAUSE)
         if time < 0 or since > FLIGHT:
             return FlyingBall(0, *np.zeros((3, 3)))
@@ -47,7 +47,7 @@ class Throws:
         return FlyingBall(int(index) + 1, position, velocity, spin)
 
     def start(self, number: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Position, velocity and spin with which a ball is thrown."""
+        """Returns initial position, velocity and spin of a ball."""
         random = np.random.default_rng([self._seed, number])
         x, y, z = self._table.middle
         half = self._table.half

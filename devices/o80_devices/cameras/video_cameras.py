@@ -1,4 +1,4 @@
-"""A driver of cameras and films by OpenCV: video4linux devices, network streams, files."""
+"""Driver of cameras and films by OpenCV: video4linux devices, network streams, files."""
 
 from __future__ import annotations
 
@@ -16,12 +16,12 @@ from o80.drivers import Reading, option
 from o80.errors import InvalidArgument
 from o80_devices.trouble import Trouble
 
-AGAIN = 0.5  # between two attempts to open a camera [s]
-KERNEL_ERROR = 1_000_000  # of its stamps: the end of the transfer, or the begin, by the driver [ns]
+AGAIN = 0.5  # interval between attempts to open a camera [s]
+KERNEL_ERROR = 1_000_000  # of kernel stamps: begin or end of a transfer, by driver [ns]
 
 
 class NewestFrame:
-    """The newest frame of one camera, taken by a thread, so that no old one waits in a buffer."""
+    """Receives frames of one camera in a thread and keeps the newest: no buffer holds old ones."""
 
     def __init__(self, cv2: Any, source: str, shape: tuple[int, int, int]) -> None:
         self._cv2 = cv2
@@ -32,13 +32,13 @@ class NewestFrame:
         self._last = 0  # arrival [ns]
         self._trouble = Trouble(f"camera {source}")
         self.wrong = ""
-        """Text for the user about a failure of the camera; empty: none."""
+        """Failure of the camera, as a text for the user; empty: none."""
         self._ends = threading.Event()
         self._thread = threading.Thread(target=self._run, daemon=True)
         self._thread.start()
 
     def take(self) -> tuple[Image, int, int] | None:
-        """The frame, its time and the error of that [ns], once; None: none came since."""
+        """Returns a new frame, its time and the error of that [ns]; None: no new one."""
         with self._lock:
             newest, self._newest = self._newest, None
         return newest
@@ -69,12 +69,12 @@ class NewestFrame:
         capture.set(self._cv2.CAP_PROP_BUFFERSIZE, 1)
 
     def _time_of(self, capture: Any) -> tuple[int, int]:
-        """Time of capture where the kernel gives it, of arrival otherwise; and its error [ns]."""
+        """Returns the kernel's capture time, else the arrival time, and its error [ns]."""
         now = time.monotonic_ns()
         between, self._last = now - self._last, now
-        said = int(1e6 * float(capture.get(self._cv2.CAP_PROP_POS_MSEC)))
-        if 0 <= now - said < 1_000_000_000:
-            return said, KERNEL_ERROR
+        stamp = int(1e6 * float(capture.get(self._cv2.CAP_PROP_POS_MSEC)))
+        if 0 <= now - stamp < 1_000_000_000:
+            return stamp, KERNEL_ERROR
         return now, min(between, 1_000_000_000)
 
     def _keep(self, frame: Image, when: int, error: int) -> None:
@@ -86,10 +86,10 @@ class NewestFrame:
 
 
 class VideoCameras:
-    """The images of several cameras or films, in one segment; recorded only if it is named.
+    """Publishes the images of several cameras or films in one segment; recorded only if named.
 
-    `valid` tells which camera gave a new image; capture_time is that of the newest, 0 if none did.
-    Films are played with one frame an iteration, and end the process.
+    `valid` marks the cameras with a new image; capture_time is the newest one's, 0 without any.
+    Films are played one frame an iteration; their end stops the process.
     """
 
     units: ClassVar = {"capture_time": "ns", "times": "ns", "errors": "ns"}
@@ -122,7 +122,7 @@ class VideoCameras:
 
     def start(self) -> None:
         cv2 = needed("cv2", "cameras", "a camera", package="o80-devices")
-        # of a camera that is not there it warns at each attempt; Trouble tells once
+        # OpenCV warns at each attempt to open a missing camera; Trouble reports once
         cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
         if not self._config.films:
             self._cameras = [NewestFrame(cv2, each, self._shape) for each in self._sources]

@@ -1,4 +1,4 @@
-"""When a sensor captured a value: stamps of its clock mapped to the clock of this machine."""
+"""Maps a sensor's time stamps to capture times on the clock of this machine."""
 
 from o80_devices.clock.clock_map import Capture, ClockMap
 

@@ -11,38 +11,38 @@ from o80_devices.clock.lower_envelope import LowerEnvelope
 SECOND = 1e9  # [ns]
 MILLISECOND = 1e6  # [ns]
 
-WINDOW = 30.0 * SECOND  # of the points that give the line
-BUCKET = 0.5 * SECOND  # whose lowest point is kept
-SETTLE = 10  # buckets that must all be late before the clock is taken to have been set back
-RECENT = 2  # buckets whose least delay counts as an error: the clock may have been set back
+WINDOW = 30.0 * SECOND  # length of the interval whose points determine the line
+BUCKET = 0.5 * SECOND  # only the lowest point of a bucket is stored
+SETTLE = 10  # number of late buckets that prove a clock set back
+RECENT = 2  # buckets whose least delay counts as an error, in case the clock was set back
 
-UNKNOWN = 10.0 * MILLISECOND  # error of a first point, whose delay is unknown
-STEP = 5.0 * MILLISECOND  # a smaller one is taken for a delay, or for its end
-STEP_SCATTERS = 10.0  # likewise, in mean delays
-REORDERED = 0.2 * SECOND  # a stamp that is older by less is a late packet, not a restart
-OLD_IN_A_ROW = 10  # so many late packets one after the other are a restart
-USUAL_RATE = 1e-4  # how far the rates of quartz clocks differ
+UNKNOWN = 10.0 * MILLISECOND  # error of the first point of all
+STEP = 5.0 * MILLISECOND  # smaller jumps are delays
+STEP_SCATTERS = 10.0  # the same limit in mean delays
+REORDERED = 0.2 * SECOND  # a stamp older by less is a late packet, not a restart
+OLD_IN_A_ROW = 10  # number of consecutive late packets that prove a restart
+USUAL_RATE = 1e-4  # usual difference of two quartz clocks' rates
 
 
 @dataclass(frozen=True)
 class Capture:
-    """When a value was captured."""
+    """Capture time of a value."""
 
     time: int  #: [ns] on the monotonic clock of this machine
-    error: int  #: estimate of how far off the time may be [ns], about two standard deviations
-    epoch: int  #: increases when the clock of the device has jumped or started again
+    error: int  #: estimated error of the time [ns], about two standard deviations
+    epoch: int  #: increases when the device's clock has jumped or restarted
 
 
 class ClockMap:
-    """Maps stamps of a device to capture times, from the times at which the stamps arrived.
+    """Maps stamps of a device to capture times, based on the arrival times of the stamps.
 
-    The delay between capture and arrival is at least `latency`, and varies above it. The map is
-    the line below all arrivals of the last 30 s, less that latency: it follows the drift of the
-    device's clock, and a packet that waited in a queue does not move it. Capture times never
+    The delay from capture to arrival varies, and is at least `latency`. The map is
+    the line below all arrivals of the last 30 s, minus `latency`: the line follows the drift of
+    the device's clock, and queued packets do not move it. Capture times never
     decrease and are never later than the arrival.
 
-    Known from the stamps: the rate, jumps, restarts. Not known: the least delay itself. Measure it
-    (`o80 latency`) and give it as `latency`.
+    The stamps determine rate, jumps and restarts, but not the least delay. Measure that delay
+    (`o80 latency`) and pass it as `latency`.
     """
 
     def __init__(
@@ -54,11 +54,11 @@ class ClockMap:
         latency_error: float = 0.0,
         max_rate: float = 5e-4,
     ) -> None:
-        """tick: what a stamp counts [ns]: 1000 for microseconds, 1e9 / 300 for frames at 300 Hz.
+        """tick: unit of a stamp [ns]: 1000 for microseconds, 1e9 / 300 for frames at 300 Hz.
 
-        wrap: the number of stamps after which the counter begins again, such as 2**32.
-        latency, latency_error: from capture to the earliest arrival [s].
-        max_rate: how much faster or slower than its tick the device's clock may run.
+        wrap: number of stamps after which the counter wraps, such as 2**32.
+        latency, latency_error: least delay from capture to arrival, and its error [s].
+        max_rate: largest relative difference of the device's clock from its tick.
         """
         if not 0 < tick < math.inf:
             raise InvalidArgument(f"tick must be positive and finite [ns], got {tick}")
@@ -78,7 +78,7 @@ class ClockMap:
         self._max_rate = max_rate
         self._epoch = -1
         self._envelope = self._new_envelope(0.0, min(USUAL_RATE, max_rate))
-        self._scatter: float | None = None  # of the epoch before [ns]
+        self._scatter: float | None = None  # of the previous epoch [ns]
         self._first = self._first_arrival = 0
         self._last = self._last_arrival = 0
         self._last_old = 0
@@ -89,9 +89,9 @@ class ClockMap:
     # ------------------------------------------------------------------ the map
 
     def capture(self, stamp: int, arrival: int) -> Capture | None:
-        """Capture time of the data with this stamp; None if the stamp is old or repeated.
+        """Returns the capture time for a stamp; None if the stamp is old or repeated.
 
-        Drop the data then.
+        Drop data without a capture time.
 
         stamp: [ticks]. arrival: [ns] on the monotonic clock (`time.monotonic_ns`).
         """
@@ -111,12 +111,12 @@ class ClockMap:
         return self._capture(x, arrival)
 
     def restarted(self) -> None:
-        """The device may have started again, as after a reconnection: begins an epoch."""
+        """Begins an epoch, because the device may have restarted, as after a reconnection."""
         self._restarted = True
 
     @property
     def rate(self) -> float:
-        """How much slower the device's clock runs than this machine's: 1e-6 is a microsecond a
+        """Relative lag of the device's clock behind this machine's: 1e-6 is a microsecond a
         second."""
         return self._envelope.rate
 
@@ -143,7 +143,7 @@ class ClockMap:
     # ------------------------------------------------------------------ jumps of the clock
 
     def _unwrapped(self, stamp: int, arrival: int) -> int:
-        """The stamp on a counter that does not wrap: nearest to where it is expected."""
+        """Unwraps a stamp, to the value nearest to the expected one."""
         if self._wrap is None:
             return stamp
         expected = self._last + round((arrival - self._last_arrival) / self._tick)
@@ -151,13 +151,13 @@ class ClockMap:
         return expected + (stamp - expected + half) % self._wrap - half
 
     def _is_old(self, stamp: int) -> bool:
-        """True for a stamp that is repeated or out of order, but not after a restart."""
+        """Whether a stamp is repeated or out of order, and not the sign of a restart."""
         if stamp > self._last:
             return False
         behind = (self._last - stamp) * self._tick
         if stamp == self._last or behind < REORDERED:
-            goes_on = self._old_in_a_row == 0 or stamp > self._last_old
-            self._old_in_a_row = self._old_in_a_row + 1 if goes_on else 1
+            continues = self._old_in_a_row == 0 or stamp > self._last_old
+            self._old_in_a_row = self._old_in_a_row + 1 if continues else 1
             self._last_old = stamp
             return self._old_in_a_row < OLD_IN_A_ROW
         return False
@@ -167,18 +167,18 @@ class ClockMap:
         return x, (arrival - self._first_arrival) - x
 
     def _step(self, but_last: int = 0) -> float:
-        """Lateness too large for a delay, judged by earlier ones but the newest buckets [ns]."""
+        """Least lateness that is no delay [ns], without the newest `but_last` buckets."""
         return max(STEP, STEP_SCATTERS * self._envelope.scatter(but_last))
 
     def _was_set_forward(self, x: float, y: float) -> bool:
-        """Whether a value would have arrived before it was captured."""
+        """Whether a point implies an arrival before the capture."""
         above = self._envelope.above(x, y)
         if above > -STEP:
             return False
         return above < -self._step() - self._line_error(x)
 
     def _was_set_back(self) -> bool:
-        """Whether all values have arrived late for so long that it is no queue."""
+        """Whether all values have been late for longer than a queue can explain."""
         envelope = self._envelope
         return (
             envelope.buckets > SETTLE
@@ -188,7 +188,7 @@ class ClockMap:
         )
 
     def _begin_epoch(self, stamp: int, arrival: int) -> None:
-        """Forgets the offset between the clocks, and keeps their rate."""
+        """Forgets the offset between the clocks, and keeps the rate."""
         before = self._envelope
         if before:
             self._scatter = before.scatter(but_last=SETTLE) or before.scatter()

@@ -1,8 +1,8 @@
-"""The line below points that lie above it by a delay that varies.
+"""Fits the line below points that are above the line by a varying delay.
 
-A stamp arrives late, never early. Of the points (time of the device, arrival less that time) the
-lowest ones are therefore nearest to the truth, and a mean would be wrong by the mean delay. The
-line is the solution of the linear program "below all points, least sum of distances": the edge of
+A stamp arrives late, never early. The lowest of the points (device time, arrival minus device
+time) are therefore the most accurate, and a mean would be wrong by the mean delay. The
+line solves the linear program "below all points, least sum of distances": it is the edge of
 the lower convex hull over the mean of the times (Moon, Skelly and Towsley, 1999).
 """
 
@@ -15,13 +15,13 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 from statistics import median
 
-WANDER = 2e-7  # by which rates of quartz clocks change within minutes
-NEWEST_KEPT = 4  # buckets that stay although they are older than the window
+WANDER = 2e-7  # drift of a quartz clock's rate within minutes
+NEWEST_KEPT = 4  # buckets that are kept beyond the window
 
 
 @dataclass
 class Bucket:
-    """The lowest of the points in an interval of time."""
+    """Lowest point of a time interval."""
 
     begin: float  #: [ns]
     x: float
@@ -31,14 +31,14 @@ class Bucket:
 
 
 class LowerEnvelope:
-    """A line y = base + rate x below the points of the last `window`, from their lowest ones."""
+    """Line y = base + rate x below all points of the last `window`."""
 
     def __init__(
         self, *, window: float, bucket: float, max_rate: float, rate: float, rate_error: float
     ) -> None:
-        """Window and buckets in it: lengths [ns]. max_rate: bound of |rate|.
+        """window, bucket: lengths [ns]. max_rate: bound of |rate|.
 
-        rate, rate_error: estimate of the rate before any point, and its standard error.
+        rate, rate_error: estimate of the rate before the first point, and its standard error.
         """
         self._window = window
         self._bucket = bucket
@@ -65,11 +65,11 @@ class LowerEnvelope:
         return self._base + self.rate * x
 
     def above(self, x: float, y: float) -> float:
-        """How far a point lies above the line; negative below it."""
+        """Distance of a point above the line; negative below."""
         return y - self.at(x)
 
     def add(self, x: float, y: float) -> None:
-        """Adds a point, later than all before it. The line is then not above it."""
+        """Adds a point, later than all others; lowers the line to the point if necessary."""
         if not self._buckets or x >= self._buckets[-1].begin + self._bucket:
             self._begin_bucket(x, y)
         above = self.above(x, y)
@@ -93,14 +93,14 @@ class LowerEnvelope:
         self._buckets.append(Bucket(x, x, y, count=0))
 
     def _fit(self) -> None:
-        """Rate and base from the lowest points of the buckets."""
+        """Fits rate and base to the lowest points of the buckets."""
         points = [(each.x, each.y) for each in self._buckets]
         span = points[-1][0] - points[0][0]
         rate, error = self._prior
         if len(points) > 2 and span > 0.0:
             slope, intercept = edge_at_mean(points)
             scatter = median(y - intercept - slope * x for x, y in points)
-            # a hull touches at least two points: its slope cannot be better than one nanosecond
+            # a hull edge touches two points exactly: at least one nanosecond of scatter is assumed
             fitted = 4.0 * (scatter + 1.0) / span
             trust = error**2 / (error**2 + fitted**2)
             rate += trust * (slope - rate)
@@ -114,22 +114,22 @@ class LowerEnvelope:
 
     @property
     def error(self) -> float:
-        """Error of the line where its points are [ns].
+        """Error of the line within the window [ns].
 
-        The median distance of the lowest points of the buckets: not the mean, because a bucket
-        whose packets all waited in a queue tells nothing. A few buckets may lie on the line by
+        Median distance of the buckets' lowest points; a mean would count buckets in which all
+        packets were queued. A few buckets may lie on the line by
         chance.
         """
         return max(self._lowest_scatter, self._least_error)
 
     def scatter(self, but_last: int = 0) -> float:
-        """Mean distance of points from the line [ns], without those of the newest buckets."""
+        """Mean distance of points from the line [ns], without the newest `but_last` buckets."""
         chosen = list(self._buckets)[: max(0, len(self._buckets) - but_last)]
         count = sum(each.count for each in chosen)
         return sum(each.above for each in chosen) / count if count else 0.0
 
     def least_above(self, newest: int) -> float:
-        """The least distance from the line in the newest buckets [ns]."""
+        """Least distance from the line in the newest buckets [ns]."""
         return min(self.above(each.x, each.y) for each in self._newest(newest))
 
     def newest_count(self, newest: int) -> int:
@@ -140,12 +140,12 @@ class LowerEnvelope:
         return islice(reversed(self._buckets), count)
 
     def from_middle(self, x: float) -> float:
-        """How far x is from the mean of the window [ns]: there the rate matters least."""
+        """Distance of x from the window's mean [ns], where an error of the rate has no effect."""
         return abs(x - self._middle)
 
 
 def edge_at_mean(points: list[tuple[float, float]]) -> tuple[float, float]:
-    """Slope and intercept of the edge of the lower hull over the mean of x. x must increase."""
+    """Slope and intercept of the lower hull's edge at the mean of x. x must increase."""
     hull: list[tuple[float, float]] = []
     for x, y in points:
         while len(hull) > 1 and _turns_down(hull[-2], hull[-1], (x, y)):

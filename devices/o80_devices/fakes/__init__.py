@@ -1,1 +1,1 @@
-"""Counterparts of the devices that speak their wire protocols."""
+"""Fake devices that speak the wire protocols of the real ones."""

@@ -1,4 +1,4 @@
-"""A fake ball launcher: it speaks the protocol, with its delays, and with faults on request.
+"""Fake ball launcher with the protocol and delays of the real one, and faults on request.
 
 python -m o80_devices.fakes.ball_launcher --magazine 20 --refuse 0.1
 python -m o80_devices.fakes.ball_launcher --tracking tcp://127.0.0.1:7660
@@ -25,36 +25,36 @@ from o80_devices.fakes import numbers
 
 SECOND = 1_000_000_000  # [ns]
 FREED_WITHIN = 2.0
-"""How long an address may be in use when the launcher starts again [s]."""
+"""Timeout of an address that is still in use at a restart [s]."""
 PLACE = (0.4, 2.95, 0.033)
-"""Beyond the far end of the table, with --tracking [m]."""
+"""Place of the launcher with --tracking, beyond the far end of the table [m]."""
 YAW = -1.5708
-"""Towards smaller y [rad]."""
+"""Direction of the launches, towards smaller y [rad]."""
 TRACKING_NOISE = 0.003
-"""[m]"""
+"""Standard deviation of a tracked place [m]."""
 LEAVES = 0.8
-"""Share of the time of a launch after which the ball leaves."""
+"""Share of a launch's duration after which the ball leaves."""
 
 
 @dataclass(frozen=True)
 class Behaviour:
-    """Times and faults."""
+    """Durations and faults of the fake launcher."""
 
     state_time: float = 1.0
     """Duration of a change of state [s]."""
     launch_time: float = 3.0
-    """Duration of a launch, with the stirring [s]."""
+    """Duration of a launch, stirring included [s]."""
     magazine: int = 100
-    """Balls in it; a launch without one fails."""
+    """Number of balls; a launch without one fails."""
     refuse: float = 0.0
     """Share of the requests that fail."""
     crash_at: int = 0
-    """The launch, from 1, in the middle of which the launcher dies; 0: none."""
+    """Number of the launch, from 1, during which the launcher crashes; 0: none."""
     seed: int = 0
 
 
 class FakeLauncher:
-    """A launcher that is stepped: `step` returns at once. After a crash it is dead until `bind`."""
+    """Fake launcher, advanced by `step`, which returns at once. A crash lasts until `bind`."""
 
     def __init__(
         self,
@@ -75,17 +75,17 @@ class FakeLauncher:
         self.state = State()
         self.magazine = behaviour.magazine
         self.requests: list[Request] = []
-        """All that were received."""
+        """All received requests."""
         self.launches: list[Launch] = []
-        """All balls that have left."""
+        """All launched balls."""
         self._busy: Request | None = None
         self._began = self._until = 0
         self._ball_left = False
 
-    # ------------------------------------------------------------------ life and death
+    # ------------------------------------------------------------------ start and crash
 
     def bind(self, address: str) -> str:
-        """Listens; port 0 takes any. Returns the address."""
+        """Listens, and returns the address; port 0 takes any free port."""
         self._socket = self._context.socket(self._zmq.REP)
         self._socket.setsockopt(self._zmq.LINGER, 0)
         end = time.monotonic() + FREED_WITHIN
@@ -96,12 +96,12 @@ class FakeLauncher:
             except self._zmq.ZMQError as error:
                 if error.errno != errno.EADDRINUSE or time.monotonic() > end:
                     raise
-                time.sleep(0.005)  # ZeroMQ closes the socket of an earlier life in the background
+                time.sleep(0.005)  # ZeroMQ closes the previous socket in the background
         bound: str = self._socket.getsockopt(self._zmq.LAST_ENDPOINT).decode().rstrip("\0")
         return bound
 
     def die(self) -> None:
-        """Loses its connections, what it was doing, and its state."""
+        """Drops connections, the open request and the state."""
         if self._socket is not None:
             bound = self._socket.getsockopt(self._zmq.LAST_ENDPOINT).decode().rstrip("\0")
             self._socket.close(linger=0)
@@ -125,7 +125,7 @@ class FakeLauncher:
     # ------------------------------------------------------------------ work
 
     def step(self, now: int, wait: float = 0.0) -> None:
-        """Goes on with a request, or takes one, for which it waits at most `wait` [s]."""
+        """Continues a request, or accepts one within `wait` [s]."""
         if self._socket is None:
             return
         if self._busy is None:
@@ -145,7 +145,7 @@ class FakeLauncher:
             self._socket.send(b"0")
             return
         self.requests.append(request)
-        self._say(f"received {request.kind.name}{_told(request.state)}")
+        self._say(f"received {request.kind.name}{_state_text(request.state)}")
         behaviour = self._behaviour
         takes = behaviour.launch_time if request.kind is Kind.LAUNCH_BALL else behaviour.state_time
         self._busy, self._began, self._until = request, now, now + round(takes * SECOND)
@@ -155,7 +155,7 @@ class FakeLauncher:
         self._ball_left = False
 
     def _launch(self, now: int) -> None:
-        """The ball leaves near the end; a crash comes before."""
+        """Launches the ball near the end of the launch time, or crashes before that."""
         share = (now - self._began) / max(1, self._until - self._began)
         kinds = [request.kind for request in self.requests]
         if share >= 0.5 and kinds.count(Kind.LAUNCH_BALL) == self._behaviour.crash_at:
@@ -195,7 +195,7 @@ class FakeLauncher:
 
 
 def _wait_until_closed(address: str) -> None:
-    """Waits until nobody listens there: ZeroMQ closes a socket in the background."""
+    """Waits until the address is free, because ZeroMQ closes a socket in the background."""
     host, _, port = address.removeprefix("tcp://").rpartition(":")
     end = time.monotonic() + FREED_WITHIN
     while time.monotonic() < end:
@@ -205,12 +205,12 @@ def _wait_until_closed(address: str) -> None:
         time.sleep(0.001)
 
 
-def _told(state: State | None) -> str:
+def _state_text(state: State | None) -> str:
     return "" if state is None else " " + " ".join(f"{value:.3g}" for value in astuple(state))
 
 
 def serve(fake: FakeLauncher, address: str, restart: float) -> None:
-    """Serves until Ctrl-C; after a crash it starts again after `restart` [s], or ends (below 0)."""
+    """Serves until Ctrl-C; restarts `restart` [s] after a crash, or returns if that is negative."""
     while True:
         fake.bind(address)
         while fake.alive:

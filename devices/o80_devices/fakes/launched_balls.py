@@ -1,4 +1,4 @@
-"""The balls of the fake launcher as a tracking server would publish them."""
+"""Publishes the balls of the fake launcher like a tracking server."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from o80_devices.fakes.tracking_server import RATE, FakeTrackingServer
 
 SECOND = 1_000_000_000  # [ns]
 SEEN_FOR = 3.0
-"""A ball that lies somewhere is not tracked any more [s]."""
+"""Time after a launch for which a ball is tracked [s]."""
 STEP = 0.01
-"""Time step in which a flight is computed [s]."""
+"""Time step of a simulated flight [s]."""
 
 
 class LaunchedBalls:
-    """Where the ball that was launched last is: it flies and bounces on the table."""
+    """Simulates the flight and bounces of the last launched ball."""
 
     def __init__(
         self,
@@ -32,7 +32,7 @@ class LaunchedBalls:
         noise: float = 0.0,
         seed: int = 0,
     ) -> None:
-        """position, yaw: of the launcher in the world [m], [rad]. noise: of a place [m]."""
+        """position, yaw: pose of the launcher in the world [m], [rad]. noise: of a place [m]."""
         self._position, self._yaw = position, yaw
         self._law = Rig(cameras=(), table=table or Table()).law()
         self._noise, self._rng = noise, np.random.default_rng(seed)
@@ -44,7 +44,7 @@ class LaunchedBalls:
         self._time = self._launched = now
 
     def message(self, now: int) -> Message:
-        """Message of the tracker at a time [ns]; times do not go back."""
+        """Returns the tracker's message at a time [ns]; times must not decrease."""
         while self._ball is not None and self._time < now:
             step = min(round(STEP * SECOND), now - self._time)
             ball = self._ball

@@ -1,4 +1,4 @@
-"""Numbers on the command lines of fakes, checked with a message that names the option."""
+"""Parses numbers on the command lines of fakes; errors name the option."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def port(text: str) -> int:
 
 
 def vector(text: str) -> tuple[float, float, float]:
-    """Vector from a text such as 0.4,2.9,0"""
+    """Parses a vector from a text such as 0.4,2.9,0"""
     try:
         x, y, z = (float(each) for each in text.split(","))
     except ValueError:

@@ -1,4 +1,4 @@
-"""A fake Qualisys Track Manager that streams moving bodies, with faults.
+"""Fake Qualisys Track Manager that streams moving bodies, with faults.
 
 python -m o80_devices.fakes.qualisys --bodies racket,table --lose 0.1 --silent-every 10
 """
@@ -30,12 +30,12 @@ from o80_devices.motion_capture.qualisys_packets import (
 
 RESIDUAL = 0.25  # [mm]
 CONNECTED = b"\x01"
-"""The state of the server."""
+"""Event that reports the state of the server."""
 COMPONENTS = {
-    **{"3d": 1, "3dnolabels": 2, "3dres": 9, "3dnolabelsres": 10},  # it has no markers
+    **{"3d": 1, "3dnolabels": 2, "3dres": 9, "3dnolabelsres": 10},  # the fake has no markers
     **{"6d": 5, "6deuler": 6, "6dres": 11, "6deulerres": 12},
 }
-ANSWERS = {  # to commands that change nothing here
+ANSWERS = {  # answers to commands without an effect
     "qtmversion": "QTM Version is 2.17 (build 4000)",
     "byteorder": "Byte order is little endian",
     "takecontrol": "You are now master",
@@ -56,7 +56,7 @@ Pose = tuple[Sequence[float], Sequence[float]]
 
 @dataclass(frozen=True)
 class Stream:
-    """How a client wants its frames."""
+    """Stream of frames that a client has requested."""
 
     send: Callable[[bytes], object]
     components: Sequence[str]
@@ -65,20 +65,20 @@ class Stream:
 
 @dataclass
 class Faults:
-    """Faults of the server; may be changed while it runs."""
+    """Faults of the server; may be changed at run time."""
 
     lose: float = 0.0  #: share of the frames that are not sent
-    silent: bool = False  #: connected, but nothing comes: a pulled cable
+    silent: bool = False  #: connected, but nothing is sent, as with a pulled cable
     hidden: set[str] = field(default_factory=set)  #: bodies that no camera sees
     draw: random.Random = field(default_factory=lambda: random.Random(0))
 
 
 class FakeQualisys:
-    """Serves the RT protocol, all commands of its vendor's client but settings and calibrations.
+    """Serves the RT protocol: all commands of the vendor's client but settings and calibrations.
 
-    Bodies move on circles of 0.1 m around (0, 0, number) [m], turning.
-    poses: where the bodies are instead, by name and time [ns, monotonic]; None: it is not seen.
-    A context manager. `restart` closes all connections and begins frames and stamps anew.
+    Bodies turn on circles of 0.1 m around (0, 0, number) [m].
+    poses: other pose of a body, by name and monotonic time [ns]; None: not seen.
+    A context manager. `restart` closes all connections and restarts frame numbers and stamps.
     """
 
     def __init__(
@@ -90,7 +90,7 @@ class FakeQualisys:
         port: int = 0,
         poses: Callable[[str, int], Pose | None] | None = None,
     ) -> None:
-        """port 0: a free one."""
+        """port: 0 takes any free one."""
         self.bodies = list(bodies)
         self.frequency = frequency
         self.faults = Faults()
@@ -112,7 +112,7 @@ class FakeQualisys:
 
     def __exit__(self, *_: object) -> None:
         self._stopping.set()
-        self._hang_up()
+        self._close_connections()
         for thread in self._threads:
             thread.join(2.0)
         self._listener.close()
@@ -120,12 +120,12 @@ class FakeQualisys:
 
     def restart(self) -> None:
         self._begin = time.monotonic()
-        self._hang_up()
+        self._close_connections()
 
-    def _hang_up(self) -> None:
+    def _close_connections(self) -> None:
         with self._lock:
             for each in self._connected:
-                with contextlib.suppress(OSError):  # the client was faster
+                with contextlib.suppress(OSError):  # the client closed first
                     each.shutdown(socket.SHUT_RDWR)
                 each.close()
             self._connected.clear()
@@ -148,7 +148,7 @@ class FakeQualisys:
         packets = Packets(connected)
         stream: Stream | None = None
         number = 0
-        with connected, contextlib.suppress(OSError, ValueError):  # the client is gone
+        with connected, contextlib.suppress(OSError, ValueError):  # the client has disconnected
             if not self.faults.silent:
                 packets.send(Type.COMMAND, GREETING)
             while not self._stopping.is_set():
@@ -166,7 +166,7 @@ class FakeQualisys:
                 self._answer(packets, connected, verb, words)
 
     def _stream(self, connected: socket.socket, words: list[str]) -> Stream | None:
-        """The stream that `streamframes` asks for; None to stop, or if it is not understood."""
+        """Parses the words of `streamframes`; None for a stop or an invalid request."""
         found = re.fullmatch(
             r"(allframes|frequency:(\d+)|frequencydivisor:(\d+))( udp:(\d+))?(.*)", " ".join(words)
         )
@@ -207,17 +207,17 @@ class FakeQualisys:
         return f"<{root}>{settings}</{root}>"
 
     def _wait_for(self, number: int) -> None:
-        """Until this frame is due; timeouts of sockets are too coarse for that."""
+        """Waits until a frame is due; socket timeouts are too coarse."""
         left = self._begin + number / self.frequency - time.monotonic()
         if left > 0.0:
             self._stopping.wait(min(left, 1.0 / self.frequency))
 
     def _due(self) -> int:
-        """The number of the frame of now."""
+        """Number of the frame that is due now."""
         return int((time.monotonic() - self._begin) * self.frequency)
 
     def _send_due(self, stream: Stream, number: int) -> int:
-        """Sends the frame of now if it was not sent; returns its number."""
+        """Sends the due frame unless `number` is that frame; returns the due number."""
         due = self._due() // stream.every * stream.every
         if due == number:
             return number
@@ -247,7 +247,7 @@ class FakeQualisys:
 
 
 def packed(pose: Pose | None, component: str) -> bytes:
-    """A body as it is sent: in millimetres and degrees; NaN if no camera sees it."""
+    """Packs a pose in millimetres and degrees; NaN: not seen."""
     (x, y, z), rows = pose or (3 * (math.nan,), 9 * (math.nan,))
     if "euler" in component:  # roll about x, then pitch and yaw about the new axes
         pitch = math.asin(min(max(rows[2], -1.0), 1.0))

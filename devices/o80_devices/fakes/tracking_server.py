@@ -1,4 +1,4 @@
-"""A fake tracking server: it publishes thrown balls, or recorded ones.
+"""Fake tracking server that publishes thrown or recorded balls.
 
 python -m o80_devices.fakes.tracking_server --lose 0.1
 python -m o80_devices.fakes.tracking_server --recording o80_robot_ball_002
@@ -27,10 +27,10 @@ RATE = 180.0  # [1/s]
 
 
 class FakeTrackingServer:
-    """Publishes what it is given."""
+    """Publishes messages over ZeroMQ."""
 
     def __init__(self, address: str) -> None:
-        """address: port 0 takes any."""
+        """address: port 0 takes any free one."""
         zmq = zeromq.required()
         self._context = zmq.Context()
         self._socket: Any = self._context.socket(zmq.PUB)
@@ -49,7 +49,7 @@ class FakeTrackingServer:
 
 
 def thrown(seed: int, noise: float, rate: float = RATE) -> Iterator[tuple[int, Message]]:
-    """Balls over the table, one by one: when each message is sent [ns], and the message."""
+    """Generates messages of thrown balls, each with its send time [ns]."""
     throws, rng = Throws(four_cameras(), seed), np.random.default_rng(seed)
     for frame in count():
         at = round(frame * SECOND / rate)
@@ -59,7 +59,7 @@ def thrown(seed: int, noise: float, rate: float = RATE) -> Iterator[tuple[int, M
 
 
 def recorded(path: Path) -> Iterator[tuple[int, Message]]:
-    """The messages of a recording, from 0 on."""
+    """Generates the messages of a recording, with send times from 0 on [ns]."""
     messages = RobotAndBall.load(path).messages()
     for at, message in messages:
         yield at - messages[0][0], message

@@ -1,4 +1,4 @@
-"""Motion capture systems as sensors: the poses of named subjects, or why there are none.
+"""Motion capture systems as sensors: poses of named subjects, or the reason for a gap.
 
 `Playback` plays recorded frames, `Qualisys` is a client of Qualisys Track Manager, `Watched` uses
 the package `motioncapture` for Vicon, OptiTrack and VRPN.

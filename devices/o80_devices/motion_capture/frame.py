@@ -1,4 +1,4 @@
-"""A frame: what a motion capture system measured at one moment."""
+"""Frame: measurements of a motion capture system at one moment."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ class Subject:
     visible: bool
     position: tuple[float, ...] = NOWHERE  #: [m]
     quaternion: tuple[float, ...] = NO_ROTATION  #: x, y, z, w
-    quality: float = float("nan")  #: residual, as the system defines it; NaN: it gives none
+    quality: float = float("nan")  #: residual, as the system defines it; NaN: none
 
 
 @dataclass(frozen=True)
 class Frame:
     number: int
-    stamp: int | None  #: of the device, [ticks] of its clock; None: it gives none
+    stamp: int | None  #: stamp of the device's clock [ticks]; None: none
     arrival: int  #: [ns] on the monotonic clock of this machine
     subjects: Mapping[str, Subject]
-    latency: int = 0  #: from capture to arrival, as far as the device knows it [ns]
-    connection: int = 0  #: increases when the device may have started again
+    latency: int = 0  #: delay from capture to arrival, as reported by the device [ns]
+    connection: int = 0  #: increases when the device may have restarted

@@ -1,4 +1,4 @@
-"""When an iteration of a sensor may end: with a frame, but never too far ahead of the clock."""
+"""Paces a sensor's iterations by its frames, within a limit ahead of the clock."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ MAX_AHEAD = 3.0  # periods; the loop allows ten, see docs/drivers.md
 
 
 class FramePace:
-    """One iteration for each frame, although frames come early and late.
+    """Allots one iteration to each frame, although frames arrive early and late.
 
-    A frame that comes after the deadline of its iteration begins one more, early. The loop ends a
-    driver that runs ahead of the clock, so the sum of what came early is counted as the loop does.
+    A frame after the deadline of its iteration begins another one, early. The loop ends a
+    driver that runs ahead of the clock; the accumulated lead is therefore counted as in the loop.
     """
 
     def __init__(self) -> None:
@@ -19,10 +19,10 @@ class FramePace:
         self._missed = False
 
     def times(self, due: int) -> tuple[int, int]:
-        """The earliest and the latest time of the next return [ns]."""
+        """Earliest and latest time at which the next wait may return [ns]."""
         spare = round(MAX_AHEAD * self.period) - self._ahead
         earliest = due - max(0, min(self.period, spare))
-        # after a missed frame: on time, so that iterations keep their places
+        # after a missed frame the return is on time, so that iterations stay in phase
         return earliest, due if self._missed else due + self.period // 4
 
     def returned(self, now: int, *, missed: bool) -> None:

@@ -1,4 +1,4 @@
-"""Frames of a connection that is opened again whenever it fails."""
+"""Receives frames over a connection, and reopens the connection after each failure."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from o80_devices.motion_capture.frame import Frame
 from o80_devices.motion_capture.sensor import SECOND, Reason
 from o80_devices.trouble import Trouble
 
-MAX_WAITING = 4  # frames; older ones are dropped, because their time is over
-WAIT = 0.05  # for a frame, before the thread looks whether it is to stop [s]
-SILENCE = 1.0  # of a connection that is then given up: a pulled cable does not close it [s]
-RETRY = 0.2  # after a failure [s]; twice as long after each further one without a frame
+MAX_WAITING = 4  # queued frames; older ones are dropped
+WAIT = 0.05  # timeout of one wait for a frame; then the stop flag is checked [s]
+SILENCE = 1.0  # silence after which a connection is reopened: a pulled cable does not close it [s]
+RETRY = 0.2  # wait after a failure, doubled after each further one without a frame [s]
 LONGEST_RETRY = 5.0  # [s]
-STOPPING = 2.0  # that a thread may take to end [s]
+STOPPING = 2.0  # timeout of the thread's end [s]
 
 
 class Connection(Protocol):
     @property
     def patience(self) -> float:
-        """How long it may be without a frame, counted from the last one or from its begin [s]."""
+        """Longest time without a frame, since the last one or since the connection began [s]."""
 
     def receive(self, timeout: float) -> Frame | None:
-        """The next frame; None: none came. Raises OSError or ValueError when it is broken."""
+        """Returns the next frame, or None. Raises OSError or ValueError if the connection fails."""
 
     def close(self) -> None: ...
 
 
 class FrameStream:
-    """Receives frames in a thread, which stamps them as they arrive.
+    """Receives frames in a thread, which stamps each arrival.
 
     Writer:  the thread.
     Reader:  the loop of the driver, which never waits for the network.
@@ -44,7 +44,7 @@ class FrameStream:
     ) -> None:
         """connect: opens a connection within about a second, or raises OSError or ValueError.
 
-        device: as the user knows it. longest_retry: to which the time between attempts grows [s].
+        device: name in messages. longest_retry: limit of the time between attempts [s].
         """
         self._connect = connect
         self._frames: deque[Frame] = deque(maxlen=MAX_WAITING)
@@ -93,7 +93,7 @@ class FrameStream:
                 finally:
                     connection.close()
             except Exception as error:
-                # whatever a damaged message causes: the next connection may be better
+                # any error, for example of a damaged message, is answered by a new connection
                 if not self._stopping.is_set():
                     self.trouble.tell(str(error) or type(error).__name__)
             self.reason = Reason.DISCONNECTED

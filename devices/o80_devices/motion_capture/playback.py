@@ -1,4 +1,4 @@
-"""Recorded frames played as the motion capture system sent them."""
+"""Plays recorded frames at the pace of the motion capture system."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_WAITING = 4  # frames
 
 
 class PlayedFrames:
-    """Frames that arrive at the recorded intervals, again and again if asked to."""
+    """Returns frames at the recorded intervals, once or repeatedly."""
 
     def __init__(self, file: Path, repeat: bool) -> None:
         self._file = file
@@ -54,13 +54,13 @@ class PlayedFrames:
         if self._begin is None:
             self._begin = now
         if self._next == len(frames) and self._repeat:
-            # the time of one frame passes between the rounds
+            # one frame interval between the rounds
             self._begin += frames[-1].arrival - frames[0].arrival + round(self.tick)
             self._next = 0
             self._round += frames[-1].number - frames[0].number + 1
         late = now - round(MAX_WAITING * self.tick)
         while self._next + 1 < len(frames) and self._arrival(self._next + 1) < late:
-            self._next += 1  # a buffer of the network would have dropped it
+            self._next += 1  # a network buffer would have dropped this frame
         if self._next == len(frames) or self._arrival(self._next) > now:
             return None
         frame, arrival = frames[self._next], self._arrival(self._next)

@@ -1,4 +1,4 @@
-"""A client of Qualisys Track Manager (QTM): poses with the server's time stamps and residuals."""
+"""Client of Qualisys Track Manager (QTM): poses with the server's time stamps and residuals."""
 
 from __future__ import annotations
 
@@ -25,17 +25,17 @@ from o80_devices.motion_capture.qualisys_packets import (
 )
 from o80_devices.motion_capture.sensor import Sensor, SensorConfig
 
-ANSWER = 1.0  # that the server may take for an answer [s]
-TICK = 1000.0  # of its time stamps [ns]
+ANSWER = 1.0  # timeout of an answer of the server [s]
+TICK = 1000.0  # unit of the server's time stamps [ns]
 
 
 class QualisysConnection:
-    """A connection that streams the poses of all bodies."""
+    """Connection that streams the poses of all bodies."""
 
     patience = SILENCE
 
     def __init__(self, host: str, port: int) -> None:
-        """Raises OSError or ValueError."""
+        """Connects. Raises OSError or ValueError if the server does not answer as expected."""
         with above_standard():
             self._packets = Packets(socket.create_connection((host, port), ANSWER))
         try:
@@ -60,10 +60,10 @@ class QualisysConnection:
         if kind == Type.ERROR:
             raise ValueError(f"the server says: {words_of(content)}")
         if kind != Type.DATA:
-            return None  # an event, or nothing is measured now
+            return None  # an event, or no measurement
         stamp, number, bodies = parsed_data(content)
         if len(bodies) != len(self.names):
-            # bodies were added or removed: their order is asked for again
+            # bodies were added or removed: requests their order again
             raise ValueError(f"{len(bodies)} bodies in a frame, {len(self.names)} in the settings")
         return Frame(number, stamp, arrival, dict(zip(self.names, bodies, strict=True)))
 
@@ -85,7 +85,7 @@ class QualisysConnection:
 
 
 def body_names(settings: str) -> list[str]:
-    """Names in the 6D settings of the server, in the order of the frames. Raises ValueError."""
+    """Reads the body names from 6D settings, in frame order. Raises ValueError for invalid XML."""
     try:
         root = ElementTree.fromstring(settings.strip())
     except ElementTree.ParseError as error:
@@ -94,7 +94,7 @@ def body_names(settings: str) -> list[str]:
 
 
 class QualisysFrames(FrameStream):
-    """Frames of a server."""
+    """Frames of a QTM server."""
 
     tick = TICK
 
@@ -105,7 +105,7 @@ class QualisysFrames(FrameStream):
 
     @cached_property
     def names(self) -> Sequence[str]:
-        """Raises DriverError."""
+        """Body names of the server. Raises DriverError if the server does not report them."""
         try:
             connection = QualisysConnection(self._host, self._port)
         except (OSError, ValueError) as error:
@@ -127,7 +127,7 @@ class QualisysFrames(FrameStream):
 
 
 class Qualisys(Sensor):
-    """A Qualisys system: `o80 run o80_devices.motion_capture:Qualisys --host 10.0.0.2`."""
+    """Driver of Qualisys: `o80 run o80_devices.motion_capture:Qualisys --host 10.0.0.2`."""
 
     name = "motion_capture"
 

@@ -1,7 +1,7 @@
-"""Packets of the real-time protocol of Qualisys Track Manager, little endian, both directions.
+"""Encodes and decodes packets of the Qualisys real-time protocol, little endian.
 
-The vendor's own client, qtm-rt 3.1, cannot take this place: a packet of 0 bytes or with a damaged
-number of components keeps it busy for ever, and it has no limit of a packet's size.
+The vendor's client, qtm-rt 3.1, is not used: a packet of 0 bytes or with a damaged
+number of components causes an endless loop, and the size of a packet is not limited.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ import numpy as np
 from o80_devices.motion_capture.frame import Subject
 from o80_devices.motion_capture.transform import quaternion_of
 
-PORT = 22223  # where it speaks little endian
+PORT = 22223  # port of the little-endian protocol
 VERSION = "1.19"
 GREETING = "QTM RT Interface connected"
 MILLIMETRE = 1e-3  # [m]
-LARGEST = 1 << 24  # of a packet [bytes]; a larger size is noise
+LARGEST = 1 << 24  # largest size of a packet [bytes]
 
 HEADER = struct.Struct("<II")  # size with the header, type
 DATA = struct.Struct("<qII")  # time stamp [us], frame number, components
@@ -32,7 +32,7 @@ BODIES = struct.Struct("<Ihh")  # number, rates of dropped and out of sync frame
 BODY = struct.Struct("<3f9ff")
 MAX_COMPONENTS = 64
 MAX_BODIES = 1000
-NOT_ORTHOGONAL = 1e-2  # how far a rotation times its transpose may be from one
+NOT_ORTHOGONAL = 1e-2  # tolerance of R R^T = 1
 SIX_D_WITH_RESIDUAL = 11
 
 
@@ -58,7 +58,7 @@ def words_of(payload: bytes) -> str:
 
 
 class Packets:
-    """Packets of a TCP connection. Raises OSError when it is closed, ValueError for noise."""
+    """Packets of a TCP connection. Raises OSError when closed, ValueError for invalid packets."""
 
     def __init__(self, connected: socket.socket) -> None:
         self._socket = connected
@@ -68,7 +68,7 @@ class Packets:
         self._socket.sendall(text(kind, words))
 
     def receive(self, timeout: float) -> tuple[int, bytes] | None:
-        """Type and content of the next packet; None: none came in time."""
+        """Returns type and content of the next packet; None after the timeout [s]."""
         end = time.monotonic() + timeout
         while (found := self._whole()) is None:
             self._socket.settimeout(max(1e-4, end - time.monotonic()))
@@ -79,7 +79,7 @@ class Packets:
             if not got:
                 raise ConnectionError("the server has closed the connection")
             self._buffer += got
-            if time.monotonic() > end:  # a packet that never ends is silence
+            if time.monotonic() > end:  # an incomplete packet counts as silence
                 return self._whole()
         return found
 
@@ -99,12 +99,12 @@ class Packets:
 
 
 def data_packet(stamp: int, number: int, bodies: Sequence[bytes]) -> bytes:
-    """stamp: [us]. bodies: each packed by BODY."""
+    """Builds a data packet. stamp: [us]. bodies: each packed by BODY."""
     return components_packet(stamp, number, {SIX_D_WITH_RESIDUAL: bodies})
 
 
 def components_packet(stamp: int, number: int, components: Mapping[int, Sequence[bytes]]) -> bytes:
-    """stamp: [us]. components: what each type of component lists."""
+    """Builds a data packet. stamp: [us]. components: content of each component type."""
     parts = [DATA.pack(stamp, number, len(components))]
     for kind, each in components.items():
         content = BODIES.pack(len(each), 0, 0) + b"".join(each)
@@ -113,7 +113,7 @@ def components_packet(stamp: int, number: int, components: Mapping[int, Sequence
 
 
 def parsed_data(content: bytes) -> tuple[int, int, list[Subject]]:
-    """Time stamp [us], frame number and the bodies of a data packet. Raises ValueError."""
+    """Returns time stamp [us], frame number and bodies. Raises ValueError for a damaged packet."""
     try:
         stamp, number, components = DATA.unpack_from(content)
         if components > MAX_COMPONENTS:
@@ -139,7 +139,7 @@ def _bodies(content: bytes, place: int) -> list[Subject]:
         x, y, z, *numbers = BODY.unpack_from(content, place)
         place += BODY.size
         rotation = np.array(numbers[:9]).reshape(3, 3).T
-        # not seen: the server sends NaN. What is no rotation is no pose either
+        # the server sends NaN for an unseen body; an invalid rotation counts as unseen, too
         with np.errstate(invalid="ignore"):
             turns = np.abs(rotation @ rotation.T - np.eye(3)).max() < NOT_ORTHOGONAL
         if not (turns and np.isfinite([x, y, z]).all() and np.linalg.det(rotation) > 0):

@@ -1,4 +1,4 @@
-"""Frames of a file as the experiment's Vicon client records them."""
+"""Reads the file format of the experiment's Vicon client."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ HEADER = struct.Struct("<iiddqQ")  # format, number, rate, latency, time stamp, 
 VALUES = struct.Struct("<?8d")  # visible; quaternion x y z w, position; quality
 FORMAT = 4
 MAX_SUBJECTS = 10_000
-MIN_RATE, MAX_RATE = 1e-3, 1e6  # [Hz]; others are noise
+MIN_RATE, MAX_RATE = 1e-3, 1e6  # valid range [Hz]
 
 
 @dataclass(frozen=True)
@@ -24,12 +24,12 @@ class RecordedFrames:
 
     @property
     def names(self) -> list[str]:
-        """Names of all subjects, in the order of their appearance."""
+        """Names of all subjects, in order of first appearance."""
         return list(dict.fromkeys(name for frame in self.frames for name in frame.subjects))
 
 
 def load(file: Path) -> RecordedFrames:
-    """Reads a file of frames. Raises InvalidArgument."""
+    """Reads a file of frames. Raises InvalidArgument if the file is no recording."""
     try:
         content = file.read_bytes()
     except OSError as error:

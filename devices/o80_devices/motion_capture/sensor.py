@@ -1,4 +1,4 @@
-"""Parts that all motion capture drivers share: the rows, the capture times, and the gaps."""
+"""Common parts of the motion capture drivers: rows, capture times and gaps."""
 
 from __future__ import annotations
 
@@ -23,26 +23,26 @@ from o80_devices.motion_capture.frame_pace import FramePace
 from o80_devices.motion_capture.transform import Transform
 
 SECOND = 1_000_000_000  # [ns]
-FRAMES_UNTIL_TOLD = 50  # that a subject may be missing from before the user is told
+FRAMES_UNTIL_REPORT = 50  # frames without a subject before a warning
 
 
 class Reason(IntEnum):
-    """Why a row has no poses, or SEEN."""
+    """Reason why a row has no poses, or SEEN."""
 
     SEEN = 0
-    NO_NEW_FRAME = 1  #: since the row before; the next one is not late yet
+    NO_NEW_FRAME = 1  #: no frame since the last row; the next one is not late yet
     SILENT = 2  #: connected, but no frame for longer than the option silent_after
     CONNECTING = 3
-    DISCONNECTED = 4  #: refused, closed by the other side, or its process died
-    ENDED = 5  #: a recording was played to its end
+    DISCONNECTED = 4  #: refused, closed by the server, or the process died
+    ENDED = 5  #: end of a recording
 
 
 class Frames(Protocol):
-    """Where frames come from."""
+    """Source of frames."""
 
     @property
     def names(self) -> Sequence[str]:
-        """Names of the subjects that it knows. Asked for before `start`, if the user names none."""
+        """Names of all known subjects; read before `start` if the user names none."""
 
     @property
     def tick(self) -> float:
@@ -50,17 +50,17 @@ class Frames(Protocol):
 
     @property
     def reason(self) -> Reason:
-        """Why there is no frame at the moment."""
+        """Reason why there is no frame now."""
 
     def start(self) -> None: ...
 
     def stop(self) -> None: ...
 
     def taken(self, now: int) -> Frame | None:
-        """The next of the frames that have arrived. now: [ns] on the clock of the rows."""
+        """Pops the oldest arrived frame, or None. now: [ns] on the clock of the rows."""
 
     def next(self, deadline: int) -> Frame | None:
-        """The next frame, waiting until a time [ns on the monotonic clock]; None: none came."""
+        """Waits for the next frame until `deadline` (monotonic) [ns]; None: none arrived."""
 
 
 @dataclass
@@ -73,7 +73,7 @@ class SensorConfig:
 
 
 class Sensor:
-    """A motion capture system as a driver."""
+    """Driver of a motion capture system."""
 
     units = {  # noqa: RUF012
         "capture_time": "ns",
@@ -94,12 +94,12 @@ class Sensor:
         self._last_number: int | None = None
         self._lost = 0
         self._connection = 0
-        self._frames_told = 0
+        self._frames_checked = 0
         self._there: set[str] = set()
 
     @cached_property
     def subjects(self) -> dict[str, str]:
-        """Names in rows of the subjects, by their names in the system. Raises InvalidArgument."""
+        """Field of each subject. Raises InvalidArgument without subjects, or for equal fields."""
         given = [name.strip() for name in self._config.subjects.split(",")]
         names = [name for name in given if name] or list(self._frames.names)
         found: dict[str, str] = {}
@@ -145,7 +145,7 @@ class Sensor:
             self._last_seen = reading.time
         frame = self._waited if self._has_waited else self._frames.taken(reading.time)
         self._waited, self._has_waited = None, False
-        if frame is not None and self._tell(frame, reading):
+        if frame is not None and self._fill(frame, reading):
             self._last_seen = reading.time
         else:
             reason = self._why_none(reading.time)
@@ -157,8 +157,8 @@ class Sensor:
 
     # ------------------------------------------------------------------ rows
 
-    def _tell(self, frame: Frame, reading: Reading) -> bool:
-        """Fills the row; False for a frame that is older than the last one."""
+    def _fill(self, frame: Frame, reading: Reading) -> bool:
+        """Fills the row; returns False for a frame older than the last one."""
         arrival = frame.arrival - frame.latency
         if frame.stamp is None:
             capture_time = arrival - round(self._config.latency * SECOND)
@@ -172,7 +172,7 @@ class Sensor:
                 return False
             capture_time, error, epoch = capture.time, capture.error, capture.epoch
         self._count_lost(frame.number)
-        self._look_for_unknown(frame)
+        self._report_unknown(frame)
         reading.extended = {
             "reason": Reason.SEEN,
             "capture_time": capture_time,
@@ -200,13 +200,13 @@ class Sensor:
             self._lost += number - self._last_number - 1
         self._last_number = number
 
-    def _look_for_unknown(self, frame: Frame) -> None:
-        """Tells once of subjects that no frame has: their names may be misspelled."""
-        if self._frames_told >= FRAMES_UNTIL_TOLD:
+    def _report_unknown(self, frame: Frame) -> None:
+        """Reports once all subjects without a frame: their names may be misspelled."""
+        if self._frames_checked >= FRAMES_UNTIL_REPORT:
             return
-        self._frames_told += 1
+        self._frames_checked += 1
         self._there |= frame.subjects.keys()
-        if self._frames_told < FRAMES_UNTIL_TOLD:
+        if self._frames_checked < FRAMES_UNTIL_REPORT:
             return
         for name in self.subjects.keys() - self._there:
             complain(hint(name, sorted(self._there)))
@@ -238,7 +238,7 @@ NO_FRAME = {
     "stamped": False,
     "frame_number": 0,
 }
-"""Values of a row without a frame; `epoch` and `lost_frames` stay."""
+"""Values of a row without a frame; `epoch` and `lost_frames` keep their values."""
 SUBJECT_FIELDS: dict[str, Any] = {
     "visible": bool,
     "position": (float, 3),
@@ -249,7 +249,7 @@ UNSEEN = (False, Subject(False).position, Subject(False).quaternion, float("nan"
 
 
 def hint(name: str, there: Sequence[str]) -> str:
-    """Hint about a subject that no frame has."""
+    """Builds the hint about a subject that is in no frame."""
     near = difflib.get_close_matches(name, there, n=1)
     listed = ", ".join(there[:5]) + (", ..." if len(there) > 5 else "")
     known = f"did you mean '{near[0]}'?" if near else f"there are: {listed or 'none'}"
@@ -257,6 +257,6 @@ def hint(name: str, there: Sequence[str]) -> str:
 
 
 def field_name(subject: str) -> str:
-    """A name of a subject as the name of a field: "TT Platte 1" is TT_Platte_1."""
+    """Converts a subject name to a field name: "TT Platte 1" to TT_Platte_1."""
     name = re.sub(r"[^0-9A-Za-z_]+", "_", subject).strip("_")
     return f"subject_{name}" if not name or name[0].isdigit() else name

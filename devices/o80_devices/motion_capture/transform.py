@@ -1,4 +1,4 @@
-"""The transform from the frame of a motion capture system to the world of the experiment."""
+"""Transform from the frame of a motion capture system to the world frame."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ class Transform:
 
     rotation: Array  #: (3, 3)
     translation: Array  #: (3,) [m]
-    residuals: Mapping[str, float]  #: of the points that it was estimated from [m]
+    residuals: Mapping[str, float]  #: residual of the points of the estimate [m]
 
     @classmethod
     def estimated(
         cls, measured: Mapping[str, Sequence[float]], known: Mapping[str, Sequence[float]]
     ) -> Transform:
-        """The rigid transform that takes measured points to known ones best (Kabsch, 1976).
+        """Fits the rigid transform from measured points to known ones (Kabsch, 1976).
 
-        Raises InvalidArgument for less than three common points, or points on a line.
+        Raises InvalidArgument for fewer than three common points, or points on a line.
         """
         names = sorted(set(measured) & set(known))
         if len(names) < 3:
@@ -48,7 +48,7 @@ class Transform:
         left, sizes, right = np.linalg.svd((source - middle).T @ (target - goal))
         if sizes[1] < 1e-6 * sizes[0] or sizes[0] == 0.0:
             raise InvalidArgument(f"the points {names} lie on a line: add one beside it")
-        # a reflection would fit as well where the points lie in a plane
+        # points in a plane fit a reflection equally well
         sign = np.sign(np.linalg.det(right.T @ left.T))
         rotation = right.T @ np.diag([1.0, 1.0, sign]) @ left.T
         translation = goal - rotation @ middle
@@ -57,7 +57,7 @@ class Transform:
 
     @classmethod
     def load(cls, file: Path) -> Transform:
-        """Raises InvalidArgument."""
+        """Reads a transform. Raises InvalidArgument if the file holds none."""
         try:
             content = json.loads(file.read_text())
             rotation = np.array(content["rotation"], float)
@@ -94,13 +94,13 @@ class Transform:
     def of_pose(
         self, position: Sequence[float], quaternion: Sequence[float]
     ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-        """A position [m] and a quaternion (x, y, z, w) in the world."""
+        """Transforms a position [m] and a quaternion (x, y, z, w) to the world."""
         turned = product(quaternion_of(self.rotation), quaternion)
         return tuple(self.of_point(position).tolist()), turned
 
 
 def quaternion_of(rotation: Array) -> tuple[float, ...]:
-    """x, y, z, w with w >= 0, of a rotation matrix; the largest component is computed first."""
+    """Converts a rotation matrix to x, y, z, w with w >= 0; computes the largest one first."""
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
     squares = [1 + a - e - i, 1 - a + e - i, 1 - a - e + i, 1 + a + e + i]  # 4 x^2, 4 y^2, ...
     columns = [
@@ -115,7 +115,7 @@ def quaternion_of(rotation: Array) -> tuple[float, ...]:
 
 
 def product(one: Sequence[float], two: Sequence[float]) -> tuple[float, ...]:
-    """The rotation `two`, then `one`."""
+    """Composes two rotations: `two`, then `one`."""
     x, y, z, w = one
     a, b, c, d = two
     return (

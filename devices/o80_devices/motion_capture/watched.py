@@ -1,8 +1,8 @@
-"""Vicon, OptiTrack and VRPN by the package `motioncapture`, in a process that is watched.
+"""Vicon, OptiTrack and VRPN by the package `motioncapture`, in a supervised child process.
 
-Its clients block without a timeout and some ignore Ctrl-C. They therefore run in a child process,
-which is killed when it is silent for too long or when the driver stops. The package gives no time
-stamps: the capture time is the arrival less the option latency, and `stamped` is False.
+The package's clients block without a timeout, and some ignore Ctrl-C. They therefore run in a
+child process, which is killed after a long silence or when the driver stops. There are no time
+stamps: the capture time is the arrival minus the option latency, and `stamped` is False.
 """
 
 from __future__ import annotations
@@ -29,14 +29,14 @@ from o80_devices.motion_capture.sensor import Sensor, SensorConfig
 from o80_devices.motion_capture.watched_line import STARTED
 
 CHILD = "o80_devices.motion_capture.watched_child"
-STARTING = 60.0  # until the child has imported its modules; a busy machine is slow [s]
-FIRST = 3.0  # from then to the first frame: the client connects [s]
-FOUND = 5.0  # within which a subject must appear, if the user names none [s]
+STARTING = 60.0  # timeout of the child's imports, long enough for a busy machine [s]
+FIRST = 3.0  # timeout from the imports to the first frame [s]
+FOUND = 5.0  # timeout of the first subject, if the user names none [s]
 LONGEST_LINE = 1 << 20  # [bytes]
 
 
 class ChildConnection:
-    """The child process, whose frames are lines of JSON."""
+    """Child process that prints frames as lines of JSON."""
 
     @above_standard()
     def __init__(self, system: str, host: str) -> None:
@@ -44,7 +44,7 @@ class ChildConnection:
             [sys.executable, "-m", CHILD, system, host, str(os.getpid())],
             stdin=subprocess.DEVNULL,
             stdout=subprocess.PIPE,
-            start_new_session=True,  # Ctrl-C is for the driver, which then kills it
+            start_new_session=True,  # Ctrl-C reaches the driver, which kills the child
         )
         assert self._child.stdout is not None
         self._pipe = self._child.stdout.fileno()
@@ -55,7 +55,7 @@ class ChildConnection:
         self._number = 0
         self._begin = time.monotonic()
         self.started_after: float | None = None
-        """How long the child took to import its modules; None: it has not yet [s]."""
+        """Duration of the child's imports [s]; None: not finished."""
 
     @property
     def patience(self) -> float:
@@ -78,7 +78,7 @@ class ChildConnection:
         return self._frame(line)
 
     def _frame(self, line: bytes) -> Frame | None:
-        """The frame of a line; None if it holds no subject: the connection may be silent."""
+        """Parses a frame; None without a subject, because the connection may be silent."""
         if line == STARTED:
             self.started_after = time.monotonic() - self._begin
             return None
@@ -102,13 +102,13 @@ class ChildConnection:
 
 
 def subject_of(position: tuple[float, ...], quaternion: tuple[float, ...]) -> Subject:
-    """Some clients tell a subject that no camera sees by NaN, or by a quaternion of zeros."""
+    """Builds a subject; some clients mark an unseen one by NaN or a zero quaternion."""
     seen = None not in position + quaternion and any(quaternion)  # NaN is null in JSON
     return Subject(True, position, quaternion) if seen else Subject(False)
 
 
 class WatchedFrames(FrameStream):
-    """Frames of the child process, which is started again when it is silent or has died."""
+    """Frames of the child process, which is restarted after silence or death."""
 
     tick = 1.0
 
@@ -121,7 +121,7 @@ class WatchedFrames(FrameStream):
 
     @cached_property
     def names(self) -> Sequence[str]:
-        """Names of the subjects of the first frame. Raises DriverError."""
+        """Names of the first frame's subjects. Raises DriverError if none arrives."""
         connection = ChildConnection(self._system, self._host)
         begin = time.monotonic()
         try:

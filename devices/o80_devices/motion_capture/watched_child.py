@@ -1,4 +1,4 @@
-"""The process in which `motioncapture` may block: prints each frame as a line of JSON."""
+"""Child process in which `motioncapture` may block: prints each frame as a line of JSON."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ PR_SET_PDEATHSIG = 1
 
 
 def main() -> None:
-    # a client that blocks does not notice that the driver has died
+    # a blocked client does not detect the death of the driver
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     system, host, driver = sys.argv[1:4]
     if os.getppid() != int(driver):
         return  # the driver died before the line above
-    # its library prints to the standard output: frames go to a copy, the rest to the errors
+    # the library prints to stdout: frames are written to a copy, all else to stderr
     frames = os.dup(1)
     os.dup2(2, 1)
     client: Any = importlib.import_module("motioncapture")
@@ -40,7 +40,7 @@ def main() -> None:
 
 
 def bodies_of(rigid_bodies: Any) -> dict[str, Any]:
-    """Position and quaternion (x, y, z, w) by name."""
+    """Returns position and quaternion (x, y, z, w) of each body by name."""
     found = {}
     for name, body in rigid_bodies.items():
         rotation = body.rotation

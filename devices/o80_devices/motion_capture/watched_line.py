@@ -1,4 +1,4 @@
-"""Lines that the process of a watched client prints."""
+"""First line that the child process of a watched client prints."""
 
 STARTED = b"started"
-"""The first line: from now on the client connects. Each line after it is a frame in JSON."""
+"""Printed when the client begins to connect. Each later line is a frame in JSON."""

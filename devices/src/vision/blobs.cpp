@@ -67,7 +67,7 @@ void BlobFinder::find_runs(const Image& image, const Region& region, const BlobR
       run.x += static_cast<double>(value) * x;
       run.y += static_cast<double>(value) * y;
     }
-    // neighbours in the row above, diagonal ones too
+    // neighbours in the row above, diagonal ones included
     std::size_t above = above_begin;
     for (std::size_t i = row_begin; i < runs_.size(); ++i) {
       while (above < above_end && runs_[above].end < runs_[i].begin) ++above;
@@ -85,7 +85,7 @@ Blobs BlobFinder::find(const Image& image, Region region, const BlobRule& rule) 
             std::clamp(region.right, 0, image.width), std::clamp(region.bottom, 0, image.height)};
   find_runs(image, region, rule);
 
-  // runs => blobs: the sums of a root are those of its blob; a root comes before its runs
+  // runs => blobs: a root holds the sums of its blob, and precedes its runs
   struct Sum {
     double weight = 0, x = 0, y = 0;
     int pixels = 0, left = 1 << 30, right = 0, top = 1 << 30, bottom = 0;

@@ -8,27 +8,27 @@
 
 namespace o80::vision {
 
-/// The probability that a colour is that of the ball, 0 to 255, by the upper five bits of red,
+/// Probability that a pixel of a colour shows the ball, 0 to 255, by the upper five bits of red,
 /// green and blue.
 using ColourTable = std::array<std::uint8_t, 32 * 32 * 32>;
 
-/// An image of three bytes a pixel, red, green, blue, row by row.
+/// Image of three bytes a pixel, red, green, blue, row by row.
 struct Image {
   const std::uint8_t* bytes = nullptr;
   int width = 0, height = 0;
 };
 
-/// A rectangle of an image: from (left, top) up to, not including, (right, bottom) [px].
+/// Rectangle of an image: from (left, top) up to, not including, (right, bottom) [px].
 struct Region {
   int left = 0, top = 0, right = 0, bottom = 0;
 };
 
-/// Neighbouring pixels that probably are of the ball.
+/// Neighbouring pixels that probably show the ball.
 struct Blob {
   Pixel centre;       // weighted by probability [px]
   double area = 0;    // [px^2]
-  double weight = 0;  // sum of the probabilities, each 0 to 1, times area per pixel looked at
-  bool cut = false;   // it touches the border of the region: its centre is not the ball's
+  double weight = 0;  // sum of the probabilities, each 0 to 1, times area per searched pixel
+  bool cut = false;   // touches the border of the region: the centre is not the ball's
   Region bounds;
 };
 
@@ -39,16 +39,16 @@ struct Blobs {
   int count = 0;
 };
 
-/// What is a blob.
+/// Criteria of a blob.
 struct BlobRule {
-  int step = 1;         // look at every step-th pixel of every step-th row
+  int step = 1;         // search every step-th pixel of every step-th row
   int threshold = 96;   // least probability of a pixel, of 255
   double min_area = 6;  // [px^2]
   double max_area = 1e9;
 };
 
-/// Finds the blobs of ball colour in a region, the largest first. The memory that it needs is kept
-/// from call to call.
+/// Finds the blobs of ball colour in a region, the largest first. Memory is reused from
+/// call to call.
 class BlobFinder {
  public:
   explicit BlobFinder(const ColourTable& table) : table_(table) {}
@@ -56,10 +56,10 @@ class BlobFinder {
   Blobs find(const Image& image, Region region, const BlobRule& rule);
 
  private:
-  /// A stretch of pixels of one row, above the threshold.
+  /// Consecutive pixels of one row above the threshold.
   struct Run {
     int row, begin, end;  // in steps
-    int root;             // the run that stands for its blob
+    int root;             // the root run of the blob
     double weight, x, y;  // sums
   };
   int root_of(int run) noexcept;

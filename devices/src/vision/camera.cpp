@@ -6,7 +6,7 @@ namespace o80::vision {
 
 namespace {
 
-/// A point of the plane at distance 1 after the lens, and its derivatives.
+/// Point of the plane at distance 1 behind the lens, and its derivatives.
 struct Distorted {
   double x = 0, y = 0;
   double xx = 1, xy = 0, yx = 0, yy = 1;
@@ -29,7 +29,7 @@ Distorted distorted(const std::array<double, 5>& lens, double x, double y) noexc
 }  // namespace
 
 void Camera::prepare() noexcept {
-  // the first r2 at which a larger angle no longer moves the pixel outwards
+  // the smallest r2 at which a larger angle no longer moves the pixel outwards
   const auto [k1, k2, p1, p2, k3] = distortion;
   constexpr int kSteps = 900;
   constexpr double kStep = 0.01;  // up to tan(72 degrees)^2

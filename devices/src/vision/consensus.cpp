@@ -8,7 +8,7 @@ namespace o80::vision {
 
 namespace {
 
-/// The sightings that agree, one a camera.
+/// Agreeing sightings, one a camera.
 struct Chosen {
   std::array<const Sighting*, kMaxCameras> sightings;
   std::size_t count = 0;
@@ -50,7 +50,7 @@ class Search {
     return cameras_[static_cast<std::size_t>(sighting.camera)];
   }
 
-  /// Two sightings => the middle between their rays, the sightings near to it, the best point.
+  /// Two sightings => middle between their rays, sightings near to it, best point.
   std::optional<Located> proposed(std::size_t i, std::size_t j) const noexcept {
     if (!directions_[i] || !directions_[j]) return std::nullopt;
     Vector point;
@@ -58,7 +58,7 @@ class Search {
     Chosen chosen = near(point, 3 * rule_.tolerance);
     std::optional<Located> found = refined(point, chosen);
     if (!found) return std::nullopt;
-    // those that the better point does not confirm leave, and it is refined without them
+    // drops sightings too far from the better point, and refines the point without them
     const Chosen confirmed = near(found->point, rule_.tolerance);
     found = refined(found->point, confirmed);
     if (!found || near(found->point, rule_.tolerance).count != confirmed.count) return std::nullopt;
@@ -81,7 +81,7 @@ class Search {
     return true;
   }
 
-  /// The nearest sighting of each camera, of those within a distance of where it sees the point.
+  /// Selects each camera's sighting nearest to the projected point, within a distance.
   Chosen near(const Vector& point, double tolerance) const noexcept {
     std::array<const Sighting*, kMaxCameras> nearest{};
     std::array<double, kMaxCameras> distance{};
@@ -110,7 +110,7 @@ class Search {
            sighting.area * rule_.size_factor > expected;
   }
 
-  /// The point with the least squares of distances in the images, by Gauss and Newton.
+  /// Minimises the squares of distances in the images by Gauss-Newton.
   std::optional<Located> refined(Vector point, const Chosen& chosen) const noexcept {
     if (chosen.count < 2) return std::nullopt;
     Located found;

@@ -9,7 +9,7 @@
 
 namespace o80::vision {
 
-/// What may be the ball in one image.
+/// Candidate of the ball in one image.
 struct Sighting {
   int camera = 0;
   Pixel pixel;
@@ -17,29 +17,29 @@ struct Sighting {
 };
 
 struct ConsensusRule {
-  double tolerance = 3;    // largest distance between a sighting and the point as seen [px]
+  double tolerance = 3;    // largest distance between a sighting and the projected point [px]
   double noise = 0.3;      // standard deviation of a sighting [px]
   double radius = 0.02;    // of the ball [m]
-  double size_factor = 4;  // a blob may be that much larger or smaller than the ball is seen
+  double size_factor = 4;  // largest ratio of a blob's size to the ball's expected one
   int least = 2;           // cameras
-  std::optional<Vector> expected{};  // where the ball should be [m]
+  std::optional<Vector> expected{};  // expected place of the ball [m]
 };
 
-/// A point in the world that several cameras agree on.
+/// Point in the world on which several cameras agree.
 struct Located {
   Vector point;               // [m]
   Matrix<3, 3> covariance;    // [m^2]
-  std::uint64_t cameras = 0;  // bits, of those that agree
-  int count = 0;              // of those
+  std::uint64_t cameras = 0;  // bit mask of the agreeing cameras
+  int count = 0;              // number of agreeing cameras
   double residual = 0;        // root mean square of the distances in the images [px]
 };
 
 inline constexpr std::size_t kMaxCameras = 16;
 inline constexpr std::size_t kMaxSightings = 128;
 
-/// The point that the most cameras agree on, by the largest consistent subset of sightings: every
-/// pair of cameras proposes a point, every other camera joins with the sighting nearest to it. Of
-/// equally many cameras those nearer to the expected place win, or those with the smaller residual.
+/// Finds the point on which most cameras agree, the largest consistent subset of sightings: every
+/// pair of cameras proposes a point, and every other camera adds the sighting nearest to it. Equal
+/// numbers are decided by the distance to the expected place, or by the residual.
 std::optional<Located> locate(std::span<const Camera> cameras, std::span<const Sighting> sightings,
                               const ConsensusRule& rule) noexcept;
 

@@ -53,7 +53,7 @@ Matrix<BallFilter::kSize, BallFilter::kSize> BallFilter::slope(double duration,
   const State ahead = state_of(advanced(ball_, law_, duration, none));
   for (std::size_t j = 0; j < kSize; ++j) {
     const double reach = j < 3 ? 1e-5 : (j < 6 ? 1e-4 : 1e-2);
-    // a side on which the ball bounces more or less often tells nothing of the slope
+    // a side with another number of bounces gives no slope
     std::array<State, 2> sides{ahead, ahead};
     double apart = 0;
     for (std::size_t side = 0; side < 2; ++side) {
@@ -112,7 +112,7 @@ double BallFilter::distance(const Vector& point, const Matrix<3, 3>& covariance)
 void BallFilter::update(const Vector& point, const Matrix<3, 3>& covariance) noexcept {
   Matrix<3, 3> inverse;
   if (!invert(innovation(covariance), inverse)) return;
-  Matrix<kSize, 3> seen;  // covariance of the state with the point
+  Matrix<kSize, 3> seen;  // covariance of state and point
   for (std::size_t i = 0; i < kSize; ++i) {
     for (std::size_t j = 0; j < 3; ++j) seen(i, j) = covariance_(i, j);
   }

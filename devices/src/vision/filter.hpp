@@ -5,18 +5,18 @@
 
 namespace o80::vision {
 
-/// What the filter expects.
+/// Noise assumed by the filter.
 struct FilterRule {
   double acceleration_noise = 0.02;  // white noise of the acceleration [m^2/s^3]
   double spin_noise = 50;            // of the spin [rad^2/s^3]
-  double bounce_velocity = 0.25;     // standard deviation that a bounce adds [m/s]
+  double bounce_velocity = 0.25;     // standard deviation added by a bounce [m/s]
   double bounce_spin = 20;           // [rad/s]
-  double first_velocity = 8;         // standard deviation in each direction before any is seen
+  double first_velocity = 8;         // initial standard deviation in each direction
   double first_spin = 60;            // [rad/s]
   double gate = 25;                  // largest squared distance of a point, in standard deviations
 };
 
-/// An extended Kalman filter over position, velocity and spin, with the law of flight and bounce.
+/// Extended Kalman filter of position, velocity and spin, with the law of flight and bounce.
 class BallFilter {
  public:
   static constexpr std::size_t kSize = 9;
@@ -24,20 +24,20 @@ class BallFilter {
 
   BallFilter(const FlightLaw& law, const FilterRule& rule) noexcept : law_(law), rule_(rule) {}
 
-  /// Starts with a point, of unknown velocity and spin.
+  /// Starts at a point, with unknown velocity and spin.
   void begin(const Vector& point, const Matrix<3, 3>& covariance) noexcept;
 
-  /// Starts with a velocity too; `spread` is its standard deviation in each direction [m/s].
+  /// Starts with a known velocity; `spread`: its standard deviation in each direction [m/s].
   void begin(const Vector& point, const Matrix<3, 3>& covariance, const Vector& velocity,
              double spread) noexcept;
 
-  /// Goes on by a time [s], at least 0.
+  /// Predicts over a time [s], at least 0.
   void predict(double duration) noexcept;
 
   /// Squared distance of a point from the prediction, in standard deviations.
   double distance(const Vector& point, const Matrix<3, 3>& covariance) const noexcept;
 
-  /// Takes a point that was seen.
+  /// Updates the state with a seen point.
   void update(const Vector& point, const Matrix<3, 3>& covariance) noexcept;
 
   const Ball& ball() const noexcept { return ball_; }

@@ -8,7 +8,7 @@ namespace o80::vision {
 namespace {
 
 constexpr double kLongestStep = 0.01;     // [s]
-constexpr double kSlowestRebound = 0.05;  // [m/s]; a ball hops on, it never rests
+constexpr double kSlowestRebound = 0.05;  // [m/s]; a ball hops, and never rests
 
 Vector acceleration(const FlightLaw& law, const Vector& velocity, const Vector& spin) noexcept {
   const double speed = length(velocity);
@@ -17,7 +17,7 @@ Vector acceleration(const FlightLaw& law, const Vector& velocity, const Vector& 
   return magnus * cross(spin, velocity) - (law.drag * speed) * velocity + law.gravity;
 }
 
-/// One classical Runge-Kutta step with the spin of the middle.
+/// Classical Runge-Kutta step, with the spin at the middle of the step.
 Ball flown(const Ball& ball, const FlightLaw& law, double duration) noexcept {
   const double half = 0.5 * duration;
   const double halfway = std::exp(-law.spin_decay * half);
@@ -35,12 +35,12 @@ Ball flown(const Ball& ball, const FlightLaw& law, double duration) noexcept {
           ball.velocity + sixth * (a1 + 2 * a2 + 2 * a3 + a4), halfway * spin};
 }
 
-/// A ball that leaves the table.
+/// Bounces a ball on the table.
 Ball bounced(const Ball& before, const FlightLaw& law) noexcept {
   const Vector& v = before.velocity;
   const Vector& spin = before.spin;
   const double rebound = std::max(-law.kept_normal * v[2], kSlowestRebound);
-  // slip => what friction takes from the velocity, and gives to the spin
+  // slip => change of velocity and spin by friction
   const double grip = 1 - law.kept_tangential;
   double taken_x = grip * (v[0] - law.radius * spin[1]);
   double taken_y = grip * (v[1] + law.radius * spin[0]);
@@ -56,7 +56,7 @@ Ball bounced(const Ball& before, const FlightLaw& law) noexcept {
           {{spin[0] - per_velocity * taken_y, spin[1] + per_velocity * taken_x, spin[2]}}};
 }
 
-/// Whether a step ends below the surface of the table, having begun above it.
+/// Whether a step begins above the table's surface and ends below.
 bool meets_table(const Ball& begin, const Ball& end, const FlightLaw& law) noexcept {
   const double height = law.table[2] + law.radius;
   return law.has_table && end.velocity[2] < 0 && begin.position[2] >= height &&
@@ -64,7 +64,7 @@ bool meets_table(const Ball& begin, const Ball& end, const FlightLaw& law) noexc
          std::abs(end.position[1] - law.table[1]) <= law.half[1];
 }
 
-/// The moment of a step at which the ball touches the table [s].
+/// Finds the time of a step at which the ball touches the table [s].
 double time_of_touch(const Ball& ball, const FlightLaw& law, double step) noexcept {
   const double height = law.table[2] + law.radius;
   double time = 0.5 * step;

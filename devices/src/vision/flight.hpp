@@ -11,7 +11,7 @@ struct Ball {
   Vector position, velocity, spin;
 };
 
-/// What air, gravity and the table do to the ball. The same law, with the same words, is in the
+/// Effects of air, gravity and table on the ball. The same law, with the same names, is in the
 /// simulator (simulators/mujoco/src/balls: ball_flight.hpp, bounce.hpp) and in the table-tennis
 /// application; a test compares them.
 struct FlightLaw {
@@ -26,14 +26,14 @@ struct FlightLaw {
   double inertia = 2.0 / 3.0;  // / (mass radius^2)
 
   bool has_table = true;
-  Vector table{{0, 0, 0}};                   // middle of its surface [m]
-  std::array<double, 2> half{0.7625, 1.37};  // of its surface, along x and y [m]
-  double kept_normal = 0.92;                 // share of the velocity kept along the normal
-  double kept_tangential = 0.505;            // along the surface, by a ball without spin
+  Vector table{{0, 0, 0}};                   // middle of the surface [m]
+  std::array<double, 2> half{0.7625, 1.37};  // half size of the surface, along x and y [m]
+  double kept_normal = 0.92;                 // kept share of the velocity along the normal
+  double kept_tangential = 0.505;            // kept share along the surface, without spin
   double friction = 0.25;
 };
 
-/// A ball after `duration` [s], with the bounces on its way. `bounces` is increased by their
+/// Moves a ball by `duration` [s], with bounces on the way. `bounces` is increased by their
 /// number.
 Ball advanced(const Ball& ball, const FlightLaw& law, double duration, int& bounces) noexcept;
 

@@ -6,7 +6,7 @@
 
 namespace o80::vision {
 
-/// A small dense matrix, row by row.
+/// Small dense matrix, row by row.
 template <std::size_t Rows, std::size_t Columns>
 struct Matrix {
   std::array<double, Rows * Columns> values{};
@@ -82,7 +82,7 @@ inline Vector cross(const Vector& a, const Vector& b) noexcept {
 }
 inline double length(const Vector& a) noexcept { return std::sqrt(dot(a, a)); }
 
-/// Inverse of a symmetric 3 x 3 matrix by its cofactors; false: it has none.
+/// Inverts a symmetric 3 x 3 matrix by its cofactors; false: not invertible.
 inline bool invert(const Matrix<3, 3>& a, Matrix<3, 3>& inverse) noexcept {
   const auto cofactor = [&](std::size_t i, std::size_t j) {
     const std::size_t i1 = (i + 1) % 3;

@@ -41,7 +41,7 @@ using Nine = std::array<double, 9>;
 
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 
-/// A new array of the caller's, to fill.
+/// Makes a new array for the caller to fill.
 Doubles array(std::vector<std::size_t> shape, double*& values) {
   std::size_t count = 1;
   for (const std::size_t each : shape) count *= each;

@@ -1,6 +1,6 @@
 """Robots of o80 for LeRobot: `--robot.type=o80 --robot.segment=so101`, `--teleop.type=o80 ...`.
 
-LeRobot's programs import this package by its name and find both classes here. See docs/lerobot.md.
+LeRobot's programs import this package by name and load both classes from it. See docs/lerobot.md.
 """
 
 from lerobot_robot_o80.robot import O80, O80Config

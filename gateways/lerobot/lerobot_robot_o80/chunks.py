@@ -1,10 +1,10 @@
-"""LeRobot's client of asynchronous inference, whose answers act in the iterations they are for.
+"""LeRobot's client of asynchronous inference, with answers executed in their own iterations.
 
 python -m lerobot_robot_o80.chunks --robot.type=o80 --robot.segment=so101 --fps=30 \\
     --policy_type=act --pretrained_name_or_path=user/model --actions_per_chunk=50
 
-The flags are those of `python -m lerobot.async_inference.robot_client`; aggregate_fn_name is not
-used. The server is LeRobot's. Needs grpcio. See docs/lerobot.md.
+Takes the flags of `python -m lerobot.async_inference.robot_client`, but ignores
+aggregate_fn_name. Uses LeRobot's server. Needs grpcio. See docs/lerobot.md.
 """
 
 import math
@@ -25,15 +25,15 @@ from o80.frontend.chunk_parts import SentChunk
 from o80.rows.columns import value_of
 
 PATIENCE = 2.0
-"""After so long without an answer the server is asked again [s]."""
+"""Timeout of an answer, after which the request is repeated [s]."""
 
 
 class ChunkClient(RobotClient):
-    """A client that plays answers through a plan of chunks (docs/chunks.md).
+    """Executes a policy server's answers through a plan of chunks (docs/chunks.md).
 
-    An observation carries the iteration of its row as its timestep, which the server gives back:
-    action i of the answer is due i + 1 steps after that row, however late it comes. The server is
-    asked when at most the share chunk_size_threshold of an answer is planned.
+    The timestep of an observation is the iteration of its row, and the server returns it: action
+    i of the answer is due i + 1 steps after that row, however late the answer is. A request is
+    sent when at most the share chunk_size_threshold of an answer is still planned.
 
     Threads: control_loop in one, receive_actions in another, as LeRobot runs them.
     """
@@ -63,7 +63,7 @@ class ChunkClient(RobotClient):
         self._failure: BaseException | None = None
 
     def control_loop(self, task: str, verbose: bool = False) -> tuple[Any, Any]:
-        """Asks for answers until `stop`. Returns the last observation and None.
+        """Requests answers until `stop`. Returns the last observation and None.
 
         Raises BackendHalted, BackendGone.
         """
@@ -76,7 +76,7 @@ class ChunkClient(RobotClient):
                 continue
             try:
                 seen = self._ask(task)
-            except RuntimeError:  # LeRobot's, if it was stopped meanwhile
+            except RuntimeError:  # LeRobot's error, if the client was stopped meanwhile
                 if self.running:
                     raise
             self._answered.wait(PATIENCE)
@@ -102,7 +102,7 @@ class ChunkClient(RobotClient):
     def _aggregate_action_queues(
         self, incoming_actions: list[TimedAction], aggregate_fn: Any = None
     ) -> None:
-        """Sends an answer. LeRobot calls it for each, in the thread of receive_actions."""
+        """Adds an answer to the plan. LeRobot calls this in the thread of receive_actions."""
         try:
             actions = np.array([each.get_action().numpy() for each in incoming_actions])
             rows = self.robot.segment.targets(actions)
@@ -116,7 +116,7 @@ class ChunkClient(RobotClient):
             self._answered.set()
 
     def _ease(self, rows: NDArray[np.float64], seen: int) -> int:
-        """Iterations that the take-over needs within the limits of the joints (docs/chunks.md)."""
+        """Number of iterations for a take-over within the joints' limits (docs/chunks.md)."""
         arm: o80.Frontend = self.robot.segment.checked()
         now: int = min(int((arm.published - seen) / self._step), len(rows) - 1)
         planned = self.plan.planned(seen, now + 1)
@@ -137,7 +137,7 @@ class ChunkClient(RobotClient):
         return np.array([value_of(row, number.column) for number in self._numbers])
 
     def stop(self) -> None:
-        """Ends the plan: what was sent is played to its last action. Disconnects the robot."""
+        """Ends the plan after the last sent action, and disconnects the robot."""
         self.plan.close()
         super().stop()
 

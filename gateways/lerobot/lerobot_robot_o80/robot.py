@@ -18,7 +18,7 @@ from o80.datasets.lerobot_numbers import Number
 
 AT_STOP = ("hold", "relax", "rest")
 HOMEWARD = 0.5
-"""Speed of the way to the resting place [unit/s]."""
+"""Speed of the motion to the rest position [unit/s]."""
 
 
 @RobotConfig.register_subclass("o80")
@@ -26,13 +26,13 @@ HOMEWARD = 0.5
 class O80Config(RobotConfig):
     """Flags `--robot.NAME` of LeRobot's programs."""
 
-    segment: str  #: name of the segment: that of the robot, if `o80 run` got no other one
-    units: str = ""  #: degrees, normalised, native; "": those of LeRobot's driver of the arm
-    fps: float = 30.0  #: actions a second of the loop; the motion to each takes about two steps
-    #: What `disconnect` leaves: "hold": the arm holds its last target. "relax": its torque goes
-    #: off. "rest": it goes back to where it stood at `connect`, then its torque goes off.
+    segment: str  #: name of the segment; by default `o80 run` uses the robot's name
+    units: str = ""  #: degrees, normalised, native; "": the units of LeRobot's driver
+    fps: float = 30.0  #: actions a second; the motion to each takes about two steps
+    #: State after `disconnect`: "hold": the arm holds its last target. "relax": torque off.
+    #: "rest": the arm returns to its position at `connect`, then torque off.
     at_stop: str = "hold"
-    timeout: float = 5.0  #: longest wait for the robot, its next row, control of it [s]
+    timeout: float = 5.0  #: timeout of the robot, of its next row, and of its control [s]
     cameras: dict[str, CameraConfig] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -44,10 +44,10 @@ class O80Config(RobotConfig):
 
 
 class O80(Robot):
-    """A robot of o80 that runs in a process of its own, by the name of its segment.
+    """LeRobot's view of an o80 robot that runs in another process.
 
-    The limits of the robot act on what is sent. Errors are those of o80: a halt raises
-    BackendHalted with its text, the end of the process BackendGone.
+    The robot's limits apply to all actions. Errors are o80's: a halt raises
+    BackendHalted with the halt's text, the end of the process BackendGone.
     """
 
     config_class = O80Config
@@ -59,19 +59,19 @@ class O80(Robot):
         self.segment = Segment(config.segment, config.units, config.timeout)
         self.cameras = make_cameras_from_configs(config.cameras)
         self._held = contextlib.ExitStack()  # control, cameras
-        #: The row of the last observation.
+        #: Row of the last observation.
         self.seen: o80.Observation | None = None
-        self._stood: dict[str, float] = {}
+        self._rest_places: dict[str, float] = {}
 
     @property
     def observation_features(self) -> dict[str, Any]:
-        """`float` for each observed number, (height, width, 3) for each camera."""
+        """Maps each observed number to `float`, and each camera to (height, width, 3)."""
         images = {name: (each.height, each.width, 3) for name, each in self.config.cameras.items()}
         return {**dict.fromkeys(self.segment.numbers(), float), **images}
 
     @property
     def action_features(self) -> dict[str, type]:
-        """`float` for each desired number."""
+        """Maps each desired number to `float`."""
         return dict.fromkeys(self.segment.numbers("desired"), float)
 
     @property
@@ -80,7 +80,7 @@ class O80(Robot):
 
     @property
     def is_calibrated(self) -> bool:
-        """Always: a driver of o80 refuses to start without its calibration."""
+        """Always True: a driver of o80 refuses to start without its calibration."""
         return True
 
     def calibrate(self) -> None:
@@ -93,8 +93,8 @@ class O80(Robot):
     def connect(self, calibrate: bool = True) -> None:
         """Attaches and takes control; moves nothing.
 
-        Raises TimeoutError if no such robot runs, ControlTaken if another program commands it,
-        BackendHalted, InvalidArgument.
+        Raises TimeoutError without the robot, ControlTaken if another program commands it,
+        BackendHalted during a halt, InvalidArgument if `at_stop` needs a missing request.
         """
         with contextlib.ExitStack() as stack:
             arm = self.segment.open()
@@ -102,7 +102,7 @@ class O80(Robot):
             if self.config.at_stop != "hold" and "relax" not in arm.requests:
                 raise o80.InvalidArgument(f"'{arm.segment}' cannot be relaxed: take at_stop=hold")
             stack.enter_context(arm.control(self.config.timeout))
-            self.seen, self._stood = self.segment.read()
+            self.seen, self._rest_places = self.segment.read()
             for camera in self.cameras.values():
                 camera.connect()
                 stack.callback(camera.disconnect)
@@ -110,17 +110,17 @@ class O80(Robot):
 
     @check_if_not_connected
     def get_observation(self) -> dict[str, Any]:
-        """The newest row in LeRobot's units, and an image of each camera."""
+        """Returns the newest row in LeRobot's units, and an image of each camera."""
         self.seen, found = self.segment.read()
         images = {name: camera.async_read() for name, camera in self.cameras.items()}
         return {**found, **images}
 
     @check_if_not_connected
     def send_action(self, action: dict[str, Any]) -> dict[str, Any]:
-        """Sends set-points: of all joints, or of some.
+        """Sends set-points of all joints or some.
 
-        Targets beyond the bounds of a joint are clipped to them, and the dictionary gets what was
-        sent: LeRobot stores that. Returns the dictionary. Raises InvalidArgument for an unknown
+        Targets are clamped to a joint's bounds, also in `action`, which LeRobot stores afterwards.
+        Returns `action`. Raises InvalidArgument for an unknown
         name or a number that is not finite.
         """
         arm = self.segment.checked()
@@ -133,7 +133,7 @@ class O80(Robot):
 
     @check_if_not_connected
     def disconnect(self) -> None:
-        """Gives control back and leaves the arm as `at_stop` says; a halted one stays as it is."""
+        """Releases control, after the action of `at_stop`, which is skipped for a halted arm."""
         with self._held:
             arm = self.segment.arm
             if self.config.at_stop == "hold" or arm is None or arm.halted or not arm.alive:
@@ -142,7 +142,7 @@ class O80(Robot):
                 numbers = self.segment.numbers("desired")
                 places = {
                     name: _within(numbers[name], place)
-                    for name, place in self._stood.items()
+                    for name, place in self._rest_places.items()
                     if name in numbers
                 }
                 self._add(arm, places, speed=HOMEWARD, mode="overwrite")
@@ -150,7 +150,7 @@ class O80(Robot):
             arm.request("relax", timeout=self.config.timeout)
 
     def _add(self, arm: o80.Frontend, places: Mapping[str, float], **pace: Any) -> None:
-        """Adds commands to these places [units of rows]."""
+        """Adds commands to target positions, in the units of rows."""
         numbers = self.segment.numbers("desired")
         states: dict[str, Any] = {}
         for name, place in places.items():
@@ -171,7 +171,7 @@ def _known(numbers: Mapping[str, Number], name: str) -> Number:
 
 
 def _within(number: Number, value: Any) -> float:
-    """A value of LeRobot, also a tensor of no dimension, in the unit of rows within the bounds."""
+    """Converts a number or scalar tensor to the unit of rows, and clamps it to the bounds."""
     place = float(value) / number.scale
     if not math.isfinite(place):
         raise o80.InvalidArgument(f"'{number.name}' must be a finite number, got {float(value)}")

@@ -1,4 +1,4 @@
-"""A segment of o80 in LeRobot's names and units."""
+"""Reads an o80 segment in LeRobot's names and units."""
 
 import contextlib
 from collections.abc import Mapping
@@ -16,21 +16,21 @@ from o80.rows.columns import value_of
 class Segment:
     """Observed and desired numbers of a segment, by LeRobot's names.
 
-    name: of the segment. units: "degrees", "normalised" or "native"; "": those of LeRobot's driver
-    of this arm, else "native". timeout: longest wait for the robot, and for its next row [s].
+    name: of the segment. units: "degrees", "normalised" or "native"; "": the units of LeRobot's
+    driver for this arm, else "native". timeout: of the robot, and of its next row [s].
     """
 
     def __init__(self, name: str, units: str, timeout: float) -> None:
         self.name = name
-        self.arm: o80.Frontend | None = None  #: while it is open
+        self.arm: o80.Frontend | None = None  #: None while closed
         self._units: Any = units or None
         self._timeout = timeout
         self._numbers: dict[str, dict[str, Number]] | None = None
 
     def numbers(self, part: Literal["observed", "desired"] = "observed") -> Mapping[str, Number]:
-        """The numbers by name. Attaches for a moment if it is not open.
+        """Returns the numbers by name; attaches briefly if the segment is not open.
 
-        Raises TimeoutError if no such robot runs, InvalidArgument for units that it cannot have.
+        Raises TimeoutError without the robot, InvalidArgument for unsupported units.
         """
         if self._numbers is None:
             with o80.Frontend(self.name, self._timeout, read_only=True) as reader:
@@ -45,7 +45,7 @@ class Segment:
         }
 
     def open(self, *, read_only: bool = False) -> o80.Frontend:
-        """Attaches. Raises TimeoutError, and InvalidArgument for a robot that bursts."""
+        """Attaches. Raises TimeoutError without the robot, InvalidArgument for a bursting one."""
         arm = o80.Frontend(self.name, self._timeout, read_only=read_only, on_error="continue")
         try:
             if arm.bursting:
@@ -67,7 +67,7 @@ class Segment:
             arm.close()
 
     def read(self) -> tuple[o80.Observation, dict[str, float]]:
-        """The newest row, and its observed numbers in LeRobot's units.
+        """Returns the newest row, and its observed numbers in LeRobot's units.
 
         Raises BackendGone if the robot has ended, BackendHalted with the text of the halt, and
         TimeoutError if the newest row is older than `timeout`.
@@ -83,7 +83,7 @@ class Segment:
         return row, found
 
     def targets(self, actions: ArrayLike) -> NDArray[np.float64]:
-        """Actions (n, numbers) in LeRobot's units as targets within the bounds, for `chunks`."""
+        """Converts actions (n, numbers) from LeRobot's units to clamped targets for `chunks`."""
         numbers = self.numbers("desired").values()
         rows = np.asarray(actions, np.float64) / [number.scale for number in numbers]
         bounds = np.array([(number.minimum, number.maximum) for number in numbers]).T
@@ -91,9 +91,9 @@ class Segment:
         return targets
 
     def checked(self) -> o80.Frontend:
-        """The frontend of a robot that runs. Raises BackendGone, BackendHalted."""
+        """Returns the frontend. Raises BackendGone or BackendHalted if the robot is not running."""
         assert self.arm is not None
-        with contextlib.suppress(o80.TimeoutError):  # raises if it has ended
+        with contextlib.suppress(o80.TimeoutError):  # raises if the robot has ended
             self.arm.wait_for(self.arm.published + 1, 0.0)
         if (halt := self.arm.halted) is not None:
             raise o80.BackendHalted(

@@ -1,4 +1,4 @@
-"""O80Teleop: any robot of o80 as a teleoperator of LeRobot: a leader that is moved by hand."""
+"""O80Teleop: any o80 robot as a teleoperator of LeRobot, for example a leader moved by hand."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -15,12 +15,12 @@ class O80TeleopConfig(TeleoperatorConfig):
     """Flags `--teleop.NAME` of LeRobot's programs."""
 
     segment: str  #: name of the leader's segment
-    units: str = ""  #: as those of the robot
-    timeout: float = 5.0  #: longest wait for the leader, and for its next row [s]
+    units: str = ""  #: as in O80Config
+    timeout: float = 5.0  #: timeout of the leader, and of its next row [s]
 
 
 class O80Teleop(Teleoperator):
-    """Observed numbers of a robot of o80 as actions. Commands nothing."""
+    """Returns the observed numbers of an o80 robot as actions; commands nothing."""
 
     config_class = O80TeleopConfig
     name = "o80"
@@ -32,7 +32,7 @@ class O80Teleop(Teleoperator):
 
     @property
     def action_features(self) -> dict[str, type]:
-        """`float` for each observed number."""
+        """Maps each observed number to `float`."""
         return dict.fromkeys(self.segment.numbers(), float)
 
     @property
@@ -45,7 +45,7 @@ class O80Teleop(Teleoperator):
 
     @property
     def is_calibrated(self) -> bool:
-        """Always: a driver of o80 refuses to start without its calibration."""
+        """Always True: a driver of o80 refuses to start without its calibration."""
         return True
 
     def calibrate(self) -> None:
@@ -56,12 +56,12 @@ class O80Teleop(Teleoperator):
 
     @check_if_already_connected
     def connect(self, calibrate: bool = True) -> None:
-        """Attaches without the right to command. Raises TimeoutError if no such robot runs."""
+        """Attaches read-only. Raises TimeoutError without the robot."""
         self.segment.open(read_only=True)
 
     @check_if_not_connected
     def get_action(self) -> dict[str, float]:
-        """The newest row in LeRobot's units. Raises BackendGone, BackendHalted, TimeoutError."""
+        """Returns the newest row in LeRobot's units; raises as `Segment.read`."""
         return self.segment.read()[1]
 
     def send_feedback(self, feedback: dict[str, Any]) -> None:

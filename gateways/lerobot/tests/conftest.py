@@ -1,4 +1,4 @@
-"""Robots that LeRobot drives."""
+"""Fixtures: robots for LeRobot's programs."""
 
 import os
 from collections.abc import Iterator
@@ -17,6 +17,6 @@ def start() -> Iterator[Start]:
 
 @pytest.fixture(scope="session")
 def leader() -> Iterator[str]:
-    """An arm that a hand has led 200 steps away from the middle."""
+    """Starts a leader 200 steps away from the middle."""
     with starting() as start:
         yield start("so101_leader", moved=200)

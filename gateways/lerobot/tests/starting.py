@@ -1,4 +1,4 @@
-"""Robots in processes of their own for the tests of this folder; arms with fake servos."""
+"""Starts robots in processes for the tests of this folder; arms have fake servos."""
 
 import itertools
 import os
@@ -9,15 +9,15 @@ from typing import Any
 import o80
 from o80_arms import fakes
 
-#: Starts a robot in real time by its name and options; returns its segment. moved: steps by which
-#: its fake servos stand away from the middle of their ranges.
+#: Starts a robot in real time by name and options; returns its segment. moved: distance of the
+#: fake servos from the middle of their ranges [steps].
 Start = Callable[..., str]
 _count = itertools.count()
 
 
 @contextmanager
 def starting() -> Iterator[Start]:
-    """Ends the robots at the end of the block."""
+    """Returns a function that starts robots, and ends them at the end of the block."""
     with ExitStack() as stack:
 
         def start(robot: str, moved: int = 0, **options: Any) -> str:

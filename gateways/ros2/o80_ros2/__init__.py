@@ -1,1 +1,1 @@
-"""Gateway to ROS 2: one process that publishes the rows of robots and takes commands for them."""
+"""Gateway to ROS 2: one process publishes the rows of robots and accepts commands for them."""

@@ -28,7 +28,7 @@ Prefix = Annotated[str, typer.Option(help="Before names of robots and joints: tw
 
 
 def rates_of(texts: list[str]) -> dict[str, float]:
-    """Rates by segment [Hz], "" for all others, 0 for every row. Raises InvalidArgument."""
+    """Parses rates by segment [Hz]: "" all others, 0 every row. Raises InvalidArgument if wrong."""
     found: dict[str, float] = {}
     for text in texts:
         name, _, word = text.rpartition("=")

@@ -1,4 +1,4 @@
-"""Commands of ROS 2 for one robot: a frontend as any other, with the same refusals."""
+"""Converts ROS 2 messages and calls to commands of one robot, through an ordinary frontend."""
 
 import time
 from collections import deque
@@ -15,17 +15,17 @@ from o80_ros2 import ros
 from o80_ros2.topics import desired_numbers
 
 PATIENCE, RESUME = 30.0, 5.0
-"""Longest waits: for a request or a step, which the robot still ends; for the end of a halt [s]."""
-SLOW = 0.5  # set-points further apart are no stream [s]
-SLACK = 1.01  # factor by which speeds may exceed their limit: times are rounded to iterations
-LARGEST = 1 << 19  # of a message [bytes]; rclpy needs seconds to read larger ones
+"""Timeouts: of a request or step, which the robot may still finish; of a resume [s]."""
+SLOW = 0.5  # longest interval of a stream of set-points [s]
+SLACK = 1.01  # tolerance of the speed limit, because times are rounded to iterations
+LARGEST = 1 << 19  # largest message [bytes]; rclpy needs seconds for larger ones
 
 
 class Commands:
-    """Takes the messages and calls of one robot."""
+    """Receives the messages and calls for one robot."""
 
     def __init__(self, shared: ros.Shared, arm: o80.Frontend, refuse: Any) -> None:
-        """refuse: gets what was refused, and why."""
+        """refuse: callback for a refusal: subject and reason."""
         self._shared, self._arm, self._refuse = shared, arm, refuse
         self._name = shared.settings.robot(arm.segment)
         self._actuators = shared.settings.joints(each.name for each in arm.actuators)
@@ -33,9 +33,9 @@ class Commands:
         self._plans: dict[tuple[int, ...], Any] = {}
         self._sent: deque[tuple[str, Any]] = deque(maxlen=64)  # batches that have not ended
         self._moves: Any = None  # the batch of the newest trajectory
-        self._last = self._every = 0.0  # of set-points: time of the last one, interval [s]
-        self._made: list[Callable[[], object]] = []  # what takes topics and services away
-        self._calls = ros.Served(f"{self._name}_calls")  # they take long: a halt does not wait
+        self._last = self._every = 0.0  # time of the last set-point, mean interval [s]
+        self._made: list[Callable[[], object]] = []  # destroy subscriptions and services
+        self._calls = ros.Served(f"{self._name}_calls")  # slow calls do not delay a halt
         calls, halt = self._calls.node, partial(o80.halt, arm.segment, "requested over ROS 2")
         if (n := shared.settings.step) and arm.bursting:
             step = partial(arm.burst, n, timeout=PATIENCE)
@@ -45,7 +45,7 @@ class Commands:
                 ("trajectory_msgs.msg.JointTrajectory", "joint_trajectory", self._trajectory, 1000),
                 ("std_msgs.msg.Float64MultiArray", "commands", self._set_points, 1),
             ):
-                taken = partial(self._tried, name, partial(self._read, ros.of(kind), take))
+                taken = partial(self._attempt, name, partial(self._read, ros.of(kind), take))
                 self._make(shared.node, "subscription", kind, name, taken, depth, raw=True)
             self._trigger("halt", lambda: f"halt {halt()} is requested", shared.node)
             ended = ("there was no halt", "the halt has ended")
@@ -56,7 +56,7 @@ class Commands:
         self._calls.start()
 
     def close(self) -> None:
-        """Closes the frontend, which ends its waits; takes topics and services away."""
+        """Closes the frontend, which ends all waits; removes topics and services."""
         self._arm.close()
         self._calls.close()
         for destroy in self._made:
@@ -74,8 +74,8 @@ class Commands:
             with suppress(Error):
                 self._arm.keep_alive()
 
-    def _tried(self, what: str, run: Callable[..., str | None], *given: Any) -> tuple[bool, str]:
-        """Calls `run`: True and its text, or False and why o80 refused it."""
+    def _attempt(self, what: str, run: Callable[..., str | None], *given: Any) -> tuple[bool, str]:
+        """Calls `run`; returns True and the text, or False and the reason of a refusal."""
         try:
             return True, run(*given) or ""
         except (Error, ValueError, TypeError, OverflowError) as error:
@@ -85,7 +85,7 @@ class Commands:
             return False, str(error)
 
     def _make(self, node: Any, what: str, kind: str, name: str, *rest: Any, **more: Any) -> None:
-        """Makes a subscription or a service."""
+        """Creates a subscription or a service."""
         create, destroy = (getattr(node, f"{verb}_{what}") for verb in ("create", "destroy"))
         made = create(ros.of(kind), f"/{self._name}/{name}", *rest, **more)
         self._made += [partial(destroy, made)] if node is self._shared.node else []
@@ -96,7 +96,7 @@ class Commands:
         take(ros.of("rclpy.serialization.deserialize_message")(data, kind))
 
     def _set_points(self, message: Any) -> None:
-        """A set-point for each actuator, in their order."""
+        """Sends a set-point for each actuator, in order."""
         if len(message.data) != len(self._actuators):
             raise InvalidArgument(
                 f"{len(self._actuators)} actuators need as many numbers, got {len(message.data)}"
@@ -110,7 +110,7 @@ class Commands:
         self._sent.append(("commands", self._arm.pulse()))
 
     def _trajectory(self, message: Any) -> None:
-        """A chunk: anchored at the stamp; without one it begins now."""
+        """Sends a trajectory as a chunk that begins at the stamp, or now without one."""
         arm, names = self._arm, list(message.joint_names)
         if not {*names} <= {*self._actuators} or len({*names}) < max(1, len(names)):
             there = ", ".join(self._actuators)
@@ -130,7 +130,7 @@ class Commands:
             begin = stamp if is_simulated else self._shared.clock.row_time(stamp)
         anchor = newest.iteration + round((begin - newest.time) / period)
         due = anchor + np.rint(times / period).astype(np.int64)
-        kept = np.append(np.diff(due) > 0, True)  # the last one of points in one iteration
+        kept = np.append(np.diff(due) > 0, True)  # of several points in an iteration, the last one
         rows, due = rows[kept], due[kept]
         if due[-1] <= newest.iteration:
             ago = (newest.iteration - int(due[-1])) * arm.period
@@ -139,7 +139,7 @@ class Commands:
         rows, due = rows[due > anchor], due[due > anchor]
         numbers = [self._desired[each] for each in chosen]
         now = np.array([np.ndarray((), each.kind, newest, each.offset) for each in numbers])
-        start = [] if stamp else [(anchor, now)]  # where it is by then nobody knows
+        start = [] if stamp else [(anchor, now)]  # the position at a future stamp is unknown
         self._check_speeds(names, chosen, [*start, *zip(due, rows, strict=True)])
         if chosen not in self._plans:
             self._plans[chosen] = arm.chunks(list(chosen), step=1)
@@ -149,7 +149,7 @@ class Commands:
         self._sent.append(("joint_trajectory", sent.batch))
 
     def _check_speeds(self, names: list[str], chosen: tuple[int, ...], way: Sequence[Any]) -> None:
-        """Raises InvalidArgument if a joint would have to be faster than its limit."""
+        """Raises InvalidArgument if a joint would exceed its speed limit."""
         limits = np.array([self._arm.actuators[each].limits.speed for each in chosen])
         due, rows = map(np.array, zip(*way, strict=True))
         speeds = np.abs(np.diff(rows, axis=0)) / (np.diff(due)[:, None] * self._arm.period)
@@ -161,13 +161,13 @@ class Commands:
 
     def _trigger(self, name: str, run: Callable[[], str], node: Any) -> None:
         def serve(_: Any, answer: Any) -> Any:
-            answer.success, answer.message = self._tried(name, run)
+            answer.success, answer.message = self._attempt(name, run)
             return answer
 
         self._make(node, "service", "std_srvs.srv.Trigger", name, serve)
 
     def _serve_request(self, request: str, path: str) -> None:
-        """A service for a request of the driver: its fields are parameters by name."""
+        """Creates a service for a driver's request, with the fields as parameters by name."""
         value_of = ros.of("rclpy.parameter.parameter_value_to_python")
 
         def serve(call: Any, answer: Any) -> Any:
@@ -176,7 +176,7 @@ class Commands:
                 self._arm.request(request, timeout=PATIENCE, **fields)
                 return f"{request} has ended"
 
-            answer.result.successful, answer.result.reason = self._tried(path, run)
+            answer.result.successful, answer.result.reason = self._attempt(path, run)
             return answer
 
         kind = "rcl_interfaces.srv.SetParametersAtomically"
@@ -184,5 +184,5 @@ class Commands:
 
 
 def nanoseconds(time: Any) -> int:
-    """A Time or Duration of ROS [ns]."""
+    """Converts a Time or Duration of ROS to [ns]."""
     return int(time.sec) * 10**9 + int(time.nanosec)

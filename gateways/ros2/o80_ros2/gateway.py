@@ -1,4 +1,4 @@
-"""The gateway: a node, the robots that it carries, and the loop that reads them."""
+"""The gateway: a node, the published robots, and the loop that reads them."""
 
 import time
 from collections.abc import Sequence
@@ -12,18 +12,18 @@ from o80_ros2.source import Source
 from o80_ros2.wall_clock import WallClock
 
 USUAL, USUAL_OF_MANY, MANY = 100.0, 20.0, 10
-"""Rate of a robot, and of each of more than MANY robots [Hz]."""
+"""Default rate [Hz], and the rate with more than MANY robots."""
 BETWEEN_LISTS, BETWEEN_REPORTS, BETWEEN_POLLS = 1.0, 1.0, 0.1
-"""Intervals: lists of segments, diagnostics, checks whether a diagnostic has changed [s]."""
+"""Intervals of segment lists, of diagnostics, and of polls for changed diagnostics [s]."""
 
-LEAST = 0.0005  # time for messages and calls before the next reading, also when that is late [s]
+LEAST = 0.0005  # least time for messages and calls between two readings [s]
 
 
 class Gateway:
-    """Publishes segments until it is asked to stop."""
+    """Publishes segments until a stop is requested."""
 
     def __init__(self, names: Sequence[str], settings: ros.Settings) -> None:
-        """names: of segments; empty for all, also those that start later."""
+        """names: of segments; empty: all, also those that start later."""
         none = ros.of("rclpy.signals.SignalHandlerOptions").NO
         ros.of("rclpy.init")(signal_handler_options=none)
         self._served, self._names, tf = ros.Served(settings.robot("o80_ros2")), names, None
@@ -38,11 +38,11 @@ class Gateway:
         self._reported: Any = None
         self._report_at = self._list_at = self._poll_at = 0.0
         self._clock: Any = None  # publisher of /clock
-        self._simulated = -1  # its last time [ns]
+        self._simulated = -1  # last published time [ns]
         self._sources: dict[str, Source] = {}
 
     def run(self, stop: StopRequest) -> None:
-        """Reads all robots, each at its rate."""
+        """Reads and publishes all robots, each at its rate, until `stop`."""
         while not stop.requested:
             now = time.monotonic()
             if now >= self._list_at:
@@ -60,7 +60,7 @@ class Gateway:
             self._served.serve(max(due, time.monotonic() + LEAST))
 
     def _update_sources(self) -> None:
-        """Adds segments that are new, and removes those that are gone."""
+        """Adds new segments, and removes those that have ended."""
         alive = [each.name for each in o80.segments() if each.alive]
         carried = {source.name: segment for segment, source in self._sources.items()}
         for segment in self._names or alive:
@@ -79,7 +79,7 @@ class Gateway:
             self._log.warning(f"the wall clock was set by {step * 1e-9:+.3f} s: stamps follow it")
 
     def _publish_clock(self) -> None:
-        """The simulated time of the first robot that has one."""
+        """Publishes the time of the first robot with simulated time."""
         topics = (each.topics for each in self._sources.values())
         first = next((each for each in topics if each and each.is_simulated), None)
         if not first or first.time == self._simulated:
@@ -91,7 +91,7 @@ class Gateway:
         self._clock.publish(message)
 
     def _report(self, now: float) -> None:
-        """Publishes /diagnostics, at once when a robot halts, ends or refuses something."""
+        """Publishes /diagnostics, at once after a halt, an end or a refusal."""
         found = [source.status() for source in self._sources.values()]
         state = [(level, values.get("halt"), values["refused"]) for level, _, values in found]
         if now < self._report_at and state == self._reported:
@@ -109,7 +109,7 @@ class Gateway:
         self._diagnostics.publish(message)
 
     def close(self) -> None:
-        """Ends the node. Robots and the commands that they have continue."""
+        """Closes the node. Robots continue, with their commands."""
         for source in self._sources.values():
             source.close(topics=True)
         self._served.close()

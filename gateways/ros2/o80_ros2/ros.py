@@ -1,4 +1,4 @@
-"""Packages and names of ROS 2, and what all parts of the gateway share."""
+"""Packages and names of ROS 2, and common parts of the gateway."""
 
 import importlib
 import math
@@ -13,11 +13,11 @@ from o80.errors import MissingExtra
 from o80.recording.epoch import topic_of
 from o80_ros2.wall_clock import WallClock
 
-LONGEST = 0.1  # wait for messages, then the end is polled [s]
+LONGEST = 0.1  # longest wait for messages; then the end is polled [s]
 
 
 def of(path: str) -> Any:
-    """A name of ROS 2, such as std_msgs.msg.String. Raises MissingExtra, which says the cure."""
+    """Imports a name of ROS 2, such as std_msgs.msg.String. Raises MissingExtra if missing."""
     module, _, name = path.rpartition(".")
     try:
         return getattr(importlib.import_module(module), name)
@@ -34,13 +34,13 @@ def of(path: str) -> Any:
 class Settings:
     """Options of the command."""
 
-    rates: Mapping[str, float]  #: by segment, "" for all others [Hz]; 0: every row
+    rates: Mapping[str, float]  #: by segment, "": all others [Hz]; 0: every row
     command: bool = False
-    step: int | None = None  #: iterations of the service `step`; None: there is none
+    step: int | None = None  #: iterations of the service `step`; None: no such service
     prefix: str = ""
 
     def robot(self, segment: str) -> str:
-        """Name of a robot below which its topics lie: with the prefix, that of a recording."""
+        """Namespace of a robot's topics: prefix and segment, spelled as in recordings."""
         return topic_of(self.prefix + segment).lstrip("/")
 
     def joints(self, names: Iterable[str]) -> list[str]:
@@ -48,7 +48,7 @@ class Settings:
 
 
 class Served:
-    """A node that one thread uses and serves: with two, rclpy loses wake-ups and can hang."""
+    """Node for one thread only: with two, rclpy loses wake-ups and can hang."""
 
     def __init__(self, name: str) -> None:
         self.node = of("rclpy.create_node")(name, start_parameter_services=False)
@@ -58,16 +58,16 @@ class Served:
         self._thread = threading.Thread(target=self.serve, args=(math.inf,))
 
     def serve(self, until: float) -> None:
-        """Takes messages and calls, up to a time of the monotonic clock [s]."""
+        """Handles messages and calls until a time of the monotonic clock [s]."""
         while (left := until - time.monotonic()) > 0 and not self._ends:
             try:
                 self._executor.spin_once(timeout_sec=min(left, LONGEST))
-            except Exception as error:  # of rclpy: others may send what it cannot read
+            except Exception as error:  # of rclpy, for example after an unreadable message
                 text = f"continues after {error!r}"
                 self.node.get_logger().warning(text, throttle_duration_sec=1.0)
 
     def start(self) -> None:
-        """Lets a thread of its own use and serve the node until it is closed."""
+        """Starts a thread that serves the node until `close`."""
         self._thread.start()
 
     def close(self) -> None:
@@ -80,7 +80,7 @@ class Served:
 
 @dataclass(frozen=True)
 class Shared:
-    """Parts that the robots of a gateway share. tf: publisher of /tf; None without tf2_msgs."""
+    """Common parts of a gateway's robots. tf: publisher of /tf; None without tf2_msgs."""
 
     node: Any
     settings: Settings
@@ -89,7 +89,7 @@ class Shared:
 
 
 def names_of(given: Iterable[str]) -> list[str]:
-    """Names that ROS accepts, each once: letters, digits and underscores, no digit first."""
+    """Converts to unique ROS names: letters, digits and underscores, no digit first."""
     found: list[str] = []
     for name in given:
         plain = re.sub(r"[^A-Za-z0-9_]+", "_", name)

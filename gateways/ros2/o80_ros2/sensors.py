@@ -1,9 +1,9 @@
-"""Sensor values that have a message type of their own in ROS 2: poses, points, wrenches, images.
+"""Finds sensor values with a ROS 2 message type: poses, points, wrenches, images.
 
-The names, shapes and units of the fields decide, as those of a recording's joints do:
-- `position`, or a name that ends so, three numbers [m], is a point; with a `quaternion` of the
-  same begin it is a pose: x, y, z, w, or as its help says `w, x, y, z`;
-- `force` and `torque`, or names that end so, three numbers each, are a wrench;
+Names, shapes and units of the fields decide:
+- `position`, or a name with this ending, three numbers [m], is a point; with a `quaternion` of
+the same prefix, a pose: x, y, z, w, or w, x, y, z if its help begins with `w`;
+- `force` and `torque`, or names with these endings, three numbers each, are a wrench;
 - bytes whose name contains `image`, of a robot with options `height` and `width`, are images of
   one or three bytes a pixel, each in a row of the array.
 """
@@ -23,19 +23,19 @@ PAIRS = (("position", "quaternion", 4), ("force", "torque", 3))
 
 @dataclass(frozen=True)
 class Sensor:
-    """One measured thing."""
+    """Sensor value with a ROS message."""
 
     kind: str  #: point, pose, wrench or image
     name: str  #: path below the robot's topics
-    structs: tuple[str, ...]  #: names of the structs of sensor values that hold its fields
+    structs: tuple[str, ...]  #: names of the enclosing structs of the fields
     fields: tuple[str, ...]
-    valid: str = ""  #: a bool beside them, False where a row holds nothing
-    place: int | None = None  #: among the images of the field
-    size: tuple[int, ...] = ()  #: of an image
-    begins_with_w: bool = False  #: a quaternion
+    valid: str = ""  #: name of a bool beside the fields, False in rows without a value
+    place: int | None = None  #: index among the images of the field
+    size: tuple[int, ...] = ()  #: shape of an image
+    begins_with_w: bool = False  #: order of a quaternion
 
     def values(self, row: NDArray[Any]) -> list[NDArray[Any]] | None:
-        """The numbers of each field in one row; None if it holds none."""
+        """Returns the numbers of each field in a row; None if a value is missing."""
         within: Any = row["extended"]
         for name in self.structs:
             within = within[name]
@@ -50,7 +50,7 @@ class Sensor:
 
 
 def sensors_of(schema: Mapping[str, Any], options: Mapping[str, str]) -> list[Sensor]:
-    """The sensors of a robot. options: of the robot, as `Provenance.options` has them."""
+    """Lists the sensors of a robot. options: as in `Provenance.options`."""
     size = [int(text) for name in ("height", "width") if (text := options.get(name, ""))]
     return [*_sensors(schema["extended"], (), size)] if "extended" in schema else []
 
@@ -86,9 +86,9 @@ def _sensors(
 
 
 def png(image: NDArray[np.uint8]) -> bytes:
-    """An image (height, width) or (height, width, 3) as a PNG file."""
+    """Encodes an image (height, width) or (height, width, 3) as PNG."""
     height, width = image.shape[:2]
-    lines = np.zeros((height, 1 + image[0].size), np.uint8)  # each begins with its filter: none
+    lines = np.zeros((height, 1 + image[0].size), np.uint8)  # filter byte 0: none
     lines[:, 1:] = image.reshape(height, -1)
     colour = 2 if image.ndim == 3 else 0
     head = struct.pack(">IIBBBBB", width, height, 8, colour, 0, 0, 0)

@@ -1,4 +1,4 @@
-"""One segment that the gateway carries, through restarts of its backend."""
+"""Publishes one segment, also after restarts of its backend."""
 
 import o80
 from o80.errors import Error
@@ -7,58 +7,58 @@ from o80_ros2.ros import Shared
 from o80_ros2.topics import Topics
 
 BETWEEN_POLLS, EVERY_ROW = 0.5, 0.005
-"""Times between attempts to attach, and between readings if every row is published [s]."""
+"""Intervals of attempts to attach, and of readings if every row is published [s]."""
 MOST_ROWS, MOST_BYTES = 200, 4 << 20
-"""Rows that are read at once; the others wait, so that other robots have their turn."""
+"""Limits of one reading; further rows wait until the other robots were read."""
 OK, WARN, ERROR, STALE = (bytes([level]) for level in range(4))
 
 
 class Source:
-    """Reads one segment and publishes its rows. Used by one thread, but for `refuse`."""
+    """Reads one segment and publishes its rows. Used by one thread, except for `refuse`."""
 
     def __init__(self, shared: Shared, segment: str) -> None:
         self.segment, self._shared = segment, shared
-        self.name = shared.settings.robot(segment)  #: in ROS
+        self.name = shared.settings.robot(segment)  #: name in ROS
         self._log = shared.node.get_logger()
         self._frontend: o80.Frontend | None = None
         self.topics: Topics | None = None
         self._commands: Commands | None = None
-        self._next = 0  # iteration that was not read yet
+        self._next = 0  # first unread iteration
         self._poll_at = 0.0
-        self._problem = self._why = ""  # why it is not read, and of the last refusal
-        self.due = 0.0  #: when it wants to be read again [s]
+        self._problem = self._why = ""  # texts of the failed attachment, of the last refusal
+        self.due = 0.0  #: time of the next reading [s]
         self.published = self.missed = self.late = self.refused = 0
 
     @property
     def gone(self) -> bool:
-        """Whether its backend has ended, or was never there."""
+        """Whether the backend has ended, or never existed."""
         return self._frontend is None or not self._frontend.alive
 
     def refuse(self, what: str, why: object) -> None:
-        """Reports that a message or a call was refused."""
+        """Reports a refused message or call."""
         self.refused += 1
         self._why = f"{what}: {why}"
         self._log.warning(f"'{self.segment}' refused {self._why}", throttle_duration_sec=1.0)
 
     def tick(self, now: float, usual: float) -> None:
-        """Publishes what is new. now: [s]; usual: rate of robots for which none was given [Hz]."""
+        """Publishes new rows. now: [s]; usual: default rate [Hz]."""
         rates = self._shared.settings.rates
         rate = rates.get(self.segment, rates.get("", usual))
         period = 1.0 / rate if rate else EVERY_ROW
         left_out = int((now - self.due) / period) if self.due else 0
         self.due = (self.due or now) + (left_out + 1) * period
-        if left_out and rate and not self.gone:  # with `all` rows wait, and may be missed
+        if left_out and rate and not self.gone:  # with `all`, rows wait, and may be overwritten
             self.late += left_out
             text = f"behind: {self.late} periods of '{self.segment}' were left out so far"
             self._log.warning(f"{text}; a lower --rate helps", throttle_duration_sec=5.0)
-        gone, robot = self.gone, self._frontend  # before the last rows are read
+        gone, robot = self.gone, self._frontend  # polled before the last rows are read
         self._publish(every=not rate)
         is_read = robot is None or robot.published < self._next
         if gone and is_read and now >= self._poll_at:
             self._poll_at = now + BETWEEN_POLLS
             if self._attach():
                 self._publish(every=not rate)
-                self.due = 0.0  # that took long
+                self.due = 0.0  # attaching is slow
         if self._commands is not None:
             self._commands.poll()
 
@@ -77,7 +77,7 @@ class Source:
         self._next = int(rows["iteration"][-1]) + 1
 
     def _attach(self) -> bool:
-        """Whether there is a backend that was not read so far."""
+        """Attaches to a new backend, if there is one; returns whether it did."""
         known, settings = self._frontend, self._shared.settings
         try:
             found = o80.Frontend(self.segment, 0.0, read_only=True)
@@ -102,7 +102,7 @@ class Source:
         return True
 
     def status(self) -> tuple[bytes, str, dict[str, object]]:
-        """Level, message and values for /diagnostics."""
+        """Returns level, message and values for /diagnostics."""
         values: dict[str, object] = {"refused": self.refused, "last refusal": self._why}
         values |= {"published": self.published, "missed": self.missed, "left out": self.late}
         robot = self._frontend
@@ -123,7 +123,7 @@ class Source:
         return OK, "bursting" if robot.bursting else f"running at {robot.frequency:g} Hz", values
 
     def close(self, *, topics: bool = False) -> None:
-        """Detaches. topics: takes the topics away too."""
+        """Detaches. topics: also removes the topics."""
         if self._commands is not None:
             self._commands.close()
             self._commands = None

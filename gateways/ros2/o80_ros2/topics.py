@@ -1,4 +1,4 @@
-"""Topics of one robot: its rows as messages of ROS 2."""
+"""Publishes the rows of one robot as messages of ROS 2."""
 
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
@@ -14,8 +14,8 @@ from o80.view.urdf import WORLD, Links, Place
 from o80_ros2 import ros
 from o80_ros2.sensors import Sensor, png, sensors_of
 
-BETWEEN_IMAGES = 100_000_000  # smallest distance of two images: packing one takes long [ns]
-DEPTH = 1000  # messages that a reliable topic keeps until its subscribers have acknowledged them
+BETWEEN_IMAGES = 100_000_000  # least interval of images, whose compression is slow [ns]
+DEPTH = 1000  # queue of unacknowledged messages of a reliable topic
 STATE, TEXT = "sensor_msgs.msg.JointState", "std_msgs.msg.String"
 TYPES = {
     "pose": ("geometry_msgs.msg.PoseStamped", ("pose.position", "pose.orientation")),
@@ -27,19 +27,19 @@ TYPES = {
         ("transform.translation", "transform.rotation"),
     ),
 }
-"""Type of each kind of message, and its parts that take numbers x, y, z, w."""
+"""Message type of each kind, and the parts with numbers x, y, z, w."""
 
 
 class Topics:
-    """Publishes rows of robots that are described alike. Used by one thread."""
+    """Publishes rows of backends with one schema. Used by one thread."""
 
     def __init__(self, shared: ros.Shared, robot: o80.Frontend) -> None:
         schema = self.schema = robot.schema
         self._shared, settings = shared, shared.settings
         self._name = settings.robot(robot.segment)
         self.is_simulated: bool = schema["clock"] == "simulated"
-        self.time = 0  #: of the newest row that was published [ns]
-        self._images: dict[str, int] = {}  # times of the newest ones [ns]
+        self.time = 0  #: time of the newest published row [ns]
+        self._images: dict[str, int] = {}  # time of each topic's last image [ns]
         self._made: list[Any] = []
         self._states: list[tuple[Any, list[str], dict[str, tuple[Number, ...]]]] = []
         joints, names = joints_of(robot._layout), dict[int, str]()
@@ -74,12 +74,12 @@ class Topics:
         return self._made[-1]
 
     def destroy(self) -> None:
-        """Takes the topics away."""
+        """Removes the topics."""
         for made in self._made:
             self._shared.node.destroy_publisher(made)
 
     def publish(self, rows: NDArray[Any]) -> None:
-        """Publishes rows, oldest first; of images and transforms only those of the last one."""
+        """Publishes rows, oldest first; images and transforms only of the last row."""
         extended = self.schema.get("extended", {"fields": []})
         captures = "capture_time" in [each["name"] for each in extended["fields"]]
         captured = rows["extended"]["capture_time"] if captures else rows["time"]
@@ -87,7 +87,7 @@ class Topics:
         raw = rows.view(np.uint8).reshape(len(rows), rows.itemsize)
         kind = ros.of(STATE)
         for publisher, names, members in self._states:
-            values = {name: _gathered(raw, each) for name, each in members.items() if each}
+            values = {name: _numbers_of(raw, each) for name, each in members.items() if each}
             for i, time in enumerate(times):
                 message = kind(header=self._header(time), name=names)
                 for member, numbers in values.items():
@@ -97,7 +97,7 @@ class Topics:
             holds = bool(captured[i]) or not captures
             for sensor, publisher in self._sensors if holds else ():
                 last, is_image = i == len(rows) - 1, sensor.kind == "image"
-                if is_image and not (last and self._wants(sensor, publisher, times[i])):
+                if is_image and not (last and self._is_image_due(sensor, publisher, times[i])):
                     continue
                 if (found := sensor.values(row)) is not None:
                     publisher.publish(_message(sensor.kind, self._header(times[i]), found))
@@ -110,15 +110,15 @@ class Topics:
             self._shared.tf.publish(message)
 
     def _header(self, time: int) -> Any:
-        """A header on the wall clock, or in simulated time."""
+        """Builds a header with wall-clock or simulated time."""
         seconds, rest = divmod(
             time if self.is_simulated else time + self._shared.clock.offset, 10**9
         )
         stamp = ros.of("builtin_interfaces.msg.Time")(sec=seconds, nanosec=rest)
         return ros.of("std_msgs.msg.Header")(stamp=stamp, frame_id=WORLD)
 
-    def _wants(self, sensor: Sensor, publisher: Any, time: int) -> bool:
-        """Whether somebody subscribes to images, and the one before is long enough ago."""
+    def _is_image_due(self, sensor: Sensor, publisher: Any, time: int) -> bool:
+        """Whether an image is due: it has a subscriber, and the last one is old enough."""
         before = self._images.get(sensor.name, time - BETWEEN_IMAGES)
         if not publisher.get_subscription_count() or 0 <= time - before < BETWEEN_IMAGES:
             return False
@@ -126,7 +126,7 @@ class Topics:
         return True
 
     def _places(self, row: NDArray[Any]) -> Iterator[Place]:
-        """Frames of the model's bodies and of poses that are measured."""
+        """Frames of the model's bodies and of measured poses."""
         if self._links is not None:
             yield from self._links.places(row.tobytes())
         for sensor, _ in self._sensors:
@@ -151,14 +151,14 @@ def _message(kind: str, header: Any, values: Sequence[NDArray[Any]], frame: str 
     return message
 
 
-def _gathered(raw: NDArray[np.uint8], numbers: Iterable[Number]) -> NDArray[np.float64]:
-    """Numbers of rows (n, bytes of a row): (n, numbers)."""
+def _numbers_of(raw: NDArray[np.uint8], numbers: Iterable[Number]) -> NDArray[np.float64]:
+    """Reads numbers from raw rows: (n, bytes of a row) => (n, numbers)."""
     columns = [np.ndarray((len(raw),), n.kind, raw, n.offset, raw.strides[:1]) for n in numbers]
     return np.stack(columns, axis=1).astype(float)
 
 
 def desired_numbers(schema: dict[str, Any]) -> Iterator[Number]:
-    """The first number of each actuator's desired state."""
+    """Locates the first number of each actuator's desired state."""
     for actuator in schema["actuators"]:
         first = schema["groups"][actuator["group"]]["type"]["fields"][0]
         kind = first["kind"] if first["kind"] != "enum" else f"u{first['size']}"

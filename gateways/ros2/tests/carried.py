@@ -1,4 +1,4 @@
-"""A robot, and a gateway's source that carries it and publishes into lists."""
+"""A robot, and a gateway's source that publishes it into lists."""
 
 from collections.abc import Callable
 from typing import Any
@@ -14,7 +14,7 @@ OFFSET = 10**18
 
 
 class Carried:
-    """A robot, and the source that carries it."""
+    """A robot and its source."""
 
     def __init__(self, robot: o80.Frontend, settings: ros.Settings) -> None:
         self.node, self.monotonic, self.now = stand_in_ros.Node(), 0, 100.0
@@ -25,12 +25,12 @@ class Carried:
         self.source = Source(shared, robot.segment)
 
     def tick(self) -> None:
-        """Lets time pass, and reads."""
+        """Advances the time, and reads."""
         self.now += 1.0
         self.source.tick(self.now, 100.0)
 
     def sent(self, topic: str) -> list[Any]:
-        """The messages of a topic below the robot's name, or of an absolute one."""
+        """Messages of a topic, relative to the robot's name or absolute."""
         name = topic if topic.startswith("/") else f"/{self.source.name}/{topic}"
         return self.node.published[name].sent
 

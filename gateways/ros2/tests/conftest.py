@@ -15,7 +15,7 @@ from o80_ros2 import ros
 
 @pytest.fixture
 def carry(monkeypatch: pytest.MonkeyPatch) -> Iterator[Carry]:
-    """Carries a robot: carry(robot, prefix=..., rates=..., command=..., step=...)."""
+    """Publishes a robot: carry(robot, prefix=..., rates=..., command=..., step=...)."""
     monkeypatch.setattr(ros, "of", stand_in_ros.of)
     with ExitStack() as stack:
 

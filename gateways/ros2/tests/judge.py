@@ -1,6 +1,6 @@
-"""A client of rclpy, run by the Python of a ROS 2: prints what it saw as one line of JSON.
+"""Client with rclpy, run by ROS 2's Python: prints its observations as one line of JSON.
 
-judge.py listen ROBOT COUNT: prints `ready` once it hears the robot, then listens to that many more.
+judge.py listen ROBOT COUNT: prints `ready` after the first message, then receives COUNT more.
 judge.py command ROBOT: moves, halts, resumes and requests.
 """
 
@@ -21,7 +21,7 @@ from std_msgs.msg import String
 from std_srvs.srv import Trigger
 from trajectory_msgs.msg import JointTrajectory, JointTrajectoryPoint
 
-signal.alarm(120)  # ends if there is no gateway
+signal.alarm(120)  # fails without a gateway
 rclpy.init()
 node = rclpy.create_node("judge")
 
@@ -32,7 +32,7 @@ def spin_until(condition: Callable[[], object]) -> None:
 
 
 def listen(robot: str, count: int) -> dict[str, Any]:
-    """Samples as bytes of the wire; what the graph says about the topic."""
+    """Returns samples as serialized bytes, and the graph's data of the topic."""
     raw, texts = list[bytes](), list[String]()
     reports, clocks = list[DiagnosticArray](), list[Clock]()
     latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)

@@ -1,4 +1,4 @@
-"""A client of Cyclone DDS: prints times of samples [ns], as `judge.py listen`; bare: as it is."""
+"""Client with Cyclone DDS: prints sample times [ns], as `judge.py listen`; bare: no IGNORING."""
 
 # mypy: disable-error-code="type-arg"
 import json
@@ -11,7 +11,7 @@ IGNORING = "<Compatibility><IgnoreTypeInformation>1.15</IgnoreTypeInformation></
 LOCAL = """<General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces>
 <AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>
 <MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><Peers><Peer address='127.0.0.1'/></Peers>
-</Discovery>"""  # as ROS with ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
+</Discovery>"""  # same as ROS with ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
 robot, count, *bare = sys.argv[1:]
 domain = f"<Domain Id='any'>{LOCAL if bare else IGNORING + LOCAL}</Domain>"
 os.environ["CYCLONEDDS_URI"] = f"<CycloneDDS>{domain}</CycloneDDS>"

@@ -1,4 +1,4 @@
-"""Message classes and a node that stand for rclpy; definitions and encoding are of rosbags."""
+"""Stand-ins for rclpy: message classes and a node; rosbags defines and encodes messages."""
 
 import re
 from collections.abc import Callable
@@ -21,7 +21,7 @@ def default(kind: int, of: Any) -> Any:
 
 @cache
 def message_class(name: str) -> type:
-    """A class with the fields of a message, all with defaults, as those of rclpy."""
+    """Builds a class with the fields of a message, all with defaults, as in rclpy."""
     _, fields = STORE.fielddefs[name]
 
     def fill(self: Any, **given: Any) -> None:
@@ -33,7 +33,7 @@ def message_class(name: str) -> type:
 
 
 def encoded(message: Any) -> Any:
-    """The message as rosbags reads it from the wire; fails for a value of a wrong type."""
+    """Encodes a message and decodes it with rosbags; fails for a value of a wrong type."""
     name = message.ros_name
     return STORE.deserialize_cdr(STORE.serialize_cdr(_plain(message), name), name)
 
@@ -55,7 +55,7 @@ def _plain(message: Any) -> Any:
 
 
 def of(path: str) -> Any:
-    """A name of ROS 2, as far as the gateway uses it."""
+    """Returns the stand-in for a name of ROS 2."""
     package, kind, name = path.split(".", 2)
     if kind == "msg":
         return message_class(f"{package}/msg/{name}")
@@ -69,7 +69,7 @@ def of(path: str) -> Any:
 
 
 class Raw:
-    """A message as it comes, with its size on the wire."""
+    """Serialized message, with its size."""
 
     def __init__(self, message: Any) -> None:
         self.message = message
@@ -90,7 +90,7 @@ class Publisher:
 
 
 class Node:
-    """Keeps what is made below it, by name."""
+    """Node that stores publishers, subscriptions and services by name."""
 
     def __init__(self) -> None:
         self.published: dict[str, Publisher] = {}
@@ -133,7 +133,7 @@ class Node:
         del self.served[name]
 
     def call(self, name: str, **parameters: Any) -> tuple[bool, str]:
-        """Calls a service: whether it succeeded, and its text."""
+        """Calls a service; returns success and text."""
         pairs = [SimpleNamespace(name=key, value=value) for key, value in parameters.items()]
         answer = SimpleNamespace(result=SimpleNamespace())
         self.served[name](SimpleNamespace(parameters=pairs), answer)
@@ -143,10 +143,10 @@ class Node:
 
 
 class Served:
-    """A node of calls, which are served in the thread that calls them."""
+    """Node of services that run in the caller's thread."""
 
     def __init__(self, others: Node, name: str) -> None:
-        """others: finds the services of this node too."""
+        """others: node that also finds the services of this one."""
         self.node, self._others = Node(), others
 
     def start(self) -> None:

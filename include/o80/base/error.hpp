@@ -23,10 +23,10 @@ O80_ERROR(SegmentTaken, Error);             // the name already has a living bac
 O80_ERROR(SegmentError, Error);             // the file is not a segment of this version of o80
 O80_ERROR(SchemaMismatch, Error);           // the robot's description differs from the caller's
 O80_ERROR(BackendGone, Error);              // the backend no longer iterates
-O80_ERROR(BackendStopped, BackendGone);     // it stopped without a fault
-O80_ERROR(BackendFailed, BackendGone);      // its driver reported a fault
-O80_ERROR(BackendKilled, BackendGone);      // its process died
-O80_ERROR(BackendSuperseded, BackendGone);  // a new backend took its name
+O80_ERROR(BackendStopped, BackendGone);     // the backend stopped without a fault
+O80_ERROR(BackendFailed, BackendGone);      // the driver reported a fault
+O80_ERROR(BackendKilled, BackendGone);      // the backend's process died
+O80_ERROR(BackendSuperseded, BackendGone);  // a new backend took the name
 O80_ERROR(BackendHalted, Error);            // commands are refused until the backend is resumed
 O80_ERROR(RowOverwritten, Error);           // the history no longer holds that iteration
 O80_ERROR(LaneFull, Error);                 // too many commands are in flight; nothing was sent

@@ -11,10 +11,10 @@ namespace o80 {
 
 namespace nearest {
 
-inline constexpr std::size_t kLongest = 64;  // names above it are not compared
+inline constexpr std::size_t kLongest = 64;  // longer names are not compared
 inline constexpr std::size_t kListed = 5;    // names listed in an error
 
-/// Upper and lower case, '-' and '_' count as the same.
+/// Maps upper to lower case, and '-' to '_'.
 constexpr char folded(char c) noexcept {
   if (c >= 'A' && c <= 'Z') return static_cast<char>(c - 'A' + 'a');
   return c == '-' ? '_' : c;
@@ -22,7 +22,7 @@ constexpr char folded(char c) noexcept {
 
 constexpr bool is_digit(char c) noexcept { return c >= '0' && c <= '9'; }
 
-/// joint_9 is another joint than joint_8, not a misspelt one.
+/// Whether the digits are equal: joint_9 is another joint than joint_8, not a misspelt one.
 inline bool same_digits(std::string_view a, std::string_view b) {
   const auto digits = [](std::string_view name) {
     std::string found(name);
@@ -32,7 +32,7 @@ inline bool same_digits(std::string_view a, std::string_view b) {
   return digits(a) == digits(b);
 }
 
-/// Edits that turn one name into the other: insert, remove, replace, swap two neighbours.
+/// Number of edits from one name to the other: insert, remove, replace, swap two neighbours.
 inline std::size_t edits(std::string_view a, std::string_view b) noexcept {
   if (a.size() > kLongest || b.size() > kLongest) return kLongest;
   std::array<std::array<std::size_t, kLongest + 1>, 3> rows{};
@@ -60,7 +60,7 @@ inline bool begins_with(std::string_view name, std::string_view begin) noexcept 
 
 }  // namespace nearest
 
-/// The known name that somebody probably meant by `given`; empty if none is near.
+/// Returns the known name nearest to `given`; empty if none is near.
 inline std::string nearest_name(std::string_view given, const std::vector<std::string>& known) {
   const std::size_t most = given.size() < 3 ? 0 : given.size() < 6 ? 1 : 2;
   std::string best;
@@ -77,7 +77,7 @@ inline std::string nearest_name(std::string_view given, const std::vector<std::s
   return best.empty() && begun.size() == 1 ? begun.front() : best;
 }
 
-/// The first five names or clauses, and how many more there are.
+/// Joins the first five names or clauses, and the number of further ones.
 inline std::string first_names(const std::vector<std::string>& names, const char* between = ", ",
                                const char* before_rest = " and ") {
   std::string text;
@@ -88,7 +88,7 @@ inline std::string first_names(const std::vector<std::string>& names, const char
   return text + before_rest + std::to_string(names.size() - nearest::kListed) + " more";
 }
 
-/// Ends an error such as "there is no actuator 'elbw'": what there is, and what may be meant.
+/// Ends an error such as "there is no actuator 'elbw'": lists known names, suggests the nearest.
 inline std::string names_instead(std::string_view given, const std::vector<std::string>& known) {
   if (known.empty()) return "; there are none";
   const std::string near = nearest_name(given, known);

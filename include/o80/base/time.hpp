@@ -21,7 +21,7 @@ std::int64_t monotonic_roughly_now() noexcept;
 /// Longest duration of a wait; empty: no timeout.
 using Timeout = std::optional<std::chrono::nanoseconds>;
 
-/// The moment at which a wait times out.
+/// Time at which a wait times out.
 class Deadline {
  public:
   explicit Deadline(Timeout timeout) noexcept;

@@ -11,8 +11,8 @@ namespace o80 {
 /// The version of the compiled library, "major.minor.patch".
 std::string_view version() noexcept;
 
-/// SHA-256 of the sources that the library was compiled from, in hexadecimal: two builds of the
-/// same sources have the same. Made by cmake/source_hash.cmake.
+/// SHA-256 of the library's sources, in hexadecimal: equal for builds of the same sources.
+/// Computed by cmake/source_hash.cmake.
 std::string_view source_hash() noexcept;
 
 }  // namespace o80

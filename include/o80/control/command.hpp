@@ -15,7 +15,7 @@ inline constexpr Iteration kNow = -1;
 
 enum class Mode : std::uint8_t { queue, overwrite };
 enum class Pace : std::uint8_t { direct, duration, speed, until, iterations, fastest, chunk };
-/// From `monotone` on they are for rows of a chunk or a trajectory (docs/chunks.md).
+/// Profile of a motion; from `monotone` on for rows of a chunk or trajectory (docs/chunks.md).
 enum class Profile : std::uint8_t { linear, minimum_jerk, as_sent, monotone, hold, smooth };
 /// True for a curve through rows.
 constexpr bool is_curved(Profile profile) noexcept {
@@ -25,7 +25,7 @@ constexpr bool is_curved(Profile profile) noexcept {
 constexpr bool is_of_rows(Profile profile) noexcept {
   return is_curved(profile) || profile == Profile::hold;
 }
-/// Which state a command starts from.
+/// State from which a command starts.
 enum class Start : std::uint8_t { desired, observed };
 
 std::string_view to_text(Mode mode) noexcept;
@@ -33,7 +33,7 @@ std::string_view to_text(Pace pace) noexcept;
 std::string_view to_text(Profile profile) noexcept;
 std::string_view to_text(Start start) noexcept;
 
-/// How to get to a target: made by direct(), duration(), speed(), until(), iterations() or
+/// Pace of a motion to a target: made by direct(), duration(), speed(), until(), iterations() or
 /// fastest().
 struct PaceSpec {
   Pace pace = Pace::direct;
@@ -42,8 +42,8 @@ struct PaceSpec {
 };
 
 /// A set-point: goes to the target as fast as the limits allow (without limits: in one iteration)
-/// and gives way to the next direct command. `every`: time between the set-points of a stream;
-/// where there is an acceleration limit, the motion then takes twice that, or longer.
+/// and is replaced by the next direct command. `every`: time between the set-points of a stream;
+/// with an acceleration limit, the motion then takes twice that, or longer.
 constexpr PaceSpec direct(std::chrono::nanoseconds every = std::chrono::nanoseconds(0)) {
   return {Pace::direct, every.count(), 0};
 }
@@ -57,7 +57,7 @@ constexpr PaceSpec until(Iteration iteration) { return {Pace::until, iteration, 
 /// Reaches the target in `count` iterations (a trajectory: each of its waypoints).
 constexpr PaceSpec iterations(std::int64_t count) { return {Pace::iterations, count, 0}; }
 
-/// True for targets of consecutive iterations: those of a burst are set-points.
+/// True for targets of consecutive iterations; the targets of a burst are set-points.
 constexpr bool is_each_iteration(const PaceSpec& pace) {
   return pace.pace == Pace::iterations && pace.amount == 1;
 }
@@ -71,26 +71,26 @@ struct CommandOptions {
   PaceSpec pace = {};
   Mode mode = Mode::queue;
   /// Default: minimum_jerk for an actuator with acceleration limits, else linear. as_sent: for
-  /// direct commands of a generator at the rate of the loop, shown as they are where limits allow.
+  /// direct commands of a generator at the loop's rate, unchanged within the limits.
   std::optional<Profile> profile = {};
   Start start = Start::desired;
 };
 
-/// The row by which a batch was decided: of this or of another segment. An observation converts to
-/// it.
+/// Row by which a batch was decided, of this or another segment. An observation converts to
+/// Seen.
 struct Seen {
-  std::uint64_t epoch = 0;  // of the run that published the row
+  std::uint64_t epoch = 0;  // run that published the row
   Iteration iteration = 0;
-  std::int64_t time = -1;          // of its capture [ns]; -1: not known
-  Clock clock = Clock::monotonic;  // of that time
-  /// The newest iteration of the commanded robot at or before that capture, from which the latency
-  /// of the decision counts; -1: not known. Set when the batch is sent.
+  std::int64_t time = -1;          // time of the row's capture [ns]; -1: not known
+  Clock clock = Clock::monotonic;  // clock of that time
+  /// Newest iteration of the commanded robot at or before that capture: start of the decision's
+  /// latency; -1: not known. Set when the batch is sent.
   Iteration since = -1;
 
   bool operator==(const Seen&) const = default;
 };
 
-/// The iteration at which a batch acts, what happens if that iteration has begun, and by which row
+/// Iteration at which a batch acts, the policy if that iteration has begun, and the row by which
 /// the batch was decided.
 struct PulseOptions {
   enum class Late : std::uint8_t { reject, now };
@@ -99,26 +99,26 @@ struct PulseOptions {
   std::optional<Seen> seen = {};  // changes no motion
 };
 
-/// How rows of targets are played, each in a fixed iteration (docs/chunks.md).
+/// Options of a chunk: rows of targets, each for a fixed iteration (docs/chunks.md).
 struct ChunkOptions {
-  Iteration anchor = 0;     ///< Iteration of the observation that the rows answer.
-  std::uint64_t epoch = 0;  ///< Of the run that takes it; set when it is sent.
+  Iteration anchor = 0;     ///< Iteration of the observation to which the rows refer.
+  std::uint64_t epoch = 0;  ///< Run that takes the chunk; set when sent.
   std::uint64_t plan = 0;   ///< Number of a plan: within one, an older anchor is rejected.
-  /// Iterations of the take-over; 0: those that limits need, at least a step, and at most half of
-  /// those that are ahead.
+  /// Iterations of the take-over; 0: as many as limits need, at least a step, and at most half of
+  /// the iterations ahead.
   std::uint32_t ease = 0;
-  std::uint32_t first = 0;   ///< Rows before this one are what was planned before, not played.
-  bool fixed = false;        ///< Rows keep their iterations also where the actuators stand still.
-  bool reject_late = false;  ///< Rejects it if row `first` is late, instead of skipping rows.
-  bool final = false;        ///< No chunk of its plan follows: as UntypedFrontend::add_close_plan.
+  std::uint32_t first = 0;   ///< Earlier rows repeat the previous plan and are not played.
+  bool fixed = false;        ///< Rows keep their iterations while the actuators are still.
+  bool reject_late = false;  ///< Rejects the chunk if row `first` is late: no rows are skipped.
+  bool final = false;        ///< No chunk of the plan follows: as UntypedFrontend::add_close_plan.
   Profile profile = Profile::smooth;  ///< Or monotone, linear or hold.
 };
 
-/// Where one number was in the iteration before a chunk began: the take-over leads on from there.
+/// State of one number in the iteration before a chunk began, where the take-over starts.
 struct ChunkStart {
   std::uint32_t actuator = 0;
-  std::uint32_t number = 0;  ///< Index in its state.
-  double place = 0.0;        ///< Of the plan in force, not of what limits made of it.
+  std::uint32_t number = 0;  ///< Index in the state.
+  double place = 0.0;        ///< Of the plan in force, before limits.
   double slope = 0.0;        ///< [1/iteration]
   double curvature = 0.0;    ///< [1/iteration^2]
 };

@@ -38,9 +38,9 @@ enum class Reason : std::uint8_t {
   silence,
   stopped,
   halted,
-  full,     // the lane has too many batches that wait for a later iteration
-  reading,  // the robot cannot be where it was read
-  older     // the chunk answers an older observation than the one before it
+  full,     // too many batches of the lane wait for a later iteration
+  reading,  // the robot cannot have moved to the position of its reading
+  older     // the chunk refers to an older observation than the previous one
 };
 inline constexpr std::size_t kReasons = static_cast<std::size_t>(Reason::older) + 1;
 

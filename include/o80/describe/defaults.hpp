@@ -23,7 +23,7 @@ constexpr bool read_numbers(const T& value) {
       all = all && read_numbers(value.*member);
     });
   } else {
-    // in a constant expression a number without a default is no error but the answer
+    // a read that is no constant expression means: no default
     // NOLINTNEXTLINE(clang-analyzer-core.uninitialized.Assign)
     [[maybe_unused]] const T read = value;
   }

@@ -84,7 +84,7 @@ FieldRow field_row(Schema& schema, std::string_view name, std::size_t offset,
   }
 }
 
-/// The index of the type T. `note`: of a plain number, which then is a type of its own.
+/// Index of the type T. `note`: of a plain number, which then becomes a separate type.
 template <Shareable T>
 std::uint32_t type_of(Schema& schema, const FieldNote& note) {
   for (std::uint32_t i = 0; i < schema.keys.size(); ++i) {
@@ -215,7 +215,7 @@ struct StateOf<std::array<T, N>> {
   using Type = T;
 };
 
-/// False if a field that is a struct has a note: units stand at the numbers.
+/// False if a field of struct type has a note: units belong to numbers.
 template <class Actuators>
 consteval bool notes_are_of_numbers() {
   bool are = true;

@@ -72,7 +72,7 @@ namespace o80 {
 template <class T>
 struct Tag {};
 
-/// Notes of O80_DESCRIBE about a field: a text, the value at which it rests, and its origin.
+/// Notes of O80_DESCRIBE about a field: a text, the rest value, and the origin.
 struct FieldNote {
   std::string_view text;
   std::optional<RestsAt> rest;
@@ -115,7 +115,7 @@ struct ArrayOf<std::array<T, N>> : std::true_type {
 
 }  // namespace describing
 
-/// How many fields a plain struct has (arrays are std::array, which counts as one).
+/// Number of fields of a plain struct (a std::array counts as one).
 template <class T, std::size_t N = 64>
 consteval std::size_t field_count() {
   if constexpr (N == 0 || describing::takes<T>(std::make_index_sequence<N>{})) {
@@ -154,7 +154,7 @@ constexpr bool crosses_memory() {
   }
 }
 
-/// May be shared as a member of a struct; `Use` is any type.
+/// Type of a shareable struct member; `Use` is any type.
 template <class T, class Use>
 inline constexpr bool kCrossesMemory = crosses_memory<T, Use>();
 

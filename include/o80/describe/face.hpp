@@ -12,9 +12,9 @@ namespace o80 {
 
 /// The described side of a robot (groups, states, limits, sensor values, requests), as a field of a
 /// Config: a simulator takes the face of another robot. Users give a robot's name, a segment, a
-/// recording or a file; o80's Python makes a text of it, so that a replay needs nothing else.
+/// recording or a file; o80's Python converts it to a text, so that a replay needs nothing else.
 struct Face {
-  Schema schema;  // of the other robot, with its period; empty if the option is not given
+  Schema schema;  // of the other robot, period included; empty if the option is not given
   bool empty() const { return schema.actuators.empty() && schema.head.extended == kNoType; }
 };
 inline constexpr std::string_view kFaceKind = "face";
@@ -22,7 +22,7 @@ inline constexpr std::string_view kFaceKind = "face";
 namespace describing {
 
 /// The schema of a text: "face:", then the hash and the bytes of the schema in base64. o80 checks
-/// it before a driver gets it (check_face), and refuses one that is damaged here.
+/// the text before it reaches a driver (check_face); this function throws for a damaged one.
 inline Schema face_from(std::string_view text) {
   constexpr std::string_view kBegin = "face:";
   constexpr std::string_view kDigits =

@@ -30,14 +30,14 @@ struct RowLayout {
   std::uint32_t clamped = 0;  // mask
   std::uint32_t braking = 0;  // mask
   std::uint32_t starved = 0;  // mask
-  /// A float for each actuator: how far `desired` is from what its command asks for, the most of
-  /// its numbers.
+  /// A float for each actuator: largest difference of `desired` from the command, over the numbers
+  /// of the state.
   std::uint32_t off_plan = 0;
   std::uint32_t size = 0;
   std::uint32_t mask_words = 0;
   std::uint32_t block = 0;
   std::uint32_t extended_size = 0;
-  /// When the row was captured [ns], int64: RowHead::time, or what a device says (`capture_time`).
+  /// Capture time of the row [ns], int64: RowHead::time, or a device's `capture_time`.
   std::uint32_t captured = offsetof(RowHead, time);
 };
 

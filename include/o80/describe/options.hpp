@@ -21,9 +21,9 @@ struct Option {
   std::string unit;
 };
 
-/// The seed of what a driver draws at random, as a field of its Config. If the option is not given,
-/// o80 draws a seed when it starts the robot, and records it with the other options; so each run
-/// can be repeated. 0 in a Config that a program makes by itself.
+/// Seed of a driver's random numbers, as a field of its Config. If the option is not given,
+/// o80 draws a seed at the robot's start, and records the seed with the other options, so that each
+/// run can be repeated. 0 in a Config that a program creates.
 struct Seed {
   std::uint64_t value = 0;
 };
@@ -64,7 +64,7 @@ std::string option_text(const T& value) {
   if constexpr (std::is_same_v<T, Seed>) {
     return option_text(value.value);
   } else if constexpr (std::is_same_v<T, Face>) {
-    return "";  // there is none unless it is given
+    return "";  // no seed unless given
   } else if constexpr (std::is_same_v<T, bool>) {
     return value ? "true" : "false";
   } else if constexpr (std::is_arithmetic_v<T>) {
@@ -147,7 +147,7 @@ constexpr void each_option(Config& config, Visit&& visit) {
   });
 }
 
-/// Collects the names of the options of a Config, to find two that are the same.
+/// Collects the option names of a Config, to find duplicates.
 template <class Config, class Names>
 constexpr void collect_option_names(Names& names, std::size_t& count) {
   o80_describe(Tag<Config>{}, [&]<class Field>(std::string_view name, Field Config::*, std::size_t,
@@ -161,7 +161,7 @@ constexpr void collect_option_names(Names& names, std::size_t& count) {
 }
 template <class Config>
 consteval bool has_repeated_option() {
-  std::array<std::string_view, 1024> names;  // more than any robot has
+  std::array<std::string_view, 1024> names;  // more than the options of any robot
   std::size_t count = 0;
   collect_option_names<Config>(names, count);
   for (std::size_t i = 0; i < count; ++i) {
@@ -174,8 +174,8 @@ consteval bool has_repeated_option() {
 
 }  // namespace describing
 
-/// The options of a described Config. A field that is a described struct adds its fields as options
-/// of their own, so that the options of a part can be kept in a struct of that part.
+/// Options of a described Config. The fields of a nested described struct become options,
+/// too, so that the options of a part can be a struct of that part.
 template <class Config>
 std::vector<Option> options_of() {
   static_assert(!describing::has_repeated_option<Config>(),

@@ -35,7 +35,7 @@ enum class Kind : std::uint8_t {
 /// observed one.
 enum class WhenIdle : std::uint8_t { hold, follow };
 
-/// A text of fixed size for shared memory, filled up with zeros.
+/// Text of fixed size for shared memory, padded with zeros.
 template <std::size_t Size>
 struct FixedText {
   std::array<char, Size> chars{};
@@ -59,12 +59,12 @@ using UnitText = FixedText<24>;
 using HelpText = FixedText<120>;
 using FieldHelpText = FixedText<119>;
 
-/// Where the value of a field comes from. A replay compares only what the robot itself computes.
+/// Origin of a field's value. A replay compares only values that the robot computes.
 enum class Origin : std::uint8_t {
-  robot,  // its commands, its options and its former states
-  clock,  // the time or the load of the machine, which differ from run to run
-  world,  // a sensor: what no replay can repeat
-  absent  // none: a simulation has the field because the robot has it whose face it takes
+  robot,  // commands, options and former states
+  clock,  // time or load of the machine, which differ from run to run
+  world,  // a sensor, which no replay can repeat
+  absent  // none: the field exists only because the simulation takes a robot's face
 };
 constexpr Origin of_the_clock() { return Origin::clock; }
 constexpr Origin of_the_world() { return Origin::world; }
@@ -86,8 +86,8 @@ struct FieldRow {
   std::uint32_t labels = 0;
   Kind kind = Kind::float64;
   std::uint8_t is_signed = 0;    // 1: the underlying type of the enumeration is signed
-  std::uint8_t resting = 0;      // 1: goes to `rest` when no command drives it
-  std::uint8_t has_default = 0;  // 1: a request may leave it out
+  std::uint8_t resting = 0;      // 1: goes to `rest` without a command
+  std::uint8_t has_default = 0;  // 1: a request may omit it
   double rest = 0.0;             // in the field's unit
 
   std::uint32_t count() const { return (rows == 0 ? 1 : rows) * (columns == 0 ? 1 : columns); }
@@ -102,7 +102,7 @@ struct TypeRow {
   std::uint32_t first_field = 0;
   std::uint32_t fields = 0;
   std::uint32_t first_default = kNoType;  // offset of the default values in Schema::defaults
-  std::uint32_t blends = 0;  // 1: interpolates in C++, by code that only the driver has
+  std::uint32_t blends = 0;               // 1: interpolates in C++, by code of the driver
   bool operator==(const TypeRow&) const = default;
 };
 
@@ -122,16 +122,16 @@ struct LimitRow {
   double jerk;            // [1/s^3]
   double error;           // largest |desired - observed|; a larger one halts the backend
   double rest;            // value without a command, if `resting` is 1
-  std::uint32_t resting;  // 1: the number goes to `rest` when no command drives it
-  float noise;            // of its reading; 0: a tenth of `error`
+  std::uint32_t resting;  // 1: the number goes to `rest` without a command
+  float noise;            // of a reading; 0: a tenth of `error`
   bool operator==(const LimitRow&) const = default;
 };
 
-/// Bounds of what a number of an actuator's state moves: a velocity moves a position.
+/// Bounds of the integral of a number: of the position that a velocity moves.
 struct IntegralRow {
-  std::uint32_t limit = 0;   // index of the limits of the number that moves the other
-  std::uint32_t number = 0;  // index of the other in the state, where it is observed
-  double minimum = 0.0;      // in the unit of the other
+  std::uint32_t limit = 0;   // index of the limits of the moving number
+  std::uint32_t number = 0;  // index of the moved number in the observed state
+  double minimum = 0.0;      // in the unit of the moved number
   double maximum = 0.0;
   double reaction = 0.0;  // from the desired velocity to the observed one [s]
   bool operator==(const IntegralRow&) const = default;
@@ -173,7 +173,7 @@ struct RequestRow {
 /// Clock of the times of a history.
 enum class Clock : std::uint8_t { monotonic, simulated };
 
-/// Policy for the commands of a frontend that dies or gives no sign of life.
+/// Policy for the commands of a frontend that dies or becomes silent.
 enum class Stale : std::uint8_t {
   hold,   // the commands keep running
   purge,  // the commands are dropped
@@ -185,7 +185,7 @@ constexpr std::string_view name_of(Stale stale) {
   return kNames[static_cast<std::size_t>(stale)];
 }
 
-/// The policy with this name, if any.
+/// Returns the policy with this name, if any.
 constexpr std::optional<Stale> stale_of(std::string_view name) {
   for (const Stale stale : {Stale::hold, Stale::purge, Stale::stop, Stale::halt}) {
     if (name_of(stale) == name) return stale;

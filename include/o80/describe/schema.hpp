@@ -15,16 +15,16 @@
 
 namespace o80 {
 
-/// Bounds of what a number moves: a velocity moves the observed position of the same actuator. o80
-/// brakes it in time, and lets it move inward only where the position is outside.
+/// Bounds of the observed position that a velocity of the same actuator moves. o80 brakes in
+/// time and, outside of the bounds, allows motion inwards only.
 struct IntegralBounds {
   std::string_view field;  // of the observed state; of an array, the element of the same index
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
-  double reaction = 0.0;  // time from the desired velocity to the observed one [s]
+  double reaction = 0.0;  // delay from desired to observed velocity [s]
 };
 
-/// Limits of one number of a state, as a driver gives them. Default: no limit.
+/// Limits of one number of a state, set by a driver. Default: no limit.
 struct Limits {
   double minimum = -std::numeric_limits<double>::infinity();
   double maximum = std::numeric_limits<double>::infinity();
@@ -33,10 +33,10 @@ struct Limits {
   double jerk = std::numeric_limits<double>::infinity();          // [1/s^3], needs an acceleration
   /// Largest allowed |desired - observed|; a larger one halts the backend.
   double error = std::numeric_limits<double>::infinity();
-  /// Largest difference of two readings, in addition to the motion that `speed` allows; with a
-  /// larger one a reading counts as wrong. 0: a tenth of `error`.
+  /// Largest difference of two readings, in addition to the motion at `speed`; a larger one marks
+  /// the reading as wrong. 0: a tenth of `error`.
   double noise = 0.0;
-  /// Field that the number moves, if it is its velocity; no limit of jerk then.
+  /// Field of which the number is the velocity, if any; then without a jerk limit.
   IntegralBounds integral = {};
 
   LimitRow row(double rest = 0.0, bool resting = false) const {
@@ -52,7 +52,7 @@ struct Limits {
   }
 };
 
-/// A field goes to `value` when no command drives it (a velocity to 0, for example).
+/// Makes a field go to `value` without a command (for example a velocity to 0).
 struct RestsAt {
   double value;
 };
@@ -60,7 +60,7 @@ constexpr RestsAt rests_at(double value) { return {value}; }
 
 class Schema;
 
-/// One actuator while a driver describes it: `schema.actuator("elbow").limits({.maximum = 1.0})`.
+/// Describes one actuator of a driver: `schema.actuator("elbow").limits({.maximum = 1.0})`.
 class ActuatorDescription {
  public:
   ActuatorDescription(Schema& schema, std::uint32_t index) : schema_(schema), index_(index) {}
@@ -76,7 +76,7 @@ class ActuatorDescription {
   /// Unit of a state that is a plain number, for example "rad". It holds for all actuators of the
   /// group; the fields of a described struct have theirs from O80_DESCRIBE.
   ActuatorDescription& unit(std::string_view unit);
-  /// The first number of the state, a double, is the position of this joint of `Schema::shown`.
+  /// Declares the first number of the state, a double, the position of a joint of `Schema::shown`.
   ActuatorDescription& moves_joint(std::string_view joint);
 
  private:
@@ -91,7 +91,7 @@ class ActuatorDescription {
   std::uint32_t index_;
 };
 
-/// The description of a robot as tables of fixed-size entries, which a segment holds as bytes.
+/// Description of a robot as tables of fixed-size entries, stored in a segment as bytes.
 ///
 /// Header-only, so that a robot library need not link o80.
 class Schema {
@@ -105,7 +105,7 @@ class Schema {
   std::vector<LimitRow> limits;
   std::vector<IntegralRow> integrals;
   std::vector<RequestRow> requests;
-  std::vector<std::byte> defaults;  // default values of the types that have some
+  std::vector<std::byte> defaults;  // default values of types
   ShownModel shown;                 // for viewers
   std::vector<TypeHooks> hooks;     // one for each type; not in the segment
   std::vector<const void*> keys;    // one for each type: identifies its C++ type, or null
@@ -115,9 +115,9 @@ class Schema {
   std::int64_t asked_period() const { return head.period; }
   /// Sets the period of this robot [ns]. Without this call the user chooses it.
   void period(std::int64_t own) { head.period = own; }
-  /// Says that this robot is a simulation. Every other robot counts as hardware: in real time a gap
-  /// between two rows halts it, a reset cannot move it farther than its limits allow, and a replay
-  /// does not start its driver.
+  /// Declares the robot a simulation. Every other robot counts as hardware: in real time a gap
+  /// between two rows halts the robot, a reset cannot move it farther than its limits allow, and a
+  /// replay does not start its driver.
   void simulated() { head.of_the_world = 2; }
   /// Deleted: a robot is of the world unless describe() calls simulated().
   template <int Unused = 0>
@@ -126,8 +126,8 @@ class Schema {
                   "every robot is of the world unless describe() calls schema.simulated(): remove "
                   "this call (single fields are marked in O80_DESCRIBE: o80::of_the_world())");
   }
-  /// Sets the longest time between two rows that does not halt the robot [ns], up to an hour, where
-  /// it is less than by default.
+  /// Sets the longest time between two rows without a halt [ns], up to an hour, if that is less
+  /// than the default.
   void gap(std::int64_t longest) {
     constexpr std::int64_t kHour = 3'600'000'000'000;
     if (longest < 1000 || longest > kHour) {
@@ -139,7 +139,7 @@ class Schema {
   ActuatorDescription actuator(std::uint32_t index);
   ActuatorDescription actuator(std::string_view name);
 
-  // for layouts that are known only at run time; describe.hpp describes C++ types
+  // for layouts known at run time only; describe.hpp describes C++ types
   /// Adds a type from its fields, computes offsets and sizes, and returns its index.
   std::uint32_t add_type(std::string_view name, std::vector<FieldRow> members);
   /// Appends an array of actuators, or a single one; returns the index of the new group.
@@ -147,9 +147,9 @@ class Schema {
                               bool is_array = true);
   /// Adds a sensor value to the extended type; returns its offset in the extended block [bytes].
   std::uint32_t add_sensor(FieldRow sensor);
-  /// Element `index` of an extended field of doubles is the position of this joint of `shown`.
+  /// Declares element `index` of an extended field of doubles the position of a joint of `shown`.
   void sensor_moves_joint(std::string_view field, std::uint32_t index, std::string_view joint);
-  /// `while_halted`: serve the request also while the backend is halted; it must move nothing.
+  /// `while_halted`: serve the request also during a halt; the request must move nothing.
   std::uint32_t add_request(std::string_view name, std::uint32_t type, std::string_view help,
                             bool while_halted = false);
 
@@ -318,8 +318,8 @@ inline std::uint32_t Schema::add_actuators(std::string_view group, std::uint32_t
 }
 
 inline std::uint32_t Schema::add_sensor(FieldRow sensor) {
-  // the fields of a type must be consecutive, and nested types must come first: rebuild it at the
-  // end
+  // the fields of a type must be consecutive, and nested types must precede it: rebuild the type
+  // at the end
   std::vector<FieldRow> members;
   if (head.extended != kNoType) {
     const TypeRow old = types.at(head.extended);
@@ -479,7 +479,7 @@ inline ActuatorDescription& ActuatorDescription::unit(std::string_view unit) {
     throw InvalidArgument("the state of actuator '" + schema_.actuators[index_].name.str() +
                           "' is a struct: give the units of its fields in O80_DESCRIBE");
   }
-  // the group gets a type of its own, for other groups of plain numbers keep their units
+  // a separate type for the group, because other groups of plain numbers keep their units
   field.unit = UnitText(unit);
   TypeRow own = type;
   own.first_field = static_cast<std::uint32_t>(schema_.fields.size());

@@ -7,8 +7,8 @@
 
 #include "o80/describe/schema.hpp"
 
-// The bytes of a schema, as segments and recordings hold them, as robot libraries give them to o80,
-// and in the text of a Face: TableHead, SchemaHead, the rows of each table; then, if they are not
+// Bytes of a schema in segments, recordings, the interface of robot libraries,
+// and the text of a Face: TableHead, SchemaHead, the rows of each table; then, if not
 // empty, the model and the integrals.
 
 namespace o80 {
@@ -33,7 +33,7 @@ void each_table(SchemaLike& schema, Visit&& visit) {
   visit(7, schema.defaults);
 }
 
-/// Before the rows, the file and the text of the model.
+/// Head of the model: precedes its rows, file name and text.
 struct ShownHead {
   std::uint64_t magic = 0x6E776F6853303880;  // "80Shown" behind a byte that is no text
   std::uint32_t rows = 0;
@@ -42,7 +42,7 @@ struct ShownHead {
   std::uint32_t mjcf = 0;  // [bytes]
 };
 
-/// Before the rows of bounds of integrals.
+/// Head of the bounds of integrals: precedes their rows.
 struct IntegralsHead {
   std::uint64_t magic = 0x6C6172676E4980;  // "80Ingral" behind a byte that is no text
   std::uint32_t rows = 0;
@@ -72,7 +72,7 @@ class PartReader {
     rows.resize(count);
     if (count > 0) take(rows.data(), count * sizeof(Row));
   }
-  /// Copies bytes; the caller knows that there are so many.
+  /// Copies bytes; the caller has checked their number.
   void take(void* out, std::size_t size) {
     std::memcpy(out, left_.data(), size);
     left_ = left_.subspan(size);
@@ -82,8 +82,8 @@ class PartReader {
   std::span<const std::byte> left_;
 };
 
-/// The schema of these bytes, which nobody has checked: an index or a size in it may be anything.
-/// Throws InvalidArgument for bytes that end early or have rows of another size.
+/// Parses a schema without checking its indices and sizes.
+/// Throws InvalidArgument for truncated bytes or rows of another size.
 inline Schema schema_in(std::span<const std::byte> bytes) {
   Schema schema;
   PartReader reader(bytes);
@@ -124,7 +124,7 @@ inline std::uint64_t hash_of(std::span<const std::byte> bytes) {
 
 }  // namespace describing
 
-/// The bytes of a schema.
+/// Serializes a schema.
 inline std::vector<std::byte> to_bytes(const Schema& schema) {
   std::vector<std::byte> bytes;
   const auto put = [&](const auto& rows) {

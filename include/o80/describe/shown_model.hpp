@@ -12,20 +12,20 @@
 
 namespace o80 {
 
-/// Part of the model that a value of a row moves.
+/// Part of the model moved by a value of a row.
 enum class Shown : std::uint8_t {
   joint,    // one number: position of a hinge or a slide
   position  // three numbers: position of a body with a free joint
 };
 
-/// Where in a row a value lies: in the states (desired and observed alike), or in the extended
+/// Part of a row that holds a value: the states (desired and observed alike), or the extended
 /// values.
 enum class ShownFrom : std::uint8_t { states, extended };
 
 /// One value of a row that moves a joint or a body of the model; its numbers are float64.
 struct ShownRow {
   NameText name;             // of the joint or of the body
-  std::uint32_t offset = 0;  // in the states or in the extended values [bytes]
+  std::uint32_t offset = 0;  // offset in the states or extended values [bytes]
   Shown what = Shown::joint;
   ShownFrom from = ShownFrom::states;
   std::array<std::uint8_t, 2> reserved{};
@@ -33,13 +33,13 @@ struct ShownRow {
 };
 static_assert(std::is_trivially_copyable_v<ShownRow> && std::is_standard_layout_v<ShownRow>);
 
-/// A model (MJCF) that viewers use to draw the robot, and the values that move it. o80 itself does
-/// not read it. It is kept as text, so that a recording can be shown on another computer.
+/// Model (MJCF) with which viewers draw the robot, and the values that move the model. o80 does
+/// not read the model, but stores its text, so that a recording can be shown on another computer.
 struct ShownModel {
   static constexpr std::size_t kLargest = 1U << 20;  // longest text [bytes]
 
   std::string mjcf;  // empty: the robot is not drawn
-  std::string file;  // where it was read; meshes and textures are looked up beside it
+  std::string file;  // path of the model; meshes and textures are searched beside it
   std::vector<ShownRow> values;
 
   void joint(std::string_view name, std::uint32_t offset, ShownFrom from = ShownFrom::states) {

@@ -9,12 +9,12 @@
 
 namespace o80 {
 
-/// Why a backend was halted.
+/// Cause of a halt.
 enum class HaltCause : std::uint32_t {
   none,
   frontend,       // a frontend or `o80 halt` requested it
   driver,         // the driver requested it
-  silence,        // a commander gave no sign of life for longer than `silence`
+  silence,        // a commander was silent for longer than `silence`
   dead_frontend,  // a commander died
   error,          // desired and observed states were further apart than an error limit
   overruns,       // too many iterations overran

@@ -34,7 +34,7 @@ class Desired {
   ActuatorsOf<D> states;  // of all actuators
 
   const auto& operator[](std::size_t actuator) const { return states[actuator]; }
-  /// A value of a layout known at run time only.
+  /// Returns a value of a layout known at run time only.
   template <class T>
   T at(Place<T> place) const {
     return unpack<T>(view_.states + place.offset);
@@ -45,14 +45,14 @@ class Desired {
   bool active(std::size_t actuator) const {
     return (view_.active[actuator / 64] >> (actuator % 64) & 1) != 0;
   }
-  /// The velocity of a number of these states, for feed-forward: `desired.rate(desired[0].angle)`.
-  /// It is the difference to the last iteration by the period [unit/s], so that times the period
-  /// its sum is the position; 0 for an actuator that is not active(). Throws for a copy of a state.
+  /// Velocity of a number of these states, for feed-forward: `desired.rate(desired[0].angle)`.
+  /// Difference to the last iteration divided by the period [unit/s], so that summed products with
+  /// the period are the position; 0 if the actuator is not active(). Throws for a copied state.
   template <class Number>
   double rate(const Number& number) const {
     return difference(number, 1) / period();
   }
-  /// The difference of the velocities of two iterations by the period [unit/s^2].
+  /// Difference of the velocities of two iterations divided by the period [unit/s^2].
   template <class Number>
   double rate2(const Number& number) const {
     return difference(number, 2) / (period() * period());
@@ -124,7 +124,7 @@ class Reading {
     faulty_ = true;
   }
   /// Halts the backend in the next iteration: the actuators brake, and nothing moves until a
-  /// frontend resumes. A driver may call it in each reading: the same text again is the same halt.
+  /// frontend resumes. A driver may halt in each reading: a repeated text is the same halt.
   void halt(std::string_view why) {
     const std::size_t size =
         why.size() < sizeof view_.halt_text.text ? why.size() : sizeof view_.halt_text.text - 1;
@@ -132,8 +132,8 @@ class Reading {
     view_.halt_text.text[size] = 0;
     view_.halted = 1;
   }
-  /// This tick of the robot brought no reading, for example because a packet was lost: the last
-  /// reading stays and the iteration counts as an overrun. No effect in bursting mode.
+  /// Reports a tick without a reading, for example after a lost packet: the last reading
+  /// remains and the iteration counts as an overrun. No effect in bursting mode.
   void missed() { view_.missed = 1; }
   /// Ends the loop in order after this row. In real time the actuators brake first: `write` and
   /// `read` continue for at most 1 s.
@@ -149,13 +149,13 @@ class Reading {
   bool runs() const {
     return report<Request>().runs != 0;
   }
-  /// Sets the text that frontends see while it runs; at most 247 characters.
+  /// Sets the text that frontends see while the request runs; at most 247 characters.
   template <class Request>
   void progress(std::string_view text) {
     store_report(report<Request>(), RequestAnswer::running, text);
   }
-  /// Ends it with this row: done, rejected (the sender reads the reason), failed (the loop ends) or
-  /// start_afresh (with the row of the fresh start). No effect if none of this kind runs.
+  /// Ends the request with this row: done, rejected (the sender reads the reason), failed (the loop
+  /// ends) or start_afresh (with the row of the fresh start). No effect if none of this kind runs.
   template <class Request>
   void ended(const Served& how) {
     store_report(report<Request>(), static_cast<RequestAnswer>(how.kind), how.why());
@@ -172,8 +172,8 @@ class Reading {
     pack(desired, view_.desired);
     view_.has_desired = 1;
   }
-  /// From this fresh start to the next one every actuator without a command follows the observed
-  /// state, whatever its when_idle, and after interrupt() the next command begins there: an arm
+  /// From this fresh start to the next one, every actuator without a command follows the observed
+  /// state, whatever its when_idle, and the next command after interrupt() begins there: for an arm
   /// without torque, guided by hand. No effect in other readings.
   void follow() { view_.follows = fresh() ? 1 : 0; }
   std::byte* desired_bytes() {
@@ -199,7 +199,7 @@ class Reading {
     static_assert(kIndex != kNoRequest, "this struct is not among the Requests of the driver");
     return view_.requests[kIndex];
   }
-  /// The first end of a request in a reading counts.
+  /// Stores the first end of a request in a reading; later ones are ignored.
   void store_report(RequestReport& report, RequestAnswer answer, std::string_view text) {
     if (report.runs == 0 || (report.changed != 0 && report.answer != RequestAnswer::running))
       return;

@@ -80,7 +80,7 @@ consteval bool serves_all() {
 template <class D>
 consteval bool config_is_described() {
   if constexpr (O80_TYPE(Config)) return DescribedStruct<typename D::Config>;
-  return true;  // a missing Config is an error of its own
+  return true;  // a missing Config has its own error
 }
 
 template <class D>
@@ -89,16 +89,16 @@ consteval bool actuators_are_states() {
     using Actuators = typename D::Actuators;
     if constexpr (describing::ArrayOf<Actuators>::value) {
       using State = typename describing::ArrayOf<Actuators>::Element;
-      return Shareable<State> || DescribedStruct<State>;  // its members are checked one by one
+      return Shareable<State> || DescribedStruct<State>;  // the members are checked one by one
     } else {
       return std::is_same_v<Actuators, NoActuators> ||
              std::is_same_v<Actuators, RunTimeActuators> || DescribedStruct<Actuators>;
     }
   }
-  return true;  // there are none: reported before
+  return true;  // missing: reported before
 }
 
-/// Its static assertions name the members that cannot be shared.
+/// The static assertions name the members that cannot be shared.
 template <class D>
 consteval bool states_cross_memory() {
   if constexpr (O80_TYPE(Actuators)) {
@@ -130,7 +130,7 @@ struct Parts {
   static constexpr bool kPassed = true;
 };
 
-/// The required functions of a driver. They must return void, because o80 would ignore a result.
+/// The required functions of a driver. They must return void: o80 would ignore a result.
 template <class D>
 struct NeededVerbs {
   static_assert(std::constructible_from<D, const typename D::Config&>,
@@ -156,7 +156,7 @@ struct NeededVerbs {
   static constexpr bool kPassed = true;
 };
 
-/// The optional functions: a driver that has one must give it the expected signature.
+/// The optional functions: if present, they must have the expected signature.
 template <class D>
 struct Verbs {
   static_assert(
@@ -195,7 +195,7 @@ struct Verbs {
   static constexpr bool kPassed = true;
 };
 
-/// The optional types: a driver that has one must be able to use it, and no name is misspelled.
+/// The optional types: if present, they must be usable, and no name may be misspelled.
 template <class D>
 struct Types {
   static_assert(!has_Requests<D>() || O80_TYPE(Requests), "a driver's Requests must be public");
@@ -236,7 +236,7 @@ struct Handlers {
 
 namespace o80 {
 
-/// True; does not compile for a driver class with a mistake.
+/// True; fails to compile for a driver class with a mistake.
 template <class D>
 inline constexpr bool kDriverPassed =
     driver_checks::Parts<D>::kPassed && driver_checks::NeededVerbs<D>::kPassed &&

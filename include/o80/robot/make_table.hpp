@@ -10,11 +10,11 @@
 #include "o80/robot/driver_checks.hpp"
 #include "o80/robot/table.hpp"
 
-/// Makes a shared library a robot. Write it once, at global scope: O80_ROBOT(arm, Arm). The first
+/// Makes a shared library a robot. Use once, at global scope: O80_ROBOT(arm, Arm). The first
 /// argument names the robot and its default segment.
 #define O80_ROBOT(robot, DriverType) O80_ROBOT_WITH(robot, DriverType, "")
 
-/// The same, with the versions of other libraries that the robot was built with ("mujoco 4.0.1").
+/// As O80_ROBOT, with versions of other libraries in the robot's build ("mujoco 4.0.1").
 #define O80_ROBOT_WITH(robot, DriverType, versions)                                             \
   static_assert(::o80::kDriverPassed<DriverType>);                                              \
   extern "C" __attribute__((visibility("default"))) const ::o80::RobotTable* o80_robot_table(); \
@@ -86,7 +86,7 @@ static_assert(static_cast<int>(RequestAnswer::rejected) ==
 
 }  // namespace driving
 
-/// The table of functions of a driver class.
+/// Makes the table of functions of a driver class.
 template <class D>
 const RobotTable* robot_table(const char* name, const char* versions = "") {
   static_assert(kDriverPassed<D> && Driver<D>);

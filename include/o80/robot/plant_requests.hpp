@@ -7,7 +7,7 @@
 
 namespace o80 {
 
-/// Requests that every simulator serves, also during a halt, because nothing real moves. They do
+/// Requests of every simulator, served also during a halt, because nothing real moves. They do
 /// not end the halt.
 struct Reset {
   static constexpr std::string_view kHelp = "return to the start state";

@@ -14,9 +14,9 @@ struct RealTimeOptions {
   int priority = 0;             // 1 to 99, for fifo and round_robin
   std::vector<int> processors;  // allowed for the loop; empty: all
   bool lock_memory = false;
-  // the thread sleeps in each period: RealtimeKit may be asked for a priority that limits refuse
+  // the thread sleeps in each period: RealtimeKit may grant a priority that limits refuse
   bool sleeps = false;
-  std::size_t stack = 256U << 10;  // touched before the loop runs [bytes]
+  std::size_t stack = 256U << 10;  // stack touched before the loop runs [bytes]
 };
 
 /// Sets up the calling thread. Returns a line for each setting that the machine refused, with the

@@ -34,7 +34,7 @@ struct OptionValue {
   const char* text;
 };
 
-/// Takes the bytes of a schema (o80/describe/schema_bytes.hpp), and the hooks of its types.
+/// Receives the bytes of a schema (o80/describe/schema_bytes.hpp), and the hooks of its types.
 using SchemaTaker = void(void* context, const std::byte* bytes, std::uint64_t size,
                          const TypeHooks* hooks);
 
@@ -45,8 +45,8 @@ struct DesiredView {
   std::int64_t iteration;
   std::int64_t time;    // [ns]
   std::int64_t period;  // [ns]
-  /// First (order 1) or second difference, to the iteration before, of the number at this offset
-  /// of the desired block; 0 for one that does not move by itself. Null: there are none.
+  /// First (order 1) or second difference, to the previous iteration, of the number at this offset
+  /// of the desired block; 0 for an inactive number. Null: no differences.
   double (*difference)(const void* context, std::uint32_t offset, std::uint32_t order) = nullptr;
   const void* context = nullptr;
 };
@@ -62,10 +62,10 @@ enum class RequestAnswer : std::uint32_t {
 
 /// Report of a driver, in a reading, about its requests of one kind.
 struct RequestReport {
-  std::uint32_t runs;     // 1: it was answered `running` and has not ended
+  std::uint32_t runs;     // 1: answered `running`, and not ended
   std::uint32_t changed;  // set it if `answer` or `text` is new
-  RequestAnswer answer;   // how it ended, or `running`
-  char text[248];         // the reason of its end, or its progress
+  RequestAnswer answer;   // result, or `running`
+  char text[248];         // reason of the end, or progress
 };
 
 /// Memory for a driver's reading; observed and extended initially hold the last reading.
@@ -80,17 +80,17 @@ struct ReadingView {
   std::uint32_t finished;     // set it to end the loop in order
   std::uint32_t has_desired;  // set it if `desired` was filled
   std::uint32_t follows;      // set it in a fresh start if idle actuators follow from now on
-  std::uint32_t missed;       // set it if this tick of the robot brought no reading
+  std::uint32_t missed;       // set it after a tick without a reading
   std::uint32_t halted;       // set it to halt the backend
   std::uint32_t reported;     // set it if a request has changed
-  FaultText halt_text;        // the reason of that halt
+  FaultText halt_text;        // reason of the halt
 };
 
 /// A robot as a table of functions. Those that return int return 0, or 1 and fill the fault.
 struct RobotTable {
   std::uint32_t version;
   std::uint32_t size;          // of this struct
-  std::uint32_t row_sizes;     // sum of the sizes of all schema rows; must be that of o80
+  std::uint32_t row_sizes;     // sum of the sizes of all schema rows; must equal o80's
   std::uint32_t paces_itself;  // 1: the driver has `wait`, which ends each iteration
   const char* name;
   const char* built_with;  // versions of o80 and of the libraries it links

@@ -29,42 +29,42 @@ class RecordedDecisions;
 struct BackendOptions {
   std::string segment;
   std::int64_t period = 0;            // [ns]; 0: the robot's own, or 1 ms
-  bool bursting = false;              // runs only the iterations that frontends request
-  std::uint64_t history = 0;          // rows kept; 0: as many as 16 MiB hold, 1e5 at most
+  bool bursting = false;              // runs only iterations requested by frontends
+  std::uint64_t history = 0;          // rows of the history; 0: as many as 16 MiB hold, 1e5 at most
   std::uint32_t lanes = 8;            // frontends that may command at once
-  std::uint32_t lane_blocks = 16384;  // blocks of 64 bytes that each of them may have in flight
+  std::uint32_t lane_blocks = 16384;  // blocks of 64 bytes in flight of each of them
   /// Size of the journal [bytes], rounded up to a power of two; -1: twice the largest batch; 0: no
   /// journal. `pulse` refuses a batch larger than half of it.
   std::int64_t journal = -1;
   mode_t permission = 0600;      // read: may observe; write: may command
   std::optional<Stale> stale{};  // nothing: halt with `silence`, else hold
-  /// Watchdog: iterations without a sign of life after which `stale` applies to a commander that
-  /// has control or commands; 0: no watchdog (src/runtime/README.md#watchdog).
+  /// Watchdog: number of silent iterations after which `stale` applies to a commander with
+  /// control or commands; 0: no watchdog (src/runtime/README.md#watchdog).
   std::int64_t silence = 0;
   Stale stale_policy() const noexcept {
     return stale.value_or(silence > 0 ? Stale::halt : Stale::hold);
   }
   /// Number of late iterations within a second that halts the backend; 0: no limit.
   std::uint32_t max_overruns = 0;
-  /// Real time only: the longest time between two rows; a longer one halts [ns]. 0: none. -1: 20
+  /// Real time only: longest time between two rows without a halt [ns]. 0: no limit. -1: 20
   /// periods, and at least 0.1 s, for the loop of a robot with actuators that is not simulated;
-  /// else none.
+  /// else no limit.
   std::int64_t gap = -1;
   /// Real time only: starts without a halt even if the previous backend of this name was halted, or
   /// was killed while commands acted.
   bool resume = false;
-  /// Real time only: starts where the robot is read to be, even if it cannot have come
+  /// Real time only: starts at the read position, even if the robot cannot have moved
   /// there.
   bool accept_reading = false;
-  /// Provenance that the caller knows: the robot's options, library, files, further run options.
-  /// The backend adds its own options, the versions and the clock, and the robot's name if none is
-  /// given.
+  /// Provenance from the caller: the robot's options, library, files, further run options.
+  /// The backend adds its options, the versions and the clock, and the robot's name if
+  /// missing.
   Provenance provenance{};
   /// The segment has no name (`segment` is for messages): only this process can attach, until
   /// UntypedBackend::publish_as().
   bool anonymous = false;
-  /// The loop of a driver iterates, which reads the robot itself: `gap` has a default, and readings
-  /// of fresh starts are judged.
+  /// A driver's loop iterates and reads the robot: `gap` has a default, and readings
+  /// of fresh starts are checked.
   bool has_loop = false;
 };
 
@@ -103,8 +103,8 @@ class UntypedBackend {
  public:
   /// Takes the name and publishes the segment as starting. Sets period and clock of the schema from
   /// the options. Throws SegmentTaken, SegmentError, InvalidArgument.
-  /// With `recorded`, the backend replays a run: it obeys these decisions instead of frontends, and
-  /// never waits.
+  /// With `recorded`, the backend replays a run: the recorded decisions replace frontends, and
+  /// no call waits.
   UntypedBackend(Schema schema, const BackendOptions& options, RequestServer* server = nullptr,
                  RecordedDecisions* recorded = nullptr);
   UntypedBackend(const UntypedBackend&) = delete;
@@ -115,7 +115,7 @@ class UntypedBackend {
   const Schema& schema() const noexcept;
   const RowLayout& layout() const noexcept;
   const std::string& name() const noexcept;
-  /// How it was started, with the effective options.
+  /// Provenance of the start, with the effective options.
   const Provenance& provenance() const noexcept;
   const OwnedSegment& segment() const noexcept;
   /// Names an anonymous segment, so that other processes can attach. Call it between two
@@ -125,15 +125,15 @@ class UntypedBackend {
   /// The observed and extended parts of the current row; fill them before `publish`.
   std::byte* observed() noexcept;
   std::byte* extended() noexcept;
-  /// True if limits say how far the robot can move between two readings.
+  /// True if limits bound the motion between two readings.
   bool watches_readings() const noexcept;
-  /// Before row 0 in real time: notes the first reading; then (`again`), a period later each, false
-  /// if the robot cannot have come there from the reading before; `failure` names the number.
+  /// Before row 0 in real time: stores the first reading; then (`again`), a period later each,
+  /// false if the robot cannot have moved there from the last one; `failure` names the number.
   bool judge_first(bool again) noexcept;
   /// Publishes the current row. The first one is row 0 and makes the backend running. Publishes
-  /// nothing and returns false if a number of row 0 is NaN or infinite or, in real time, lies too
-  /// far outside its bounds, or if the robot cannot have come from row 0 to the next row; then the
-  /// backend ends. `failure` names the number.
+  /// nothing and returns false if a number of row 0 is NaN or infinite or, in real time, too
+  /// far outside its bounds, or if the robot cannot have moved from row 0 to the next row; then
+  /// the backend ends. `failure` names the number.
   bool publish() noexcept;
 
   /// Replay only: sets the first iteration (default 0), with these desired states instead of the
@@ -145,8 +145,8 @@ class UntypedBackend {
   Step try_step() noexcept;
   /// As `step`, but waits for at most `at_most` [ns]; then returns `standing`.
   Step step_within(std::int64_t at_most) noexcept;
-  /// Inline group only: grants the next iterations, with targets for them, as a batch would. False
-  /// if a batch is needed, because others command or a journal is written. Call it between two
+  /// Inline group only: grants the next iterations, with targets for them, like a batch. False
+  /// if a batch is needed, because others command or a journal is written. Call between two
   /// iterations; the memory of the targets must outlive those iterations.
   bool begin_direct(const DirectBurst& burst) noexcept;
   /// Cancels the rest of the current burst. Call it between two iterations.
@@ -159,10 +159,10 @@ class UntypedBackend {
   const std::byte* desired() const noexcept;
   /// One bit for each actuator: a command or braking gave its desired state.
   const std::uint64_t* active() const noexcept;
-  /// First (order 1) or second difference, to the iteration before, of the number at this offset
-  /// of the desired block; 0 for an actuator that is not active, and for what does not move.
+  /// First (order 1) or second difference, to the previous iteration, of the number at this offset
+  /// of the desired block; 0 for an inactive actuator, and for numbers that do not move.
   double difference(std::uint32_t offset, std::uint32_t order) const noexcept;
-  /// One bit for each actuator: it comes to rest within its limits, without a command.
+  /// One bit for each actuator: set while it brakes to rest within its limits, without a command.
   const std::uint64_t* braking() const noexcept;
   /// Phase of the backend. For the thread of the loop.
   Phase phase() const noexcept;
@@ -171,7 +171,7 @@ class UntypedBackend {
   /// Time of the current iteration, on the schema's clock [ns].
   std::int64_t time() const noexcept;
   void set_timing(const Timing& timing) noexcept;
-  /// Call them before and after each call of the driver: observers see a call that does not return.
+  /// Call before and after each call of the driver: observers detect a call that does not return.
   void enter(Verb verb) noexcept;
   void leave() noexcept;
 
@@ -185,10 +185,10 @@ class UntypedBackend {
   // Requests that the server answered with `running`; `request` is the index in the schema. For the
   // thread of the loop.
   /// Ends a request with the current row as done, rejected or failed. `start_afresh` makes a fresh
-  /// start in the next step and ends the request with the row of that. No effect if it does not
-  /// run.
+  /// start in the next step and ends the request with the row of that start. No effect on a
+  /// request that does not run.
   void end_request(std::uint32_t request, const Served& how) noexcept;
-  /// Sets the text that frontends see while the request runs.
+  /// Sets the progress text that frontends read while the request runs.
   void show_progress(std::uint32_t request, std::string_view text) noexcept;
   /// True if the request was answered `running` and has not ended. A halt ends it, unless it is
   /// served during halts.
@@ -205,7 +205,7 @@ class UntypedBackend {
   /// Reason for which `step` returned `ended` without ask_to_stop() (a failed request or fresh
   /// start, the policy `stop`), or for which row 0 was refused; empty if there is none.
   std::string_view failure() const noexcept;
-  /// Ends the backend: frontends learn that no row follows. `text`: the fault of a failed one.
+  /// Ends the backend, and reports to frontends that no row follows. `text`: fault of a failed one.
   void end(BackendState stopped_or_failed, std::string_view text = {}) noexcept;
 
  private:

@@ -35,7 +35,7 @@ class UntypedBackend;
 struct BatchRecord;
 struct RecordHead;
 
-/// A request that has begun and not ended.
+/// Request that has begun and not ended.
 struct RequestUnderWay {
   std::string name;
   Iteration since = -1;  // iteration in which it was taken
@@ -44,11 +44,11 @@ struct RequestUnderWay {
 };
 
 struct FrontendOptions {
-  Timeout timeout = std::chrono::seconds(5);  // to wait for the backend
+  Timeout timeout = std::chrono::seconds(5);  // longest wait for the backend
   Access access = Access::read_write;
-  bool dead = false;              // attach also to a backend that is gone, to read its history
-  bool starting = false;          // attach also to one that has not published row 0 yet
-  KeepWaiting keep_waiting = {};  // called during the wait for the backend; false ends it
+  bool dead = false;              // attach also to an ended backend, to read the history
+  bool starting = false;          // attach also before row 0 is published
+  KeepWaiting keep_waiting = {};  // called during the wait for the backend; false ends the wait
 };
 
 class UntypedFrontend;
@@ -64,9 +64,9 @@ class UntypedFrontend {
  public:
   /// Waits for the backend, up to the timeout. Throws TimeoutError, SegmentError, BackendFailed.
   explicit UntypedFrontend(const std::string& segment, const FrontendOptions& options = {});
-  /// A frontend of an inline robot: its bursts run in the calling thread.
+  /// Frontend of an inline robot: bursts run in the calling thread.
   UntypedFrontend(const std::string& segment, std::shared_ptr<InlineRunner> runner);
-  /// The same for a robot whose segment may have no name.
+  /// Frontend of an inline robot whose segment may have no name.
   UntypedFrontend(const UntypedBackend& backend, std::shared_ptr<InlineRunner> runner);
   UntypedFrontend(UntypedFrontend&&) noexcept;
   UntypedFrontend& operator=(UntypedFrontend&&) noexcept;
@@ -77,7 +77,7 @@ class UntypedFrontend {
   const RowLayout& layout() const;
   std::shared_ptr<const Description> description() const;
   std::uint64_t epoch() const;
-  /// How the backend was started. Throws SegmentError if that part of the segment is damaged.
+  /// Provenance of the backend. Throws SegmentError if that part of the segment is damaged.
   Provenance provenance() const;
   bool bursting() const;
   /// [ns]
@@ -85,79 +85,79 @@ class UntypedFrontend {
   Life life() const;
   std::uint32_t actuator(std::string_view name) const;
   std::uint32_t request_index(std::string_view name) const;
-  /// The checks of the functions below: whether the robot can follow a command.
+  /// Checks of the functions below: whether the robot can execute a command.
   const CommandCheck& command_check() const;
 
   // The add functions append to the next pulse and return the index in its batch.
-  /// Adds a command. `mask` has a bit for each number of the state that is given; empty: all.
+  /// Adds a command. `mask` has a bit for each given number of the state; empty: all.
   std::uint32_t add_command(std::uint32_t actuator, std::span<const std::byte> state,
                             const CommandOptions& options = {},
                             std::span<const std::uint64_t> mask = {});
-  /// Adds one command for several actuators. They begin together, when it is the next command of
-  /// all of them, take as many iterations as the slowest, and have one status. `states` holds their
+  /// Adds one command for several actuators. They begin together, when the command is next in all
+  /// queues, take as many iterations as the slowest, and have one status. `states` holds their
   /// states one after the other, `masks` a mask for each, or nothing.
   std::uint32_t add_commands(std::span<const std::uint32_t> actuators,
                              std::span<const std::byte> states, const CommandOptions& options = {},
                              std::span<const std::uint64_t> masks = {});
-  /// Computes what the command of add_commands would do if it began after the newest row: how many
-  /// iterations it takes, later than requested by how many and why, and the desired states in each
-  /// of them, bit for bit, because the loop's own code computes them here. Sends nothing and needs
+  /// Computes the effect of a command of add_commands that begins after the newest row: number of
+  /// iterations, delay against the request and its reason, and the desired states in each
+  /// iteration, bit for bit, because the loop's own code computes them. Sends nothing and needs
   /// no lane.
   ///
-  /// It begins at the desired states of that row; doubles with acceleration limits also with the
-  /// velocity and acceleration of the last three rows, other numbers at rest. Commands that run or
-  /// wait do not count. Throws InvalidArgument as add_commands, for an `until` that has passed, for
+  /// The motion begins at the desired states of that row; doubles with acceleration limits also
+  /// with the velocity and acceleration of the last three rows, other numbers at rest. Running and
+  /// queued commands are ignored. Throws InvalidArgument as add_commands, for a past `until`, for
   /// more than a million iterations, for state types that interpolate in C++ (`blend`), and for
-  /// numbers with the bound of an integral, which depends on what will be observed.
+  /// numbers with the bound of an integral, which depends on future observations.
   Preview preview(std::span<const std::uint32_t> actuators, std::span<const std::byte> states,
                   const CommandOptions& options = {},
                   std::span<const std::uint64_t> masks = {}) const;
-  /// The same from rest, after `row`: one of the history, or one with other desired states.
+  /// Preview from rest, after `row`: a row of the history, or one with other desired states.
   Preview preview_from(const UntypedObservation& row, std::span<const std::uint32_t> actuators,
                        std::span<const std::byte> states, const CommandOptions& options = {},
                        std::span<const std::uint64_t> masks = {}) const;
-  /// Adds one command through `rows` states: at `times` (when each row is reached, since the start
-  /// [ns], each in an iteration of its own; options.pace is then ignored), or with options.pace for
-  /// each row. Its profile is smooth (a curve through the rows), or linear at a speed, unless
+  /// Adds one command through `rows` states: at `times` (of reaching each row, since the start
+  /// [ns], each in its own iteration; options.pace is then ignored), or with options.pace for
+  /// each row. The profile is smooth (a curve through the rows), or linear at a speed, unless
   /// options.profile is given.
   std::uint32_t add_trajectory(std::uint32_t actuator, std::uint32_t rows,
                                std::span<const std::byte> states,
                                const CommandOptions& options = {.pace = iterations(1)},
                                std::span<const std::int64_t> times = {});
-  /// The same for several actuators; `states` holds all rows of the first actuator, then all rows
-  /// of the second, and so on. `masks` as in add_commands(), each for all rows of its actuator.
+  /// Adds a trajectory of several actuators; `states` holds all rows of the first one, then all
+  /// rows of the second, and so on. `masks` as in add_commands(), each for all rows of an actuator.
   std::uint32_t add_trajectories(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                                  std::span<const std::byte> states,
                                  const CommandOptions& options = {.pace = iterations(1)},
                                  std::span<const std::int64_t> times = {},
                                  std::span<const std::uint64_t> masks = {});
-  /// Adds a row of set-points for each of several actuators, one an iteration; the last one stays
+  /// Adds rows of set-points of several actuators, one row an iteration; the last one remains
   /// in force. `states` as in add_trajectories().
   void add_set_points(std::span<const std::uint32_t> actuators, std::uint32_t rows,
                       std::span<const std::byte> states, Mode mode = Mode::queue);
-  /// Adds a chunk (docs/chunks.md): rows that are due in fixed iterations, which overwrite what the
-  /// actuators do. `due`: iterations after the anchor, rising from 1, one for each row. `states`
+  /// Adds a chunk (docs/chunks.md): rows for fixed iterations, which overwrite the actuators'
+  /// motions. `due`: iterations after the anchor, rising from 1, one for each row. `states`
   /// and `masks` as in add_trajectories(). Throws InvalidArgument.
   std::uint32_t add_chunk(std::span<const std::uint32_t> actuators,
                           std::span<const std::uint32_t> due, std::span<const std::byte> states,
                           const ChunkOptions& options, std::span<const std::uint64_t> masks = {}) {
     return add_chunk(own_builder(), actuators, due, states, options, masks);
   }
-  /// The same, for a batch of its own.
+  /// As add_chunk, for a separate batch.
   std::uint32_t add_chunk(BatchBuilder& batch, std::span<const std::uint32_t> actuators,
                           std::span<const std::uint32_t> due, std::span<const std::byte> states,
                           const ChunkOptions& options, std::span<const std::uint64_t> masks);
-  /// So many numbers of the added targets were put inside their bounds: the batch counts them.
+  /// Adds to the batch's count of target values that were clamped to their bounds.
   void note_clipped(std::size_t numbers);
-  /// No chunk of this plan follows (ChunkOptions::plan; 0: of no plan of this frontend): when its
-  /// rows end, it is not starved. Changes no motion.
+  /// Declares that no chunk of this plan follows (ChunkOptions::plan; 0: all plans of this
+  /// frontend): the end of the rows is then no starvation. Changes no motion.
   std::uint32_t add_close_plan(std::uint64_t plan = 0);
   std::uint32_t add_purge(std::uint32_t actuator = kEveryActuator);
-  /// Drops only what this frontend sent.
+  /// Drops only commands of this frontend.
   std::uint32_t add_purge_own();
   std::uint32_t add_request(std::uint32_t request, std::span<const std::byte> payload);
-  /// A note in the journal, of 1 to 976 bytes in UTF-8, at the iteration in which the batch is
-  /// taken. It moves nothing and needs no control. Throws InvalidArgument.
+  /// Adds a note to the journal, of 1 to 976 bytes in UTF-8, at the iteration in which the batch is
+  /// taken. Moves nothing and needs no control. Throws InvalidArgument.
   std::uint32_t add_mark(std::string_view text);
   std::uint32_t add_take_control();
   std::uint32_t add_release_control();
@@ -165,21 +165,21 @@ class UntypedFrontend {
   std::size_t added() const;
   void forget_added();
 
-  /// Sends the added records as one batch. Throws LaneFull (nothing is sent, all stays added),
-  /// NoLane, ReadOnly, BackendGone.
+  /// Sends the added records as one batch. Throws LaneFull (nothing is sent, all records stay
+  /// added), NoLane, ReadOnly, BackendGone.
   Batch pulse(const PulseOptions& options = {}) { return pulse(options, 0); }
   /// Sends the records of `batch`; added records stay added.
   Batch pulse(BatchBuilder& batch, const std::optional<Seen>& seen = {});
-  /// As `pulse`; a bursting backend also runs until all records have ended.
+  /// As `pulse`; also makes a bursting backend run until all records have ended.
   Batch pulse_to_end(const PulseOptions& options = {});
-  /// The same for the records of `batch`; added records stay added.
+  /// As pulse_to_end for the records of `batch`; added records stay added.
   Batch pulse_to_end(BatchBuilder& batch, const std::optional<Seen>& seen = {});
   /// Waits for the end of a batch of pulse_to_end and returns the row of its last iteration (of an
   /// empty batch: the newest row). Throws as Batch::wait; BackendGone also for an empty batch.
   UntypedObservation wait_for_end(const Batch& batch, Timeout timeout,
                                   const KeepWaiting& keep_waiting = {},
                                   const WaitOptions& options = {}) const;
-  /// Waits for that end, whatever it is, and returns its iteration, or -1 if the batch was
+  /// Waits for the end of a batch, with any result, and returns its iteration, or -1 if
   /// rejected.
   Iteration wait_until_ended(const Batch& batch, Timeout timeout,
                              const KeepWaiting& keep_waiting = {}) const;
@@ -199,18 +199,18 @@ class UntypedFrontend {
                              std::span<const std::byte> states, const MoveOptions& options,
                              Timeout timeout, std::span<const std::uint64_t> masks = {},
                              const KeepWaiting& keep_waiting = {});
-  /// The first part of move_to: sends the command.
+  /// First part of move_to: sends the command.
   Move start_move(std::span<const std::uint32_t> actuators, std::span<const std::byte> states,
                   const MoveOptions& options, std::span<const std::uint64_t> masks = {});
-  /// The second part.
+  /// Second part of move_to: waits.
   UntypedObservation wait_for_move(const Move& move, Timeout timeout,
                                    const KeepWaiting& keep_waiting = {});
 
   /// Sends the added records and requests n iterations. The burst starts now, even if the batch is
-  /// scheduled (`at`) for a later iteration of it.
+  /// scheduled (`at`) for a later iteration of the burst.
   Burst start_burst(std::int64_t iterations, const PulseOptions& options = {});
-  /// The same, and waits. If the wait ends without the last row (timeout, `keep_waiting` returned
-  /// false), the rest of the burst is cancelled. So do burst_rows and pulse_and_wait.
+  /// start_burst and wait. If the wait ends without the last row (timeout, `keep_waiting` returned
+  /// false), the rest of the burst is cancelled, also in burst_rows and pulse_and_wait.
   UntypedObservation burst(std::int64_t iterations, Timeout timeout,
                            const KeepWaiting& keep_waiting = {}, const PulseOptions& options = {});
   /// Bursts one iteration for each row that `rows` can hold, fills `rows`, and returns the
@@ -218,7 +218,7 @@ class UntypedFrontend {
   Iteration burst_rows(std::span<std::byte> rows, Timeout timeout,
                        const KeepWaiting& keep_waiting = {}, const PulseOptions& options = {});
 
-  /// The requests that the driver serves over several iterations, oldest first.
+  /// Running requests of the driver, oldest first.
   std::vector<RequestUnderWay> running_requests() const;
 
   // halts: see src/runtime/README.md#halts
@@ -226,17 +226,17 @@ class UntypedFrontend {
   /// from the first iteration begun after it. Throws ReadOnly, and BackendGone also if the backend
   /// ended meanwhile: its successor may not be halted.
   std::uint64_t halt(std::string_view reason);
-  /// The halt in force, or the last one requested (`iteration` is -1 until it is in force).
+  /// The halt in force, or the last requested one (with `iteration` -1 until in force).
   std::optional<Halt> halted() const;
   /// Clears halts up to this number; the robot makes a fresh start. False, without an effect, if
   /// the backend is not halted. In real time it first waits
   /// until the halt is in force and the robot is at rest. Needs a lane, but no control. Throws
-  /// BackendHalted if it is refused (another halt came after it, the robot refuses, it cannot be
-  /// where it is read unless you `accept_reading`, or, in bursting mode, it still brakes),
+  /// BackendHalted if refused (a newer halt exists, the robot refuses, it cannot have moved to the
+  /// read position unless you `accept_reading`, or, in bursting mode, it still brakes),
   /// TimeoutError, NoLane, BackendGone.
   bool resume(std::uint64_t number, Timeout timeout, const KeepWaiting& keep_waiting = {},
               bool accept_reading = false);
-  /// A sign of life for the backend's watchdog, as a pulse or a wait for a batch is.
+  /// Sends a sign of life to the backend's watchdog, like a pulse or a wait for a batch.
   void keep_alive();
 
   // observations
@@ -251,15 +251,15 @@ class UntypedFrontend {
                               const KeepWaiting& keep_waiting = {}) const;
   void wait_for(Iteration k, std::byte* row, Timeout timeout,
                 const KeepWaiting& keep_waiting = {}) const;
-  /// The rows from first to last that the history holds.
+  /// Returns the rows from first to last that the history holds.
   Rows history(Iteration first, Iteration last) const;
   /// The last n rows.
   Rows history(std::size_t n) const;
-  /// The newest iteration at or before a time [ns]; one before the oldest if all rows are later.
+  /// The newest iteration at or before a time [ns]; the one before the oldest if all are later.
   Iteration iteration_at(std::int64_t time) const;
   /// The row of that iteration. Throws RowOverwritten if all rows in the history are later.
   UntypedObservation at_time(std::int64_t time) const;
-  /// The rows between two times [ns], both included, that the history holds.
+  /// Returns the rows between two times [ns], both included, that the history holds.
   Rows history_between(std::int64_t first, std::int64_t last) const;
   /// Reads rows in sequence: waits for row `position`, or takes the oldest row if that one is
   /// overwritten, and moves `position` behind it. Returns the number of rows that were skipped.
@@ -290,7 +290,7 @@ class UntypedFrontend {
   Batch pulse(const PulseOptions& options, std::uint16_t flags);
   void wait_for_rest(std::uint64_t number, const Deadline& deadline,
                      const KeepWaiting& keep_waiting);
-  /// Whether somebody will ask for the statuses of a batch.
+  /// Whether the statuses of a batch will be read.
   enum class Requested : std::uint8_t { yes, no };
   Sent send(BatchBuilder& builder, const BatchRecord& record, const std::optional<Seen>& seen = {},
             Requested requested = Requested::yes);
@@ -323,13 +323,13 @@ class UntypedFrontend {
   std::shared_ptr<Link> link_;
 };
 
-/// A row of a frontend's segment, for wait_for_first.
+/// Row of a frontend's segment, for wait_for_first.
 struct RowWish {
   const UntypedFrontend* frontend;
   Iteration row;
 };
-/// Waits, in one sleep, until at least one of these rows is published; returns the indices of all
-/// that are. Throws TimeoutError, BackendGone of a segment that ended without its row, Closed,
+/// Waits, in one sleep, until at least one of these rows is published; returns the indices of the
+/// published ones. Throws TimeoutError, BackendGone if a segment ended without its row, Closed,
 /// Cancelled.
 std::vector<std::size_t> wait_for_first(std::span<const RowWish> wishes, Timeout timeout,
                                         const KeepWaiting& keep_waiting = {});
@@ -341,15 +341,15 @@ std::uint64_t halt(const std::string& segment, std::string_view reason,
 
 /// Starts bursts of several backends that run at the same time; does not wait. No burst starts
 /// unless all backends are alive, bursting, and have a lane with room for the added records.
-/// `seen`: by which row all of them were decided.
+/// `seen`: row by which all of them were decided.
 std::vector<Burst> start_bursts(std::span<const BurstMember> group,
                                 const std::optional<Seen>& seen = {});
 
 /// start_bursts and wait_for.
 std::vector<UntypedObservation> burst(std::span<const BurstMember> group, Timeout timeout,
                                       const KeepWaiting& keep_waiting = {});
-/// Waits for bursts that were started together and returns the last row of each. If it throws, the
-/// rest of all of them is cancelled.
+/// Waits for bursts that were started together and returns the last row of each. An exception
+/// cancels the rest of all of them.
 std::vector<UntypedObservation> wait_for(std::span<const Burst> bursts, Timeout timeout,
                                          const KeepWaiting& keep_waiting = {});
 

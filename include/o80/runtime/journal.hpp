@@ -18,7 +18,7 @@ namespace o80 {
 
 class UntypedFrontend;
 
-/// A command, a request or an order of a batch in the journal.
+/// Command, request or order of a batch in the journal.
 struct JournalRecord {
   enum class Kind : std::uint8_t {
     command,
@@ -34,7 +34,7 @@ struct JournalRecord {
   /// Targets of a command for one actuator.
   struct Target {
     std::uint16_t actuator = 0;
-    std::vector<std::uint64_t> mask;  // one bit for each number that was given; empty: all
+    std::vector<std::uint64_t> mask;  // one bit for each given number; empty: all
     std::vector<std::byte> states;    // the rows, one state each
   };
 
@@ -47,7 +47,7 @@ struct JournalRecord {
   Start start = Start::desired;
   std::uint32_t rows = 1;               // above 1: a trajectory
   std::vector<std::int64_t> row_times;  // of a trajectory with its own times [ns]
-  // of a chunk; the rows are due so many iterations after its anchor
+  // of a chunk; `due`: iterations of the rows after the anchor
   ChunkOptions chunk;
   std::vector<std::uint32_t> due;
   std::vector<Target> targets;  // more than one: a command of several actuators
@@ -61,17 +61,17 @@ struct JournalRecord {
   std::string text;
   // of a resume
   std::uint64_t halt = 0;
-  // what this o80 does not know, "record kind 10" or "pace 7": a newer one has recorded it
+  // parts unknown to this o80, "record kind 10" or "pace 7", recorded by a newer one
   std::string unknown{};
 };
 
-/// One decision of a backend. Which members are set depends on `kind`.
+/// Decision of a backend. `kind` determines the set members.
 struct JournalEntry {
   static constexpr std::uint32_t kNoLane = 0xFFFFFFFF;
 
   JournalKind kind = JournalKind::none;
-  std::uint64_t number = 0;  // of the entry, from 0; entries of batches in transfer count too
-  std::uint64_t missed = 0;  // entries just before this one that were overwritten before the read
+  std::uint64_t number = 0;  // of the entry, from 0; entries of batches in transfer count, too
+  std::uint64_t missed = 0;  // previous entries that were overwritten before the read
   Iteration iteration = -1;
   std::uint32_t lane = kNoLane;
   std::uint64_t owner = 0;  // incarnation of the lane's owner that caused it; 0: unknown
@@ -80,22 +80,22 @@ struct JournalEntry {
 
   // taken, scheduled, rejected
   std::uint64_t ticket = 0;
-  Iteration at = kNow;                 // the iteration that the batch was sent for
+  Iteration at = kNow;                 // requested iteration of the batch
   std::int64_t burst = 0;              // iterations; -1: until the batch has ended
   std::vector<JournalRecord> records;  // empty with `records_lost`
-  bool records_lost = false;           // they were overwritten before they were read
+  bool records_lost = false;           // the records were overwritten before the read
   std::vector<std::byte> blocks;       // the batch as it was sent; empty with `records_lost`
-  std::optional<Seen> seen{};          // by which row it was decided, as its sender says
-  std::uint32_t clipped = 0;           // numbers of its targets that were put inside their bounds
+  std::optional<Seen> seen{};          // row by which the batch was decided, from the sender
+  std::uint32_t clipped = 0;           // number of target values clamped to their bounds
   // status, rejected
   Status status = Status::none;
   Reason reason = Reason::none;
   std::uint8_t detail = 0;
-  // chunk_begun: the first row that is reached; its rows are so many iterations later; from where
+  // chunk_begun: the first reached row; delay of the rows [iterations]; start of the take-over
   std::uint32_t row = 0;
   std::int64_t shift = 0;
   std::vector<ChunkStart> starts;
-  // halt, halt_reason, resume: the number; burst_ended: whether it was cut
+  // halt, halt_reason, resume: the number; burst_ended: whether it was cut short
   std::uint64_t halt = 0;
   HaltCause cause = HaltCause::none;
   bool cut = false;
@@ -104,23 +104,23 @@ struct JournalEntry {
   bool follows = false;                        // fresh_start: idle actuators follow from now on
   bool before_step = false;                    // interrupted before the step of the iteration
   BackendState state = BackendState::running;  // ended
-  /// Parts of it, or of its records, that this o80 does not know ("entry kind 30"): a newer o80
-  /// has recorded it. Empty: none.
+  /// Parts of the entry or its records that are unknown to this o80 ("entry kind 30"), recorded by
+  /// a newer o80. Empty: none.
   std::string unknown;
-  // snapshot: what the driver keeps in a slot
+  // snapshot: state of the driver in a slot
   std::uint32_t slot = 0;
   std::vector<std::byte> kept;
 };
 
-/// Reads the decisions of a backend from the journal in its segment, in their order: batches that
-/// it took or rejected, begins and ends of their commands, halts, control, bursts, deaths
+/// Reads the decisions of a backend, in order, from the journal in its segment: taken and
+/// rejected batches, begins and ends of their commands, halts, control, bursts, deaths
 /// (src/runtime/README.md#journal).
 ///
-/// The journal is a ring. A reader that is too slow misses entries; `missed` of the next entry says
-/// how many. The records of a batch are joined to the entry that decides on it.
+/// The journal is a ring. A slow reader misses entries; `missed` of the next entry counts them.
+/// The records of a batch are joined to the entry that decides on the batch.
 ///
-/// Writer / Readers: one thread. Works on any attached segment, also read-only, also of a backend
-/// that is gone.
+/// Writer / Readers: one thread. Works on any attached segment, also read-only, also of an ended
+/// backend.
 class Journal {
  public:
   /// Starts at the oldest entry in the ring. Throws Closed.
@@ -131,7 +131,7 @@ class Journal {
 
   /// False if the backend was started without a journal.
   bool exists() const;
-  /// Reads the next entry; false if there is none now. Does not wait. Throws Closed,
+  /// Reads the next entry; false if there is none yet. Does not wait. Throws Closed,
   /// UsedAfterFork.
   bool next(JournalEntry& entry);
   /// Continues at the entry of this number; entries before the oldest are reported as missed.

@@ -13,17 +13,17 @@
 
 namespace o80 {
 
-/// How `move_to` gets to its targets, and how near the robot must come.
+/// Options of `move_to`: the command's options, and the tolerances.
 struct MoveOptions {
   CommandOptions command = {};
   /// Largest distance of each observed number from its target [its unit]. Must be given.
   double tolerance = std::numeric_limits<double>::quiet_NaN();
   /// Instead of `tolerance`: one for each number of each actuator, in order [its unit]; infinity
-  /// for a number that is not judged. Numbers that the command leaves out are never judged.
+  /// for a number that is not checked. Numbers that the command omits are never checked.
   std::vector<double> tolerances = {};
 };
 
-/// A number that was observed too far from its target.
+/// Number that was observed too far from its target.
 struct Miss {
   std::string actuator;
   std::string field;  // empty if the state is a plain number
@@ -34,7 +34,7 @@ struct Miss {
   std::string unit;  // of all four
 };
 
-/// A motion that was sent by UntypedFrontend::start_move.
+/// Motion sent by UntypedFrontend::start_move.
 class Move {
  public:
   const Batch& batch() const { return batch_; }
@@ -58,7 +58,7 @@ class NotReached : public TimeoutError {
 
   /// The commands of the move; those that have not ended continue.
   const Batch& batch() const noexcept { return what_->batch; }
-  /// The numbers that were too far away; none if only the commands had not ended.
+  /// Numbers outside of the tolerance; none if only the commands had not ended.
   const std::vector<Miss>& misses() const noexcept { return what_->misses; }
   /// The row in which they were observed.
   const UntypedObservation& observation() const noexcept { return what_->observation; }
@@ -69,7 +69,7 @@ class NotReached : public TimeoutError {
     std::vector<Miss> misses;
     UntypedObservation observation;
   };
-  std::shared_ptr<const What> what_;  // shared, because an exception must be copied without a throw
+  std::shared_ptr<const What> what_;  // shared, because copying an exception must not throw
 };
 
 }  // namespace o80

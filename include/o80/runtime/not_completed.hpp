@@ -13,7 +13,7 @@ namespace o80 {
 
 /// Commands or requests of a batch ended otherwise than completed, or the whole batch was rejected.
 ///
-/// A command that a later command of the same frontend has overwritten is not among them.
+/// Commands overwritten by a later command of the same frontend are not included.
 class NotCompleted : public Error {
  public:
   /// A command or request that did not complete.
@@ -27,7 +27,7 @@ class NotCompleted : public Error {
         what_(std::make_shared<const What>(What{std::move(ends), std::move(observation)})) {}
 
   const std::vector<End>& ends() const noexcept { return what_->ends; }
-  /// The row of the last iteration of the batch; the newest row if that one is not there.
+  /// Row of the batch's last iteration; the newest row if that one is not available.
   const UntypedObservation& observation() const noexcept { return what_->observation; }
 
  private:
@@ -35,7 +35,7 @@ class NotCompleted : public Error {
     std::vector<End> ends;
     UntypedObservation observation;
   };
-  std::shared_ptr<const What> what_;  // shared, because an exception must be copied without a throw
+  std::shared_ptr<const What> what_;  // shared, because copying an exception must not throw
 };
 
 }  // namespace o80

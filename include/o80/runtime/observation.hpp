@@ -14,14 +14,14 @@
 
 namespace o80 {
 
-/// A robot as its segment describes it: shared by all observations of a frontend.
+/// Description of a robot from its segment, shared by all observations of a frontend.
 struct Description {
   Schema schema;
   RowLayout layout;
-  std::uint64_t epoch = 0;  // of the run whose rows it describes; 0: of none
+  std::uint64_t epoch = 0;  // run of the described rows; 0: none
 };
 
-/// One row of a history, in bytes: desired, observed and extended values of one iteration.
+/// Row of a history, in bytes: desired, observed and extended values of one iteration.
 class UntypedObservation {
  public:
   explicit UntypedObservation(std::shared_ptr<const Description> description)
@@ -50,14 +50,14 @@ class UntypedObservation {
   const std::byte* extended() const { return bytes() + layout().extended; }
   /// True if a command or braking gave the desired state of this actuator.
   bool active(std::uint32_t actuator) const { return bit(layout().active, actuator); }
-  /// True if the limits changed that state.
+  /// True if limits changed the desired state of this actuator.
   bool clamped(std::uint32_t actuator) const { return bit(layout().clamped, actuator); }
-  /// True if the actuator comes to rest without a command.
+  /// True if the actuator brakes to rest without a command.
   bool braking(std::uint32_t actuator) const { return bit(layout().braking, actuator); }
   /// True if a plan of chunks has no row left for this actuator, and is not closed.
   bool starved(std::uint32_t actuator) const { return bit(layout().starved, actuator); }
-  /// How far the desired state of this actuator is from what its command asks for, in its units:
-  /// the most of its numbers. 0 where no limit changed it.
+  /// Largest difference of this actuator's desired state from the commanded one, over all numbers,
+  /// in their units. 0 if no limit changed the state.
   float off_plan(std::uint32_t actuator) const {
     return unpack<float>(bytes() + layout().off_plan + actuator * sizeof(float));
   }

@@ -14,15 +14,15 @@ struct Preview {
   /// Number of iterations that the command takes.
   std::int64_t iterations() const { return static_cast<std::int64_t>(rows.count); }
 
-  /// By how many iterations it takes longer than requested, at most 65535.
+  /// Number of iterations beyond the request, at most 65535.
   std::int64_t late = 0;
-  std::string text;  // why, as Handle::text says it; empty if it is not late
-  /// The desired states of all actuators in each of these iterations. `rows.first` is the iteration
-  /// in which the command would begin.
+  std::string text;  // reason, as in Handle::text; empty if not late
+  /// The desired states of all actuators in each of these iterations. `rows.first`: iteration in
+  /// which the command would begin.
   Rows rows;
 };
 
-/// The same, in the robot's own types.
+/// Preview in the robot's own types.
 template <class R>
 struct TypedPreview : Preview {
   explicit TypedPreview(Preview&& untyped) : Preview(std::move(untyped)) {}

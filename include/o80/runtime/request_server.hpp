@@ -18,7 +18,7 @@ struct Served {
   std::array<char, 248> text{};
 
   static Served done() { return {}; }
-  /// The request is rejected; the sender reads `why`.
+  /// Rejects the request; the sender reads `why`.
   static Served rejected(std::string_view why) { return with(Kind::rejected, why); }
   /// Makes a fresh start: drops all queues, reads the robot again, and publishes an extra row with
   /// desired = observed.
@@ -26,8 +26,8 @@ struct Served {
   /// Ends the loop as failed.
   static Served failed(std::string_view why) { return with(Kind::failed, why); }
 
-  /// The request runs and ends in a later iteration; its sender sees `progress` meanwhile. At most
-  /// one request of a kind runs: another one is rejected without a call of its handler.
+  /// The request runs and ends in a later iteration; the sender reads `progress` meanwhile. At most
+  /// one request of a kind runs: another one is rejected without a call of the handler.
   static Served running(std::string_view progress = {}) { return with(Kind::running, progress); }
 
   /// The reason of a rejection or failure, or the progress of a running request.
@@ -64,15 +64,15 @@ struct FreshReading {
 class RequestServer {
  public:
   virtual Served serve(std::uint32_t request, std::span<const std::byte> payload) noexcept = 0;
-  /// The state that this request has kept, for the journal, so that a replay can begin with it;
-  /// empty if the request keeps none. Called after `serve` has answered `done`.
+  /// Returns the state stored by this request, for the journal, so that a replay can begin with it;
+  /// empty if the request stores none. Called after `serve` has answered `done`.
   virtual KeptState kept_state(std::uint32_t /*request*/,
                                std::span<const std::byte> /*payload*/) noexcept {
     return {};
   }
   /// Reads the robot for a fresh start; false if that failed.
   virtual bool read_fresh(FreshReading& reading) noexcept = 0;
-  /// Called when a halt begins: commands have ended, the actuators brake. False if the robot
+  /// Called at the begin of a halt: commands have ended, the actuators brake. False if the robot
   /// failed.
   virtual bool halt() noexcept { return true; }
   /// Called before a halt is cleared; `rejected` keeps the halt, and the sender reads the reason.

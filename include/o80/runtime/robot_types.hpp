@@ -9,11 +9,11 @@
 
 namespace o80 {
 
-/// The layout is known only at run time: `describe` adds actuators and sensors and stores the
-/// offsets that it gets (Place).
+/// Layout known at run time only: `describe` adds actuators and sensors and stores the
+/// returned offsets (Place).
 struct RunTimeActuators {};
 
-/// The requests a robot serves.
+/// Requests of a robot.
 template <class... Each>
 struct Requests {
   static_assert((Shareable<Each> && ...),
@@ -43,7 +43,7 @@ struct RequestsIn<R> {
 
 }  // namespace robot_types
 
-/// The types of a robot: members of its driver class, or of any struct with the same members.
+/// Types of a robot: members of the driver class, or of any struct with the same members.
 template <class R>
 using ActuatorsOf = typename R::Actuators;
 template <class R>
@@ -63,7 +63,7 @@ consteval std::uint32_t index_of_request(Requests<Each...>) {
   return found ? place : kNoRequest;
 }
 
-/// A request's name: that of its struct in snake_case, "Home" => "home", "LaunchBall" =>
+/// Name of a request: the struct's name in snake_case, "Home" => "home", "LaunchBall" =>
 /// "launch_ball".
 template <Shareable Request>
 std::string request_name() {
@@ -79,7 +79,7 @@ std::string request_name() {
   return name;
 }
 
-/// A request's help: `static constexpr std::string_view kHelp` of its struct, if it has one.
+/// Help of a request: `static constexpr std::string_view kHelp` of the struct, if any.
 template <Shareable Request>
 constexpr std::string_view request_help() {
   if constexpr (requires { std::string_view(Request::kHelp); }) {
@@ -89,8 +89,8 @@ constexpr std::string_view request_help() {
   }
 }
 
-/// True if a request is served during a halt: `static constexpr bool kWhileHalted` of its struct,
-/// if it has one.
+/// True if a request is served during a halt: `static constexpr bool kWhileHalted` of the struct,
+/// if any.
 template <Shareable Request>
 constexpr bool request_while_halted() {
   if constexpr (requires { bool{Request::kWhileHalted}; }) {

@@ -43,12 +43,12 @@ class Backend final : private RequestServer {
   bool runs() const {
     return backend_.runs(index_of<Request>());
   }
-  /// Sets the text that frontends see while it runs.
+  /// Sets the progress text that frontends read while the request runs.
   template <Shareable Request>
   void progress(std::string_view text) {
     backend_.show_progress(index_of<Request>(), text);
   }
-  /// Ends it with the row that is published next; `start_afresh` ends it in the next step. No
+  /// Ends the request with the next published row; `start_afresh` ends it in the next step. No
   /// effect if none of this kind runs.
   template <Shareable Request>
   void ended(const Served& how) {
@@ -62,12 +62,12 @@ class Backend final : private RequestServer {
   void on_halt(std::function<void()> halt) { halt_ = std::move(halt); }
   /// Sets a function that is called before a halt is cleared; `Served::rejected` keeps the halt.
   void on_resume(std::function<Served()> resume) { resume_ = std::move(resume); }
-  /// Halts on behalf of the program, as a driver does in its reading.
+  /// Halts on behalf of the program, like a driver in a reading.
   void halt(std::string_view why) noexcept { backend_.halt(HaltCause::driver, why); }
 
-  /// Publishes the reading of the current iteration; the first call publishes row 0. The first two
-  /// throw InvalidArgument, row 0 if a number is NaN, infinite or, in real time, too far outside
-  /// its bounds, the next one if the robot cannot have come there, see
+  /// Publishes the reading of the current iteration; the first call publishes row 0. Throws
+  /// InvalidArgument for row 0 if a number is NaN, infinite or, in real time, too far outside its
+  /// bounds, and for the next row if the robot cannot have moved there, see
   /// BackendOptions::accept_reading.
   void publish(const Actuators& observed, const Extended& extended = {}) {
     if constexpr (!std::is_same_v<Actuators, NoActuators>) pack(observed, backend_.observed());
@@ -77,8 +77,8 @@ class Backend final : private RequestServer {
                             "' cannot begin: " + std::string(backend_.failure()));
     }
   }
-  /// The desired states of the next iteration. Nothing when the backend must end, after a stop or a
-  /// failure: see `untyped().failure()`. In bursting mode it waits for a burst.
+  /// Begins an iteration and returns the desired states; nothing when the backend must end, after a
+  /// stop or a failure: see `untyped().failure()`. Waits for a burst in bursting mode.
   std::optional<Actuators> step() noexcept {
     if (backend_.step() != Step::run) return std::nullopt;
     return unpack<Actuators>(backend_.desired());

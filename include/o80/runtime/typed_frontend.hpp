@@ -16,11 +16,11 @@
 
 namespace o80 {
 
-/// Throws SchemaMismatch with the difference if the types in `expected` and `found` are laid out
-/// differently. Names, limits and help texts may differ.
+/// Throws SchemaMismatch with the difference if the types in `expected` and `found` have different
+/// layouts. Names, limits and help texts may differ.
 void check_types(const Schema& expected, const Schema& found, const std::string& segment);
 
-/// A frontend with the robot's types; `Frontend<>` has none and works on bytes.
+/// Frontend with the robot's types; `Frontend<>` has none and works on bytes.
 template <class R = void>
 class Frontend : public UntypedFrontend {
  public:
@@ -28,7 +28,7 @@ class Frontend : public UntypedFrontend {
       : UntypedFrontend(segment, options) {
     compare();
   }
-  /// A frontend of an inline robot: its bursts run in the calling thread.
+  /// Frontend of an inline robot: bursts run in the calling thread.
   Frontend(const std::string& segment, std::shared_ptr<InlineRunner> runner)
       : UntypedFrontend(segment, std::move(runner)) {
     compare();
@@ -50,7 +50,7 @@ class Frontend : public UntypedFrontend {
     return add_command(actuator(name), target, options);
   }
   using UntypedFrontend::add_commands;
-  /// One command for several actuators of one state type, a target for each.
+  /// Adds one command for several actuators of one state type, a target for each.
   template <Shareable State>
   std::uint32_t add_commands(std::span<const std::string_view> names,
                              std::span<const State> targets, const CommandOptions& options = {}) {

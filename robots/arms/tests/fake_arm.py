@@ -1,4 +1,4 @@
-"""Arms with fake servos, whose time passes with each reading: no test needs a clock."""
+"""Arms with fake servos, whose time advances with each reading, so that no test needs a clock."""
 
 import json
 from contextlib import ExitStack
@@ -16,7 +16,7 @@ RANGES = ((750, 3400), (830, 3200), (900, 3100), (860, 3180), (60, 4000), (2000,
 
 
 class FakeArm:
-    """The fake servos, their calibration file, and the options with which the arm finds both."""
+    """Fake servos, their calibration file, and the options of an arm that uses both."""
 
     def __init__(self, folder: Path, stack: ExitStack, kind: str = "so101") -> None:
         self.kind = kind
@@ -32,7 +32,7 @@ class FakeArm:
             servo = self.line.servos[number]
             servo.calibrate(each["homing_offset"], each["range_min"], each["range_max"])
             servo.stand_at(2100)
-            if kind != "so101":  # as LeRobot leaves them
+            if kind != "so101":  # LeRobot's settings
                 servo.put(dynamixel.RETURN_DELAY, 0)
                 servo.put(servo.MODE, 5 if number == 6 else 4)
                 servo.keep()
@@ -40,7 +40,7 @@ class FakeArm:
 
     @property
     def options(self) -> dict[str, Any]:
-        # a busy machine may be late by seconds; a servo that is silent costs this time
+        # a busy machine may be late by seconds; a silent servo costs this time
         options = {"port": str(self.line.port), "calibration": str(self.file)}
         return {**options, "answer_timeout": 0.5}
 

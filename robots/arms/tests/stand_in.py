@@ -1,8 +1,8 @@
-"""A stand-in for the published model of the SO-101."""
+"""Stand-in for the published model of the SO-101."""
 
 
 def stand_in() -> str:
-    """A model of about the size of the published one, with its names."""
+    """Makes a model of about the published one's size, with the same names."""
     bodies, end, servos = "", "", ""
     for joint, place, axis, limit in (
         ("shoulder_pan", "0.04 0 0.06", "0 0 -1", 1.9198),

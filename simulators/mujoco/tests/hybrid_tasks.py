@@ -1,4 +1,4 @@
-"""Tasks for the tests of o80.hybrid: an arm pushes a puck, or another arm follows it."""
+"""Tasks for the tests of o80.hybrid: an arm pushes a puck, or one arm follows another."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ START = np.array([0.4, 0.15])  # of the puck
 
 
 class Push(HybridTask):
-    """Bring the puck to a drawn goal; an episode ends by itself after a drawn number of steps."""
+    """Bring the puck to a random goal; an episode ends after a random number of steps."""
 
     rig = Rig(
         robot="two_joints",
@@ -54,7 +54,7 @@ class Push(HybridTask):
 
 
 class Many(Push):
-    """The same in many worlds, each with a goal, an end and a place of the puck of its own."""
+    """Push in many worlds, each with its own goal, end and place of the puck."""
 
     rig = replace(Push.rig, worlds=1)
     only: int | None = None  # of `drawn` worlds, as if it were alone
@@ -84,7 +84,7 @@ class Many(Push):
 
 
 class Still(Many):
-    """By the clock it begins where a reset leads, as inline."""
+    """Begins at the state of a reset, in real time as inline."""
 
     def go_home(self, robot: o80.Frontend) -> None:
         if robot.schema["requests"]:
@@ -92,7 +92,7 @@ class Still(Many):
 
 
 class Followed(HybridTask):
-    """A simulated arm follows another one: a world without a velocity, in a process of its own."""
+    """A simulated arm follows another one: a world without a velocity, in another process."""
 
     rig = Rig(robot="two_joints", world="two_joints", every=4, frequency=RATE)
     action_space = Box(-1, 1, (2,), np.float32)
@@ -108,7 +108,7 @@ class Followed(HybridTask):
 
 
 def played(environment: Any, steps: int, seed: int) -> Iterator[NDArray[np.float64]]:
-    """Results of so many steps of drawn actions; an episode that ends is followed by a reset."""
+    """Plays random actions for `steps` steps, with a reset after each end; returns the results."""
     random = np.random.default_rng(seed)
     shape = environment.action_space.shape
     observation, _ = environment.reset(seed=seed)

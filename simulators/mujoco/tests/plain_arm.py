@@ -1,4 +1,4 @@
-"""A simulated arm in Python that serves no requests."""
+"""Simulated arm in Python without requests."""
 
 from typing import Any, ClassVar
 
@@ -8,7 +8,7 @@ from o80.drivers import Desired, Reading
 
 
 class PlainArm:
-    """Two joints that follow."""
+    """Two joints that follow the desired states."""
 
     actuators = ("shoulder", "elbow")
     simulated = True
@@ -24,13 +24,13 @@ class PlainArm:
 
 
 class LimitedArm(PlainArm):
-    """The same with limits of speed and acceleration, so that its motions are planned."""
+    """PlainArm with limits of speed and acceleration, so that motions are planned."""
 
     limits: ClassVar = dict.fromkeys(PlainArm.actuators, (-2.0, 2.0, 1.5, 8.0))  # [rad], [1/s]
 
 
 class GroupsArm(PlainArm):
-    """The same with each joint in a group of its own."""
+    """PlainArm with each joint in a separate group."""
 
     actuators: Any = dict.fromkeys(PlainArm.actuators, float)
 

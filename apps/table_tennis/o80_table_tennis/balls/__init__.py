@@ -1,1 +1,1 @@
-"""Where balls come from: recordings, their reconstruction, simulated shots, sampled flights."""
+"""Sources of balls: recordings, their reconstruction, simulated shots, sampled flights."""

@@ -1,10 +1,10 @@
-"""The flight that explains recorded positions: a flight model between bounces, fitted to them.
+"""Fits a flight model to recorded positions, one flight between each two bounces.
 
-Each segment between two bounces is a flight with drag and Magnus force: start position, start
-velocity, drag and turn (Magnus acceleration over speed) are found by damped least squares with
-weak beliefs about drag and turn, and with far rows counting less (Huber weights). A bounce is
-where the flights before and after it meet; both are then fitted again through that one point, so
-that the path has no jump.
+Each flight has drag and Magnus force: start position, start velocity, drag and turn (Magnus
+acceleration over speed) are found by damped least squares with weak priors of drag and turn.
+Outliers count less (Huber weights). The flights before and after a bounce meet in its point; both
+are fitted again through that point, so that the path has no
+jump.
 """
 
 from __future__ import annotations
@@ -28,35 +28,35 @@ STEP = 0.05
 POSITION_NOISE = 0.003
 """Expected error of a recorded position [m]."""
 TURN_BELIEF = 0.3
-"""Standard deviation expected of each number of the turn [1/s]: a strong top spin has 0.3."""
+"""Prior standard deviation of each number of the turn [1/s]; a strong top spin has 0.3."""
 UNKNOWN_TURN = np.zeros(3)
 DRAG_BELIEF = 0.25
-"""Standard deviation expected of the drag, as a share of the drag of the model."""
+"""Prior standard deviation of the drag, as a share of the model's drag."""
 ANCHOR_NOISE = 1e-5
-"""How closely the two flights of a bounce meet in its point [m]."""
+"""Tolerance of the common point of the two flights at a bounce [m]."""
 FAR = 2.5
-"""Rows further from the flight than this many times the usual distance count less."""
+"""Rows at more than this multiple of the median distance count less."""
 DEEP = 0.02
-"""A bounce is a lowest row from which the ball rises by more than this [m]."""
+"""Least rise of the ball after the lowest row of a bounce [m]."""
 FEWEST = 4
-"""Rows needed to fit the flight between two bounces."""
+"""Least number of rows to fit a flight."""
 SLOPE_SHARE = 1e-3
-"""Change of an unknown for a difference, as a share of its scale."""
+"""Step of the numeric derivatives, as a share of an unknown's scale."""
 CLOSE_ENOUGH = 1e-3
 """Precision of a fit, see `fitted`."""
 MAX_ROUNDS = 12
 SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.1 * AERODYNAMICS.drag] + [0.1] * 3)
 """Typical sizes of the ten unknowns, for differences and damping."""
 BELIEFS = np.array([0.0] * 6 + [1 / (DRAG_BELIEF * AERODYNAMICS.drag)] + [1 / TURN_BELIEF] * 3)
-"""How sure each unknown is known before [1 / its unit]."""
+"""Prior certainty of each unknown [1 / unit of the unknown]."""
 Fly = Callable[[FloatArray], FloatArray]
-"""Positions (T, 3, B) of B flights of unknowns (K, B)."""
+"""Maps unknowns (K, B) of B flights to positions (T, 3, B)."""
 _TURNING = replace(AERODYNAMICS, spin_decay=0.0, lift_saturation=0.0).air
 
 
 @dataclass(frozen=True, eq=False)
 class Flight:
-    """A flight without bounce: a state at `origin`, drag and turn."""
+    """Flight without a bounce: state at `origin`, drag and turn."""
 
     origin: float
     """[s]"""
@@ -82,11 +82,11 @@ class FlightFit:
     bounce_times: FloatArray
     """(flights - 1,) [s]"""
     start: float
-    """First row [s]."""
+    """Time of the first row [s]."""
     end: float
-    """Last row that the fit covers [s]."""
+    """Time of the last fitted row [s]."""
     residuals: FloatArray
-    """(N,) distance of each row from the fit [m]; NaN-free, rows after `end` are left out"""
+    """(N,) distance of each fitted row from the fit [m]"""
 
     def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Positions [m] and velocities [m/s], each (T, 3), at `times` (T,) [s]."""
@@ -99,11 +99,11 @@ class FlightFit:
         return positions, velocities
 
     def spins(self, times: FloatArray, velocities: FloatArray) -> FloatArray:
-        """Spins (T, 3) [rad/s] at `times` (T,) [s], where the ball has `velocities` (T, 3) [m/s].
+        """Spins (T, 3) [rad/s] at `times` (T,) [s], for a ball with `velocities` (T, 3) [m/s].
 
-        Before the first bounce, those with which a simulated ball turns as the fitted one does.
-        After a bounce, those that the law of the bounce gives: the ball then spins so much that
-        the turn of its flight says little about its spin.
+        Before the first bounce, a simulated ball with these spins turns like the fitted one.
+        After a bounce, the law of the bounce gives the spin, which is then so large that the
+        turn of the flight determines it badly.
         """
         spins = AERODYNAMICS.spins(self.flights[0].turn, np.linalg.norm(velocities, axis=1))
         spin: FloatArray | None = None
@@ -116,16 +116,16 @@ class FlightFit:
 
 
 def fit_flight(stamps: FloatArray, positions: FloatArray) -> FlightFit:
-    """The flights and bounces behind `positions` (N, 3) [m] at `stamps` (N,) [s], rising.
+    """Fits flights and bounces to `positions` (N, 3) [m] at rising `stamps` (N,) [s].
 
-    A few rows before the first or after the last bounce that are too few to say anything are
-    left out: the fit then starts later or ends earlier.
+    Too few rows before the first or after the last bounce are left out: the fit then starts
+    later or ends earlier.
     """
     first, last, bounces = _covered(positions)
     edges = [first - 1, *bounces, last + 1]
     flights = [fit_segment(stamps[a + 1 : b], positions[a + 1 : b]) for a, b in pairwise(edges)]
 
-    # where two flights meet => both go through that point
+    # intersection of two flights => common point of both
     meetings = [
         meeting(before, after, float(stamps[row - 1]), float(stamps[row + 1]))
         for before, after, row in zip(flights, flights[1:], bounces, strict=False)
@@ -156,7 +156,7 @@ def fit_flight(stamps: FloatArray, positions: FloatArray) -> FlightFit:
 
 
 def _expected_turns(flights: Sequence[Flight], bounce_times: FloatArray) -> list[FloatArray]:
-    """The turn (3,) of each flight before it is fitted: unknown, or what the last bounce gives."""
+    """Prior turn (3,) of each flight: unknown, or derived from the last bounce."""
     turns = [np.zeros(3)]
     spin: FloatArray | None = None
     for before, after, time in zip(flights, flights[1:], bounce_times, strict=False):
@@ -167,13 +167,13 @@ def _expected_turns(flights: Sequence[Flight], bounce_times: FloatArray) -> list
 
 
 def bounce_rows(positions: FloatArray) -> tuple[list[int], int]:
-    """Lowest rows of `positions` (N, 3) at bounces, and the last row that is surely in flight.
+    """Finds the lowest rows of `positions` (N, 3) at bounces, and the last certain row in flight.
 
-    Only the lowest row of a bounce may lie on either side of it. Rows at the end that rise a
-    little from a lowest one belong to a bounce too short to be seen: the last sure row is before.
+    Only the lowest row of a bounce may be on either side of it. Final rows that rise a little
+    after a lowest one belong to an incomplete bounce: the last certain row precedes them.
     """
     raw = positions[:, 2]
-    # a single row far off is not a bounce
+    # a single outlier is not a bounce
     heights = np.median(sliding_window_view(np.pad(raw, 1, mode="edge"), 3), axis=-1)
     found: list[int] = []
     falling = False
@@ -194,7 +194,7 @@ def _lowest_near(heights: FloatArray, row: int) -> int:
 
 
 def _covered(positions: FloatArray) -> tuple[int, int, list[int]]:
-    """First and last row to fit, and the bounce rows between them."""
+    """Returns the first and last row to fit, and the bounce rows between them."""
     bounces, last = bounce_rows(positions)
     first = 0
     if bounces and bounces[0] < FEWEST:
@@ -207,7 +207,7 @@ def _covered(positions: FloatArray) -> tuple[int, int, list[int]]:
 def meeting(
     before: Flight, after: Flight, earliest: float, latest: float
 ) -> tuple[float, FloatArray]:
-    """Time [s] and point (3,) [m], between two times, where two flights have equal height."""
+    """Finds the time [s] and point (3,) [m] of equal height of two flights, between two times."""
     times = np.linspace(earliest, latest, 257)
     falling, rising = before.at(times)[0], after.at(times)[0]
     gap = rising[:, 2] - falling[:, 2]
@@ -224,10 +224,10 @@ def fit_segment(
     start: Flight | None = None,
     expected_turn: FloatArray = UNKNOWN_TURN,
 ) -> Flight:
-    """The flight without bounce through `positions` (n, 3) at `stamps` (n,).
+    """Fits a flight without a bounce to `positions` (n, 3) at `stamps` (n,).
 
-    `anchors` are times and points it goes through exactly; `start` is a first guess. What the
-    positions leave open is drawn towards `expected_turn` (3,) [1/s].
+    `anchors`: times and points of the flight to be met exactly. `start`: first guess.
+    `expected_turn` (3,) [1/s]: prior of the turn.
     """
     origin = float(stamps[0]) if start is None else start.origin
     unknowns = _guess(stamps - origin, positions) if start is None else start.unknowns
@@ -259,11 +259,11 @@ def fitted(
     precision: float,
     largest: FloatArray | float = np.inf,
 ) -> FloatArray:
-    """The unknowns (K,) of the flight that goes best through `points` (n, 3), from a first guess.
+    """Fits the unknowns (K,) of a flight to `points` (n, 3), from a first guess.
 
-    It goes through the last `anchors` points exactly. Scales, centre, certainty (`beliefs`) and
-    limit of each unknown are (K,); one with a limit changes by at most its scale in a step. The
-    search ends when no unknown moves by more than `precision`, a share of its scale.
+    The flight meets the last `anchors` points exactly. Scales, centre, certainty (`beliefs`) and
+    limit of each unknown are (K,); limited unknowns change by at most their scale in a step. The
+    search ends when no unknown changes by more than `precision`, a share of its scale.
     """
     rows = len(points) - anchors
     noise = np.full(len(points), POSITION_NOISE)
@@ -274,7 +274,7 @@ def fitted(
         flown, slopes = sloped(fly, unknowns, scales)
         misses = points - flown
 
-        # far rows count less
+        # outliers count less
         distance = np.linalg.norm(misses, axis=1) / noise
         usual = max(1.0, float(np.median(distance)))
         weight = np.sqrt(np.minimum(1.0, FAR * usual / np.maximum(distance, 1e-9)))
@@ -294,15 +294,15 @@ def fitted(
 
 
 def sloped(fly: Fly, unknowns: FloatArray, scales: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Positions (T, 3) of a flight, and their slopes (T, 3, K) in its unknowns (K,)."""
-    # the flight as it is and others with one unknown changed
+    """Computes positions (T, 3) of a flight, and their derivatives (T, 3, K) by unknowns (K,)."""
+    # the flight itself, and others with one changed unknown
     change = SLOPE_SHARE * scales
     flown = fly(unknowns[:, None] + np.column_stack([np.zeros(len(change)), np.diag(change)]))
     return flown[..., 0], (flown[..., 1:] - flown[..., :1]) / change
 
 
 def _guess(times: FloatArray, positions: FloatArray) -> FloatArray:
-    """Unknowns from a parabola through the positions."""
+    """Guesses the unknowns from a parabola through the positions."""
     degree = min(2, len(times) - 1)
     coefficients = np.zeros((3, 3))
     coefficients[: degree + 1] = np.polynomial.polynomial.polyfit(times, positions, degree)
@@ -311,7 +311,7 @@ def _guess(times: FloatArray, positions: FloatArray) -> FloatArray:
 
 def fly(unknowns: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Positions and velocities (T, 3, B) of B flights, `unknowns` (10, B), at `times` (T,)."""
-    # a spin without saturation and decay turns the flight as its turn says
+    # a spin without saturation and decay gives a constant turn
     balls = np.ascontiguousarray(np.vstack([unknowns[:6], unknowns[7:] / AERODYNAMICS.magnus]).T)
     forth, back = max(1, int(np.ceil(times.max() / STEP))), int(np.ceil(-times.min() / STEP))
     drags = np.ascontiguousarray(unknowns[6])

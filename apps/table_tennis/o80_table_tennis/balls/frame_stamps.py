@@ -1,10 +1,10 @@
-"""Time stamps for recordings that have none, from their positions and velocities.
+"""Reconstructs time stamps of recordings without any, from positions and velocities.
 
 The vision system delivers frames at a fixed rate; a reader took the newest frame about every 10 ms
-and kept no stamp. So rows are whole numbers of frames apart (0: the same frame again, mostly 1 or
-2, more where the ball was lost). A flight fitted to roughly stamped rows is far more exact than
-the stamps were: where on it a row lies tells its frame. The rough stamps are those of the reader's
-rate; where they end in a poor fit, distance over recorded velocity (which lags by some 25 ms).
+and stored no stamp. Rows are therefore whole numbers of frames apart (0: the same frame again,
+mostly 1 or 2, more after a lost ball). A flight fitted to roughly stamped rows is far more exact
+than the stamps: a row's place on the flight determines its frame. The rough stamps come from the
+reader's rate, or after a poor fit from distance over recorded velocity (which lags by some 25 ms).
 """
 
 from __future__ import annotations
@@ -31,31 +31,31 @@ from .flight_fit import (
 )
 
 FRAME_PERIOD = 1 / 180
-"""Between two frames of the vision system [s]; slope of stamps over frames where both are known."""
+"""Interval of the vision system's frames [s]: slope of known stamps over frame numbers."""
 READER_PERIOD = 0.010
-"""About the time between two rows: the rate of the reader [s]."""
+"""Approximate interval of the reader's rows [s]."""
 CLOSE = 0.0025
-"""Rows this near to a flight, on average, leave no doubt about their frames [m]."""
+"""Mean distance of rows from a flight below which their frames are certain [m]."""
 CLEAR_GAIN = 0.1
-"""A frame is added or taken away if the squared distances fall by more than this share."""
+"""Least relative fall of the squared distances for which a frame is added or removed."""
 MAX_ROUNDS = 30
 NEAR_BOUNCE = 3
-"""Rows next to a bounce whose recorded velocities are not used."""
+"""Number of rows next to a bounce whose recorded velocities are ignored."""
 LONGEST_GAP = 8
-"""Frames that may lie between the last row before a bounce and the first one after it."""
+"""Largest number of frames from the last row before a bounce to the first one after it."""
 
 
 def new_frames(positions: FloatArray) -> NDArray[np.bool_]:
-    """(N,) False where a row repeats the frame of the row before it."""
+    """Returns (N,) False for rows that repeat the previous frame."""
     repeated = np.all(np.diff(positions, axis=0) == 0, axis=1)
     return np.concatenate([[True], ~repeated])
 
 
 def frames_of(positions: FloatArray, velocities: FloatArray, rows: IntArray) -> IntArray:
-    """Number of the frame (N,) of each row, from 0; times `FRAME_PERIOD` these are the stamps.
+    """Finds the frame number (N,) of each row, from 0; stamps are numbers times `FRAME_PERIOD`.
 
-    `positions` (N, 3) [m], `velocities` (N, 3) [m/s] of new frames only, and their number in the
-    file `rows` (N,).
+    `positions` (N, 3) [m] and `velocities` (N, 3) [m/s] hold new frames only, `rows` (N,) their
+    row numbers in the file.
     """
     bounces, _ = bounce_rows(positions)
     edges = [-1, *bounces, len(positions)]
@@ -66,7 +66,7 @@ def frames_of(positions: FloatArray, velocities: FloatArray, rows: IntArray) -> 
         counted = _count(positions[segment], velocities[segment], rows[segment])
         mine, flight = counted.frames, counted.flight
         if before is not None:
-            # the segment goes on after the one before, the lowest row lies between them
+            # the segment continues the previous one; the lowest row is between them
             start = int(frames[first - 1])
             ahead, between = _gap(before, flight, start, positions[first])
             frames[first] = start + between
@@ -80,15 +80,15 @@ def frames_of(positions: FloatArray, velocities: FloatArray, rows: IntArray) -> 
 @dataclass(frozen=True, eq=False)
 class _Count:
     frames: IntArray
-    """(n,), from 0"""
+    """(n,) frame numbers, from 0"""
     flight: Flight
-    """Through the rows at frames * `FRAME_PERIOD`."""
+    """Flight fitted to the rows at frames * `FRAME_PERIOD`."""
     distance: float
     """Root mean square of the rows' distances from the flight [m]."""
 
 
 def _count(positions: FloatArray, velocities: FloatArray, rows: IntArray) -> _Count:
-    """Frames of the rows between two bounces; a second first guess where the first fits badly."""
+    """Finds the frames of rows between two bounces, with a second guess after a poor fit."""
     by_reader = _settle((rows - rows[0]) * READER_PERIOD, positions)
     if by_reader.distance < CLOSE:
         return by_reader
@@ -98,12 +98,12 @@ def _count(positions: FloatArray, velocities: FloatArray, rows: IntArray) -> _Co
 
 
 def _settle(times: FloatArray, positions: FloatArray) -> _Count:
-    """Frames near `times` (n,) [s] that agree with the flight fitted to them."""
+    """Finds frames near `times` (n,) [s] that agree with a flight fitted to them."""
     frames = np.zeros(0, dtype=np.int64)
     flight: Flight | None = None
     for _ in range(MAX_ROUNDS):
         flight = fit_segment(times, positions, start=flight)
-        # delay of each row on the flight relative to its stamp => its frame
+        # delay of each row on the flight relative to its stamp => frame
         flown, speed = flight.at(times)
         misses = positions - flown
         late = np.sum(misses * speed, axis=1) / np.sum(speed**2, axis=1)
@@ -119,10 +119,10 @@ def _settle(times: FloatArray, positions: FloatArray) -> _Count:
 
 
 def _missed(flight: Flight, frames: IntArray, misses: FloatArray, speed: FloatArray) -> IntArray:
-    """Frames (n,) to add where one frame more or less from some row on brings the rows closer.
+    """Returns frames (n,) to add: one more or less from some row on, if that reduces the distances.
 
-    A flight gives way to a frame missed in its middle, so that no row looks wrong by itself: each
-    cut is judged by the residual after the best flight for it, to first order.
+    A fitted flight adapts to a missed frame in its middle, so that no single row is an outlier:
+    each cut is rated by the residual after the best flight for this cut, to first order.
     """
     times = frames.astype(np.float64) * FRAME_PERIOD
     _, slopes = sloped(lambda tried: fly(tried, times)[0], flight.unknowns, SCALES)
@@ -130,7 +130,7 @@ def _missed(flight: Flight, frames: IntArray, misses: FloatArray, speed: FloatAr
     basis = np.linalg.qr(matrix * SCALES)[0][: misses.size]
     left = misses.ravel() / POSITION_NOISE
 
-    # column c: change of the misses when all rows after c come one frame later
+    # column c: change of the misses if all rows after c are one frame later
     later = np.tri(len(frames), k=-1)[:, :-1]
     shifts = (later[:, None, :] * (speed * FRAME_PERIOD)[..., None]).reshape(misses.size, -1)
     shifts /= POSITION_NOISE
@@ -147,11 +147,11 @@ def _missed(flight: Flight, frames: IntArray, misses: FloatArray, speed: FloatAr
 
 
 def _durations(positions: FloatArray, velocities: FloatArray) -> FloatArray:
-    """Time from each row to the next (n - 1,) [s]: distance over smoothed recorded velocity."""
+    """Durations from row to row (n - 1,) [s]: distance over smoothed recorded velocity."""
     rows = np.arange(len(positions), dtype=np.float64)
     windows = sliding_window_view(np.pad(velocities, ((2, 2), (0, 0)), mode="edge"), 5, axis=0)
     calm = np.median(windows, axis=-1)
-    # the velocities of rows next to a bounce are mixed with those of its other side
+    # velocities next to a bounce are mixed with ones from its other side
     inner = slice(NEAR_BOUNCE, -NEAR_BOUNCE) if len(rows) > 4 * NEAR_BOUNCE else slice(None)
     polynomial = np.polynomial.polynomial.polyfit(rows[inner], calm[inner], min(2, len(rows) - 1))
     speed = np.polynomial.polynomial.polyval(rows[1:] - 0.5, polynomial).T
@@ -161,9 +161,9 @@ def _durations(positions: FloatArray, velocities: FloatArray) -> FloatArray:
 
 
 def _whole(frames: FloatArray) -> IntArray:
-    """Whole frames from 0, each at least one after the one before, nearest to `frames` (n,).
+    """Rounds `frames` (n,) to strictly rising whole frames from 0.
 
-    What is left over is the same for most rows (when the first frame was taken): it is removed
+    The fraction is the same for most rows (the time of the first frame), and is removed
     before rounding.
     """
     phase = float(np.angle(np.mean(np.exp(2j * np.pi * frames)))) / (2 * np.pi)
@@ -176,7 +176,7 @@ def _whole(frames: FloatArray) -> IntArray:
 def _gap(before: Flight, after: Flight, frame: int, lowest: FloatArray) -> tuple[int, int]:
     """Frames from the last row before a bounce, `frame`, to the first row after, and to the lowest.
 
-    Of all gaps, the one with which the two flights meet best, in one point.
+    Chooses the gap with the closest meeting of the two flights.
     """
     best = (np.inf, 2, 1)
     start = frame * FRAME_PERIOD
@@ -185,7 +185,7 @@ def _gap(before: Flight, after: Flight, frame: int, lowest: FloatArray) -> tuple
         time, _ = meeting(before, shifted, start, start + ahead * FRAME_PERIOD)
         at = np.array([time])
         apart = float(np.linalg.norm(before.at(at)[0] - shifted.at(at)[0]))
-        # the lowest row lies on one of the two flights
+        # the lowest row is on one of the two flights
         between = np.arange(1, ahead)
         times = start + between.astype(np.float64) * FRAME_PERIOD
         path = np.where((times < time)[:, None], before.at(times)[0], shifted.at(times)[0])

@@ -1,4 +1,4 @@
-"""Shots of the ball launcher, by the launch model of the package o80-devices."""
+"""Simulates shots of the ball launcher with the launch model of o80-devices."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ if TYPE_CHECKING:
 SETTINGS = ((1200.0, 1200.0, 1200.0), (1800.0, 1800.0, 400.0))
 """Motor speeds [1/min] without and with top spin, as in the recorded shots."""
 TOP_SPINS = (0.0, 60.0)
-"""Least and most of an aim [rad/s]: with the scatter of the launcher, within those of `WIDE`."""
+"""Range of an aim's top spin [rad/s]; with the launcher's scatter, within the range of `WIDE`."""
 SPREAD = 0.2
-"""Spread of each component of its velocity, either way [m/s]; the launcher adds its scatter."""
+"""Spread of each component of an aim's velocity, either way; the scatter is added [m/s]."""
 
 
 @dataclass(frozen=True)
 class LauncherShots:
     """Motor speeds drawn between the two recorded settings, with the scatter of the launcher.
 
-    It stands at the far end of the table and shoots at the arm.
+    The launcher is at the far end of the table and shoots at the arm.
     """
 
     def draw(self, rng: np.random.Generator) -> Launch:
-        """Another launch. Raises o80.MissingExtra without the package o80-devices."""
+        """Draws a launch. Raises o80.MissingExtra without the package o80-devices."""
         model, share = _model(), rng.uniform()
         left, right, bottom = (
             (1 - share) * plain + share * top for plain, top in zip(*SETTINGS, strict=True)
@@ -51,16 +51,16 @@ def _model() -> LaunchModel:
 
 
 LAUNCHER = LauncherShots()
-"""Like the shots of the recorded launcher, and between its two settings."""
+"""Shots like the recorded launcher's, also between its two settings."""
 
 
 def drawn_aim(rng: np.random.Generator) -> list[float]:
-    """Angles and motors (5,) of the launcher for a ball of `WIDE`: the launch model, inverted."""
+    """Draws angles and motors (5,) for a ball like `WIDE`, by the inverse of the launch model."""
     from o80_devices.ball_launcher.wheel_speeds import actuation_of
 
     model = _model()
     velocity = np.array(WIDE.velocity) + SPREAD * rng.uniform(-1.0, 1.0, 3)
-    difference = (rng.uniform(*TOP_SPINS) - model.spin) / model.spin_gain  # of upper and lower
+    difference = (rng.uniform(*TOP_SPINS) - model.spin) / model.spin_gain  # of motor speeds
     speed = float(np.linalg.norm(velocity))
     bottom = (speed - 2 * model.top_gain * difference) / (2 * model.top_gain + model.bottom_gain)
     aside, ahead, up = velocity[0], -velocity[1], velocity[2]

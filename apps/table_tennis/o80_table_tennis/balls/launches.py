@@ -1,6 +1,6 @@
-"""How simulated shots start: the launch of one, and the distributions that launches are drawn from.
+"""Launches of simulated shots, and the distributions of launches.
 
-`narrow` are shots like those of the recorded ball gun, `wide` ones are spread much further.
+`narrow` shots are like the recorded ball gun's, `wide` ones have a much larger spread.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ from .sampled_flight import SampledFlight
 from .trajectories import BallTrajectory
 
 DURATION = 1.28
-"""Duration of a simulated shot as cameras would see it: the mean of the recorded ones [s]."""
+"""Duration of a simulated shot before the cameras: mean of the recorded shots [s]."""
 
 
 @dataclass(frozen=True, eq=False)
 class Launch:
-    """The state of a ball when it is first seen, which decides its whole flight."""
+    """State of a ball at its first sighting, which determines the whole flight."""
 
     position: FloatArray
     """(3,) world frame [m]"""
@@ -35,7 +35,7 @@ class Launch:
     name: str = "simulated shot"
 
     def flight(self, period: float) -> SampledFlight:
-        """One row, the launch itself: from there the simulator lets the ball fly by its own law."""
+        """Returns a flight of one row, the launch; the simulator computes the rest."""
         return SampledFlight(
             name=self.name,
             period=period,
@@ -47,7 +47,7 @@ class Launch:
         )
 
     def seen(self, *, duration: float = DURATION, period: float = FRAME_PERIOD) -> BallTrajectory:
-        """The predicted flight, in rows every `period` [s]: by default those of the cameras."""
+        """Predicts the flight in rows of `period` [s]; by default at the cameras' rate."""
         flight = predict(self.position, self.velocity, duration, spin=self.spin, period=period)
         return BallTrajectory(
             self.name, flight.stamps, flight.positions, flight.velocities, flight.spins
@@ -56,15 +56,15 @@ class Launch:
 
 @dataclass(frozen=True)
 class NormalLaunches:
-    """A normal distribution of position [m], velocity [m/s] and spin [rad/s], nine numbers."""
+    """Normal distribution of position [m], velocity [m/s] and spin [rad/s], nine numbers."""
 
     mean: tuple[float, ...]
     """(9,)"""
     factor: tuple[tuple[float, ...], ...]
-    """(9, 9) lower triangle L of the covariance L L^T; rows may end with their last number."""
+    """(9, 9) lower triangle L of the covariance L L^T; zeros at the end of a row may be omitted."""
 
     def draw(self, rng: np.random.Generator) -> Launch:
-        """Another launch."""
+        """Draws a launch."""
         numbers = self._mean + self._factor @ rng.standard_normal(9)
         return Launch(numbers[:3], numbers[3:6], numbers[6:])
 
@@ -91,13 +91,13 @@ NARROW = NormalLaunches(
         (-2.7453, -0.1803, 1.7132, -0.2434, 0.5993, -0.7898, -0.4311, 1.7903, 4.2418),
     ),
 )
-"""Like the recorded shots of the ball gun: fitted to 40 of them, tested on the other 40, by
+"""Launches like the ball gun's: fitted to 40 recorded shots, tested on 40 others, by
 studies/fit_launches.py."""
 
 
 @dataclass(frozen=True)
 class UniformLaunches:
-    """Means, those of the ball gun, and how far each number may lie from its mean, all alike."""
+    """Uniform distribution: the ball gun's means, and the largest deviation of each number."""
 
     position: Vector = (0.46, 2.95, 1.37)
     """[m]"""
@@ -108,10 +108,10 @@ class UniformLaunches:
     velocity_spread: float = 0.3
     """Along each axis, either way [m/s]."""
     top_spin: tuple[float, float] = (-60.0, 90.0)
-    """Least and most spin about x [rad/s]; below 0 it is backspin. There is no side spin."""
+    """Range of the spin about x [rad/s]; negative: backspin. There is no side spin."""
 
     def draw(self, rng: np.random.Generator) -> Launch:
-        """Another launch."""
+        """Draws a launch."""
         share = rng.uniform(-1.0, 1.0, 7)
         least, most = self.top_spin
         spin = 0.5 * (least + most) + 0.5 * (most - least) * share.item(6)
@@ -123,4 +123,4 @@ class UniformLaunches:
 
 
 WIDE = UniformLaunches()
-"""Around the ball gun's, much further spread, with backspin too."""
+"""Launches around the ball gun's, with a much larger spread, and also with backspin."""

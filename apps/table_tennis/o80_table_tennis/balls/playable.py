@@ -1,4 +1,4 @@
-"""Which shots a player can return: those that pass the net, bounce once and come within reach."""
+"""Judges whether a shot can be returned: it passes the net, bounces once and comes within reach."""
 
 from __future__ import annotations
 
@@ -13,16 +13,16 @@ from ..world.table import NET_HEIGHT, TABLE
 from .launches import Launch
 
 REACH = UPPER_ARM + FOREARM + 0.063
-"""How near to the shoulder a ball must come [m]: the recorded shots of the ball gun, which can all
-be returned, come to 0.51 to 0.79 m; the blade reaches 0.094 m beyond its centre."""
+"""Largest distance of a playable ball from the shoulder [m]: the recorded shots of the ball gun can
+all be returned, and pass it at 0.51 to 0.79 m; the blade reaches 0.094 m beyond its centre."""
 DURATION = 2.0
-"""A flight that has not come within reach after this time does not [s]."""
+"""Time after which a flight counts as out of reach [s]."""
 PASSED = -0.8
-"""A ball that is nearer to the wall behind the arm than this has passed it [m]."""
+"""Largest y of a ball that has passed the arm [m]."""
 
 _NET_Y = TABLE.centre[1]
 _NET_TOP = TABLE.top + NET_HEIGHT + BALL_RADIUS
-_LOWEST = TABLE.bounce_height - 1e-6  # a ball below has missed the table
+_LOWEST = TABLE.bounce_height - 1e-6  # a lower ball has missed the table
 _X, _Y, _Z, _, _, _VZ = range(STATE.start, STATE.stop)
 
 
@@ -60,7 +60,7 @@ def verdict(launch: Launch) -> Verdict:
 
 
 def _height_at_net(before: Sequence[float], after: Sequence[float]) -> float:
-    """By a parabola through both states."""
+    """Interpolates the height at the net by a parabola through both states."""
     share = (before[_Y] - _NET_Y) / (before[_Y] - after[_Y])
     time = after[TIME] - before[TIME]
     sag = share * (1.0 - share) * time * (before[_VZ] - after[_VZ]) / 2.0
@@ -68,7 +68,7 @@ def _height_at_net(before: Sequence[float], after: Sequence[float]) -> float:
 
 
 def _passes(before: Sequence[float], after: Sequence[float]) -> bool:
-    """Whether the straight way between two states comes within reach of the shoulder."""
+    """Whether the straight line between two states comes within reach of the shoulder."""
     x, y, z = before[_X], before[_Y], before[_Z] - SHOULDER
     dx, dy, dz = after[_X] - x, after[_Y] - y, after[_Z] - before[_Z]
     along = -(x * dx + y * dy + z * dz) / max(dx * dx + dy * dy + dz * dz, 1e-12)

@@ -1,4 +1,4 @@
-"""Files of recorded balls: JSON of a ball gun, HDF5 of shots with known launch parameters."""
+"""Reads recorded balls: JSON of a ball gun, HDF5 of shots with known launch parameters."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .trajectories import BallTrajectory, require_enough_rows, require_finite
 
 @dataclass(frozen=True)
 class Frame:
-    """How rows of a file lie in the world: turned about z by `yaw`, then shifted by `offset`."""
+    """Pose of a file's frame in the world: rotation about z by `yaw`, then shift by `offset`."""
 
     offset: tuple[float, float, float]
     """[m]"""
@@ -27,29 +27,29 @@ class Frame:
     """[rad]"""
 
     def point(self, rows: FloatArray) -> FloatArray:
-        """Positions (N, 3) in the world [m]."""
+        """Transforms positions (N, 3) to the world [m]."""
         shifted: FloatArray = self.direction(rows) + np.array(self.offset)
         return shifted
 
     def direction(self, rows: FloatArray) -> FloatArray:
-        """Velocities (N, 3) in the world."""
+        """Transforms velocities (N, 3) to the world."""
         c, s = math.cos(self.yaw), math.sin(self.yaw)
         turned: FloatArray = rows @ np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
         return turned
 
 
 BALL_GUN_FRAME = Frame(offset=(-0.4, -0.13, 1.23))
-"""Frame of the JSON files, as measured."""
+"""Measured frame of the JSON files."""
 LAUNCHER_FRAME = Frame(offset=(0.4, 2.95, 0.033), yaw=-math.pi / 2)
 """Frame of the HDF5 files, whose shots begin at the launcher and fly along +x. The height is fitted
-to the bounces; the rest is chosen so that the launcher stands at the far end of the table and
+to the bounces; all else is chosen: the launcher is at the far end of the table and
 shoots at the arm."""
 
 FORMATS = (".json", ".hdf5", ".h5")
 
 
 def recording_files(path: Path) -> list[Path]:
-    """The file itself, or the recordings of a folder in the order of their names."""
+    """Returns the file itself, or the recordings of a folder, sorted by name."""
     if path.is_file():
         return [path]
     if not path.is_dir():
@@ -66,9 +66,9 @@ def recording_files(path: Path) -> list[Path]:
 
 
 def load_trajectories(path: str | Path) -> list[BallTrajectory]:
-    """The trajectories of a file, or of all files of a folder, in the order of their names.
+    """Reads the trajectories of a file, or of all files of a folder, sorted by name.
 
-    Read are JSON files of a ball gun (`.json`, time stamps reconstructed), HDF5 files of shots
+    Formats: JSON of a ball gun (`.json`, reconstructed time stamps), HDF5 of shots
     (`.hdf5`, `.h5`).
 
     Raises FileNotFoundError or ValueError, naming the file and the cure.
@@ -85,11 +85,11 @@ def _read(file: Path) -> list[BallTrajectory]:
 
 
 def _read_ball_gun(file: Path) -> list[BallTrajectory]:
-    """One shot: {"ob": rows of x, y, z [m], vx, vy, vz [m/s]}, no stamps."""
+    """Reads one shot: {"ob": rows of x, y, z [m], vx, vy, vz [m/s]}, no stamps."""
     every_row = _ball_gun_rows(file)
     numbers = np.flatnonzero(new_frames(every_row[:, :3]))
     rows = every_row[numbers]
-    require_finite(f"{file}:", rows)  # time stamps cannot be reconstructed around others
+    require_finite(f"{file}:", rows)  # time stamps cannot be reconstructed around invalid rows
     require_enough_rows(str(file), len(rows))
     frames = frames_of(rows[:, :3], rows[:, 3:], numbers)
     trajectory = BallTrajectory(
@@ -170,5 +170,5 @@ def _read_shot(file: Path, shot: Any) -> BallTrajectory:
 
 
 def _number(key: str) -> tuple[int, str]:
-    """Orders "2" before "10", and names after numbers."""
+    """Sort key: "2" before "10", and names after numbers."""
     return (int(key), "") if key.isdigit() else (sys.maxsize, key)

@@ -1,10 +1,10 @@
-"""A recorded flight by the law of the simulator, so that nothing jumps at the hand-over.
+"""Fits recorded flights with the simulator's law, so that nothing jumps at the hand-over.
 
-`flight_fit` finds the drag and the turn of each flight, whatever they are. Here position, velocity
-and spin are fitted again, with the drag and the lift of the simulator. What the rows leave open
-is drawn towards the spin of the fitted turn, and after a bounce towards the spin that the law of
-the bounce gives. From any row on, a simulated ball of that state flies on as the recorded one is
-replayed.
+`flight_fit` finds a free drag and turn for each flight. Here position, velocity and spin are
+fitted again, with the simulator's drag and lift. The prior of the spin is the spin of the fitted
+turn, and after a bounce the spin from the law of the bounce. A simulated ball that starts from
+any row's state therefore flies like the replayed
+one.
 """
 
 from __future__ import annotations
@@ -26,21 +26,21 @@ STEP = 0.02
 SPIN_ERROR = 30.0
 """Expected error of each number of the spin before the first bounce [rad/s]."""
 SHARE_ERROR = 0.3
-"""Expected error of a spin after a bounce, as a share of it; its axis is that of the law."""
+"""Expected relative error of a spin after a bounce; the axis is not changed."""
 MAX_ERRORS = 2.5
-"""A spin is at most so many expected errors away: where lift saturates, flights say little."""
+"""Limit of a spin's deviation in expected errors: saturated lift hardly shows the spin."""
 SCALES = np.array([0.01] * 3 + [0.1] * 3 + [0.3] * 3)
-"""Typical changes of position [m], velocity [m/s] and spin [expected errors], for differences."""
+"""Typical changes of position [m], velocity [m/s] and spin [expected errors]."""
 CLOSE_ENOUGH = 1e-4
 """Precision of a fit, see `fitted`."""
 
 
 @dataclass(frozen=True, eq=False)
 class ReplayedFlight:
-    """A flight without bounce."""
+    """Flight without a bounce, by the simulator's law."""
 
     origin: float
-    """Its first time [s]."""
+    """Start time [s]."""
     state: FloatArray
     """(6,) position [m] and velocity [m/s] at `origin`"""
     spin: FloatArray
@@ -68,7 +68,7 @@ class ReplayedFlights:
     bounce_times: FloatArray
     """(flights - 1,) [s]"""
     residuals: FloatArray
-    """(N,) distance of each row that the fit covers [m]"""
+    """(N,) distance of each fitted row [m]"""
 
     def at(self, times: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Positions [m], velocities [m/s] and spins [rad/s], each (T, 3), at `times` (T,) [s]."""
@@ -83,9 +83,9 @@ class ReplayedFlights:
 
 
 def replayed(fit: FlightFit, stamps: FloatArray, positions: FloatArray) -> ReplayedFlights:
-    """The flights by the law of the simulator behind `positions` (N, 3) [m].
+    """Fits flights with the simulator's law to `positions` (N, 3) [m].
 
-    `stamps` (N,) [s]; `fit` is that of the same rows.
+    `stamps` (N,) [s]; `fit`: free fit of the same rows.
     """
     inside = (stamps >= fit.start) & (stamps <= fit.end)
     stamps, positions = stamps[inside], positions[inside]
@@ -108,9 +108,9 @@ def replayed(fit: FlightFit, stamps: FloatArray, positions: FloatArray) -> Repla
 
 
 def _spin(fit: FlightFit, edges: FloatArray, before: list[ReplayedFlight]) -> FloatArray:
-    """Spin (3,) at the beginning of the next flight."""
+    """Computes the spin (3,) at the beginning of the next flight."""
     if not before:
-        # with this spin the middle of the flight turns as it was fitted
+        # this spin gives the fitted turn in the middle of the flight
         middle = np.array([0.5 * (edges[0] + edges[1])])
         spin = fit.spins(middle, fit.at(middle)[1])[0]
         grown: FloatArray = spin * np.exp(AERODYNAMICS.spin_decay * (middle[0] - edges[0]))
@@ -128,10 +128,10 @@ def _fitted(
     *,
     anchors: int,
 ) -> ReplayedFlight:
-    """With the state and spin that fit best; the last `anchors` rows are points that it goes
-    through.
+    """Fits state and spin of a flight, which meets the last `anchors` positions
+    exactly.
 
-    `spin_errors` (K, 3) [rad/s]: in these directions the spin may differ, about so far.
+    `spin_errors` (K, 3) [rad/s]: directions and expected sizes of changes of the spin.
     """
     spins = len(spin_errors)
 
@@ -154,12 +154,12 @@ def _fitted(
     flight = replace(start, state=found[:6], spin=found[6:])
     if not spins:
         return flight
-    # a spin that was held at its most has left position and velocity behind
+    # position and velocity are fitted again, because a limited spin leaves them unconverged
     return _fitted(flight, np.zeros((0, 3)), times, positions, anchors=anchors)
 
 
 def flown(states: FloatArray, times: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Positions and velocities (T, 3, B) of B balls after `times` (T,) [s].
+    """Computes positions and velocities (T, 3, B) of B balls after `times` (T,) [s].
 
     `states` (9, B): position [m], velocity [m/s] and spin [rad/s].
     """

@@ -1,4 +1,4 @@
-"""A flight in equal steps, as the twins play it."""
+"""A flight in equal steps, as replayed by the twins."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..world.ball import BALL_GUN_SPIN
 
 @dataclass(frozen=True)
 class SampledFlight:
-    """A flight in equal steps, ready to be commanded: row i is at i * period after the start."""
+    """Flight in equal steps, ready to be commanded: row i is at i * period after the start."""
 
     name: str
     period: float
@@ -27,11 +27,11 @@ class SampledFlight:
     residuals: FloatArray
     """(N,) distance of each recorded row from the fit [m]"""
     spins: FloatArray | None = None
-    """(T, 3), in the axes of the world [rad/s]; None: that of the ball gun in every row"""
+    """(T, 3), in the axes of the world [rad/s]; None: the ball gun's spin in every row"""
 
     @property
     def states(self) -> FloatArray:
-        """(T, 9) positions, velocities and spins, a fresh array."""
+        """Returns positions, velocities and spins (T, 9), a fresh array."""
         spins = self.spins
         if spins is None:
             spins = np.broadcast_to(BALL_GUN_SPIN, self.positions.shape)
@@ -39,5 +39,5 @@ class SampledFlight:
 
     @property
     def residual(self) -> float:
-        """Root mean square of the distances of the recorded rows from the fit [m]."""
+        """Root mean square distance of the recorded rows from the fit [m]."""
         return float(np.sqrt(np.mean(self.residuals**2)))

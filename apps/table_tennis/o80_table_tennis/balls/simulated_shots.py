@@ -1,4 +1,4 @@
-"""Shots without any file: as many as one likes, each with a number that brings it back."""
+"""Unlimited simulated shots, each reproduced by its number."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from .playable import Verdict, verdict
 from .sampled_flight import SampledFlight
 
 LaunchDistribution = NormalLaunches | UniformLaunches | LauncherShots
-"""Distribution that launches are drawn from: the same generator gives the same ones."""
+"""Distribution of launches; the same generator gives the same launches."""
 DISTRIBUTIONS: dict[str, LaunchDistribution] = {
     "narrow": NARROW,
     "wide": WIDE,
     "launcher": LAUNCHER,
 }
-"""By the names that `TaskSettings.balls` takes."""
+"""Distributions by the names for `TaskSettings.balls`."""
 NUMBERS = 2**31
-"""How many shots there are of a distribution and a seed."""
+"""Number of shots of a distribution and seed."""
 MAX_DRAWS = 1000
 
 
 def drawn_launch(rng: np.random.Generator, distribution: LaunchDistribution = NARROW) -> Launch:
-    """The first launch drawn from `rng` that can be played; the same `rng`, the same launch.
+    """Draws launches until one is playable; the same `rng` gives the same launch.
 
-    Raises ValueError if the distribution hardly has any.
+    Raises ValueError if hardly any launch is playable.
     """
     for _ in range(MAX_DRAWS):
         launch = distribution.draw(rng)
@@ -42,12 +42,12 @@ def drawn_launch(rng: np.random.Generator, distribution: LaunchDistribution = NA
 
 @dataclass(frozen=True)
 class SimulatedShots:
-    """The shots of a distribution and a seed, by their numbers; nothing is kept."""
+    """Shots of a distribution and seed, computed from their numbers."""
 
     distribution: LaunchDistribution = NARROW
     seed: int = 0
     count: int = NUMBERS
-    """How many there are."""
+    """Number of shots."""
     period: float = PERIOD
     """[s]"""
 
@@ -55,11 +55,11 @@ class SimulatedShots:
         return self.count
 
     def launch(self, index: int) -> Launch:
-        """Launch `index`, from 0. Raises IndexError beyond the last."""
+        """Returns launch `index`, from 0. Raises IndexError beyond the last."""
         if not 0 <= index < self.count:
             raise IndexError(f"there is no ball {index}: there are 0 to {self.count - 1}")
         return drawn_launch(np.random.default_rng((self.seed, index)), self.distribution)
 
     def flight(self, index: int) -> SampledFlight:
-        """The launch `index`, from which a simulator lets the ball fly."""
+        """Returns launch `index` as a flight of one row, which a simulator continues."""
         return self.launch(index).flight(self.period)

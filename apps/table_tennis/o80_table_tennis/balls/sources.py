@@ -1,4 +1,4 @@
-"""Where the balls of the episodes come from: recorded files, or simulated shots."""
+"""Sources of the episodes' balls: recorded files, or simulated shots."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .trajectories import BallTrajectory
 
 
 class KeptFlights:
-    """Flights that are read or fitted when first asked for, and kept."""
+    """Flights that are read or fitted on first access, and cached."""
 
     def __init__(self, shots: list[Callable[[], SampledFlight]]):
         if not shots:
@@ -27,7 +27,7 @@ class KeptFlights:
         return len(self._shots)
 
     def flight(self, index: int) -> SampledFlight:
-        """Flight `index`, from 0. Raises IndexError beyond the last."""
+        """Returns flight `index`, from 0. Raises IndexError beyond the last."""
         if not 0 <= index < len(self):
             raise IndexError(f"there is no ball {index}: there are 0 to {len(self) - 1}")
         if index not in self._kept:
@@ -40,10 +40,10 @@ Flights = KeptFlights | SimulatedShots
 
 
 def recorded_balls(path: str | Path, *, period: float = PERIOD) -> KeptFlights:
-    """The shots of a file, or of all recordings of a folder in the order of their names.
+    """Returns the shots of a file, or of all recordings of a folder, sorted by name.
 
-    A file of one shot (JSON) is read when the shot is asked for, one of many (HDF5) at once. The
-    fitted flights are kept in files too, see `flight_cache`.
+    A file of one shot (JSON) is read on first access, a file of many (HDF5) at once. Fitted
+    flights are also cached in files, see `flight_cache`.
     """
     shots: list[Callable[[], SampledFlight]] = []
     for file in recording_files(Path(path)):
@@ -55,7 +55,7 @@ def recorded_balls(path: str | Path, *, period: float = PERIOD) -> KeptFlights:
 
 
 def _of_file(file: Path, period: float) -> SampledFlight:
-    """Flight in a file of one shot, cached because the time stamps take most of the time."""
+    """Reads the flight of a one-shot file; cached, because reconstructing time stamps is slow."""
     content = file.read_bytes()
     return cached_flight(
         content, file.stem, period, lambda: load_trajectories(file)[0].resample(period)
@@ -71,10 +71,10 @@ def _of_shot(shot: BallTrajectory, period: float) -> SampledFlight:
 def balls_from(
     balls: str | None, seed: int = 0, period: float = PERIOD, count: int | None = None
 ) -> Flights:
-    """Simulated shots: "narrow", "wide", "launcher"; or the recorded ones of a path. None: narrow.
+    """Returns simulated shots, "narrow" (also for None), "wide" or "launcher", or a path's shots.
 
-    `seed` is that of simulated shots, of which there are `count`; None: no end of them. Shared in
-    this process. Raises FileNotFoundError or ValueError.
+    `seed`, `count`: of simulated shots; None: unlimited. Instances are shared in
+    this process. Raises FileNotFoundError or ValueError for a wrong path or count.
     """
     name = balls or "narrow"
     if name in DISTRIBUTIONS:

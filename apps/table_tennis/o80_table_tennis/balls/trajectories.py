@@ -1,4 +1,4 @@
-"""Ball trajectories: recorded or computed, and made ready to be commanded."""
+"""Ball trajectories: recorded or computed, and resampled for commands."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .replayed_flight import ReplayedFlights, replayed
 from .sampled_flight import SampledFlight
 
 SHORTEST = 8
-"""Rows below which a trajectory cannot be fitted."""
+"""Least number of rows to fit a trajectory."""
 
 
 def require_enough_rows(name: str, rows: int) -> None:
-    """Raises ValueError if a flight cannot be fitted to so few rows."""
+    """Raises ValueError for too few rows to fit a flight."""
     if rows < SHORTEST:
         raise ValueError(
             f"{name}: {rows} rows are too few to fit a flight, {SHORTEST} are needed; leave it out"
@@ -27,7 +27,7 @@ def require_enough_rows(name: str, rows: int) -> None:
 
 
 def require_finite(what: str, rows: FloatArray) -> None:
-    """Raises ValueError unless all numbers are finite."""
+    """Raises ValueError for numbers that are not finite."""
     if not np.isfinite(rows).all():
         raise ValueError(
             f"{what} NaN or infinity (first in row {np.argwhere(~np.isfinite(rows))[0][0]}); "
@@ -37,9 +37,9 @@ def require_finite(what: str, rows: FloatArray) -> None:
 
 @dataclass(frozen=True, eq=False)
 class BallTrajectory:
-    """Where a ball was seen, and when.
+    """Seen positions of a ball, with time stamps.
 
-    Raises ValueError, naming the trajectory and the cure, unless the arrays fit each other, all
+    Raises ValueError, naming the trajectory and the cure, unless the shapes agree, all
     numbers are finite and the stamps rise.
     """
 
@@ -49,9 +49,9 @@ class BallTrajectory:
     positions: FloatArray
     """(N, 3), world frame [m]"""
     velocities: FloatArray
-    """(N, 3), world frame [m/s]; of a recording: as the vision system gave them, a rough value"""
+    """(N, 3), world frame [m/s]; of a recording: rough values of the vision system"""
     spins: FloatArray | None = None
-    """(N, 3) [rad/s], if they are known: a simulated ball"""
+    """(N, 3) [rad/s], known for a simulated ball only"""
 
     def __post_init__(self) -> None:
         rows = len(self.stamps)
@@ -72,20 +72,20 @@ class BallTrajectory:
 
     @cached_property
     def fit(self) -> FlightFit:
-        """The flight, with its bounces, that explains the positions best."""
+        """Flights and bounces fitted to the positions."""
         require_enough_rows(self.name, len(self.stamps))
         return fit_flight(self.stamps, self.positions)
 
     @cached_property
     def replayed(self) -> ReplayedFlights:
-        """The same flight by the law of the simulator."""
+        """Flights fitted with the simulator's law."""
         return replayed(self.fit, self.stamps, self.positions)
 
     def resample(self, period: float = PERIOD) -> SampledFlight:
-        """The replayed flight in steps of `period` [s], from the first row to the last one fitted.
+        """Samples the replayed flight each `period` [s], from the first to the last fitted row.
 
         The velocities are derivatives of the fit: differences of neighbouring rows, and the
-        recorded velocities, are off by 0.2 to 0.9 m/s. The fit is made once and kept.
+        recorded velocities, are wrong by 0.2 to 0.9 m/s. The fit is cached.
         """
         if not (np.isfinite(period) and period > 0):
             raise ValueError(f"period must be a positive number of seconds, got {period}")

@@ -20,9 +20,9 @@ from .processes import PartEndedError, Processes, Watched
 from .report import write_report
 
 STARTS_WITHIN = 60.0
-"""All processes, on a busy machine [s]."""
+"""Timeout of the start of all processes, long enough for a busy machine [s]."""
 POLL = 0.5
-"""Between two readings of the row of the environment [s]."""
+"""Interval of reading the environment's row [s]."""
 CLASSES = {os.SCHED_OTHER: "other", os.SCHED_FIFO: "fifo", os.SCHED_RR: "rr"}
 
 
@@ -52,7 +52,7 @@ def main(
 
 
 def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str, str]:
-    """Plays all balls. Returns the scheduling class of each process. Raises PartEndedError."""
+    """Plays all balls; returns each process's scheduling class. Raises PartEndedError."""
     settings.recording.unlink(missing_ok=True)
     folder = settings.folder / "processes"
     console.print(f"starts nine processes; what they print is in {folder}")
@@ -73,15 +73,15 @@ def play(settings: LabSettings, console: Console, *, restart: bool) -> dict[str,
             row = environment.latest().extended
             played, touched, returned, _ = (row[count] for count in COUNTS)
             missing = "".join(f"; {name} is missing" for name in row.missing if row.missing[name])
-            said = f"{played} balls, {touched} touched, {returned} returned{missing}"
-            if said != shown:
-                console.print(shown := said)
+            line = f"{played} balls, {touched} touched, {returned} returned{missing}"
+            if line != shown:
+                console.print(shown := line)
             if row.phase == Phase.over:
                 return {name: scheduling(each.pid) for name, each in processes.running.items()}
 
 
 def scheduling(pid: int) -> str:
-    """Scheduling class of a process, and its priority if it has one."""
+    """Returns a process's scheduling class, and its priority if any."""
     kind, priority = os.sched_getscheduler(pid), os.sched_getparam(pid).sched_priority
     return f"{CLASSES.get(kind, kind)} {priority or ''}".rstrip()
 

@@ -1,6 +1,6 @@
-"""The hardware behind the drivers: what plays it, and how the environment asks it for a ball.
+"""Fakes of the hardware behind the drivers, and the environment's client of the launcher.
 
-The launcher is raised so far that its balls leave it where those of the shots `wide` begin.
+The muzzle of the launcher is at the mean start of the shots `wide`.
 """
 
 from __future__ import annotations
@@ -27,13 +27,13 @@ from .processes import Watched
 
 _X, _Y, _Z = WIDE.position
 PLACE = ((_X, _Y, _Z - LAUNCH_MODEL.muzzle[2]), -math.pi / 2)
-"""Position [m] and yaw [rad] of the launcher in the world: it shoots along -y."""
+"""Position [m] and yaw [rad] of the launcher in the world; shots fly along -y."""
 BALL = dict.fromkeys(("position", "velocity", "spin"), (np.float64, (3,)))
 UNTURNED = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class Counterparts:
-    """Driver of the fakes: its row is the last launch, in the world; number 0: none yet."""
+    """Driver of the fakes; a row holds the last launch, in the world; number 0: none yet."""
 
     simulated = True
     frequency = 200.0
@@ -73,7 +73,7 @@ class Counterparts:
         self._row = {"number": self._row["number"] + 1} | vars(ball.placed(*PLACE))
 
     def _pose(self, name: str, when: int) -> Pose | None:
-        """Pose of a body at a time [ns]; None: it is not there. Each connection is a thread."""
+        """Returns a body's pose at a time [ns]; None: unseen. Called in connection threads."""
         if name != "racket":
             return (TABLE.centre if name == "table" else (0.0, 0.0, 0.0)), UNTURNED
         with self._lock:
@@ -86,26 +86,26 @@ class Counterparts:
 
 
 class Launching:
-    """Sets the motors, asks for a launch, and finds the ball; never blocks."""
+    """Sets the motors, requests a launch, and detects the launched ball; never blocks."""
 
     def __init__(self, settings: LabSettings) -> None:
         self._launcher = Watched(settings.segment(LAUNCHER), read_only=False)
         self._launches = Watched(settings.segment(COUNTERPARTS))
         self._random = np.random.default_rng(settings.seed)
         self.number = 0
-        """Number of the last launch that was found."""
+        """Number of the last detected launch."""
 
     def ask(self) -> None:
-        """The next ball is wanted: the launcher is asked as soon as it is there and ready."""
+        """Requests the next ball, which `came` sends as soon as the launcher is connected."""
         self._batch: o80.Batch | None = None
         self.failed = False
-        """The launcher has refused the last launch, or has lost it."""
+        """Whether the last launch was refused or lost."""
         self._aim = drawn_aim(self._random)
         if (row := self._newest()) is not None:
-            self.number = int(row.number)  # others are none of ours
+            self.number = int(row.number)  # earlier launches are of other requests
 
     def came(self) -> launches.Launch | None:
-        """The ball that has left the launcher since `ask`; None: none yet."""
+        """Returns the ball that was launched since `ask`; None: none yet."""
         launcher, row = self._launcher.now, self._newest()
         if self._batch is not None:
             self.failed = launcher is None or (
@@ -118,7 +118,7 @@ class Launching:
         if row is None:
             return None
         if self._batch is None or row.number <= self.number:
-            self.number = min(self.number, int(row.number))  # the counterpart was started again
+            self.number = min(self.number, int(row.number))  # the counterparts were restarted
             return None
         self.number = int(row.number)
         return launches.Launch(np.array(row.position), np.array(row.velocity), np.array(row.spin))

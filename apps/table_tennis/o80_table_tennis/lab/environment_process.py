@@ -1,8 +1,8 @@
-"""The process of the environment: it plays the balls that the launcher launches, in real time.
+"""Process of the environment: plays the launcher's balls in real time.
 
-Every 10 ms it publishes a row: by the clock of the arm while arm and world are there, else by its
-own. It waits for what it needs, and says in each row what is missing; a ball during which arm or
-world end is given up. When all balls were played its rows say so until it is asked to end.
+Publishes a row every 10 ms, by the arm's clock while arm and world run, else by its own clock.
+Each row names the missing processes, for which the environment waits. If arm or world end during
+a ball, the ball is given up. After the last ball, rows have the phase `over` until the end.
 """
 
 from __future__ import annotations
@@ -31,14 +31,14 @@ from .parts import ARM, ENVIRONMENT, RATES, RIG, TRACKER, WATCHED, WORLD, LabSet
 from .processes import Watched
 
 STEP = 1.0 / RATES[ENVIRONMENT]
-"""[s]"""
+"""Interval of rows [s]."""
 OPENING = (o80.BackendGone, o80.TimeoutError, o80.SegmentError)
-"""Errors that are raised while arm or world end, or are missing."""
+"""Errors while arm or world end, or are missing."""
 
 
 class Phase(IntEnum):
-    """Phase of the environment: arm or world is missing; the arm returns to its start; no ball has
-    left the launcher yet; a ball is played; all were played.
+    """Phase of the environment: arm or world are missing; the arm returns to its start; the ball is
+    not launched yet; a ball is played; all balls were played.
     """
 
     waiting = 0
@@ -57,14 +57,14 @@ EXTENDED: dict[str, Any] = {
     **dict.fromkeys(("arm_row", "world_row", "late", *COUNTS, *TIMES), np.int64),
     **dict.fromkeys(PLACES, (np.float64, (3,))),
 }
-"""late: rows of the arm that were newer than the one used. observed_ball: what the policy observed
-last; observed_at: the time of the row of the arm when it did. ball_time: of the images in which it
-was seen; 0: in none. true_ball: of the world, now."""
+"""late: number of the arm's rows that were newer than the used one. observed_ball: last observation
+of the policy; observed_at: time of the arm's row at that observation. ball_time: time of the
+images with the ball; 0: not seen. true_ball: current ball of the world."""
 UNITS = dict.fromkeys(TIMES, "ns") | dict.fromkeys(PLACES, "m")
 
 
 class EnvironmentProcess:
-    """Plays so many balls (0: without end), and stays until it is asked to end."""
+    """Plays a number of balls (0: without end), and runs until a stop is requested."""
 
     def __init__(self, settings: LabSettings, backend: o80.Backend) -> None:
         self._settings, self._backend = settings, backend
@@ -72,7 +72,7 @@ class EnvironmentProcess:
         self._launching = Launching(settings)
         self._policy, conditions = named_policy(settings.policy, preset=RIG.preset)
         self._task = conditions.task(fly_out=False)
-        with o80.robots.load("pam").inline(**arm_options(RIG)) as arm:  # where the arm starts
+        with o80.robots.load("pam").inline(**arm_options(RIG)) as arm:  # start of the arm
             self._home = Home(arm)
         self._environment: TableTennisEnvironment | None = None
         self._due = time.monotonic() + STEP
@@ -80,7 +80,7 @@ class EnvironmentProcess:
         self._row |= dict.fromkeys(COUNTS, 0)
 
     def _publish(self) -> None:
-        """A row, and the beginning of the next one. Exits if it is asked to."""
+        """Publishes a row and begins the next one. Exits if a stop is requested."""
         row = self._row
         row["missing"] = {name: watched.missing for name, watched in self._watched.items()}
         seen = self._perception if row["phase"] is Phase.playing else None
@@ -91,14 +91,14 @@ class EnvironmentProcess:
             sys.exit()
 
     def _by_own_clock(self) -> None:
-        """A row without arm and world, when it is due."""
+        """Waits for its own period, and publishes a row."""
         now = time.monotonic()
         self._due = max(self._due + STEP, now)
         time.sleep(max(0.0, self._due - now))
         self._publish()
 
     def run(self) -> None:
-        """Until it is asked to end."""
+        """Plays, and publishes rows until a stop is requested."""
         row, balls = self._row, self._settings.balls
         try:
             while not balls or row["balls_played"] < balls:
@@ -117,7 +117,7 @@ class EnvironmentProcess:
             self._close_environment()
 
     def _opened(self) -> TableTennisEnvironment | None:
-        """The environment if arm and world are there; else a row says so."""
+        """Publishes a row; returns a new environment if arm and world run, else None."""
         self._row["phase"] = Phase.waiting
         self._by_own_clock()
         if any(self._watched[name].now is None for name in (ARM, WORLD)):
@@ -140,7 +140,7 @@ class EnvironmentProcess:
             row["true_ball"] = task.rows.balls[0, :3]
             self._publish()
 
-        task.home_of_arm = self._home.of(environment.arm)  # the arm may stand anywhere now
+        task.home_of_arm = self._home.of(environment.arm)  # the arm may be anywhere now
         self._perception = TrackedPerception(lambda: tracker.now, arm_time)
         task.observer.look_through(self._perception)
         task.after_step, task.returns_at_reset = after_step, False
@@ -152,7 +152,7 @@ class EnvironmentProcess:
         self._environment = None
 
     def _try_ball(self, environment: TableTennisEnvironment) -> None:
-        """The arm goes back, a ball is asked for and played, unless the launcher fails."""
+        """Returns the arm, requests a ball and plays it, unless the launcher fails."""
         row, task, launching = self._row, environment.task, self._launching
         row["phase"] = Phase.returning
         task.single.begin()
@@ -175,7 +175,7 @@ class EnvironmentProcess:
         observation, _ = environment.reset(seed=seed, options=options)
         self._policy.reset()
         row["phase"], over = Phase.playing, False
-        for robot in (environment.arm, *environment.twins):  # one moment of both clocks
+        for robot in (environment.arm, *environment.twins):  # marks one moment on both clocks
             robot.mark(f"launch {launching.number}")
         while not over:
             action = self._policy.act(observation)

@@ -1,7 +1,7 @@
-"""The table of the lab: its processes in the order of their start, and what follows if one dies.
+"""Table of the lab: processes in the order of their start, and the consequences of their deaths.
 
-Every command is one that a user could type: `o80 run`, `o80 record`, `o80 view`, or a module of
-this package. The processes end in the opposite order.
+All commands are ordinary ones: `o80 run`, `o80 record`, `o80 view`, or a module of
+this package. The processes end in reverse order.
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ ARM, WORLD, LAUNCHER, CAMERAS = "arm", "world", "launcher", "cameras"
 TRACKER, MOTION_CAPTURE, ENVIRONMENT = "tracker", "motion_capture", "environment"
 RECORDER, VIEW, COUNTERPARTS = "recorder", "view", "counterparts"
 WATCHED = (ARM, WORLD, LAUNCHER, CAMERAS, TRACKER, MOTION_CAPTURE)
-"""Parts of which a row of the environment says whether they are missing."""
+"""Parts whose absence is shown in the environment's rows."""
 RATES = {ARM: 500.0, LAUNCHER: 50.0, CAMERAS: 180.0, TRACKER: 180.0, MOTION_CAPTURE: 300.0}
 RATES[ENVIRONMENT] = 100.0
 """Rows a second."""
 RIG = RigSettings(preset="identified")
 SUBJECTS = ("racket", "base", "table")
-"""Subjects that the motion capture sees."""
+"""Subjects of the motion capture."""
 NO_IMAGE, DIED = "`reason` is `no_image`", "journal: `died`"
 NO_RACKET = "`racket.visible` is false"
 COMMAND = str(Path(sysconfig.get_path("scripts")) / "o80")
@@ -54,30 +54,30 @@ class LabSettings:
 
     @property
     def recording(self) -> Path:
-        """All rows but the images."""
+        """Path of the recording of all rows but images."""
         return self.folder / "run.mcap"
 
 
 @dataclass(frozen=True)
 class Part:
-    """One process of the lab, and what the others do when it is killed."""
+    """A process of the lab, and the others' reactions when it is killed."""
 
     name: str
     command: tuple[str, ...]
     segment: str | None = None
-    """Name of its backend's segment; the part counts as running while the segment does."""
+    """Name of the backend's segment, which shows whether the part is running."""
     says: str = ""
-    """Text of a process without a segment: it runs when it has printed this."""
+    """Text that a process without a segment prints when it is running."""
     missed: Mapping[str, str] = field(default_factory=dict)
-    """How others say that it is missing, by part; the supervisor always does."""
+    """Signs of the absence of this part in the rows of others, by part."""
     halts: tuple[str, ...] = ()
-    """Parts that stand still until it is back."""
+    """Parts that stop until this one is back."""
     besides: str = ""
     """Further consequences."""
 
 
 def lab_parts(settings: LabSettings) -> dict[str, Part]:
-    """The table. Ports are chosen now."""
+    """Builds the table, and chooses free ports."""
     of, seed = settings.segment, settings.seed
     launcher, qualisys = f"tcp://127.0.0.1:{_free_port()}", _free_port()
     fifo = ("--policy=fifo", "--lock-memory") if settings.fifo else ()
@@ -106,7 +106,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
             ARM,
             "pam",
             {"stale": "purge", "priority": 80 if fifo else None, **arm_options(RIG)},
-            "--resume",  # it is simulated: one that was killed goes on at once
+            "--resume",  # simulated: after a kill it continues at once
             *fifo,
             missed=blind | {MOTION_CAPTURE: NO_RACKET},
             halts=(WORLD,),
@@ -156,7 +156,7 @@ def lab_parts(settings: LabSettings) -> dict[str, Part]:
         Part(
             RECORDER,
             record,
-            says=f"'{of(ENVIRONMENT)}' ",  # what becomes of its rows
+            says=f"'{of(ENVIRONMENT)}' ",  # begin of the line about the environment's rows
             besides="started again, it goes on in the same file, without a gap",
         ),
         Part(

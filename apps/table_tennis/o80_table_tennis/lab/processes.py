@@ -1,7 +1,7 @@
-"""Starts and ends the processes of the lab, and says which of them has ended and why.
+"""Starts and ends the processes of the lab, and reports ended ones with the reason.
 
-They end in order when the supervisor does, in whatever way: a signal of the kernel tells them
-(PR_SET_PDEATHSIG), so that a supervisor that is killed leaves nothing.
+The processes also end when the supervisor is killed: the kernel then sends them a signal
+(PR_SET_PDEATHSIG).
 """
 
 from __future__ import annotations
@@ -23,19 +23,19 @@ from o80_devices.cameras.ball_of_segment import Attached
 from .parts import Part
 
 POLL = 0.05
-"""Between two checks whether a process has ended, or runs [s]."""
+"""Interval of polling the processes [s]."""
 GRACE = 5.0
-"""For a process to end in order; then it is killed [s]."""
+"""Timeout of a clean end; then the process is killed [s]."""
 SILENT = 0.1
-"""Without a row for so long a segment that does not burst counts as missing [s]."""
+"""Age of the newest row above which a segment that does not burst counts as missing [s]."""
 LAST_LINES = 8
-"""Number of the last lines of its output, which say why a process has ended."""
+"""Number of the last lines of output that are shown for an ended process."""
 PR_SET_PDEATHSIG = 1
 _libc = ctypes.CDLL(None, use_errno=True)
 
 
 class PartEndedError(RuntimeError):
-    """A process has ended that nobody had asked to."""
+    """A process has ended without a request."""
 
     def __init__(self, part: str, code: int, lines: list[str]) -> None:
         self.code, self.lines = code, lines
@@ -47,26 +47,26 @@ class PartEndedError(RuntimeError):
 
 
 class Processes(Closeable):
-    """The processes of the lab. Leaving a `with` block ends all.
+    """Processes of the lab. Leaving a `with` block ends all.
 
-    Start them from the main thread: the kernel takes its end for that of the whole supervisor.
+    Start them in the main thread: the kernel takes the end of the starting thread for the parent's.
     """
 
     def __init__(self, parts: Iterable[Part], folder: Path) -> None:
-        """folder: where each process has a file of what it prints."""
+        """folder: for a file of each process's output."""
         self.parts: dict[str, Part] = {part.name: part for part in parts}
         self.running: dict[str, subprocess.Popen[bytes]] = {}
-        """Processes that were started and have not been collected."""
+        """Started processes that have not been collected."""
         self._folder = folder
         folder.mkdir(parents=True, exist_ok=True)
 
     def start(self, *names: str) -> None:
-        """Starts processes, in this order, without waiting; none named: all."""
+        """Starts processes in this order, all if none is named, without waiting."""
         supervisor = os.getpid()
 
         def end_with_it() -> None:
             _libc.prctl(PR_SET_PDEATHSIG, signal.SIGTERM)
-            if os.getppid() != supervisor:  # it died before the kernel was asked
+            if os.getppid() != supervisor:  # the supervisor died before prctl
                 os._exit(1)
 
         for name in names or self.parts:
@@ -82,9 +82,9 @@ class Processes(Closeable):
                 )
 
     def wait_until_running(self, timeout: float) -> None:
-        """Waits until all processes that were started run.
+        """Waits until all started processes are running.
 
-        Raises PartEndedError if one ends meanwhile, o80.TimeoutError with those that do not run.
+        Raises PartEndedError if one ends meanwhile, o80.TimeoutError naming the missing ones.
         """
         end = time.monotonic() + timeout
         while missing := [name for name in self.running if not self.runs(name)]:
@@ -99,7 +99,7 @@ class Processes(Closeable):
                 raise self.collected(name)
 
     def runs(self, name: str) -> bool:
-        """Whether a process is there and has begun its work."""
+        """Whether a process is alive and has begun its work."""
         popen, part = self.running.get(name), self.parts[name]
         if popen is None or popen.poll() is not None:
             return False
@@ -109,7 +109,7 @@ class Processes(Closeable):
         return (part.segment, popen.pid, "running") in found
 
     def ended(self, timeout: float = 0.0) -> list[str]:
-        """The processes that have ended and were not collected; waits for one at most so long."""
+        """Returns ended processes that were not collected; waits for one up to `timeout` [s]."""
         end = time.monotonic() + timeout
         while True:
             found = [name for name, popen in self.running.items() if popen.poll() is not None]
@@ -118,16 +118,16 @@ class Processes(Closeable):
             time.sleep(POLL)
 
     def collected(self, name: str) -> PartEndedError:
-        """Takes a process that has ended off the list, and tells how; it may be started again."""
+        """Removes an ended process, which may be started again; returns the reason of its end."""
         code = self.running.pop(name).wait()
         return PartEndedError(name, code, self.printed(name)[-LAST_LINES:])
 
     def printed(self, name: str) -> list[str]:
-        """Lines that a process has printed, over all its starts."""
+        """Returns the printed lines of a process, of all its starts."""
         return (self._folder / f"{name}.txt").read_text(errors="replace").rstrip().splitlines()
 
     def close(self) -> None:
-        """Ends all, the last of the table first, and removes the segments of those killed."""
+        """Ends all in reverse order, and removes the segments of killed ones."""
         try:
             for name in reversed(self.parts):
                 if name in self.running:
@@ -144,15 +144,15 @@ class Processes(Closeable):
 
 
 class Watched(Attached):
-    """Observes a segment whose backend may end and start again."""
+    """Observes a segment whose backend may end and restart."""
 
     @property
     def now(self) -> o80.Frontend | None:
-        """Attached to the living backend; None: there is none."""
+        """Frontend of the living backend; None: there is none."""
         return self.frontend(time.monotonic_ns())[0]
 
     @property
     def missing(self) -> bool:
-        """There is no backend, or it has published nothing for a while."""
+        """Whether there is no backend, or no new row for a while."""
         age = None if (frontend := self.now) is None else frontend.row_age
         return self._frontend is None or (age is not None and age > SILENT)

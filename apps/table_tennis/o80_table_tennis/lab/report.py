@@ -1,4 +1,4 @@
-"""report.json: what the recording of a lab says about rates, latencies and errors."""
+"""Computes report.json from a lab's recording: rates, latencies and errors."""
 
 from __future__ import annotations
 
@@ -18,16 +18,16 @@ from .parts import ARM, ENVIRONMENT, LAUNCHER, MOTION_CAPTURE, RATES, TRACKER, L
 Figures = dict[str, Any]
 Rows = Mapping[str, Any]
 MAX_MISSED = {ARM: 0.1, TRACKER: 1.0, MOTION_CAPTURE: 1.0, ENVIRONMENT: 1.0}
-"""Periods that may be missed on a quiet machine [%]."""
+"""Limits of missed periods on a quiet machine [%]."""
 SETTLING = 1.0
-"""Left out at the beginning, while processes still start [s]."""
+"""Omitted time at the beginning, while processes still start [s]."""
 CAPTURES = (
     ("image to row of the tracker", TRACKER, "image_time"),
     ("frame to row of the motion capture", MOTION_CAPTURE, "capture_time"),
     ("row of the arm to row of the environment", ENVIRONMENT, "arm_time"),
     ("image to row of the environment", ENVIRONMENT, "ball_time"),
 )
-"""Latencies from capture to the row that shows it, and where the time of the capture is."""
+"""Latencies from capture to row: name, part, field of the capture time."""
 
 
 def write_report(settings: LabSettings, scheduling: Mapping[str, str]) -> Figures:
@@ -36,7 +36,7 @@ def write_report(settings: LabSettings, scheduling: Mapping[str, str]) -> Figure
     for part in RATES:
         name = settings.segment(part)
         if name in recording and recording[name].epochs:
-            history = recording[name].epochs[-1].history()  # of its last run
+            history = recording[name].epochs[-1].history()  # of the last run
             begin = int(np.searchsorted(history.time, history.time[:1] + round(SETTLING * 1e9))[0])
             if len(history) - begin > 2:
                 rows[part] = history[begin:]
@@ -62,7 +62,7 @@ def write_report(settings: LabSettings, scheduling: Mapping[str, str]) -> Figure
 
 
 def spread(values: NDArray[np.floating[Any]]) -> dict[str, float] | None:
-    """Mean, 50 %, 95 %, 99 % and greatest of numbers; None: there are none."""
+    """Computes mean, 50 %, 95 %, 99 % and maximum of finite numbers; None without any."""
     numbers = values[np.isfinite(values)]
     if len(numbers) == 0:
         return None
@@ -76,11 +76,11 @@ def _last(rows: Rows, part: str, *names: str) -> dict[str, int]:
 
 
 def _regularity(name: str, rows: o80.History) -> Figures:
-    """Rate, missed periods and jitter: distance of neighbouring rows from the period [us]."""
+    """Computes rate, missed periods and jitter: deviation of intervals from the period [us]."""
     between, skipped = np.diff(rows.time), np.asarray(rows.skipped)
     missed = int(skipped[-1]) - int(skipped[0])
     percent = 100.0 * missed / (len(between) + missed)
-    if name == ENVIRONMENT:  # it skips no step, but makes up for those that came late
+    if name == ENVIRONMENT:  # the environment skips no step, but catches up after late ones
         percent = 100.0 * float((np.asarray(rows.extended.late) >= ITERATIONS).mean())
     return {
         "asked": RATES[name],
@@ -95,16 +95,16 @@ def _latency(rows: o80.History, field: str) -> Figures | None:
     return spread((rows.time - then)[then > 0] * 1e-6)
 
 
-def _off(places: Any, at: Any, times: Any, true: Any, which: Any) -> Figures | None:
-    """Distances [mm] of some places (n, 3) from the true ones, between the times of these."""
+def _errors(places: Any, at: Any, times: Any, true: Any, which: Any) -> Figures | None:
+    """Distances [mm] of `places[which]` from true places, interpolated at the times `at`."""
     axes = [np.interp(at, times, axis, left=np.nan, right=np.nan) for axis in np.asarray(true).T]
     off = np.linalg.norm(np.asarray(places) - np.stack(axes, axis=1), axis=1)
     return spread(1e3 * off[which])
 
 
 def _tracking_error(rows: Rows) -> Figures | None:
-    """Errors [mm] of the tracker, at the times of its images against the ball of the world between
-    rows of the environment, and of the ball that the policy observed."""
+    """Errors [mm] of the tracker's ball at its images' times, and of the policy's observed ball,
+    against the world's ball, interpolated between the environment's rows."""
     if TRACKER not in rows or ENVIRONMENT not in rows:
         return None
     tracker, environment = rows[TRACKER].extended, rows[ENVIRONMENT].extended
@@ -116,24 +116,24 @@ def _tracking_error(rows: Rows) -> Figures | None:
     # an observation is published with the next row of the environment
     observed = environment.observed_ball, environment.observed_at
     return {
-        "at the time of the images": _off(tracker.position, images, *true, images > 0),
-        "as observed, flown on to the row of the arm": _off(*observed, *true, seen),
+        "at the time of the images": _errors(tracker.position, images, *true, images > 0),
+        "as observed, flown on to the row of the arm": _errors(*observed, *true, seen),
         "share of the rows with a ball that was seen": round(float(seen[playing].mean()), 4),
     }
 
 
 def _motion_capture_error(rows: Rows) -> Figures | None:
-    """Error of the racket against the rows of the arm at the same times [mm]."""
+    """Error of the racket against the arm's rows, interpolated at the capture times [mm]."""
     if MOTION_CAPTURE not in rows or ARM not in rows:
         return None
     system, arm = rows[MOTION_CAPTURE].extended, rows[ARM]
     true = arm.time, arm.extended.racket_position
     racket = system.racket
-    return _off(racket.position, system.capture_time, *true, np.asarray(racket.visible))
+    return _errors(racket.position, system.capture_time, *true, np.asarray(racket.visible))
 
 
 def _wanted(processes: Mapping[str, Figures]) -> Figures:
-    """Targets of a quiet machine, and whether this run has reached them."""
+    """Compares this run with the targets for a quiet machine."""
     wanted: dict[str, tuple[Any, ...]] = {}
     for name in (name for name in MAX_MISSED if name in processes):
         most, missed = MAX_MISSED[name], round(processes[name]["missed_percent"], 3)

@@ -1,4 +1,4 @@
-"""The picture of an evaluation: where the balls landed on the table."""
+"""Draws an evaluation: landings of the balls on the table."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ RESOLUTION = 110
 
 
 def plot_landings(path: Path, evaluations: Mapping[str, Played]) -> None:
-    """The table from above, one for each evaluation; the arm stands on the left."""
+    """Draws the table from above for each evaluation, with the arm on the left."""
     figure = Figure(figsize=(8.5, 4.2 * len(evaluations)), layout="constrained")
     panels = figure.subplots(len(evaluations), 1, squeeze=False)[:, 0]
     for axes, (name, played) in zip(panels, evaluations.items(), strict=True):

@@ -1,4 +1,4 @@
-"""One policy plays the same balls accelerated and in real time: the results ball by ball."""
+"""Compares a policy's results ball by ball, accelerated and in real time."""
 
 from __future__ import annotations
 
@@ -9,18 +9,18 @@ from ..report.statistics import Played
 
 @dataclass(frozen=True)
 class Paired:
-    """How many balls were returned in which way, and how many actions were late in real time."""
+    """Counts of balls returned in either pacing or both, and of late actions in real time."""
 
     balls: int
     returned_both: int
     returned_only_accelerated: int
     returned_only_real_time: int
     actions: int
-    """In real time."""
+    """Number of actions in real time."""
     late_actions: int
-    """Actions that were sent after their iteration had begun, and acted at once."""
+    """Number of actions that were sent after their iteration began, and acted at once."""
     stalled_episodes: int
-    """Episodes that ended because the player fell too far behind."""
+    """Number of episodes that ended because the policy was too slow."""
 
     @classmethod
     def of(cls, accelerated: Played, real_time: Played) -> Paired:

@@ -3,8 +3,8 @@
     a = -1/2 rho Cd A/m |v| v + 1/2 rho Cl A r/m / (1 + s r |omega| / |v|) (omega x v) - g z
 
 rho is the density of air, A = pi r^2, m the mass. With s = 0 this is the law published for the
-ball of the experiment; the saturation s is what recorded shots of different spins show.
-The law itself is the simulator's, in C++ (`o80_mujoco.balls`); here are its numbers.
+ball of the experiment; the saturation s is fitted to recorded shots with different spins.
+The simulator implements the law in C++ (`o80_mujoco.balls`); this module has its numbers.
 """
 
 from __future__ import annotations
@@ -22,20 +22,20 @@ from ..world.ball import BALL_MASS, BALL_RADIUS, GRAVITY
 
 @dataclass(frozen=True)
 class Aerodynamics:
-    """Forces of air and gravity on the ball. The twins get the same numbers as options."""
+    """Forces of air and gravity on the ball; also the options of the twins."""
 
     air_density: float = 1.18
     """[kg/m^3]"""
     drag_coefficient: float = 0.40
-    """Cd: 0.34 to 0.44 on recorded shots without spin (the published configuration says 0.47)."""
+    """Cd: 0.34 to 0.44 in recorded shots without spin (published configuration: 0.47)."""
     lift_coefficient: float = 1.14
     """Cl of a slow spin: fitted with the bounces of recorded shots (published: 1.47, without
     saturation)."""
     lift_saturation: float = 3.0
     """s: the lift of a spin is halved where r |omega| / |v| is 1 / s. Fitted likewise."""
     spin_decay: float = 0.5
-    """Share of the spin lost in a second [1/s]: the published 0.005 a step, of 10 ms (with steps of
-    2 ms the recorded shots would lose their spin five times faster than is seen)."""
+    """Share of the spin lost in a second [1/s]: the published 0.005 a step of 10 ms (with steps of
+    2 ms, the spin of the recorded shots would decay five times too fast)."""
     gravity: float = GRAVITY
     """[m/s^2]"""
     radius: float = BALL_RADIUS
@@ -60,7 +60,7 @@ class Aerodynamics:
 
     @property
     def air(self) -> Air:
-        """As predictions want it."""
+        """Parameters for predictions."""
         return Air(
             drag=self.drag,
             magnus=self.magnus,
@@ -70,20 +70,20 @@ class Aerodynamics:
         )
 
     def halved_at(self, spin: float) -> float:
-        """The speed at which saturation halves the lift of a spin [rad/s], in [m/s]."""
+        """Speed at which saturation halves the lift of a spin [m/s]. spin: [rad/s]."""
         return self.lift_saturation * self.radius * spin
 
     def turn(self, spin: NDArray[np.float64], speed: float) -> NDArray[np.float64]:
-        """The turn (3,) [1/s] of a ball with a spin (3,) [rad/s] at a speed [m/s]."""
+        """Computes the turn (3,) [1/s] of a ball from spin (3,) [rad/s] and speed [m/s]."""
         halved_at = self.halved_at(float(np.linalg.norm(spin)))
         turn: NDArray[np.float64] = self.magnus * speed / (speed + halved_at) * spin
         return turn
 
     def spins(self, turn: NDArray[np.float64], speeds: NDArray[np.float64]) -> NDArray[np.float64]:
-        """The spins (T, 3) [rad/s] with which a ball at `speeds` (T,) turns by `turn` (3,) [1/s].
+        """Computes spins (T, 3) [rad/s] that give `turn` (3,) [1/s] at `speeds` (T,).
 
-        A turn near the largest that saturation allows says little about the spin: it gives at most
-        `MAX_SATURATED` times the spin that it would have without saturation.
+        A turn near the saturation limit hardly determines the spin: the result is at most
+        `MAX_SATURATED` times the spin without saturation.
         """
         lost = self.lift_saturation * self.radius * float(np.linalg.norm(turn)) / self.magnus
         share = np.maximum(1.0 - lost / np.maximum(speeds, 1e-9), 1.0 / MAX_SATURATED)

@@ -1,13 +1,13 @@
-"""An estimate of flying balls from noisy measurements: position, velocity and top spin.
+"""Estimates flying balls from noisy measurements: position, velocity and top spin.
 
-After each measurement the estimate is the last one flown on for a step, by the laws of flight and
-bounce, plus gain times what the measurement adds. Where a ball was not seen, its estimate flies on
-alone. A velocity that no flight and no bounce explains (a racket has met the ball) makes the filter
-begin anew. One ball and many get the same bits.
+After each measurement, the estimate is the prediction of the last one by the laws of flight and
+bounce, plus gain times innovation. Without a measurement, the estimate is the prediction. A
+velocity that no flight and no bounce explains (a racket has hit the ball) restarts the filter.
+One ball and many give the same bits.
 
-The gains are those of an extended Kalman filter along a typical shot. What a spin does to a flight
-depends on its velocity, and the velocities of all shots are alike, so that the gains do not depend
-on the shot: they are computed once, before the first ball flies.
+The gains are from an extended Kalman filter along a typical shot. The effect of a spin depends on
+the ball's velocity, which is similar for all shots. The gains therefore do not depend on the shot,
+and are computed once, before the first ball flies.
 """
 
 from __future__ import annotations
@@ -27,43 +27,43 @@ from .aerodynamics import AIR
 from .impact import platform
 
 TYPICAL = (0.46, 2.95, 1.37, 0.24, -4.14, 2.28, 30.0)
-"""Position, velocity and top spin of the launch of the recorded ball gun, with less spin."""
+"""Position, velocity and top spin of a typical launch: the ball gun's, with less spin."""
 STEPS_AFTER = 40
-"""Measurements after the bounce for which there are gains of their own; then the last ones go on.
+"""Number of measurements after the bounce with separate gains; afterwards, the last gains hold.
 """
 
 _ALONG_X = ((0, 0), (0, 3), (3, 0), (3, 3))
 _ALONG_YZ = tuple((row, column) for row in (1, 2, 4, 5, 6) for column in (1, 2, 4, 5))
 PLACES = _ALONG_X + _ALONG_YZ
-"""Row in the estimate (7) and column in the measurement (6) of each gain; the others are 0: what is
-seen across the table says nothing about the flight along it."""
+"""Row of the estimate (7) and column of the measurement (6) of each gain. The others are 0, because
+motion across the table is independent of motion along it."""
 
 
 @dataclass(frozen=True)
 class FilterSettings:
-    """Standard deviations that the filter expects of the measurements and of the ball."""
+    """Standard deviations of measurements and of the ball's motion, assumed by the filter."""
 
     step: float = STEP
-    """From one measurement to the next [s]."""
+    """Interval of measurements [s]."""
     position: float = 0.005
     """Standard deviation of a measured position [m]."""
     velocity: float = 0.1
     """Standard deviation of a measured velocity [m/s]."""
     spin: float = 45.0
-    """Standard deviation of the spin of a shot before it is seen [rad/s]."""
+    """Prior standard deviation of a shot's spin [rad/s]."""
     mean_spin: float = 20.0
-    """[rad/s]"""
+    """Prior mean of a shot's spin [rad/s]."""
     force: float = 0.3
-    """Standard deviation of an acceleration that no law explains, in each step [m/s^2]."""
+    """Standard deviation of unmodelled accelerations, in each step [m/s^2]."""
     bounce_velocity: float = 0.1
-    """Standard deviation of the law of the bounce [m/s]."""
+    """Standard deviation of the bounce law's velocity [m/s]."""
     bounce_spin: float = 10.0
     """[rad/s]"""
 
 
 @dataclass(frozen=True, eq=False)
 class Gains:
-    """One row for each measurement since the ball was first seen, or since its bounce."""
+    """Gains, a row for each measurement since the first sighting, or since the bounce."""
 
     before: FloatArray
     """(steps, 24), in the order of `PLACES`"""
@@ -72,7 +72,7 @@ class Gains:
 
 
 def ball_filter(settings: FilterSettings, count: int) -> BallFilter:
-    """The filter of `count` balls."""
+    """Makes the filter of `count` balls."""
     table = gains(settings)
     return BallFilter(
         count=count,
@@ -87,7 +87,7 @@ def ball_filter(settings: FilterSettings, count: int) -> BallFilter:
 
 @cache
 def gains(settings: FilterSettings) -> Gains:
-    """The gains for these settings."""
+    """Computes the gains for these settings."""
     s = settings
     measured = np.diag([s.position**2] * 3 + [s.velocity**2] * 3)
     moved = np.zeros((7, 7))
@@ -116,13 +116,13 @@ def gains(settings: FilterSettings) -> Gains:
 
 
 def _gain(covariance: FloatArray, measured: FloatArray) -> FloatArray:
-    """(7, 6) of an estimate and a measurement with these covariances."""
+    """Kalman gain (7, 6) for the covariances of estimate and measurement."""
     gain: FloatArray = covariance[:, :6] @ np.linalg.inv(covariance[:6, :6] + measured)
     return gain
 
 
 def _slopes(move: Callable[[FloatArray], FloatArray], ball: FloatArray) -> FloatArray:
-    """(7, 7) change of a moved ball with the ball."""
+    """Jacobian (7, 7) of `move` at a ball."""
     small = 1e-5
     moved = move(ball + np.vstack([np.zeros(7), small * np.eye(7)]))
     slopes: FloatArray = (moved[1:] - moved[0]).T / small
@@ -130,26 +130,26 @@ def _slopes(move: Callable[[FloatArray], FloatArray], ball: FloatArray) -> Float
 
 
 def _flown(balls: FloatArray, *, step: float) -> FloatArray:
-    """Balls (n, 7) after a step [s] of free flight."""
+    """Moves balls (n, 7) by a step [s] of free flight."""
     return path(_whole(balls), step, 1, AIR)[1, :, :7]
 
 
 def _bounced(balls: FloatArray) -> FloatArray:
-    """Balls (n, 7) at the table after its touch."""
+    """Bounces balls (n, 7) on the table."""
     return platform(TABLE).bounced(_whole(balls))[:, :7]
 
 
 def _past_table(ball: FloatArray, *, step: float) -> FloatArray:
-    """A ball (7,) that touches the table within a step [s], after the step."""
+    """Moves a ball (7,) by a step [s] that contains a bounce."""
     whole = _whole(ball[None])[0]
     return predicted_flight(whole, AIR, platform(TABLE), step, step)[-1, 1:8]
 
 
 def _whole(balls: FloatArray) -> FloatArray:
-    """Balls (n, 7) with top spin only, as (n, 9)."""
+    """Converts balls (n, 7) with top spin only to (n, 9)."""
     return np.hstack([balls, np.zeros((len(balls), 2))])
 
 
 def _table(rows: Sequence[FloatArray]) -> FloatArray:
-    """(rows, 24), in the order of `PLACES`."""
+    """Flattens gains to (rows, 24), in the order of `PLACES`."""
     return np.array([[row[place] for place in PLACES] for row in rows])

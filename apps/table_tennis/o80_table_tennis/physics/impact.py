@@ -1,9 +1,9 @@
-"""Impact of a ball on the table, which is at rest, or on a moving racket.
+"""Impact of a ball on the resting table, or on a moving racket.
 
 Along the normal the ball keeps a share of its velocity. Friction acts on the slip, the velocity of
-the ball's surface relative to the other one: it takes a share of the slip from the velocity while
-the ball grips, no more than friction allows where it slides, and gives the same to the spin. The
-law is the simulator's, in C++ (`o80_mujoco.balls`); here are the numbers of table, racket and ball.
+the ball's surface relative to the other one: a gripping ball loses a share of the slip, a sliding
+one no more than friction allows, and the spin changes accordingly. The simulator implements
+the law in C++ (`o80_mujoco.balls`); this module has the numbers of table, racket and ball.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from .aerodynamics import AERODYNAMICS
 
 
 class Leaving(NamedTuple):
-    """A ball after an impact."""
+    """State of a ball after an impact."""
 
     velocity: FloatArray
     """(3,) [m/s]"""
@@ -34,7 +34,7 @@ class Leaving(NamedTuple):
 
 @cache
 def platform(table: Table) -> Platform:
-    """The table, as predictions want it."""
+    """Converts the table to parameters for predictions."""
     (x, y, _), (width, length, _) = table.centre, table.size
     return Platform(
         height=table.bounce_height,
@@ -52,17 +52,17 @@ def platform(table: Table) -> Platform:
 
 
 def bounced(velocity: FloatArray, spin: FloatArray, table: Table = TABLE) -> Leaving:
-    """A ball with this velocity (3,) [m/s] and spin (3,) [rad/s] after a touch of the table."""
+    """Computes a bounce on the table from velocity (3,) [m/s] and spin (3,) [rad/s]."""
     ball = np.concatenate([np.zeros(3), velocity, spin])[np.newaxis]
     after = platform(table).bounced(ball)[0]
     return Leaving(after[3:6], after[6:])
 
 
 def spin_after(velocity: FloatArray, turn: FloatArray, spin: FloatArray | None) -> FloatArray:
-    """Spin (3,) [rad/s] after a bounce, by the law of the bounce.
+    """Computes the spin (3,) [rad/s] after a bounce.
 
-    `velocity` (1, 3) [m/s] and `turn` (3,) [1/s] are those before it, as is `spin` (3,) [rad/s];
-    None: what the turn says.
+    `velocity` (1, 3) [m/s], `turn` (3,) [1/s] and `spin` (3,) [rad/s]: before the bounce; spin
+    None: derived from the turn.
     """
     if spin is None:
         spin = AERODYNAMICS.spins(turn, np.linalg.norm(velocity, axis=1))[0]
@@ -70,10 +70,10 @@ def spin_after(velocity: FloatArray, turn: FloatArray, spin: FloatArray | None) 
 
 
 def leaving(ball: FloatArray, spin: FloatArray, racket: FloatArray, normal: FloatArray) -> Leaving:
-    """The ball after an impact on a racket.
+    """Computes the ball after an impact on a racket.
 
-    `ball` and `spin` (3,) are those before it, `racket` (3,) is the velocity of the racket at the
-    point of contact and `normal` (3,) the unit normal of its face, on either side.
+    `ball`, `spin` (3,): velocity and spin before the impact. `racket` (3,): velocity at the point
+    of contact. `normal` (3,): unit normal of the face, on either side.
     """
     towards = normal if (ball - racket) @ normal <= 0.0 else -normal
     after = bounced_off(

@@ -1,4 +1,4 @@
-"""Values between the steps of an integration: a cubic through positions and velocities."""
+"""Interpolates between the steps of an integration by cubics through positions and velocities."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ def along_path(
 ) -> tuple[FloatArray, FloatArray]:
     """Positions and velocities, each (T, 3, ...), at `times` (T,) [s].
 
-    `nodes` (K, 6, ...) holds position and velocity at `node_times` (K,), which do not fall; two
-    nodes of the same time are a jump (a bounce): at that time the second one counts. Between
-    nodes, the cubic Hermite polynomial; outside, the first and last polynomial go on.
+    `nodes` (K, 6, ...) holds position and velocity at `node_times` (K,), which do not fall. Two
+    nodes of the same time are a jump (a bounce), where the second one counts. Uses cubic Hermite
+    polynomials; outside of the nodes, the first or last one is extrapolated.
     """
     late = np.searchsorted(node_times, times, side="right")
     right = np.clip(late, 1, len(node_times) - 1)

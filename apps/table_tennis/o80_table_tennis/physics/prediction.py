@@ -1,4 +1,4 @@
-"""Predicted flights of a ball that bounces on the table."""
+"""Predicts flights of a ball that bounces on the table."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ Numbers = Sequence[float] | FloatArray
 STEP = 0.02
 """Step of the integration [s]; the error over a second of flight stays below 10 um."""
 TIME, STATE, SPIN, BOUNCED = 0, slice(1, 7), slice(7, 10), 10
-"""Columns of `flight_nodes`: [s]; position [m] and velocity [m/s]; [rad/s]; 1 after a bounce."""
+"""Columns of `flight_nodes`: [s]; position [m], velocity [m/s]; spin [rad/s]; 1 after a bounce."""
 
 
 @dataclass(frozen=True, eq=False)
 class PredictedFlight:
-    """Where a ball will be, in equal steps."""
+    """Predicted states of a ball, in equal steps."""
 
     stamps: FloatArray
     """(N,) since the start [s]"""
@@ -50,9 +50,9 @@ def predict(
     period: float = 0.01,
     table: Table | None = TABLE,
 ) -> PredictedFlight:
-    """The flight from `position` (3,) [m], `velocity` (3,) [m/s], `spin` (3,) [rad/s], world frame.
+    """Predicts a flight from `position` [m], `velocity` [m/s] and `spin` [rad/s], each (3,).
 
-    Rows every `period` [s] from 0 to `duration` [s]; the ball bounces on `table` if there is one.
+    Rows are every `period` [s] from 0 to `duration` [s]; the ball bounces on `table`, if any.
     """
     for name, value in (("duration", duration), ("period", period)):
         if not (math.isfinite(value) and value > 0):
@@ -76,9 +76,9 @@ def flight_nodes(
     *,
     step: float = STEP,
 ) -> FloatArray:
-    """States (K, 11) along the flight, every `step` [s]: `TIME`, `STATE`, `SPIN`, `BOUNCED`.
+    """Integrates a flight to states (K, 11), every `step` [s]: `TIME`, `STATE`, `SPIN`, `BOUNCED`.
 
-    A bounce gives two of the same time, before and after; the second one is marked.
+    A bounce gives two states of the same time, before and after; the second one is marked.
     """
     ball = np.array([*position, *velocity, *spin], np.float64)
     if not np.isfinite(ball).all():

@@ -1,1 +1,1 @@
-"""Policies, from a still arm to one that returns most balls."""
+"""Policies, from a still arm to a learned player."""

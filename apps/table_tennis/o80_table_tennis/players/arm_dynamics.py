@@ -1,7 +1,7 @@
-"""Torques that move the arm: a model with its masses on points of the links.
+"""Model of the arm's torques, with point masses on the links.
 
-It leaves out effects that feedback corrects: the coupling of the speeds of joints 2 and 3, and the
-couplings of the wrist.
+The model omits effects that feedback corrects: the coupling of the speeds of joints 2 and 3, and
+the couplings of the wrist.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from ..world.ball import GRAVITY
 
 
 def _joined(*parts: tuple[PointMass, float]) -> PointMass:
-    """Masses of one link as one; with each, how far out its own origin lies. To 10 um."""
+    """Merges point masses of a link, each given with its origin along the link; rounds to 10 um."""
     mass = sum(part.mass for part, _ in parts)
     centre = sum(part.mass * (origin + part.centre) for part, origin in parts) / mass
     return PointMass(mass, round(centre, 5))
@@ -27,30 +27,30 @@ def _joined(*parts: tuple[PointMass, float]) -> PointMass:
 
 UPPER_ARM_MASS, ELBOW_MASS = mass_of("upper_arm"), mass_of("elbow")
 FOREARM_MASS = _joined((mass_of("forearm"), 0.0), (mass_of("racket"), FOREARM))
-"""Forearm and racket."""
+"""Merged mass of forearm and racket."""
 TURNING = (0.012, 0.0145, 0.0115, 0.004)
-"""Inertia of the links about their own centres, and of the pulleys, for each joint, fitted to the
-torques of the scene [kg m^2]."""
+"""Inertia of links about their centres, and of pulleys, for each joint, fitted to the
+scene's torques [kg m^2]."""
 
 
 @dataclass(frozen=True)
 class ArmModel:
-    """Masses of the scene, and damping."""
+    """Model of the arm: masses of the scene, and damping."""
 
     damping: tuple[float, ...] = JOINT_DAMPING
     """[Nm s/rad]"""
 
     def torque(self, q: FloatArray, dq: FloatArray, acceleration: FloatArray) -> FloatArray:
-        """Torques of the muscles (4,) [Nm] for angles, speeds and accelerations (4,)."""
+        """Computes the muscles' torques (4,) [Nm] from angles, speeds and accelerations (4,)."""
         a1, a2, a3, a4 = acceleration.tolist()
         w1, w2, w3, _ = dq.tolist()
         t1, t2, t3, t4 = TURNING
         torque1, torque2, torque3 = t1 * a1, t2 * a2, t3 * a3
         for mass, out, up, out3, up3 in points(q):
-            # rotation about the vertical, and its centrifugal effect
+            # rotation about the vertical, and centrifugal force
             torque1 += mass * out * (out * a1 + 2.0 * w1 * (up * w2 + up3 * w3))
             away = -out * w1 * w1
-            # the vertical plane, gravity as an acceleration upwards
+            # motion in the vertical plane; gravity is an upward acceleration
             outwards = up * a2 + up3 * a3 + away
             upwards = -out * a2 - out3 * a3 + GRAVITY
             torque2 += mass * (up * outwards - out * upwards)
@@ -60,7 +60,7 @@ class ArmModel:
     def speeds_after(
         self, q: FloatArray, dq: FloatArray, torque: FloatArray, duration: float
     ) -> FloatArray:
-        """Speeds (4,) after `duration` [s] of these torques (4,), damping taken implicitly."""
+        """Computes the speeds (4,) after `duration` [s] of torques (4,), with implicit damping."""
         at_rest = np.zeros_like(q)
         bias = self.torque(q, dq, at_rest) - np.array(self.damping) * dq
         # joint 1 turns the plane in which joints 2 and 3 bend the arm
@@ -77,7 +77,7 @@ class ArmModel:
 
 
 def points(q: FloatArray) -> Iterator[tuple[float, float, float, float, float]]:
-    """Masses [kg]: how far out and up each lies from joint 2, then from joint 3 [m]."""
+    """Yields masses [kg] with distances out and up from joint 2, then from joint 3 [m]."""
     s2, c2 = math.sin(q[1]), math.cos(q[1])
     s23, c23 = math.sin(q[1] + q[2]), math.cos(q[1] + q[2])
     for mass, along_upper, along_fore in (

@@ -1,7 +1,7 @@
-"""Where the arm will be when an action begins to act: the actions in flight are known.
+"""Predicts the arm's state when an action begins to act, from the actions that are still in flight.
 
-An arm with dead time goes on by pressures that were asked for before. From its present state and
-those pressures a model of muscles and links is integrated over the dead time of each joint.
+During its dead time the arm follows earlier commands. From the present state and those commands,
+a model of muscles and links is integrated over the dead time of each joint.
 """
 
 from __future__ import annotations
@@ -20,12 +20,12 @@ from .arm_dynamics import ArmModel
 from .pressure_control import MusclePair, PressureLag
 
 INTEGRATION_STEP = 0.0025
-"""Longest one of the model [s]."""
+"""Longest integration step of the model [s]."""
 
 
 @dataclass(frozen=True)
 class ArmState:
-    """State of the arm, each joint at a time of its own."""
+    """State of the arm, each joint at its own time."""
 
     q: FloatArray
     """(4,) [rad]"""
@@ -46,24 +46,24 @@ class ArmPredictor:
         dead_time: tuple[float, ...],
         begin: float,
     ) -> None:
-        """`begin`: from an observation until its action is asked for [s]."""
+        """`begin`: time from an observation to the command of its action [s]."""
         self._arm, self._muscles, self._lag = arm, muscles, lag
         self._dead_time, self._begin = dead_time, begin
         self.longest = max(dead_time)
-        """[s]"""
+        """Longest dead time [s]."""
         self._commanded: deque[FloatArray] = deque(maxlen=2 + math.ceil(self.longest / STEP))
 
     def start(self, commanded: FloatArray) -> None:
-        """The pressures (8,) that an arm at rest was asked for until now."""
+        """Sets the commanded pressures (8,) of an arm at rest."""
         self._commanded.clear()
         self._commanded.append(commanded)
 
     def ask(self, commanded: FloatArray) -> None:
-        """These are asked for in the step that begins now."""
+        """Adds the pressures (8,) that are commanded in the step that begins now."""
         self._commanded.append(commanded)
 
     def predict(self, now: ArmState) -> ArmState:
-        """The state of each joint when what is asked for now begins to act on it."""
+        """Predicts each joint's state at the time when a command sent now begins to act."""
         if self.longest == 0.0:
             return now
         q, dq, pressures = now.q.copy(), now.dq.copy(), now.pressures.copy()
@@ -85,10 +85,10 @@ class ArmPredictor:
         return result
 
     def _targets(self, time: float) -> FloatArray:
-        """Pressures (8,) that act at `time` from now [s]."""
+        """Returns the pressures (8,) that act at `time` from now [s]."""
         targets = np.empty(2 * JOINTS)
         for joint, dead_time in enumerate(self._dead_time):
-            # steps back from the newest: it is asked for from begin - STEP on
+            # number of commands back from the newest one, which is sent from begin - STEP on
             back = math.floor((dead_time + self._begin - time) / STEP)
             index = max(len(self._commanded) - 1 - max(back, 0), 0)
             part = slice(2 * joint, 2 * joint + 2)

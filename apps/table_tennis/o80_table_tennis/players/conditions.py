@@ -1,4 +1,4 @@
-"""Conditions of a policy: arm, actions and observation. A learned policy holds its own."""
+"""Conditions of a policy: arm, actions and observation. A learned policy stores its conditions."""
 
 from __future__ import annotations
 
@@ -12,24 +12,24 @@ from ..task.noise import NoiseSettings
 
 @dataclass(frozen=True)
 class Conditions:
-    """Arm, actions, observation and reward; the defaults are those of the training."""
+    """Arm, actions, observation and reward; the defaults are the training's."""
 
     preset: str = "identified"
     """Preset of the simulated arm."""
     observation: str = "full"
     """published (22 numbers) or full, see `task.full_observation`."""
     ball_position_noise: float = 0.005
-    """Noise of the observed ball, along each axis [m]: as a camera system leaves it."""
+    """Noise of the observed ball along each axis, as of a camera system [m]."""
     ball_velocity_noise: float = 0.1
     """[m/s]"""
     start_noise: float = 0.02
-    """On each joint at the start of an episode, uniform in plus or minus this [rad]."""
+    """Largest deviation of each joint at the start of an episode, either way, uniform [rad]."""
     factor: float = 0.6
     """Factor of the actions."""
     repeat: int = 2
-    """Steps of 10 ms that an action lasts."""
+    """Duration of an action in steps of 10 ms."""
     delay: int = 1
-    """Iterations from an observation to its action, less 1, see `settings.TaskSettings`."""
+    """Iterations from an observation to its action, minus 1, see `settings.TaskSettings`."""
     goal: str = "return"
     """return or smash."""
     reward: str = "ordered"
@@ -37,13 +37,13 @@ class Conditions:
     """Simulated shots: wide, narrow or launcher; or a path of recordings."""
 
     def rig(self, pacing: Pacing = Pacing.INLINE) -> RigSettings:
-        """The arm and its twin."""
+        """Returns the settings of arm and twin."""
         return RigSettings(pacing=pacing, preset=self.preset)
 
     def task(self, *, ball_seed: int = 0, fly_out: bool = True) -> TaskSettings:
-        """The task; each `ball_seed` has simulated shots of its own.
+        """Returns the settings of the task; each `ball_seed` gives other simulated shots.
 
-        Without `fly_out` the rows of the ball's flight after the touch are there, for a film.
+        Without `fly_out`, the flight after the touch has rows, for a film.
         """
         return TaskSettings(
             task=self.goal,
@@ -64,6 +64,6 @@ class Conditions:
 
     @classmethod
     def of_options(cls, options: Mapping[str, Any]) -> Conditions:
-        """Conditions of a training's options, without those that say how it was stepped."""
+        """Converts a training's options, without the options of stepping."""
         known = [each.name for each in fields(cls)]
         return cls(**{name: value for name, value in options.items() if name in known})

@@ -1,7 +1,7 @@
-"""A policy that hits: it predicts the ball, plans a strike and drives the arm through it.
+"""Scripted policy: predicts the ball, plans a strike and drives the arm through the strike.
 
-An arm with dead time obeys late. Then all is planned and controlled for the time at which an action
-begins to act: ball and arm are predicted that far, the arm by the actions in flight.
+An arm with dead time reacts late. Planning and control are therefore for the time at which an
+action begins to act: ball and arm are predicted to it, the arm from the actions in flight.
 """
 
 from __future__ import annotations
@@ -43,14 +43,14 @@ from .swing import JointMotion, Swing
 WRIST = 3
 """Index of joint 4."""
 LOW = 0.1
-"""A ball that begins to rise this near above the table has bounced [m]."""
+"""Height above the table below which a rising ball has bounced [m]."""
 PREDICTED_EVERY = 4
-"""A predicted path of the ball is used for so many steps."""
+"""Number of steps for which a predicted path of the ball is used."""
 
 
 @dataclass(frozen=True)
 class ControlSettings:
-    """How the arm is driven along its swing. A search on simulated shots found uneven numbers."""
+    """Settings of the control along a swing. A search on simulated shots found the odd numbers."""
 
     stiffness: float = 412.5150855132902
     """Stiffness of the feedback [1/s^2]."""
@@ -61,26 +61,26 @@ class ControlSettings:
     begin: float = 0.003
     """Time from an observation to the effect of its action [s]."""
     ahead: float = 0.016792337953590822
-    """Time after the observation at which the action aims [s]."""
+    """Time after the observation for which the action is computed [s]."""
     settling: float = 0.015620133347269057
-    """Time in which the pressures should reach the wanted ones [s]."""
+    """Time in which the pressures should reach their targets [s]."""
     wrist_stiffness: float = 12.0
     """Additional feedback of joint 4, whose inertia is very small [Nm/rad]."""
     learning: tuple[float, float, float, float] = (600.0, 600.0, 225.0, 120.0)
-    """Integral gain of each joint, for torques that the model lacks [Nm/(rad s)]."""
+    """Integral gain of each joint, for unmodelled torques [Nm/(rad s)]."""
     last_change: float = 0.03
-    """From this time before the strike on, the swing is not changed any more [s]."""
+    """Time before the strike from which on the swing is fixed [s]."""
     shortest: float = 0.02
-    """Least duration of a swing, for balls that come sooner than predicted [s]."""
+    """Least duration of a swing, for balls that arrive earlier than predicted [s]."""
     follow_through: float = 0.03
-    """The swing goes on this long after the strike, unless the ball flies back before [s]."""
+    """Continuation of the swing after the strike, unless the ball flies back earlier [s]."""
     stop: float = 0.25
-    """From the end of a swing to rest [s]."""
+    """Time from the end of a swing to rest [s]."""
 
 
 @dataclass(frozen=True)
 class HittingSettings:
-    """Everything the policy can be told: of the arm, of which the standard one is assumed."""
+    """Settings of the policy; the defaults are for the standard arm."""
 
     interception: InterceptionSettings = field(default_factory=InterceptionSettings)
     control: ControlSettings = field(default_factory=ControlSettings)
@@ -94,7 +94,7 @@ class HittingSettings:
 
     @classmethod
     def of_rig(cls, rig: RigSettings) -> HittingSettings:
-        """Settings for the arm that a rig will have: one is made and asked."""
+        """Makes the settings for a rig's arm, by starting one and reading its description."""
         if rig.attach:
             with o80.Frontend(str(rig.arm_segment)) as arm:
                 return cls.of(arm)
@@ -103,7 +103,7 @@ class HittingSettings:
 
     @classmethod
     def of(cls, arm: o80.Frontend) -> HittingSettings:
-        """Settings for an arm that runs. Raises ValueError if its description lacks numbers."""
+        """Makes the settings for a running arm. Raises ValueError for an incomplete description."""
         custom = ElementTree.fromstring(arm.model).find("custom") if arm.model else None
         if custom is None:
             raise ValueError(
@@ -147,7 +147,7 @@ class HittingSettings:
 
 
 class HittingPolicy:
-    """Meets each ball with the racket so that it flies back to the other side."""
+    """Hits each ball so that it flies back to the other side."""
 
     def __init__(self, settings: HittingSettings | None = None) -> None:
         self._settings = settings or HittingSettings()
@@ -156,14 +156,14 @@ class HittingPolicy:
         s = self._settings
         self._predictor = ArmPredictor(s.arm, s.muscles, s.lag, s.dead_time, s.control.begin)
         self._ahead = self._predictor.longest
-        """All is planned for this long after an observation [s]."""
+        """Time after an observation for which all is planned [s]."""
         self._planned: deque[Swing] = deque(maxlen=1 + math.ceil(self._ahead / STEP))
         self.reset()
 
     def reset(self) -> None:
-        """A new episode begins."""
+        """Begins a new episode."""
         self._planner.forget()
-        self._lacking = np.zeros(JOINTS)
+        self._integral = np.zeros(JOINTS)
         self._swing: Swing | None = None
         self._ball: ComingBall | None = None
         self._steps = 0
@@ -171,10 +171,10 @@ class HittingPolicy:
         self._spin: Vector = self._settings.interception.spin
         self._over = False
         self.strike: Strike | None = None
-        """Strike that is planned now."""
+        """Planned strike."""
 
     def act(self, observation: Float32Array) -> NDArray[np.float32]:
-        """The action (8,) in [-1, 1] after `observation` (22,)."""
+        """Computes the action (8,) in [-1, 1] after `observation` (22,)."""
         row = observation.astype(np.float64)
         if self._swing is None:
             self._actions.start(row[PRESSURES])
@@ -191,11 +191,11 @@ class HittingPolicy:
         return action
 
     def _plan(self, position: FloatArray, velocity: FloatArray, swing: Swing) -> Swing:
-        """The motion from now on, which was to be `swing`."""
+        """Plans the motion from now on; `swing` is the last plan."""
         control = self._settings.control
         flying_back = velocity[1] > 0.0
         if self.strike is not None and self.strike.time <= control.last_change + STEP:
-            # straight on through the ball
+            # keeps the swing through the ball
             self.strike = self.strike.later(STEP)
             if self.strike.time >= -control.follow_through and not flying_back:
                 return swing
@@ -207,7 +207,7 @@ class HittingPolicy:
             ball = None if self._ball is None else self._ball.later(self._ahead)
             self.strike = None if ball is None else self._planner.plan(ball)
         now, still = swing.at(0.0), np.zeros(JOINTS)
-        if self.strike is None:  # the joints come to rest without haste
+        if self.strike is None:  # brings the joints to rest slowly
             rest = now.q + 0.5 * control.stop * now.dq
             rest = np.clip(rest, -0.95 * JOINT_LIMIT, 0.95 * JOINT_LIMIT)
             return Swing.between(now, JointMotion(rest, still, still), control.stop)
@@ -227,7 +227,7 @@ class HittingPolicy:
         self._steps += 1
 
     def _spin_after(self, position: FloatArray, velocity: FloatArray) -> Vector:
-        """The spin of the ball, which a bounce since the last observation has changed."""
+        """Returns the ball's spin, changed by a bounce since the last observation."""
         low = position[2] < TABLE.bounce_height + LOW
         if self._seen is None or not (low and self._seen[5] < 0.0 < velocity[2]):
             return self._spin
@@ -235,7 +235,7 @@ class HittingPolicy:
         return wx, wy, wz
 
     def _wanted(self, after: float) -> JointMotion:
-        """The planned motion of each joint, `after` [s] its dead time."""
+        """Returns the planned motion of each joint, `after` [s] its dead time."""
         motions = [self._planned_at(dead_time + after) for dead_time in self._settings.dead_time]
         return JointMotion(
             *(
@@ -245,24 +245,24 @@ class HittingPolicy:
         )
 
     def _planned_at(self, time: float) -> JointMotion:
-        """In `time` [s] from now, by the plan that was made for that time."""
+        """Returns the motion in `time` [s] from now, from the plan that was made for that time."""
         early = self._ahead - time
         back = min(max(math.ceil(early / STEP - 1e-9), 0), len(self._planned) - 1)
-        # an older plan began so many steps earlier
+        # older plans began earlier
         return self._planned[-1 - back].at(max(0.0, back * STEP - early))
 
     def _drive(self, arm: ArmState) -> NDArray[np.float32]:
         s, control = self._settings, self._settings.control
         wanted, start = self._wanted(control.ahead), self._wanted(0.0)
         q, pressures = arm.q, arm.pressures
-        # where the arm will be: as far from the swing as it is then, going on at its speed
+        # the deviation from the swing is extrapolated by its speed
         q_error = (start.q - q) + control.ahead * (start.dq - arm.dq)
         dq_error = start.dq - arm.dq
         acceleration = wanted.ddq + control.stiffness * q_error + control.damping * dq_error
         torque = s.arm.torque(wanted.q, wanted.dq, acceleration)
         torque[WRIST] += control.wrist_stiffness * q_error[WRIST]
-        self._lacking += STEP * np.array(control.learning) * (start.q - q)
-        torque += self._lacking
+        self._integral += STEP * np.array(control.learning) * (start.q - q)
+        torque += self._integral
         in_muscles = s.muscles.pressures(torque, wanted.q, control.mean_pressure).ravel()
         begin = s.lag.after(pressures, self._actions.commanded, control.begin)
         return self._actions.towards(s.lag.asking(begin, in_muscles, control.settling))

@@ -1,9 +1,9 @@
-"""Where, when and how to meet the ball, so that it flies back to the target.
+"""Plans strikes that send the ball to the target.
 
 A strike has three unknowns: its time, the angle of the wrist, and the speed of joint 1. The time
 determines the place of the ball, and so the angles of joints 1 to 3; all three determine the
-velocity with which the ball leaves. Least squares finds the strike that sends it to the target,
-with a preference for a comfortable one.
+velocity of the leaving ball. Least squares finds the strike that sends the ball to the target,
+with a preference for comfortable strikes.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from .inverse_kinematics import posture_towards
 PATH_PERIOD = 0.01
 """Period of the rows of a predicted path [s]."""
 TOUCH = BALL_RADIUS + BLADE_THICKNESS / 2
-"""From the middle of the blade to the centre of a ball that touches it [m]."""
+"""Distance from the middle of the blade to the centre of a touching ball [m]."""
 LATEST = 1.6
-"""No ball is followed further ahead than this [s]."""
+"""Longest time of a predicted path [s]."""
 STEPS, CORRECTIONS = 6, 2
-"""Steps of the flight to the target, and flights to find its first velocity."""
+"""Steps of the flight to the target, and corrections of its initial velocity."""
 AIR = replace(AERODYNAMICS, spin_decay=0.0).air
 FIRST_ROUNDS = 4
-"""Iterations for the first strike of a ball; later searches start at the last one, and take one."""
+"""Iterations for a ball's first strike; later searches start at the last one and need one."""
 
 
 @dataclass(frozen=True)
@@ -42,14 +42,14 @@ class Strike:
     """A motion of the racket through the ball."""
 
     time: float
-    """From now [s]."""
+    """Time from now [s]."""
     posture: FloatArray
     """(4,) [rad]"""
     speeds: FloatArray
     """(4,) [rad/s]"""
 
     def later(self, time: float) -> Strike:
-        """The same strike, seen `time` [s] later."""
+        """Returns the strike as seen `time` [s] later."""
         return replace(self, time=self.time - time)
 
 
@@ -58,36 +58,36 @@ class InterceptionSettings:
     """Target, limits and preferences of strikes."""
 
     target_x: float = -0.011334484200464848
-    """Where on the table the ball should land [m]."""
+    """Target of the ball on the table [m]."""
     target_y: float = 2.5272907045719197
     """[m]"""
     flight: float = 0.5376000137690394
-    """Duration of its flight there [s]."""
+    """Duration of the flight to the target [s]."""
     nearest: float = -0.15
-    """Least y at which a ball is met [m]."""
+    """Least y of a strike [m]."""
     farthest: float = 0.30
-    """Largest y [m]."""
+    """Largest y of a strike [m]."""
     fastest: float = 4.0
-    """Speed of joint 1 [rad/s]."""
+    """Limit of the speed of joint 1 [rad/s]."""
     steepest: float = 1.2
-    """Angle of the wrist, either way [rad]."""
+    """Limit of the wrist's angle, either way [rad]."""
     comfortable_y: float = 0.1185812861960035
-    """Where the ball is met if all places do equally well [m]."""
+    """Preferred y of a strike [m]."""
     comfortable_wrist: float = 0.3
-    """The same for joint 4 [rad]."""
+    """Preferred angle of joint 4 [rad]."""
     comfortable_speed: float = 1.5
-    """The same for the speed of joint 1 [rad/s]."""
+    """Preferred speed of joint 1 [rad/s]."""
     discomfort: Vector = (0.2, 0.05, 0.02)
-    """Weights of deviations from them, relative to an error of its velocity [1/s, m/s, m]."""
+    """Weights of deviations from the preferences, relative to velocity errors [1/s, m/s, m]."""
     off_middle: float = 8.0
-    """Weight of a touch off the middle of the blade, relative to the same error [1/s]."""
+    """Weight of a touch off the middle of the blade, relative to velocity errors [1/s]."""
     spin: Vector = BALL_GUN_SPIN
-    """Spin of an approaching ball, before its bounce [rad/s]."""
+    """Assumed spin of an approaching ball, before its bounce [rad/s]."""
 
 
 @dataclass(frozen=True)
 class ComingBall:
-    """The part of a predicted path on which the ball can be met."""
+    """Part of a predicted path on which the ball can be hit."""
 
     times: FloatArray
     """(N,) from now [s]"""
@@ -96,14 +96,14 @@ class ComingBall:
     velocities: FloatArray
     """(N, 3) [m/s]"""
     spin: FloatArray
-    """(3,) [rad/s], which changes little while the ball can be met"""
+    """(3,) [rad/s], about constant while the ball can be hit"""
 
     def later(self, time: float) -> ComingBall:
-        """The same path, seen `time` [s] later."""
+        """Returns the path as seen `time` [s] later."""
         return replace(self, times=self.times - time)
 
     def at(self, time: float) -> tuple[FloatArray, FloatArray]:
-        """Position and velocity (3,) at `time` from now, between the first row and the last."""
+        """Interpolates position and velocity (3,) at `time` from now, within the path."""
         row = int(np.clip((time - self.times[0]) / PATH_PERIOD, 0, len(self.times) - 2))
         share = (time - self.times[row]) / PATH_PERIOD
         change = self.velocities[row + 1] - self.velocities[row]
@@ -112,7 +112,7 @@ class ComingBall:
         return self.positions[row] + share * PATH_PERIOD * mean, velocity
 
     def time_at(self, y: float) -> float:
-        """When it is at `y`, or as near to it as it comes [s]."""
+        """Returns the time at which the ball is at `y`, or nearest to it [s]."""
         return float(np.interp(-y, -self.positions[:, 1], self.times))
 
 
@@ -122,9 +122,9 @@ def coming_ball(
     settings: InterceptionSettings,
     spin: Vector | FloatArray | None = None,
 ) -> ComingBall | None:
-    """The path of a ball while it can be met, after its bounce; None if it does not come.
+    """Predicts the path on which a ball can be hit, after its bounce; None if there is none.
 
-    `spin` is that of the ball now [rad/s]; None: that of a ball before its bounce.
+    `spin`: present spin [rad/s]; None: the spin of `settings`, before the bounce.
     """
     if velocity[1] > -0.5 or position[1] < settings.nearest:
         return None
@@ -146,21 +146,21 @@ def coming_ball(
 
 
 class StrikePlanner:
-    """Finds strikes; each search begins at the strike found before."""
+    """Finds strikes; each search begins at the last strike."""
 
     def __init__(self, settings: InterceptionSettings) -> None:
         self._settings = settings
         self.forget()
 
     def forget(self) -> None:
-        """Forgets the last strike: another ball comes."""
+        """Forgets the last strike, before a new ball."""
         self._place = self._settings.comfortable_y
         self._wrist = self._settings.comfortable_wrist
         self._speed = self._settings.comfortable_speed
         self._found = False
 
     def plan(self, ball: ComingBall) -> Strike:
-        """The strike that sends the ball best to the target, or comes nearest to the ball."""
+        """Finds the strike that sends the ball nearest to the target."""
         s = self._settings
         low = np.array([ball.time_at(s.farthest), -s.steepest, 0.0])
         high = np.array([ball.time_at(s.nearest), s.steepest, s.fastest])
@@ -170,7 +170,7 @@ class StrikePlanner:
         _, velocity = ball.at(float(comfort[0]))
         discomfort = np.array(s.discomfort) * [abs(float(velocity[1])), 1.0, 1.0]
 
-        # Gauss-Newton, held within the limits
+        # Gauss-Newton, clamped to the limits
         guess = np.clip([ball.time_at(self._place), self._wrist, self._speed], low, high)
         probe = np.array([0.004, 0.02, 0.05])
         for _ in range(1 if self._found else FIRST_ROUNDS):
@@ -185,7 +185,7 @@ class StrikePlanner:
             right = discomfort**2 * (comfort - guess) - slopes.T @ error
             guess = np.clip(guess + np.linalg.solve(matrix, right), low, high)
 
-        # guess => strike, and where the next search begins
+        # guess => strike, start of the next search
         position, _ = ball.at(float(guess[0]))
         self._place, self._wrist, self._speed = float(position[1]), float(guess[1]), float(guess[2])
         self._found = True
@@ -193,12 +193,12 @@ class StrikePlanner:
         return Strike(float(guess[0]), touching_posture(position, self._wrist), speeds)
 
     def _wanted(self, ball: ComingBall, guess: FloatArray) -> FloatArray:
-        """Velocity (3,) with which the ball should leave."""
+        """Computes the velocity (3,) of the leaving ball that reaches the target."""
         s = self._settings
         position, _ = ball.at(float(guess[0]))
         target = np.array([s.target_x, s.target_y, TABLE.bounce_height])
         spin = self._leaving(ball, guess)[0].spin
-        # start with a flight without air, then add the miss that the air causes
+        # starts with a flight without air, then corrects the miss
         velocity: FloatArray = (target - position) / s.flight
         velocity[2] += 0.5 * AERODYNAMICS.gravity * s.flight
         for _ in range(CORRECTIONS):
@@ -208,12 +208,12 @@ class StrikePlanner:
         return velocity
 
     def _error(self, ball: ComingBall, guess: FloatArray, wanted: FloatArray) -> FloatArray:
-        """Velocity of the leaving ball less `wanted`, and the racket's offset from it, (6,)."""
+        """Residuals (6,): velocity of the leaving ball minus `wanted`, and weighted offset."""
         after, off = self._leaving(ball, guess)
         return np.concatenate([after.velocity - wanted, self._settings.off_middle * off])
 
     def _leaving(self, ball: ComingBall, guess: FloatArray) -> tuple[Leaving, FloatArray]:
-        """The ball after the strike, and its offset from the middle of the blade (3,) [m]."""
+        """Computes the ball after the strike, and its offset from the blade's middle (3,) [m]."""
         position, velocity = ball.at(float(guess[0]))
         speed = float(guess[2])
         pose = racket_pose(touching_posture(position, float(guess[1])))
@@ -224,7 +224,7 @@ class StrikePlanner:
 
 
 def touching_posture(ball: FloatArray, wrist: float) -> FloatArray:
-    """Angles (4,) [rad] with which the racket's face touches the ball, if the arm reaches it."""
+    """Computes angles (4,) [rad] at which the racket's face touches a ball within reach."""
     x, y, z = ball.tolist()
     nx, ny, nz = racket_pose(posture_towards((x, y, z), wrist)).normal
     return posture_towards((x - TOUCH * nx, y - TOUCH * ny, z - TOUCH * nz), wrist)

@@ -1,4 +1,4 @@
-"""The angles of the joints that bring the racket to a point."""
+"""Computes joint angles that bring the racket to a point."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from ..world.scene import Vector
 
 
 def posture_towards(point: Vector, wrist: float) -> FloatArray:
-    """Angles (4,) [rad], the elbow up, that bring the racket's centre to `point` of the world [m].
+    """Computes angles (4,) [rad], elbow up, that bring the racket's centre to `point` [m].
 
-    `wrist` is the angle of joint 4. Where the joints do not reach: a posture near to the point.
+    `wrist`: angle of joint 4. A point out of reach gives a posture near to it.
     """
     x, y, z = point
     out, height = math.hypot(x, y), z - SHOULDER
-    # the triangle of upper arm, forearm and the line from the shoulder to the racket
+    # triangle of upper arm, forearm and the line from shoulder to racket
     square = out * out + height * height
     cosine = (square - UPPER_ARM**2 - FOREARM**2) / (2 * UPPER_ARM * FOREARM)
     bend = _held(math.acos(min(max(cosine, -1.0), 1.0)))
@@ -27,7 +27,7 @@ def posture_towards(point: Vector, wrist: float) -> FloatArray:
         FOREARM * math.sin(bend), UPPER_ARM + FOREARM * math.cos(bend)
     )
     if abs(lift) > JOINT_LIMIT:
-        # the upper arm at its stop: the forearm points at the racket
+        # upper arm at its stop: the forearm points at the racket
         lift = _held(lift)
         elbow_out, elbow_height = UPPER_ARM * math.sin(lift), UPPER_ARM * math.cos(lift)
         bend = _held(math.atan2(out - elbow_out, height - elbow_height) - lift)

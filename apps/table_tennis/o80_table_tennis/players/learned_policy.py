@@ -1,4 +1,4 @@
-"""A learned policy, as `python -m o80.learning train` writes it, and what it plays in."""
+"""A learned policy of `python -m o80.learning train`, with its conditions."""
 
 from __future__ import annotations
 
@@ -12,30 +12,30 @@ from o80.learning.training import policy
 from .conditions import Conditions
 
 SHIPPED = Path(__file__).with_name("learned")
-"""The policy that comes with this package, `learned.npz` and `learned.json`."""
+"""Path of the shipped policy, `learned.npz` and `learned.json`."""
 TASK = "o80_table_tennis.learning:play"
-"""The task that policies are trained for."""
+"""Task for which policies are trained."""
 
 
 @dataclass
 class LearnedPolicy:
-    """Plays in an environment of `conditions`: `conditions.rig()` and `conditions.task()`."""
+    """Learned policy for an environment with `conditions.rig()` and `conditions.task()`."""
 
     learned: policy.LearnedPolicy
     conditions: Conditions
 
     def reset(self) -> None:
-        """Every action follows from one observation."""
+        """Does nothing: each action depends on one observation only."""
 
     def act(self, observation: Float32Array) -> Float32Array:
-        """The action (..., 8) after observations (..., M)."""
+        """Computes actions (..., 8) from observations (..., M)."""
         return self.learned.act(observation)
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> LearnedPolicy:
         """Loads both files; `path` names one of them, or the folder of a training.
 
-        Raises o80.InvalidArgument or ValueError.
+        Raises o80.InvalidArgument or ValueError for other files or another task.
         """
         learned = policy.LearnedPolicy.load(path)
         if learned.task.name != TASK:
@@ -44,5 +44,5 @@ class LearnedPolicy:
 
 
 def shipped_policy() -> LearnedPolicy:
-    """The policy that comes with this package."""
+    """Loads the shipped policy."""
     return LearnedPolicy.load(SHIPPED)

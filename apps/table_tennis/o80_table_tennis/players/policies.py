@@ -1,4 +1,4 @@
-"""Policies turn observations into actions: the protocol, baselines, the default policy."""
+"""Protocol of policies, baselines, and the default policy."""
 
 from __future__ import annotations
 
@@ -16,36 +16,36 @@ from ..world.arm import MUSCLES
 from .hitting_policy import HittingPolicy, HittingSettings
 
 DEFAULT_FACTOR = COARSE
-"""Factor of the environment's actions for which `default_policy` is made."""
+"""Factor of the environment's actions for `default_policy`."""
 
 
 class Policy(Protocol):
-    """Chooses actions from observations only."""
+    """Maps observations to actions."""
 
     def reset(self) -> None:
-        """A new episode begins."""
+        """Begins a new episode."""
         ...
 
     def act(self, observation: Float32Array) -> NDArray[np.float32]:
-        """The action (8,) in [-1, 1], or chunk (n, 8), after `observation` (M,)."""
+        """Returns the action (8,) in [-1, 1], or chunk (n, 8), after `observation` (M,)."""
         ...
 
 
 @dataclass
 class StillPolicy:
-    """Leaves the pressures as they are."""
+    """Keeps the pressures."""
 
     def reset(self) -> None:
-        """Nothing to forget."""
+        """Does nothing."""
 
     def act(self, observation: Float32Array) -> NDArray[np.float32]:
-        """No change."""
+        """Returns zeros: no change."""
         return np.zeros(MUSCLES, dtype=np.float32)
 
 
 @dataclass
 class RandomPolicy:
-    """Draws each action at random, as an untrained learner does."""
+    """Draws random actions, like an untrained learner."""
 
     seed: int = 0
 
@@ -53,10 +53,10 @@ class RandomPolicy:
         self._rng = np.random.default_rng(self.seed)
 
     def reset(self) -> None:
-        """The draws go on: no episode repeats another."""
+        """Does nothing: the draws continue, so that no episode repeats another."""
 
     def act(self, observation: Float32Array) -> NDArray[np.float32]:
-        """Random action, uniform in [-1, 1]."""
+        """Returns a random action, uniform in [-1, 1]."""
         return self._rng.uniform(-1.0, 1.0, MUSCLES).astype(np.float32)
 
 
@@ -65,14 +65,14 @@ BASELINES: Mapping[str, tuple[Callable[[], Policy], float]] = {
     "random, fine": (RandomPolicy, FINE),
     "random, coarse": (RandomPolicy, COARSE),
 }
-"""Baselines that a policy must beat, and the factors of their actions; each plays the same in every
+"""Baselines for comparisons, and the factors of their actions; each is the same in every
 run."""
 
 
 def default_policy(settings: HittingSettings | None = None) -> Policy:
-    """The scripted policy; None: for the standard arm.
+    """Makes the scripted policy; None: for the standard arm.
 
-    `HittingSettings.of(frontend)` are those for an arm that runs, `HittingSettings.of_rig(rig)`
-    for an arm to come.
+    `HittingSettings.of(frontend)` gives the settings for a running arm,
+    `HittingSettings.of_rig(rig)` for one to be started.
     """
     return HittingPolicy(settings)

@@ -1,4 +1,4 @@
-"""Pressures for wanted torques: the inverse of the muscles' law and of their lag."""
+"""Computes pressures for torques: the inverse of the muscles' force law and lag."""
 
 from __future__ import annotations
 
@@ -18,34 +18,34 @@ PerMuscle = tuple[tuple[float, float], ...]
 
 @dataclass(frozen=True)
 class MusclePair:
-    """Two muscles against each other on one pulley: force linear in activation and in length.
+    """Two antagonistic muscles on a pulley, with force linear in activation and in length.
 
-    Numbers hold for all joints, tuples for each of them. The defaults are those of the standard
-    arm, in which the normalised pressure is the activation.
+    Numbers hold for all joints, tuples for each joint. The defaults are of the standard
+    arm, where activation equals normalised pressure.
     """
 
     pulley: float = 0.037
     """[m]"""
     maximum_force: PerJoint = 1500.0
-    """[N], fully activated, not contracted."""
+    """Force at full activation without contraction [N]."""
     stroke: PerJoint = 0.10
-    """Contraction without any force [m]."""
+    """Contraction at which the force is zero [m]."""
     contracted: float = 0.02
-    """Contraction of both where they are equally long [m]."""
+    """Contraction of both at equal lengths [m]."""
     neutral: PerJoint = 0.0
-    """Angle at which they are equally long [rad]."""
+    """Angle of equal lengths [rad]."""
     directions: PerJoint = 1.0
-    """1: the agonist turns the joint towards larger angles; -1: towards smaller ones."""
+    """Sign of the agonist's rotation: 1 towards larger angles, -1 towards smaller ones."""
     least: PerMuscle = ((0.0, 0.0),) * JOINTS
-    """(4, 2) activation at the least pressure."""
+    """Activation (4, 2) at the least pressure."""
     most: PerMuscle = ((1.0, 1.0),) * JOINTS
-    """(4, 2) activation at the most pressure."""
+    """Activation (4, 2) at the largest pressure."""
 
     def pressures(self, torque: FloatArray, q: FloatArray, mean: float) -> FloatArray:
-        """Normalised pressures (4, 2) in agonists and antagonists for torques (4,) at q (4,).
+        """Normalised pressures (4, 2) of agonists and antagonists for torques (4,) at q (4,).
 
-        `mean` is that of both muscles and sets the stiffness; where a muscle reaches an end of its
-        range, the other one makes the torque.
+        `mean`, the mean pressure of a pair, sets the stiffness; if a muscle reaches a limit of its
+        range, the other one produces the torque.
         """
         agonist, antagonist = self._lengths(q)
         share = np.asarray(self.directions) * torque / (self.pulley * self._force)
@@ -61,7 +61,7 @@ class MusclePair:
         return result
 
     def torque(self, pressures: FloatArray, q: FloatArray) -> FloatArray:
-        """Torques (4,) [Nm] of normalised pressures (8,) in the muscles, at q (4,)."""
+        """Computes torques (4,) [Nm] from normalised pressures (8,) at q (4,)."""
         low, high = np.array(self.least), np.array(self.most)
         activations = low + pressures.reshape(JOINTS, 2) * (high - low)
         agonist, antagonist = self._lengths(q)
@@ -74,7 +74,7 @@ class MusclePair:
         return np.asarray(self.maximum_force, dtype=np.float64)
 
     def _lengths(self, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """(4,) each: force of agonists and antagonists per maximum force and activation."""
+        """Relative force (4,) of agonists, and of antagonists, at full activation."""
         stroke = np.asarray(self.stroke, dtype=np.float64)
         at_zero = 1.0 - self.contracted / stroke
         change = self.pulley / stroke * np.asarray(self.directions) * (q - np.asarray(self.neutral))
@@ -83,36 +83,36 @@ class MusclePair:
 
 @dataclass(frozen=True)
 class PressureLag:
-    """How the pressures in the muscles follow those asked for."""
+    """First-order lag of the muscles' pressures behind the commanded ones."""
 
     times: tuple[float, ...] = (0.016, 0.016, 0.044, 0.044, 0.044, 0.044, 0.044, 0.044)
-    """(8,) of a first-order lag [s]"""
+    """Time constants (8,) [s]."""
 
     def after(self, pressures: FloatArray, commanded: FloatArray, duration: float) -> FloatArray:
-        """Pressures (8,) in the muscles after `duration` [s] of `asked` (8,)."""
+        """Computes the muscles' pressures (8,) after `duration` [s] of `commanded` (8,)."""
         return commanded + (pressures - commanded) * np.exp(-duration / np.array(self.times))
 
     def asking(self, pressures: FloatArray, wanted: FloatArray, duration: float) -> FloatArray:
-        """Pressures to ask for (8,) to have `wanted` (8,) in the muscles after `duration` [s]."""
+        """Computes commands (8,) that give `wanted` (8,) in the muscles after `duration` [s]."""
         return pressures + (wanted - pressures) / -np.expm1(-duration / np.array(self.times))
 
 
 class PressureActions:
-    """Turns wanted pressures into actions, and keeps track of the pressures asked for."""
+    """Converts target pressures to actions, and tracks the commanded pressures."""
 
     def __init__(self, *, factor: float = COARSE) -> None:
         self._factor = factor
         self.commanded = np.full(MUSCLES, 0.5)
 
     def start(self, pressures: FloatArray) -> None:
-        """A new episode: the arm rests, the pressures in its muscles (8,) are those asked for."""
+        """Begins an episode: the arm rests, and `pressures` (8,) equal the commanded ones."""
         self.commanded = np.clip(pressures, 0.0, 1.0)
 
     def towards(self, wanted: FloatArray) -> NDArray[np.float32]:
-        """The action (8,) in [-1, 1] that brings the asked pressures nearest to `wanted` (8,)."""
+        """Computes the action (8,) in [-1, 1] that moves the commands nearest to `wanted` (8,)."""
         delta = np.clip(np.clip(wanted, 0.0, 1.0) - self.commanded, -0.49, 0.49)
-        wished = 2.0 * np.arctanh(2.0 * delta) / self._factor
-        action: NDArray[np.float32] = np.clip(wished, -1.0, 1.0).astype(np.float32)
+        unclamped = 2.0 * np.arctanh(2.0 * delta) / self._factor
+        action: NDArray[np.float32] = np.clip(unclamped, -1.0, 1.0).astype(np.float32)
         taken = action.astype(np.float64)
         self.commanded = changed_pressures(self.commanded, taken, factor=self._factor)
         return action

@@ -1,4 +1,4 @@
-"""Smooth motions of the joints: from the present motion into the strike, and to rest after it."""
+"""Smooth joint motions: from the present motion to the strike, and then to rest."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from o80.base.arrays import FloatArray
 
 @dataclass(frozen=True)
 class JointMotion:
-    """Angles, speeds and accelerations of the joints at one instant, each (4,)."""
+    """Angles, speeds and accelerations of the joints at one time, each (4,)."""
 
     q: FloatArray
     """[rad]"""
@@ -23,27 +23,27 @@ class JointMotion:
 
 @dataclass(frozen=True)
 class Swing:
-    """Polynomials of the fifth degree, one a joint, continued with their last speed."""
+    """Fifth-degree polynomial for each joint, continued at its final speed."""
 
     coefficients: FloatArray
     """(6, 4), of the powers of time"""
     duration: float
     """[s]"""
     gone: float = 0.0
-    """How much of it is over [s]."""
+    """Elapsed part of the duration [s]."""
 
     @classmethod
     def resting_at(cls, q: FloatArray) -> Swing:
-        """Stands still at q (4,) [rad]."""
+        """Makes a motion at rest at q (4,) [rad]."""
         coefficients = np.zeros((6, len(q)))
         coefficients[0] = q
         return cls(coefficients, duration=0.0)
 
     @classmethod
     def between(cls, start: JointMotion, end: JointMotion, duration: float) -> Swing:
-        """From `start` to `end` in `duration` [s]."""
+        """Makes a motion from `start` to `end` in `duration` [s]."""
         t = duration
-        # difference at the end if the motion of the start went on
+        # difference at the end to a continued start motion
         gap = end.q - (start.q + t * start.dq + 0.5 * t * t * start.ddq)
         gap_dq = t * (end.dq - start.dq - t * start.ddq)
         gap_ddq = t * t * (end.ddq - start.ddq)
@@ -62,11 +62,11 @@ class Swing:
         )
 
     def later(self, time: float) -> Swing:
-        """The same motion, seen `time` [s] later."""
+        """Returns the motion as seen `time` [s] later."""
         return replace(self, gone=self.gone + time)
 
     def at(self, time: float) -> JointMotion:
-        """In `time` [s] from now."""
+        """Returns angles, speeds and accelerations in `time` [s] from now."""
         time += self.gone
         t = min(time, self.duration)
         c = self.coefficients

@@ -1,4 +1,4 @@
-"""How an environment is shown in the browser, with `render_mode="human"`."""
+"""Shows an environment in the browser, for `render_mode="human"`."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ RENDER_MODES = ["human", "rgb_array"]
 
 
 class Page:
-    """`o80 view` of arm and worlds, in a process of its own; opened where there is a screen.
+    """Runs `o80 view` of arm and worlds, and opens the page if there is a screen.
 
-    An accelerated environment is slowed down to real time, so that its motion can be followed.
+    An accelerated environment is slowed down to real time.
     """
 
     def __init__(self, shown: list[o80.Frontend], step: float) -> None:
-        """step: duration of a step of an accelerated environment [s]; 0 by the clock."""
+        """step: duration of an accelerated environment's step [s]; 0: in real time."""
         from o80.view.browser import has_screen
 
         screen = has_screen()
@@ -28,7 +28,7 @@ class Page:
             complain(f"no screen found; the view is at {self._view.url}")
 
     def after_step(self) -> None:
-        """Waits until the step has taken as long as in real time."""
+        """Waits until the step has lasted as long as in real time."""
         if self._step:
             now = time.monotonic()
             time.sleep(max(0.0, self._due - now))

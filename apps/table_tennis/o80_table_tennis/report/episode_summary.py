@@ -1,4 +1,4 @@
-"""How an episode ended, as the environment tells it."""
+"""Summary of an episode, made by the environment."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..task.outcome import returned
 
 @dataclass(frozen=True)
 class EpisodeSummary:
-    """How an episode ended."""
+    """Result of an episode."""
 
     number: int
     """Number of the episode in its environment, from 0."""
@@ -21,19 +21,19 @@ class EpisodeSummary:
     """Number of the ball in its source; -1 for one given by the user."""
     steps: int
     reward: float
-    """Sum over the episode."""
+    """Sum of rewards over the episode."""
     touched: bool
-    """The racket has touched the ball."""
+    """Whether the racket has touched the ball."""
     returned: bool
-    """The ball then landed on the opponent's half, see `task.outcome`."""
+    """Whether the ball was returned to the opponent's half, see `task.outcome`."""
     landing: list[float] | None
-    """Where it first touched the table after the touch, on whichever half [m]; None: nowhere."""
+    """First contact with the table after the touch, on either half [m]; None: none."""
     speed: float
-    """Largest speed of the ball after the touch [m/s]; 0 without one."""
+    """Largest speed of the ball after the touch [m/s]; 0 without a touch."""
     terminated: bool
-    """Ended by the rule of the task; else truncated: by the number of steps, or as stalled."""
+    """Whether the task ended the episode; else truncated by the number of steps, or stalled."""
     end: str
-    """Why the episode ended."""
+    """Reason of the end."""
     arm_first: int
     """Iteration of the arm before the first step."""
     arm_last: int
@@ -43,7 +43,7 @@ class EpisodeSummary:
 
     @classmethod
     def of(cls, record: BallRecord, **others: Any) -> EpisodeSummary:
-        """Summary of what happened to the ball of one episode, and the `others` as they are."""
+        """Makes a summary from the record of a ball; `others` are copied."""
         return cls(
             touched=bool(record.touched),
             returned=bool(returned(record)),

@@ -1,8 +1,8 @@
-"""The episodes of a recorded environment: rows of arm and twin, and how they ended.
+"""Reads the episodes of a recorded environment: rows of arm and twin, and results.
 
 `o80.hybrid` marks environments and episodes. After each `episode_end` the environment adds a mark
-`table_tennis`: the EpisodeSummary, what was drawn, and all observations (1 + steps, M). These are
-in base64: as texts in JSON they would take a fifth of a fast step.
+`table_tennis`: the EpisodeSummary, the draws, and all observations (1 + steps, M), in base64,
+because JSON numbers would take a fifth of a fast step.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ MARK = "table_tennis"
 
 
 def settings_mark(rig: RigSettings, task: TaskSettings, epochs: Sequence[int]) -> dict[str, Any]:
-    """Options in the mark of an environment; epochs: of arm and twins."""
+    """Returns the options for the mark of an environment. epochs: of arm and twins."""
     told: dict[str, Any] = dict(vars(task)) | {"task": task.title}
     for name, each in told.items():
         if is_dataclass(each):
@@ -40,7 +40,7 @@ def settings_mark(rig: RigSettings, task: TaskSettings, epochs: Sequence[int]) -
 def mark_episode(
     recording: o80.Recording, summary: EpisodeSummary, observed: Sequence[Float32Array], **more: Any
 ) -> None:
-    """Marks an episode that has ended."""
+    """Marks an ended episode."""
     array = np.array(observed, "<f4")
     packed = {"shape": array.shape, "float32": base64.b64encode(array.tobytes()).decode()}
     recording.mark(MARK, **asdict(summary), **more, observations=packed)
@@ -48,13 +48,13 @@ def mark_episode(
 
 @dataclass(frozen=True, eq=False)
 class RecordedEpisode:
-    """A recorded episode. Its rows begin with the one before the first step."""
+    """Recorded episode; the first row precedes the first step."""
 
     summary: EpisodeSummary
     environment: Mapping[str, Any]
-    """Settings of its environment: `rig`, `task`."""
+    """Settings of the environment: `rig`, `task`."""
     begun: Mapping[str, Any]
-    """Values of the mark at its beginning: task, number, seed, options."""
+    """Values of the mark at the beginning: task, number, seed, options."""
     drawn: Mapping[str, Any]
     """Draws: goal, extra balls, seeds of arm and twin."""
     arm: o80.History
@@ -66,32 +66,32 @@ class RecordedEpisode:
     rewards: FloatArray
     """(steps,)"""
     observations: NDArray[np.float32]
-    """(1 + steps, M): the first one is that of the reset"""
+    """(1 + steps, M), from the reset on"""
 
     @property
     def period(self) -> float:
-        """Between two rows [s]."""
+        """Interval of rows [s]."""
         return 1.0 / float(self.environment["rig"]["frequency"])
 
     @property
     def pacing(self) -> str:
-        """How arm and twins ran: real time, processes or inline."""
+        """Pacing of arm and twins: real time, processes or inline."""
         return str(self.environment["rig"]["pacing"])
 
     @property
     def times(self) -> FloatArray:
-        """(T,) since the beginning of the episode [s]."""
+        """Times (T,) since the beginning of the episode [s]."""
         times: FloatArray = (self.arm.iteration - self.arm.iteration[0]) * self.period
         return times
 
     @property
     def balls(self) -> FloatArray:
-        """(T, B, 3), world frame [m]; the first one is played."""
+        """Balls (T, B, 3), world frame [m]; the first one is played."""
         return np.asarray(self.twin.observed.balls["position"])
 
 
 def recorded_episodes(path: Path | str) -> list[RecordedEpisode]:
-    """All episodes that came to an end, in their order.
+    """Reads all ended episodes, in order.
 
     Raises o80.RecordingError if rows of an episode are missing, or another task marked episodes.
     """

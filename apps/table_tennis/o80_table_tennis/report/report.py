@@ -1,4 +1,4 @@
-"""The figures of episodes that were played, and tables of them."""
+"""Figures of played episodes, and tables of figures."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ LABELS = {
     "arm_lateness_us": "arm late by at most, {} % of rows [us]",
     "arm_jitter_us": "arm period off by, {} % of rows [us]",
 }
-"""By the names of the figures; those of percentiles end in "_p" and the percentage."""
-SHARES = ("touched", "returned", "returned_95_percent")  #: where they are no counts
+"""Labels by figure name; names of percentiles end in "_p" and the percentage."""
+SHARES = ("touched", "returned", "returned_95_percent")  #: shown as percents unless they are counts
 
 
 def print_table(console: Console, title: str, columns: Mapping[str, Mapping[str, Any]]) -> None:
-    """A row for each figure that has a label."""
+    """Prints a row for each figure with a label."""
     grid = Grid(title=title, title_justify="left")
     grid.add_column("")
     for name in columns:
@@ -71,7 +71,7 @@ def _text(key: str, value: Any) -> str:
 
 
 def mode_figures(played: Played, recorded: int) -> Figures:
-    """All figures of one mode; recorded: episodes in its recording."""
+    """Collects all figures of a mode. recorded: number of recorded episodes."""
     statistics = played.statistics
     figures: Figures = {
         "episodes": len(played.episodes),

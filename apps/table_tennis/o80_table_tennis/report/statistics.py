@@ -1,4 +1,4 @@
-"""Rates and lateness of an environment, and episodes that were played."""
+"""Rates and lateness of an environment, and results of played episodes."""
 
 from __future__ import annotations
 
@@ -25,53 +25,53 @@ class EpisodeCounts:
 
     episodes: int = 0
     seconds: float = 0.0
-    """In episodes, from the first step to the last, the caller's own time included."""
+    """Time in episodes, from the first step to the last, with the caller's time."""
     seconds_stepping: float = 0.0
-    """In steps, the caller's own time left out."""
+    """Time in steps, without the caller's time."""
     stalled_episodes: int = 0
 
 
 @dataclass(frozen=True)
 class Statistics:
-    """Rates and lateness since an environment was made."""
+    """Rates and lateness of an environment since its start."""
 
     episodes: int
     steps: int
     steps_per_second: float
-    """While an episode was played, the caller's own time (its policy) included [1/s]."""
+    """Rate during episodes, with the caller's time, such as its policy's [1/s]."""
     bare_steps_per_second: float
-    """Without the caller's own time, as for a policy that needs no time [1/s]."""
+    """Rate without the caller's time, as for a policy that takes no time [1/s]."""
     step_seconds: float
-    """How long a step takes in real time [s]."""
+    """Duration of a step in real time [s]."""
     late_actions: int
-    """Actions that came after the iteration for which they were meant, and acted at once; rows of
-    chunks that were skipped instead."""
+    """Number of actions that were sent after their iteration and acted at once, or of rows of
+    chunks that were skipped."""
     starved_iterations: int
-    """Iterations of the arm, within episodes, for which no chunk had a row."""
+    """Number of the arm's iterations, within episodes, for which no chunk had a row."""
     stalled_episodes: int
     mean_lateness: float
-    """Rows of the arm that were newer than the one observed when a step began; real time only."""
+    """Mean number of rows newer than the observed one when a step began; real time only."""
     largest_lateness: int
     """[rows]"""
     arm_iterations: int
-    """All that the arm has made."""
+    """Number of the arm's iterations."""
     arm_rate: float
-    """Iterations of the arm a second of its own clock [1/s]."""
+    """Iterations of the arm per second of its own clock [1/s]."""
     arm_overruns: int
     arm_skipped: int
-    """Periods that the arm left out to catch up."""
+    """Number of periods that the arm skipped to catch up."""
     arm_lateness_us: FloatArray = field(repr=False)
-    """(T,) how late each iteration began, as far back as the history goes [us]; real time only."""
+    """(T,) lateness of each iteration in the history [us]; real time only."""
     arm_periods_us: FloatArray = field(repr=False)
-    """(T - 1,) between the times of neighbouring rows [us]; real time only."""
+    """(T - 1,) intervals of rows [us]; real time only."""
 
 
 def statistics_of(
     counts: EpisodeCounts, of_rig: Counts, arm: o80.Frontend, *, step_seconds: float, rows: int = 1
 ) -> Statistics:
-    """From the counts of an environment and of its rig, and the history of the arm.
+    """Computes the statistics from counts of environment and rig, and the arm's history.
 
-    rows: of a chunk in a step of the rig.
+    rows: number of a chunk's rows in a step of the rig.
     """
     steps, history = of_rig.steps * rows, arm.history()
     seconds = float(history.time[-1] - history.time[0]) * 1e-9
@@ -103,36 +103,36 @@ class Played:
     episodes: Sequence[EpisodeSummary]
     statistics: Statistics
     seconds: float
-    """From the first reset to the last step."""
+    """Time from the first reset to the last step."""
 
     @property
     def touches(self) -> int:
-        """Episodes in which the racket met the ball."""
+        """Number of episodes in which the racket touched the ball."""
         return sum(episode.touched for episode in self.episodes)
 
     @property
     def returns(self) -> int:
-        """Episodes in which the ball was returned, see `task.outcome`."""
+        """Number of episodes in which the ball was returned, see `task.outcome`."""
         return sum(episode.returned for episode in self.episodes)
 
     @property
     def touched(self) -> float:
-        """Share of the balls."""
+        """Share of all balls."""
         return self.touches / max(1, len(self.episodes))
 
     @property
     def returned(self) -> float:
-        """Share of the balls."""
+        """Share of all balls."""
         return self.returns / max(1, len(self.episodes))
 
     @property
     def reward(self) -> float:
-        """Mean of an episode."""
+        """Mean reward of an episode."""
         return float(np.mean([episode.reward for episode in self.episodes]))
 
     @property
     def speed(self) -> float:
-        """Median of the largest speeds of the returned balls after the touch [m/s]; NaN without."""
+        """Median of the returned balls' largest speeds after the touch [m/s]; NaN without any."""
         speeds = [episode.speed for episode in self.episodes if episode.returned]
         return float(np.median(speeds)) if speeds else math.nan
 
@@ -144,7 +144,7 @@ class Played:
         return float(np.median(apart)) if apart else math.nan
 
     def as_json(self) -> dict[str, Any]:
-        """The figures; `returned_95_percent` is Wilson's interval."""
+        """Returns the figures; `returned_95_percent` is Wilson's interval."""
         interval = wilson(self.returns, len(self.episodes))
         return {
             "balls": len(self.episodes),

@@ -1,1 +1,1 @@
-"""The arm and the simulated twins that mirror it, with their balls, in three ways of pacing."""
+"""The arm and the simulated twins that mirror it, with their balls, with three pacings."""

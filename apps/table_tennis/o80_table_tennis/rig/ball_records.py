@@ -1,6 +1,6 @@
-"""The balls of a twin: the options that describe them, and the records that it publishes of each.
+"""Balls of a twin: their options, and their published records.
 
-No other module knows how the simulator names what happens to a ball.
+Only this module uses the simulator's names of contacts.
 """
 
 from __future__ import annotations
@@ -22,18 +22,18 @@ from ..world.materials import (
 )
 
 FAR = 1e9
-"""[m]"""
+"""Bound that no ball reaches [m]."""
 SURFACES = {
     "racket": RACKET_RESTITUTION,
     "table": TABLE_RESTITUTION,
     "net": NET_RESTITUTION,
     "floor": FLOOR_RESTITUTION,
 }
-"""Surfaces that balls bounce on, by the names of geoms; to the simulator they are all alike."""
+"""Restitutions of surfaces by the names of geoms."""
 
 
 def ball_options() -> dict[str, Any]:
-    """Options of the simulator for the ball, for the air, and for what it bounces on."""
+    """Returns the simulator's options of ball, air and surfaces."""
     return {
         "balls": "ball",
         "surfaces": [f"{geom}={restitution.text}" for geom, restitution in SURFACES.items()],
@@ -48,8 +48,8 @@ def ball_options() -> dict[str, Any]:
 
 
 def fly_out_fields(*, every: int, passed_y: float) -> dict[str, Any]:
-    """Fields of the request `fly_out` of a twin: its first ball flies until it has bounced off
-    table, net or floor, or has passed y [m], both looked at every `every` iterations.
+    """Returns the fields of the request `fly_out`: the first ball flies until it has bounced off
+    table, net or floor, or has passed y [m], both checked every `every` iterations.
     """
     return {"every": every, "low": (-FAR, passed_y, -FAR)}
 
@@ -60,15 +60,15 @@ FLAGS = {
     "met_net": ("net", "count", ">", 0),
     "touched_floor": ("floor", "count", ">", 0),
 }
-"""Flags of a ball: a surface and what its record says, compared with a number.
+"""Flags of a ball: surface, field of its record, comparison and number.
 
-The iteration is that of the first touch after the racket's, or -1.
+`iteration`: of the first contact after the racket's, or -1.
 """
 COMPARE = {">": np.greater, ">=": np.greater_equal}
 
 
 def event_flags() -> dict[str, Any]:
-    """The flags of the first ball of each row, for `InlineGroup.gather`."""
+    """Returns the flags of the first ball of each row, for `InlineGroup.gather`."""
     return {
         name: (f"extended.contacts[0].{surface}.{number}", compare, value)
         for name, (surface, number, compare, value) in FLAGS.items()
@@ -76,12 +76,12 @@ def event_flags() -> dict[str, Any]:
 
 
 class BallRecords:
-    """The records (N,) of N balls, an array that is filled anew for each reading."""
+    """Records of N balls, views of an array (N,) that each step overwrites."""
 
     def __init__(
         self, records: NDArray[Any], flags: Mapping[str, NDArray[np.bool_]] | None = None
     ) -> None:
-        """flags: those of `event_flags`, filled anew at the same time; None: `read` does so."""
+        """flags: of `event_flags`, overwritten in each step, too; None: `read` computes them."""
         self._compared: list[Any] = []
         if flags is None:
             flags = {name: np.zeros(len(records), np.bool_) for name in FLAGS}
@@ -91,8 +91,8 @@ class BallRecords:
         racket, table, net = records["racket"], records["table"], records["net"]
         self._landed_at, self._net_at = table["iteration"], net["iteration"]
         self._landed, self._met_net = flags["landed"], flags["met_net"]
-        self._nobody = np.zeros(len(records), np.bool_)
-        self._nobody.flags.writeable = False
+        self._all_false = np.zeros(len(records), np.bool_)
+        self._all_false.flags.writeable = False
         self._record = BallRecord(
             racket["smallest_distance"],
             flags["touched"],
@@ -100,14 +100,14 @@ class BallRecords:
             racket["largest_speed"],
             flags["landed"],
             table["position"],
-            self._nobody,
+            self._all_false,
             flags["touched_floor"],
             net["position"],
             records["floor"]["position"],
         )
 
     def read(self) -> BallRecord:
-        """Reads what has happened to the balls; all arrays but `touched_net` are views."""
+        """Reads the records; all arrays but `touched_net` are views."""
         record = self._record
         for compare, numbers, value, flag in self._compared:
             compare(numbers, value, out=flag)
@@ -115,5 +115,5 @@ class BallRecords:
             late = self._landed & (self._landed_at < self._net_at)
             record.touched_net = self._met_net & ~late
         else:
-            record.touched_net = self._nobody
+            record.touched_net = self._all_false
         return record

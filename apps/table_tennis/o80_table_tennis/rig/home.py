@@ -1,4 +1,4 @@
-"""Where episodes begin, and how an arm that runs by its clock comes back there."""
+"""Start of episodes, and the return of a real-time arm to it."""
 
 from __future__ import annotations
 
@@ -18,17 +18,17 @@ from .rig import MOTION
 RETURN_SECONDS = 0.6
 """Duration of the return to the start pressures [s]."""
 LONGEST_RETURN = 4.0
-"""After this the episode begins from wherever the arm stands [s]."""
+"""Timeout of the return; then the episode begins at the arm's present position [s]."""
 SETTLED_SPEED = 0.02
-"""Below this speed of every joint the arm stands [rad/s]."""
+"""Speed of each joint below which the arm is at rest [rad/s]."""
 SETTLED_ANGLE = 0.05
-"""The arm is back where it started when every joint is this near [rad]."""
+"""Tolerance of each joint at the start [rad]."""
 TIMEOUT = 5.0
 """Longest wait for a row [s]."""
 
 
 class Home:
-    """The start of an arm: where it stands when this is made."""
+    """Start of an arm: its position when this object is created."""
 
     def __init__(self, arm: o80.Frontend) -> None:
         self._arm = arm
@@ -39,26 +39,26 @@ class Home:
         """(4,) [rad]"""
 
     def of(self, arm: o80.Frontend) -> Home:
-        """The same place for another arm."""
+        """Returns the same start for another arm."""
         other = copy(self)
         other._arm = arm
         return other
 
     def go(self) -> None:
-        """To the start by commands, as a real arm must."""
+        """Moves the arm to the start by commands, as necessary for a real arm."""
         self.begin().wait(timeout=RETURN_SECONDS + TIMEOUT)
         end = time.monotonic() + LONGEST_RETURN
         while time.monotonic() < end and not self.reached:
             self._arm.wait_for(self._arm.published + 10 * ITERATIONS, timeout=TIMEOUT)
 
     def begin(self) -> o80.Batch:
-        """Sends the pressures back to those of the start, and does not wait."""
+        """Sends a motion to the start pressures, without waiting."""
         self._arm.add_command(None, self.pressures, duration=RETURN_SECONDS, mode="overwrite")
         return self._arm.pulse()
 
     @property
     def reached(self) -> bool:
-        """In its newest row the arm stands where it started, and is asked to."""
+        """Whether the arm is at rest at the start, with the start pressures desired."""
         row = self._arm.history(1).rows
         motion = field_view(row, *MOTION)[0]
         still = np.abs(motion[JOINTS:]).max() < SETTLED_SPEED

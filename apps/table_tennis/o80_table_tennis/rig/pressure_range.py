@@ -1,4 +1,4 @@
-"""The range of each muscle's pressure, as the arm describes it."""
+"""Range of each muscle's pressure, from the arm's description."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from o80.base.arrays import FloatArray
 
 
 class PressureRange:
-    """The least and the most raw pressure (8,) of each muscle."""
+    """Least and largest raw pressure (8,) of each muscle."""
 
     def __init__(self, least: Sequence[float], most: Sequence[float]) -> None:
         self.least: FloatArray = np.array(least, dtype=np.float64)
         self._span: FloatArray = np.array(most, dtype=np.float64) - self.least
         self.scale: FloatArray = 1.0 / self._span
-        """(8,) normalised pressures are (raw - least) * scale."""
+        """(8,) factor: normalised pressures are (raw - least) * scale."""
 
     @classmethod
     def of(cls, frontend: o80.Frontend) -> PressureRange:
-        """The limits of the actuators of an arm, as its driver describes them."""
+        """Reads the limits of an arm's actuators."""
         muscles = frontend.actuators
         return cls([m.minimum for m in muscles], [m.maximum for m in muscles])
 
@@ -31,10 +31,10 @@ class PressureRange:
         return self.least + self._span
 
     def raw(self, normalised: FloatArray, *, out: FloatArray | None = None) -> FloatArray:
-        """Whole raw pressures (..., 8) of normalised ones in [0, 1]; fresh, or `out`."""
+        """Converts normalised pressures in [0, 1] to whole raw ones (..., 8); fresh, or `out`."""
         return np.rint(self.least + normalised * self._span, out)
 
     def normalised(self, raw: FloatArray, *, out: FloatArray | None = None) -> FloatArray:
-        """Normalised pressures (..., 8) of raw ones; not clipped; fresh, or `out`."""
+        """Converts raw pressures to normalised ones (..., 8), not clipped; fresh, or `out`."""
         above = np.subtract(raw, self.least, out)
         return np.multiply(above, self.scale, above)

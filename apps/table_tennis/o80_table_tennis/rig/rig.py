@@ -1,4 +1,4 @@
-"""The arm and the worlds that mirror it, as a rig of o80.hybrid."""
+"""The arm and its mirroring worlds, as a rig of o80.hybrid."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from ..world.timing import ITERATIONS
 from .ball_records import ball_options
 
 MOTION = ("extended.joint_positions", "extended.joint_velocities")
-"""Fields of a row with the angles [rad] and velocities [rad/s] of the joints, side by side."""
+"""Adjacent fields of a row: angles [rad] and velocities [rad/s] of the joints."""
 LANE_BLOCKS = 2048
-"""Blocks of 64 bytes in a lane of a copied world: the states of a recorded flight are one batch."""
+"""Size of a copied world's lane [64 bytes]: a recorded flight is sent in one batch."""
 
 
 def arm_options(settings: RigSettings) -> dict[str, Any]:
-    """Options of the pneumatic arm."""
+    """Returns the options of the pneumatic arm."""
     return {
         "preset": settings.preset,
         "muscle": settings.muscle,
@@ -34,14 +34,14 @@ def arm_options(settings: RigSettings) -> dict[str, Any]:
 
 
 def world_options(settings: RigSettings) -> dict[str, Any]:
-    """Options of the simulation of arm, table and ball."""
+    """Returns the options of the simulation of arm, table and ball."""
     return {"model": str(MODEL), "timestep": settings.period, **ball_options()}
 
 
 def rig_of(settings: RigSettings, *, delay: int, group: bool) -> Rig:
-    """The rig of these settings; group: of copies, or with several worlds.
+    """Makes the rig of these settings. group: for copies, or several worlds.
 
-    Raises ValueError for a running robot that is not such an arm.
+    Raises ValueError if the running robot is another arm.
     """
     arm, world = arm_options(settings), world_options(settings)
     if settings.history is not None:
@@ -66,7 +66,7 @@ def rig_of(settings: RigSettings, *, delay: int, group: bool) -> Rig:
 
 
 def _check_arm(settings: RigSettings) -> None:
-    """Raises ValueError for another robot than the arm of these settings."""
+    """Raises ValueError if the running robot is not the arm of these settings."""
     segment = str(settings.arm_segment)
     with o80.Frontend(segment) as frontend:
         actuators, period = len(frontend.actuators), frontend.period

@@ -1,4 +1,4 @@
-"""The newest rows of arms and of their worlds, as the task reads them."""
+"""Newest rows of arms and worlds, with names for the task."""
 
 from __future__ import annotations
 
@@ -20,21 +20,21 @@ from .pressure_range import PressureRange
 from .rig import MOTION
 
 SEEN_NUMBERS = 6
-"""Position and velocity: what is observed of a ball."""
+"""Observed numbers of a ball: position and velocity."""
 
 
 class RigRows:
-    """Views of the newest rows (N,) of arms and (N, worlds) of worlds, that each step fills.
+    """Views of the newest rows (N,) of arms and (N, worlds) of worlds, overwritten by each step.
 
-    Arrays of all balls have the worlds of the first arm first.
+    Arrays of all balls begin with the worlds of the first arm.
     """
 
     def __init__(
         self, arms: NDArray[Any], worlds: NDArray[Any], arm: o80.Frontend, world: o80.Frontend
     ) -> None:
-        """arm, world: frontends of the first ones."""
+        """arm, world: frontends of the first arm and world."""
         self.ball = world.actuators[JOINTS].name
-        """Name of the actuator that is the ball."""
+        """Name of the ball's actuator."""
         self.range = PressureRange.of(arm)
         """Range of the raw pressures."""
         self.motion: FloatArray = field_view(arms, *MOTION)
@@ -42,16 +42,16 @@ class RigRows:
         self.racket: FloatArray = field_view(arms, "extended.racket_position")
         """(N, 3) [m]"""
         self.desired, self.observed = arms["desired"], arms["observed"]
-        """(N, 8) raw pressures that were asked for, and those in the muscles."""
+        """(N, 8) raw pressures: desired, and in the muscles."""
         flat = worlds.reshape(-1)
         self._iteration = flat["iteration"][:1]
         self.balls: FloatArray = field_view(flat, "observed.balls")[:, :SEEN_NUMBERS]
         """(N * worlds, 6) position [m] and velocity [m/s]"""
         assert np.shares_memory(self.balls, worlds)
         self.records: NDArray[Any] = flat["extended"]["contacts"][:, 0]
-        """(N * worlds,) what has happened to each ball, as the simulator has it."""
+        """(N * worlds,) contacts of each ball, in the simulator's form."""
         self.read_records: Callable[[], BallRecord] = BallRecords(self.records).read
-        """Record of what has happened to each ball."""
+        """Reads the records of all balls."""
         self._muscles = [actuator.name for actuator in arm.actuators]
 
     @property
@@ -65,10 +65,10 @@ class RigRows:
         worlds: o80.InlineGroup,
         bounds: tuple[Float32Array, Float32Array] | None,
     ) -> list[Float32Array]:
-        """C++ reads what happens to the balls from now on, in each step and reset.
+        """Makes C++ gather the balls' flags in each step and reset.
 
-        bounds: least and largest observation (22,) of ball play; then it fills in the parts
-        (N, ...) that this returns, too.
+        bounds: least and largest observation (22,) of ball play; if given, C++ also fills the
+        returned parts (N, ...) of the observation.
         """
         numbers: list[o80.Gathered] = []
         gathered: list[Float32Array] = []
@@ -78,8 +78,8 @@ class RigRows:
             paths += [f"observed.{name}" for name in self._muscles]
             offsets = [0.0] * (2 * JOINTS) + self.range.least.tolist()
             scales = [1.0] * (2 * JOINTS) + self.range.scale.tolist()
-            its = zip(paths, offsets, scales, clips[: PRESSURES.stop], strict=True)
-            gathered.append(arms.gather([o80.Gathered(*each) for each in its]).observations)
+            columns = zip(paths, offsets, scales, clips[: PRESSURES.stop], strict=True)
+            gathered.append(arms.gather([o80.Gathered(*each) for each in columns]).observations)
             parts = ("position", "velocity")
             paths = [f"observed.{self.ball}.{part}[{axis}]" for part in parts for axis in range(3)]
             ball = zip(paths, clips[BALL_POSITION.start : SIZE], strict=True)

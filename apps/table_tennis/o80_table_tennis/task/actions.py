@@ -1,7 +1,7 @@
 """Actions: small changes of eight muscle pressures.
 
-The order of the muscles is that of the arm: agonist and antagonist of joint 1, of joint 2, and so
-on. Normalised pressures run from 0 (the least of the muscle's range) to 1 (the most).
+Muscles are in the arm's order: agonist and antagonist of joint 1, of joint 2, and so
+on. Normalised pressures are from 0 (least of the muscle's range) to 1 (largest).
 """
 
 from __future__ import annotations
@@ -26,23 +26,23 @@ _MINUS_ONES = -_ONES
 
 
 def largest_change(factor: float) -> float:
-    """Largest change of a normalised pressure by one action."""
+    """Returns the largest change of a normalised pressure by one action."""
     return 0.5 * math.tanh(0.5 * factor)
 
 
 def changed_pressures(
     pressures: FloatArray, action: NDArray[np.floating[Any]], *, factor: float = FINE
 ) -> FloatArray:
-    """Normalised pressures (..., 8) after actions (..., 8) in [-1, 1]; clipped to [0, 1], fresh.
+    """Applies actions (..., 8) in [-1, 1] to normalised pressures; clamps to [0, 1]; a fresh array.
 
     delta = sigmoid(factor * action) - 1/2, as published, which is tanh(factor * action / 2) / 2.
-    Raises ValueError for a wrong shape or a number that is not finite; an action outside of
-    [-1, 1] is clipped.
+    Raises ValueError for a wrong shape or a number that is not finite; actions outside of
+    [-1, 1] are clamped.
     """
     action = np.asarray(action, dtype=np.float64)
     if action.shape != pressures.shape:
         raise ValueError(f"an action must have shape {pressures.shape}, got {action.shape}")
-    # the square of a number that is not finite is not finite either; that of a large one neither
+    # the sum of squares is finite only if all numbers are, and not too large
     if not math.isfinite(np.vdot(action, action)) and not np.isfinite(action).all():
         raise ValueError(f"an action must be finite, got {action}")
     changed: FloatArray = np.minimum(np.maximum(action, _MINUS_ONES), _ONES)

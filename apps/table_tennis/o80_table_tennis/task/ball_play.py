@@ -1,8 +1,8 @@
-"""The named tasks: return the ball to the target, or smash it there.
+"""Named tasks: return the ball to the target, or smash it there.
 
-They share the observation of 22 numbers and the end of an episode, and differ in the reward, which
-is paid in the last step. An episode that is truncated is paid nothing: its value is for the learner
-to estimate. The goal of an episode is the target on the table.
+Both have the observation of 22 numbers and the same end of an episode, but different rewards,
+which are paid in the last step. A truncated episode has no reward: the learner estimates its
+value. The goal of an episode is the target on the table.
 """
 
 from __future__ import annotations
@@ -24,11 +24,11 @@ from .state import State
 
 @dataclass(frozen=True)
 class ReturnTask:
-    """The ball should land on the target.
+    """Task: the ball should land on the target.
 
-    A task of your own is an object with the same members (`MEMBERS`), derived from this class or
+    Your own task is an object with the same members (`MEMBERS`), derived from this class or
     not, for `TaskSettings(task=...)`. The environment moves arm and ball; the task defines
-    observation, reward and end. Each method takes the `State` of N episodes, and returns as many
+    observation, reward and end. Each method takes the `State` of N episodes and returns N
     results: a single environment has one episode, a vector environment many.
     """
 
@@ -38,48 +38,48 @@ class ReturnTask:
 
     @property
     def low(self) -> Float32Array:
-        """(22,)"""
+        """Least observation (22,)."""
         return self.bounds.low
 
     @property
     def high(self) -> Float32Array:
-        """(22,)"""
+        """Largest observation (22,)."""
         return self.bounds.high
 
     def begin(self, rng: np.random.Generator) -> FloatArray:
-        """Goal (G,) of a new episode: the target (3,) on the table [m], always the same one.
+        """Returns the goal (G,) of a new episode: the fixed target (3,) on the table [m].
 
-        A task that draws its goal draws from `rng` only.
+        A task with random goals draws from `rng` only.
         """
         return np.array(self.pay.target)
 
     def observe(self, state: State) -> FloatArray:
-        """(..., 22) fresh, see `observations`; the environment clips them into the bounds."""
+        """Returns observations (..., 22), fresh, see `observations`; the caller clamps them."""
         return observe_ball(state)
 
     def eventful(self, state: State) -> Any:
-        """(...) whether the episode has ended; of other tasks also whether the step is paid.
+        """Flags (...) of ended episodes; for other tasks also of steps with a reward.
 
-        Cheap: it is called after every step, `end` and `reward` only where it is true.
+        Cheap, because called after every step; `end` and `reward` are called for flagged episodes.
         """
         return self.rule.ended(state.record, state.ball[..., 1], state.steps)
 
     def end(self, state: State) -> NDArray[np.int64]:
-        """(...) numbers of `End`: RUNNING, or why the episode has ended."""
+        """Returns numbers (...) of `End`: RUNNING, or the reason of the end."""
         return self.rule.judge(state.record, state.ball[..., 1], state.steps)
 
     def reward(self, state: State) -> FloatArray:
-        """(...) reward of an episode that ends in this state; 0 if it is truncated or goes on."""
+        """Returns rewards (...) of this state; 0 for truncated and running episodes."""
         return np.where(terminated(self.end(state)), self.worth(state), 0.0)
 
     def worth(self, state: State) -> FloatArray:
-        """(...) of an episode that an event ends in this state."""
+        """Returns rewards (...) of episodes that an event ends in this state."""
         return self.pay.returned(state)
 
     def info(self, state: State) -> dict[str, Any]:
-        """`touched`, `returned`, `landing` and `distance`: see `outcome`; `speed`, the largest one
-        of the ball since the touch [m/s] (0 before); `smallest_distance` of the surfaces of ball
-        and racket so far [m].
+        """Returns `touched`, `returned`, `landing`, `distance`, see `outcome`; `speed`, the ball's
+        largest speed since the touch [m/s] (0 before); `smallest_distance` between the surfaces of
+        ball and racket so far [m].
         """
         info = outcome(state.record, state.goal)
         info["speed"] = state.record.largest_speed
@@ -91,19 +91,19 @@ MEMBERS = ("low", "high", "begin", "observe", "eventful", "end", "reward", "info
 
 
 def missing_members(task: object) -> list[str]:
-    """Members that an object lacks to be a task."""
+    """Lists the members of a task that an object lacks."""
     return [name for name in MEMBERS if not hasattr(task, name)]
 
 
 def observes_as_published(task: object) -> bool:
-    """Whether a task observes the 22 numbers, and nothing of its own."""
+    """Whether a task observes the 22 published numbers."""
     return getattr(type(task), "observe", None) is ReturnTask.observe
 
 
 @dataclass(frozen=True)
 class SmashTask(ReturnTask):
-    """The ball should land on the target, and be fast."""
+    """Task: the ball should land on the target, and be fast."""
 
     def worth(self, state: State) -> FloatArray:
-        """(...) of an episode that an event ends in this state."""
+        """Returns rewards (...) of episodes that an event ends in this state."""
         return self.pay.smashed(state)

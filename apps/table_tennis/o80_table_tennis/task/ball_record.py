@@ -1,4 +1,4 @@
-"""Record of what has happened to a ball in an episode, or to many balls in theirs."""
+"""Record of a ball's contacts in an episode, or of many balls in many episodes."""
 
 from __future__ import annotations
 
@@ -18,28 +18,28 @@ NOWHERE = (0.0, 0.0, 0.0)
 
 @dataclass(slots=True)
 class BallRecord:
-    """Since the episode began. Of one ball: Python numbers; of many: arrays, shapes (...)."""
+    """Contacts since the episode began. One ball: Python numbers; many: arrays, shapes (...)."""
 
     smallest_distance: Numbers
-    """Smallest distance of the surfaces of ball and racket so far [m]."""
+    """Smallest distance between the surfaces of ball and racket so far [m]."""
     touched: Flags = False
-    """The racket has touched the ball."""
+    """Whether the racket has touched the ball."""
     velocity_after: Vectors = NOWHERE
-    """(..., 3) of the ball after that touch [m/s]."""
+    """(..., 3) velocity of the ball after the touch [m/s]."""
     largest_speed: Numbers = 0.0
-    """Largest speed of the ball since that touch [m/s]."""
+    """Largest speed of the ball since the touch [m/s]."""
     landed: Flags = False
-    """The ball has touched the table after the touch; bounces before it do not count."""
+    """Whether the ball has touched the table after the touch; earlier bounces do not count."""
     landing: Vectors = NOWHERE
-    """(..., 3) where it did, if it did [m]."""
+    """(..., 3) place of the landing, if any [m]."""
     touched_net: Flags = False
-    """The ball has touched the net, and not the table between racket and net."""
+    """Whether the ball has touched the net, without touching the table between racket and net."""
     touched_floor: Flags = False
     net_position: Vectors = NOWHERE
-    """(..., 3) where it touched the net after the touch of the racket, if it did [m]."""
+    """(..., 3) place of the contact with the net after the touch, if any [m]."""
     floor_position: Vectors = NOWHERE
-    """(..., 3) of the floor alike [m]."""
+    """(..., 3) place of the contact with the floor after the touch, if any [m]."""
 
     def at(self, index: Any) -> BallRecord:
-        """The records of some of many balls, by an index or a mask."""
+        """Selects the records of some balls by an index or a mask."""
         return BallRecord(*(np.asarray(getattr(self, name))[index] for name in self.__slots__))

@@ -1,4 +1,4 @@
-"""When an episode of ball play ends, and why."""
+"""Ends of episodes of ball play, and their reasons."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_STEPS = 300
 
 
 class End(IntEnum):
-    """Why an episode ended. Arrays hold these numbers."""
+    """Reason of an episode's end; arrays hold its number."""
 
     RUNNING = 0
     RETURNED = 1
@@ -31,54 +31,54 @@ class End(IntEnum):
     GOAL = 6
     """The goal of the task is reached."""
     OWN_HALF = 7
-    """The ball landed first on the player's own half after the touch."""
+    """The ball first landed on the player's own half after the touch."""
     TABLE_SIDE = 8
-    """The ball met a side of the table after the touch, not its top."""
+    """The ball hit a side of the table after the touch, not the top."""
     STALLED = 9
-    """Real time: the caller paused for so long that the episode was given up."""
+    """Real time: the caller was too late."""
     HALTED = 10
-    """The arm or a twin was halted: why is in `info["halt"]`."""
+    """The arm or a twin was halted; `info["halt"]` has the reason."""
 
     def __init__(self, number: int) -> None:
         self.text = self.name.lower().replace("_", " ")
-        """As in `info["end_text"]`: "out of steps"."""
+        """Text in `info["end_text"]`, such as "out of steps"."""
 
     @property
     def terminated(self) -> bool:
-        """Ended by an event."""
+        """Whether an event ended the episode."""
         return self is not End.RUNNING and not self.truncated
 
     @property
     def truncated(self) -> bool:
-        """Ended by the number of steps, or stalled."""
+        """Whether the number of steps ended the episode, or the caller stalled."""
         return self in (End.OUT_OF_STEPS, End.STALLED)
 
 
 BY_EVENT = np.array([end.terminated for end in End])
-"""Whether an event ended the episode, for each end by its number."""
-# plain numbers: NumPy takes ten times as long to read a member of an IntEnum
+"""Whether each end, by number, is by an event."""
+# plain numbers: NumPy reads members of an IntEnum ten times as slowly
 _RUNNING, _RETURNED, _NET, _FLOOR, _PASSED, _OUT_OF_STEPS = map(int, list(End)[:6])
 _OWN_HALF, _TABLE_SIDE = int(End.OWN_HALF), int(End.TABLE_SIDE)
 
 
 def terminated(ends: Any) -> Any:
-    """(...) whether numbers of `End` are ends by an event: only these are paid by a named task."""
+    """Flags (...) of numbers of `End` that are ends by an event: only these have a reward."""
     return BY_EVENT[np.asarray(ends)]
 
 
 @dataclass(frozen=True)
 class EndRule:
-    """The limits of an episode."""
+    """Limits of an episode."""
 
     passed_y: float = -0.8
-    """A ball nearer to the wall behind the arm than this has passed it [m]."""
+    """Largest y of a ball that has passed the arm [m]."""
     max_steps: int = MAX_STEPS
-    """Steps of the environment after which an episode is truncated."""
+    """Number of steps after which an episode is truncated."""
 
     def ended(self, record: BallRecord, y: Numbers, steps: int | IntArray) -> Any:
-        """(...) whether any reason holds, for balls at `y` [m] after so many steps.
+        """Flags (...) of ended episodes, for balls at `y` [m] after `steps`.
 
-        Cheap: it is asked after every step. `judge` says which one.
+        Cheap, because called after every step. `judge` finds the reason.
         """
         return (
             record.landed
@@ -89,8 +89,8 @@ class EndRule:
         )
 
     def judge(self, record: BallRecord, y: Numbers, steps: int | IntArray) -> IntArray:
-        """(...) the first reason that holds, as numbers of `End`."""
-        # the first reasons last: they replace the others
+        """Returns the first valid reason (...), as numbers of `End`."""
+        # in reverse order, so that the first reasons replace the others
         ends = np.where(steps >= self.max_steps, _OUT_OF_STEPS, _RUNNING)
         ends = np.where(y < self.passed_y, _PASSED, ends)
         ends = np.where(record.touched_floor, _FLOOR, ends)

@@ -1,7 +1,7 @@
-"""The observation `full`: all that decides what happens next, also with dead time and noise.
+"""The observation `full`: a Markov state also with dead time and noise.
 
-Beside the arm and the pressures it holds what was asked for lately, which has not acted yet, and an
-estimate of the ball with its spin and with where it will go through the plane of the racket. All
+Contains the arm, the pressures, recent commands that have not acted yet, and an estimate of
+the ball with its spin and its predicted crossing of the racket's plane. All
 numbers are scaled to about -1 to 1.
 """
 
@@ -19,7 +19,7 @@ from ..world.arm import MUSCLES
 
 
 class Part(NamedTuple):
-    """Some numbers of the observation: (number - centre) / scale, within plus or minus `bound`."""
+    """Part of the observation: (number - centre) / scale, clamped to plus or minus `bound`."""
 
     name: str
     centres: tuple[float, ...]
@@ -29,13 +29,13 @@ class Part(NamedTuple):
 
 @dataclass(frozen=True)
 class FullObservation:
-    """Content and scaling of `full`: `parts` names everything in its order."""
+    """Content and scaling of `full`; `parts` lists all numbers in order."""
 
     changes: int = 4
-    """How many of the last changes of the asked pressures it holds: in steps of 10 ms they cover
-    the longest dead time of the real arm, 40 ms."""
+    """Number of recent changes of the commanded pressures: with steps of 10 ms, they cover
+    the real arm's longest dead time, 40 ms."""
     plane: float = 0.3
-    """The ball's crossing of y = this is predicted [m]; the racket reaches 0.7 m."""
+    """y of the plane whose crossing by the ball is predicted [m]; the racket reaches 0.7 m."""
     joint_position: float = 1.75
     """[rad]"""
     joint_velocity: float = 10.0
@@ -46,7 +46,7 @@ class FullObservation:
     """[rad/s]"""
 
     def parts(self) -> Iterator[Part]:
-        """All numbers."""
+        """Yields all parts in order."""
         velocity = (self.ball_velocity,) * 3
         yield _alike("joint_positions", 4, self.joint_position, 1.0)
         yield _alike("joint_velocities", 4, self.joint_velocity, 4.0)
@@ -64,27 +64,27 @@ class FullObservation:
 
     @property
     def high(self) -> Float32Array:
-        """(M,) largest observation, a fresh array."""
+        """Largest observation (M,), a fresh array."""
         bounds = [part.bound for part in self.parts() for _ in part.centres]
         return np.array(bounds, dtype=np.float32)
 
     @property
     def low(self) -> Float32Array:
-        """(M,) least observation, a fresh array."""
+        """Least observation (M,), a fresh array."""
         return -self.high
 
     @property
     def centres(self) -> FloatArray:
-        """(M,) fresh"""
+        """Centres (M,), a fresh array."""
         return np.array([centre for part in self.parts() for centre in part.centres])
 
     @property
     def scales(self) -> FloatArray:
-        """(M,) fresh"""
+        """Scales (M,), a fresh array."""
         return np.array([scale for part in self.parts() for scale in part.scale])
 
     def places(self) -> dict[str, slice]:
-        """Where in an observation each part lies, by its name."""
+        """Returns the slice of each part by name."""
         places, at = {}, 0
         for part in self.parts():
             places[part.name] = slice(at, at + len(part.centres))
@@ -93,9 +93,9 @@ class FullObservation:
 
 
 def full_observation(observation: str | FullObservation) -> FullObservation | None:
-    """The observation of a name, or the object itself; None: what the task itself observes.
+    """Returns the observation of a name, or the object itself; None: the task observes.
 
-    Raises ValueError or TypeError.
+    Raises ValueError or TypeError for other values.
     """
     if isinstance(observation, FullObservation):
         return observation

@@ -1,4 +1,4 @@
-"""Makes the observation `full` of N episodes: each gets the bits that it would get alone."""
+"""Computes the observation `full` of N episodes, bit for bit as of each episode alone."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from .perception import EVERY, Perceived
 from .state import State
 
 MIN_POSITION_NOISE = 0.0005
-"""With less noise the filter still expects so much: the laws are not quite exact [m]."""
+"""Least position noise of the filter, because the laws are not quite exact [m]."""
 MIN_VELOCITY_NOISE = 0.02
-"""[m/s]"""
+"""Least velocity noise of the filter [m/s]."""
 
 
 class FullObserver:
-    """Observer of N episodes (`count`): beyond the state, the latest requests and a filtered ball.
+    """Observer of N episodes (`count`): adds recent commands and a filtered ball to the state.
 
-    `interval` is the time from one observation to the next [s], `largest_change` that of an asked
-    pressure in that time, normalised.
+    `interval`: time between observations [s]. `largest_change`: of a commanded pressure in that
+    time, normalised.
     """
 
     def __init__(
@@ -53,16 +53,16 @@ class FullObserver:
         self._last = np.zeros((count, MUSCLES))
 
     def begin(self, state: State, seen: Perceived, which: IntArray) -> FloatArray:
-        """The first observations (n, M) of new episodes, scaled."""
+        """Computes the first observations (n, M) of new episodes, scaled."""
         self._rows[which, self._changes] = 0.0
         self._last[which] = state.asked
         self._filter.begin(seen.ball, which)
         return self._scaled(self._rows[which], state, seen, which)
 
     def observe(self, state: State, seen: Perceived, which: IntArray | slice = EVERY) -> FloatArray:
-        """The observations (n, M) of some episodes after a step, scaled."""
+        """Computes the observations (n, M) of some episodes after a step, scaled."""
         rows = self._rows[which]
-        # the change of the asked pressures is the newest one
+        # shifts the changes, and adds the newest one
         rows[:, self._earlier] = rows[:, self._later].copy()
         rows[:, self._newest] = (state.asked - self._last[which]) * self._per_change
         self._rows[which], self._last[which] = rows, state.asked

@@ -1,4 +1,4 @@
-"""Noise of what is observed: of the ball, as a camera system measures it, and of the pressures."""
+"""Observation noise: of the ball, like a camera system's, and of the pressures."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from typing import Self
 
 @dataclass(frozen=True)
 class NoiseSettings:
-    """Standard deviations of what is observed, and how the arm starts. Raises ValueError.
+    """Noise of observations and of the arm's start. Raises ValueError for wrong numbers.
 
-    The noise of each observation is drawn anew (white); that of a camera system is not quite so:
-    its velocities are filtered, so that their errors last for a few frames. Reward and end of an
-    episode are judged without noise.
+    The noise is white. The noise of a camera system is not quite white: its velocities are
+    filtered, so that errors last for a few frames. Reward and end of an episode are
+    computed without noise.
     """
 
     ball_position: float = 0.0
@@ -21,13 +21,13 @@ class NoiseSettings:
     ball_velocity: float = 0.0
     """Noise of the ball's velocity, along each axis [m/s]."""
     missed_frames: float = 0.0
-    """Share of the observations in which the ball was not seen: they hold the last one."""
+    """Share of observations without a sighting of the ball; they repeat the last one."""
     latency: float = 0.0
-    """How old the observed ball is [s]."""
+    """Age of the observed ball [s]."""
     pressure: float = 0.0
     """Noise of the observed pressures, normalised."""
     start_posture: float = 0.0
-    """On each joint of the simulated arm at a reset, uniform in plus or minus this [rad]."""
+    """Largest deviation of each simulated joint at a reset, either way, uniform [rad]."""
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -41,15 +41,15 @@ class NoiseSettings:
 
     @classmethod
     def tracker(cls) -> Self:
-        """Noise that a real camera system leaves on a ball in flight."""
+        """Returns the noise of a real camera system for a ball in flight."""
         return cls(ball_position=0.005, ball_velocity=0.1)
 
     @property
     def of_observations(self) -> bool:
-        """Whether anything that is observed differs from what is."""
+        """Whether observations differ from the true state."""
         return any(getattr(self, f.name) > 0 for f in fields(self) if f.name != "start_posture")
 
 
 LONGEST_LATENCY = 0.2
-"""[s]"""
+"""Limit of the latency [s]."""
 NO_NOISE = NoiseSettings()

@@ -1,4 +1,4 @@
-"""The observation of ball play: 22 numbers about the arm and one ball."""
+"""Observation of ball play: 22 numbers of the arm and one ball."""
 
 from __future__ import annotations
 
@@ -26,19 +26,19 @@ SIZE = 22
 
 @dataclass(frozen=True)
 class ObservationBounds:
-    """The box of observations; values outside are clipped into it."""
+    """Bounds of observations; values outside are clamped."""
 
     joint_position: float = 1.75
-    """Either way [rad]: the real arm passes its stops a little, to 1.73 rad in public logs."""
+    """Bound either way [rad]: the real arm exceeds its stops, to 1.73 rad in public logs."""
     joint_velocity: float = 40.0
-    """Either way [rad/s]: joints of the simulated arm reach 39 when its muscles are switched fully,
-    those of the real one 8."""
+    """Bound either way [rad/s]: simulated joints reach 39 when the muscles are switched fully,
+    real ones 8."""
     ball_low: Vector = (-3.0, -3.0, -1.0)
     """[m]"""
     ball_high: Vector = (3.0, 5.0, 4.0)
     """[m]"""
     ball_velocity: float = 30.0
-    """Either way, along each axis [m/s]: a recorded ball comes in at 5."""
+    """Bound of each axis, either way [m/s]: a recorded ball arrives at 5."""
 
     @property
     def low(self) -> Float32Array:
@@ -59,5 +59,5 @@ class ObservationBounds:
 
 
 def observe_ball(state: State) -> FloatArray:
-    """The rows (..., 22) of arm and ball, a fresh array; not clipped."""
+    """Returns observations (..., 22) of arm and ball, a fresh array; not clamped."""
     return np.concatenate((state.motion, state.pressures, state.ball), axis=-1)

@@ -1,7 +1,7 @@
-"""From the states of N episodes to what the learner observes: noise, then the numbers.
+"""Converts the states of N episodes to observations: noise first, then the numbers.
 
-An environment makes one `Observer` from its settings. Noise and filters have a memory: `begin` is
-called for each new episode, `observe` exactly once after each step.
+An environment makes one `Observer` from its settings. Noise and filters have a memory: call
+`begin` for each new episode, and `observe` exactly once after each step.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .state import State
 
 
 class Observer:
-    """The observations of N episodes (`count`)."""
+    """Observer of N episodes (`count`)."""
 
     def __init__(
         self,
@@ -35,9 +35,9 @@ class Observer:
         interval: float = 0.01,
         largest_change: float = 1.0,
     ) -> None:
-        """full: None is what the task itself observes. interval: between observations [s].
+        """full: None: the task observes. interval: between observations [s].
 
-        largest_change: of an asked pressure in that time, normalised.
+        largest_change: of a commanded pressure in that time, normalised.
         """
         self._task = task
         self._perception = Perception()
@@ -51,30 +51,30 @@ class Observer:
         self.space = spaces.Box(self.low, self.high, self.low.shape, np.float32)
         """Space of the observation of one episode."""
         self.size = self.high.size
-        """M, the numbers of an observation."""
+        """M, the size of an observation."""
         self.is_ball_play = (
             full is None
             and not noise.of_observations
             and observes_as_published(task)
             and bool(np.all(self.low < self.high))
         )
-        """Whether observations are the numbers of `observations`, in their bounds, and no more:
-        then `begin` and `observe` need not be called."""
+        """Whether observations are exactly the numbers of `observations`, within bounds: then
+        `begin` and `observe` need not be called."""
         self._full: FullObserver | None = None
         if full is not None:
             self._full = FullObserver(full, noise, interval, largest_change, count)
 
     def look_through(self, perception: Perception) -> None:
-        """From the next episode on, ball and pressures are what this one perceives."""
+        """Sets the source of ball and pressures from the next episode on."""
         self._perception = perception
 
     def begin(
         self, state: State, generators: Sequence[np.random.Generator], which: IntArray
     ) -> Float32Array:
-        """The first observations (n, M) of new episodes `which` (n,).
+        """Computes the first observations (n, M) of new episodes `which` (n,).
 
-        `state` is theirs alone, as are the `generators`, of which each is drawn from once if there
-        is any noise.
+        `state` and `generators` are of these episodes only; each generator is drawn from once if
+        there is any noise.
         """
         seen = self._perception.begin(state, generators, which)
         if self._full is None:
@@ -82,14 +82,14 @@ class Observer:
         return self.clip(self._full.begin(state, seen, which))
 
     def observe(self, state: State, which: IntArray | slice = EVERY) -> Float32Array:
-        """The observations (n, M) after a step of the episodes `which` (n,), in this state."""
+        """Computes the observations (n, M) after a step of episodes `which` (n,) to this state."""
         seen = self._perception.perceive(state, which)
         if self._full is None:
             return self._of_task(state, seen)
         return self.clip(self._full.observe(state, seen, which))
 
     def clip(self, observations: FloatArray) -> Float32Array:
-        """Observations (..., M) within the bounds, a fresh array."""
+        """Clamps observations (..., M) to the bounds; a fresh array."""
         within = np.minimum(np.maximum(observations, self._low), self._high)
         return within.astype(np.float32)
 

@@ -1,6 +1,6 @@
-"""The ball and the pressures as they are observed: noisy, late, now and then not seen.
+"""Observed ball and pressures: noisy, delayed, with missed frames.
 
-Each episode has a generator of its own for its noise, so that one environment and a copy among many
+Each episode has its own generator of noise, so that one environment and a copy among many
 observe the same.
 """
 
@@ -20,9 +20,9 @@ from .noise import NoiseSettings
 from .state import State
 
 BLOCK = 128
-"""Observations whose noise is drawn at once."""
+"""Number of observations whose noise is drawn at once."""
 BALL = 6
-"""Numbers of a ball: position, velocity."""
+"""Size of a ball: position, velocity."""
 SEEDS = 2**63
 EVERY = slice(None)
 
@@ -32,33 +32,33 @@ class Perceived:
     """Perception of N episodes."""
 
     ball: FloatArray
-    """(N, 6) position [m] and velocity [m/s]; where the ball was not seen, the last ones"""
+    """(N, 6) position [m] and velocity [m/s]; the last ones while the ball is not seen"""
     missed: NDArray[np.bool_]
     """(N,) whether the ball was not seen"""
     pressures: FloatArray
     """(N, 8) normalised"""
     first: bool = False
-    """The balls are seen for the first time in this episode: what was said before was a guess."""
+    """Whether this is the first sighting in the episode, after a guess."""
 
 
 class Perception:
-    """Source of the ball and the pressures in observations: as they are."""
+    """Source of observed ball and pressures; this one returns the true values."""
 
     def begin(
         self, state: State, generators: Sequence[np.random.Generator], which: IntArray
     ) -> Perceived:
-        """First perception of new episodes `which` (n,), whose state this is."""
+        """Returns the first perception of new episodes `which` (n,) in this state."""
         return self.perceive(state, which)
 
     def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
-        """After a step of some of the N episodes."""
+        """Returns the perception after a step of some of the N episodes."""
         return Perceived(state.ball, np.zeros(len(state.ball), np.bool_), state.pressures)
 
 
 class NoisyPerception(Perception):
-    """The noise of N episodes (`count`).
+    """Perception of N episodes (`count`) with noise.
 
-    `interval` is the time from one observation to the next [s].
+    `interval`: time between observations [s].
     """
 
     def __init__(self, noise: NoiseSettings, interval: float, count: int) -> None:
@@ -77,18 +77,18 @@ class NoisyPerception(Perception):
     def begin(
         self, state: State, generators: Sequence[np.random.Generator], which: IntArray
     ) -> Perceived:
-        """Each generator gives the seed of its noise."""
+        """Draws the seed of each episode's noise from its generator."""
         for copy, generator in zip(which.tolist(), generators, strict=True):
             self._generators[copy] = np.random.default_rng(int(generator.integers(SEEDS)))
             self._draw(copy)
-            self._missed[copy, 0] = False  # an episode begins with a ball that is seen
+            self._missed[copy, 0] = False  # an episode begins with a sighting
         self._at[which] = 0
         if self._delay is not None:
             self._delay.begin(state.ball, which)
-        return self._look(state, which)
+        return self._perceived(state, which)
 
     def perceive(self, state: State, which: IntArray | slice = EVERY) -> Perceived:
-        """With the next noise."""
+        """Returns the perception with the next noise."""
         if self._delay is not None:
             self._delay.add(state.ball, which)
         chosen = self._every[which]
@@ -96,9 +96,9 @@ class NoisyPerception(Perception):
         self._at[chosen] = at
         for copy in chosen[at == 0].tolist():
             self._draw(copy)
-        return self._look(state, chosen)
+        return self._perceived(state, chosen)
 
-    def _look(self, state: State, which: IntArray) -> Perceived:
+    def _perceived(self, state: State, which: IntArray) -> Perceived:
         at = self._at[which]
         ball = state.ball if self._delay is None else self._delay.delayed(which)
         noise, missed = self._normal[which, at], self._missed[which, at]
@@ -107,14 +107,14 @@ class NoisyPerception(Perception):
         return Perceived(ball, missed, state.pressures + noise[:, BALL:])
 
     def _draw(self, copy: int) -> None:
-        """The noise of the next observations of an episode."""
+        """Draws the noise of an episode's next BLOCK observations."""
         generator = self._generators[copy]
         self._normal[copy] = generator.standard_normal((BLOCK, BALL + MUSCLES)) * self._sigmas
         self._missed[copy] = generator.random(BLOCK) < self._noise.missed_frames
 
 
 class Delay:
-    """The balls of N episodes as they were some time ago."""
+    """Delays the balls of N episodes."""
 
     def __init__(self, latency: float, interval: float, copies: int) -> None:
         self._late, self._share = int(latency / interval), latency / interval % 1.0
@@ -123,7 +123,7 @@ class Delay:
         """Balls of the last observations, the newest first."""
 
     def begin(self, balls: FloatArray, which: IntArray) -> None:
-        """New episodes with these balls (n, 6): before, they were on the way to where they are."""
+        """Begins episodes with balls (n, 6); extrapolates their flights backwards."""
         ago = self._interval * np.arange(self._late + 2)[:, None]
         states = np.repeat(balls[:, None], self._late + 2, axis=1)
         states[..., :3] -= ago * states[..., 3:]
@@ -132,12 +132,12 @@ class Delay:
         self._past[which] = states
 
     def add(self, balls: FloatArray, which: IntArray | slice) -> None:
-        """The next balls (n, 6)."""
+        """Adds the next balls (n, 6)."""
         self._past[which, 1:] = self._past[which, :-1].copy()
         self._past[which, 0] = balls
 
     def delayed(self, which: IntArray) -> FloatArray:
-        """(n, 6) between two observations by a cubic through positions and velocities."""
+        """Interpolates delayed balls (n, 6) by cubics through positions and velocities."""
         new, old = self._past[which, self._late], self._past[which, self._late + 1]
         back, forth = self._share, 1.0 - self._share
         rise = (new[:, :3] - old[:, :3]) / self._interval

@@ -1,8 +1,8 @@
 """Rewards of the named tasks, paid when an episode has ended by an event.
 
-`ORDERED` pays any miss less than any touch, and any touch less than any return. `PUBLISHED` is the
-rule of the published configuration. It does not ask on which half the ball landed, so a policy may
-learn to drop the ball on its own half; and a touch that does not reach the table costs more than a
+`ORDERED` rates any miss below any touch, and any touch below any return. `PUBLISHED` is the
+rule of the published configuration. It ignores the half of the landing, so that a policy may
+learn to drop the ball on its own half, and rates a touch that does not reach the table below a
 near miss.
 """
 
@@ -22,12 +22,12 @@ from .ball_record import Numbers
 from .outcome import distance, ended_at, returned
 from .state import State
 
-# of math, not of NumPy, which differ in the last bit: one episode and many get the same rewards
+# math and NumPy differ in the last bit: one episode and many must have the same rewards
 _power = np.frompyfunc(math.pow, 2, 1)
 
 
 def falling(distance: Numbers, reach: float, exponent: float) -> FloatArray:
-    """1 - (distance / reach)^exponent, for distances (...)."""
+    """Computes 1 - (distance / reach)^exponent for distances (...)."""
     share = np.asarray(_power(np.asarray(distance) / reach, exponent), np.float64)
     result: FloatArray = 1.0 - share
     return result
@@ -35,28 +35,28 @@ def falling(distance: Numbers, reach: float, exponent: float) -> FloatArray:
 
 @dataclass(frozen=True)
 class OrderedReward:
-    """Miss: -min(smallest distance, 1.5), at most 0. Touch: between 0 and 0.5, the more the nearer
-    to the target the flight ended. Return: 1 plus the accuracy of the landing, from 0 to 1.
+    """Miss: -min(smallest distance, 1.5), at most 0. Touch: 0 to 0.5, larger for a flight that ends
+    nearer to the target. Return: 1 plus the accuracy of the landing, from 0 to 1.
     """
 
     target: Vector = TARGET
-    """Where the ball should land [m]."""
+    """Target of the ball [m]."""
     farthest_miss: float = 1.5
-    """A ball that was missed by more costs this [m]."""
+    """Distance above which all misses have the same reward [m]."""
     touch: float = 0.5
-    """Least upper bound of a touch without a return, for a flight that ended at the target."""
+    """Limit of a touch without a return, for a flight that ends at the target."""
     touch_scale: float = 1.5
-    """A touch is worth half of that where the flight ended this far from the target [m]."""
+    """Distance from the target at which a touch has half of that reward [m]."""
     reach: float = 3.0
-    """A landing this far from the target has accuracy 0 [m]: accuracy is 1 - (d / 3)^0.75."""
+    """Distance of a landing with accuracy 0 [m]: accuracy is 1 - (d / 3)^0.75."""
     exponent: float = 0.75
 
     def returned(self, state: State) -> FloatArray:
-        """(...) see the class."""
+        """Rewards (...), see the class."""
         return self._paid(state, 1.0)
 
     def smashed(self, state: State) -> FloatArray:
-        """(...) the same, accuracy times the largest speed of the ball after the touch [m/s]."""
+        """Rewards (...) with accuracy times the largest speed after the touch [m/s]."""
         return self._paid(state, state.record.largest_speed)
 
     def _paid(self, state: State, factor: Numbers) -> FloatArray:
@@ -74,27 +74,27 @@ class OrderedReward:
 
 @dataclass(frozen=True)
 class PublishedReward:
-    """Miss: minus the smallest distance. Touch: max(1 - (d / 3)^0.75, -0.2), d the distance of the
-    first landing on either half from the target; -0.2 without a landing.
+    """Miss: minus the smallest distance. Touch: max(1 - (d / 3)^0.75, -0.2), with the distance d of
+    the first landing, on either half, from the target; -0.2 without a landing.
 
-    In the published system d is the smallest distance of the whole flight after the touch, and no
-    table stops the ball; here the episode ends at the table.
+    In the published system, d is the smallest distance of the whole flight after the touch, and no
+    table stops the ball; here, the episode ends at the table.
     """
 
     target: Vector = TARGET
-    """Where the ball should land [m]."""
+    """Target of the ball [m]."""
     reach: float = 3.0
-    """A landing this far from the target is worth 0 [m]."""
+    """Distance of a landing with reward 0 [m]."""
     exponent: float = 0.75
     floor: float = -0.2
-    """The least a touched ball is worth."""
+    """Least reward of a touched ball."""
 
     def returned(self, state: State) -> FloatArray:
-        """(...) see the class."""
+        """Rewards (...), see the class."""
         return self._paid(state, 1.0)
 
     def smashed(self, state: State) -> FloatArray:
-        """(...) the same times the largest speed of the ball after the touch [m/s]."""
+        """Rewards (...) times the largest speed of the ball after the touch [m/s]."""
         return self._paid(state, state.record.largest_speed)
 
     def _paid(self, state: State, factor: Numbers) -> FloatArray:
@@ -106,13 +106,13 @@ class PublishedReward:
 
 
 RewardRule = OrderedReward | PublishedReward
-"""Or any object with their `target`, `returned` and `smashed`."""
+"""Reward rule, or any object with `target`, `returned` and `smashed`."""
 REWARDS: Mapping[str, RewardRule] = {"ordered": OrderedReward(), "published": PublishedReward()}
-"""The rules with a name."""
+"""Named rules."""
 
 
 def reward_rule(reward: str | RewardRule) -> RewardRule:
-    """A rule by its name, or the rule itself. Raises ValueError or TypeError."""
+    """Returns a rule by name, or the given one. Raises ValueError or TypeError for others."""
     if isinstance(reward, str):
         if reward not in REWARDS:
             raise ValueError(f"unknown reward '{reward}'; there are: {', '.join(REWARDS)}")

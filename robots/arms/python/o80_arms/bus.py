@@ -1,4 +1,4 @@
-"""A line with servos, for set-up: one question at a time, each in its own time."""
+"""Serial line of servos, for set-up: sends one request at a time and waits for the answer."""
 
 import errno
 import fcntl
@@ -17,20 +17,20 @@ import o80
 from o80.base.descriptors import above_standard
 from o80_arms import dynamixel
 
-WAIT = 0.05  # for an answer [s]
+WAIT = 0.05  # timeout of an answer [s]
 TRIES = 3
-PATIENCE = 60  # tries while somebody's work would be lost
+PATIENCE = 60  # attempts where a failure would lose the user's work
 EVERYBODY = 254
 SERVOS = range(1, 7)  # of an arm
 
 
 class BusError(o80.Error):
-    """A line that cannot be used, or a servo that does not do what it is told."""
+    """The line cannot be used, or a servo does not obey."""
 
 
 @dataclass(frozen=True)
 class Register:
-    """Where a number of a servo lies; its sign is a bit of its own, if it has one."""
+    """Address and size of a servo's number; `sign` is the bit of the sign, if any."""
 
     address: int
     size: int
@@ -41,7 +41,7 @@ TURN = 4096
 
 
 class Bus:
-    """Questions to Feetech servos of a port, which is open for this process alone."""
+    """Requests to Feetech servos on a port, which this process opens exclusively."""
 
     MODELS: ClassVar = {777: "STS3215"}
     FIRMWARE, MODEL, ID = Register(0, 2), Register(3, 2), Register(5, 1)
@@ -51,8 +51,8 @@ class Bus:
     GOAL, LOCK, POSITION = Register(42, 2, 15), Register(55, 1), Register(56, 2, 15)
     VOLTAGE, TEMPERATURE = Register(62, 1), Register(63, 1)
     modes = (0,) * 6  # of the servos of an arm
-    tries = TRIES  # of a reading
-    PING = 0  # bytes in the answer to a ping
+    tries = TRIES  # attempts of a read
+    PING = 0  # bytes of the answer to a ping
     OFFSET_SIGN = -1  # shown position = encoder - offset
 
     @above_standard()
@@ -93,9 +93,9 @@ class Bus:
         return [servo for servo in servos if self._ask(servo, 1, b"", self.PING) is not None]
 
     def read(self, servo: int, register: Register) -> int:
-        """A number of a servo. Raises BusError."""
+        """Reads a register. Raises BusError if the servo does not answer."""
         for _ in range(self.tries):
-            # a number of bytes of its own for each question: an answer to another is known by it
+            # request sizes differ in turn, so that a late answer to another request is detected
             self._question = (self._question + 1) % 8
             size = register.size + self._question
             if answer := self._ask(servo, 2, self._numbers(register.address, size), size):
@@ -103,7 +103,7 @@ class Bus:
         raise BusError(f"servo {servo} at {self.port} does not answer: look at its plug")
 
     def write(self, servo: int, register: Register, value: int) -> None:
-        """Writes a number, and reads it back. Raises BusError."""
+        """Writes a register and reads it back. Raises BusError if the values differ."""
         for _ in range(TRIES):
             self.send(servo, register, value)
             if self.read(servo, register) == value:
@@ -113,12 +113,12 @@ class Bus:
         )
 
     def send(self, servo: int, register: Register, value: int) -> None:
-        """Writes a number, whatever becomes of it."""
+        """Writes a register without a check."""
         self._ask(servo, 3, self._numbers(register.address) + self._bytes(register, value), 0)
 
     @contextmanager
     def unlocked(self, servo: int) -> Iterator[None]:
-        """Makes what is written meanwhile last when the power goes off. The torque is off."""
+        """Switches the torque off and makes writes inside the context persistent."""
         self.write(servo, self.TORQUE, 0)
         self.write(servo, self.LOCK, 0)
         yield
@@ -128,7 +128,7 @@ class Bus:
         self.write(servo, self.TORQUE, 0)
 
     def found(self) -> list[int] | None:
-        """Numbers of the servos that answer a ping to all; None if their answers collide."""
+        """Numbers of the servos that answer a broadcast ping; None if their answers collide."""
         received, found = self.answers(packet(EVERYBODY, 1, b"")), []
         while received:
             head, received = received[:6], received[6:]
@@ -138,20 +138,20 @@ class Bus:
         return found
 
     def number(self, servo: int, number: int) -> None:
-        """Gives a servo its number, for good."""
+        """Writes a servo's number persistently."""
         self.write(servo, self.TORQUE, 0)
         self.write(servo, self.LOCK, 0)
-        self.send(servo, self.ID, number)  # it answers by its new number from here on
+        self.send(servo, self.ID, number)  # from here on the servo answers to the new number
         self.write(number, self.ID, number)
         self.write(number, self.LOCK, 1)
 
     def read_all(self, servos: list[int], size: int) -> tuple[bytes, int]:
-        """The question for the positions of servos and what follows, and the size of its answer."""
+        """Request for `size` bytes of each servo from POSITION on, and the answer's size."""
         request = packet(EVERYBODY, 0x82, bytes([self.POSITION.address, size, *servos]))
         return request, len(servos) * (size + 6)
 
     def answered(self, received: bytes, servo: int) -> bool:
-        """Whether an answer of this servo is there."""
+        """Whether `received` holds an answer of this servo."""
         return received.find(bytes([0xFF, 0xFF, servo])) >= 0
 
     @staticmethod
@@ -161,7 +161,7 @@ class Bus:
     # the protocol
     @staticmethod
     def _numbers(*numbers: int) -> bytes:
-        """Addresses and sizes in a request."""
+        """Encodes addresses and sizes of a request."""
         return bytes(numbers)
 
     @staticmethod
@@ -180,20 +180,20 @@ class Bus:
 
     @staticmethod
     def _data(received: bytes, servo: int, size: int) -> bytes | None:
-        """Data of the first answer of a servo that has this many bytes."""
+        """Returns the data of the servo's first answer of this size."""
         begin = received.find(bytes([0xFF, 0xFF, servo, size + 2]))
         found = received[begin + 2 : begin + size + 6]
         whole = begin >= 0 and len(found) == size + 4 and sum(found) & 0xFF == 0xFF
         return found[3:-1] if whole else None
 
     def answers(self, request: bytes, size: int | None = None, wait: float | None = None) -> bytes:
-        """All that comes back within the wait; with a size: that many bytes, or none."""
+        """Returns all bytes received within the timeout; with a size: that many bytes, or none."""
         self._send(request)
         received = self._received(lambda received: len(received) == size, wait)
         return received if size is None or len(received) == size else b""
 
     def _ask(self, servo: int, instruction: int, parameters: bytes, size: int) -> bytes | None:
-        """Data of the answer, if it has this many bytes."""
+        """Sends a request; returns the data of an answer of this size, or None."""
         self._send(self._packet(servo, instruction, parameters))
         received = self._received(lambda received: self._data(received, servo, size) is not None)
         return self._data(received, servo, size)
@@ -225,11 +225,11 @@ def packet(servo: int, instruction: int, parameters: bytes) -> bytes:
 
 
 class DynamixelBus(Bus):
-    """Questions to Dynamixel servos."""
+    """Requests to Dynamixel servos."""
 
     MODELS: ClassVar = {1060: "XL430-W250", 1190: "XL330-M077", 1200: "XL330-M288"}
     RATES = (termios.B1000000, termios.B57600, termios.B115200)  # ours, as delivered, another
-    ALL = 0.8  # servos answer a ping to all one after the other, 3 ms for each number [s]
+    ALL = 0.8  # servos answer a broadcast ping in turn, 3 ms for each number [s]
     RATE, OUR_RATE = Register(8, 1), 3
     FIRMWARE, MODEL, ID = Register(6, 1), Register(0, 2), Register(7, 1)
     SMALLEST, LARGEST, LEAST_VOLTAGE = Register(52, 4), Register(48, 4), Register(34, 2)
@@ -247,14 +247,14 @@ class DynamixelBus(Bus):
         yield
 
     def relax(self, servo: int) -> None:
-        """Without torque a servo that has switched itself off can be restarted."""
+        """Switches the torque off, and restarts a servo after a failure."""
         self.write(servo, self.TORQUE, 0)
         self.write(servo, self.WATCHDOG, 0)
         if self.read(servo, self.FAILURE):
             self._ask(servo, 8, b"", 0)
 
     def found(self) -> list[int] | None:
-        """Numbers at the first rate at which a servo answers; the line keeps that rate."""
+        """Numbers found at the first rate with an answer; the line keeps that rate."""
         for rate in self.RATES:
             self._set_rate(rate)
             received, found = self.answers(dynamixel.packet(EVERYBODY, 1, b""), wait=self.ALL), []
@@ -268,7 +268,7 @@ class DynamixelBus(Bus):
         return []
 
     def number(self, servo: int, number: int) -> None:
-        """Gives a servo its number and our rate, for good."""
+        """Writes a servo's number and o80's rate persistently."""
         self.write(servo, self.TORQUE, 0)
         self.send(servo, self.ID, number)
         self.write(number, self.ID, number)
@@ -317,7 +317,7 @@ class DynamixelBus(Bus):
 
 
 def bus_at(port: Path) -> Bus:
-    """The bus of a port, by the protocol in which one of its servos answers; else of Feetech."""
+    """Opens a port with the protocol that a servo answers, or with Feetech's if none does."""
     for protocol in (Bus, DynamixelBus):
         with ExitStack() as opened:
             bus = protocol(port)
@@ -329,12 +329,12 @@ def bus_at(port: Path) -> Bus:
 
 
 def ports() -> list[Path]:
-    """Adapters that may have servos."""
+    """Lists the serial adapters that may have servos."""
     return sorted([*Path("/dev").glob("ttyACM*"), *Path("/dev").glob("ttyUSB*")])
 
 
 def owner_of(port: Path) -> str:
-    """The process that has a port open, "'lerobot-teleop' (pid 4711)"; empty if none is seen."""
+    """Names the process that has a port open, "'lerobot-teleop' (pid 4711)"; empty: none."""
     file = str(port.resolve())
     for process in Path("/proc").glob("[0-9]*"):
         if process.name == str(os.getpid()):

@@ -1,4 +1,4 @@
-"""Calibrations of an arm as LeRobot keeps them: a file, and the same numbers in the servos."""
+"""Calibrations of an arm in LeRobot's form: a file, and the same numbers in the servos."""
 
 import json
 import os
@@ -12,20 +12,20 @@ from o80.base.finite import json_text
 from o80_arms.bus import TURN, Bus, DynamixelBus
 
 JOINTS = ("shoulder_pan", "shoulder_lift", "elbow_flex", "wrist_flex", "wrist_roll", "gripper")
-KEYS = ("homing_offset", "range_min", "range_max")  # in LeRobot's files
+KEYS = ("homing_offset", "range_min", "range_max")  # keys of LeRobot's files
 MODEL_RANGES = (220, 200, 194, 190, 320, 110)  # of the published arm [deg]
 
 
 class CalibrationError(o80.Error):
-    """A calibration that does not exist, or is none."""
+    """A calibration is missing or invalid."""
 
 
-LARGEST_OFFSET = 2047  # that an STS3215 can keep
+LARGEST_OFFSET = 2047  # limit of an STS3215
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """Numbers that a servo and LeRobot's file hold of a joint [steps]."""
+    """Calibration of a joint, as in its servo and in LeRobot's file [steps]."""
 
     offset: int
     smallest: int
@@ -37,10 +37,10 @@ class Calibration:
 
     @classmethod
     def of_motion(cls, smallest: int, largest: int, bus: Bus | type[Bus] = Bus) -> Self:
-        """From the range that a joint was moved through, in steps of its encoder without offset.
+        """Computes a calibration from a joint's range of motion, in encoder steps without offset.
 
-        The middle of the range becomes the middle of what the servo shows, so that the step from
-        4095 to 0 is as far away as it can be.
+        The middle of the range becomes the middle of the shown positions, so that the wrap from
+        4095 to 0 is as far away as possible.
         """
         offset = min((smallest + largest) // 2 % TURN - (TURN // 2 - 1), LARGEST_OFFSET)
         middle, half = TURN // 2 - 1, min((largest - smallest) // 2, TURN // 2 - 1)
@@ -61,7 +61,7 @@ class Calibration:
 
 
 def folder() -> Path:
-    """The folder in which LeRobot keeps calibrations."""
+    """Returns LeRobot's folder of calibrations."""
     if own := os.environ.get("HF_LEROBOT_CALIBRATION"):
         return Path(own)
     cache = Path(os.environ.get("HF_HOME", Path.home() / ".cache" / "huggingface"))
@@ -69,7 +69,7 @@ def folder() -> Path:
 
 
 def folders_of(bus: Bus, leader: bool) -> list[str]:
-    """LeRobot's folders for such arms, the newest first."""
+    """Returns LeRobot's folder names for this type of arm, the newest first."""
     names = ("koch",) if isinstance(bus, DynamixelBus) else ("so", "so101", "so100")
     return [
         f"teleoperators/{name}_leader" if leader else f"robots/{name}_follower" for name in names
@@ -77,13 +77,13 @@ def folders_of(bus: Bus, leader: bool) -> list[str]:
 
 
 def files(bus: Bus) -> list[Path]:
-    """Calibrations that LeRobot has of such arms."""
+    """Lists LeRobot's calibration files for this type of arm."""
     folders = folders_of(bus, False) + folders_of(bus, True)
     return [file for each in folders for file in sorted((folder() / each).glob("*.json"))]
 
 
 def find(name: str, folders: Sequence[str]) -> Path:
-    """The file of a name in these folders, or a path. Raises CalibrationError."""
+    """Finds the file of a name, which may be a path. Raises CalibrationError if there is none."""
     if "/" in name or name.endswith(".json"):
         return Path(name)
     for each in folders:
@@ -93,20 +93,20 @@ def find(name: str, folders: Sequence[str]) -> Path:
 
 
 def place_for(name: str, folders: Sequence[str]) -> Path:
-    """The file in which a calibration of this name is written."""
+    """Returns the file to which a calibration of this name is written."""
     own = "/" in name or name.endswith(".json")
     return Path(name) if own else folder() / folders[0] / f"{name}.json"
 
 
 def read(file: Path) -> dict[str, Calibration]:
-    """The joints of a file. Raises CalibrationError."""
+    """Reads the joints of a file. Raises CalibrationError for an invalid file."""
     try:
         content = json.loads(file.read_text(encoding="utf-8-sig"))
         joints = {joint: Calibration(*(content[joint][each] for each in KEYS)) for joint in JOINTS}
         for joint, each in joints.items():
             numbers = each.offset, each.smallest, each.largest
-            whole = all(isinstance(number, int) for number in numbers)
-            if not whole or not 0 <= each.smallest < each.largest < TURN:
+            are_integers = all(isinstance(number, int) for number in numbers)
+            if not are_integers or not 0 <= each.smallest < each.largest < TURN:
                 raise ValueError(f"{joint} has {each}")
         return joints
     except (OSError, ValueError, KeyError, TypeError) as error:
@@ -118,7 +118,7 @@ def read(file: Path) -> dict[str, Calibration]:
 
 
 def write(file: Path, joints: dict[str, Calibration]) -> None:
-    """Writes a file that LeRobot reads too."""
+    """Writes a file in LeRobot's format."""
     content = {
         joint: {
             "id": number,
@@ -132,7 +132,7 @@ def write(file: Path, joints: dict[str, Calibration]) -> None:
 
 
 def doubts(joints: dict[str, Calibration]) -> list[str]:
-    """Sentences on what is strange about the ranges: 0 is the middle of what was moved by hand."""
+    """Describes suspiciously small ranges: the middle of a range moved by hand becomes 0."""
     found = []
     for joint, degrees in zip(JOINTS, MODEL_RANGES, strict=True):
         moved = (joints[joint].largest - joints[joint].smallest) * 360 / (TURN - 1)

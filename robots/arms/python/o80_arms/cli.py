@@ -1,4 +1,4 @@
-"""``o80 arms``: lists arms, calibrates them, numbers their servos, checks what is not known."""
+"""``o80 arms``: lists, calibrates and checks arms, and numbers their servos."""
 
 import select
 import statistics
@@ -30,7 +30,7 @@ Port = Annotated[Path | None, typer.Option(help="Port of the adapter (default: t
 
 @contextmanager
 def opened(port: Path | None, kind: Callable[[Path], Bus] = bus_at) -> Iterator[Bus]:
-    """The bus of a port, or of the only one."""
+    """Opens the bus of a port, or of the only port."""
     found = [port] if port else ports()
     if len(found) != 1:
         names = ", ".join(map(str, found)) or "none"
@@ -61,7 +61,7 @@ def arms(
 
 
 def told_of(port: Path) -> str:
-    """Describes the servos of a port, or says why it cannot."""
+    """Describes the servos of a port, or the error."""
     try:
         with opened(port) as bus:
             servos = bus.scan()
@@ -82,7 +82,7 @@ def told_of(port: Path) -> str:
 
 
 def calibration_of(bus: Bus) -> str:
-    """The name of that of LeRobot's files which the servos hold."""
+    """Names the LeRobot file with the same calibration as the servos."""
     held = held_by(bus)
     for file in calibration.files(bus):
         with suppress(calibration.CalibrationError):
@@ -120,9 +120,9 @@ def calibrate(
     ] = None,
     leader: Annotated[bool, typer.Option("--leader", help="The arm is moved by hand.")] = False,
 ) -> None:
-    """Calibrate an arm, or bring its servos and LeRobot's file to the same.
+    """Calibrate an arm, or copy a calibration between its servos and LeRobot's file.
 
-    The torque is switched off where something is written: the arm sinks.
+    The torque of written servos is switched off: the arm sinks.
     """
     given = [each for each in (name, take, write) if each]
     if len(given) != 1:
@@ -145,7 +145,7 @@ def calibrate(
 
 
 def doubts(bus: Bus, joints: dict[str, Calibration]) -> list[str]:
-    """Sentences on what is strange about ranges, of an arm whose model is published."""
+    """Describes suspicious ranges of an arm with a published model."""
     return [] if isinstance(bus, DynamixelBus) else calibration.doubts(joints)
 
 
@@ -162,7 +162,7 @@ def put(bus: Bus, joints: dict[str, Calibration]) -> None:
 
 
 def moved_by_hand(bus: Bus) -> dict[str, Calibration]:
-    """Ranges through which somebody moves the joints, written into the servos."""
+    """Measures the ranges while the user moves the joints, and writes them into the servos."""
     bus.tries = PATIENCE
     for servo in SERVOS:
         bus.write(servo, bus.TORQUE, 0)
@@ -177,9 +177,9 @@ def moved_by_hand(bus: Bus) -> dict[str, Calibration]:
 
 
 def watch(bus: Bus, is_over: Callable[[], bool]) -> dict[str, tuple[int, int]]:
-    """The range of each joint until it is over, in steps of its encoder without offset.
+    """Measures each joint's range until `is_over`, in encoder steps without offset.
 
-    A jump of more than half a turn is the step from 4095 to 0, or back.
+    A jump of more than half a turn is the wrap from 4095 to 0, or back.
     """
 
     def encoder(servo: int) -> int:
@@ -188,7 +188,7 @@ def watch(bus: Bus, is_over: Callable[[], bool]) -> dict[str, tuple[int, int]]:
     place = {servo: encoder(servo) for servo in SERVOS}
     ranges = {servo: (start, start) for servo, start in place.items()}
     while True:
-        over = is_over()  # what is read afterwards belongs to the motion, too
+        over = is_over()  # the positions read below still count
         for servo, before in place.items():
             step = (encoder(servo) - before + TURN // 2) % TURN - TURN // 2
             place[servo] = now = before + step
@@ -198,7 +198,7 @@ def watch(bus: Bus, is_over: Callable[[], bool]) -> dict[str, tuple[int, int]]:
 
 
 def pressed_enter() -> bool:
-    """True if a line is there to be read from the terminal."""
+    """Whether a line can be read from the terminal; reads the line."""
     if not select.select([sys.stdin], [], [], 0)[0]:
         return False
     sys.stdin.readline()
@@ -228,12 +228,12 @@ def number(
 
 
 def next_servo(bus: Bus, model: int, before: int | None) -> int:
-    """Waits until one servo is there, of this model, that is not the one before; its number."""
+    """Waits until only a new servo of this model answers; returns its number."""
     told = set()
     while True:
         found = bus.found()
         if found == []:
-            before = None  # it was disconnected
+            before = None  # the previous servo was disconnected
             continue
         doubt = "Several servos answer: leave one only."
         if found and len(found) == 1:
@@ -241,7 +241,7 @@ def next_servo(bus: Bus, model: int, before: int | None) -> int:
                 continue
             try:
                 its = bus.read(found[0], bus.MODEL)
-            except BusError:  # its plug has no good contact yet
+            except BusError:  # the plug has no good contact yet
                 continue
             if its == model:
                 return found[0]
@@ -254,7 +254,7 @@ def next_servo(bus: Bus, model: int, before: int | None) -> int:
 
 @app.command()
 def check(port: Port = None) -> None:
-    """Find out what is not known of real servos: report what it prints. Nothing moves far."""
+    """Measure unknown properties of real servos; please report the output. Nothing moves far."""
     with opened(port) as bus:
         servos = bus.scan()
         if not servos:
@@ -276,7 +276,7 @@ def check(port: Port = None) -> None:
 
 
 def told_of_torque(bus: Bus, servo: int) -> str:
-    """Whether torque begins with a goal (Feetech), or a goal with torque (Dynamixel)."""
+    """Tests whether a goal switches torque on (Feetech), or torque sets the goal (Dynamixel)."""
     place = bus.read(servo, bus.POSITION)
     if not isinstance(bus, DynamixelBus):
         bus.write(servo, bus.GOAL, place)

@@ -11,7 +11,7 @@ def packet(servo: int, instruction: int, parameters: bytes) -> bytes:
 
 
 def unpacked(received: bytes) -> tuple[int, bytes, bytes] | None:
-    """Servo and body of the first whole packet, and the bytes behind it."""
+    """Returns servo and body of the first complete packet, and the remaining bytes."""
     begin = received.find(b"\xff\xff\xfd\x00")
     while begin >= 0:
         found = received[begin:]
@@ -23,7 +23,7 @@ def unpacked(received: bytes) -> tuple[int, bytes, bytes] | None:
 
 
 def crc(data: bytes) -> int:
-    """CRC-16 with the polynomial 0x8005."""
+    """Computes the CRC-16 with the polynomial 0x8005."""
     value = 0
     for byte in data:
         value ^= byte << 8
@@ -37,7 +37,7 @@ def has_crc(whole: bytes) -> bool:
 
 
 def stuffed(body: bytes) -> bytes:
-    """A header inside a body gets an FD more."""
+    """Inserts an FD after each header inside a body."""
     return body.replace(b"\xff\xff\xfd", b"\xff\xff\xfd\xfd")
 
 

@@ -16,7 +16,7 @@ namespace {
 namespace fs = std::filesystem;
 using Fields = std::map<std::string, int, std::less<>>;
 
-/// Reads `{"joint": {"field": number, ...}, ...}`, the JSON that LeRobot writes.
+/// Reads `{"joint": {"field": number, ...}, ...}`, LeRobot's JSON.
 class CalibrationText {
  public:
   explicit CalibrationText(std::string text) : text_(std::move(text)) {}
@@ -108,7 +108,7 @@ Calibration of_joint(const Fields& fields, int id) {
   return found;
 }
 
-/// Where LeRobot keeps calibrations.
+/// Returns LeRobot's folder of calibrations.
 fs::path calibrations() {
   const auto variable = [](const char* name) {
     const char* const text = std::getenv(name);

@@ -9,7 +9,7 @@
 
 namespace o80::arms {
 
-/// How the steps of a servo become an angle: what LeRobot's calibration file says of a joint.
+/// Calibration of a joint from LeRobot's file: converts steps of a servo to an angle.
 struct Calibration {
   int offset = 0;    // register 31
   int smallest = 0;  // registers 9 and 11 [steps]
@@ -29,12 +29,12 @@ struct Calibration {
 };
 
 /// Reads a calibration file of LeRobot. `joints`: in the order of their servos, which have the
-/// numbers 1, 2, ... Throws std::runtime_error that names the file and what is wrong.
+/// numbers 1, 2, ... Throws std::runtime_error, which names the file and the fault.
 std::vector<Calibration> read_calibration(const std::string& path,
                                           const std::vector<std::string>& joints);
 
-/// The file of a name in LeRobot's folders for such arms, or the path itself if it is one. An empty
-/// name: the only file that is there, or an empty path. Throws std::runtime_error.
+/// Finds the file of a name in LeRobot's folders for this type of arm; a path is returned
+/// unchanged. Empty name: the only file, or an empty path. Throws std::runtime_error.
 std::string find_calibration(const std::string& name, const std::vector<std::string>& folders);
 
 }  // namespace o80::arms

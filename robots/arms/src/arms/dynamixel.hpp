@@ -3,12 +3,12 @@
 #include "arms/packets.hpp"
 
 // Protocol 2.0 of Dynamixel servos: packets `FF FF FD 00 id length instruction parameters crc`,
-// numbers little-endian. A header inside the parameters gets an FD more. Registers are those of the
-// X series.
+// numbers little-endian. A header inside the parameters is followed by an additional FD. Registers
+// are of the X series.
 
 namespace o80::arms::dynamixel {
 
-// below 64 they can be written without torque only, and are kept when the power goes off
+// registers below 64 are persistent, and can be written without torque only
 inline constexpr Register kModel{0, 2};
 inline constexpr Register kReturnDelay{9, 1};   // [2 us]
 inline constexpr Register kDriveMode{10, 1};    // 0: neither reversed nor paced by time
@@ -28,7 +28,7 @@ inline constexpr Register kFailure{70, 1};  // bits of Failure
 inline constexpr Register kGainD{80, 2};
 inline constexpr Register kGainI{82, 2};
 inline constexpr Register kGainP{84, 2};
-inline constexpr Register kWatchdog{98, 1};  // [20 ms]; 0 ends what it did
+inline constexpr Register kWatchdog{98, 1};  // [20 ms]; 0 ends a stop
 inline constexpr Register kPwm{100, 2};      // at most, in position modes
 inline constexpr Register kGoalCurrent{102, 2};
 inline constexpr Register kAcceleration{108, 4};  // [214.577 rev/min^2]
@@ -85,7 +85,7 @@ class Requests : public arms::Requests {
     put(kTwo, address), put(kTwo, size);
     close(begin);
   }
-  /// Each servo answers with a packet of its own, in this order.
+  /// Each servo answers with its own packet, in this order.
   void bulk_read(std::span<const Block> blocks) noexcept {
     const std::size_t begin = open(kEverybody, 0x92, 5 * blocks.size());
     for (const Block& each : blocks) put(each.id), put(kTwo, each.first), put(kTwo, each.size);
@@ -126,7 +126,7 @@ class Requests : public arms::Requests {
   }
 };
 
-/// The status of an answer has kAlert, and in its low bits why an instruction was refused.
+/// The status of an answer has kAlert, and in its low bits the reason of a refusal.
 class Answers : public arms::Answers {
  public:
   std::optional<Answer> next() noexcept override {

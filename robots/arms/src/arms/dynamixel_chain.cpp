@@ -13,7 +13,7 @@ namespace {
 constexpr double kSpeedUnit = 0.229 * 4096 / 60;             // [steps/s]
 constexpr double kAccelerationUnit = 214.577 * 4096 / 3600;  // [steps/s^2]
 constexpr int kTurn = 4096;                                  // [steps]
-constexpr int kSlack = 200;  // outside a range of a whole turn without being another turn [steps]
+constexpr int kSlack = 200;       // tolerance outside of a range of a whole turn [steps]
 constexpr int kWatchdogTime = 5;  // 0.1 s [20 ms]
 constexpr int kShutdowns =
     dynamixel::heat_failure | dynamixel::shock_failure | dynamixel::overload_failure;
@@ -58,7 +58,7 @@ void DynamixelChain::set_up(std::size_t servo) {
   state.most_voltage = 0.1 * needed(servo, dynamixel::kMostVoltage);
 }
 
-/// Writes a setting that a servo does not have yet. Throws std::runtime_error.
+/// Writes a setting if the servo has another value. Throws std::runtime_error if that fails.
 void DynamixelChain::keep(std::size_t servo, const Setting& setting) {
   if (needed(servo, setting.where) == setting.value) return;
   const std::string where =
@@ -85,8 +85,8 @@ Setting DynamixelChain::goal(std::size_t servo, int position) const noexcept {
   return {dynamixel::kGoal, position + turns_[servo]};
 }
 
-/// A servo forgets its turns when it loses its power, and has no torque then: the position counts
-/// that is nearest to the middle of the range.
+/// Without power a servo loses its turns and its torque: takes the position nearest to
+/// the middle of the range.
 int DynamixelChain::without_turns(std::size_t servo, int position) noexcept {
   const bool is_off = std::abs(position - turns_[servo] - middles_[servo]) > kTurn / 2 + kSlack;
   if (!placed_[servo] || (is_off && !states_[servo].torque)) {
@@ -132,8 +132,8 @@ void DynamixelChain::queue_watchdog(bool on) noexcept {
   if (on) queue(dynamixel::kWatchdog, all(), kWatchdogTime);
 }
 
-/// One servo in each transfer tells its torque and its failure too: the next one, or one that has a
-/// failure without a name.
+/// Selects the servo that also reports torque and failure in a transfer: the next one, or one with
+/// an unknown failure.
 void DynamixelChain::ask(std::uint8_t variant) noexcept {
   whole_ =
       unnamed_ != 0 ? static_cast<std::size_t>(std::countr_zero(unnamed_)) : (whole_ + 1) % count_;

@@ -7,8 +7,8 @@
 
 namespace o80::arms {
 
-/// Dynamixel servos of the X series, set up as LeRobot has those of a Koch arm: positions over many
-/// turns, the last servo with a current that limits its force.
+/// Dynamixel servos of the X series with LeRobot's settings of a Koch arm: positions over many
+/// turns, and a current limit of the last servo.
 class DynamixelChain : public ServoChain {
  public:
   /// A kind of servo.
@@ -21,7 +21,7 @@ class DynamixelChain : public ServoChain {
   static constexpr Model kXl330{1200, "XL330-M288", 3.5e-4};
   static constexpr Model kXl330Weak{1190, "XL330-M077", 1.5e-4};
 
-  /// `stiff`: the servo that has the gains which LeRobot gives to an elbow.
+  /// `stiff`: the servo with LeRobot's gains of an elbow.
   DynamixelChain(std::span<const Model> models, std::size_t stiff);
 
   void set_up(std::size_t servo) override;
@@ -49,12 +49,12 @@ class DynamixelChain : public ServoChain {
   std::array<Model, kMost> models_{};
   std::size_t stiff_;
   std::array<int, kMost> middles_{};   // of the calibrated ranges [steps]
-  std::array<int, kMost> turns_{};     // that a servo counts too many [steps]
-  std::array<bool, kMost> placed_{};   // its turns are known
-  std::array<int, kMost> most_{};      // of the register that limits the strength
+  std::array<int, kMost> turns_{};     // surplus turns in a servo's count [steps]
+  std::array<bool, kMost> placed_{};   // turns are known
+  std::array<int, kMost> most_{};      // of the register of the strength limit
   std::array<int, kMost> failures_{};  // bits of dynamixel::Failure
-  Mask unnamed_ = 0;                   // servos with a failure that was not read yet
-  std::size_t whole_ = 0;              // the servo that is asked for its torque and failure, too
+  Mask unnamed_ = 0;                   // servos with an unread failure
+  std::size_t whole_ = 0;              // the servo that also reports torque and failure
 };
 
 }  // namespace o80::arms

@@ -17,7 +17,7 @@ inline constexpr Register kLeastVoltage{15, 1};
 inline constexpr Register kPhase{18, 1};         // bit 2: speeds are in steps/s, else in 50 steps/s
 inline constexpr Register kOffset{31, 2, 11};    // shown position = encoder - offset
 inline constexpr Register kMode{33, 1};          // 0: position
-inline constexpr Register kWeak{34, 1};          // strength that an overload leaves [%]
+inline constexpr Register kWeak{34, 1};          // strength after an overload [%]
 inline constexpr Register kTorque{40, 1};        // 0: off, 1: on
 inline constexpr Register kAcceleration{41, 1};  // [100 steps/s^2]
 inline constexpr Register kGoal{42, 2, 15};
@@ -37,7 +37,7 @@ class Requests : public arms::Requests {
     put(address), put(size);
     close(begin);
   }
-  /// Each servo answers with a packet of its own, in this order.
+  /// Each servo answers with its own packet, in this order.
   void sync_read(std::uint8_t address, std::uint8_t size,
                  std::span<const std::uint8_t> ids) noexcept {
     const std::size_t begin = open(kEverybody, 0x82, 2 + ids.size());

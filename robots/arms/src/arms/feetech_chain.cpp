@@ -54,7 +54,7 @@ Setting FeetechChain::strength(std::size_t /*servo*/, double share) const noexce
 }
 
 void FeetechChain::ask(std::uint8_t variant) noexcept {
-  // in every tenth transfer the torque, too
+  // every tenth transfer also reads the torque
   if (asked_[0].first == feetech::kTorque.address && !failed_) transfers_ = 0;
   const bool with_torque = ++transfers_ >= kTorqueEvery;
   const std::uint8_t first = (with_torque ? feetech::kTorque : feetech::kPosition).address;

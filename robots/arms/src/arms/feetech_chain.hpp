@@ -31,8 +31,8 @@ class FeetechChain : public ServoChain {
   feetech::Answers answers_;
   std::array<bool, kMost> coarse_{};  // speeds are in 50 steps/s
   std::array<int, kMost> weak_{};     // strength after an overload [%]
-  int firmware_ = -1;                 // of the servos before
-  int transfers_ = 0;                 // since torque was asked for
+  int firmware_ = -1;                 // of the previous servos
+  int transfers_ = 0;                 // transfers since the last request of torque
 };
 
 }  // namespace o80::arms

@@ -6,22 +6,22 @@
 #include <optional>
 #include <span>
 
-// What the protocols of bus servos share: buffers of packets, numbers little-endian. Fixed
-// buffers, no memory is taken.
+// Common parts of bus servo protocols: buffers of packets, numbers little-endian. Fixed
+// buffers, no allocation.
 
 namespace o80::arms {
 
 inline constexpr std::uint8_t kEverybody = 254;
 inline constexpr std::uint8_t kHeader = 0xFF;  // begins each packet, twice
 
-/// Where a number of a servo lies.
+/// Register of a servo.
 struct Register {
   std::uint8_t address;
   std::uint8_t size;          // [bytes]
-  std::uint8_t sign_bit = 0;  // a bit of its own is its sign; 0: it has none, or two's complement
+  std::uint8_t sign_bit = 0;  // bit of the sign; 0: unsigned, or two's complement
 };
 
-/// A number whose sign is a bit of its own.
+/// Decodes a number with a sign bit.
 constexpr int signed_by_bit(int raw, int bit) noexcept {
   const int magnitude = raw & ((1 << bit) - 1);
   return (raw & (1 << bit)) != 0 ? -magnitude : magnitude;
@@ -29,7 +29,7 @@ constexpr int signed_by_bit(int raw, int bit) noexcept {
 constexpr int with_sign_bit(int value, int bit) noexcept {
   return value < 0 ? -value | (1 << bit) : value;
 }
-/// The number of a register whose bytes begin there.
+/// Decodes a register from its first byte.
 constexpr int number_of(Register where, std::span<const std::uint8_t> data) noexcept {
   std::uint32_t raw = 0;
   for (std::size_t i = where.size; i > 0; --i) raw = raw << 8 | data[i - 1];
@@ -43,7 +43,7 @@ struct Value {
   int value;
 };
 
-/// Packets that leave in one write(2). One that does not fit is left out: `fits` tells.
+/// Packets for one write(2). A packet that does not fit is left out, see `fits`.
 class Requests {
  public:
   virtual ~Requests() = default;
@@ -57,7 +57,7 @@ class Requests {
   virtual void sync_write(Register where, std::span<const Value> values) noexcept = 0;
 
  protected:
-  /// Returns where a packet of this size begins.
+  /// Returns the begin of a packet of this size.
   std::size_t begin(std::size_t size) noexcept {
     if (size_ + size > bytes_.size()) fits_ = false;
     return size_;
@@ -79,19 +79,19 @@ class Requests {
   bool fits_ = true;
 };
 
-/// What a servo sent back.
+/// Answer of a servo.
 struct Answer {
   std::uint8_t id;
   std::uint8_t status;  // a byte of the protocol
   std::span<const std::uint8_t> data;
 };
 
-/// Finds answers in the bytes that arrive, whatever lies between them.
+/// Finds answers in the received bytes, and skips all else.
 class Answers {
  public:
   virtual ~Answers() = default;
   void clear() noexcept { begin_ = end_ = 0, lost_track_ = false; }
-  /// Where bytes may be put; `arrived` says how many were.
+  /// Free memory for received bytes; `arrived` reports their number.
   std::span<std::uint8_t> room() noexcept {
     if (begin_ > 0) {
       for (std::size_t i = begin_; i < end_; ++i) bytes_[i - begin_] = bytes_[i];
@@ -101,26 +101,26 @@ class Answers {
   }
   void arrived(std::size_t count) noexcept { end_ += count; }
 
-  /// The next one that is whole and undamaged. It is valid until the next call of `room`.
+  /// The next complete, undamaged answer, valid until the next call of `room`.
   virtual std::optional<Answer> next() noexcept = 0;
-  /// Packets so far that were damaged.
+  /// Number of damaged packets so far.
   std::uint32_t damaged() const noexcept { return damaged_; }
 
  protected:
-  /// What has arrived, and was not looked at.
+  /// Received bytes that were not searched yet.
   std::span<std::uint8_t> rest() noexcept {
     return std::span(bytes_).subspan(begin_, end_ - begin_);
   }
-  /// A packet of this size was whole.
+  /// Consumes a complete packet of this size.
   void take(std::size_t size) noexcept { begin_ += size, lost_track_ = false; }
-  /// This was no packet. Bytes behind a damaged one are not counted again.
+  /// Counts a damaged packet. Bytes behind a damaged one are not counted again.
   void skip(std::size_t size) noexcept {
     begin_ += size;
     lost_track_ = true;
     ++damaged_;
   }
-  /// Looks for a header one byte later. `shifted`: this one only begins a byte too early, which is
-  /// no damage.
+  /// Searches for a header one byte later. `shifted`: this one only begins a byte too early, which
+  /// is no damage.
   void skip_to_header(bool shifted) noexcept {
     ++begin_;
     if (shifted) return;
@@ -132,7 +132,7 @@ class Answers {
   std::array<std::uint8_t, 512> bytes_{};
   std::size_t begin_ = 0;
   std::size_t end_ = 0;
-  bool lost_track_ = false;  // inside what was counted as damaged
+  bool lost_track_ = false;  // inside of bytes already counted as damaged
   std::uint32_t damaged_ = 0;
 };
 

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Raw bytes at 1 Mbaud; false if this is no terminal.
+/// Sets raw bytes at 1 Mbaud; false if this is no terminal.
 bool set_line(int descriptor) noexcept {
   termios line{};
   if (tcgetattr(descriptor, &line) != 0) return false;
@@ -34,7 +34,7 @@ bool set_line(int descriptor) noexcept {
   line.c_cc[VMIN] = 1;
   line.c_cc[VTIME] = 0;
   if (cfsetspeed(&line, B1000000) != 0 || tcsetattr(descriptor, TCSANOW, &line) != 0) return false;
-  // FTDI adapters keep bytes for 16 ms without it; others and pseudo-terminals have no such thing
+  // FTDI adapters delay bytes for 16 ms without it; others and pseudo-terminals lack the setting
   serial_struct serial{};
   if (ioctl(descriptor, TIOCGSERIAL, &serial) == 0) {
     serial.flags |= ASYNC_LOW_LATENCY;
@@ -43,7 +43,7 @@ bool set_line(int descriptor) noexcept {
   return true;
 }
 
-/// It would stay exclusive, also after this process was killed, while its other side is open.
+/// A pseudo-terminal would stay exclusive while its other side is open, even after a kill.
 bool is_pseudo_terminal(int descriptor) noexcept {
   constexpr unsigned kFirst = 136, kLast = 143;  // major numbers
   struct stat file{};
@@ -54,14 +54,14 @@ bool is_pseudo_terminal(int descriptor) noexcept {
 /// Opens, locks and sets a line; a negative errno if that fails.
 int opened(const char* path) noexcept {
   int descriptor = ::open(path, O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  // a host with closed standard descriptors would write its messages to the servos
+  // with closed standard descriptors, messages would be written to the servos
   if (descriptor >= 0 && descriptor <= STDERR_FILENO) {
     const int low =
         std::exchange(descriptor, fcntl(descriptor, F_DUPFD_CLOEXEC, STDERR_FILENO + 1));
     ::close(low);
   }
   if (descriptor < 0) return -errno;
-  // the lock is for o80, TIOCEXCL for those that do not lock
+  // the lock excludes o80, TIOCEXCL programs that do not lock
   int failed = 0;
   if (flock(descriptor, LOCK_EX | LOCK_NB) != 0) {
     failed = EBUSY;
@@ -77,8 +77,8 @@ int opened(const char* path) noexcept {
   return descriptor;
 }
 
-/// "'lerobot-teleoperate' (pid 4711)" of a process that has this file open, as far as this user may
-/// see.
+/// Names a process that has this file open, "'lerobot-teleoperate' (pid 4711)", if visible to this
+/// user.
 std::string owner_of(const fs::path& file) {
   std::error_code error;
   const std::string own = std::to_string(getpid());
@@ -160,7 +160,7 @@ std::size_t SerialPort::read(std::span<std::uint8_t> room) noexcept {
   const ssize_t got = ::read(descriptor_, room.data(), room.size());
   if (got > 0) return static_cast<std::size_t>(got);
   const bool nothing = got < 0 && (errno == EAGAIN || errno == EINTR);
-  if (!nothing && !room.empty()) close();  // end of file or EIO: it was unplugged
+  if (!nothing && !room.empty()) close();  // end of file or EIO: unplugged
   return 0;
 }
 

@@ -11,7 +11,7 @@
 namespace o80::arms {
 namespace {
 
-constexpr double kReach = 0.15;                 // of a gripper's goal beyond where it stands [1]
+constexpr double kReach = 0.15;                 // of a gripper's goal beyond its position [1]
 constexpr int kMissesToHalt = 3;                // transfers
 constexpr int kAlarmsToHalt = 2;                // answers: one may be damaged and pass its checksum
 constexpr int kJumpsToHalt = 3;                 // readings
@@ -37,14 +37,14 @@ void ServoArm::set_motion(Mask servos, double speed, double acceleration,
   chain_->queue_motion(servos, speed, acceleration, strengths);
 }
 
-/// Its torque is on, and nothing is wrong with it.
+/// Whether a servo's torque is on, without alarms.
 bool ServoArm::holds(std::size_t servo) const noexcept {
   return (*chain_)[servo].torque && (*chain_)[servo].status == 0;
 }
 
-/// Goals where the servos stand, and gentle registers for those that do not hold yet.
+/// Sets goals to the present positions, and gentle registers for servos that do not hold yet.
 void ServoArm::approach(Mask servos) noexcept {
-  chain_->watch(false);  // servos that it has stopped take neither goal nor strength
+  chain_->watch(false);  // servos stopped by the watchdog accept neither goal nor strength
   Mask gentle = servos;
   for (std::size_t i = 0; i < kServos; ++i) {
     if (holds(i)) gentle &= ~bit(i);
@@ -59,7 +59,7 @@ void ServoArm::approach(Mask servos) noexcept {
   settling_ = static_cast<int>(kSettleTime * 1e9 / static_cast<double>(period_));
 }
 
-/// Switches the torque on where the servos stand, with the next request.
+/// Switches the torque on at the present positions, with the next request.
 void ServoArm::hold(Mask servos) noexcept {
   if (servos == 0) return;
   chain_->queue_recovery(servos & failing());
@@ -73,7 +73,7 @@ void ServoArm::hold(Mask servos) noexcept {
   }
 }
 
-/// Full strength when the arm has stood for half a second.
+/// Sets full strength after half a second at rest.
 void ServoArm::settle() noexcept {
   if (settling_ == 0 || !link_.fresh) return;
   for (std::size_t i = 0; i < kServos; ++i) {
@@ -92,7 +92,7 @@ int ServoArm::goal_of(std::size_t servo, const ArmState& desired) const noexcept
   const Calibration& range = calibration_[servo];
   double steps = 0.0;
   if (servo == kGripper) {
-    // no farther than where it closes firmly on something
+    // limits the force on an object by a goal near the position
     const double stands = range.share(servos_[servo].position);
     steps = range.steps_of_share(std::clamp(desired.gripper, stands - kReach, stands + kReach));
   } else {
@@ -111,7 +111,7 @@ void ServoArm::send(const ArmState& desired) noexcept {
   chain_->request(held_, goals_);
 }
 
-/// Looks every half second whether the adapter is there again.
+/// Tries every half second to reopen the adapter.
 void ServoArm::reopen() noexcept {
   if (++closed_ * period_ < kSecond / 2) return;
   closed_ = 0;
@@ -127,7 +127,7 @@ std::int64_t ServoArm::deadline() const noexcept {
 }
 
 void ServoArm::receive(ArmState& observed, ArmSensors& sensors, std::int64_t time) noexcept {
-  // row 0 and fresh starts have readings of their own
+  // row 0 and fresh starts have separate readings
   if (!wrote_) chain_->request(0, {});
   wrote_ = false;
   const ServoChain::Transfer transfer = chain_->collect(deadline());
@@ -135,7 +135,7 @@ void ServoArm::receive(ArmState& observed, ArmSensors& sensors, std::int64_t tim
   if (transfer.asked) look_for_trouble(transfer);
   if (!chain_->has_port()) {
     because("the adapter %s is gone", lasting_name_.c_str());
-    held_ = 0;  // goals of before would move it when the adapter is there again
+    held_ = 0;  // old goals would move the arm when the adapter returns
   }
 
   for (std::size_t i = 0; i < kServos; ++i) {
@@ -158,7 +158,7 @@ void ServoArm::receive(ArmState& observed, ArmSensors& sensors, std::int64_t tim
   sensors.link = link_;
 }
 
-/// Answers => what is known of each servo.
+/// Updates the state of each servo from the answers.
 void ServoArm::take(const ServoChain::Transfer& transfer) noexcept {
   link_.late += transfer.late;
   link_.damaged += transfer.damaged;
@@ -187,11 +187,11 @@ void ServoArm::take(const ServoChain::Transfer& transfer) noexcept {
   if (link_.fresh) complete_at_ = chain_->asked_at();
 }
 
-/// Whether it can have come there since it was seen: a damaged answer may pass its checksum.
+/// Whether the servo can have moved there: a damaged answer may pass its checksum.
 bool ServoArm::is_plausible(std::size_t servo) const noexcept {
   const std::int64_t unseen = chain_->asked_at() - servos_[servo].seen_at;
   const std::int64_t since = std::clamp(unseen, period_, std::max(period_, kLongestGap));
-  // by hand it is moved faster
+  // a hand moves it faster
   const double speed = (relaxed_ ? 8.0 : 2.0) * kMostSpeed / Calibration::kStep;
   const double most = speed * static_cast<double>(since) * 1e-9 + kBacklash;
   return std::abs((*chain_)[servo].position - servos_[servo].position) <= most;
@@ -209,10 +209,10 @@ void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
   }
   for (std::size_t i = 0; i < kServos; ++i) {
     Servo& servo = servos_[i];
-    // one that comes back may stand elsewhere, with a goal that it forgot
+    // a returning servo may be elsewhere, and has lost its goal
     if (lost(servo)) held_ &= ~bit(i);
     if (servo.jumped >= kJumpsToHalt) {
-      // its goal is from before the jump: it would go there
+      // the goal is from before the jump, and would move the servo
       goals_[i] = (*chain_)[i].position;
       chain_->queue_goals(bit(i) & held_, goals_);
       held_ &= ~bit(i);
@@ -232,7 +232,7 @@ void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
   if (++window_ >= window) window_ = damaged_in_window_ = 0;
 }
 
-/// The halt for what the status byte of a servo says, if anything.
+/// Returns the halt for a servo's status byte, if any.
 void ServoArm::name_alarm(std::size_t servo) noexcept {
   const ServoState& state = (*chain_)[servo];
   const char* const name = kJointNames[servo];
@@ -268,21 +268,21 @@ Health ServoArm::health_of(std::size_t servo) const noexcept {
   return alarmed(voltage_alarm) ? Health::voltage : Health::ok;
 }
 
-/// Servos that report a failure.
+/// Lists servos that report a failure.
 ServoArm::Mask ServoArm::failing() const noexcept {
   Mask found = 0;
   for (std::size_t i = 0; i < kServos; ++i) found |= (*chain_)[i].status != 0 ? bit(i) : 0;
   return found;
 }
 
-/// Servos that do not hold although they should, or have less strength.
+/// Lists servos that should hold but do not, or have less strength.
 ServoArm::Mask ServoArm::troubled() const noexcept {
   Mask found = failing() | (relaxed_ ? 0 : chain_->all() & ~held_);
   for (std::size_t i = 0; i < kServos; ++i) found |= servos_[i].without_torque ? bit(i) : 0;
   return found;
 }
 
-/// Why the arm cannot be held now; null if it can.
+/// Reason why the arm cannot hold now; null if it can.
 const char* ServoArm::why_not_ready() noexcept {
   const auto say = [&](const char* format, auto... values) {
     std::snprintf(not_ready_.data(), not_ready_.size(), format, values...);
@@ -323,7 +323,7 @@ Served ServoArm::resume() noexcept {
   return Served::done();
 }
 
-/// Forgets why it was halted. What cannot be is believed from now on: o80 judges it.
+/// Clears the halt. From now on implausible readings are accepted, because o80 checks them.
 void ServoArm::begin_anew() noexcept {
   why_[0] = 0;
   halted_ = false;
@@ -366,10 +366,10 @@ Served ServoArm::on(const Recover& /*request*/) noexcept {
   }
   if (const char* const why = why_not_ready()) return Served::rejected(why);
   if (!relaxed_) hold(troubled());
-  return Served::start_afresh();  // desired states of before would move what has sunk
+  return Served::start_afresh();  // old desired states would move a sunken arm
 }
 
-/// Moves the joints slowly to where the arm stood when it was started; false if something is wrong.
+/// Moves the joints slowly to their positions at the start; false after a fault.
 bool ServoArm::goes_to_rest() noexcept {
   if (halted_ || relaxed_ || held_ != chain_->all()) return false;
   const OfServos<int> from = goals_;

@@ -4,7 +4,7 @@ from pathlib import Path
 
 
 def library() -> Path:
-    """The robot library, which o80 loads."""
-    # an editable installation has two folders: the sources, and what was built
+    """Path of the robot library, which o80 loads."""
+    # an editable installation has two folders: one of sources, one of built files
     files = [Path(folder) / "lib" / "pam.so" for folder in __path__]
     return next((file for file in files if file.exists()), files[0])

@@ -60,7 +60,7 @@ struct Arm::Plane {
 
 namespace {
 
-// A vector into the axes of a link (x lies in the plane, z along the link), and back.
+// Transforms a vector to the axes of a link (x in the plane, z along the link), and back.
 Vector into(const Vector& along, const Vector& v) {
   return {along[2] * v[0] - along[0] * v[2], v[1], along[0] * v[0] + along[2] * v[2]};
 }
@@ -68,7 +68,7 @@ Vector out_of(const Vector& along, const Vector& v) {
   return {along[2] * v[0] + along[0] * v[2], v[1], -along[0] * v[0] + along[2] * v[2]};
 }
 
-// Inertia of a link that the wrist turns about its z: the x-y block; z stays.
+// Inertia of a link turned about its z by the wrist: the x-y block; z is unchanged.
 struct Turned {
   Turned(const Vector& inertia, double c, double s)
       : xx(c * c * inertia[0] + s * s * inertia[1]),
@@ -121,15 +121,15 @@ JointMatrix responses(const JointMatrix& factors) {
   return response;
 }
 
-// How dry friction holds back each joint: 1 or -1 for one that slides towards larger or smaller
-// angles, 0 for one that sticks.
+// State of dry friction of each joint: 1 or -1 for sliding towards larger or smaller
+// angles, 0 for sticking.
 using Sliding = std::array<int, kJoints>;
 
-// The speeds after a step in which `sliding` is assumed, and whether they bear it out; else the
-// first joint that does not is changed in it. `most` is the largest impulse of friction [Nm s].
+// Computes the speeds after a step with the assumption `sliding`, and whether they are consistent;
+// else corrects the first inconsistent joint. `most`: largest impulse of friction [Nm s].
 bool slides_so(const JointMatrix& mass, const Joints& momentum, const Joints& most,
                Sliding& sliding, Joints& dq) {
-  // a joint that sticks gets an equation of its own: speed = 0
+  // a sticking joint has the equation speed = 0
   JointMatrix moving = mass;
   Joints pushed{};
   for (std::size_t j = 0; j < kJoints; ++j) {
@@ -158,9 +158,9 @@ bool slides_so(const JointMatrix& mass, const Joints& momentum, const Joints& mo
   return true;
 }
 
-// The speeds that dry friction brings nearest to rest: mass * dq = momentum + impulses of at most
-// `most`. A linear complementarity problem with bounds; changing the first joint that does not fit
-// never comes back to an assumption (Murty's least-index rule), of which there are 3^4.
+// Computes the speeds under dry friction: mass * dq = momentum + impulses of at most
+// `most`. A linear complementarity problem with bounds; correcting the first inconsistent joint
+// never repeats one of the 3^4 assumptions (Murty's least-index rule).
 Joints rubbed(const JointMatrix& mass, const Joints& momentum, const Joints& most,
               const Joints& before) {
   Sliding sliding{};
@@ -173,7 +173,7 @@ Joints rubbed(const JointMatrix& mass, const Joints& momentum, const Joints& mos
   return dq;
 }
 
-// The smallest impulses that keep every joint within its stops for `duration`.
+// Computes the smallest impulses that keep every joint within its stops for `duration`.
 void stop_at_limits(const Joints& q, const JointMatrix& mass, double duration, Joints& dq) {
   const auto passes = [&](std::size_t j) {
     return std::abs(q[j] + duration * dq[j]) > kJointLimit;
@@ -283,7 +283,7 @@ Joints Arm::bias(const Plane& plane, const Joints& dq) const noexcept {
     return cross(a, arm) + cross(w, cross(w, arm));
   };
 
-  // the forces and moments of that motion; gravity is an acceleration upwards
+  // forces and moments of that motion; gravity is an upward acceleration
   const Vector up = config_.gravity * kUp;
   const Vector at_elbow = swing(w2, a2, kUpperArmLength * zu);
   const Vector force2 = upper.mass * (up + swing(w2, a2, upper.centre * zu));
@@ -359,7 +359,7 @@ RacketMotion Arm::racket(const Motion& motion) const noexcept {
   const Vector arm = kForearmLength * zf;
   const Vector position = plane.to_world(plane.elbow() + arm);
 
-  // axes of the racket: those of the forearm, turned by the wrist
+  // axes of the racket: the forearm's axes, turned by the wrist
   const Vector in_plane{zf[2], 0.0, -zf[0]};
   const Vector x = plane.to_world(plane.c4 * in_plane + plane.s4 * kAcross);
   const Vector y = plane.to_world(-plane.s4 * in_plane + plane.c4 * kAcross);
@@ -379,7 +379,7 @@ std::optional<Joints> Arm::posture_reaching(const Vector& point, double wrist) c
   const double out = std::hypot(target[0], target[1]);
   const double height = target[2] - kShoulderHeight;
 
-  // the triangle of upper arm, forearm and the line from shoulder to racket
+  // triangle of upper arm, forearm and the line from shoulder to racket
   const double a = kUpperArmLength, b = kForearmLength;
   const double square = out * out + height * height;
   const double cosine = (square - a * a - b * b) / (2.0 * a * b);

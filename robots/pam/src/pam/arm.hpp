@@ -13,7 +13,7 @@ using Vector = std::array<double, 3>;
 using Rotation = std::array<double, 9>;  ///< row by row; its columns are the axes of the body
 using JointMatrix = std::array<Joints, kJoints>;
 
-// The kinematic chain [m]. At angles of zero it is a straight line upwards from the base.
+// The kinematic chain [m]. At zero angles, it points straight upwards from the base.
 inline constexpr double kShoulderHeight = 0.075;    ///< joint 2 above the base
 inline constexpr double kUpperArmLength = 0.36742;  ///< joint 2 to joint 3
 inline constexpr double kForearmLength = 0.370;     ///< joint 3 to the centre of the racket
@@ -25,7 +25,7 @@ inline constexpr double kBladeHalfWidth = 0.5 * 0.1485;
 inline constexpr double kBladeHalfLength = 0.5 * 0.1882;
 inline constexpr double kBladeThickness = 0.0054;
 
-/// One moving part. Its centre of mass lies on the z axis of its joint's frame; its principal axes
+/// Moving part. The centre of mass is on the z axis of the joint's frame; the principal axes
 /// are parallel to the axes of the frame.
 struct Link {
   double mass = 0.0;    ///< [kg]
@@ -45,7 +45,7 @@ Links published_links() noexcept;
 Link published_forearm() noexcept;
 Link published_racket() noexcept;
 
-/// Two parts of one body as one link.
+/// Merges two parts of a body to one link.
 Link joined(const Link& a, const Link& b) noexcept;
 
 /// Angles and speeds of the joints [rad, rad/s].
@@ -92,8 +92,8 @@ class Arm {
 
   RacketMotion racket(const Motion& motion) const noexcept;
 
-  /// Inverse kinematics: the angles (elbow up) that bring the centre of the racket to a point of
-  /// the world, with the given angle of the wrist; nullopt if the point is out of reach.
+  /// Inverse kinematics: computes the angles (elbow up) that bring the racket's centre to a point
+  /// of the world, for an angle of the wrist; nullopt if the point is out of reach.
   std::optional<Joints> posture_reaching(const Vector& point, double wrist) const noexcept;
 
  private:

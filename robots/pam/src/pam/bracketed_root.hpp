@@ -7,8 +7,8 @@
 
 namespace o80::pam {
 
-/// The root of `f` between `low` and `high`, where the signs of `f` must differ. Brent's method
-/// (1973): inverse interpolation, or bisection where that does not converge. Exact to rounding.
+/// Finds the root of `f` between `low` and `high`, where the signs of `f` must differ. Brent's
+/// method (1973): inverse interpolation, or bisection without convergence. Exact to rounding.
 template <class F>
 double bracketed_root(const F& f, double low, double high) noexcept {
   double previous = low, f_previous = f(low);
@@ -17,7 +17,7 @@ double bracketed_root(const F& f, double low, double high) noexcept {
   double step = best - previous, last_step = step;
 
   for (int i = 0; i < 100 && f_best != 0.0; ++i) {
-    // keep the root between best and other; best is the end nearer to zero
+    // keep the root between best and other; best has the smaller |f|
     if ((f_best > 0.0) == (f_other > 0.0)) {
       other = previous, f_other = f_previous;
       step = last_step = best - previous;
@@ -31,7 +31,7 @@ double bracketed_root(const F& f, double low, double high) noexcept {
     const double half = 0.5 * (other - best);
     if (std::abs(half) <= tolerance) break;
 
-    // the secant or the inverse parabola, if it lies well inside the bracket; else the middle
+    // secant or inverse parabola, if well inside the bracket; else the middle
     const double two_steps_ago = last_step;
     last_step = step;
     step = half;

@@ -11,7 +11,7 @@
 namespace o80::pam {
 namespace {
 
-/// Takes the numbers that are given. Each joint may be left to the preset.
+/// Sets the given numbers; joints without one keep the preset's.
 void take(const Joints& given, Joints& numbers) {
   for (std::size_t j = 0; j < kJoints; ++j) {
     if (given[j] != kOfPreset[j]) numbers[j] = given[j];

@@ -20,11 +20,11 @@ O80_DESCRIBE_ENUM(Law, of_preset, linear, hill);
 enum class Ranges : std::uint8_t { of_preset, simulated, real };
 O80_DESCRIBE_ENUM(Ranges, of_preset, simulated, real);
 
-/// What determines the activation of a muscle: where the pressure lies in its range, or the bar.
+/// Source of a muscle's activation: the pressure's share of its range, or the pressure in bar.
 enum class ActivatedBy : std::uint8_t { of_preset, range, bar };
 O80_DESCRIBE_ENUM(ActivatedBy, of_preset, range, bar);
 
-/// An option that is left to the preset.
+/// Value of an option that the preset determines.
 inline constexpr Joints kOfPreset{-1.0, -1.0, -1.0, -1.0};
 
 /// Sensor values beside the pressures.
@@ -49,8 +49,8 @@ O80_DESCRIBE(ArmSensors, (joint_positions, "[rad]"), (joint_velocities, "[rad/s]
 /// The pneumatic arm as a robot: commands are the raw pressures of eight muscles, rows hold joint
 /// angles.
 ///
-/// A commanded pressure is rounded to whole raw units, as by the valve of the real arm. The
-/// observed pressure is the one in the muscle, which lags behind.
+/// Commanded pressures are rounded to whole raw units, as by the real arm's valves. Observed
+/// pressures are those in the muscles, which lag behind.
 class PamDriver {
  public:
   struct Config {
@@ -107,7 +107,7 @@ class PamDriver {
   Served no_such_slot() const noexcept;
 
   Plant plant_;
-  State now_;  // without the plant's, which the plant holds
+  State now_;  // without the plant's snapshots, which the plant holds
   std::vector<State> slots_;
   std::int64_t period_;  // [ns]
 };

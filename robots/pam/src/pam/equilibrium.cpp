@@ -9,7 +9,7 @@
 namespace o80::pam {
 namespace {
 
-/// `pull` is the activation of the muscle that turns the joint towards larger angles.
+/// `pull`: activation of the muscle that turns the joint towards larger angles.
 double pair_torque(const Muscle& muscle, double angle, double pull, double counter_pull) {
   return std::visit(
       [&](const auto& law) {
@@ -19,7 +19,7 @@ double pair_torque(const Muscle& muscle, double angle, double pull, double count
       muscle);
 }
 
-/// The activations of two antagonists with this mean and difference.
+/// Computes the activations of two antagonists with this mean and difference.
 std::pair<double, double> around(double mean, double difference, const PressureRange& range,
                                  const PressureRange& counter_range) {
   return {std::clamp(mean + 0.5 * difference, range.least(), range.most()),
@@ -57,7 +57,7 @@ Pressures Equilibrium::pressures_holding(const Joints& q, double activation) con
     const auto shared = [&](double difference) {
       return around(activation, difference, ranges[larger], ranges[smaller]);
     };
-    // the torque grows with the difference of the activations: bisect
+    // bisection, because the torque grows with the difference of the activations
     double low = -2.0, high = 2.0;
     for (int i = 0; i < 50; ++i) {
       const double middle = 0.5 * (low + high);
@@ -77,7 +77,7 @@ Pressures Equilibrium::pressures_holding(const Joints& q, double activation) con
 
 Joints Equilibrium::posture_held_by(const Pressures& pressures,
                                     const Joints& start) const noexcept {
-  // descend the potential energy of muscles and gravity, which leads to a stable equilibrium
+  // descends the potential energy of muscles and gravity to a stable equilibrium
   constexpr double gravity_stiffness = 10.0;  // [Nm/rad], more than that of gravity
   constexpr double probe_angle = 1e-5;        // [rad]
   Joints q = start;

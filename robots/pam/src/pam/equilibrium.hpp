@@ -6,7 +6,7 @@
 
 namespace o80::pam {
 
-/// An arm and its muscles at rest: from a posture to its pressures, and back.
+/// Equilibrium of an arm and its muscles: converts postures to pressures, and back.
 struct Equilibrium {
   const Arm& arm;
   const Muscles& muscles;
@@ -17,11 +17,11 @@ struct Equilibrium {
   /// Torque of the muscles on the joints [Nm].
   Joints muscle_torque(const Joints& q, const Pressures& pressures) const noexcept;
 
-  /// Pressures that hold a posture. `activation` is the mean of two antagonists, unless one of them
-  /// reaches the end of its range. If the posture cannot be held: the pressures nearest to that.
+  /// Computes pressures that hold a posture. `activation`: mean of two antagonists, unless one
+  /// reaches a limit of its range. Without a solution: the pressures nearest to one.
   Pressures pressures_holding(const Joints& q, double activation) const noexcept;
 
-  /// The stable posture into which these pressures pull the arm from `start`, without dynamics.
+  /// Computes the stable posture for these pressures, reached from `start` without dynamics.
   Joints posture_held_by(const Pressures& pressures, const Joints& start) const noexcept;
 };
 

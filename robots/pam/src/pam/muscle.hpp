@@ -7,14 +7,14 @@
 
 namespace o80::pam {
 
-/// The force of a muscle, and the velocity at which its contractile element changes length.
+/// Force of a muscle, and velocity of its contractile element.
 struct Pull {
   double force = 0.0;           ///< [N], never negative: a muscle cannot push
   double fibre_velocity = 0.0;  ///< [m/s], 0 for a muscle without a contractile element
 };
 
-/// The law of a muscle: its length and velocity, the length of its contractile element (fibre) and
-/// its activation from 0 to 1 => pull. The law is constant; the caller holds the state.
+/// Law of a muscle: length, velocity, length of the contractile element (fibre) and
+/// activation from 0 to 1 => pull. The law is constant; the caller holds the state.
 template <class T>
 concept MuscleLaw = requires(const T& law, double x) {
   { law.pull(x, x, x, x) } noexcept -> std::same_as<Pull>;  // length, velocity, fibre, act.
@@ -82,7 +82,7 @@ class HillMuscle {
   double resting_force(double length, double activation) const noexcept;
 
  private:
-  struct Fibre {  // values that depend on its length and activation only
+  struct Fibre {  // values that depend on length and activation only
     double isometric, parallel;
     double drive;           // activation x isometric
     double hill_a, hill_b;  // of the concentric curve, relative to maximum force and length
@@ -110,14 +110,14 @@ static_assert(MuscleLaw<LinearMuscle> && MuscleLaw<HillMuscle>);
 /// The law of the muscles of a plant.
 enum class MuscleModel : std::uint8_t { linear, hill };
 
-/// A law chosen at run time.
+/// Law chosen at run time.
 using Muscle = std::variant<LinearMuscle, HillMuscle>;
 
-/// The muscles of each joint, whose two are alike. All joints have the same law with numbers of
-/// their own, so that the law is chosen once for all of them.
+/// Muscles of all joints; the two of a joint are equal. All joints have the same law with
+/// different numbers, so that the law is chosen once.
 using Muscles = std::array<Muscle, 4>;
 
-/// `stroke` is that of the linear law; the Hill law has none.
+/// `stroke`: of the linear law; the Hill law has none.
 Muscle make_muscle(MuscleModel model, double maximum_force = 1500.0, double stroke = 0.10) noexcept;
 
 }  // namespace o80::pam

@@ -10,7 +10,7 @@
 namespace o80::pam {
 namespace {
 
-// A random number by SplitMix64, whose sequence is good from any seed.
+// Draws a random number by SplitMix64, which is good for any seed.
 double uniform(std::uint64_t& seed, double low, double high) {
   seed += 0x9E3779B97F4A7C15u;
   std::uint64_t z = seed;
@@ -136,7 +136,7 @@ Plant::Clipped Plant::advance(const Pressures& pressures, const Joints& external
     if (state_.commanded[m] != pressures[m]) clipped |= static_cast<Clipped>(1u << m);
   }
 
-  // dead time: the muscles follow pressures that were asked for earlier
+  // dead time: the muscles follow earlier commands
   const auto newest = static_cast<std::size_t>(state_.iteration) % state_.requested.size();
   state_.requested[newest] = state_.commanded;
   for (std::size_t m = 0; m < kMuscles; ++m) {

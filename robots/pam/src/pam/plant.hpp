@@ -22,10 +22,10 @@ inline constexpr Joints kActivationLag{0.016, 0.044, 0.044, 0.044};
 /// Near the median posture of the real arm in recorded play [rad].
 inline constexpr Joints kPlayingPosture{0.17, 1.1, 1.04, 0.5};
 
-/// Periods that a dead time may last.
+/// Longest dead time [periods].
 inline constexpr std::size_t kLongestDeadTime = 127;
 
-/// The simulated arm: `advance` takes eight pressures and integrates one period.
+/// Simulated arm: `advance` takes eight pressures and integrates one period.
 ///
 /// Realtime: everything but the constructor; no allocation, no lock, no exception. Two plants with
 /// the same configuration and state stay equal bit for bit under the same pressures.
@@ -40,13 +40,13 @@ class Plant {
     Joints maximum_force{1500.0, 1500.0, 1500.0, 1500.0};  ///< [N], of each muscle of a joint
     Joints stroke{0.10, 0.10, 0.10, 0.10};                 ///< [m], of linear muscles
     Joints lag = kActivationLag;                           ///< [s]
-    /// [s], from a pressure that is asked for to the first change in the muscle; rounded to whole
+    /// [s], from a commanded pressure to the first change in the muscle; rounded to whole
     /// periods.
     Joints dead_time{};
     /// 1: the agonist of the joint turns it towards larger angles; -1: towards smaller ones.
     Joints directions{1.0, 1.0, 1.0, 1.0};
-    Joints neutral{};  ///< [rad], angles at which the two muscles of a joint are equally long
-    /// The arm starts at rest in the posture that these pressures hold; unset: the pressures that
+    Joints neutral{};  ///< [rad], angles at which the two muscles of a joint have equal lengths
+    /// Pressures at the start, in whose posture the arm rests; unset: the pressures that
     /// hold `start_posture`.
     std::optional<Pressures> start_pressures{};
     Joints start_posture = kPlayingPosture;  ///< [rad]
@@ -54,20 +54,20 @@ class Plant {
     double start_noise = 0.0;       ///< [rad], uniform within ± this, from the seed of a reset
   };
 
-  /// Everything that changes: a copy is a snapshot, which `restore` takes back.
+  /// Complete state: a copy is a snapshot, for `restore`.
   struct State {
     std::int64_t iteration = 0;
     Motion motion{};
     std::array<double, kMuscles> activation{};
     std::array<double, kMuscles> fibre_length{};  ///< [m], Hill model
     Pressures commanded{};                        ///< raw, within the ranges
-    /// The last commanded pressures, a ring: the newest lies at iteration % its size.
+    /// The last commanded pressures, a ring: the newest is at iteration % size.
     std::array<Pressures, kLongestDeadTime + 1> requested{};
     std::int64_t clipped = 0;  ///< iterations with a pressure out of range
   };
   static_assert(std::is_trivially_copyable_v<State>);
 
-  /// Which pressures were out of range: bit m for muscle m.
+  /// Pressures out of range: bit m for muscle m.
   using Clipped = std::uint8_t;
   static_assert(kMuscles <= 8);
 
@@ -78,16 +78,16 @@ class Plant {
 
   const Config& config() const noexcept { return config_; }
   const Arm& arm() const noexcept { return arm_; }
-  /// Of each joint.
+  /// Muscles of each joint.
   const Muscles& muscles() const noexcept { return muscles_; }
-  /// The laws of this plant without its motion.
+  /// Laws of this plant at rest.
   Equilibrium equilibrium() const noexcept;
 
   /// The pressures that hold the arm in its start posture.
   const Pressures& start_pressures() const noexcept { return start_pressures_; }
 
   /// Integrates one period with these pressures, and with further torques on the joints [Nm].
-  /// Pressures out of range are clipped; the result says which.
+  /// Pressures out of range are clamped; the result marks them.
   Clipped advance(const Pressures& pressures, const Joints& external = {}) noexcept;
 
   /// Returns to the start. The seed has an effect only with `start_noise`.
@@ -116,14 +116,14 @@ class Plant {
   Muscles muscles_;
   std::array<std::int64_t, kJoints> delay_{};  // iterations of dead time
   double substep_;                             // [s]
-  Joints lag_gain_;  // share of its difference that an activation covers in a substep
+  Joints lag_gain_;  // share of the remaining difference that an activation covers in a substep
   Pressures start_pressures_{};
   Joints start_equilibrium_{};
   State state_{};
 };
 
-/// Length of a muscle [m] with its joint at `angle`. `side` is 1 for a muscle that turns the joint
-/// towards larger angles and shortens then, else -1.
+/// Length of a muscle [m] with its joint at `angle`. `side`: 1 for a muscle that turns the joint
+/// towards larger angles, at which it is shorter, else -1.
 constexpr double muscle_length(double side, double angle) noexcept {
   return kRestLength + (side > 0 ? -kPulleyRadius : kPulleyRadius) * angle;
 }

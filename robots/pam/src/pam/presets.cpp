@@ -3,12 +3,12 @@
 namespace o80::pam {
 namespace {
 
-/// The answers of the real arm to small steps, published for December 2023: gain 0.25, 0.17, 0.30,
+/// Step responses of the real arm, published for December 2023: gain 0.25, 0.17, 0.30,
 /// 0.30 rad per 1000 raw units; 63 % after 190, 270, 160, 110 ms; overshoot 47, 31, 4, 1 %; dead
 /// time 40, 40, 20, 10 ms; agonists of joints 1 and 3 that decrease the angle. Force, stroke and
 /// damping were fitted to the first three (a step of 500 units up in one muscle and down in the
-/// other, in the playing posture). Not published, and chosen: the friction, and that antagonists
-/// are equally long in the playing posture.
+/// other, in the playing posture). Assumed, because not published: the friction, and equal lengths
+/// of antagonists in the playing posture.
 Plant::Config identified() noexcept {
   Plant::Config config;
   config.ranges = in_bar(kRealRanges, kFullBar);

@@ -25,7 +25,7 @@ constexpr Pressures equal_pressures(std::int32_t raw) noexcept {
   return {raw, raw, raw, raw, raw, raw, raw, raw};
 }
 
-/// The nearest integer, halves away from zero: std::lround without a call.
+/// Rounds to the nearest integer, halves away from zero: std::lround without a call.
 constexpr std::int32_t rounded(double raw) noexcept {
   const auto whole = static_cast<std::int32_t>(raw);
   const double rest = raw - whole;
@@ -35,11 +35,11 @@ constexpr std::int32_t rounded(double raw) noexcept {
 /// Pressure above the atmosphere [bar]; 18000 is 1.81 bar.
 constexpr double to_bar(double raw) noexcept { return 0.0002 * raw - 1.7888; }
 
-/// The raw pressure of a number of bar above the atmosphere.
+/// Raw pressure of a pressure in bar above the atmosphere.
 constexpr double from_bar(double bar) noexcept { return (bar + 1.7888) / 0.0002; }
 
-/// Raw pressures that a muscle accepts, and the pressures of no and of full activation: the ends of
-/// the range unless they are given.
+/// Range of a muscle's raw pressures, and the pressures of zero and full activation, by default
+/// the ends of the range.
 struct PressureRange {
   std::int32_t minimum = 6000;
   std::int32_t maximum = 24000;
@@ -52,7 +52,7 @@ struct PressureRange {
   constexpr double pressure(double activation) const noexcept {
     return idle + activation * (full - idle);
   }
-  /// Of the least and the most pressure.
+  /// Activations at the least and the largest pressure.
   constexpr double least() const noexcept { return activation(minimum); }
   constexpr double most() const noexcept { return activation(maximum); }
 };

@@ -10,7 +10,7 @@
 namespace o80::pam {
 namespace {
 
-// The frame stands below the base; each link lies along z from its joint.
+// The frame is below the base; each link is along z from its joint.
 constexpr const char* kModel = R"(<mujoco model="pam">
   <compiler angle="radian"/>
   <statistic center="0 0 %g" extent="1.4"/>
@@ -55,7 +55,7 @@ std::string numeric(const char* name, const std::array<double, N>& values) {
   return text + "/>\n";
 }
 
-/// Numbers of each joint, or of each muscle.
+/// Numbers for each joint, or each muscle.
 std::string numbers_of(const Plant::Config& config) {
   std::array<double, kMuscles> idle{};
   std::array<double, kMuscles> full{};

@@ -1,8 +1,8 @@
-"""The laws by which simulated balls fly and bounce, for predictions and fits.
+"""Laws of flight and bounce of the simulated balls, for predictions and fits.
 
-They are the simulator's own: a ball that is predicted with the numbers of its options flies as in
-the simulation. A ball is nine numbers: position [m], velocity [m/s] and spin [rad/s], in the axes
-of the world.
+The simulator uses the same code: with its options, predicted and simulated flights are
+equal. A ball is nine numbers: position [m], velocity [m/s] and spin [rad/s], in the world
+frame.
 """
 
 from o80_mujoco._balls import (

@@ -15,9 +15,9 @@ struct Ball {
   bool operator==(const Ball&) const = default;
 };
 
-/// The forces of air and gravity on one kind of ball:
+/// Forces of air and gravity on one kind of ball:
 /// a = -drag |v| v + magnus / (1 + saturation |omega| / |v|) (omega x v) + gravity.
-/// The lift of a ball grows less than its spin: the surface cannot turn the flow ever further.
+/// The lift grows less than the spin, because the surface cannot turn the flow without limit.
 struct Air {
   double drag = 0;        // 1/2 rho Cd A/m [1/m]
   double magnus = 0;      // 1/2 rho Cl A r/m []
@@ -28,7 +28,7 @@ struct Air {
   struct Coefficients {
     double drag = 0;             // Cd
     double lift = 0;             // Cl per r |omega| / |v|, of a slow spin
-    double lift_saturation = 0;  // the lift is halved where r |omega| / |v| is 1 over this
+    double lift_saturation = 0;  // the lift is halved at r |omega| / |v| = 1 / lift_saturation
   };
   static Air of(double density, const Coefficients& coefficients, double radius, double mass,
                 double spin_decay, const Vector& gravity) noexcept {
@@ -38,7 +38,7 @@ struct Air {
   }
 };
 
-/// The acceleration of a ball [m/s^2].
+/// Computes the acceleration of a ball [m/s^2].
 inline Vector acceleration(const Air& air, const Vector& velocity, const Vector& spin) noexcept {
   const double speed = length(velocity);
   const double turning = air.saturation * length(spin);
@@ -46,7 +46,7 @@ inline Vector acceleration(const Air& air, const Vector& velocity, const Vector&
   return magnus * cross(spin, velocity) - (air.drag * speed) * velocity + air.gravity;
 }
 
-/// A ball after `duration` [s] of free flight, by one classical Runge-Kutta step with the spin of
+/// Moves a ball by `duration` [s] of free flight, by a classical Runge-Kutta step with the spin at
 /// the middle.
 inline Ball flown(const Ball& ball, const Air& air, double duration) noexcept {
   const double half = 0.5 * duration;

@@ -35,7 +35,7 @@ void check_numbers(const BallOptions& options) {
   }
 }
 
-/// Of all balls, extra ones last.
+/// Names of all balls, extra ones last.
 std::vector<std::string> ball_names(const BallOptions& options) {
   std::vector<std::string> names = entries_of(options.balls);
   for (std::uint32_t copy = 1; copy <= options.extra_balls; ++copy) {

@@ -13,7 +13,7 @@
 
 namespace o80::mujoco {
 
-/// A free body that is a ball.
+/// Free body that is a ball.
 struct BallPlace {
   std::string name;
   int position;  // in qpos
@@ -22,7 +22,7 @@ struct BallPlace {
   double mass;  // [kg]
 };
 
-/// A geom that balls bounce on.
+/// Geom on which balls bounce.
 struct SurfacePlace {
   std::string name;
   int geom;
@@ -35,20 +35,20 @@ struct SurfacePlace {
 
 inline constexpr std::uint32_t kMaxExtraBalls = 1000;
 
-/// True if the options name balls. Throws DriverError if they name surfaces only, or if a number is
-/// out of its range.
+/// True if the options name balls. Throws DriverError if they name surfaces only, or for a number
+/// out of range.
 bool has_balls(const BallOptions& options);
 
-/// Adds copies of the first ball to a model that is not compiled yet. Throws DriverError.
+/// Adds copies of the first ball to an uncompiled model. Throws DriverError.
 void add_extra_balls(mjSpec& spec, const BallOptions& options);
 
-/// Switches the contacts of the balls in the engine off: `Balls` computes them. Throws DriverError.
+/// Switches the engine's contacts of balls off: `Balls` computes them. Throws DriverError.
 void switch_off_contacts(mjModel& model, const BallOptions& options);
 
-/// The balls that the options name. Throws DriverError.
+/// Finds the balls named by the options. Throws DriverError.
 std::vector<BallPlace> balls_in(const mjModel& model, const BallOptions& options);
 
-/// The surfaces that the options name, in their order. Throws DriverError.
+/// Finds the surfaces named by the options, in order. Throws DriverError.
 std::vector<SurfacePlace> surfaces_in(const mjModel& model, const BallOptions& options);
 
 }  // namespace o80::mujoco

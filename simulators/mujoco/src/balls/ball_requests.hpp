@@ -11,7 +11,7 @@
 
 namespace o80::mujoco {
 
-/// Clears the contacts of a ball, so that the next contact is the first again.
+/// Clears the contacts of a ball, so that the next contact counts as the first.
 struct ClearContacts {
   static constexpr std::string_view kHelp = "clear the contact records of balls";
   std::uint32_t ball = 0;
@@ -20,7 +20,7 @@ O80_DESCRIBE(ClearContacts, (ball, "which, counted from 1; 0: all of them"));
 
 Served clear_contacts(Balls* balls, const ClearContacts& request) noexcept;
 
-/// The ball flies in the next iteration of `balls`.
+/// Makes the ball fly out in the next iteration of `balls`.
 Served fly_out(Balls* balls, const FlyOut& request) noexcept;
 
 }  // namespace o80::mujoco

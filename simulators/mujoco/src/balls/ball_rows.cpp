@@ -45,7 +45,7 @@ void BallRows::add_sensors(Schema& schema, const Balls& balls) {
     offsets.push_back(schema.fields[row.first_field + i].offset);
   }
 
-  // an array of them, one element for each ball
+  // an array with an element for each ball
   const std::uint32_t first = schema.add_sensor(structure_field(
       "contacts", contacts, "of each ball with each surface since the last clear_contacts",
       balls.size()));

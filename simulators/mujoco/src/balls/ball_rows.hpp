@@ -8,8 +8,8 @@
 
 namespace o80::mujoco {
 
-/// Where the balls lie in a row: each is an actuator, and has an element of the sensor `contacts`
-/// with a field for each surface, named after its geom.
+/// Places of the balls in a row: each is an actuator, and has an element of the sensor `contacts`
+/// with a field for each surface, named after the geom.
 class BallRows {
  public:
   void add_actuators(Schema& schema, const Balls& balls);

@@ -26,8 +26,8 @@ Balls::Balls(const mjModel& model, const BallOptions& options)
   imposed_starts_.resize(places_.size());
 }
 
-/// Watched surfaces first: an imposed ball meets no others. Still ones last: a ball that flies out
-/// meets no others.
+/// Sorts watched surfaces first: an imposed ball hits no others; and still ones last: a ball that
+/// flies out hits no others.
 void Balls::add_surfaces() {
   const auto add_those = [this](auto&& belongs) {
     std::size_t records[2] = {0,
@@ -110,7 +110,7 @@ void Balls::move_surfaces(const mjData& data, std::uint32_t steps) noexcept {
   }
 }
 
-/// Where the path to a target begins: at the ball, unless the target is a teleport.
+/// Begin of the path to a target: the ball, unless the target is a teleport.
 Ball Balls::start_of_imposed(const Ball& now, const BallState& target) const noexcept {
   const Vector to = vector(target.position);
   const Vector velocity = vector(target.velocity);
@@ -119,7 +119,7 @@ Ball Balls::start_of_imposed(const Ball& now, const BallState& target) const noe
   return {to - period_ * velocity, velocity, {}};
 }
 
-/// The straight path of an imposed ball in a step.
+/// Straight path of an imposed ball in a step.
 Path Balls::imposed_path(std::size_t i, const StepOfIteration& step) const noexcept {
   const Ball& start = imposed_starts_[i];
   const Vector end = vector(now_.targets[i].state.position);
@@ -134,7 +134,7 @@ Path Balls::imposed_path(std::size_t i, const StepOfIteration& step) const noexc
   return path;
 }
 
-/// Moves a ball along its imposed path, from which only a watched surface releases it.
+/// Moves a ball along its imposed path, which ends only at a watched surface.
 void Balls::impose(std::size_t i, const StepOfIteration& step) noexcept {
   BallNow& now = now_.balls[i];
   const ContactRecords contacts = records(i);
@@ -166,7 +166,7 @@ bool Balls::fly(std::size_t i, const Ball& from, double begin, const StepOfItera
   return bounced;
 }
 
-/// The contacts bear the iterations in which an ordinary flight would meet them.
+/// Contacts are stored with the iterations of an ordinary flight.
 void Balls::fly_out(std::size_t i, const StepOfIteration& step) noexcept {
   const FlyOut& request = now_.balls[i].fly_out;
   const Ball& ball = now_.balls[i].ball;

@@ -31,8 +31,8 @@ struct BallTarget {
   bool imposed = false;  // false: the ball flies freely, and `state` has no meaning
 };
 
-/// The balls of a simulation: imposed, or in free flight among moving surfaces. Between the steps
-/// of the engine, which knows nothing of their contacts, each ball is moved by our own laws of
+/// Balls of a simulation: imposed, or in free flight among moving surfaces. The engine does not
+/// compute their contacts: between its steps, each ball is moved by the laws of
 /// flight (ball_flight.hpp) and bounce (bounce.hpp).
 ///
 /// Realtime: everything but the constructor; no allocation, no lock.
@@ -41,10 +41,10 @@ class Balls {
   struct BallNow {
     Ball ball;
     bool released = false;
-    bool flies_out = false;  // in the next iteration, as `fly_out` says
+    bool flies_out = false;  // flies out in the next iteration
     FlyOut fly_out{};
   };
-  /// Everything that changes; a restored state repeats bit for bit.
+  /// Complete state; a restored state repeats bit for bit.
   struct State {
     std::vector<BallTarget> targets;
     std::vector<BallNow> balls;
@@ -53,26 +53,26 @@ class Balls {
     std::vector<Pose> poses;               // of the surfaces, watched ones first
   };
 
-  /// Throws DriverError. Switches off the contacts of the balls in `model`, which must outlive
-  /// this.
+  /// Switches off the engine's contacts of balls in `model`, which must outlive this object.
+  /// Throws DriverError.
   Balls(const mjModel& model, const BallOptions& options);
 
   std::size_t size() const noexcept { return places_.size(); }
-  /// Of the model, which the engine need not integrate.
+  /// Degrees of freedom of the balls, which the engine need not integrate.
   std::size_t degrees_of_freedom() const noexcept { return 6 * size(); }
   const std::vector<BallPlace>& places() const noexcept { return places_; }
-  /// In the order of the option.
+  /// Surfaces in the order of the option.
   const std::vector<SurfacePlace>& surfaces() const noexcept { return surface_places_; }
 
   std::vector<BallTarget>& targets() noexcept { return now_.targets; }
   const std::vector<BallTarget>& targets() const noexcept { return now_.targets; }
   BallState ball(std::size_t i) const noexcept;
-  /// A watched surface ended the imposed motion of this ball in the last iteration.
+  /// Whether a watched surface ended the imposed motion of this ball in the last iteration.
   bool released(std::size_t i) const noexcept { return now_.balls[i].released; }
   std::span<const WatchedContacts> watched_contacts(std::size_t i) const noexcept;
   std::span<const SurfaceContacts> other_contacts(std::size_t i) const noexcept;
 
-  /// Takes the start state of balls and surfaces from the engine.
+  /// Reads the start state of balls and surfaces from the engine.
   void reset(const mjData& data) noexcept;
   /// Clears the records of a ball.
   void clear(std::size_t i) noexcept { records(i).clear(); }
@@ -80,7 +80,7 @@ class Balls {
   bool imposed(std::size_t i) const noexcept {
     return now_.targets[i].imposed && !now_.balls[i].released;
   }
-  /// The ball flies out in the next iteration, unless a command moves it then.
+  /// Makes the ball fly out in the next iteration, unless a command moves it then.
   void fly_out(const FlyOut& request) noexcept {
     now_.balls[request.ball - 1].flies_out = true;
     now_.balls[request.ball - 1].fly_out = request;
@@ -90,13 +90,13 @@ class Balls {
   /// Moves all balls by a step, after the engine has moved the surfaces.
   void step(mjData& data, const StepOfIteration& step) noexcept;
 
-  /// Goes on with the same model with another step of the engine, which must outlive this.
+  /// Continues with a copy of the model with another time step, which must outlive this object.
   void take(const mjModel& model) noexcept { model_ = &model; }
 
   State& state() noexcept { return now_; }
 
  private:
-  /// A surface that balls meet, and the geom that it follows.
+  /// Surface, and its geom.
   struct Follower {
     int geom;
     bool still;
@@ -111,7 +111,7 @@ class Balls {
   Path imposed_path(std::size_t i, const StepOfIteration& step) const noexcept;
   void impose(std::size_t i, const StepOfIteration& step) noexcept;
   std::span<const Surface> all_surfaces() const noexcept { return surfaces_; }
-  /// Those that are part of the world.
+  /// Surfaces that are part of the world.
   std::span<const Surface> still_surfaces() const noexcept {
     return all_surfaces().subspan(moving_);
   }

@@ -7,32 +7,32 @@
 #include "balls/ball_flight.hpp"
 #include "balls/sweep.hpp"
 
-// The law of the bounce, one for all surfaces. Along the normal a share of the velocity is kept. In
+// Law of the bounce, one for all surfaces. Along the normal a share of the velocity is kept. In
 // the tangent plane friction acts on the slip, the velocity of the ball's surface relative to the
-// other one: it takes a share of the slip from the velocity of the ball while the ball grips, and
-// no more than the friction allows where it slides. What friction does to the velocity, it also
-// does to the spin.
+// other one: a gripping ball loses a share of the slip, a sliding one no more than friction
+// allows. The spin changes
+// accordingly.
 
 namespace o80::mujoco {
 
-/// A ball leaves a surface at least this fast [m/s], so that it hops and never rests.
+/// Least speed at which a ball leaves a surface [m/s], so that a ball hops and never rests.
 inline constexpr double kSlowestRebound = 0.05;
 
-/// What the bounce needs to know of a ball.
+/// Properties of a ball for the bounce.
 struct Sphere {
   double radius = 0.02;        // [m]
   double inertia = 2.0 / 3.0;  // moment of inertia / (mass radius^2): 2/3 of a hollow ball
 
-  /// The share of a slip that friction takes from the velocity until the ball rolls.
+  /// Share of the slip that the velocity loses until the ball rolls.
   double rolling() const noexcept { return inertia / (1 + inertia); }
 };
 
-/// Normal, then two tangents: unit vectors at right angles. The first tangent is along an axis of
+/// Normal and two tangents: perpendicular unit vectors. The first tangent is along an axis of
 /// the surface.
 struct Directions {
   Vector normal, first, second;
 
-  /// The axis of the surface nearest to the normal is left out; the next one is projected on the
+  /// Omits the surface's axis nearest to the normal, and projects the next one to the
   /// tangent plane.
   static Directions of(const Vector& normal, const std::array<Vector, 3>& axes) noexcept {
     std::size_t k = 0;
@@ -45,29 +45,29 @@ struct Directions {
   }
 };
 
-/// What friction does along one tangent of a surface.
+/// Effect of friction along one tangent of a surface.
 struct Friction {
-  double taken = 0;  // from the velocity of the ball [m/s]
-  double given = 0;  // to its spin, times inertia and radius [m/s]
+  double taken = 0;  // loss of the ball's velocity [m/s]
+  double given = 0;  // gain of spin, times inertia and radius [m/s]
 
   /// `velocity` of the ball relative to the surface, and `slip` of the ball's surface [m/s].
   static Friction of(double kept, double velocity, double slip, const Sphere& sphere) noexcept {
     const double grip = 1 - kept;
     if (grip <= 2 * sphere.rolling()) return {grip * slip, grip * slip};
-    // more than any push at one point can take: the ball leaves rolling, and slower
+    // more than any impulse at one point can take: the ball leaves rolling, and slower
     const double after = kept / (1 - sphere.rolling()) * (velocity - sphere.rolling() * slip);
     return {velocity - after, sphere.inertia * (slip - velocity + after)};
   }
 };
 
-/// A ball after a bounce off a point that moves with `surface_velocity`.
+/// Computes a bounce off a point that moves with `surface_velocity`.
 inline Ball bounced(const Ball& before, const Vector& surface_velocity, const Directions& along,
                     const Restitution& kept, double friction, const Sphere& sphere) noexcept {
   const Vector relative = before.velocity - surface_velocity;
   const double approach = -dot(relative, along.normal);
   const double rebound = std::max(kept[2] * approach, kSlowestRebound);
 
-  // velocity and slip => what a grip takes, or less where the ball slides
+  // velocity and slip => change by a grip, or less for a sliding ball
   const Vector slip = relative - sphere.radius * cross(before.spin, along.normal);
   const double velocity[2] = {dot(relative, along.first), dot(relative, along.second)};
   const Friction first = Friction::of(kept[0], velocity[0], dot(slip, along.first), sphere);
@@ -85,7 +85,7 @@ inline Ball bounced(const Ball& before, const Vector& surface_velocity, const Di
   return after;
 }
 
-/// A ball after a bounce; `before` is the ball at the contact.
+/// Computes a bounce; `before`: the ball at the contact.
 inline Ball bounced(const Ball& before, const Contact& contact, const Sphere& sphere) noexcept {
   const Motion& motion = contact.surface->motion;
   const std::array<Vector, 3> axes{motion.outside({1, 0, 0}, contact.share),

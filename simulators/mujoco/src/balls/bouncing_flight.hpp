@@ -5,15 +5,15 @@
 
 #include "balls/bounce.hpp"
 
-// Free flight through a step: the ball flies to the first contact, bounces, and flies on.
+// Free flight through a step: the ball flies to the first contact, bounces, and continues.
 
 namespace o80::mujoco {
 
 inline constexpr int kMaxBounces = 8;  // in one step
 
 /// Flies a ball from the share `begin` of a step [s] to its end, with all bounces on the way.
-/// `bounced_off(contact, before, after)` is told of each bounce, `passed(surface, gap)` of the
-/// smallest gap to each watched surface.
+/// Calls `bounced_off(contact, before, after)` for each bounce, and `passed(surface, gap)` with
+/// the smallest gap to each watched surface.
 template <class BouncedOff, class Passed>
 Ball flown_among(std::span<const Surface> surfaces, Ball ball, const Air& air, const Sphere& sphere,
                  double step, double begin, BouncedOff&& bounced_off, Passed&& passed) noexcept {
@@ -29,7 +29,7 @@ Ball flown_among(std::span<const Surface> surfaces, Ball ball, const Air& air, c
     bounced_off(*contact, before, ball);
     begin = share;
   }
-  return ball;  // the step is over, or the ball is wedged between surfaces for its rest
+  return ball;  // the step is over, or the ball is wedged between surfaces until its end
 }
 
 }  // namespace o80::mujoco

@@ -10,13 +10,13 @@
 
 namespace o80::mujoco {
 
-/// Velocities of a point that a body carries.
+/// Velocities of a point on a body.
 struct Carried {
   Vector velocity{};  // [m/s]
   Vector spin{};      // [rad/s], in the world's axes
 };
 
-/// The joints that carry a body: its own, and those of the bodies that it hangs on.
+/// Joints that carry a body: its own, and its ancestors' joints.
 inline std::vector<int> joints_under(const mjModel& model, int body) {
   std::vector<int> joints;
   for (; body != 0; body = model.body_parentid[body]) {
@@ -27,9 +27,9 @@ inline std::vector<int> joints_under(const mjModel& model, int body) {
   return joints;
 }
 
-/// Of a point of the world that bodies carry on these joints: the sum of what each adds. The same
-/// as mj_objectVelocity gives, without mj_comPos and mj_comVel, which look at all bodies; positions
-/// of joints and bodies are those of the last mj_kinematics.
+/// Computes the velocities of a point carried by these joints: the sum of their contributions.
+/// Equal to mj_objectVelocity, without mj_comPos and mj_comVel, which process all bodies; uses
+/// positions of joints and bodies of the last mj_kinematics.
 inline Carried carried_by(const std::vector<int>& joints, const mjModel& model, const mjData& data,
                           const Vector& point) noexcept {
   const auto vector = [](const mjtNum* n) { return Vector{n[0], n[1], n[2]}; };
@@ -42,7 +42,7 @@ inline Carried carried_by(const std::vector<int>& joints, const mjModel& model, 
     const auto at = 3 * static_cast<std::ptrdiff_t>(joint);
     const auto body = static_cast<std::ptrdiff_t>(model.jnt_bodyid[joint]);
     const mjtNum* rate = data.qvel + model.jnt_dofadr[joint];
-    // rates of a turning body are in its own axes, which are the columns of its matrix
+    // angular rates are in the body's axes, the columns of its matrix
     const auto own = [&](const mjtNum* spin) {
       Rotation rotation;
       std::copy_n(data.xmat + 9 * body, 9, rotation.m.begin());

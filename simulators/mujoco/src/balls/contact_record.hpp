@@ -12,11 +12,11 @@
 #include "balls/sweep.hpp"
 #include "o80/describe/describe.hpp"
 
-// The contacts of one ball with each surface since they were last cleared.
+// Contacts of one ball with each surface since the last clear.
 
 namespace o80::mujoco {
 
-/// Contacts of a ball with a watched surface; the first one in full.
+/// Contacts of a ball with a watched surface, with all data of the first one.
 struct WatchedContacts {
   std::int64_t count = 0;
   std::int64_t iteration = -1;
@@ -55,7 +55,7 @@ static_assert(std::is_trivially_copyable_v<SurfaceContacts>);
 constexpr std::array<double, 3> numbers(const Vector& v) noexcept { return {v.x, v.y, v.z}; }
 constexpr Vector vector(const std::array<double, 3>& v) noexcept { return {v[0], v[1], v[2]}; }
 
-/// One of the steps of an iteration.
+/// Step of an iteration.
 struct StepOfIteration {
   std::int64_t iteration = 0;  // on the simulation's clock
   std::uint32_t number = 0;
@@ -68,7 +68,7 @@ struct StepOfIteration {
   double duration() const noexcept { return 1.0 / count; }
 };
 
-/// The records of one ball, which belong to its owner.
+/// Records of one ball, in memory of the owner.
 struct ContactRecords {
   std::span<WatchedContacts> watched;
   std::span<SurfaceContacts> others;

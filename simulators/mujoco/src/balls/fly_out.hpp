@@ -9,9 +9,9 @@
 
 namespace o80::mujoco {
 
-/// Flies a ball to the end of its flight within one iteration. It meets the surfaces that are part
-/// of the world, by the same laws and in the same steps as in ordinary iterations; moving surfaces
-/// are left out.
+/// Flies a ball to the end of its flight within one iteration. The ball bounces off surfaces that
+/// are part of the world, by the same laws and in the same steps as in ordinary iterations; moving
+/// surfaces are ignored.
 struct FlyOut {
   static constexpr std::string_view kHelp = "fly a ball to its next bounce within one iteration";
   std::uint32_t ball = 1;
@@ -26,7 +26,7 @@ O80_DESCRIBE(FlyOut, (ball, "which, counted from 1; no command may move it"),
              (low, "the ball is outside below one of these [m]"),
              (high, "the ball is outside above one of these [m]"));
 
-inline constexpr std::uint32_t kMaxFlownOut = 100'000;  // iterations, so that the work is bounded
+inline constexpr std::uint32_t kMaxFlownOut = 100'000;  // limit of the iterations
 
 /// True outside the box of a request.
 inline bool outside(const FlyOut& request, const Vector& position) noexcept {

@@ -12,8 +12,8 @@ struct Pose {
   Vector spin{};      // [rad/s], in the world's axes
 };
 
-/// A rigid motion from one pose to another, by shares of a step from 0 to 1: straight, and turning
-/// evenly about one axis.
+/// Rigid motion from one pose to another, by shares of a step from 0 to 1: straight, with an
+/// even rotation about one axis.
 class Motion {
  public:
   Motion() = default;
@@ -28,7 +28,7 @@ class Motion {
   double angle() const noexcept { return turn_.angle; }
   /// Displacement in the step [m].
   Vector travel() const noexcept { return to_.position - from_.position; }
-  /// A point of the world in the frame of the body.
+  /// Transforms a point of the world to the frame of the body.
   Vector inside(const Vector& point, double share) const noexcept {
     if (share == 1) return to_.rotation.in(point - to_.position);
     const Vector relative = point - position(share);
@@ -36,7 +36,7 @@ class Motion {
                                  ? relative
                                  : turned(relative, turn_.axis, -share * turn_.angle));
   }
-  /// A direction of the body in the frame of the world.
+  /// Transforms a direction of the body to the frame of the world.
   Vector outside(const Vector& direction, double share) const noexcept {
     const Vector out = from_.rotation.out(direction);
     return turn_.angle == 0 ? out : turned(out, turn_.axis, share * turn_.angle);
@@ -53,10 +53,10 @@ class Motion {
   Turn turn_;
 };
 
-/// A body that turns in a step by this much more than its spin explains was teleported [rad].
+/// Unexplained rotation in a step above which a body was teleported [rad].
 inline constexpr double kTeleportAngle = 0.5;
 
-/// True if the velocities at both ends of a motion of `step` [s] do not explain its way.
+/// True if the velocities at both ends of a motion of `step` [s] do not explain its displacement.
 inline bool teleported(const Motion& motion, double step, double distance) noexcept {
   const Pose& from = motion.from();
   const Pose& to = motion.to();
@@ -65,7 +65,7 @@ inline bool teleported(const Motion& motion, double step, double distance) noexc
   return motion.angle() > 0.5 * step * (length(from.spin) + length(to.spin)) + kTeleportAngle;
 }
 
-/// The motion into a pose after a teleport: as the velocity there says.
+/// Motion into a pose after a teleport, extrapolated from the velocity there.
 inline Motion arriving_at(const Pose& pose, double step) noexcept {
   Pose from = pose;
   from.position = pose.position - step * pose.velocity;

@@ -8,18 +8,18 @@
 
 namespace o80::mujoco {
 
-/// A point beside a shape: its distance from the surface [m], negative inside, and the direction
-/// away from it.
+/// Relation of a point to a shape: distance from the surface [m], negative inside, and direction
+/// away from the surface.
 struct Near {
   double distance = 0;
   Vector normal{};
 };
 
-/// An elliptic plate, rounded at its rim: all points within half its thickness of a
+/// Elliptic plate with a rounded rim: all points within half the thickness of a
 /// flat ellipse.
 struct Plate {
   Vector half{};  // half axes [m]
-  int thin = 1;   // the axis along which its faces look
+  int thin = 1;   // the normal axis of the faces
 
   Near near(const Vector& point) const noexcept;
 };
@@ -30,26 +30,26 @@ struct Box {
   Near near(const Vector& point) const noexcept;
 };
 
-/// The half space below z = 0.
+/// Half space below z = 0.
 struct Plane {
   Near near(const Vector& point) const noexcept { return {point.z, {0, 0, 1}}; }
 };
 
-/// The shape of a surface, in the frame of its geom.
+/// Shape of a surface, in the frame of its geom.
 using Shape = std::variant<Plate, Box, Plane>;
 
 inline Near near(const Shape& shape, const Vector& point) noexcept {
   return std::visit([&](const auto& each) { return each.near(point); }, shape);
 }
 
-/// The point of an ellipse (half axes a, b) nearest to a point outside of it; both in the first
+/// Finds the point of an ellipse (half axes a, b) nearest to an outside point; both in the first
 /// quadrant.
 struct EllipsePoint {
   double x = 0, y = 0;
 };
 inline EllipsePoint nearest_on_ellipse(double a, double b, double x, double y) noexcept {
-  // the root t of (a x / (t + a^2))^2 + (b y / (t + b^2))^2 = 1: convex and falling, so that
-  // Newton's rule comes from the left and never passes it
+  // root t of (a x / (t + a^2))^2 + (b y / (t + b^2))^2 = 1: convex and falling, so that
+  // Newton's method approaches from the left and never passes the root
   double t = std::max({0.0, a * x - a * a, b * y - b * b});
   for (int i = 0; i < 64; ++i) {
     const double u = a * x / (t + a * a);

@@ -13,16 +13,16 @@ namespace o80::mujoco {
 /// of the surface and along its normal, in the order of the surface's axes with the normal last.
 using Restitution = std::array<double, 3>;
 
-/// Friction of a surface on which no ball slides.
+/// Friction of a surface without sliding.
 inline constexpr double kNoSliding = std::numeric_limits<double>::infinity();
 
-/// Something that balls bounce on, during a step.
+/// Surface on which balls bounce, during a step.
 struct Surface {
   Shape shape{};
   Restitution restitution{1, 1, 1};
   double friction = kNoSliding;  // largest tangential force over normal force
   bool watched = false;          // see BallOptions::watched
-  std::size_t record = 0;  // index of its record among those of watched, or of other, surfaces
+  std::size_t record = 0;        // index of the record among watched, or among other, surfaces
   Motion motion{};
 };
 

@@ -10,8 +10,8 @@
 namespace o80::mujoco {
 namespace {
 
-/// "0.8" => 0.8 three times; "0.7 0.7 0.9" => these; a fourth number is the friction. False if the
-/// text is none of these.
+/// Parses "0.8" => 0.8 three times; "0.7 0.7 0.9" => these; a fourth number is the friction. False
+/// for other texts.
 bool parse_bounce(std::string_view text, SurfaceEntry& entry) {
   const auto numbers = numbers_of(text);
   const std::size_t count = numbers ? numbers->size() : 0;

@@ -8,7 +8,7 @@
 
 namespace o80::mujoco {
 
-/// One entry of the option `surfaces`.
+/// Entry of the option `surfaces`.
 struct SurfaceEntry {
   std::string geom;
   Restitution restitution{1, 1, 1};
@@ -16,7 +16,7 @@ struct SurfaceEntry {
   bool watched = false;
 };
 
-/// The surfaces that the options name, in their order. Throws DriverError.
+/// Parses the surfaces named by the options, in order. Throws DriverError.
 std::vector<SurfaceEntry> surfaces_of(const BallOptions& options);
 
 }  // namespace o80::mujoco

@@ -7,11 +7,11 @@
 
 #include "balls/surface.hpp"
 
-// Finds the contact of a ball with a surface: the relative motion of both is swept through a step.
+// Finds the contact of a ball with a surface by a sweep of their relative motion through a step.
 
 namespace o80::mujoco {
 
-/// The path of a ball's centre from a share of the step to its end, a straight line.
+/// Straight path of a ball's centre from a share of the step to its end.
 struct Path {
   Vector from{}, to{};                    // [m]
   Vector velocity_from{}, velocity_to{};  // [m/s]
@@ -24,7 +24,7 @@ struct Path {
   }
 };
 
-/// One contact of a ball with a surface.
+/// Contact of a ball with a surface.
 struct Contact {
   const Surface* surface = nullptr;
   double share = 0;           // of the step
@@ -33,7 +33,7 @@ struct Contact {
   Vector surface_velocity{};  // at the point [m/s]
 };
 
-/// The result of a sweep.
+/// Result of a sweep.
 struct Swept {
   std::optional<Contact> contact;
   double smallest = std::numeric_limits<double>::infinity();  // gap on the path [m], if watched
@@ -43,14 +43,14 @@ inline constexpr double kTouching = 1e-9;    // a smaller gap is a contact [m]
 inline constexpr double kFinestStep = 1e-4;  // of a sweep: a graze within it is 60 nm deep [m]
 inline constexpr int kMaxSweepSteps = 4096;  // a path of 40 cm within kFinestStep of a surface
 
-/// One ball that passes one surface in a step.
+/// Ball that passes a surface in a step.
 class Sweep {
  public:
   Sweep(const Surface& surface, const Path& path, double radius) noexcept
       : surface_(surface), path_(path), radius_(radius) {}
 
-  /// The first contact at which the ball approaches the surface. Conservative advancement: a sweep
-  /// step is never longer than the gap, so that no contact is missed at any speed.
+  /// Finds the first contact at which the ball approaches the surface. Conservative advancement: a
+  /// sweep step is never longer than the gap, so that no contact is missed at any speed.
   Swept run() const noexcept;
 
  private:
@@ -69,7 +69,7 @@ class Sweep {
                  length(path_.to - motion.position(1)));
     return straight + motion.angle() * lever;
   }
-  /// The share at which the gap closes, between one where it is open and one where it is not.
+  /// Finds the share at which the gap closes, between a share with and one without a gap.
   double closing(double open, double closed) const noexcept {
     for (int i = 0; i < 50 && closed - open > 1e-15; ++i) {
       const double middle = 0.5 * (open + closed);
@@ -105,7 +105,7 @@ inline Swept Sweep::run() const noexcept {
     if (now > kTouching) {
       open = share;
     } else {
-      // already inside: back to the contact
+      // already inside: goes back to the contact
       double touching = share;
       if (open >= 0 && now < -kTouching) {
         touching = closing(open, share);
@@ -128,8 +128,8 @@ inline Swept Sweep::run() const noexcept {
   return result;
 }
 
-/// The first contact of a ball with any of the surfaces. `passed(surface, gap)` is told the
-/// smallest gap to each watched surface.
+/// Finds the first contact of a ball with any of the surfaces. Calls `passed(surface, gap)` with
+/// the smallest gap to each watched surface.
 template <class Passed>
 std::optional<Contact> first_contact(std::span<const Surface> surfaces, const Path& path,
                                      double radius, Passed&& passed) noexcept {

@@ -5,7 +5,7 @@
 
 namespace o80::mujoco {
 
-/// A point, a direction or a velocity in space.
+/// Point, direction or velocity in space.
 struct Vector {
   double x = 0, y = 0, z = 0;
 
@@ -36,13 +36,13 @@ constexpr Vector between(const Vector& from, const Vector& to, double share) noe
   return from + share * (to - from);
 }
 
-/// `a` turned about a unit axis [rad].
+/// Turns `a` about a unit axis [rad].
 inline Vector turned(const Vector& a, const Vector& axis, double angle) noexcept {
   const double cosine = std::cos(angle);
   return cosine * a + std::sin(angle) * cross(axis, a) + ((1 - cosine) * dot(axis, a)) * axis;
 }
 
-/// An orientation, row by row; its columns are the axes of the body.
+/// Orientation, row by row; the columns are the axes of the body.
 struct Rotation {
   std::array<double, 9> m{1, 0, 0, 0, 1, 0, 0, 0, 1};
 
@@ -50,18 +50,18 @@ struct Rotation {
     const auto k = static_cast<std::size_t>(i);
     return {m[k], m[3 + k], m[6 + k]};
   }
-  /// From the body's axes to the world's.
+  /// Transforms from the body's axes to the world's.
   constexpr Vector out(const Vector& a) const noexcept {
     return a.x * axis(0) + a.y * axis(1) + a.z * axis(2);
   }
-  /// From the world's axes to the body's.
+  /// Transforms from the world's axes to the body's.
   constexpr Vector in(const Vector& a) const noexcept {
     return {dot(axis(0), a), dot(axis(1), a), dot(axis(2), a)};
   }
   bool operator==(const Rotation&) const = default;
 };
 
-/// The turn that leads from one orientation to another: a unit axis of the world and an angle
+/// Computes the rotation from one orientation to another: unit axis of the world and angle
 /// [rad].
 struct Turn {
   Vector axis{0, 0, 1};

@@ -9,11 +9,11 @@
 
 namespace o80::mujoco {
 
-/// What a command to the robot sets.
+/// Target of commands.
 enum class JointMode : std::uint8_t {
   imposed,  // position and velocity of a joint, exactly
   control,  // the input of an actuator of the model
-  actuated  // what the actuator of a joint takes: its position, its velocity or its torque
+  actuated  // the input of a joint's actuator: position, velocity or torque
 };
 O80_DESCRIBE_ENUM(JointMode, imposed, control, actuated);
 

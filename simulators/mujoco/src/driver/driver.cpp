@@ -10,7 +10,7 @@
 namespace o80::mujoco {
 namespace {
 
-/// The type of the states of spread joints, in the numbers of their actuators.
+/// Type of the states of spread joints, in the numbers of their actuators.
 std::uint32_t type_of_spread(Schema& schema, const std::vector<JointPlace>& joints) {
   const TypeRow own = schema.types[describing::type_of<JointState>(schema)];
   const auto first = schema.fields.begin() + own.first_field;
@@ -30,7 +30,7 @@ std::uint32_t type_of_spread(Schema& schema, const std::vector<JointPlace>& join
   return schema.add_type("ActuatorState", fields);
 }
 
-/// The type of the states of joints. Its units say "rad or m" only where there are both.
+/// Type of the states of joints, with the unit "rad or m" only for both kinds.
 std::uint32_t type_of_states(Schema& schema, const std::vector<JointPlace>& joints) {
   const std::uint32_t type = describing::type_of<JointState>(schema);
   const auto slides = std::ranges::count(joints, true, &JointPlace::slides);
@@ -41,7 +41,7 @@ std::uint32_t type_of_states(Schema& schema, const std::vector<JointPlace>& join
   return type;
 }
 
-/// Adds an array of actuators, named as the members of the model; returns the place of each.
+/// Adds an array of actuators with the names of model elements; returns the place of each.
 template <class T, class Member>
 std::vector<Place<T>> add_group(Schema& schema, std::string_view group, std::uint32_t type,
                                 const std::vector<Member>& members) {
@@ -71,7 +71,7 @@ std::vector<Place<JointState>> add_joint_sensors(Schema& schema,
   return places;
 }
 
-/// Adds the actuators of joints that are driven, at the begin of the states.
+/// Adds the actuators of driven joints, at the begin of the states.
 void add_face(const JointFace& face, Schema& schema) {
   const Schema& own = face.schema;
   for (const GroupRow& group : own.groups) {
@@ -87,7 +87,7 @@ void add_face(const JointFace& face, Schema& schema) {
   schema.integrals = own.integrals;
 }
 
-/// The requests that only these simulations have.
+/// Adds the requests specific to these simulations.
 struct BallRequests {
   using Actuators = RunTimeActuators;
   using Requests = o80::Requests<ClearContacts, FlyOut>;
@@ -116,7 +116,7 @@ MujocoDriver::Places MujocoDriver::add_to(Schema& schema) const {
   return places;
 }
 
-/// Takes all from the other robot, but for its name, and puts the requests of simulations first.
+/// Copies the other robot's description but its name, with the simulation's requests first.
 void MujocoDriver::take_face(Schema& schema) const {
   Schema own = face()->schema;
   const std::vector<RequestRow> others = std::exchange(own.requests, {});
@@ -127,7 +127,7 @@ void MujocoDriver::take_face(Schema& schema) const {
   schema = std::move(own);
 }
 
-/// Names the model for viewers, and the values that move its joints and balls.
+/// Describes the model for viewers, and the values that move joints and balls.
 void MujocoDriver::show(Schema& schema, const Places& places) const {
   const Model& model = simulation_.model();
   schema.shown.mjcf = model.mjcf;
@@ -191,7 +191,7 @@ void MujocoDriver::describe(Schema& schema) const {
   const std::int64_t requested = schema.asked_period();
   (void)add_to(schema);
   schema.simulated();
-  if (is_like_) {  // any rate, as the other robot
+  if (is_like_) {  // any rate, like the other robot
     constexpr std::int64_t kDefault = 1'000'000;
     if (schema.head.period == 0) schema.period(kDefault);
     period_ = schema.head.period;
@@ -208,8 +208,8 @@ void MujocoDriver::describe(Schema& schema) const {
   schema.period(std::llround(steps * (timestep * 1e9)));
 }
 
-/// What follows another robot has any period, as a whole number of steps of the engine, which are
-/// at most as long as those of the model.
+/// A simulation that follows another robot has any period, divided into engine steps that are
+/// at most as long as the model's.
 void MujocoDriver::start() {
   if (period_ == 0) return;
   const double period = static_cast<double>(period_) * 1e-9;
@@ -297,7 +297,7 @@ void MujocoDriver::read_sensors(Reading<MujocoDriver>& reading) const {
 void MujocoDriver::go_on_from_targets(Reading<MujocoDriver>& reading) {
   const Targets& targets = simulation_.targets();
   std::byte* desired = reading.desired_bytes();
-  // joints that are driven go on from where they are, as those of a robot; a restore is exact
+  // driven joints continue from their positions, as on a robot; a restore is exact
   const std::byte* states =
       std::exchange(restored_, false) ? targets.states.data() : reading.observed_bytes();
   std::copy_n(states, targets.states.size(), desired);
@@ -328,7 +328,7 @@ Served MujocoDriver::on(const Restore& restore) noexcept {
   return Served::rejected("this slot holds no snapshot: send the request snapshot first");
 }
 
-/// The requests of arms, as far as a model has what they mean.
+/// Serves the requests of arms that the model supports.
 Served MujocoDriver::serve_as_arm(JointFace::Word word, const std::byte* payload) noexcept {
   using Word = JointFace::Word;
   if (word == Word::none) {
@@ -347,13 +347,13 @@ Served MujocoDriver::serve_as_arm(JointFace::Word word, const std::byte* payload
   return Served::start_afresh();
 }
 
-/// As an arm, it holds then.
+/// Makes the joints hold again, as on an arm.
 Served MujocoDriver::resume() noexcept {
   simulation_.relax(false);
   return Served::done();
 }
 
-/// The requests about balls and free bodies, or those of the other robot.
+/// Serves requests of balls and free bodies, or of the other robot.
 Served MujocoDriver::on(std::uint32_t request, const std::byte* payload) noexcept {
   if (is_like_) return serve_as_arm(face()->words[request - 3], payload);
   if (request == 5) return simulation_.place(unpack<PlaceBody>(payload));

@@ -67,10 +67,10 @@ class MujocoDriver {
 
   Simulation simulation_;
   std::uint32_t steps_;  // 0: as many as the period holds
-  bool is_like_;         // it has the face of another robot
+  bool is_like_;         // has the face of another robot
   bool restored_ = false;
   std::vector<std::uint32_t> commanded_;  // actuators of a relaxed robot, in the last iteration
-  // as described, where the steps of the engine are shortened to fill it; else 0 [ns]
+  // as described, if engine steps are shortened to fill it; else 0 [ns]
   mutable std::int64_t period_ = 0;
   Places places_;
   bool steps_known_ = false;

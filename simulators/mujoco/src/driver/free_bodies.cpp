@@ -79,7 +79,7 @@ Served place(const mjModel& model, mjData& data, const std::vector<FreeBody>& bo
       !all_finite(request.angular_velocity)) {
     return Served::rejected("position, quaternion and velocities must be finite numbers");
   }
-  // of the largest number first: no square is too large or too small
+  // divides by the largest number first, so that no square overflows or vanishes
   const double largest =
       std::abs(std::ranges::max(quaternion, {}, [](double x) { return std::abs(x); }));
   if (largest == 0) {

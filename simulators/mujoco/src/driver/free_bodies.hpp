@@ -14,17 +14,17 @@
 
 namespace o80::mujoco {
 
-/// A body with a free joint that is not a ball.
+/// Body with a free joint that is not a ball.
 struct FreeBody {
   std::string name;
   int position;  // in qpos
   int velocity;  // in qvel
 };
 
-/// The free bodies of a model, in its order, without the balls.
+/// Lists the free bodies of a model, in model order, without balls.
 std::vector<FreeBody> free_bodies_in(const mjModel& model, const std::vector<BallPlace>& balls);
 
-/// Position and velocity of a free body, as the engine has them.
+/// Position and velocity of a free body, in the engine's form.
 struct FreeBodyState {
   std::array<double, 3> position;
   std::array<double, 4> quaternion;
@@ -36,7 +36,7 @@ O80_DESCRIBE(FreeBodyState, (position, "of the body's frame, in the world [m]"),
              (angular_velocity, "in the body's axes [rad/s]"));
 FreeBodyState state_of(const FreeBody& body, const mjData& data) noexcept;
 
-/// Puts a body where it is asked to be. `body`, a number in the order of the free bodies, is
+/// Places a body. `body`, a number in the order of the free bodies, is
 /// described as an enumeration of their names.
 struct PlaceBody {
   static constexpr std::string_view kHelp = "put a free body to a place, with a velocity";
@@ -51,19 +51,19 @@ O80_DESCRIBE(PlaceBody, (body, "its name"), (position, "of the body's frame, in 
              (velocity, "in the world's axes [m/s]"),
              (angular_velocity, "in the body's axes [rad/s]"));
 
-/// Where the state of a body is in the sensor values.
+/// Place of a body's state in the sensor values.
 struct BodyRow {
   std::size_t body;  // index
   Place<FreeBodyState> place;
 };
-/// Adds a sensor value for each body whose name no other sensor value has.
+/// Adds a sensor value for each body with an unused name.
 std::vector<BodyRow> add_body_sensors(Schema& schema, const std::vector<FreeBody>& bodies);
 
-/// Adds the request `place`, unless there are no bodies.
+/// Adds the request `place` if there are bodies.
 void add_place(Schema& schema, const std::vector<FreeBody>& bodies);
 
-/// The engine forgets the accelerations with which it would begin its next step, so that what
-/// follows does not depend on the past.
+/// Clears the engine's accelerations, the first guess of the next step, so that the future does
+/// not depend on the past.
 Served place(const mjModel& model, mjData& data, const std::vector<FreeBody>& bodies,
              const PlaceBody& request) noexcept;
 

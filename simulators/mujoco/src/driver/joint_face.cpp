@@ -35,7 +35,7 @@ Quantity quantity_of_unit(std::string_view unit) {
   return unit == "Nm" || unit == "N" || unit == "N m" ? Quantity::effort : Quantity::none;
 }
 
-/// What a number of a state is: by its unit, else by its name; a plain number is a position.
+/// Kind of a state's number: by its unit, else by its name; a plain number is a position.
 Quantity quantity_of(const FieldRow& field) {
   const Quantity by_unit = quantity_of_unit(field.unit.view());
   const Quantity by_name = quantity_of_name(field.name.view());
@@ -56,7 +56,7 @@ std::string shown(double number) {
   return text.data();
 }
 
-/// The same interval in the number of which `line` makes the joint's.
+/// Converts an interval by the inverse of `line`.
 Range back(const Line& line, const Range& range) {
   Range found{line.back(range.low), line.back(range.high)};
   if (line.factor < 0) std::swap(found.low, found.high);
@@ -105,9 +105,9 @@ class Builder {
     return nullptr;
   }
 
-  // the face that the model gives
+  // the face of the model
 
-  /// speeds: the largest ones, by the names of joints.
+  /// speeds: limits by the names of joints.
   void describe(const std::map<std::string, double>& speeds, const std::string& limits) {
     if (named_.empty()) {
       for (const Servo& servo : servos_) {
@@ -137,7 +137,7 @@ class Builder {
     throw DriverError("joint '" + named.joint + "' has no actuator: add one to the model");
   }
 
-  /// The joint of this name, or that of the actuator of this name.
+  /// Finds the joint of this name, or the joint of the actuator of this name.
   int joint_of(const Named& named) const {
     for (const mjtObj kind : {mjOBJ_JOINT, mjOBJ_ACTUATOR}) {
       for (const Servo& servo : servos_) {
@@ -148,7 +148,7 @@ class Builder {
     return find(model_, mjOBJ_JOINT, named.joint, "joint");
   }
 
-  /// What a joint is commanded by: position rather than velocity, velocity rather than torque.
+  /// Chooses the command of a joint: position before velocity, velocity before torque.
   Quantity commanded(int joint) const {
     return *std::ranges::find_if(kQuantities,
                                  [&](Quantity each) { return servo_of(joint, each) != nullptr; });
@@ -182,7 +182,7 @@ class Builder {
     for (std::uint32_t i = 0; i < names.size(); ++i) schema().actuator(first + i).name(names[i]);
   }
 
-  /// Of positions, and of velocities that are commanded themselves.
+  /// Limits of positions, and of commanded velocities.
   void limit_speed(const std::string& joint, double speed) {
     const int id = mj_name2id(&model_, mjOBJ_JOINT, joint.c_str());
     for (Servo& servo : servos_) {
@@ -195,7 +195,7 @@ class Builder {
     }
   }
 
-  /// "2.5 20 1000 0.35, elbow=2": for all joints, then for one.
+  /// Parses "2.5 20 1000 0.35, elbow=2": for all joints, then for one.
   void limit(const std::string& list) {
     for (const std::string& entry : entries_of(list)) {
       const auto equals = entry.find('=');
@@ -232,7 +232,7 @@ class Builder {
     }
   }
 
-  /// A force can be taken away only where it follows from the input at once.
+  /// A force can be removed only if it follows from the input at once.
   Word word_of(const RequestRow& request) const {
     const std::string_view name = request.name.view();
     if (!std::ranges::all_of(face.inputs, [&](const Input& input) {
@@ -255,7 +255,7 @@ class Builder {
     return name == "strength" && is_one_number && have_most ? Word::strength : Word::none;
   }
 
-  // from the numbers of an actuator to those of its joint
+  // from numbers of an actuator to numbers of its joint
 
   void drive(std::uint32_t index) {
     const ActuatorRow& actuator = schema().actuators[index];
@@ -323,7 +323,7 @@ class Builder {
                       ", which the state of '" + named.name + "' does not have");
   }
 
-  /// From the position of an actuator to that of its joint: the same, or spread over its range.
+  /// Conversion of an actuator's position to its joint's: equal, or spread over the range.
   Line spread(const ActuatorRow& actuator, const Named& named, const Servo& servo) const {
     std::vector<double> over = named.over;
     std::uint32_t limit = actuator.first_limit;
@@ -346,9 +346,9 @@ class Builder {
     return spread_over(named, over, range);
   }
 
-  /// Bounds that are not given are those of the model; others must lie inside them.
+  /// Sets missing bounds to the model's, and checks that given ones are inside these.
   void bound(const ActuatorRow& actuator, const Named& named, LimitRow& row, const Range& allowed) {
-    constexpr double kTolerance = 1e-4;  // share of the width: rounded numbers
+    constexpr double kTolerance = 1e-4;  // tolerance of rounded numbers, as a share of the width
     const double slack = kTolerance * (allowed.high - allowed.low);
     const bool fits = (!std::isfinite(row.minimum) || row.minimum >= allowed.low - slack) &&
                       (!std::isfinite(row.maximum) || row.maximum <= allowed.high + slack);
@@ -398,7 +398,7 @@ class Builder {
     return true;
   }
 
-  /// The velocity or the torque of a joint, the time, and that a reading is fresh.
+  /// Sensor values of arms: velocity or torque of a joint, time, freshness of a reading.
   bool serve_number(FieldRow& field, std::uint32_t offset, std::uint32_t element) {
     const Quantity quantity = quantity_of_name(field.name.view());
     const std::string_view name = field.name.view();
@@ -494,7 +494,7 @@ bool JointFace::moves(int position) const noexcept {
   });
 }
 
-/// Viewers spread a share with bounds over the joint's range.
+/// Makes viewers spread a share with bounds over the joint's range.
 bool JointFace::is_shown(const mjModel& model, const Number& number) const {
   if (number.line.factor == 1) return true;
   for (const ActuatorRow& actuator : schema.actuators) {

@@ -13,7 +13,7 @@
 
 namespace o80::mujoco {
 
-/// An entry of the option `joints`: `elbow`, `elbow=j2` or `jaw=j6 0 1`.
+/// Entry of the option `joints`: `elbow`, `elbow=j2` or `jaw=j6 0 1`.
 struct Named {
   std::string name;
   std::string joint;
@@ -21,60 +21,60 @@ struct Named {
 };
 /// Throws DriverError.
 std::vector<Named> named_in(const std::string& list);
-/// From a number in `over` to one in the range of this joint. Throws DriverError if it has none.
+/// Conversion from a number in `over` to the range of a joint. Throws DriverError without a range.
 Line spread_over(const Named& named, const std::vector<double>& over, const Range& range);
 
-/// The joints of a model as actuators of o80, each driven by its servo, with the face that the
-/// model gives (mode actuated) or that of another robot (like).
+/// Joints of a model as actuators of o80, each driven by a servo, with the model's face
+/// (mode actuated) or another robot's (like).
 struct JointFace {
-  /// One input of the model's actuators.
+  /// Input of the model's actuators.
   struct Input {
-    std::uint32_t offset;  // of the number that it takes, in the states
+    std::uint32_t offset;  // place of the input's number in the states
     Line line;             // from that number to ctrl
     int control;           // address in ctrl
-    int position;          // address in qpos of what it holds after a reset; -1: it takes 0
+    int position;          // address in qpos of the held value after a reset; -1: 0
     Line hold;             // from there to ctrl
     int actuator;          // id
-    bool weakens;          // by the request strength: not a gripper, which has one of its own
+    bool weakens;          // changed by the request strength: not a gripper, which has its own
   };
-  /// A request of arms that a simulation serves too.
+  /// Request of arms that a simulation also serves.
   enum class Word : std::uint8_t { none, hold, relax, strength, recover };
-  /// Where a number of a row comes from.
+  /// Source of a number of a row.
   struct Number {
     std::uint32_t offset;
     Quantity quantity;  // none: a sensor
     int joint;          // id
     int address;        // in qpos, in qvel and its forces, or in sensordata
-    Line line;          // from the number to that of the joint
+    Line line;          // from the number to the joint's number
   };
 
-  /// The actuators; with like also sensor values, requests and the period (0: any).
+  /// Description of the actuators; with like, also of sensor values, requests and period (0: any).
   Schema schema;
   std::vector<Input> inputs;
   std::vector<Number> states;
   std::vector<Number> sensors;
   std::vector<std::uint32_t> capture_times;
   std::vector<Word> words;        // of the requests
-  std::vector<std::byte> absent;  // sensor values: NaN or 0 where the model has none
+  std::vector<std::byte> absent;  // sensor values: NaN or 0 if missing in the model
 
   /// True if a state has the position of this address in qpos.
   bool moves(int position) const noexcept;
   bool is_shown(const mjModel& model, const Number& number) const;
-  /// Names the joints that the states move, for viewers.
+  /// Describes the joints that the states move, for viewers.
   void show(const mjModel& model, ShownModel& shown) const;
-  /// Sets the inputs as the states say.
+  /// Sets the inputs from the states.
   void drive(const std::byte* block, mjData& data) const noexcept;
-  /// Changes the inputs so that no actuator gives more than this share of its largest force; for 0
-  /// none gives any.
+  /// Changes the inputs so that no actuator exceeds this share of its largest force; 0: no force
+  /// at all.
   void weaken(double share, const mjModel& model, mjData& data) const noexcept;
-  /// Sets the inputs so that the joints stay.
+  /// Sets the inputs to hold the joints.
   void hold(mjData& data) const noexcept;
-  /// Observed numbers of the states; those that no joint has are left.
+  /// Writes the observed numbers of the states; numbers without a joint are not changed.
   void observe(const mjData& data, std::byte* block) const noexcept;
   void extend(const mjData& data, std::int64_t time, std::byte* extended) const noexcept;
 };
 
-/// Throws DriverError: a joint or its actuator is missing, or it cannot do what the face says.
+/// Throws DriverError if a joint or its actuator is missing or does not support the face.
 JointFace joint_face(const mjModel& model, const Config& config);
 
 }  // namespace o80::mujoco

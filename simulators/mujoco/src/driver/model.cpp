@@ -32,7 +32,7 @@ ModelPointer compiled(const Config& config, mjSpec& spec) {
   return model;
 }
 
-/// The model as MJCF, with what was added to it; empty if it is longer than a description takes.
+/// The model as MJCF, additions included; empty if too long for a description.
 std::string text_of(const mjSpec& spec) {
   std::string text(std::size_t{1} << 14, '\0');
   for (int tries = 0; tries < 2; ++tries) {
@@ -51,7 +51,7 @@ std::string absolute(const std::string& path) {
   return failed ? path : found.lexically_normal().string();
 }
 
-/// Equal for options and files of equal models.
+/// Key that is equal for equal options and files.
 std::string key_of(const Config& config) {
   std::string key = state_of_files(absolute(config.model)) + '\n';
   if (!config.things.empty()) key += state_of_files(absolute(config.things));
@@ -86,7 +86,7 @@ JointPlace place_of(const mjModel& model, int id, const Named& named) {
           line};
 }
 
-/// The named hinges and slides; all of them if no name is given.
+/// Finds the named hinges and slides; all if no name is given.
 std::vector<JointPlace> joints_in(const mjModel& model, const std::vector<Named>& all) {
   std::vector<JointPlace> joints;
   for (const Named& named : all) {

@@ -11,25 +11,25 @@
 
 namespace o80::mujoco {
 
-/// One hinge or slide.
+/// Hinge or slide.
 struct JointPlace {
-  std::string name;   // as an actuator
-  std::string joint;  // its own name
+  std::string name;   // name as an actuator
+  std::string joint;  // name in the model
   int position;       // in qpos
   int velocity;       // in qvel
   bool slides;        // else it turns
-  bool spread;        // the actuator's position is another number than the joint's
-  Line line;          // from that number to that of the joint
+  bool spread;        // the actuator's position differs from the joint's
+  Line line;          // from the actuator's number to the joint's
 };
 
-/// One sensor of the model: a number or a vector.
+/// Sensor of the model: a number or a vector.
 struct SensorPlace {
   std::string name;
   int address;  // in sensordata
   int numbers;
 };
 
-/// One input of an actuator of the model.
+/// Input of an actuator of the model.
 struct ControlPlace {
   std::string name;
   int address;  // in ctrl
@@ -37,11 +37,11 @@ struct ControlPlace {
   double minimum, maximum;
 };
 
-/// A compiled model, and the addresses of its joints, actuators and sensors.
+/// Compiled model, and the addresses of its joints, actuators and sensors.
 ///
 /// Move-only.
 struct Model {
-  /// `edit` may change the model before it is compiled, `finish` after that. Throws DriverError.
+  /// `edit` may change the model before its compilation, `finish` afterwards. Throws DriverError.
   Model(const Config& config, const std::function<void(mjSpec&)>& edit,
         const std::function<void(mjModel&)>& finish);
 

@@ -59,7 +59,7 @@ void Simulation::reset() noexcept {
   now_.engine_contacts = static_cast<std::uint32_t>(data_->ncon);
 }
 
-/// Computes all that is read of the engine's state.
+/// Computes all values that are read from the engine.
 void Simulation::forward() noexcept {
   if (integrates_ || !model_.sensors.empty()) {
     mj_forward(model_.model.get(), data_.get());
@@ -97,7 +97,7 @@ void Simulation::step(std::uint32_t number) noexcept {
   if (balls_) balls_->step(*data_, {now_.clock, number, steps_});
 }
 
-/// mj_step() where update_sensors() has computed what follows from positions and velocities.
+/// mj_step() after update_sensors(), without computing positions and velocities again.
 void Simulation::step_on() noexcept {
   const mjModel* model = model_.model.get();
   mjData* data = data_.get();
@@ -115,8 +115,8 @@ void Simulation::step_on() noexcept {
   }
 }
 
-/// What mirrors a robot does not sweep from the model's start to where the robot is, through the
-/// bodies between. Where there are none, surfaces have a teleport distance.
+/// Teleports imposed joints at the first commands, instead of sweeping them through bodies on the
+/// way. Without bodies, surfaces have a teleport distance.
 void Simulation::teleport_joints() noexcept {
   now_.teleports = false;
   if (!integrates_) return;
@@ -145,7 +145,7 @@ void Simulation::impose_joints(std::uint32_t number) noexcept {
   mj_kinematics(model_.model.get(), data_.get());
 }
 
-/// Sensors show the state that is published; the next step begins with what was computed for them.
+/// Computes the sensors of the published state; the next step reuses the results.
 void Simulation::update_sensors() noexcept {
   if (model_.sensors.empty()) return;
   const mjModel* model = model_.model.get();

@@ -19,31 +19,31 @@ struct JointState {
 };
 O80_DESCRIBE(JointState, (position, "[rad or m]"), (velocity, "[rad/s or m/s]", o80::rests_at(0)));
 
-/// Targets of an iteration; those of balls are in `Balls`.
+/// Targets of an iteration; `Balls` has the balls' targets.
 struct Targets {
   std::vector<JointState> joints;  // imposed, in the numbers of their actuators
-  bool commanded = false;          // a command moves one of them
+  bool commanded = false;          // whether a command moves one of them
   std::vector<double> controls;
   std::vector<std::byte> states;  // of mode actuated, as desired
 };
 
-/// A model in motion: its joints are imposed or controlled, the engine integrates the rest.
+/// Simulation of a model: joints are imposed or controlled, the engine integrates all else.
 ///
 /// Move-only. Realtime: everything but the constructor; no allocation, no lock. A snapshot holds
-/// all that changes: a restored simulation continues bit for bit.
+/// the complete state: a restored simulation continues bit for bit.
 class Simulation {
  public:
   /// Throws DriverError.
   explicit Simulation(const Config& config);
 
   const Model& model() const noexcept { return model_; }
-  /// Of the engine [s].
+  /// Time step of the engine [s].
   double timestep() const noexcept { return model_.model->opt.timestep; }
-  /// Of an iteration [s].
+  /// Duration of an iteration [s].
   double period() const noexcept { return timestep() * steps_; }
   /// Sets the steps of the engine in an iteration, at least 1.
   void steps(std::uint32_t count) noexcept { steps_ = count; }
-  /// The same, and changes the engine's so that they last one period [s].
+  /// Sets the steps, and changes the engine's time step so that they last one period [s].
   void steps(std::uint32_t count, double period) {
     steps_ = count;
     model_.timestep(period / count);
@@ -51,7 +51,7 @@ class Simulation {
   }
   /// Targets of the next `advance`.
   Targets& targets() noexcept { return now_.targets; }
-  /// Actuators that hold nothing, or give less than they can; until a reset.
+  /// Relaxes or weakens actuators until a reset.
   void relax(bool relaxed) noexcept { now_.relaxed = relaxed; }
   bool relaxed() const noexcept { return now_.relaxed; }
   void strength(double share) noexcept { now_.strength = share; }
@@ -77,26 +77,26 @@ class Simulation {
   std::size_t slots() const noexcept { return slots_.size(); }
   /// The snapshot in a slot; empty if the slot holds none.
   std::span<const std::byte> snapshot_bytes(std::size_t slot) const noexcept;
-  /// Fills a slot; false if there is no such slot, or if the bytes are those of another model.
+  /// Fills a slot; false if there is no such slot, or for bytes of another model.
   bool load_snapshot(std::size_t slot, std::span<const std::byte> bytes) noexcept;
 
   const mjData& data() const noexcept { return *data_; }
   JointState joint(std::size_t i) const noexcept;
-  /// Of an imposed joint, in the numbers of its actuator.
+  /// State of an imposed joint, in the numbers of its actuator.
   JointState imposed(std::size_t i) const noexcept { return now_.joints[i]; }
   double control(std::size_t i) const noexcept;
   std::span<const double> sensor(std::size_t i) const noexcept;
-  /// Iterations since the start; a restore sets it back too.
+  /// Number of iterations since the start, also restored by a snapshot.
   std::int64_t clock() const noexcept { return now_.clock; }
   /// True if the engine integrates anything: a body that is neither imposed nor a ball.
   bool integrates() const noexcept { return integrates_; }
   /// Contacts between bodies in the engine, in the last step.
   std::uint32_t engine_contacts() const noexcept { return now_.engine_contacts; }
-  /// A position, velocity or acceleration is not finite, or too large.
+  /// True if a position, velocity or acceleration is not finite, or too large.
   bool diverged() const noexcept;
 
  private:
-  /// Everything that changes, but for the engine's data and the balls.
+  /// State, except for the engine's data and the balls.
   struct State {
     std::int64_t clock = 0;  // [iterations]
     std::uint32_t engine_contacts = 0;
@@ -129,8 +129,8 @@ class Simulation {
   bool integrates_;
   DataPointer data_;
   State now_;
-  bool needs_forces_;       // rows show something that follows from forces
-  bool forwarded_ = false;  // sensors were computed, and nothing has changed since
+  bool needs_forces_;       // rows contain values that follow from forces
+  bool forwarded_ = false;  // sensors are up to date
   std::vector<Slot> slots_;
   std::vector<mjtNum> engine_state_;  // of a snapshot
 };

@@ -1,4 +1,4 @@
-// Snapshots, as bytes: a replay can begin with one.
+// Snapshots as bytes, so that a replay can begin with one.
 
 #include <algorithm>
 
@@ -8,7 +8,7 @@
 namespace o80::mujoco {
 
 namespace {
-constexpr int kWholeState = mjSTATE_INTEGRATION;  // all that the next step depends on
+constexpr int kWholeState = mjSTATE_INTEGRATION;  // all inputs of the next step
 }
 
 void Simulation::add_slots(std::uint32_t count) {
@@ -19,7 +19,7 @@ void Simulation::add_slots(std::uint32_t count) {
   for (Slot& slot : slots_) slot.bytes.resize(counted.bytes());
 }
 
-/// The engine's state first: all else that rows show follows from it, or is kept beside it.
+/// Copies the engine's state first: other values of rows follow from it, or are copied here.
 template <class Bytes>
 void Simulation::each_part(Bytes& bytes) noexcept {
   bytes(engine_state_);
@@ -41,7 +41,7 @@ void Simulation::each_part(Bytes& bytes) noexcept {
     bytes(balls.others);
     bytes(balls.poses);
   }
-  // the efforts of the last step, which rows of a face show
+  // the efforts of the last step, shown in rows of a face
   if (model_.face) bytes.copy(data_->qfrc_actuator, static_cast<std::size_t>(model_.model->nv));
 }
 
@@ -61,7 +61,7 @@ bool Simulation::restore(std::size_t slot) noexcept {
   mj_setState(model_.model.get(), data_.get(), engine_state_.data(), kWholeState);
   std::ranges::fill(data_->warning, mjWarningStat{});
   forward();
-  // that has changed the first guess of the next step, and the sensors
+  // that changed the first guess of the next step, and the sensors
   mj_setState(model_.model.get(), data_.get(), engine_state_.data(), kWholeState);
   StateBytes from = StateBytes::from(bytes);
   each_part(from);

@@ -9,7 +9,7 @@
 namespace o80::mujoco {
 namespace {
 
-/// True if the body moves freely: it may be a ball, whose sphere needs no name.
+/// True if the body moves freely: it may be a ball, with an unnamed sphere.
 bool is_free(const mjModel& model, int body) {
   const int first = model.body_jntadr[body];
   return first >= 0 && model.jnt_type[first] == mjJNT_FREE;
@@ -29,7 +29,7 @@ bool equal(const Number* a, const Number* b, std::size_t count) {
   return std::ranges::equal(std::span(a, count), std::span(b, count));
 }
 
-/// True if both have the same joints, and bodies of the same masses in the same places.
+/// True if both models have the same joints, and bodies of the same masses in the same places.
 bool move_alike(const mjModel& a, const mjModel& b) {
   if (a.nbody != b.nbody || a.nq != b.nq || a.nv != b.nv || a.na != b.na || a.nu != b.nu) {
     return false;

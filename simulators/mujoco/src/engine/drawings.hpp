@@ -4,10 +4,10 @@
 
 namespace o80::mujoco {
 
-/// `full`, compiled from `spec`, without the geoms that are only drawn: the engine would compute
-/// where each of them is, in every step. They have no name, touch nothing, weigh nothing, and feel
-/// no air; the spec loses them. `full` itself where it has sensors, some of which see what is
-/// drawn, or plugins; where nothing is only drawn; and where bodies would not be the same.
+/// Removes geoms that are only drawn from `full` and `spec`, because the engine would compute
+/// their places in every step. Such geoms have no name, no contacts, no mass, and no
+/// drag. Returns `full` unchanged if it has sensors, some of which react to drawn geoms, or
+/// plugins; if no geom is only drawn; and if bodies would change.
 ModelPointer without_drawings(mjSpec& spec, ModelPointer full);
 
 }  // namespace o80::mujoco

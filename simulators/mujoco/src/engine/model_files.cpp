@@ -13,7 +13,7 @@ namespace {
 
 using std::filesystem::path;
 
-/// The values in the quotes of a text that may be files, or folders of files.
+/// Lists quoted values of a text that may be files, or folders of files.
 struct Quoted {
   void read(std::string_view text) {
     std::size_t begin = 0;

@@ -4,9 +4,9 @@
 
 namespace o80::mujoco {
 
-/// What the files of a model are now, as text: of those in MJCF the contents, of others, such as
-/// meshes, size and time of the last change. Files are all those that `path`, or an MJCF file among
-/// them, names in quotes.
+/// Text that identifies the present files of a model: contents of MJCF files; size and
+/// modification time of others, such as meshes. Includes all files that `path`, or an MJCF file
+/// among them, names in quotes.
 std::string state_of_files(const std::string& path);
 
 }  // namespace o80::mujoco

@@ -18,8 +18,8 @@ bool drives_one_joint(const mjModel& model, int actuator) {
          (bias == mjBIAS_NONE || bias == mjBIAS_AFFINE);
 }
 
-/// What the input asks for: where the force gain x input + b0 + b1 length + b2 velocity is 0, or
-/// the force itself. An integrator takes the velocity of its place.
+/// Meaning of the input: the number at which the force gain x input + b0 + b1 length + b2 velocity
+/// is 0, or the force itself. The input of an integrator is the velocity of its position.
 void set_input(const mjModel& model, int actuator, Servo& servo) {
   const double gear = model.actuator_gear[6 * model.actuator_outadr[actuator]];
   const double gain = model.actuator_gainprm[mjNGAIN * actuator];

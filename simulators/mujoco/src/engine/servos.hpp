@@ -8,10 +8,10 @@
 
 namespace o80::mujoco {
 
-/// A number of a joint: what an actuator of the model is told, or what is read.
+/// Number of a joint: input of an actuator of the model, or reading.
 enum class Quantity : std::uint8_t { position, velocity, effort, none };
 
-/// From one number to another: factor x number + shift.
+/// Linear conversion: factor x number + shift.
 struct Line {
   double factor = 1;
   double shift = 0;
@@ -26,18 +26,18 @@ struct Range {
 
 Range intersection(const Range& a, const Range& b);
 
-/// An actuator of the model that drives a hinge or a slide.
+/// Actuator of the model that drives a hinge or a slide.
 struct Servo {
   int actuator, joint;  // ids
   int control;          // address in ctrl
   Quantity commanded;   // of the joint
   Line input;           // from that number, in [rad], [m], ... of the joint, to ctrl
-  Range allowed;    // values of that number, by ctrlrange; of a position also by the joint's range
+  Range allowed;    // range of the number, by ctrlrange; of a position also by the joint's range
   Range positions;  // the joint's range
 };
 
-/// The servos of a model, in the order of its actuators. An actuator belongs to them if it acts on
-/// one hinge or slide, has one input, and a force that is linear in it.
+/// Lists the servos of a model, in the order of its actuators: actuators that act on one hinge or
+/// slide, with one input, and a force linear in the input.
 std::vector<Servo> servos_in(const mjModel& model);
 
 }  // namespace o80::mujoco

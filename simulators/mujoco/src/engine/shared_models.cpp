@@ -57,7 +57,7 @@ SharedModel with_timestep(SharedModel model, double step) {
   const mjModel* of = model.get();
   SharedModel made(own.release(), [kept = std::move(model)](mjModel* each) mutable {
     mj_deleteModel(each);
-    kept.reset();  // this function lives as long as `in_another_step` knows the model
+    kept.reset();  // this function lives as long as `in_another_step` refers to the model
   });
   in_another_step.push_back({of, step, made});
   return made;

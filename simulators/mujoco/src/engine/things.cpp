@@ -12,7 +12,7 @@ namespace {
 
 using std::filesystem::path;
 
-/// Files are found from anywhere: the text of the whole model names them.
+/// Makes file names absolute, because the text of the whole model names them.
 void make_absolute(mjString* file, const path& folder) {
   const std::string name = mjs_getString(file);
   if (!name.empty()) mjs_setString(file, (folder / name).lexically_normal().c_str());
@@ -32,7 +32,7 @@ void make_files_absolute(mjSpec& spec, const path& folder) {
   }
 }
 
-/// Without the warning that names may be repeated: that is an error when the model is compiled.
+/// Suppresses the warning of repeated names, which are an error of the compilation.
 bool attached(mjsFrame& frame, const mjSpec& things) {
   static std::mutex swaps;  // copies are constructed by several threads
   const std::scoped_lock lock(swaps);

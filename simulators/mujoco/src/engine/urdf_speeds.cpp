@@ -34,7 +34,7 @@ bool opens(std::string_view tag, std::string_view element) {
          (tag.size() == element.size() || is_space(tag[element.size()]));
 }
 
-/// The value of an attribute; empty if the tag has none.
+/// Value of an attribute; empty if missing in the tag.
 std::string_view value_of(std::string_view tag, std::string_view attribute) {
   for (auto at = tag.find(attribute); at != kNowhere; at = tag.find(attribute, at + 1)) {
     const auto equals = tag.find_first_not_of(" \t\r\n", at + attribute.size());

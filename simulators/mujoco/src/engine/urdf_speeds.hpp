@@ -5,8 +5,8 @@
 
 namespace o80::mujoco {
 
-/// The largest speeds that a URDF file gives its joints, by their names [rad/s or m/s]: what MuJoCo
-/// does not read. Empty for other models; joints with a speed of 0 are left out. Throws
+/// Reads the speed limits of a URDF file by joint name [rad/s or m/s], which MuJoCo ignores.
+/// Empty for other models; joints with a speed of 0 are omitted. Throws
 /// DriverError.
 std::map<std::string, double> urdf_speeds(const std::string& path);
 

@@ -2,11 +2,11 @@
 
 namespace o80::mujoco {
 
-/// The MuJoCo that this library was built with: "mujoco 4.0.1".
+/// MuJoCo version of this library's build: "mujoco 4.0.1".
 const char* built_with();
 
-/// Throws DriverError, naming both versions and the cure, unless `library` is the version that this
-/// library was built with.
+/// Throws DriverError, naming both versions and the cure, unless `library` is the version of this
+/// library's build.
 void check_version(int library, const char* library_text);
 
 }  // namespace o80::mujoco

@@ -11,13 +11,13 @@ namespace {
 
 constexpr double kNear = 0.1;         // a ball that rises below this height has bounced [m]
 constexpr double kUnexplained = 2.0;  // a velocity farther off begins a new flight [m/s]
-constexpr double kSlowest = 0.5;      // that comes nearer and has a crossing [m/s]
-constexpr double kLongest = 2.0;      // flight that is predicted, however wrong an estimate is [s]
-constexpr double kMaxLate = 0.3;      // correction of a predicted time, and longest way back [s]
-constexpr int kPieces = 4;            // in which a long flight is computed
+constexpr double kSlowest = 0.5;      // least approach speed of a ball with a crossing [m/s]
+constexpr double kLongest = 2.0;      // limit of the predicted flight of a wrong estimate [s]
+constexpr double kMaxLate = 0.3;      // limit of time corrections, and of times back [s]
+constexpr int kPieces = 4;            // steps of a long flight
 constexpr double kTiny = 1e-9;
 
-/// Spin about other axes than x, which a slanted bounce makes, is left out of estimates.
+/// Estimates omit spin about other axes than x, which a slanted bounce causes.
 Ball with_spin_about_x(Ball ball) noexcept {
   ball.spin.y = ball.spin.z = 0;
   return ball;
@@ -90,12 +90,12 @@ bool BallFilter::touches(const Estimate& estimate, const Seen* seen) const noexc
   return seen == nullptr ? ball.position.z < settings_.platform.height : (*seen)[5] > 0;
 }
 
-/// A ball that has come below the platform in the last step, as if it had touched it.
+/// Bounces a ball that was below the platform after the last step.
 Ball BallFilter::bounced_within(const Ball& ball) const noexcept {
   const Platform& platform = settings_.platform;
   const double deep = (platform.height - ball.position.z) / std::max(-ball.velocity.z, kTiny);
   const double since = std::clamp(deep, 0.0, settings_.step);
-  const Vector fallen = since * settings_.air.gravity;  // what gravity has added since the touch
+  const Vector fallen = since * settings_.air.gravity;  // gravity since the touch
   Ball touching = ball;
   touching.velocity = ball.velocity - fallen;
   Ball after = with_spin_about_x(bounced(touching, platform));
@@ -105,18 +105,18 @@ Ball BallFilter::bounced_within(const Ball& ball) const noexcept {
   return after;
 }
 
-/// A ball that comes down on the platform, after its touch, and the time until then [s].
+/// Computes a ball after its next touch of the platform, and the time until then [s].
 Ball BallFilter::after_touch(const Ball& ball, double& time) const noexcept {
   const Air& air = settings_.air;
   const double height = settings_.platform.height;
   const double rise = ball.velocity.z;
   const double fall = std::max(ball.position.z - height, 0.0);
-  // however wrong the estimate of the spin is, the ball falls
+  // the ball falls even with a wrong estimate of the spin
   const double falling = std::max(-acceleration(air, ball.velocity, ball.spin).z, 1.0);
   time = std::min((rise + std::sqrt(rise * rise + 2 * falling * fall)) / falling, kLongest);
   Ball touching = flown_far(ball, air, time);
 
-  // the forces have changed on the way
+  // corrects for the changed forces on the way
   const double above = touching.position.z - height;
   const double speed = std::max(-touching.velocity.z, kSlowest);
   const double root = std::sqrt(std::max(speed * speed - 2 * air.gravity.z * above, 0.0));
@@ -134,7 +134,7 @@ Crossing BallFilter::crossing(std::size_t number, double plane) const noexcept {
   double before = 0;
   const Ball ball = estimate.bounced ? estimate.ball : after_touch(estimate.ball, before);
 
-  // by a parabola, then by flights of so long
+  // by a parabola, then corrected by flights
   const double way = ball.position.y - plane;
   const double speed = std::max(-ball.velocity.y, kSlowest);
   const double slowing = acceleration(air, ball.velocity, ball.spin).y;

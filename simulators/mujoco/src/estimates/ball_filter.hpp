@@ -7,20 +7,20 @@
 #include "estimates/platform.hpp"
 
 // Estimates of flying balls from noisy measurements: position, velocity and spin about x. After
-// each measurement the estimate is the last one flown on for a step, by the laws of flight and
-// bounce, plus gain times what the measurement adds. Where a ball was not seen, its estimate flies
-// on alone. A velocity that no flight and no bounce explains begins a new flight.
+// each measurement, the estimate is the prediction of the last one by the laws of flight and
+// bounce, plus gain times innovation. Without a measurement, the estimate is the prediction.
+// A velocity that no flight and no bounce explains begins a new flight.
 
 namespace o80::mujoco {
 
 /// Position and velocity of a measured ball [m, m/s].
 using Seen = std::array<double, 6>;
 
-/// What a measurement changes: of position and velocity x by those of x (4), then of y, z, their
-/// velocities and the spin by those of y and z (20).
+/// Gains: position and velocity along x by measurements along x (4), then y, z, their
+/// velocities and the spin by measurements along y and z (20).
 using Gain = std::array<double, 24>;
 
-/// Where a ball goes through a plane of constant y: x and z [m], its velocity [m/s], and the time
+/// Crossing of a plane of constant y by a ball: x and z [m], velocity [m/s], and time
 /// until then [s].
 using Crossing = std::array<double, 6>;
 
@@ -29,10 +29,10 @@ class BallFilter {
   struct Settings {
     Air air{};
     Platform platform{};
-    double step = 0.01;        // from one measurement to the next [s]
-    double mean_spin = 0;      // of a ball that was seen once [rad/s]
-    std::vector<Gain> before;  // a gain for each measurement since the ball was first seen
-    std::vector<Gain> after;   // and since its bounce; the last one goes on
+    double step = 0.01;        // interval of measurements [s]
+    double mean_spin = 0;      // of a ball with one measurement [rad/s]
+    std::vector<Gain> before;  // a gain for each measurement since the first sighting
+    std::vector<Gain> after;   // and since the bounce; the last one repeats
   };
 
   /// Throws std::invalid_argument without gains.
@@ -41,18 +41,18 @@ class BallFilter {
   std::size_t count() const noexcept { return estimates_.size(); }
   const Ball& ball(std::size_t number) const noexcept { return estimates_[number].ball; }
 
-  /// A new flight of a ball, with its first measurement.
+  /// Begins a flight of a ball with its first measurement.
   void begin(std::size_t number, const Seen& seen) noexcept;
-  /// A step later; without a measurement `seen` is null.
+  /// Updates after a step; `seen`: measurement, or null.
   void step(std::size_t number, const Seen* seen) noexcept;
-  /// All 0 for a ball that does not come nearer to the plane from greater y, or is too absurd.
+  /// All 0 for a ball that does not approach the plane from greater y, or is implausible.
   Crossing crossing(std::size_t number, double plane) const noexcept;
 
  private:
   struct Estimate {
     Ball ball{};
     bool bounced = false;
-    std::ptrdiff_t measured = 0;  // which gain was used last; -1: none since the bounce
+    std::ptrdiff_t measured = 0;  // index of the last used gain; -1: none since the bounce
   };
 
   bool touches(const Estimate& estimate, const Seen* seen) const noexcept;

@@ -8,22 +8,22 @@
 
 namespace o80::mujoco {
 
-/// A level rectangle at rest that balls bounce on.
+/// Level resting rectangle on which balls bounce.
 struct Platform {
-  double height = 0;            // of the centre of a ball that touches it [m]
+  double height = 0;            // of the centre of a touching ball [m]
   std::array<double, 2> low{};  // least x and y [m]
   std::array<double, 2> high{};
   Restitution restitution{1, 1, 1};
   double friction = kNoSliding;
   Sphere sphere{};
 
-  /// Whether it lies below a point.
+  /// Whether the platform is below a point.
   bool carries(const Vector& point) const noexcept {
     return point.x >= low[0] && point.x <= high[0] && point.y >= low[1] && point.y <= high[1];
   }
 };
 
-/// A ball after a touch of the platform, from above whatever its velocity says.
+/// Bounces a ball on the platform from above, whatever its velocity.
 inline Ball bounced(Ball ball, const Platform& platform) noexcept {
   ball.velocity.z = -std::abs(ball.velocity.z);
   constexpr Directions kUpwards{{0, 0, 1}, {1, 0, 0}, {0, 1, 0}};

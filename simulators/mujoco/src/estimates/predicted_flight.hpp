@@ -10,7 +10,7 @@
 
 namespace o80::mujoco {
 
-/// A ball along a predicted flight. A bounce gives two nodes of the same time, before and after.
+/// Node of a predicted flight. A bounce gives two nodes of the same time, before and after.
 struct Node {
   double time = 0;  // since the start [s]
   Ball ball{};
@@ -18,11 +18,11 @@ struct Node {
 };
 
 inline constexpr std::size_t kMaxNodes = 1'000'000;
-inline constexpr double kShortestStep = 1e-9;  // a shorter rest of a flight is left out [s]
-inline constexpr double kShortestRise = 0.05;  // [s^2/m]: a rising ball is above where it started
+inline constexpr double kShortestStep = 1e-9;  // a shorter remainder of a flight is omitted [s]
+inline constexpr double kShortestRise = 0.05;  // [s^2/m]: a rising ball is above its start
                                                // for at least this times its velocity
 
-/// The time within a step at which a falling ball touches the platform [s]; none if it does not.
+/// Finds the time within a step at which a falling ball touches the platform [s], if any.
 inline std::optional<double> touch_within(const Ball& ball, const Air& air,
                                           const Platform& platform, double step) noexcept {
   const auto above = [&](double time) {
@@ -39,8 +39,8 @@ inline std::optional<double> touch_within(const Ball& ball, const Air& air,
   return high;
 }
 
-/// The flight of a ball in steps [s], with its bounces if there is a platform; the last node is at
-/// `duration` [s]. Throws std::length_error for more than `kMaxNodes`.
+/// Predicts the flight of a ball in steps [s], with bounces on a platform, if any; the last node is
+/// at `duration` [s]. Throws std::length_error for more than `kMaxNodes`.
 inline std::vector<Node> predicted_flight(Ball ball, const Air& air, const Platform* platform,
                                           double duration, double step) {
   std::vector<Node> nodes{{0, ball, false}};

@@ -36,7 +36,7 @@ using Flags = nb::ndarray<const bool, nb::shape<-1>, nb::c_contig, nb::device::c
 using Which = nb::ndarray<const std::int64_t, nb::shape<-1>, nb::c_contig, nb::device::cpu>;
 using Three = std::array<double, 3>;
 
-/// A new array of the caller's, to fill.
+/// Makes a new array for the caller to fill.
 Doubles array(std::initializer_list<std::size_t> shape, double*& values) {
   std::size_t count = 1;
   for (const std::size_t each : shape) count *= each;
@@ -59,7 +59,7 @@ double* put(double* to, const Ball& from) {
   return put(put(put(to, from.position), from.velocity), from.spin);
 }
 
-/// Raises ValueError with the name of the number that is wrong.
+/// Raises ValueError with the name of a wrong number.
 double finite(double number, const char* name) {
   if (std::isfinite(number)) return number;
   throw nb::value_error((std::string(name) + " must be a finite number").c_str());
@@ -184,7 +184,7 @@ std::vector<Gain> gains(const Rows<24>& rows) {
   return made;
 }
 
-/// Numbers of balls of a filter; all of them by default.
+/// Indices of a filter's balls; all by default.
 class Chosen {
  public:
   Chosen(const BallFilter& filter, const std::optional<Which>& which)

@@ -1,4 +1,4 @@
-"""Counterparts of the arms that speak their wire protocols."""
+"""Fake arms that speak the wire protocols of the real ones."""
 
 from o80_arms.fakes.arms import FakeArm, koch, koch_leader, so101, so101_leader
 

@@ -1,4 +1,4 @@
-"""A fake arm: `python -m o80_arms.fakes` prints what to type, and obeys its terminal."""
+"""Fake arm: `python -m o80_arms.fakes` lists commands, and reads them from the terminal."""
 
 import argparse
 import sys
@@ -17,7 +17,7 @@ heat N C, voltage N V, overload N, torque_off N, pull N STEPS_PER_S STRENGTH"""
 
 
 def obey(chain: FakeChain[Any], words: list[str]) -> None:
-    """Breaks something, or mends it. Raises ValueError, KeyError, IndexError."""
+    """Runs a command. Raises ValueError, KeyError or IndexError for an invalid one."""
     verb, *numbers = words
     if verb in ("cut", "plug"):
         getattr(chain, verb)()

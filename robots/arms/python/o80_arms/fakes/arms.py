@@ -1,4 +1,4 @@
-"""Fake arms: their servos, and the calibration with which o80 finds them."""
+"""Fake arms: servos, and a calibration file for the driver."""
 
 import tempfile
 from collections.abc import Iterator
@@ -19,14 +19,14 @@ RANGES = ((795, 3300), (910, 3185), (944, 3151), (967, 3128), (228, 3867), (2030
 
 @dataclass(frozen=True)
 class FakeArm:
-    """Servos on a pseudo-terminal, and the file with their calibration."""
+    """Servos on a pseudo-terminal, and their calibration file."""
 
     chain: FakeChain[Any]
     file: Path
 
     @property
     def options(self) -> dict[str, Any]:
-        """Options of the robot; a program in Python may answer late."""
+        """Options of the robot, with a long timeout because a fake in Python may answer late."""
         return {
             "port": str(self.chain.port),
             "calibration": str(self.file),
@@ -35,23 +35,23 @@ class FakeArm:
 
 
 def so101(*, latency: float = 0.001, tick: float | None = None) -> AbstractContextManager[FakeArm]:
-    """A calibrated SO-101 that stands in the middle of its ranges.
+    """Creates a calibrated SO-101 in the middle of its ranges.
 
-    latency: of the adapter [s]. tick: time that passes with each reading [s]; the bus then takes
-    none, so that bursts are fast and repeatable. None: time passes by the clock.
+    latency: of the adapter [s]. tick: simulated time per reading [s]; the bus then takes no
+    time, so that bursts are fast and repeatable. None: the clock's time.
     """
     return _arm(feetech.FakeChain, latency, tick)
 
 
 def koch(*, latency: float = 0.001, tick: float | None = None) -> AbstractContextManager[FakeArm]:
-    """A calibrated Koch, as `so101`."""
+    """Creates a calibrated Koch, as `so101`."""
     return _arm(dynamixel.FakeChain, latency, tick)
 
 
 def koch_leader(
     *, latency: float = 0.001, tick: float | None = None
 ) -> AbstractContextManager[FakeArm]:
-    """A calibrated leader of a Koch, as `so101`."""
+    """Creates a calibrated leader of a Koch, as `so101`."""
     return _arm(partial(dynamixel.FakeChain, models=KOCH_LEADER), latency, tick)
 
 

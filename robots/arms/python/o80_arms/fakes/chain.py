@@ -1,7 +1,7 @@
-"""Bus servos on a pseudo-terminal, as their clients see them, whatever their protocol.
+"""Simulates bus servos on a pseudo-terminal; subclasses add the protocol.
 
-`FakeChain` answers in a thread of its own. Its time passes by the clock, or by a period for each
-reading of all servos, so that a test depends on no clock. Its methods break things.
+`FakeChain` answers in a thread. Simulated time follows the clock, or advances by a period for
+each reading of all servos, so that tests depend on no clock. Methods inject faults.
 """
 
 import math
@@ -17,13 +17,13 @@ from pathlib import Path
 from typing import ClassVar, Generic, Self, TypeVar
 
 TURN = 4096
-BYTE = 10e-6  # on a line of 1 Mbaud [s]
+BYTE = 10e-6  # duration at 1 Mbaud [s]
 EVERYBODY = 254
 Register = tuple[int, int]  # address, size
 
 
 class FakeServo:
-    """Registers, and a motor that follows its goal within speed, acceleration and strength."""
+    """Registers, and a motor with limits of speed, acceleration and strength."""
 
     MODEL: ClassVar[Register]
     ID: ClassVar[Register]
@@ -33,15 +33,15 @@ class FakeServo:
     POSITION: ClassVar[Register]
     VOLTAGE: ClassVar[Register]
     TEMPERATURE: ClassVar[Register]
-    KEPT: ClassVar[int]  # registers below are as before when the power comes back
+    KEPT: ClassVar[int]  # registers below this address are persistent
     AS_DELIVERED: ClassVar[dict[Register, int]]
 
     def __init__(self, number: int) -> None:
-        self.encoder = TURN / 2  # where the axis is [steps]
+        self.encoder = TURN / 2  # position of the axis [steps]
         self.speed = 0.0  # [steps/s]
-        self.pull = 0.0  # what pulls at it: moves it where it has no strength [steps/s]
-        self.needs = 0.0  # strength that it takes to withstand the pull, 0 to 1
-        self.alarms = 0  # that the back door has set
+        self.pull = 0.0  # external load: speed of the axis without strength [steps/s]
+        self.needs = 0.0  # strength needed to hold against the load, 0 to 1
+        self.alarms = 0  # alarms set by a test
         self.unheard = 0.0  # since the last instruction [s]
         self.powered = True
         self.registers = bytearray(256)
@@ -62,43 +62,43 @@ class FakeServo:
         )
 
     def power_up(self) -> None:
-        """Sets the registers as they are after the power was off."""
+        """Restores the registers after a power cycle."""
         self.registers[:] = self.eeprom
         self.powered, self.speed, self.alarms = True, 0.0, 0
 
     def keep(self) -> None:
-        """The registers that last become those after the power was off."""
+        """Stores the persistent registers."""
         self.eeprom = bytes(self.registers[: self.KEPT]) + self.eeprom[self.KEPT :]
 
-    # what a protocol says of them
+    # defined by a protocol
     @property
     def torque(self) -> int:
         return self.get(self.TORQUE)
 
     @property
     def strength(self) -> float:
-        """Share of its strength that its registers allow."""
+        """Share of the full strength that the registers allow."""
         raise NotImplementedError
 
     @property
     def shown(self) -> int:
-        """Its position [steps]."""
+        """Shown position [steps]."""
         raise NotImplementedError
 
     @property
     def status(self) -> int:
-        """The byte that comes with each answer."""
+        """Status byte of each answer."""
         raise NotImplementedError
 
     def stand_at(self, position: int) -> None:
-        """Moves the axis to where the servo shows this position."""
+        """Moves the axis until the servo shows this position."""
         raise NotImplementedError
 
     def calibrate(self, offset: int, smallest: int, largest: int) -> None:
         raise NotImplementedError
 
     def overload(self) -> None:
-        """Something has blocked it for too long."""
+        """Simulates an overload alarm."""
         raise NotImplementedError
 
     def write(self, address: int, data: bytes) -> None:
@@ -113,10 +113,10 @@ class FakeServo:
     def move(
         self, seconds: float, strength: float, way: float, fastest: float, acceleration: float
     ) -> None:
-        """Moves the axis a part of the way to its goal, or as it is pulled."""
+        """Moves the axis towards the goal, or by the load if the strength does not suffice."""
         if strength == 0 or strength < self.needs:
             self.encoder += self.pull * seconds
-            self.speed = 0.0  # of the motor's own motion
+            self.speed = 0.0  # speed of the motor
             return
         wanted = min(fastest, math.sqrt(2 * acceleration * abs(way)), abs(way) / seconds)
         change = acceleration * seconds
@@ -128,7 +128,7 @@ Servo = TypeVar("Servo", bound=FakeServo)
 
 
 class FakeChain(Generic[Servo]):
-    """Servos on a pseudo-terminal. `port` is its name, which stays when it is plugged in again."""
+    """Servos on a pseudo-terminal. Its name `port` stays the same after a reconnection."""
 
     def __init__(
         self,
@@ -142,16 +142,16 @@ class FakeChain(Generic[Servo]):
         self.port = port
         self.servos = dict(enumerate(servos, 1))
         self.tick, self.latency, self.bus_time = tick, latency, bus_time
-        self.reads = 0  # of all servos at once
+        self.reads = 0  # group reads
         self.requests = 0
-        self.cut_at: int | None = None  # the request at which the adapter is unplugged
-        self.damaged = 0  # answers
-        self.goals: list[dict[int, int]] = []  # of each sync write of goals
+        self.cut_at: int | None = None  # number of the request that unplugs the adapter
+        self.damaged = 0  # number of damaged answers
+        self.goals: list[dict[int, int]] = []  # one entry per sync write
         self.silent: set[int] = set()
-        self.damages = 0.0  # share of the answers
-        self.false: dict[int, list[int]] = {}  # positions that undamaged answers show
-        self.late: list[int] = []  # after how many readings the answers to the next ones come
-        self._held: list[tuple[int, bytes]] = []  # at which reading they come
+        self.damages = 0.0  # share of damaged answers
+        self.false: dict[int, list[int]] = {}  # wrong positions in undamaged answers
+        self.late: list[int] = []  # delays of the next answers, in readings
+        self._held: list[tuple[int, bytes]] = []  # number of the reading that returns them
         self._dice = random.Random(1)
         self._lock = threading.RLock()
         self._passed = time.monotonic()
@@ -172,9 +172,9 @@ class FakeChain(Generic[Servo]):
         os.close(self._wake)
         os.close(self._waker)
 
-    # the back door
+    # faults
     def cut(self) -> None:
-        """The adapter is unplugged."""
+        """Unplugs the adapter."""
         with self._lock:
             if self._master >= 0:
                 os.close(self._master)
@@ -182,30 +182,30 @@ class FakeChain(Generic[Servo]):
             self.port.unlink(missing_ok=True)
 
     def plug(self) -> None:
-        """The adapter is plugged in."""
+        """Plugs the adapter in."""
         with self._lock:
             self._master, slave = os.openpty()
             tty.setraw(slave)
             self.port.unlink(missing_ok=True)
             self.port.symlink_to(os.ttyname(slave))
-            os.close(slave)  # as a line that nobody has opened
+            os.close(slave)  # leaves the line unopened
         with suppress(OSError):
             os.write(self._waker, b"p")
 
     def unplug(self, servo: int) -> None:
-        """This servo and those behind it lose their power."""
+        """Cuts the power of this servo and all behind it."""
         with self._lock:
             for number in range(servo, len(self.servos) + 1):
                 self.servos[number].powered = False
 
     def plug_in(self, servo: int) -> None:
-        """They have it again, and their registers are as after a power-up."""
+        """Restores the power of this servo and all behind it, as after a power-up."""
         with self._lock:
             for number in range(servo, len(self.servos) + 1):
                 self.servos[number].power_up()
 
     def wait_until_closed(self) -> None:
-        """Returns when the client has closed the line and all that it sent has been done."""
+        """Waits until the client has closed the line and all requests are executed."""
         self._closed.wait()
 
     # the line
@@ -226,10 +226,10 @@ class FakeChain(Generic[Servo]):
             if not self._serve_once(master, received):
                 self._closed.set()
                 received.clear()
-                time.sleep(0.005)  # until somebody opens the line
+                time.sleep(0.005)  # polls until the line is opened
 
     def _serve_once(self, master: int, received: bytearray) -> bool:
-        """Answers what has arrived; false if nobody has the line open."""
+        """Answers the received requests; returns False if no client has the line open."""
         with self._lock:
             if master != self._master:
                 return True
@@ -247,14 +247,14 @@ class FakeChain(Generic[Servo]):
             return True
 
     def _requests(self, received: bytearray) -> list[bytes]:
-        """The whole packets, which are removed: id, instruction, parameters."""
+        """Removes and returns all complete packets: id, instruction, parameters."""
         raise NotImplementedError
 
     def _serve_request(self, number: int, instruction: int, parameters: bytes) -> bytes:
         raise NotImplementedError
 
     def _packet(self, number: int, status: int, data: bytes) -> bytes:
-        """An answer."""
+        """Builds an answer."""
         raise NotImplementedError
 
     def _answer(self, request: bytes) -> bytes:
@@ -289,14 +289,14 @@ class FakeChain(Generic[Servo]):
             self.goals.append(goals)
 
     def _read_all(self, blocks: Sequence[tuple[int, int, int]]) -> bytes:
-        """Answers of servos in their order, each with an address and a size."""
+        """Answers a group read; blocks: number, address and size of each servo."""
         self.reads += 1
         if self.tick is not None:
             self.pass_time(self.tick, silent=False)
         found = []
         for number, address, size in blocks:
             if not self._hears(number):
-                break  # those behind it wait for it
+                break  # the servos behind it wait for its answer
             servo = self.servos[number]
             data = bytearray(servo.read(address, size))
             if positions := self.false.get(number):
@@ -314,7 +314,7 @@ class FakeChain(Generic[Servo]):
         return due + answers
 
     def pass_time(self, seconds: float, *, silent: bool = True) -> None:
-        """Lets time pass; the servos hear nothing meanwhile, or are spoken to all the time."""
+        """Advances the simulated time, without requests (silent) or with continuous ones."""
         with self._lock:
             while seconds > 0:
                 step = min(seconds, 0.01)

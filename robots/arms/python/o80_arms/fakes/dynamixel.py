@@ -14,7 +14,7 @@ MOST_VOLTAGE, LEAST_VOLTAGE, MOST_PWM, MOST_CURRENT = (32, 2), (34, 2), (36, 2),
 LARGEST, SMALLEST, SHUTDOWN = (48, 4), (52, 4), (63, 1)
 ANSWERS, FAILURE, WATCHDOG, PWM, CURRENT = (68, 1), (70, 1), (98, 1), (100, 2), (102, 2)
 ACCELERATION, SPEED, MOVED = (108, 4), (112, 4), (128, 4)
-GOALS = (100, 102, 104, 116)  # registers that a stop by the watchdog locks
+GOALS = (100, 102, 104, 116)  # registers locked after a stop by the watchdog
 RATE, RATES = (8, 1), {termios.B57600: 1, termios.B115200: 2, termios.B1000000: 3}
 SPEED_UNIT, ACCELERATION_UNIT = 0.229 * 4096 / 60, 214.577 * 4096 / 3600  # [steps/s, /s^2]
 RANGE_ERROR, ACCESS_ERROR, ALERT = 4, 7, 128
@@ -47,8 +47,8 @@ class FakeServo(chain.FakeServo):
     }
 
     def __init__(self, number: int, model: int) -> None:
-        self.error = 0  # of the last instruction
-        self.starts = 0.0  # so long until it has restarted [s]
+        self.error = 0  # error of the last instruction
+        self.starts = 0.0  # remaining time of a restart [s]
         super().__init__(number)
         self.put(self.MODEL, model)
         if model == XL430:
@@ -84,7 +84,7 @@ class FakeServo(chain.FakeServo):
         self.alarms |= 32
 
     def write(self, address: int, data: bytes) -> None:
-        """Refuses registers that last while the torque is on, and goals after a watchdog."""
+        """Refuses persistent registers while the torque is on, and goals after a watchdog stop."""
         self.error = 0
         if address < self.KEPT and self.torque:
             self.error = ACCESS_ERROR
@@ -109,7 +109,7 @@ class FakeServo(chain.FakeServo):
 
     @property
     def failures(self) -> int:
-        """Bits of its failures, which stay until it is restarted."""
+        """Bits of the failures, kept until a restart."""
         volts = self.get(self.VOLTAGE)
         if not self.get(LEAST_VOLTAGE) <= volts <= self.get(MOST_VOLTAGE):
             self.alarms |= 1
@@ -136,7 +136,7 @@ class FakeServo(chain.FakeServo):
         if self.torque and 0 < limit < 255 and self.unheard > 0.02 * limit:
             self.put(WATCHDOG, 255)
         if self.get(WATCHDOG) == 255:
-            self.put(self.GOAL, self.shown)  # it stops
+            self.put(self.GOAL, self.shown)  # stops the motor
         strength = self.strength if self.powered and self.torque else 0.0
         way = self.signed(self.GOAL) - (self.encoder + self.signed(OFFSET))
         fastest = self.get(SPEED) * SPEED_UNIT or 5000
@@ -159,12 +159,12 @@ class FakeChain(chain.FakeChain[FakeServo]):
     ) -> None:
         servos = [FakeServo(number, model) for number, model in enumerate(models, 1)]
         for servo in servos:
-            servo.put(RATE, 3)  # as it is numbered
+            servo.put(RATE, 3)  # rate set by `o80 arms number`
             servo.keep()
         super().__init__(port, servos, tick=tick, latency=latency, bus_time=bus_time)
 
     def _hears(self, number: int) -> bool:
-        """Whether a servo hears a request: the line must have its rate."""
+        """Whether a servo receives a request: the line must have the servo's rate."""
         rate = RATES.get(termios.tcgetattr(self._master)[5])
         return super()._hears(number) and self.servos[number].get(RATE) == rate
 
