@@ -220,9 +220,9 @@ CEILINGS = {
     "robots/pam, robots/two_joints": (2_108, 1_184),
     "simulators/mujoco": (5_367, 4_667),
     "apps/table_tennis": (8_396, 4_400),
-    "benchmarks, tools": (4_426, 0),
+    "benchmarks, tools": (4_478, 0),
     "examples": (2_080, 0),
-    "tests, conftest.py": (0, 63_283),
+    "tests, conftest.py": (0, 63_313),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
