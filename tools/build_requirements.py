@@ -7,6 +7,7 @@ are read from all packages that define them.
 import sys
 import tomllib
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = (
@@ -23,14 +24,17 @@ ELSEWHERE = ("o80=", "o80-", "o80[", "lerobot>")
 """Prefixes of omitted requirements: the packages themselves, and LeRobot (tools/lerobot.txt)."""
 
 
+def pyproject(package: str) -> dict[str, Any]:
+    return tomllib.loads((ROOT / package / "pyproject.toml").read_text())
+
+
 def requirements(kind: str, extras: list[str]) -> list[str]:
     """Collects the requirements of all packages, without ELSEWHERE."""
     found: set[str] = set()
     for package in PACKAGES:
-        pyproject = tomllib.loads((ROOT / package / "pyproject.toml").read_text())
-        project = pyproject["project"]
+        project = pyproject(package)["project"]
         if kind == "build":
-            found.update(pyproject["build-system"]["requires"])
+            found.update(pyproject(package)["build-system"]["requires"])
         else:
             found.update(project["dependencies"])
             for extra in extras:

@@ -45,7 +45,13 @@ from o80.base.errors import SegmentTaken as SegmentTaken
 from o80.base.errors import TimeoutError as TimeoutError
 from o80.base.errors import UsedAfterFork as UsedAfterFork
 
-__version__ = version()
+__version__ = "0.1.0"
+
+if version() != __version__:
+    raise ImportError(
+        f"the Python files of o80 have version {__version__}, its compiled module {version()}: "
+        "install o80 again, pip install --force-reinstall --no-deps o80"
+    )
 
 if TYPE_CHECKING:
     from o80 import errors as errors

@@ -1,6 +1,10 @@
 """The packages as they were installed agree with what their pyproject.toml say."""
 
+import itertools
+import os
 import re
+import subprocess
+import sys
 import tomllib
 from importlib.metadata import requires, version
 from pathlib import Path
@@ -17,6 +21,7 @@ OTHERS = (
     "robots/pam",
     "robots/arms",
     "devices",
+    "gateways/lerobot",
     "gateways/ros2",
     "apps/table_tennis",
 )
@@ -32,25 +37,52 @@ def test_the_core_needs_numpy_and_the_command_line_only() -> None:
     assert needed == ["numpy", "typer", "rich"]
 
 
-@pytest.mark.parametrize("folder", OTHERS)
-def test_each_package_asks_for_the_others_in_the_version_of_this_tree(folder: str) -> None:
-    versions = {
-        project["name"]: project["version"]
-        for project in (pyproject(each)["project"] for each in (".", *OTHERS))
-    }
+@pytest.mark.parametrize("folder", [".", *OTHERS])
+def test_each_package_has_the_version_of_this_tree_and_asks_for_the_others_in_it(
+    folder: str,
+) -> None:
     project = pyproject(folder)["project"]
-    pins = {
-        name.partition("==")[0].partition("[")[0]: name.partition("==")[2]
-        for name in project["dependencies"]
-        if name.startswith("o80")
-    }
+    extras = project.get("optional-dependencies", {}).values()
+    needed = itertools.chain(project["dependencies"], *extras)
+    pins = {name.partition("==")[2] for name in needed if re.match(r"o80\b", name)}
 
-    assert "o80" in pins
-    assert pins.items() <= versions.items()
-    for extra in project.get("optional-dependencies", {}).values():
-        for name in extra:
-            if name.startswith("o80"):
-                assert name.endswith(f"=={versions[name.partition('==')[0].partition('[')[0]]}")
+    assert project["version"] == o80.__version__
+    assert pins == (set() if folder == "." else {o80.__version__})
+
+
+def test_the_citation_names_the_version() -> None:
+    assert f"\nversion: {o80.__version__}\n" in (ROOT / "CITATION.cff").read_text()
+
+
+def test_packages_of_another_version_than_o80_refuse_to_be_imported(tmp_path: Path) -> None:
+    names = [pyproject(folder)["project"]["name"] for folder in OTHERS]
+    for name in names:
+        found = tmp_path / f"{name.replace('-', '_')}-9.9.dist-info" / "METADATA"
+        found.parent.mkdir()
+        found.write_text(f"Name: {name}\nVersion: 9.9\n")
+    program = "import importlib, sys\nfor name in sys.argv[1:]:\n"
+    program += "  try: importlib.import_module(name.replace('-', '_'))\n"
+    program += "  except ImportError as error: print(error)\n"
+    environment = os.environ | {"PYTHONPATH": f"{tmp_path}:" + os.environ.get("PYTHONPATH", "")}
+    command = [sys.executable, "-c", program, *names]
+    said = subprocess.check_output(command, env=environment, text=True).splitlines()
+
+    fits = f"does not fit o80 {o80.__version__}: install both in one version, pip install"
+    assert said == [f"{name} 9.9 {fits} {name}=={o80.__version__}" for name in names]
+
+
+def test_files_of_another_version_than_the_compiled_module_refuse_to_be_imported(
+    tmp_path: Path,
+) -> None:
+    files = (INSTALLED / "__init__.py").read_text()
+    (tmp_path / "o80").mkdir()
+    stale = files.replace(f'__version__ = "{o80.__version__}"', '__version__ = "9.9"')
+    (tmp_path / "o80/__init__.py").write_text(f"__path__.append({str(INSTALLED)!r})\n{stale}")
+    environment = os.environ | {"PYTHONPATH": f"{tmp_path}:" + os.environ.get("PYTHONPATH", "")}
+    command = [sys.executable, "-c", "import o80"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+
+    assert f"have version 9.9, its compiled module {o80.__version__}" in done.stderr
 
 
 @pytest.mark.parametrize("folder", [".", *OTHERS])

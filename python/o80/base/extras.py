@@ -13,7 +13,7 @@ def needed(module: str, extra: str | None, purpose: str, *, package: str = "o80"
     """
     try:
         return importlib.import_module(module)
-    except ImportError as error:
+    except ModuleNotFoundError as error:
         missing = module.partition(".")[0]
         what = package if extra is None else f"{package}[{extra}]"
         raise MissingExtra(

@@ -5,6 +5,8 @@ import sys
 from functools import cache
 from typing import TYPE_CHECKING
 
+from o80._core import version
+
 if TYPE_CHECKING:
     from importlib.metadata import EntryPoint
     from pathlib import Path
@@ -41,6 +43,17 @@ def _names_group(place: str, group: bytes) -> bool:
             except OSError:
                 continue
     return False
+
+
+def check_version(package: str) -> None:
+    """Raises ImportError unless the installed package has the version of o80."""
+    from importlib import metadata
+
+    if (found := metadata.version(package)) != version():
+        raise ImportError(
+            f"{package} {found} does not fit o80 {version()}: install both in one version, "
+            f"pip install {package}=={version()}"
+        )
 
 
 def prefix() -> "Path":

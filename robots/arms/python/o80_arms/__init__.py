@@ -4,7 +4,10 @@ from collections.abc import Callable
 from importlib.util import find_spec
 from pathlib import Path
 
+from o80.base.installation import check_version
 from o80.errors import DriverError
+
+check_version("o80-arms")
 
 
 def so101() -> Path:

@@ -2,6 +2,10 @@
 
 from pathlib import Path
 
+from o80.base.installation import check_version
+
+check_version("o80-mujoco")
+
 
 def library() -> Path:
     """Path of the robot library, which o80 loads."""
