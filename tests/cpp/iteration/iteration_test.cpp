@@ -12,14 +12,14 @@
 
 #include "iteration/watched_loop.hpp"
 #include "memory/child_process.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::HasSubstr;
 
-class WatchedLoopTest : public StationTest {
+class WatchedLoopTest : public ManualBackendTest {
  protected:
   void SetUp() override {
     if (!kCallsAreIntercepted) GTEST_SKIP() << "a sanitizer makes calls of its own";

@@ -16,7 +16,7 @@
 #include "iteration/interception.hpp"
 #include "o80/robot/make_table.hpp"
 #include "robot/loop/loop.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 

@@ -15,11 +15,11 @@
 
 #include "o80/base/error.hpp"
 #include "o80/runtime/journal.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 
-/// A test in a few lines: what frontends send to a station, and what is to be seen after it.
+/// A test in a few lines: what frontends send to a manual backend, and what is to be seen after it.
 ///
 /// Statements end with ';' or a line, and # begins a comment. `B:` before one names the frontend,
 /// which is opened at its first mention; without a name it is A.
@@ -60,12 +60,12 @@ namespace o80::test {
 class Trace {
  public:
   explicit Trace(const BackendOptions& options, const std::function<void(Schema&)>& describe = {})
-      : station(options, describe) {
+      : manual(options, describe) {
     observer_.emplace("pair", FrontendOptions{.access = Access::read_only});
     journal_.emplace(*observer_);
-    station.on_refuse = [this] { play_all(std::exchange(while_refused_, {})); };
-    station.before_publish = [this] {
-      if (auto found = in_row_.extract(station.backend.iteration())) play_all(found.mapped());
+    manual.on_refuse = [this] { play_all(std::exchange(while_refused_, {})); };
+    manual.before_publish = [this] {
+      if (auto found = in_row_.extract(manual.backend.iteration())) play_all(found.mapped());
     };
   }
 
@@ -80,7 +80,7 @@ class Trace {
     }
   }
 
-  StartedStation station;
+  StartedBackend manual;
 
  private:
   using Statements = std::vector<std::string>;
@@ -204,14 +204,14 @@ class Trace {
 
   bool acts(UntypedFrontend& frontend) {
     const std::string& verb = words_[0];
-    UntypedBackend& backend = station.backend;
+    UntypedBackend& backend = manual.backend;
     if (verb == "run") {
-      station.run(static_cast<int>(whole(1)));
+      manual.run(static_cast<int>(whole(1)));
     } else if (verb == "drive") {
-      EXPECT_EQ(station.drive(), Step::standing);
+      EXPECT_EQ(manual.drive(), Step::standing);
     } else if (verb == "burst") {
       frontend.start_burst(whole(1));
-      EXPECT_EQ(station.drive(), Step::standing);
+      EXPECT_EQ(manual.drive(), Step::standing);
     } else if (verb == "cancel") {
       bursts_.at(words_[1]).cancel();
     } else if (verb == "cut") {
@@ -219,7 +219,7 @@ class Trace {
     } else if (verb == "missed") {
       backend.set_timing({.skipped = small(1)});
     } else if (verb == "read") {
-      station.now.at(small(1)) = number(2);
+      manual.now.at(small(1)) = number(2);
     } else if (verb == "alive") {
       frontend.keep_alive();
     } else if (verb == "halt") {
@@ -274,15 +274,15 @@ class Trace {
       for (const auto& each : frontend.running_requests()) names += " " + each.name;
       EXPECT_EQ(what + names, rest(0));
     } else if (what == "homed") {
-      EXPECT_EQ(station.homed, whole(1));
+      EXPECT_EQ(manual.homed, whole(1));
     } else if (begins("fresh starts ")) {
-      EXPECT_EQ(station.fresh_starts, whole(2));
+      EXPECT_EQ(manual.fresh_starts, whole(2));
     } else if (what == "ends") {
-      EXPECT_EQ(station.iterate(), Step::ended);
+      EXPECT_EQ(manual.iterate(), Step::ended);
     } else if (what == "brakes") {
-      EXPECT_EQ(station.backend.brake(), Step::run);
+      EXPECT_EQ(manual.backend.brake(), Step::run);
     } else if (what == "fails") {
-      EXPECT_THAT(std::string(station.backend.failure()), ::testing::HasSubstr(rest(1)));
+      EXPECT_THAT(std::string(manual.backend.failure()), ::testing::HasSubstr(rest(1)));
     } else if (what == "journal") {
       std::string entries;
       for (JournalEntry entry; journal_->next(entry);) entries += " " + text_of(entry);

@@ -129,9 +129,9 @@ class Plant final : private RequestServer {
 };
 
 /// Everything the owner of a lane can write.
-class Liar {
+class HostileFrontend {
  public:
-  Liar()
+  HostileFrontend()
       : segment_(AttachedSegment::attach("robot", Access::read_write, Deadline(kAtOnce))),
         sender_(std::make_unique<LaneSender>(segment_)),
         view_(segment_.view()),
@@ -341,7 +341,7 @@ class HonestFrontend {
     if (frontend_.link()->lane()->free_blocks() < kBlocks / 2) return;
     send(bytes.below(2) == 0 ? -kReach : kReach, {.pace = iterations(1 + bytes.below(5))});
   }
-  /// Once the liar is gone, what it asked for lasts no longer than its batches.
+  /// Once the hostile frontend is gone, what it asked for lasts no longer than its batches.
   void is_served_by(Plant& plant) {
     for (int attempt = 0; attempt < 3 * static_cast<int>(kBlocks); ++attempt) {
       if (serve(plant)) return;
@@ -354,7 +354,7 @@ class HonestFrontend {
     constexpr double kTarget = 0.75;
     std::optional<Batch> batch;
     for (int i = 0; i < 20; ++i) {
-      // no burst of the liar's stands before it for ever
+      // no burst of the hostile frontend stands before it for ever
       if (!batch || batch->first_iteration() < 0) plant.backend.cut_burst();
       if (!batch) {
         frontend_.add_purge();
@@ -376,22 +376,22 @@ void run(Bytes bytes) {
   static const Directory directory;
   const auto kind = bytes.number<std::uint8_t>();
   Plant plant((kind & 1) != 0, (kind & 2) != 0 ? Stale::purge : Stale::hold);
-  Liar liar;
+  HostileFrontend hostile;
   HonestFrontend honest;
   for (int operations = 0; operations < 200 && !bytes.empty(); ++operations) {
     switch (bytes.number<std::uint8_t>() % 8) {
       case 0:
-        liar.write_page(bytes);
+        hostile.write_page(bytes);
         break;
       case 1:
-        liar.write_bell(bytes);
+        hostile.write_bell(bytes);
         break;
       case 2:
-        liar.write_transport(bytes);
+        hostile.write_transport(bytes);
         break;
       case 3:
       case 4:
-        liar.send(bytes);
+        hostile.send(bytes);
         break;
       case 5:
         honest.send_something(bytes);
@@ -400,7 +400,7 @@ void run(Bytes bytes) {
         for (auto n = bytes.below(4); n < 4; ++n) plant.iterate();
     }
   }
-  liar.leave();
+  hostile.leave();
   honest.is_served_by(plant);
 }
 

@@ -257,7 +257,7 @@ TEST_F(LaneTest, ForgetsGarbageWhenToldTo) {
 TEST_F(LaneTest, KeepsTheBatchOfASuccessorBehindTheGarbageOfItsPredecessor) {
   for (const bool successor_comes_late : {false, true}) {
     {
-      const LaneSender liar(attached_);
+      const LaneSender hostile(attached_);
       segment_.view().lane(0).committed += 3;
     }
     std::optional<LaneSender> successor;
@@ -280,8 +280,8 @@ TEST_F(LaneTest, KeepsTheBatchOfASuccessorBehindTheGarbageOfItsPredecessor) {
 TEST_F(LaneTest, TakesTheBatchOfASuccessorWherePartOfALaneWasTakenBack) {
   for (const std::size_t blocks : {2U, 3U, 4U}) {
     {
-      LaneSender liar(attached_);
-      send(liar, 1, 4);
+      LaneSender hostile(attached_);
+      send(hostile, 1, 4);
       EXPECT_THAT(take_all(), ElementsAre(1));
       give_back(0);
       segment_.view().lane(0).committed -= 3;

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <iterator>
 
-#include "robot/puppet.hpp"
+#include "robot/fake_driver.hpp"
 
 namespace o80::test {
 namespace {
@@ -16,7 +16,7 @@ namespace fs = std::filesystem;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-class LibraryTest : public StationTest {
+class LibraryTest : public ManualBackendTest {
  protected:
   ~LibraryTest() override { unsetenv("O80_ROBOT_PATH"); }
 };

@@ -1,9 +1,9 @@
 #include "o80/robot/make_table.hpp"
 
 #include "robot/driver/driver_instance.hpp"
+#include "robot/fake_driver.hpp"
 #include "robot/inline_simulation.hpp"
 #include "robot/loop/loop.hpp"
-#include "robot/puppet.hpp"
 
 namespace o80::test {
 namespace {
@@ -11,7 +11,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-class MakeTableTest : public PuppetTest {};
+class MakeTableTest : public FakeDriverTest {};
 
 /// A driver that describes nothing but itself.
 struct Sensor {
@@ -68,7 +68,7 @@ struct TickingSensor : Sensor {
   void read(Reading<TickingSensor>& reading) { reading.extended.temperature = 20; }
 };
 
-static_assert(Driver<TickingSensor> && Driver<Puppet> && Driver<Sensor> && Driver<Model>);
+static_assert(Driver<TickingSensor> && Driver<FakeDriver> && Driver<Sensor> && Driver<Model>);
 
 TEST_F(MakeTableTest, ListsTheOptionsOfTheConfig) {
   const std::vector<Option> options = options_of(table());
@@ -81,7 +81,7 @@ TEST_F(MakeTableTest, ListsTheOptionsOfTheConfig) {
 TEST_F(MakeTableTest, DescribesTheDriverAcrossTheTable) {
   DriverInstance robot(table(), {});
   const Schema schema = robot.describe();
-  EXPECT_EQ(schema.head.robot.view(), "puppet");
+  EXPECT_EQ(schema.head.robot.view(), "fake");
   EXPECT_EQ(schema.actuators[1].name.view(), "right");
   EXPECT_EQ(schema.requests[0].name.view(), "poke");
 }
@@ -107,7 +107,7 @@ TEST_F(MakeTableTest, ARobotOfAnyPeriodRunsAtOneKilohertzUnlessAskedOtherwise) {
 
 TEST_F(MakeTableTest, NothingThatADriverThrowsCrossesTheTable) {
   EXPECT_THAT(message_of<DriverError>([] { DriverInstance(table(), {{"fails", "construct"}}); }),
-              AllOf(HasSubstr("'puppet'"), HasSubstr("no cable")));
+              AllOf(HasSubstr("'fake'"), HasSubstr("no cable")));
   EXPECT_THAT(
       message_of<DriverError>([] { DriverInstance(table(), {{"fails", "describe"}}).describe(); }),
       HasSubstr("no plan"));
@@ -120,15 +120,15 @@ TEST_F(MakeTableTest, ADriverIsStoppedOnceAndOnlyIfAStartWasTried) {
   {
     const DriverInstance robot(table(), {});
   }
-  EXPECT_EQ(Puppet::calls.stopped, 0);
-  EXPECT_EQ(Puppet::calls.destroyed, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 0);
+  EXPECT_EQ(FakeDriver::calls.destroyed, 1);
   {
     DriverInstance robot(table(), {});
     robot.start();
     robot.stop();
     robot.stop();
   }
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 TEST_F(MakeTableTest, ATableOfAnotherVersionIsRefusedWithTheCure) {

@@ -3,8 +3,8 @@
 #include <random>
 #include <set>
 
-#include "robot/drifter.hpp"
 #include "robot/driver/library.hpp"
+#include "robot/fake_simulator.hpp"
 
 namespace o80::test {
 namespace {
@@ -243,7 +243,7 @@ void play(Side& side, std::uint64_t seed, double largest) {
 class Guarded {
  public:
   using Actuators = std::array<double, 2>;
-  using Extended = Drifter::Sensors;
+  using Extended = FakeSimulator::Sensors;
   using Requests = o80::Requests<Reset, Snapshot, Restore, Dawdle>;
   struct Config {
     double start = 0;
@@ -289,14 +289,14 @@ class Guarded {
  private:
   struct State {
     std::array<double, 2> at{};
-    Drifter::Sensors sensors;
+    FakeSimulator::Sensors sensors;
   };
   State now_;
   std::map<std::uint32_t, State> saved_;
 };
 O80_DESCRIBE(Guarded::Config, start);
 
-class GroupEqualityTest : public StationTest {
+class GroupEqualityTest : public ManualBackendTest {
  protected:
   static void expect_equality(const RobotTable& table, double largest) {
     std::size_t failures = 0;
@@ -320,7 +320,7 @@ class GroupEqualityTest : public StationTest {
 };
 
 // rule G7
-TEST_F(GroupEqualityTest, HoldsForRandomRunsOfAPlantWithMemory) { expect_equality(drifter(), 40); }
+TEST_F(GroupEqualityTest, HoldsForRandomRunsOfAPlantWithMemory) { expect_equality(fake(), 40); }
 
 TEST_F(GroupEqualityTest, HoldsForLimitsInterruptsAndActuatorsThatFollow) {
   expect_equality(*robot_table<Guarded>("guarded"), 31);

@@ -9,7 +9,7 @@
 
 #include "memory/child_process.hpp"
 #include "o80/memory/segment_list.hpp"
-#include "robot/drifter.hpp"
+#include "robot/fake_simulator.hpp"
 #include "runtime/frontend/link.hpp"
 
 namespace o80::test {
@@ -18,7 +18,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class InlineGroupTest : public StationTest {
+class InlineGroupTest : public ManualBackendTest {
  protected:
   static InlineGroup::Options group_of(std::size_t copies, std::size_t threads = 2) {
     return {.copies = copies, .threads = threads, .backend = InlineGroup::default_options()};
@@ -41,7 +41,7 @@ TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeeds
   for (const std::int64_t journal : {0, 1 << 20}) {
     InlineGroup::Options options = group_of(1);
     options.backend.journal = journal;
-    InlineGroup group(drifter(), {}, options);
+    InlineGroup group(fake(), {}, options);
     const auto batches = [&, frontend = group.attach(0)] {
       return frontend->link()->segment.view().bell().tickets.load();
     };
@@ -57,12 +57,12 @@ TEST_F(InlineGroupTest, SendsNoBatchForTargetsOfEachIterationUnlessAJournalNeeds
 }
 
 TEST_F(InlineGroupTest, IsFollowedByAnotherGroupCopyByCopyInTheSameCall) {
-  InlineGroup leader(drifter(), {}, group_of(9, 3));
+  InlineGroup leader(fake(), {}, group_of(9, 3));
   InlineGroup::Options sharing = group_of(9);
   sharing.sharing = &leader;
-  InlineGroup follower(drifter(), {}, sharing);
-  InlineGroup first(drifter(), {}, group_of(9, 1));
-  InlineGroup second(drifter(), {}, group_of(9, 1));
+  InlineGroup follower(fake(), {}, sharing);
+  InlineGroup first(fake(), {}, group_of(9, 1));
+  InlineGroup second(fake(), {}, group_of(9, 1));
   GroupBurst leading(leader, 2, 1, 4), following(follower, 2, 4, 4);
   GroupBurst one(first, 2, 1, 4), other(second, 2, 4, 4);
   for (GroupBurst* each : {&leading, &following, &one, &other})
@@ -95,7 +95,7 @@ TEST_F(InlineGroupTest, IsFollowedByAnotherGroupCopyByCopyInTheSameCall) {
 }
 
 TEST_F(InlineGroupTest, RunsOnlyTheChosenCopies) {
-  InlineGroup group(drifter(), {}, group_of(4));
+  InlineGroup group(fake(), {}, group_of(4));
   GroupBurst burst(group, 2, 1, 4);
   const std::vector<std::uint32_t> chosen{3, 1};
   group.burst(burst.plan, chosen, kPatience);
@@ -114,14 +114,14 @@ TEST_F(InlineGroupTest, RunsOnlyTheChosenCopies) {
 
 // rule G7
 TEST_F(InlineGroupTest, NamesTheCopyThatFailsAndRunsTheOthers) {
-  InlineGroup group(drifter(), {}, group_of(5));
+  InlineGroup group(fake(), {}, group_of(5));
   GroupBurst burst(group, 2, 1, 4);
   burst.target(3, 0) = 200;
   try {
     burst.run();
     FAIL() << "no copy failed";
   } catch (const CopyFailed& failed) {
-    EXPECT_THAT(failed.what(), HasSubstr("copy 3 of 'drifter' failed"));
+    EXPECT_THAT(failed.what(), HasSubstr("copy 3 of 'fake' failed"));
     EXPECT_THAT(failed.what(), HasSubstr("left is too far"));
     ASSERT_EQ(failed.failures().size(), 1U);
     EXPECT_EQ(failed.failures()[0].copy, 3U);
@@ -138,7 +138,7 @@ TEST_F(InlineGroupTest, NamesTheCopyThatFailsAndRunsTheOthers) {
 }
 
 TEST_F(InlineGroupTest, NamesEveryCopyThatFailsButNoLongList) {
-  InlineGroup group(drifter(), {}, group_of(9));
+  InlineGroup group(fake(), {}, group_of(9));
   GroupBurst burst(group, 2, 1, 4);
   for (const std::size_t copy : {1U, 2U, 4U, 7U, 8U}) burst.target(copy, 0) = 200;
   EXPECT_THAT(message_of<CopyFailed>([&] { burst.run(); }),
@@ -164,17 +164,17 @@ void expect_end_between_iterations(InlineGroup& group, Timeout timeout,
 }
 
 TEST_F(InlineGroupTest, EndsBetweenTwoIterationsWhenItsCallerSaysSoOrThrowsOrHasNoMoreTime) {
-  InlineGroup group(drifter(), {}, group_of(4));
+  InlineGroup group(fake(), {}, group_of(4));
   expect_end_between_iterations<Cancelled>(group, kPatience, [] { return false; });
-  InlineGroup other(drifter(), {}, group_of(4));
+  InlineGroup other(fake(), {}, group_of(4));
   expect_end_between_iterations<std::out_of_range>(
       other, kPatience, []() -> bool { throw std::out_of_range("as Ctrl-C in Python"); });
-  InlineGroup late(drifter(), {}, group_of(4));
+  InlineGroup late(fake(), {}, group_of(4));
   expect_end_between_iterations<TimeoutError>(late, std::chrono::milliseconds(60), {});
 }
 
 TEST_F(InlineGroupTest, LeavesTheOthersTheirCallWhenOneThreadUsesIt) {
-  InlineGroup group(drifter(), {}, group_of(2));
+  InlineGroup group(fake(), {}, group_of(2));
   std::vector<std::uint32_t> all{0, 1};
   GroupBurst burst(group, 2, 1, 4);
   std::string said;
@@ -188,10 +188,10 @@ TEST_F(InlineGroupTest, LeavesTheOthersTheirCallWhenOneThreadUsesIt) {
 }
 
 TEST_F(InlineGroupTest, SharesItsThreadsInTurn) {
-  InlineGroup leader(drifter(), {}, group_of(2));
+  InlineGroup leader(fake(), {}, group_of(2));
   InlineGroup::Options sharing = group_of(3);
   sharing.sharing = &leader;
-  InlineGroup follower(drifter(), {}, sharing);
+  InlineGroup follower(fake(), {}, sharing);
   GroupBurst burst(follower, 2, 1, 4);
   EXPECT_EQ(follower.threads(), 2U);
   const std::vector<std::uint32_t> all{0, 1};
@@ -208,7 +208,7 @@ TEST_F(InlineGroupTest, SharesItsThreadsInTurn) {
 }
 
 TEST_F(InlineGroupTest, ServesRequestsWithAPayloadForEachCopy) {
-  InlineGroup group(drifter(), {}, group_of(3));
+  InlineGroup group(fake(), {}, group_of(3));
   const std::vector<std::uint32_t> chosen{2, 0};
   std::vector<std::byte> payloads(2 * sizeof(Dawdle));
   pack(Dawdle{.until = 7}, payloads.data());
@@ -221,12 +221,12 @@ TEST_F(InlineGroupTest, ServesRequestsWithAPayloadForEachCopy) {
   std::vector<std::byte> slot(sizeof(Restore));
   const std::vector<std::uint32_t> one{1};
   EXPECT_THAT(message_of<CopyFailed>([&] { group.request(2, one, slot, kPatience); }),
-              HasSubstr("copy 1 of 'drifter' failed: request 'restore' was not completed: nothing "
+              HasSubstr("copy 1 of 'fake' failed: request 'restore' was not completed: nothing "
                         "was saved there"));
 }
 
 TEST_F(InlineGroupTest, GathersObservationsAndFlagsOfTheNewestRows) {
-  InlineGroup group(drifter(), {}, group_of(3));
+  InlineGroup group(fake(), {}, group_of(3));
   const RowLayout& layout = group.description().layout;
   const RowGather wanted{
       .numbers = {{.from = {layout.observed, Kind::float64}, .offset = 0.5, .scale = 2},
@@ -266,7 +266,7 @@ TEST_F(InlineGroupTest, GathersObservationsAndFlagsOfTheNewestRows) {
 }
 
 TEST_F(InlineGroupTest, RefusesMemoryOfAnotherSizeAndMoreRowsThanTheHistoryHas) {
-  InlineGroup group(drifter(), {}, group_of(2));
+  InlineGroup group(fake(), {}, group_of(2));
   GroupBurst burst(group, 2, 1, 3);
   InlineGroup::BurstPlan wrong = burst.plan;
   wrong.rows = wrong.rows.first(8);
@@ -282,7 +282,7 @@ TEST_F(InlineGroupTest, TakesAtMostOneMebibyteACopyAndNoFile) {
   constexpr std::size_t kCopies = 16;
   const std::size_t files = open_files();
   const std::size_t before = mallinfo2().uordblks;
-  InlineGroup group(drifter(), {}, group_of(kCopies));
+  InlineGroup group(fake(), {}, group_of(kCopies));
   GroupBurst burst(group, 2, 1, 32);
   for (int i = 0; i < 200; ++i) burst.run();
   const std::size_t heap = mallinfo2().uordblks - before;
@@ -301,14 +301,14 @@ TEST_F(InlineGroupTest, RaisesTheSoftLimitOfOpenFilesOrNamesTheHardOne) {
     const rlimit low{.rlim_cur = 100, .rlim_max = 400};
     setrlimit(RLIMIT_NOFILE, &low);
     {
-      const InlineGroup fits(drifter(), {}, group_of(20));
+      const InlineGroup fits(fake(), {}, group_of(20));
     }
     rlimit now{};
     getrlimit(RLIMIT_NOFILE, &now);
     const std::string said =
-        message_of<Error>([] { const InlineGroup larger(drifter(), {}, group_of(100)); });
+        message_of<Error>([] { const InlineGroup larger(fake(), {}, group_of(100)); });
     const bool named = said.find(
-                           "100 copies of 'drifter' need 900 open files, and this process "
+                           "100 copies of 'fake' need 900 open files, and this process "
                            "may open 400") != std::string::npos;
     _exit(now.rlim_cur > 100 && named ? 0 : 1);
   });
@@ -317,7 +317,7 @@ TEST_F(InlineGroupTest, RaisesTheSoftLimitOfOpenFilesOrNamesTheHardOne) {
 
 TEST_F(InlineGroupTest, LeavesNothingBehindWhenItIsKilled) {
   ChildProcess child([](const ChildProcess::Ready& ready) {
-    InlineGroup group(drifter(), {}, group_of(4));
+    InlineGroup group(fake(), {}, group_of(4));
     GroupBurst burst(group, 2, 1, 3);
     burst.run();
     ready();
@@ -332,7 +332,7 @@ TEST_F(InlineGroupTest, BelongsToTheParentOfAForkedChild) {
 #ifdef O80_TEST_SANITIZED
   GTEST_SKIP() << "a sanitizer's own locks may be held by a thread that a forked child lacks";
 #endif
-  auto group = std::make_unique<InlineGroup>(drifter(), OptionValues{}, group_of(3));
+  auto group = std::make_unique<InlineGroup>(fake(), OptionValues{}, group_of(3));
   GroupBurst burst(*group, 2, 1, 3);
   burst.run();
   const std::vector<std::uint32_t> all{0, 1, 2};
@@ -344,7 +344,7 @@ TEST_F(InlineGroupTest, BelongsToTheParentOfAForkedChild) {
         message_of<UsedAfterFork>([&] { group->request(3, all, dawdle(3)); }).empty() ? 0 : 1;
     group.reset();
     // a group of its own works
-    InlineGroup own(drifter(), {}, group_of(2));
+    InlineGroup own(fake(), {}, group_of(2));
     GroupBurst other(own, 2, 1, 3);
     other.run();
     _exit(refused * 10 + static_cast<int>(other.last_iteration(1)));
@@ -355,7 +355,7 @@ TEST_F(InlineGroupTest, BelongsToTheParentOfAForkedChild) {
 }
 
 TEST_F(InlineGroupTest, PublishesACopyUnderANameOnRequest) {
-  InlineGroup group(drifter(), {}, group_of(3));
+  InlineGroup group(fake(), {}, group_of(3));
   GroupBurst burst(group, 2, 1, 3);
   group.publish_as(1, "shown");
   UntypedFrontend watcher("shown", {.access = Access::read_only});
@@ -378,7 +378,7 @@ TEST_F(InlineGroupTest, PublishesACopyUnderANameOnRequest) {
 }
 
 TEST_F(InlineGroupTest, IsClosedWithAllItsCopies) {
-  InlineGroup group(drifter(), {}, group_of(2));
+  InlineGroup group(fake(), {}, group_of(2));
   const auto watcher = group.attach(1);
   GroupBurst burst(group, 2, 1, 3);
   group.close();
@@ -397,7 +397,7 @@ class Gated {
     std::atomic<bool> open{true};
   };
   static Gate gate;
-  using Config = Drifter::Config;
+  using Config = FakeSimulator::Config;
   using Actuators = std::array<double, 1>;
 
   explicit Gated(const Config& /*config*/) {}
@@ -459,7 +459,7 @@ TEST_F(InlineGroupTest, IsClosedInASignalHandlerOfItsCallWhichDoesNotWaitForItse
 TEST_F(InlineGroupTest, LetsAnotherThreadUseAFrontendOfACopyMeanwhile) {
   InlineGroup::Options options = group_of(3);
   options.backend.history = 100'000;  // its thread may pause between its burst and its row
-  InlineGroup group(drifter(), {}, options);
+  InlineGroup group(fake(), {}, options);
   GroupBurst burst(group, 2, 1, 3);
   const auto other = group.attach(1);
   std::atomic<bool> done{false};

@@ -2,14 +2,14 @@
 
 #include "o80/runtime/typed_frontend.hpp"
 #include "robot/driver/library.hpp"
-#include "robot/puppet.hpp"
+#include "robot/fake_driver.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::HasSubstr;
 
-class InlineRobotTest : public PuppetTest {};
+class InlineRobotTest : public FakeDriverTest {};
 
 std::unique_ptr<DriverInstance> two_joints() {
   static const RobotLibrary library = RobotLibrary::load(kTwoJoints);
@@ -74,7 +74,7 @@ TEST_F(InlineRobotTest, LeavesTheHardwareToTheParentOfAForkedChild) {
   const pid_t child = fork();
   if (child == 0) {
     loop.reset();
-    _exit(Puppet::calls.stopped);
+    _exit(FakeDriver::calls.stopped);
   }
   int status = -1;
   ASSERT_EQ(waitpid(child, &status, 0), child);
@@ -101,7 +101,7 @@ TEST_F(InlineRobotTest, RaisesAFaultWhereItWasBurst) {
   UntypedFrontend frontend("here", robot);
   EXPECT_THAT(message_of<DriverError>([&] { frontend.burst(10, kPatience); }),
               HasSubstr("wire cut"));
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
   EXPECT_THROW(frontend.burst(1, kPatience), BackendFailed);
   EXPECT_EQ(frontend.published(), 2);
 }
@@ -112,7 +112,7 @@ TEST_F(InlineRobotTest, StopsWhenToldAndItsFrontendsSeeIt) {
   UntypedFrontend frontend("here", robot);
   frontend.burst(2, kAtOnce);
   robot->stop();
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
   EXPECT_THROW(frontend.burst(1, kPatience), BackendStopped);
   EXPECT_EQ(frontend.latest().iteration(), 2);
 }

@@ -11,8 +11,8 @@
 #include "cases.hpp"
 #include "dice.hpp"
 #include "memory/segment/verb_word.hpp"
+#include "robot/fake_driver.hpp"
 #include "robot/loop/loop.hpp"
-#include "robot/puppet.hpp"
 
 namespace o80::test {
 namespace {
@@ -20,26 +20,26 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-class LoopHaltTest : public PuppetTest {
+class LoopHaltTest : public FakeDriverTest {
  protected:
   static std::unique_ptr<Loop> bursting_loop(const OptionValues& options = {}) {
     auto loop = std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), options),
-                                       BackendOptions{.segment = "puppet", .bursting = true});
+                                       BackendOptions{.segment = "fake", .bursting = true});
     loop->start();
     return loop;
   }
   static Loop timed_loop() {
     return {std::make_unique<DriverInstance>(table(), OptionValues{}),
-            BackendOptions{.segment = "puppet", .period = 100'000}};
+            BackendOptions{.segment = "fake", .period = 100'000}};
   }
 };
 
 TEST_F(LoopHaltTest, ADriverHaltsWithItsReading) {
   const auto loop = bursting_loop();
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     if (reading.iteration() >= 3) reading.halt("the belt slipped");
   };
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   add(frontend, 0, 10.0, {.pace = iterations(10)});
   frontend.start_burst(10);
   EXPECT_EQ(loop->run_granted(kAll), Step::standing);
@@ -48,13 +48,13 @@ TEST_F(LoopHaltTest, ADriverHaltsWithItsReading) {
   EXPECT_EQ(frontend.halted()->cause, HaltCause::driver);
   EXPECT_EQ(frontend.halted()->number, 1U);
   EXPECT_EQ(frontend.halted()->reason(), "the belt slipped");
-  EXPECT_EQ(Puppet::calls.halted, 1) << "the driver is told that a halt begins";
+  EXPECT_EQ(FakeDriver::calls.halted, 1) << "the driver is told that a halt begins";
 }
 
 // rule H10
 TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
   const auto loop = bursting_loop();
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   const std::uint64_t number = frontend.halt("");
   loop->run_granted(kAll);
   const auto resume = [&] {
@@ -62,43 +62,43 @@ TEST_F(LoopHaltTest, ADriverMayRefuseToResume) {
     loop->run_granted(kAll);
     return batch.handle(0);
   };
-  Puppet::on_resume = [] { return Served::rejected("the door is open"); };
+  FakeDriver::on_resume = [] { return Served::rejected("the door is open"); };
   EXPECT_EQ(resume().text, "the door is open");
   EXPECT_TRUE(frontend.halted());
-  Puppet::on_resume = {};
+  FakeDriver::on_resume = {};
   EXPECT_EQ(resume().status, Status::completed);
   EXPECT_FALSE(frontend.halted());
   EXPECT_EQ(frontend.latest().head().fresh, 1U);
-  EXPECT_EQ(Puppet::calls.halted, 1);
-  EXPECT_EQ(Puppet::calls.resumed, 2);
+  EXPECT_EQ(FakeDriver::calls.halted, 1);
+  EXPECT_EQ(FakeDriver::calls.resumed, 2);
 }
 
 TEST_F(LoopHaltTest, ADriverThatFailsToHaltEndsTheLoop) {
   const auto loop = bursting_loop({{"fails", "halt"}});
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   frontend.halt("");
   EXPECT_EQ(loop->run_granted(kAll), Step::ended);
   EXPECT_THAT(loop->fault(), AllOf(HasSubstr("failed in halt"), HasSubstr("no brake")));
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 // ------------------------------------------------------------------------------ readings
 
 // rule R7
 TEST_F(LoopHaltTest, AFirstReadingThatIsNoNumberIsAFaultThatNamesIt) {
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     reading.observed[1] = std::numeric_limits<double>::quiet_NaN();
   };
   EXPECT_THAT(message_of<DriverError>([] { bursting_loop(); }),
               AllOf(HasSubstr("actuator 'right'"), HasSubstr("is NaN or infinite")));
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 // rule R7
 TEST_F(LoopHaltTest, SoIsOneOfAFreshStart) {
   const auto loop = bursting_loop();
-  UntypedFrontend frontend("puppet");
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  UntypedFrontend frontend("fake");
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     if (reading.fresh()) reading.observed[0] = std::numeric_limits<double>::infinity();
   };
   add_request(frontend, Poke{.how = 2});
@@ -124,20 +124,22 @@ void expect_braked(const std::vector<double>& written) {
 // rule H12
 TEST_F(LoopHaltTest, AStopBrakesWithinTheLimitsAndThenStopsTheDriver) {
   for (const bool robot_is_done : {false, true}) {
-    Puppet::calls = {};
-    Puppet::limits = {.speed = 1000.0, .acceleration = 1e6};  // of iterations: 0.1 and 0.01
+    FakeDriver::calls = {};
+    FakeDriver::limits = {.speed = 1000.0, .acceleration = 1e6};  // of iterations: 0.1 and 0.01
     std::vector<double> written;
-    Puppet::on_write = [&](const Desired<Puppet>& desired) { written.push_back(desired[0]); };
+    FakeDriver::on_write = [&](const Desired<FakeDriver>& desired) {
+      written.push_back(desired[0]);
+    };
     Loop loop = timed_loop();
-    Puppet::on_read = [&](Reading<Puppet>& reading) {
+    FakeDriver::on_read = [&](Reading<FakeDriver>& reading) {
       if (written.empty() || written.back() < 5.0) return;
       robot_is_done ? reading.finish() : loop.ask_to_stop();
     };
     loop.start();
-    UntypedFrontend frontend("puppet");
+    UntypedFrontend frontend("fake");
     send(frontend, 0, 1000.0, {.pace = speed(1000.0), .profile = Profile::linear});
     EXPECT_TRUE(loop.run().in_order);
-    EXPECT_EQ(Puppet::calls.stopped, 1);
+    EXPECT_EQ(FakeDriver::calls.stopped, 1);
     expect_braked(written);
   }
 }
@@ -147,17 +149,17 @@ TEST_F(LoopHaltTest, ARobotThatDoesNothingIsStoppedAtOnce) {
   loop.start();
   loop.ask_to_stop();
   EXPECT_TRUE(loop.run().in_order);
-  EXPECT_EQ(Puppet::calls.written, 0);
+  EXPECT_EQ(FakeDriver::calls.written, 0);
 }
 
 // rule H12
 TEST_F(LoopHaltTest, BrakingThatTakesTooLongIsCut) {
-  Puppet::limits = {.speed = 1000.0, .acceleration = 1.0};  // a quarter of an hour to stop
+  FakeDriver::limits = {.speed = 1000.0, .acceleration = 1.0};  // a quarter of an hour to stop
   Loop loop = timed_loop();
   loop.start();
   std::int64_t requested = 0;
   std::thread user([&] {
-    UntypedFrontend frontend("puppet");
+    UntypedFrontend frontend("fake");
     send(frontend, 0, 1e6, {.pace = speed(1000.0), .profile = Profile::linear});
     frontend.wait_for(15'000, kPatience);
     requested = monotonic_now();
@@ -167,33 +169,33 @@ TEST_F(LoopHaltTest, BrakingThatTakesTooLongIsCut) {
   const std::int64_t took = monotonic_now() - requested;
   user.join();
   EXPECT_GT(took, 900'000'000);
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 // rule H13
 TEST_F(LoopHaltTest, AFailedVerbLeavesNoTimeForBraking) {
-  Puppet::limits = {.speed = 1000.0, .acceleration = 1.0};
+  FakeDriver::limits = {.speed = 1000.0, .acceleration = 1.0};
   Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{{"fails", "write"}}),
-            BackendOptions{.segment = "puppet", .period = 100'000});
+            BackendOptions{.segment = "fake", .period = 100'000});
   loop.start();
-  const int before = Puppet::calls.written;
+  const int before = FakeDriver::calls.written;
   EXPECT_FALSE(loop.run().in_order);
-  EXPECT_EQ(Puppet::calls.written - before, 3);
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.written - before, 3);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 // ------------------------------------------------------------------------------ verbs that hang
 
 TEST_F(LoopHaltTest, AVerbThatDoesNotReturnIsSeenFromOutside) {
   std::atomic<bool> hangs{true};
-  Puppet::on_write = [&](const Desired<Puppet>& desired) {
+  FakeDriver::on_write = [&](const Desired<FakeDriver>& desired) {
     while (desired.iteration() == 2 && hangs) std::this_thread::yield();
   };
   Loop loop = timed_loop();
   loop.start();
   std::thread runner([&] { static_cast<void>(loop.run()); });
   const AttachedSegment observer =
-      AttachedSegment::attach("puppet", Access::read_only, Deadline(kPatience));
+      AttachedSegment::attach("fake", Access::read_only, Deadline(kPatience));
   SlowVerb slow;
   while (slow.verb != Verb::write || monotonic_now() - slow.since < 50'000'000) {
     slow = slow_verb(observer.view());
@@ -206,17 +208,17 @@ TEST_F(LoopHaltTest, AVerbThatDoesNotReturnIsSeenFromOutside) {
 
 // ------------------------------------------------------------------------- readings
 
-/// A bursting puppet that is commanded, halted and resumed; its sensor may lie.
+/// A bursting fake driver that is commanded, halted and resumed; its sensor may lie.
 class ReadingTest : public LoopHaltTest {
  protected:
   void begin(const Limits& limits) {
-    Puppet::limits = limits;
-    Puppet::on_write = [this](const Desired<Puppet>& desired) { written_ = desired[0]; };
-    Puppet::on_read = [this](Reading<Puppet>& reading) {
+    FakeDriver::limits = limits;
+    FakeDriver::on_write = [this](const Desired<FakeDriver>& desired) { written_ = desired[0]; };
+    FakeDriver::on_read = [this](Reading<FakeDriver>& reading) {
       reading.observed[0] += moved_ + offset_ + (reading.fresh() ? fresh_offset_ : 0.0);
     };
     loop_ = bursting_loop();
-    frontend_ = std::make_unique<UntypedFrontend>("puppet");
+    frontend_ = std::make_unique<UntypedFrontend>("fake");
   }
   void run(int iterations) {
     frontend_->start_burst(iterations);
@@ -358,7 +360,7 @@ TEST_F(ReadingTest, TheNoiseThatADriverDescribesIsAllowedAndNoMore) {
 
 TEST_F(ReadingTest, ARobotThatCollidedResumesWhereItIs) {
   begin({.speed = 2.0, .acceleration = 15.0, .error = 0.05});
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     reading.observed[0] = std::min(reading.observed[0], 0.3);
   };
   add(*frontend_, 0, 1.0);
@@ -373,7 +375,7 @@ TEST_F(ReadingTest, ARobotThatCollidedResumesWhereItIs) {
 // rule R1
 TEST_F(ReadingTest, ARobotOfTheWorldCannotComeFarByARequest) {
   for (const bool of_the_world : {false, true}) {
-    Puppet::simulated = !of_the_world;
+    FakeDriver::simulated = !of_the_world;
     begin({.speed = 2.0});
     run(10);
     add_request(*frontend_, Poke{.how = 2});  // it is at 7 and starts afresh
@@ -409,7 +411,7 @@ TEST_F(ReadingTest, AFreshStartBeforeAHaltIsNoStep) {
 TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
   begin({});
   const std::uint64_t number = halt();
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     if (reading.fresh()) throw std::runtime_error("the cable is off");
   };
   const Handle handle = resume(number);
@@ -417,25 +419,25 @@ TEST_F(ReadingTest, ARobotThatCannotBeReadInAResumeStaysHalted) {
   EXPECT_THAT(handle.text, HasSubstr("the cable is off"));
   EXPECT_TRUE(frontend_->halted());
   run(2);
-  EXPECT_EQ(Puppet::calls.halted, 2) << "the driver had resumed";
-  Puppet::on_read = {};
+  EXPECT_EQ(FakeDriver::calls.halted, 2) << "the driver had resumed";
+  FakeDriver::on_read = {};
   EXPECT_EQ(resume(frontend_->halted()->number).status, Status::completed);
   EXPECT_TRUE(is_alive());
 }
 
 // rule R2
 TEST_F(ReadingTest, RowZeroInRealTimeIsReadUntilTwoReadingsAgree) {
-  Puppet::limits = {.speed = 2.0};
+  FakeDriver::limits = {.speed = 2.0};
   int reads = 0;
   const auto start = [&](double every, bool accepts) {
-    Puppet::on_read = [&reads, every](Reading<Puppet>& reading) {
+    FakeDriver::on_read = [&reads, every](Reading<FakeDriver>& reading) {
       if (reads++ == 0 || every != 0.0) reading.observed[0] = 7.0 + every * reads;
     };
     reads = 0;
     Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
-              BackendOptions{.segment = "puppet", .period = 100'000, .accept_reading = accepts});
+              BackendOptions{.segment = "fake", .period = 100'000, .accept_reading = accepts});
     loop.start();
-    return UntypedFrontend("puppet").latest().iteration();
+    return UntypedFrontend("fake").latest().iteration();
   };
   EXPECT_EQ(start(0.0, false), 0);
   EXPECT_EQ(reads, 3) << "the second differs from the first, the third agrees";
@@ -456,14 +458,14 @@ TEST_F(ReadingTest, RowZeroInRealTimeIsReadUntilTwoReadingsAgree) {
 class GapTest : public LoopHaltTest {
  protected:
   std::string cause_after(const std::function<void()>& stall, std::int64_t gap) {
-    Puppet::on_write = [&](const Desired<Puppet>& desired) {
+    FakeDriver::on_write = [&](const Desired<FakeDriver>& desired) {
       if (desired.iteration() == 20) stall();
     };
     Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
-              BackendOptions{.segment = "puppet", .period = 1'000'000, .gap = gap});
+              BackendOptions{.segment = "fake", .period = 1'000'000, .gap = gap});
     loop.start();
     std::thread runner([&] { static_cast<void>(loop.run()); });
-    UntypedFrontend frontend("puppet");
+    UntypedFrontend frontend("fake");
     const Iteration later = frontend.wait_for(25, kPatience).iteration();
     const auto halt = frontend.halted();
     loop.ask_to_stop();
@@ -479,12 +481,12 @@ TEST_F(GapTest, ADriverDescribesAShorterOne) {
   EXPECT_THAT(cause_after(hang, 250'000'000),
               AllOf(HasSubstr("no iteration for "), HasSubstr("longer than --gap 0.25")));
   EXPECT_EQ(cause_after(hang, 0), "");
-  Puppet::own_gap = 250'000'000;
+  FakeDriver::own_gap = 250'000'000;
   EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.25"));
-  Puppet::simulated = false;
+  FakeDriver::simulated = false;
   EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.1 s:"))
       << "the default is less";
-  Puppet::own_gap = 50'000'000;
+  FakeDriver::own_gap = 50'000'000;
   EXPECT_THAT(cause_after(hang, -1), HasSubstr("longer than --gap 0.05"));
   EXPECT_EQ(cause_after(hang, 3'600'000'000'000), "") << "an option has the last word";
 }

@@ -5,7 +5,7 @@
 #include <cstring>
 #include <string>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {

@@ -7,7 +7,7 @@
 #include <string_view>
 #include <tuple>
 
-#include "robot/puppet.hpp"
+#include "robot/fake_driver.hpp"
 
 namespace o80::test {
 namespace {
@@ -16,12 +16,12 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Pair;
 
-class LoopTest : public PuppetTest {
+class LoopTest : public FakeDriverTest {
  protected:
   static std::unique_ptr<Loop> make(const OptionValues& options = {}, bool bursting = true) {
     return std::make_unique<Loop>(
         std::make_unique<DriverInstance>(table(), options),
-        BackendOptions{.segment = "puppet", .period = 200'000, .bursting = bursting});
+        BackendOptions{.segment = "fake", .period = 200'000, .bursting = bursting});
   }
   static std::unique_ptr<Loop> started(const OptionValues& options = {}, bool bursting = true) {
     auto loop = make(options, bursting);
@@ -32,22 +32,22 @@ class LoopTest : public PuppetTest {
 
 TEST_F(LoopTest, StartsThenReadsThenIsRunning) {
   const auto loop = make();
-  EXPECT_EQ(Puppet::calls.started, 0) << "the name is taken before the hardware is touched";
-  EXPECT_THROW(UntypedFrontend("puppet", {.timeout = kAtOnce}), TimeoutError);
+  EXPECT_EQ(FakeDriver::calls.started, 0) << "the name is taken before the hardware is touched";
+  EXPECT_THROW(UntypedFrontend("fake", {.timeout = kAtOnce}), TimeoutError);
   loop->start();
-  EXPECT_EQ(Puppet::calls.started, 1);
-  EXPECT_EQ(Puppet::calls.read, 1);
-  EXPECT_EQ(Puppet::calls.written, 0);
-  EXPECT_EQ(UntypedFrontend("puppet").latest().iteration(), 0);
+  EXPECT_EQ(FakeDriver::calls.started, 1);
+  EXPECT_EQ(FakeDriver::calls.read, 1);
+  EXPECT_EQ(FakeDriver::calls.written, 0);
+  EXPECT_EQ(UntypedFrontend("fake").latest().iteration(), 0);
 }
 
 TEST_F(LoopTest, WritesAndReadsOnceAnIteration) {
   const auto loop = started();
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   add(frontend, 1, 4.0, {.pace = iterations(4)});
   frontend.start_burst(5);
   std::vector<Iteration> written;
-  Puppet::on_write = [&](const Desired<Puppet>& desired) {
+  FakeDriver::on_write = [&](const Desired<FakeDriver>& desired) {
     written.push_back(desired.iteration());
     EXPECT_EQ(desired.active(1), desired.iteration() <= 4);
     EXPECT_FALSE(desired.active(0));
@@ -56,7 +56,7 @@ TEST_F(LoopTest, WritesAndReadsOnceAnIteration) {
   };
   EXPECT_EQ(loop->run_granted(kAll), Step::standing);
   EXPECT_THAT(written, ::testing::ElementsAre(1, 2, 3, 4, 5));
-  EXPECT_EQ(Puppet::calls.read, 6);
+  EXPECT_EQ(FakeDriver::calls.read, 6);
   EXPECT_EQ(observed(frontend.latest(), 1), 4.0);
 }
 
@@ -91,19 +91,19 @@ TEST_P(ForkingLoop, EndsTheChildWhichTouchesNothing) {
   const auto [verb, bursting] = GetParam();
   ASSERT_EQ(pipe(said_.data()), 0);
   const bool writes = std::string_view(verb) == "write";
-  Puppet::on_write = [&](const Desired<Puppet>& desired) {
+  FakeDriver::on_write = [&](const Desired<FakeDriver>& desired) {
     if (writes || child_ == 0) fork_at(desired.iteration());
   };
-  Puppet::on_read = [&](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [&](Reading<FakeDriver>& reading) {
     if (!writes || child_ == 0) fork_at(reading.iteration());
   };
   const auto loop = started({{"finish_at", "4"}}, bursting);
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   if (bursting) frontend.start_burst(4);
   EXPECT_TRUE(loop->run().in_order);
 
-  EXPECT_THAT(end_of_child(), Pair(1, HasSubstr(std::string("'puppet' forked in ") + verb)));
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_THAT(end_of_child(), Pair(1, HasSubstr(std::string("'fake' forked in ") + verb)));
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
   EXPECT_EQ(frontend.published(), 4);
   EXPECT_EQ(frontend.life(), Life::stopped);
 }
@@ -121,15 +121,15 @@ TEST_P(LoopFails, OnTheWayAndSaysSoInTheSegmentAndStopsItsDriverOnce) {
   std::thread waiter([why] {
     // whoever waits to attach raises it
     const std::string text =
-        message_of<BackendFailed>([] { UntypedFrontend("puppet", {.timeout = kPatience}); });
-    EXPECT_THAT(text, AllOf(HasSubstr("'puppet'"), HasSubstr(why)));
+        message_of<BackendFailed>([] { UntypedFrontend("fake", {.timeout = kPatience}); });
+    EXPECT_THAT(text, AllOf(HasSubstr("'fake'"), HasSubstr(why)));
   });
   EXPECT_THAT(message_of<DriverError>([&] { loop->start(); }), HasSubstr(why));
   waiter.join();
   loop.reset();
-  EXPECT_EQ(Puppet::calls.stopped, 1);
-  EXPECT_EQ(Puppet::calls.destroyed, 1);
-  EXPECT_THROW(UntypedFrontend("puppet", {.timeout = kPatience}), BackendFailed);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.destroyed, 1);
+  EXPECT_THROW(UntypedFrontend("fake", {.timeout = kPatience}), BackendFailed);
 }
 
 INSTANTIATE_TEST_SUITE_P(WhileItStarts, LoopFails,
@@ -141,7 +141,7 @@ class LoopBreaks : public LoopFails {};
 TEST_P(LoopBreaks, InAnIterationAndSaysSoInTheSegmentAndStopsItsDriverOnce) {
   const auto [fails, why] = GetParam();
   auto loop = started({{"fails", fails}});
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   std::thread runner([&] {
     const Ended ended = loop->run();
     EXPECT_FALSE(ended.in_order);
@@ -150,11 +150,11 @@ TEST_P(LoopBreaks, InAnIterationAndSaysSoInTheSegmentAndStopsItsDriverOnce) {
   add(frontend, 0, 1.0, {.pace = iterations(100)});
   EXPECT_THAT(message_of<BackendFailed>([&] { frontend.burst(10, kPatience); }), HasSubstr(why));
   runner.join();
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
   EXPECT_EQ(frontend.published(), 2) << "the iteration that failed has no row";
   EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(3, kPatience); }), HasSubstr(why));
   loop.reset();
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 INSTANTIATE_TEST_SUITE_P(WhileItRuns, LoopBreaks,
@@ -170,7 +170,7 @@ Batch poke(UntypedFrontend& frontend, std::uint32_t how) {
 
 TEST_F(LoopTest, ServesRequests) {
   const auto loop = started();
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   const Batch done = poke(frontend, 0);
   const Batch rejected = poke(frontend, 1);
   const Batch fresh = poke(frontend, 2);
@@ -186,37 +186,37 @@ TEST_F(LoopTest, ServesRequests) {
 
 TEST_F(LoopTest, EndsWhenARequestFailsOrThrows) {
   for (const auto& [how, why] : {std::pair(3U, "poked too hard"), std::pair(4U, "ouch")}) {
-    Puppet::calls = {};
+    FakeDriver::calls = {};
     const auto loop = started();
-    UntypedFrontend frontend("puppet");
+    UntypedFrontend frontend("fake");
     const Batch batch = poke(frontend, how);
     EXPECT_EQ(loop->run_granted(kAll), Step::ended);
     EXPECT_THAT(loop->fault(), AllOf(HasSubstr("failed in poke"), HasSubstr(why)));
     EXPECT_EQ(batch.handle(0).text, why);
     EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(1, kPatience); }),
                 HasSubstr(why));
-    EXPECT_EQ(Puppet::calls.stopped, 1);
+    EXPECT_EQ(FakeDriver::calls.stopped, 1);
   }
 }
 
 TEST_F(LoopTest, EndsInOrderWhenTheDriverIsDone) {
   const auto loop = started({{"finish_at", "4"}});
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   const Burst burst = frontend.start_burst(10);
   EXPECT_EQ(loop->run_granted(kAll), Step::ended);
   EXPECT_EQ(loop->fault(), "");
   EXPECT_EQ(frontend.published(), 4) << "that row is there";
   EXPECT_EQ(frontend.life(), Life::stopped);
   EXPECT_THROW(burst.wait(kPatience), BackendStopped);
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 TEST_F(LoopTest, InterruptsWhatTheDriverSays) {
   const auto loop = started();
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   add(frontend, 1, 9.0, {.pace = iterations(9)});
   const Batch batch = frontend.pulse_to_end();
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     if (reading.iteration() == 3) reading.interrupt(1);
   };
   EXPECT_EQ(loop->run_granted(kAll), Step::standing);
@@ -227,7 +227,7 @@ TEST_F(LoopTest, InterruptsWhatTheDriverSays) {
 
 TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
   const auto loop = started({}, false);
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   std::thread runner([&] { EXPECT_TRUE(loop->run().in_order); });
   const std::int64_t begin = frontend.wait_for(1, kPatience).time();
   const UntypedObservation row = frontend.wait_for(51, kPatience);
@@ -235,14 +235,14 @@ TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
   loop->ask_to_stop();
   runner.join();
   EXPECT_EQ(frontend.life(), Life::stopped);
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 // rule W9
 TEST_F(LoopTest, PublishesAnOverrunAndSkipsThePeriodsInsteadOfHurrying) {
   const auto loop = started({}, false);
-  UntypedFrontend frontend("puppet");
-  Puppet::on_write = [](const Desired<Puppet>& desired) {
+  UntypedFrontend frontend("fake");
+  FakeDriver::on_write = [](const Desired<FakeDriver>& desired) {
     if (desired.iteration() != 5) return;
     const std::int64_t until = monotonic_now() + 2'100'000;  // ten periods and a half
     while (monotonic_now() < until) {

@@ -5,9 +5,9 @@
 #include <cstdlib>
 #include <new>
 
-#include "robot/drifter.hpp"
+#include "robot/fake_driver.hpp"
+#include "robot/fake_simulator.hpp"
 #include "robot/loop/loop.hpp"
-#include "robot/puppet.hpp"
 
 namespace {
 
@@ -32,7 +32,7 @@ __attribute__((noinline)) void operator delete(void* memory, std::size_t) noexce
 namespace o80::test {
 namespace {
 
-class AllocationTest : public PuppetTest {};
+class AllocationTest : public FakeDriverTest {};
 
 TEST_F(AllocationTest, TheCountCounts) {
 #ifdef O80_TEST_THREAD_SANITIZED
@@ -48,7 +48,7 @@ TEST_F(AllocationTest, TheCountCounts) {
 
 TEST_F(AllocationTest, ABurstOfAGroupTakesNothingInAnyOfItsThreads) {
   for (const std::size_t threads : {1U, 3U}) {
-    InlineGroup group(drifter(), {},
+    InlineGroup group(fake(), {},
                       {.copies = 6, .threads = threads, .backend = InlineGroup::default_options()});
     GroupBurst burst(group, 2, 3, 9);
     burst.plan.command.pace = iterations(3);

@@ -7,7 +7,7 @@
 #include <sstream>
 
 #include "memory/child_process.hpp"
-#include "robot/puppet.hpp"
+#include "robot/fake_driver.hpp"
 
 namespace o80::test {
 namespace {

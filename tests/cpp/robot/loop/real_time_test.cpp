@@ -8,8 +8,8 @@
 #include <thread>
 
 #include "memory/child_process.hpp"
+#include "robot/fake_driver.hpp"
 #include "robot/loop/loop.hpp"
-#include "robot/puppet.hpp"
 
 namespace o80::test {
 namespace {
@@ -85,16 +85,16 @@ TEST(RealTime, TouchesTheStackBeforehand) {
   }).join();
 }
 
-class RealTimeLoop : public PuppetTest {};
+class RealTimeLoop : public FakeDriverTest {};
 
 TEST_F(RealTimeLoop, MeetsNoPageForTheFirstTimeInAnIteration) {
 #if defined(O80_TEST_SANITIZED) || defined(O80_TEST_EMULATOR)
   GTEST_SKIP() << "a sanitizer has pages of its own, an emulator too";
 #endif
   Loop loop(std::make_unique<DriverInstance>(table(), OptionValues{}),
-            {.segment = "puppet", .bursting = true, .history = 20'000});
+            {.segment = "fake", .bursting = true, .history = 20'000});
   loop.start();
-  UntypedFrontend frontend("puppet");
+  UntypedFrontend frontend("fake");
   // a batch and a burst, so that code and data have been used once; the history and lane have not
   send(frontend, 0, 1.0, {.pace = iterations(3)});
   add_request(frontend, Poke{1});

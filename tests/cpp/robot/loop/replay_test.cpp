@@ -12,7 +12,7 @@
 
 #include "cases.hpp"
 #include "o80/robot/make_table.hpp"
-#include "robot/puppet.hpp"
+#include "robot/fake_driver.hpp"
 #include "runtime/replay/driverless_replay.hpp"
 
 namespace o80::test {
@@ -384,7 +384,7 @@ std::string text_of(const std::optional<DecisionMismatch>& mismatch) {
          mismatch->recorded + " / " + mismatch->replayed;
 }
 
-class ReplayTest : public StationTest, public ::testing::WithParamInterface<unsigned> {};
+class ReplayTest : public ManualBackendTest, public ::testing::WithParamInterface<unsigned> {};
 
 TEST_P(ReplayTest, BurstsRepeatBitForBit) {
   const Recorded recorded = record_bursts(GetParam(), 500);
@@ -500,10 +500,10 @@ TEST_P(ReplayTest, ItBeginsAtAnyResetOrRestoredSnapshot) {
   EXPECT_GT(begun, 3);
 }
 
-class HardwareReplayTest : public PuppetTest {};
+class HardwareReplayTest : public FakeDriverTest {};
 
 TEST_F(HardwareReplayTest, ARobotThatMayBeHardwareIsNotStarted) {
-  Puppet::simulated = false;
+  FakeDriver::simulated = false;
   BackendOptions options;
   options.segment = "replay";
   options.bursting = true;
@@ -512,9 +512,9 @@ TEST_F(HardwareReplayTest, ARobotThatMayBeHardwareIsNotStarted) {
     replay.run(std::array<std::int64_t, 2>{0, 1});
     FAIL() << "it does not say that it is simulated";
   } catch (const DriverError& error) {
-    EXPECT_THAT(error.what(), ::testing::HasSubstr("robot 'puppet' is not started for a replay"));
+    EXPECT_THAT(error.what(), ::testing::HasSubstr("robot 'fake' is not started for a replay"));
   }
-  EXPECT_EQ(Puppet::calls.started, 0);
+  EXPECT_EQ(FakeDriver::calls.started, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Seeds, ReplayTest, ::testing::Range(1U, 1U + cases(8U)));

@@ -7,8 +7,8 @@
 #include <random>
 
 #include "o80/robot/run.hpp"
+#include "robot/fake_driver.hpp"
 #include "robot/loop/loop.hpp"
-#include "robot/puppet.hpp"
 #include "runtime/backend/backend_options.hpp"
 
 namespace o80::test {
@@ -85,7 +85,7 @@ TEST(SeedTest, IsAnOptionThatIsANumber) {
               HasSubstr("option 'seed' must be a whole number, at least 0, got '-1'"));
 }
 
-class RobotProvenanceTest : public PuppetTest {};
+class RobotProvenanceTest : public FakeDriverTest {};
 
 TEST_F(RobotProvenanceTest, OfARobotSaysHowToStartItAgain) {
   Loop loop(std::make_unique<DriverInstance>(dice(), OptionValues{{"model", "a.xml"}}),
@@ -121,13 +121,13 @@ TEST_F(RobotProvenanceTest, NamesTheFilesOfOptionsWithTheirHashes) {
 }
 
 TEST_F(RobotProvenanceTest, OfARobotThatFailedToStartIsThereToo) {
-  std::vector<std::string> words{"puppet", "--fails=construct", "--gain=3"};
+  std::vector<std::string> words{"fake", "--fails=construct", "--gain=3"};
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
   EXPECT_EQ(o80::run(table(), static_cast<int>(words.size()), arguments.data()), 1);
-  const UntypedFrontend frontend("puppet", {.access = Access::read_only, .dead = true});
-  EXPECT_EQ(frontend.provenance().robot, "puppet");
+  const UntypedFrontend frontend("fake", {.access = Access::read_only, .dead = true});
+  EXPECT_EQ(frontend.provenance().robot, "fake");
   EXPECT_THAT(frontend.provenance().options, Contains(Pair("gain", "3")));
 }
 

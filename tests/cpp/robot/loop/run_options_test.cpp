@@ -4,7 +4,7 @@
 #include <iterator>
 #include <sstream>
 
-#include "robot/puppet.hpp"
+#include "robot/fake_driver.hpp"
 
 namespace o80::test {
 namespace {
@@ -14,7 +14,7 @@ using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Pair;
 
-class RunOptionsTest : public PuppetTest {
+class RunOptionsTest : public FakeDriverTest {
  protected:
   static RunOptions parse(std::vector<std::string> words) {
     words.insert(words.begin(), "o80-run");
@@ -30,7 +30,7 @@ class RunOptionsTest : public PuppetTest {
 
 TEST_F(RunOptionsTest, HaveDefaults) {
   const RunOptions options = parse({});
-  EXPECT_EQ(options.backend.segment, "puppet");
+  EXPECT_EQ(options.backend.segment, "fake");
   EXPECT_EQ(options.backend.period, 0);
   EXPECT_FALSE(options.backend.bursting);
   EXPECT_EQ(options.backend.permission, 0600U);
@@ -91,9 +91,9 @@ TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
   EXPECT_THAT(refusal({"--bursting", "0"}), HasSubstr(no_value));
   EXPECT_THAT(refusal({"--bursting=0"}), HasSubstr(no_value));
   EXPECT_THAT(refusal({"--gain", "fast"}),
-              HasSubstr("robot 'puppet': option 'gain' must be a number, got 'fast'"));
+              HasSubstr("robot 'fake': option 'gain' must be a number, got 'fast'"));
   EXPECT_THAT(refusal({"--fails", "often"}), HasSubstr("must be one of: never"));
-  EXPECT_EQ(Puppet::calls.constructed, 0);
+  EXPECT_EQ(FakeDriver::calls.constructed, 0);
 }
 
 TEST_F(RunOptionsTest, AreAllInTheHelp) {

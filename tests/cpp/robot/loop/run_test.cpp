@@ -19,7 +19,7 @@
 #include "memory/child_process.hpp"
 #include "o80/base/time.hpp"
 #include "o80/memory/segment_list.hpp"
-#include "robot/puppet.hpp"
+#include "robot/fake_driver.hpp"
 
 namespace o80::test {
 namespace {
@@ -47,7 +47,7 @@ long locked_memory(pid_t pid) {
   return -1;
 }
 
-class RunTest : public PuppetTest {
+class RunTest : public FakeDriverTest {
  protected:
   static std::vector<std::string> two_joints(std::vector<std::string> flags = {}) {
     flags.insert(flags.begin(), {kRunProgram, kTwoJoints});
@@ -121,7 +121,7 @@ TEST_F(RunTest, RunsARobotLibraryUntilASignalStopsItInOrder) {
 TEST_F(RunTest, ALibraryThatCallsExitStopsTheRobotFirst) {
   for (const bool in_the_loop : {true, false}) {
     ChildProcess child([&](const auto&) {
-      Puppet::on_write = [&](const Desired<Puppet>& desired) {
+      FakeDriver::on_write = [&](const Desired<FakeDriver>& desired) {
         if (desired.iteration() != 3) return;
         if (in_the_loop) std::exit(5);               // NOLINT(concurrency-mt-unsafe)
         std::thread([] { std::exit(5); }).detach();  // NOLINT(concurrency-mt-unsafe)
@@ -132,7 +132,7 @@ TEST_F(RunTest, ALibraryThatCallsExitStopsTheRobotFirst) {
     EXPECT_EQ(child.wait(), 5);
     if (in_the_loop) {
       EXPECT_THAT(
-          message_of<BackendFailed>([] { UntypedFrontend("puppet", {.timeout = kPatience}); }),
+          message_of<BackendFailed>([] { UntypedFrontend("fake", {.timeout = kPatience}); }),
           HasSubstr("called exit()"));
     }
     // in order: its files are removed, or say that it has stopped
@@ -179,13 +179,13 @@ TEST_F(RunTest, ASignalEndsEvenALongPeriodAtOnce) {
 }
 
 TEST_F(RunTest, OneThatIsAskedToStopWhileItStartsEndsAtOnce) {
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     if (reading.iteration() == 0) raise(SIGTERM);
   };
   const std::int64_t begin = monotonic_now();
   EXPECT_EQ(run_here(table(), {}), 0);
   EXPECT_LT(monotonic_now() - begin, 5'000'000'000) << "it waits 5 s for a backend that may come";
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 TEST_F(RunTest, StopsABurstingRobotThatStandsStill) {
@@ -207,11 +207,11 @@ TEST_F(RunTest, StopsWhenItsInputEndsIfToldSo) {
 
 // rule O11
 TEST_F(RunTest, ASecondOneOfTheNameDoesNotEvenConstructItsDriver) {
-  Station owner({.segment = "puppet"});
+  ManualBackend owner({.segment = "fake"});
   ::testing::internal::CaptureStderr();
   EXPECT_EQ(run_here(table(), {}), 1);
   EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("already has a backend"));
-  EXPECT_EQ(Puppet::calls.constructed, 0);
+  EXPECT_EQ(FakeDriver::calls.constructed, 0);
 }
 
 TEST_F(RunTest, LeavesTheFaultOfAConstructorForWhoWaitsToAttach) {
@@ -219,7 +219,7 @@ TEST_F(RunTest, LeavesTheFaultOfAConstructorForWhoWaitsToAttach) {
        {std::pair("construct", "no cable"), std::pair("describe", "no plan")}) {
     std::thread waiter([why] {
       EXPECT_THAT(
-          message_of<BackendFailed>([] { UntypedFrontend("puppet", {.timeout = kPatience}); }),
+          message_of<BackendFailed>([] { UntypedFrontend("fake", {.timeout = kPatience}); }),
           HasSubstr(why));
     });
     ::testing::internal::CaptureStderr();
@@ -227,16 +227,16 @@ TEST_F(RunTest, LeavesTheFaultOfAConstructorForWhoWaitsToAttach) {
     EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr(why));
     waiter.join();
     EXPECT_EQ(directory_.files(), 2U) << "they stay to be read";
-    std::filesystem::remove(directory_.file_of("puppet"));
+    std::filesystem::remove(directory_.file_of("fake"));
   }
 }
 
 TEST_F(RunTest, RunsInItsOwnMainAndFinishesInOrder) {
   ::testing::internal::CaptureStdout();
   EXPECT_EQ(run_here(table(), {"--finish-at", "3", "--frequency", "5000"}), 0);
-  EXPECT_THAT(::testing::internal::GetCapturedStdout(), HasSubstr("puppet runs on segment"));
-  EXPECT_EQ(Puppet::calls.stopped, 1);
-  EXPECT_EQ(Puppet::calls.destroyed, 1);
+  EXPECT_THAT(::testing::internal::GetCapturedStdout(), HasSubstr("fake runs on segment"));
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.destroyed, 1);
   struct sigaction now{};
   sigaction(SIGINT, nullptr, &now);
   EXPECT_EQ(now.sa_handler, SIG_DFL) << "signals are as they were";
@@ -325,7 +325,7 @@ TEST_F(RunTest, ReportsAFaultAndEndsWithAFailure) {
   ::testing::internal::CaptureStderr();
   EXPECT_EQ(run_here(table(), {"--fails", "read", "--frequency", "5000"}), 1);
   EXPECT_THAT(::testing::internal::GetCapturedStderr(), HasSubstr("failed in read: went blind"));
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 /// Calls of each kind that the loop's thread made while strace looked on; empty if it may not.

@@ -4,8 +4,8 @@
 
 #include <memory>
 
+#include "robot/fake_driver.hpp"
 #include "robot/loop/loop.hpp"
-#include "robot/puppet.hpp"
 
 namespace o80::test {
 namespace {
@@ -14,13 +14,13 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-class RunningRequestLoopTest : public PuppetTest {
+class RunningRequestLoopTest : public FakeDriverTest {
  protected:
   RunningRequestLoopTest()
       : loop_(std::make_unique<Loop>(std::make_unique<DriverInstance>(table(), OptionValues{}),
-                                     BackendOptions{.segment = "puppet", .bursting = true})) {
+                                     BackendOptions{.segment = "fake", .bursting = true})) {
     loop_->start();
-    frontend_ = std::make_unique<UntypedFrontend>("puppet");
+    frontend_ = std::make_unique<UntypedFrontend>("fake");
   }
   Batch poke(std::uint32_t how) {
     add_request(*frontend_, Poke{.how = how});
@@ -37,7 +37,7 @@ class RunningRequestLoopTest : public PuppetTest {
 
 TEST_F(RunningRequestLoopTest, TheReadingTellsProgressAndEnd) {
   std::vector<bool> ran;
-  Puppet::on_read = [&](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [&](Reading<FakeDriver>& reading) {
     ran.push_back(reading.runs<Poke>());
     if (reading.iteration() == 2) reading.progress<Poke>("half way");
     if (reading.iteration() == 4) reading.ended<Poke>(Served::done());
@@ -54,7 +54,7 @@ TEST_F(RunningRequestLoopTest, TheReadingTellsProgressAndEnd) {
 }
 
 TEST_F(RunningRequestLoopTest, AnEndAndAProgressInOneReadingAreAnEnd) {
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     reading.ended<Poke>(Served::rejected("slipped"));
     reading.progress<Poke>("nearly there");
     reading.ended<Poke>(Served::done());
@@ -66,7 +66,7 @@ TEST_F(RunningRequestLoopTest, AnEndAndAProgressInOneReadingAreAnEnd) {
 }
 
 TEST_F(RunningRequestLoopTest, WhatDoesNotRunCannotEnd) {
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     reading.ended<Poke>(Served::failed("of what?"));
     reading.progress<Poke>("of what?");
   };
@@ -76,18 +76,18 @@ TEST_F(RunningRequestLoopTest, WhatDoesNotRunCannotEnd) {
 }
 
 TEST_F(RunningRequestLoopTest, AFailureEndsTheLoopWithItsName) {
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     reading.ended<Poke>(Served::failed("the gear broke"));
   };
   poke(5);
   burst(3);
   EXPECT_THAT(loop_->fault(), AllOf(HasSubstr("failed in poke"), HasSubstr("the gear broke")));
   EXPECT_EQ(frontend_->published(), 1) << "its row is still published";
-  EXPECT_EQ(Puppet::calls.stopped, 1);
+  EXPECT_EQ(FakeDriver::calls.stopped, 1);
 }
 
 TEST_F(RunningRequestLoopTest, MayEndInTheReadingOfAnothersFreshStart) {
-  Puppet::on_read = [](Reading<Puppet>& reading) {
+  FakeDriver::on_read = [](Reading<FakeDriver>& reading) {
     if (reading.fresh()) reading.ended<Poke>(Served::start_afresh());
   };
   const Batch batch = poke(5);
@@ -103,7 +103,7 @@ TEST_F(RunningRequestLoopTest, MayEndInTheReadingOfAnothersFreshStart) {
 }
 
 TEST_F(RunningRequestLoopTest, AResumeCannotRun) {
-  Puppet::on_resume = [] { return Served::running("warming up"); };
+  FakeDriver::on_resume = [] { return Served::running("warming up"); };
   const std::uint64_t number = frontend_->halt("");
   loop_->run_granted(kAll);
   const Batch batch = send_resume(*frontend_, number);

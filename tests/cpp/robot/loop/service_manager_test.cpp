@@ -10,7 +10,7 @@
 #include <cstdlib>
 #include <string>
 
-#include "robot/puppet.hpp"
+#include "robot/fake_driver.hpp"
 
 namespace o80::test {
 namespace {
@@ -48,7 +48,7 @@ class Manager {
   int socket_ = -1;
 };
 
-class ServiceManagerTest : public StationTest {
+class ServiceManagerTest : public ManualBackendTest {
  protected:
   static std::string abstract_name() { return "@o80-test-" + std::to_string(getpid()); }
 };

@@ -10,7 +10,7 @@
 
 #include "o80/robot/make_table.hpp"
 #include "robot/loop/loop.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -52,7 +52,7 @@ class Ticking {
 };
 O80_DESCRIBE(Ticking::Config);
 
-class TickTest : public StationTest {
+class TickTest : public ManualBackendTest {
  protected:
   TickTest() {
     Ticking::in_time = 1'000'000;

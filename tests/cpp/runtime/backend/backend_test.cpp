@@ -2,7 +2,7 @@
 #include <optional>
 #include <utility>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
@@ -11,13 +11,13 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class BackendTest : public StationTest {};
+class BackendTest : public ManualBackendTest {};
 
 // rule O1
 TEST_F(BackendTest, RowZeroIsTheRobotBeforeAnythingWasAsked) {
-  Station station;
-  station.now = {0.25, -0.5};
-  station.start();
+  ManualBackend manual;
+  manual.now = {0.25, -0.5};
+  manual.start();
   const UntypedFrontend frontend("pair");
   const UntypedObservation row = frontend.latest();
   EXPECT_EQ(row.iteration(), 0);
@@ -29,10 +29,10 @@ TEST_F(BackendTest, RowZeroIsTheRobotBeforeAnythingWasAsked) {
 
 // rule O2
 TEST_F(BackendTest, ARowShowsWhatWasAskedAndWhatCameOfIt) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0);
-  station.run(1);
+  manual.run(1);
   const UntypedObservation row = frontend.latest();
   EXPECT_EQ(row.iteration(), 1);
   EXPECT_EQ(desired(row), 1.0);
@@ -43,9 +43,9 @@ TEST_F(BackendTest, ARowShowsWhatWasAskedAndWhatCameOfIt) {
 }
 
 TEST_F(BackendTest, IsStartingUntilRowZeroAndRunningFromThenOn) {
-  Station station;
+  ManualBackend manual;
   EXPECT_THROW(UntypedFrontend("pair", {.timeout = kAtOnce}), TimeoutError);
-  station.start();
+  manual.start();
   EXPECT_EQ(UntypedFrontend("pair").life(), Life::running);
 }
 
@@ -80,11 +80,11 @@ TEST_F(BackendTest, NothingIsCompletedBeforeItsRowIsOut) {
 }
 
 TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0);
-  ASSERT_EQ(station.backend.try_step(), Step::run);
-  station.backend.end(BackendState::failed, "the arm fell off");
+  ASSERT_EQ(manual.backend.try_step(), Step::run);
+  manual.backend.end(BackendState::failed, "the arm fell off");
   EXPECT_EQ(batch.handle(0).status, Status::purged);
   EXPECT_EQ(batch.handle(0).reason, Reason::stopped);
   EXPECT_THROW(batch.wait(kPatience), BackendFailed);
@@ -92,7 +92,7 @@ TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
 
 // rule B1
 TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   UntypedFrontend other("pair");
   constexpr int kCommands = 3000;  // of a block each: three iterations of 1024
@@ -100,8 +100,8 @@ TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
   add(frontend, 1, -1.0);
   const Batch large = frontend.pulse();
   const Batch behind = send(other, 1, -2.0);
-  for (int i = 0; i < 10 && large.first_iteration() < 0; ++i) station.run(1);
-  station.run(1);
+  for (int i = 0; i < 10 && large.first_iteration() < 0; ++i) manual.run(1);
+  manual.run(1);
   EXPECT_GE(large.first_iteration(), 3) << "1024 blocks an iteration";
   const Iteration taken = large.first_iteration();
   for (Iteration i = 1; i < taken; ++i) {
@@ -110,19 +110,19 @@ TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
   }
   EXPECT_THAT(desired(frontend, taken, taken, 0), ElementsAre(1));
   EXPECT_THAT(desired(frontend, taken, taken + 1, 1), ElementsAre(-1, -2)) << "in order";
-  station.run(kCommands);
+  manual.run(kCommands);
   EXPECT_EQ(desired(frontend.latest()), kCommands);
   EXPECT_EQ(large.last_iteration(), taken + kCommands - 1) << "no idle iteration";
   EXPECT_TRUE(behind.ended());
 }
 
 TEST_F(BackendTest, GivesTheMemoryOfALaneBackForEver) {
-  StartedStation station({.segment = "pair", .lanes = 2, .lane_blocks = 64});
+  StartedBackend manual({.segment = "pair", .lanes = 2, .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   for (int round = 0; round < 2000; ++round) {
     for (int i = 0; i < 10; ++i) add(frontend, i % 2, round, {.mode = Mode::overwrite});
     const Batch batch = frontend.pulse();
-    station.run(2);
+    manual.run(2);
     ASSERT_TRUE(batch.ended()) << round;
   }
 }
@@ -173,18 +173,18 @@ TEST_F(BackendTest, APastUntilIsRejectedAsLateAndTheNextStartsInItsPlace) {
 
 // rule O8
 TEST_F(BackendTest, TellsTimeByTheIterationWhenItBursts) {
-  StartedStation station({.segment = "pair", .period = 2'000'000, .bursting = true});
+  StartedBackend manual({.segment = "pair", .period = 2'000'000, .bursting = true});
   UntypedFrontend frontend("pair");
   frontend.start_burst(3);
-  EXPECT_EQ(station.drive(), Step::standing);
+  EXPECT_EQ(manual.drive(), Step::standing);
   EXPECT_EQ(frontend.latest().time(), 6'000'000);
   EXPECT_EQ(frontend.schema().head.clock, Clock::simulated);
 }
 
 TEST_F(BackendTest, PublishesTheTimingOfThePeriods) {
-  StartedStation station;
-  station.backend.set_timing({.lateness = 17, .overruns = 2, .skipped = 5});
-  station.run(1);
+  StartedBackend manual;
+  manual.backend.set_timing({.lateness = 17, .overruns = 2, .skipped = 5});
+  manual.run(1);
   const RowHead head = UntypedFrontend("pair").latest().head();
   EXPECT_EQ(head.lateness, 17);
   EXPECT_EQ(head.overruns, 2U);
@@ -193,16 +193,17 @@ TEST_F(BackendTest, PublishesTheTimingOfThePeriods) {
 }
 
 TEST_F(BackendTest, RefusesOptionsThatCannotBe) {
-  EXPECT_THAT(
-      message_of<InvalidArgument>([] { Station({.segment = "pair", .period = -2'000'000'000}); }),
-      HasSubstr("period must be positive, got -2 s"));
   EXPECT_THAT(message_of<InvalidArgument>(
-                  [] { Station({.segment = "pair", .stale = Stale::hold, .silence = 1000}); }),
+                  [] { ManualBackend({.segment = "pair", .period = -2'000'000'000}); }),
+              HasSubstr("period must be positive, got -2 s"));
+  EXPECT_THAT(message_of<InvalidArgument>([] {
+                ManualBackend({.segment = "pair", .stale = Stale::hold, .silence = 1000});
+              }),
               HasSubstr("purge, halt or stop"));
   for (const mode_t wrong : {0U, 0200U, 644U}) {  // the last forgot its leading 0
-    EXPECT_THAT(
-        message_of<InvalidArgument>([&] { Station({.segment = "pair", .permission = wrong}); }),
-        HasSubstr("permission must be an octal mode"));
+    EXPECT_THAT(message_of<InvalidArgument>(
+                    [&] { ManualBackend({.segment = "pair", .permission = wrong}); }),
+                HasSubstr("permission must be an octal mode"));
   }
   EXPECT_EQ(directory_.files(), 0U);
 }
@@ -219,16 +220,16 @@ TEST_F(BackendTest, StartsAfreshInARowOfItsOwn) {
 }
 
 TEST_F(BackendTest, ItsPhaseFollowsStepPublishBrakeAndEnd) {
-  Station station;
-  UntypedBackend& backend = station.backend;
+  ManualBackend manual;
+  UntypedBackend& backend = manual.backend;
   Phase at_publish = Phase::ready;
-  station.before_publish = [&] { at_publish = backend.phase(); };
+  manual.before_publish = [&] { at_publish = backend.phase(); };
   EXPECT_EQ(backend.phase(), Phase::starting);
-  station.start();
+  manual.start();
   EXPECT_EQ(backend.phase(), Phase::ready);
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0, {.pace = iterations(9)});
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(at_publish, Phase::iterating);
   EXPECT_EQ(backend.phase(), Phase::ready);
   EXPECT_EQ(backend.brake(), Step::run);

@@ -15,7 +15,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-class BurstCancelTest : public StationTest {
+class BurstCancelTest : public ManualBackendTest {
  protected:
   /// Plays a trace of a bursting backend.
   static void play(const std::string& script) {
@@ -50,7 +50,7 @@ TEST_F(BurstCancelTest, AnotherFrontendEndsItByNeitherCloseNorPurge) {
 }
 
 TEST_F(BurstCancelTest, TheRestIsCancelledWhenTheCallGivesUpItsWait) {
-  StartedStation station({.segment = "pair", .bursting = true});
+  StartedBackend manual({.segment = "pair", .bursting = true});
   UntypedFrontend frontend("pair");
   EXPECT_THROW(frontend.burst(1'000'000, kAtOnce), TimeoutError);
   EXPECT_THROW(frontend.burst(1'000'000, kPatience, [] { return false; }), Cancelled);
@@ -58,24 +58,24 @@ TEST_F(BurstCancelTest, TheRestIsCancelledWhenTheCallGivesUpItsWait) {
   EXPECT_THROW(frontend.pulse_and_wait(kAtOnce), TimeoutError);
   std::vector<std::byte> rows(5 * std::size_t{frontend.layout().size});
   EXPECT_THROW(frontend.burst_rows(rows, kAtOnce), TimeoutError);
-  EXPECT_EQ(station.drive(), Step::standing);
-  EXPECT_EQ(station.last(), 0) << "none had begun";
+  EXPECT_EQ(manual.drive(), Step::standing);
+  EXPECT_EQ(manual.last(), 0) << "none had begun";
 }
 
 TEST_F(BurstCancelTest, ABurstThatWasStartedCanBeWaitedForAgainAfterATimeout) {
-  StartedStation station({.segment = "pair", .bursting = true});
+  StartedBackend manual({.segment = "pair", .bursting = true});
   UntypedFrontend frontend("pair");
   const Burst burst = frontend.start_burst(4);
   EXPECT_THROW(burst.wait(kAtOnce), TimeoutError);
-  EXPECT_EQ(station.drive(), Step::standing);
+  EXPECT_EQ(manual.drive(), Step::standing);
   EXPECT_EQ(burst.wait(kAtOnce).iteration(), 4);
 }
 
 // ------------------------------------------------------------------------------ groups
 
-class BurstGroupTest : public StationTest {
+class BurstGroupTest : public ManualBackendTest {
  protected:
-  StartedStation station{{.segment = "pair", .bursting = true}};
+  StartedBackend manual{{.segment = "pair", .bursting = true}};
 };
 
 // rule G5
@@ -91,12 +91,12 @@ TEST_F(BurstGroupTest, NoMemberOfAGroupMovesIfOneCannot) {
       message = error.what();
     }
     EXPECT_NE(message, "");
-    EXPECT_EQ(station.drive(), Step::standing);
-    EXPECT_EQ(station.last(), 0) << message;
+    EXPECT_EQ(manual.drive(), Step::standing);
+    EXPECT_EQ(manual.last(), 0) << message;
     return message;
   };
 
-  StartedStation other({.segment = "other", .bursting = true, .lanes = 1, .lane_blocks = 16});
+  StartedBackend other({.segment = "other", .bursting = true, .lanes = 1, .lane_blocks = 16});
   UntypedFrontend second("other");
   EXPECT_THAT(refused_with(second, 0), HasSubstr("at least 1"));
 
@@ -111,7 +111,7 @@ TEST_F(BurstGroupTest, NoMemberOfAGroupMovesIfOneCannot) {
   EXPECT_THAT(refused_with(second, 5), HasSubstr("blocks"));
   second.forget_added();
   {  // a clock of its own
-    StartedStation paced({.segment = "paced"});
+    StartedBackend paced({.segment = "paced"});
     UntypedFrontend third("paced");
     EXPECT_THAT(refused_with(third, 5), HasSubstr("cannot be burst"));
   }
@@ -124,14 +124,14 @@ TEST_F(BurstGroupTest, NoMemberOfAGroupMovesIfOneCannot) {
 }
 
 TEST_F(BurstGroupTest, AGroupReturnsAtOnceWithEachItsOwnIterationsToWaitFor) {
-  StartedStation other({.segment = "other", .bursting = true});
+  StartedBackend other({.segment = "other", .bursting = true});
   UntypedFrontend first("pair");
   UntypedFrontend second("other");
   const BurstMember group[] = {{&first, 5}, {&second, 3}};
   const std::vector<Burst> bursts = start_bursts(group);
   ASSERT_EQ(bursts.size(), 2U);
   EXPECT_FALSE(bursts[0].done());
-  station.drive();
+  manual.drive();
   EXPECT_TRUE(bursts[0].done());
   EXPECT_FALSE(bursts[1].done());
   other.drive();
@@ -141,14 +141,14 @@ TEST_F(BurstGroupTest, AGroupReturnsAtOnceWithEachItsOwnIterationsToWaitFor) {
 }
 
 TEST_F(BurstGroupTest, AGroupThatIsNotDoneInTimeIsCancelledWhole) {
-  StartedStation other({.segment = "other", .bursting = true});
+  StartedBackend other({.segment = "other", .bursting = true});
   UntypedFrontend first("pair");
   UntypedFrontend second("other");
   const BurstMember group[] = {{&first, 1'000'000}, {&second, 1'000'000}};
   EXPECT_THROW(burst(group, kAtOnce), TimeoutError);
-  station.drive();
+  manual.drive();
   other.drive();
-  EXPECT_EQ(station.last(), 0);
+  EXPECT_EQ(manual.last(), 0);
   EXPECT_EQ(other.last(), 0);
 }
 
@@ -160,7 +160,7 @@ class BurstGroupFailureTest : public BurstGroupTest {
     second.emplace("other");
     const BurstMember group[] = {{&first, 1'000'000'000}, {&*second, 1'000'000'000}};
     bursts = start_bursts(group);
-    station.run(3);
+    manual.run(3);
     other.run(2);
   }
   /// The wait raises an error of the second member that has this text, and cancels the first.
@@ -168,11 +168,11 @@ class BurstGroupFailureTest : public BurstGroupTest {
   void expect_failure(const std::string& text, Timeout timeout = kPatience) {
     EXPECT_THAT(message_of<Expected>([&] { wait_for(bursts, timeout); }),
                 AllOf(HasSubstr("'other'"), HasSubstr(text)));
-    EXPECT_EQ(station.drive(), Step::standing);
-    EXPECT_EQ(station.last(), 3);
+    EXPECT_EQ(manual.drive(), Step::standing);
+    EXPECT_EQ(manual.last(), 3);
   }
 
-  Station other{{.segment = "other", .bursting = true}};
+  ManualBackend other{{.segment = "other", .bursting = true}};
   UntypedFrontend first{"pair"};
   std::optional<UntypedFrontend> second;
   std::vector<Burst> bursts;

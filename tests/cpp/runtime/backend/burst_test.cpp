@@ -10,7 +10,7 @@ using ::testing::ElementsAre;
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 
-class BurstTest : public StationTest {
+class BurstTest : public ManualBackendTest {
  protected:
   /// Plays a trace of a bursting backend.
   static void play(const std::string& script) {
@@ -25,7 +25,7 @@ void wait_until_it_runs(const UntypedFrontend& frontend) {
 
 // rule G1
 TEST_F(BurstTest, RunsExactlyAsManyIterationsAndReturnsTheLastRow) {
-  BurstingStation bursting;
+  BurstingBackend bursting;
   UntypedFrontend frontend("pair");
   EXPECT_EQ(frontend.burst(1, kPatience).iteration(), 1);
   EXPECT_EQ(frontend.burst(7, kPatience).iteration(), 8);
@@ -44,7 +44,7 @@ TEST_F(BurstTest, WhatIsSentWithItActsFromItsFirstIteration) {
 }
 
 TEST_F(BurstTest, GivesAllItsRowsIfAsked) {
-  BurstingStation bursting;
+  BurstingBackend bursting;
   UntypedFrontend frontend("pair");
   const std::size_t size = frontend.layout().size;
   std::vector<std::byte> rows(3 * size);
@@ -56,7 +56,7 @@ TEST_F(BurstTest, GivesAllItsRowsIfAsked) {
 }
 
 TEST_F(BurstTest, OfMoreRowsThanTheHistoryKeepsIsAnErrorAtOnce) {
-  BurstingStation bursting;
+  BurstingBackend bursting;
   UntypedFrontend frontend("pair");
   const auto kept = static_cast<std::size_t>(frontend.link()->history.rows());
   std::vector<std::byte> rows((kept + 1) * frontend.layout().size);
@@ -78,13 +78,13 @@ TEST_F(BurstTest, TwoFrontendsBurstOneAfterTheOther) {
 }
 
 TEST_F(BurstTest, StagesAllThatWasSentBeforeIt) {
-  StartedStation station({.segment = "pair", .bursting = true});
+  StartedBackend manual({.segment = "pair", .bursting = true});
   UntypedFrontend one("pair");
   UntypedFrontend two("pair");
   for (int i = 0; i < 5000; ++i) add(one, 0, i + 1);
   const Batch large = one.pulse();
   two.start_burst(3);
-  station.drive();
+  manual.drive();
   EXPECT_EQ(large.first_iteration(), 1);
   EXPECT_THAT(desired(one, 1, 3), ElementsAre(1, 2, 3));
   EXPECT_EQ(one.published(), 3);
@@ -102,14 +102,14 @@ TEST_F(BurstTest, ABatchThatEndsWithoutMotionNeedsNoIteration) {
 }
 
 TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
-  StartedStation station({.segment = "pair", .bursting = true});
+  StartedBackend manual({.segment = "pair", .bursting = true});
   UntypedFrontend frontend("pair");
   add(frontend, 0, 9.0, {.pace = iterations(9)});
   const Batch batch = frontend.pulse_to_end();
-  station.before_publish = [&] {
-    if (station.backend.iteration() == 4) station.backend.interrupt(0);
+  manual.before_publish = [&] {
+    if (manual.backend.iteration() == 4) manual.backend.interrupt(0);
   };
-  station.drive();
+  manual.drive();
   EXPECT_EQ(batch.handle(0).status, Status::interrupted);
   try {
     frontend.wait_for_end(batch, kAtOnce);
@@ -124,7 +124,7 @@ TEST_F(BurstTest, AMovementThatIsInterruptedEndsItsBurstInThatRow) {
 
 // rule G1
 TEST_F(BurstTest, OfABackendWithAClockOfItsOwnIsAnErrorAtOnce) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   EXPECT_THAT(message_of<NotBursting>([&] { frontend.burst(1, std::nullopt); }),
               HasSubstr("start it with bursting"));
@@ -141,15 +141,15 @@ TEST_F(BurstTest, OfAGroupLetsAllRunBeforeItWaits) {
   // each of the two goes on only when the other has begun
   std::array<std::atomic<bool>, 2> begun{};
   const auto meet = [&](std::size_t me) {
-    return [&, me](Station& station) {
-      station.before_publish = [&, me] {
+    return [&, me](ManualBackend& manual) {
+      manual.before_publish = [&, me] {
         begun[me] = true;
         while (!begun[1 - me]) std::this_thread::yield();
       };
     };
   };
-  BurstingStation left("left", meet(0));
-  BurstingStation right("right", meet(1));
+  BurstingBackend left("left", meet(0));
+  BurstingBackend right("right", meet(1));
   UntypedFrontend first("left");
   UntypedFrontend second("right");
   const std::pair<UntypedFrontend*, std::int64_t> group[] = {{&first, 5}, {&second, 3}};
@@ -160,24 +160,24 @@ TEST_F(BurstTest, OfAGroupLetsAllRunBeforeItWaits) {
 }
 
 TEST_F(BurstTest, EndsWithAnErrorWhenTheBackendStopsInIt) {
-  BurstingStation bursting;
+  BurstingBackend bursting;
   UntypedFrontend frontend("pair");
   const Burst burst = frontend.start_burst(1'000'000'000);
   wait_until_it_runs(frontend);
   bursting.stop();
-  bursting.station.backend.end(BackendState::stopped);
+  bursting.manual.backend.end(BackendState::stopped);
   EXPECT_THROW(burst.wait(kPatience), BackendStopped);
   EXPECT_FALSE(burst.done());
 }
 
 TEST_F(BurstTest, ThatIsRejectedBecauseTheBackendEndsSaysWhyItEnded) {
   for (const BackendState state : {BackendState::stopped, BackendState::failed}) {
-    StartedStation station({.segment = "pair", .bursting = true});
+    StartedBackend manual({.segment = "pair", .bursting = true});
     UntypedFrontend frontend("pair");
     add(frontend, 0, 1.0);
     const Burst burst = frontend.start_burst(5, {.at = 3});
-    ASSERT_EQ(station.iterate(), Step::run);
-    station.backend.end(state, "the elbow is too hot");
+    ASSERT_EQ(manual.iterate(), Step::run);
+    manual.backend.end(state, "the elbow is too hot");
     EXPECT_TRUE(burst.done());
     const auto wait = [&] { burst.wait(kPatience); };
     if (state == BackendState::stopped) {
@@ -189,13 +189,13 @@ TEST_F(BurstTest, ThatIsRejectedBecauseTheBackendEndsSaysWhyItEnded) {
 }
 
 TEST_F(BurstTest, AMovementIsNotCalledEndedWhenTheBackendStopsInIt) {
-  BurstingStation bursting;
+  BurstingBackend bursting;
   UntypedFrontend frontend("pair");
   add(frontend, 0, 1.0, {.pace = iterations(1'000'000'000)});
   const Batch batch = frontend.pulse_to_end();
   wait_until_it_runs(frontend);
   bursting.stop();
-  bursting.station.backend.end(BackendState::stopped);
+  bursting.manual.backend.end(BackendState::stopped);
   EXPECT_THROW(frontend.wait_for_end(batch, kPatience), BackendStopped);
   EXPECT_THROW(batch.wait(kPatience), BackendStopped);
   EXPECT_EQ(batch.handle(0).status, Status::purged);
@@ -214,7 +214,7 @@ TEST_F(BurstTest, AFrontendThatDiesInABurstLeavesTheBackendUsable) {
     ready();
     pause_for_ever();
   });
-  BurstingStation bursting;
+  BurstingBackend bursting;
   ASSERT_EQ(write(gate[1], "x", 1), 1);
   ASSERT_TRUE(child.wait_until_ready());
   child.kill_now();
@@ -228,7 +228,7 @@ TEST_F(BurstTest, AFrontendThatDiesInABurstLeavesTheBackendUsable) {
 // rule G6
 TEST_F(BurstTest, TwoRunsOfTheSameScriptGiveHistoriesIdenticalBitForBit) {
   const auto history = [] {
-    BurstingStation bursting;
+    BurstingBackend bursting;
     UntypedFrontend frontend("pair");
     for (int i = 0; i < 20; ++i) {
       add(frontend, 0, 0.1 * i, {.pace = iterations(3), .profile = Profile::minimum_jerk});
@@ -244,12 +244,12 @@ TEST_F(BurstTest, TwoRunsOfTheSameScriptGiveHistoriesIdenticalBitForBit) {
 }
 
 TEST_F(BurstTest, AStepWithinATimeGivesUpStanding) {
-  StartedStation station({.segment = "pair", .bursting = true});
-  EXPECT_EQ(station.backend.step_within(0), Step::standing);
-  EXPECT_EQ(station.backend.step_within(1'000'000), Step::standing);
+  StartedBackend manual({.segment = "pair", .bursting = true});
+  EXPECT_EQ(manual.backend.step_within(0), Step::standing);
+  EXPECT_EQ(manual.backend.step_within(1'000'000), Step::standing);
   UntypedFrontend frontend("pair");
   frontend.start_burst(1);
-  EXPECT_EQ(station.backend.step_within(1'000'000), Step::run);
+  EXPECT_EQ(manual.backend.step_within(1'000'000), Step::run);
 }
 
 TEST_F(BurstTest, ThatIsCutIsDoneAndTheNextOneBegins) {

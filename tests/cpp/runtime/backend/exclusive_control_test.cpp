@@ -5,7 +5,7 @@
 namespace o80::test {
 namespace {
 
-using ExclusiveControl = StationTest;
+using ExclusiveControl = ManualBackendTest;
 
 // rule B5
 TEST_F(ExclusiveControl, WhoHasControlHasItAlone) {

@@ -16,7 +16,7 @@
 #include "runtime/backend/schedule.hpp"
 #include "runtime/frontend/link.hpp"
 #include "runtime/frontend/loop_state.hpp"
-#include "runtime/liar.hpp"
+#include "runtime/hostile_frontend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
@@ -24,9 +24,9 @@ namespace {
 
 using ::testing::HasSubstr;
 
-using ExpressTraces = StationTest;
+using ExpressTraces = ManualBackendTest;
 
-class ExpressTest : public StationTest {
+class ExpressTest : public ManualBackendTest {
  protected:
   /// So many frontends, each with as much in its lane as fits.
   std::vector<std::unique_ptr<UntypedFrontend>> flood(std::size_t count) {
@@ -41,7 +41,7 @@ class ExpressTest : public StationTest {
     return frontends;
   }
 
-  StartedStation station;
+  StartedBackend manual;
   std::vector<Batch> floods;
 };
 
@@ -49,16 +49,16 @@ class ExpressTest : public StationTest {
 TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOtherLanes) {
   UntypedFrontend one("pair");
   const Batch moving = send(one, 0, 9.0, {.pace = iterations(1000)});
-  station.run(3);
+  manual.run(3);
   const auto others = flood(7);
-  station.run(2);
+  manual.run(2);
   // a little of its own stands before it, which waits for the others' turn
   const Batch queued = send(one, 0, 5.0, {.pace = iterations(10)});
   const Batch mixed = send(one, 1, 5.0, {.pace = iterations(10)});
   one.add_purge(0);
   const Batch purge = one.pulse({.seen = one.latest()});
-  const Iteration now = station.last() + 1;
-  station.run(1);
+  const Iteration now = manual.last() + 1;
+  manual.run(1);
   EXPECT_EQ(purge.first_iteration(), now);
   EXPECT_EQ(purge.handle(0).status, Status::completed);
   EXPECT_EQ(moving.handle(0).status, Status::purged);
@@ -66,7 +66,7 @@ TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOther
   EXPECT_EQ(queued.first_iteration(), -1) << "commands keep their turn";
 
   // when their turn comes
-  for (int i = 0; i < 1000 && !(mixed.ended() && queued.ended()); ++i) station.run(1);
+  for (int i = 0; i < 1000 && !(mixed.ended() && queued.ended()); ++i) manual.run(1);
   EXPECT_EQ(queued.handle(0).status, Status::purged);
   EXPECT_EQ(mixed.handle(0).status, Status::completed) << "of another actuator";
   for (const Batch& flood : floods) {
@@ -78,13 +78,13 @@ TEST_F(ExpressTest, APurgeIsTakenInTheIterationAfterItsCommitWhateverLiesInOther
 TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
   UntypedFrontend one("pair");
   send(one, 1, 1.0);
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(queue_holder(one.link()->segment.view()), std::nullopt);
   const auto others = flood(1);
-  const Iteration begun = station.last() + 1;
-  station.run(1);
+  const Iteration begun = manual.last() + 1;
+  manual.run(1);
   const Batch waiting = send(one, 1, 2.0);
-  station.run(kLongQueue);
+  manual.run(kLongQueue);
 
   const std::optional<QueueHolder> holder = queue_holder(one.link()->segment.view());
   ASSERT_TRUE(holder.has_value());
@@ -101,15 +101,15 @@ TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
   const UntypedFrontend reader("pair", {.access = Access::read_only});
   EXPECT_EQ(loop_state(reader).trouble(), told);
 
-  for (int i = 0; i < 1000 && !waiting.ended(); ++i) station.run(1);
-  station.run(1);
+  for (int i = 0; i < 1000 && !waiting.ended(); ++i) manual.run(1);
+  manual.run(1);
   EXPECT_EQ(loop_state(one).queue, "");
 }
 
 TEST_F(ExpressTest, TheHolderOfTheQueueIsTheLaneThatDoesMostOfTheWork) {
   const UntypedFrontend reader("pair", {.access = Access::read_only});
   const SegmentView& view = reader.link()->segment.view();
-  QueueWord word(station.backend.segment().view());
+  QueueWord word(manual.backend.segment().view());
   word.waits(1);
   EXPECT_EQ(queue_holder(view), std::nullopt) << "nobody has done any work";
   for (Iteration i = 2; i < 1'000'000; ++i) {
@@ -129,16 +129,16 @@ TEST_F(ExpressTest, TheHolderOfTheQueueIsTheLaneThatDoesMostOfTheWork) {
 TEST_F(ExpressTest, ControlIsTakenAtOnceToo) {
   UntypedFrontend one("pair");
   send(one, 1, 1.0);
-  station.run(1);
+  manual.run(1);
   const auto others = flood(7);
-  station.run(1);
+  manual.run(1);
   one.add_take_control();
   const Batch control = one.pulse();
-  const Iteration now = station.last() + 1;
-  station.run(1);
+  const Iteration now = manual.last() + 1;
+  manual.run(1);
   EXPECT_EQ(control.first_iteration(), now);
   const Batch mine = send(one, 1, 2.0);
-  for (int i = 0; i < 400 && !mine.ended(); ++i) station.run(1);
+  for (int i = 0; i < 400 && !mine.ended(); ++i) manual.run(1);
   EXPECT_EQ(mine.handle(0).status, Status::completed);
   EXPECT_EQ(floods.back().handle(0).reason, Reason::exclusive);
 }
@@ -147,13 +147,13 @@ TEST_F(ExpressTest, ControlIsNotLetGoOfBeforeWhatWasSentUnderIt) {
   UntypedFrontend one("pair");
   one.add_take_control();
   one.pulse();
-  station.run(1);
+  manual.run(1);
   const auto others = flood(7);
-  station.run(1);
+  manual.run(1);
   const Batch mine = send(one, 1, 2.0);
   one.add_release_control();
   const Batch release = one.pulse();
-  for (int i = 0; i < 1000 && !release.ended(); ++i) station.run(1);
+  for (int i = 0; i < 1000 && !release.ended(); ++i) manual.run(1);
   EXPECT_EQ(mine.handle(0).status, Status::completed);
   EXPECT_GE(release.first_iteration(), mine.first_iteration());
 }
@@ -161,11 +161,11 @@ TEST_F(ExpressTest, ControlIsNotLetGoOfBeforeWhatWasSentUnderIt) {
 TEST_F(ExpressTest, AResumeWaitsForWhatWasSentBeforeIt) {
   UntypedFrontend one("pair");
   const std::uint64_t number = one.halt("stop");
-  station.run(1);
+  manual.run(1);
   const auto others = flood(7);
-  station.run(1);
+  manual.run(1);
   const Batch resumed = send_resume(one, number);
-  for (int i = 0; i < 1000 && !resumed.ended(); ++i) station.run(1);
+  for (int i = 0; i < 1000 && !resumed.ended(); ++i) manual.run(1);
   EXPECT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
   for (const Batch& flood : floods) {
     EXPECT_EQ(flood.handle(0).reason, Reason::halted) << "sent while the robot was halted";
@@ -212,25 +212,25 @@ TEST_F(ExpressTest, MoreBatchesThanMayWaitForLaterIterationsAreRefused) {
   }
   EXPECT_THAT(message_of<LaneFull>([&] { pulse_at(2000); }), HasSubstr("256 batches"));
   // what was sent is still added, and goes when there is room
-  station.run(901);
+  manual.run(901);
   EXPECT_EQ(one.pulse({.at = 2000}).size(), 1U);
-  station.run(1200);
+  manual.run(1200);
   for (const Batch& batch : batches) EXPECT_EQ(batch.handle(0).status, Status::completed);
 }
 
 TEST_F(ExpressTest, ABackendRejectsWhatASenderPutsIntoItsScheduleBeyondThat) {
-  Liar liar;
+  HostileFrontend hostile;
   std::vector<CommandId> ids;
   for (std::uint32_t i = 0; i < kMaxScheduledAt + 1; ++i) {
     BatchBuilder batch;
     batch.purge(0);
-    const CommandId id = liar.sender().next_id();
-    liar.sender().draw_ids(id + 3);
-    liar.send(batch, {.id = id, .at = 50});
+    const CommandId id = hostile.sender().next_id();
+    hostile.sender().draw_ids(id + 3);
+    hostile.send(batch, {.id = id, .at = 50});
     ids.push_back(id);
   }
-  station.run(60);
-  const auto word = [&](CommandId id) { return liar.sender().status(id).word; };
+  manual.run(60);
+  const auto word = [&](CommandId id) { return hostile.sender().status(id).word; };
   EXPECT_EQ(static_cast<Status>(word(ids.front()).status), Status::active);
   EXPECT_EQ(static_cast<Status>(word(ids.back()).status), Status::rejected);
   EXPECT_EQ(static_cast<Reason>(word(ids.back()).reason), Reason::full);
@@ -252,7 +252,7 @@ TEST_F(ExpressTraces, ABatchThatCannotBeTakenAtItsIterationIsLateUnlessItMayActI
 // ------------------------------------------------------------------------------ ids
 
 TEST_F(ExpressTest, APurgeAlwaysHasIdsHoweverNarrowTheGapsBetweenThoseInUse) {
-  StartedStation bursting({.segment = "bursting", .bursting = true, .lane_blocks = 1024});
+  StartedBackend bursting({.segment = "bursting", .bursting = true, .lane_blocks = 1024});
   UntypedFrontend one("bursting");
   // long commands and bursts in turn leave gaps of ids two wide
   std::vector<Batch> running;

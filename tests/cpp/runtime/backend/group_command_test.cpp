@@ -5,7 +5,7 @@
 #include <array>
 #include <vector>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
@@ -23,7 +23,7 @@ std::uint32_t add_both(UntypedFrontend& frontend, double shoulder, double elbow,
   return frontend.add_commands(kBoth, std::as_bytes(std::span(targets)), options);
 }
 
-class GroupCommandTest : public StationTest {};
+class GroupCommandTest : public ManualBackendTest {};
 
 // rule C21
 TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
@@ -32,20 +32,20 @@ TEST_F(GroupCommandTest, IsOneRecordWithOneStatus) {
 }
 
 TEST_F(GroupCommandTest, ATrajectoryIsOneToo) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const std::array<double, 6> rows{1, 2, 3, 10, 20, 30};
   frontend.add_trajectories(kBoth, 3, std::as_bytes(std::span(rows)));
   const Batch batch = frontend.pulse();
   EXPECT_EQ(batch.size(), 1U);
-  station.run(3);
+  manual.run(3);
   EXPECT_THAT(desired(frontend, 1, 3), ElementsAre(1, 2, 3));
   EXPECT_THAT(desired(frontend, 1, 3, 1), ElementsAre(10, 20, 30));
   EXPECT_EQ(batch.handle(0).status, Status::completed);
 }
 
 TEST_F(GroupCommandTest, IsRefusedWholeWithTheReason) {
-  StartedStation station({.segment = "pair"}, [](Schema& schema) {
+  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.minimum = -1, .maximum = 1, .speed = 10});
   });
   UntypedFrontend frontend("pair");
@@ -69,19 +69,19 @@ TEST_F(GroupCommandTest, IsRefusedWholeWithTheReason) {
 
 // rule C13
 TEST_F(GroupCommandTest, MovesSmoothlyIfOneOfItsActuatorsDoesByDefault) {
-  StartedStation station({.segment = "pair"}, [](Schema& schema) {
+  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.speed = 1e6, .acceleration = 1e9});
   });
   UntypedFrontend frontend("pair");
   add_both(frontend, 1.0, 1.0, {.pace = iterations(4)});
   frontend.pulse();
-  station.run(4);
+  manual.run(4);
   EXPECT_EQ(desired(frontend, 1, 4), desired(frontend, 1, 4, 1)) << "one way for both";
   EXPECT_LT(desired(frontend.wait_for(1, kAtOnce)), 0.25) << "a minimum jerk begins at rest";
 }
 
 TEST_F(GroupCommandTest, FillsItsLaneAsItsBlocksSay) {
-  StartedStation station({.segment = "pair", .lane_blocks = 64});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   // a block for the batch, then three for each: its head and two members
   for (int i = 0; i < 20; ++i) add_both(frontend, i, i);
@@ -90,14 +90,14 @@ TEST_F(GroupCommandTest, FillsItsLaneAsItsBlocksSay) {
   for (int round = 0; round < 20; ++round) {
     for (int i = 0; i < 19; ++i) add_both(frontend, i, i);
     const Batch batch = frontend.pulse();
-    station.run(19);
+    manual.run(19);
     ASSERT_TRUE(batch.ended());
     ASSERT_EQ(batch.handle(18).status, Status::completed);
   }
 }
 
 TEST_F(GroupCommandTest, ABatchStagedOverSeveralIterationsActsWhole) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   constexpr int kGroups = 2000;
   for (int i = 1; i <= kGroups; ++i) add_both(frontend, i, -i);
@@ -106,11 +106,11 @@ TEST_F(GroupCommandTest, ABatchStagedOverSeveralIterationsActsWhole) {
   while (batch.first_iteration() < 0) {
     ASSERT_LT(begun, 100);
     EXPECT_EQ(desired(frontend.latest(), 0), 0.0);
-    station.run(1);
+    manual.run(1);
     ++begun;
   }
   EXPECT_GT(begun, 3) << "it was staged";
-  station.run(kGroups);
+  manual.run(kGroups);
   ASSERT_TRUE(batch.ended());
   for (int i = 1; i <= kGroups; ++i) {
     ASSERT_EQ(batch.handle(static_cast<std::size_t>(i - 1)).iteration, begun + i - 1);
@@ -174,19 +174,19 @@ TEST_F(GroupCommandTest, ABurstUntilItsEndRunsUntilItsLastMemberHasEnded) {
 TEST_F(GroupCommandTest, BeginsAtTheSameIterationHoweverLongTheBackendStoodBefore) {
   // one queue waits behind a dropped member of a group; telling its drop takes several iterations
   const auto begins = [](bool stands_between) {
-    StartedStation station({.segment = "pair", .bursting = true});
+    StartedBackend manual({.segment = "pair", .bursting = true});
     UntypedFrontend frontend("pair");
     for (int i = 0; i < 5000; ++i) add(frontend, 1, 1.0, {.pace = iterations(1'000'000)});
     add_both(frontend, 5.0, 5.0);
     frontend.pulse();
     frontend.start_burst(20);
-    station.drive();
+    manual.drive();
     frontend.add_purge(1);
     frontend.pulse();
-    if (stands_between) station.drive();
+    if (stands_between) manual.drive();
     frontend.start_burst(20);
-    station.drive();
-    if (stands_between) station.drive();
+    manual.drive();
+    if (stands_between) manual.drive();
     for (Iteration i = frontend.published() - 19; i <= frontend.published(); ++i) {
       if (desired(frontend.wait_for(i, kAtOnce)) == 5.0) return i;
     }

@@ -5,7 +5,7 @@
 namespace o80::test {
 namespace {
 
-using HaltBurstTest = StationTest;
+using HaltBurstTest = ManualBackendTest;
 
 void play_bursts(const std::string& script) { play({.segment = "pair", .bursting = true}, script); }
 
@@ -15,9 +15,9 @@ TEST_F(HaltBurstTest, AHaltEndsABurstAfterTheIterationUnderWay) {
     play_bursts("0 to 100 over 100;" + sent + R"(; in 5 driver halts five; drive
       last 5; halted driver @6 why five; a halted  # in the next one, that has not begun)");
   }
-  BurstingStation bursting("pair", [](Station& station) {
-    station.before_publish = [&station] {
-      if (station.backend.iteration() == 5) station.backend.halt(HaltCause::driver, "five");
+  BurstingBackend bursting("pair", [](ManualBackend& manual) {
+    manual.before_publish = [&manual] {
+      if (manual.backend.iteration() == 5) manual.backend.halt(HaltCause::driver, "five");
     };
   });
   EXPECT_THAT(

@@ -5,23 +5,23 @@
 #include <optional>
 
 #include "memory/child_process.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::HasSubstr;
-using HaltSuccessorTest = StationTest;
+using HaltSuccessorTest = ManualBackendTest;
 
 enum class Before { idle, acting, halted, requested, resumed, stopped, failed };
 
 /// Leaves a backend in some state and dies.
 void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting = false) {
-  StartedStation station({.segment = "pair", .bursting = bursting});
+  StartedBackend manual({.segment = "pair", .bursting = bursting});
   UntypedFrontend frontend("pair");
   const auto iterate = [&] {
     if (bursting) frontend.start_burst(1);
-    station.iterate();
+    manual.iterate();
   };
   iterate();
   if (before == Before::acting) {
@@ -39,8 +39,8 @@ void live_and_die(Before before, const ChildProcess::Ready& ready, bool bursting
     iterate();
   }
   if (before == Before::requested) frontend.halt("me");
-  if (before == Before::stopped) station.backend.end(BackendState::stopped);
-  if (before == Before::failed) station.backend.end(BackendState::failed, "broken");
+  if (before == Before::stopped) manual.backend.end(BackendState::stopped);
+  if (before == Before::failed) manual.backend.end(BackendState::failed, "broken");
   ready();
   pause_for_ever();
 }
@@ -51,13 +51,13 @@ std::optional<Halt> halt_of_successor(Before before, BackendOptions options = {.
       [&](const ChildProcess::Ready& ready) { live_and_die(before, ready, was_bursting); });
   EXPECT_TRUE(child.wait_until_ready());
   child.kill_now();
-  StartedStation station(options);
+  StartedBackend manual(options);
   UntypedFrontend frontend("pair");
   const auto halt = frontend.halted();
   EXPECT_EQ(frontend.wait_for(0, kAtOnce).head().halted, halt ? 1U : 0U);
   if (halt) {
     const Batch batch = send(frontend, 0, 1.0);
-    station.run(1);
+    manual.run(1);
     EXPECT_EQ(batch.handle(0).status, Status::rejected);
   }
   return halt;
@@ -88,11 +88,11 @@ TEST_F(HaltSuccessorTest, OfAHaltedBackendWithoutARowStartsHaltedToo) {
   child.kill_now();
   // this one does not live to publish a row
   StandingProcess second([&](const StandingProcess::Stand& stand) {
-    Station station;
+    ManualBackend manual;
     stand();
   });
   second.kill_now();
-  StartedStation station;
+  StartedBackend manual;
   EXPECT_TRUE(UntypedFrontend("pair").halted());
 }
 

@@ -4,7 +4,7 @@
 
 #include "control/sending/batch_builder.hpp"
 #include "o80/base/error.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
@@ -12,7 +12,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using HaltTest = StationTest;
+using HaltTest = ManualBackendTest;
 
 std::uint32_t halted_in_row(const UntypedFrontend& frontend, Iteration k) {
   return frontend.wait_for(k, kAtOnce).head().halted;
@@ -35,7 +35,7 @@ TEST_F(HaltTest, ActsInTheFirstStepBegunAfterIt) {
 }
 
 TEST_F(HaltTest, AReadOnlyFrontendMayNotHalt) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend reader("pair", {.access = Access::read_only});
   EXPECT_THROW(reader.halt("no"), ReadOnly);
   EXPECT_FALSE(reader.halted());
@@ -66,12 +66,12 @@ TEST_F(HaltTest, EndsWhatWasSentBeforeItWhereverItIs) {
 }
 
 TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   BatchBuilder late;
   send(frontend, 1, 0.0);
   frontend.halt("");
-  station.run(1);
+  manual.run(1);
   // drawn before the halt acts, committed long after
   AttachedSegment segment =
       AttachedSegment::attach("pair", Access::read_write, Deadline(kPatience));
@@ -85,7 +85,7 @@ TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
   sender.draw_ids(record.id + 3);
   frontend.forget_added();
   const Batch resumed = send_resume(frontend, 1);
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(resumed.handle(0).status, Status::completed) << resumed.handle(0).text;
   EXPECT_FALSE(frontend.halted());
   const auto blocks = late.seal(record);
@@ -94,7 +94,7 @@ TEST_F(HaltTest, WhatWasSentBeforeItNeverActsAlsoAfterTheResume) {
   const std::uint64_t early = 0;
   auto* words = reinterpret_cast<std::uint64_t*>(segment.view().transport(sender.lane()));
   std::atomic_ref(words[offsetof(BatchRecord, ticket) / 8]).store(early);
-  station.run(2);
+  manual.run(2);
   EXPECT_EQ(static_cast<Status>(sender.status(record_id(record.id, 0)).word.status),
             Status::halted);
   EXPECT_EQ(desired(frontend.latest()), 0.0);
@@ -112,9 +112,9 @@ TEST_F(HaltTest, NeedsNoLane) {
 
 // rule H3
 TEST_F(HaltTest, IsLatchedBeforeRowZero) {
-  Station station;
+  ManualBackend manual;
   halt("pair", "not today", kPatience);
-  station.start();
+  manual.start();
   UntypedFrontend frontend("pair");
   EXPECT_EQ(halted_in_row(frontend, 0), 1U);
   ASSERT_TRUE(frontend.halted());

@@ -1,12 +1,12 @@
 // kill -9 of either side, at the level of frontends and backends.
 
 #include "memory/child_process.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
-class KillTest : public StationTest {};
+class KillTest : public ManualBackendTest {};
 
 /// A frontend in a process of its own that sends a long movement and takes control.
 class Commander {
@@ -45,36 +45,36 @@ class Commander {
 // rule W5
 TEST_F(KillTest, TheBackendGoesOnWhenACommandingFrontendIsKilledAndTheNextOneCommands) {
   Commander commander;
-  StartedStation station({.segment = "pair", .lanes = 1});
+  StartedBackend manual({.segment = "pair", .lanes = 1});
   commander.command();
-  station.run(3);
+  manual.run(3);
   commander.kill_now();
   UntypedFrontend next("pair");
-  station.run(2);
+  manual.run(2);
   EXPECT_GT(desired(next.latest()), 4.0) << "held: the movement goes on";
   const Batch batch = send(next, 0, -1.0, {.mode = Mode::overwrite});
-  station.run_until([&] { return batch.ended(); });
+  manual.run_until([&] { return batch.ended(); });
   EXPECT_EQ(batch.handle(0).status, Status::completed) << "control fell with its holder";
   EXPECT_EQ(desired(next.latest()), -1.0);
 }
 
 TEST_F(KillTest, PurgesTheCommandsOfADeadFrontendIfToldSo) {
   Commander commander;
-  StartedStation station({.segment = "pair", .stale = Stale::purge});
+  StartedBackend manual({.segment = "pair", .stale = Stale::purge});
   UntypedFrontend reader("pair");
   commander.command();
-  station.run(3);
+  manual.run(3);
   EXPECT_TRUE(reader.latest().active(0));
   commander.kill_now();
-  station.run_until([&] { return !reader.latest().active(0); });
+  manual.run_until([&] { return !reader.latest().active(0); });
   // nor is what it had sent for later taken
-  while (station.last() < 500'010) station.iterate();
+  while (manual.last() < 500'010) manual.iterate();
   EXPECT_EQ(desired(reader.latest(), 1), 0.0);
 }
 
 TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
   for (const bool successor_stays : {true, false}) {
-    StartedStation station({.segment = "pair", .lanes = 1, .stale = Stale::purge});
+    StartedBackend manual({.segment = "pair", .lanes = 1, .stale = Stale::purge});
     UntypedFrontend reader("pair");
     StandingProcess dying([](const StandingProcess::Stand& stand) {
       UntypedFrontend frontend("pair", {.timeout = kPatience});
@@ -82,13 +82,13 @@ TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
       frontend.pulse({.at = 300});
       stand();
     });
-    station.run(3);  // it waits for its iteration
+    manual.run(3);  // it waits for its iteration
     dying.kill_now();
     std::optional<UntypedFrontend> successor("pair");
     const Batch own = send(*successor, 1, 1.0);
     if (!successor_stays) successor.reset();
-    station.run_until([&] { return own.ended(); });
-    while (station.last() < 310) station.iterate();
+    manual.run_until([&] { return own.ended(); });
+    while (manual.last() < 310) manual.iterate();
     EXPECT_EQ(desired(reader.latest(), 0), 0.0);
     EXPECT_EQ(desired(reader.latest(), 1), 1.0) << "the batch of its successor is carried out";
   }
@@ -96,16 +96,16 @@ TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
 
 TEST_F(KillTest, StopsWhenACommandingFrontendDiesIfToldSo) {
   Commander commander;
-  StartedStation station({.segment = "pair", .stale = Stale::stop});
+  StartedBackend manual({.segment = "pair", .stale = Stale::stop});
   commander.command();
-  station.run(3);
+  manual.run(3);
   commander.kill_now();
   Step step = Step::run;
-  station.run_until([&] {
-    if (step != Step::ended) step = station.iterate();
+  manual.run_until([&] {
+    if (step != Step::ended) step = manual.iterate();
     return step == Step::ended;
   });
-  EXPECT_EQ(station.backend.failure(), "a commanding frontend died");
+  EXPECT_EQ(manual.backend.failure(), "a commanding frontend died");
 }
 
 }  // namespace

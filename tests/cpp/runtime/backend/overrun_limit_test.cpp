@@ -2,7 +2,7 @@
 
 #include <gmock/gmock.h>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -25,17 +25,17 @@ TEST(OverrunLimit, OfNoneIsNeverExceeded) {
   for (int i = 0; i < 1000; ++i) EXPECT_FALSE(limit.exceeded(i));
 }
 
-using OverrunLimitTest = StationTest;
+using OverrunLimitTest = ManualBackendTest;
 
 TEST_F(OverrunLimitTest, HaltsTheBackend) {
-  StartedStation station({.segment = "pair", .max_overruns = 2});
+  StartedBackend manual({.segment = "pair", .max_overruns = 2});
   UntypedFrontend frontend("pair");
-  station.backend.set_timing({.lateness = 5, .overruns = 1});
-  station.backend.set_timing({.lateness = 0, .overruns = 1});
-  station.run(1);
+  manual.backend.set_timing({.lateness = 5, .overruns = 1});
+  manual.backend.set_timing({.lateness = 0, .overruns = 1});
+  manual.run(1);
   EXPECT_FALSE(frontend.halted());
-  station.backend.set_timing({.lateness = 5, .overruns = 2});
-  station.run(1);
+  manual.backend.set_timing({.lateness = 5, .overruns = 2});
+  manual.run(1);
   ASSERT_TRUE(frontend.halted());
   EXPECT_EQ(frontend.halted()->cause, HaltCause::overruns);
 }

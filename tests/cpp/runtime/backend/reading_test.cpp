@@ -8,15 +8,15 @@
 
 #include "cases.hpp"
 #include "o80/runtime/typed_backend.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using EmbeddedReadingTest = StationTest;
-using FollowerTest = StationTest;
+using EmbeddedReadingTest = ManualBackendTest;
+using FollowerTest = ManualBackendTest;
 
 constexpr Limits kLimits{.minimum = -2.0, .maximum = 2.0, .speed = 1.0, .error = 0.3};
 constexpr double kInfinity = std::numeric_limits<double>::infinity();

@@ -8,14 +8,14 @@
 
 #include "control/sending/batch_builder.hpp"
 #include "o80/base/error.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::HasSubstr;
-using ResumeTest = StationTest;
+using ResumeTest = ManualBackendTest;
 
 // rule H10
 TEST_F(ResumeTest, StartsAfreshFromWhereTheRobotIs) {
@@ -33,7 +33,7 @@ TEST_F(ResumeTest, OfAHaltThatWasRequestedInTheSameStepClearsIt) {
 // rule H10
 TEST_F(ResumeTest, IsRefusedUntilTheRobotHasBraked) {
   // a backend that stands still latches a halt without an iteration in which it could brake
-  BurstingStation bursting("pair", {}, [](Schema& schema) {
+  BurstingBackend bursting("pair", {}, [](Schema& schema) {
     schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});
   });
   UntypedFrontend frontend("pair");
@@ -77,14 +77,14 @@ TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
 struct Moving {
   Moving() {
     send(frontend, 0, 1e6, {.pace = speed(100.0), .profile = Profile::linear});
-    station.run(20);
+    manual.run(20);
   }
   /// What it says, while another thread iterates.
   std::string resume(std::uint64_t number, const KeepWaiting& keep_waiting = {}) {
     std::atomic<bool> over{false};
     std::thread loop([&] {
       while (!over) {
-        station.iterate();
+        manual.iterate();
         std::this_thread::yield();
       }
     });
@@ -95,7 +95,7 @@ struct Moving {
     return refused;
   }
 
-  StartedStation station{{.segment = "pair"}, limit_shoulder};
+  StartedBackend manual{{.segment = "pair"}, limit_shoulder};
   UntypedFrontend frontend{"pair"};
 };
 
@@ -132,29 +132,29 @@ TEST_F(ResumeTest, OfAFrontendSaysWhatItWaitsFor) {
   const std::uint64_t number = frontend.halt("");
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
               HasSubstr("is not in force yet"));
-  moving.station.run(1);
+  moving.manual.run(1);
   EXPECT_THAT(message_of<TimeoutError>([&] { frontend.resume(number, kAtOnce); }),
               HasSubstr("still brakes"));
 }
 
 TEST_F(ResumeTest, NeedsNoControl) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend holder("pair");
   UntypedFrontend other("pair");
   holder.add_take_control();
   holder.pulse();
   const std::uint64_t number = other.halt("");
-  station.run(1);
+  manual.run(1);
   BatchBuilder mixed;
   mixed.resume(number);
   mixed.purge(kEveryActuator);
   const Batch refused = other.pulse(mixed);
   const Batch resume = send_resume(other, number);
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(refused.handle(0).reason, Reason::exclusive) << "nothing else passes with it";
   EXPECT_EQ(resume.handle(0).status, Status::completed) << resume.handle(0).text;
   const Batch batch = send(other, 0, 1.0);
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(batch.handle(0).reason, Reason::exclusive) << "control stays with its holder";
 }
 

@@ -10,13 +10,13 @@ namespace o80::test {
 namespace {
 
 using ::testing::HasSubstr;
-using RunningRequestTest = StationTest;
+using RunningRequestTest = ManualBackendTest;
 
 /// A request that runs since iteration 1.
-Batch ask_home(UntypedFrontend& frontend, Station& station) {
+Batch ask_home(UntypedFrontend& frontend, ManualBackend& manual) {
   add_request<Home>(frontend);
   Batch batch = frontend.pulse();
-  station.run(1);
+  manual.run(1);
   return batch;
 }
 
@@ -31,9 +31,9 @@ TEST_F(RunningRequestTest, ShowsItsProgressToItsSenderAndToObservers) {
   play(R"(a = home; a shows; run 1; a shows looks for the index of joint 1
     home progress looks for the index of joint 2; a shows looks for the index of joint 2
     home ends; run 1; a shows; runs)");
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
-  ask_home(frontend, station);
+  ask_home(frontend, manual);
   const UntypedFrontend observer("pair", {.access = Access::read_only});
   ASSERT_EQ(observer.running_requests().size(), 1U);
   const RequestUnderWay seen = observer.running_requests()[0];
@@ -121,21 +121,21 @@ TEST_F(RunningRequestTest, ItContinuesWhenItsSenderCloses) {
 }
 
 TEST_F(RunningRequestTest, ItContinuesWhenItsSenderIsKilledAndCommandsArePurged) {
-  StartedStation station({.segment = "pair", .stale = Stale::purge});
+  StartedBackend manual({.segment = "pair", .stale = Stale::purge});
   StandingProcess child([](const StandingProcess::Stand& stand) {
     UntypedFrontend frontend("pair");
     add_request<Home>(frontend);
     frontend.pulse();
     stand();
   });
-  station.run(1);
-  ASSERT_EQ(station.homed, 1);
+  manual.run(1);
+  ASSERT_EQ(manual.homed, 1);
   child.kill_now();
   // its death is seen when its lane has a new owner, whatever the helper thread has seen
   UntypedFrontend successor("pair");
   send(successor, 0, 1.0);
-  station.run(2);
-  EXPECT_TRUE(station.backend.runs_any());
+  manual.run(2);
+  EXPECT_TRUE(manual.backend.runs_any());
 }
 
 TEST_F(RunningRequestTest, ItsSilentSenderIsHaltedByTheWatchdogUnlessItMovesNothing) {
@@ -146,9 +146,9 @@ TEST_F(RunningRequestTest, ItsSilentSenderIsHaltedByTheWatchdogUnlessItMovesNoth
 
 TEST_F(RunningRequestTest, ABackendThatIsReplacedWhileItRunsLeavesAHalt) {
   StandingProcess child([](const StandingProcess::Stand& stand) {
-    StartedStation station;
+    StartedBackend manual;
     UntypedFrontend frontend("pair");
-    ask_home(frontend, station);
+    ask_home(frontend, manual);
     stand();
   });
   child.kill_now();
@@ -165,27 +165,27 @@ TEST_F(RunningRequestTest, ABurstUntilTheEndLastsUntilItsEndOrItsFreshStart) {
 }
 
 TEST_F(RunningRequestTest, ThousandsOfThemLeaveNoBlockBehind) {
-  StartedStation station({.segment = "pair", .lane_blocks = 64});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 2000; ++i) {
-    const Batch batch = ask_home(frontend, station);
-    station.backend.end_request(frontend.request_index("home"), Served::done());
-    station.run(1);
+    const Batch batch = ask_home(frontend, manual);
+    manual.backend.end_request(frontend.request_index("home"), Served::done());
+    manual.run(1);
     ASSERT_EQ(batch.handle(0).status, Status::completed) << i;
   }
 }
 
 TEST_F(RunningRequestTest, ItsStatusIsNotForgottenWhileOthersComeAndGo) {
-  StartedStation station({.segment = "pair", .lane_blocks = 64});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
-  const Batch batch = ask_home(frontend, station);
+  const Batch batch = ask_home(frontend, manual);
   for (int i = 0; i < 2000; ++i) {
     send(frontend, 0, 1.0 * i);
-    station.run(1);
+    manual.run(1);
   }
   EXPECT_EQ(batch.handle(0).status, Status::active);
-  station.backend.end_request(frontend.request_index("home"), Served::done());
-  station.run(1);
+  manual.backend.end_request(frontend.request_index("home"), Served::done());
+  manual.run(1);
   EXPECT_EQ(batch.handle(0).status, Status::completed);
 }
 

@@ -4,8 +4,8 @@
 
 #include "memory/child_process.hpp"
 #include "o80/base/error.hpp"
-#include "runtime/liar.hpp"
-#include "runtime/station.hpp"
+#include "runtime/hostile_frontend.hpp"
+#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
@@ -13,7 +13,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-using SilenceTest = StationTest;
+using SilenceTest = ManualBackendTest;
 
 BackendOptions watched(Stale stale, std::int64_t silence = 5) {
   return {.segment = "pair", .stale = stale, .silence = silence};
@@ -29,7 +29,7 @@ TEST_F(SilenceTest, PurgesTheCommandsOfASilentCommander) {
 TEST_F(SilenceTest, AStarvedPlanActsAndAClosedOneDoesNot) {
   enum class Closed { no, by_its_last_chunk, by_order };
   for (const Closed closed : {Closed::no, Closed::by_its_last_chunk, Closed::by_order}) {
-    StartedStation station(watched(Stale::halt));
+    StartedBackend manual(watched(Stale::halt));
     UntypedFrontend frontend("pair");
     const std::array<std::uint32_t, 1> actuator{0};
     const std::array<std::uint32_t, 2> due{1, 2};
@@ -39,12 +39,12 @@ TEST_F(SilenceTest, AStarvedPlanActsAndAClosedOneDoesNot) {
         {.anchor = frontend.published(), .plan = 1, .final = closed == Closed::by_its_last_chunk});
     if (closed == Closed::by_order) frontend.add_close_plan(1);
     const Batch batch = frontend.pulse();
-    station.run(3);
+    manual.run(3);
     EXPECT_EQ(batch.handle(0).status, Status::completed);
     EXPECT_EQ(frontend.latest().starved(0), closed == Closed::no);
     EXPECT_FALSE(frontend.latest().starved(1));
     EXPECT_FALSE(frontend.halted());
-    station.run(4);
+    manual.run(4);
     ASSERT_EQ(frontend.halted().has_value(), closed == Closed::no);
     if (closed != Closed::no) continue;
     EXPECT_EQ(frontend.halted()->iteration, 7);
@@ -55,23 +55,23 @@ TEST_F(SilenceTest, AStarvedPlanActsAndAClosedOneDoesNot) {
 
 // rule W7
 TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
-  StartedStation station(watched(Stale::purge, 50));
+  StartedBackend manual(watched(Stale::purge, 50));
   UntypedFrontend silent("pair");
   UntypedFrontend lively("pair");
   const Batch batch = send(silent, 0, 1000.0, {.pace = iterations(1000)});
   const Batch other = send(lively, 1, 1000.0, {.pace = iterations(1000)});
-  station.run(5);
+  manual.run(5);
   const double before = desired(silent.latest());
-  station.backend.set_timing({.skipped = 100});
-  station.run(1);
+  manual.backend.set_timing({.skipped = 100});
+  manual.run(1);
   EXPECT_EQ(desired(silent.latest()), before + 1.0) << "a plan counts no missed periods";
   lively.keep_alive();
-  const auto grace = static_cast<int>(10'000'000 / station.backend.schema().head.period) + 2;
-  station.run(grace);
+  const auto grace = static_cast<int>(10'000'000 / manual.backend.schema().head.period) + 2;
+  manual.run(grace);
   EXPECT_EQ(batch.handle(0).status, Status::purged);
   EXPECT_EQ(batch.handle(0).reason, Reason::silence);
   EXPECT_EQ(other.handle(0).status, Status::active) << "its sign of life came after the gap";
-  station.run(30);
+  manual.run(30);
   EXPECT_EQ(other.handle(0).status, Status::active);
 }
 
@@ -140,13 +140,13 @@ TEST_F(SilenceTest, LifeCountsFromWhenItWasShown) {
 
 // rule W2
 TEST_F(SilenceTest, ReadingIsNoLife) {
-  StartedStation station(watched(Stale::purge));
+  StartedBackend manual(watched(Stale::purge));
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
   for (int i = 0; i < 8; ++i) {
-    station.run(1);
+    manual.run(1);
     frontend.latest();
-    frontend.wait_for(station.last(), kPatience);
+    frontend.wait_for(manual.last(), kPatience);
     frontend.halted();
     batch.handle(0);
   }
@@ -155,14 +155,14 @@ TEST_F(SilenceTest, ReadingIsNoLife) {
 
 // rule W2
 TEST_F(SilenceTest, AWaitForOnesOwnBatchIsLife) {
-  StartedStation station(watched(Stale::purge, 3));
+  StartedBackend manual(watched(Stale::purge, 3));
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 20.0, {.pace = iterations(20)});
   // each look of a wait that does not wait
   while (!batch.ended()) {
-    station.run(1);
+    manual.run(1);
     EXPECT_THROW(batch.wait(kAtOnce), TimeoutError);
-    if (station.last() > 18) break;
+    if (manual.last() > 18) break;
   }
   EXPECT_EQ(batch.handle(0).status, Status::active);
 }
@@ -186,8 +186,8 @@ TEST_F(SilenceTest, AnothersBurstIsNot) {
 }
 
 TEST_F(SilenceTest, LifeFromTheFutureIsThatOfNow) {
-  StartedStation station(watched(Stale::purge));
-  Liar liar;
+  StartedBackend manual(watched(Stale::purge));
+  HostileFrontend hostile;
   BatchBuilder builder;
   RecordHead head;
   head.pace = Pace::iterations;
@@ -195,14 +195,14 @@ TEST_F(SilenceTest, LifeFromTheFutureIsThatOfNow) {
   const double target = 1000.0;
   builder.command(head, std::as_bytes(std::span(&target, 1)));
   BatchRecord batch;
-  batch.id = liar.sender().next_id();
-  liar.sender().draw_ids(batch.id + 3);
-  liar.send(builder, batch);
-  liar.page().life = std::numeric_limits<std::int64_t>::max();
-  station.run(10);
+  batch.id = hostile.sender().next_id();
+  hostile.sender().draw_ids(batch.id + 3);
+  hostile.send(builder, batch);
+  hostile.page().life = std::numeric_limits<std::int64_t>::max();
+  manual.run(10);
   EXPECT_TRUE(UntypedFrontend("pair").latest().active(0)) << "it may say what it likes";
-  liar.page().life = std::numeric_limits<std::int64_t>::min();
-  station.run(10);
+  hostile.page().life = std::numeric_limits<std::int64_t>::min();
+  manual.run(10);
   EXPECT_FALSE(UntypedFrontend("pair").latest().active(0)) << "but has to go on saying it";
 }
 
@@ -220,7 +220,7 @@ TEST_F(SilenceTest, ADirectValueThatStillActsCountsAlthoughNothingIsQueued) {
 
 // rule W6
 TEST_F(SilenceTest, WithoutAWatchdogADirectValueThatDoesNotRestIsRefused) {
-  StartedStation station({.segment = "pair"}, rest_at_zero);
+  StartedBackend manual({.segment = "pair"}, rest_at_zero);
   UntypedFrontend frontend("pair");
   EXPECT_THAT(message_of<InvalidArgument>([&] { add(frontend, 0, 3.0); }),
               AllOf(HasSubstr("actuator 'shoulder'"), HasSubstr("--silence")));
@@ -231,7 +231,7 @@ TEST_F(SilenceTest, WithoutAWatchdogADirectValueThatDoesNotRestIsRefused) {
 }
 
 TEST_F(SilenceTest, ASimulationNeedsNoWatchdog) {
-  StartedStation station({.segment = "pair", .bursting = true}, rest_at_zero);
+  StartedBackend manual({.segment = "pair", .bursting = true}, rest_at_zero);
   UntypedFrontend frontend("pair");
   add(frontend, 0, 3.0);
   EXPECT_EQ(frontend.added(), 1U);
@@ -239,25 +239,25 @@ TEST_F(SilenceTest, ASimulationNeedsNoWatchdog) {
 
 // rule W4
 TEST_F(SilenceTest, HaltsUnlessAnotherPolicyIsAskedFor) {
-  const StartedStation station({.segment = "watched", .silence = 7});
+  const StartedBackend manual({.segment = "watched", .silence = 7});
   const UntypedFrontend frontend("watched");
   EXPECT_EQ(frontend.schema().head.silence, 7);
   EXPECT_EQ(frontend.schema().head.stale, Stale::halt);
-  EXPECT_EQ(Station({.segment = "other"}).backend.schema().head.stale, Stale::hold);
+  EXPECT_EQ(ManualBackend({.segment = "other"}).backend.schema().head.stale, Stale::hold);
 }
 
 // rule W5
 TEST_F(SilenceTest, ADeadCommanderHaltsIfToldSo) {
-  StartedStation station({.segment = "pair", .stale = Stale::halt});
+  StartedBackend manual({.segment = "pair", .stale = Stale::halt});
   StandingProcess child([](const StandingProcess::Stand& stand) {
     UntypedFrontend frontend("pair");
     send(frontend, 0, 1e6, {.pace = iterations(1'000'000)});
     stand();
   });
-  station.run(2);
+  manual.run(2);
   child.kill_now();
   UntypedFrontend frontend("pair");
-  station.run_until([&] { return frontend.halted().has_value(); });
+  manual.run_until([&] { return frontend.halted().has_value(); });
   EXPECT_EQ(frontend.halted()->cause, HaltCause::dead_frontend);
 }
 

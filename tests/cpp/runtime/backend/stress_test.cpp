@@ -7,15 +7,15 @@
 #include <thread>
 
 #include "o80/base/error.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
-class StressTest : public StationTest {};
+class StressTest : public ManualBackendTest {};
 
 TEST_F(StressTest, OneFrontendServesManyThreads) {
-  BurstingStation server;
+  BurstingBackend server;
   UntypedFrontend frontend("pair", {.timeout = kPatience});
   std::atomic<std::uint64_t> before{0};
   {
@@ -45,7 +45,7 @@ TEST_F(StressTest, OneFrontendServesManyThreads) {
 }
 
 TEST_F(StressTest, FrontendsComeGoBurstAndRequest) {
-  BurstingStation server;
+  BurstingBackend server;
   std::vector<std::jthread> threads;
   for (int i = 0; i < 4; ++i)
     threads.emplace_back([i] {
@@ -63,7 +63,7 @@ TEST_F(StressTest, FrontendsComeGoBurstAndRequest) {
 }
 
 TEST_F(StressTest, AFrontendIsClosedWhileItsThreadsWait) {
-  BurstingStation server;
+  BurstingBackend server;
   for (int round = 0; round < 10; ++round) {
     UntypedFrontend frontend("pair", {.timeout = kPatience});
     const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(1'000'000)});
@@ -84,7 +84,7 @@ TEST_F(StressTest, AFrontendIsClosedWhileItsThreadsWait) {
 
 TEST_F(StressTest, ABackendStopsWhileFrontendsBurstAndWait) {
   for (int round = 0; round < 10; ++round) {
-    auto server = std::make_unique<BurstingStation>();
+    auto server = std::make_unique<BurstingBackend>();
     std::atomic<int> burst{0};
     std::atomic<int> attached{0};
     std::vector<std::jthread> threads;

@@ -8,13 +8,13 @@
 #include "memory/segment/liveness.hpp"
 #include "o80/base/time.hpp"
 #include "o80/memory/segment_list.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::HasSubstr;
-class SuspendedTest : public StationTest {};
+class SuspendedTest : public ManualBackendTest {};
 
 constexpr Timeout kShort = std::chrono::milliseconds(60);  // more than a slice of a wait
 
@@ -26,11 +26,11 @@ void pause_for_a_millisecond() {
 }
 
 void be_a_backend(bool bursting, const ChildProcess::Ready& ready) {
-  StartedStation station({.segment = "pair", .bursting = bursting});
+  StartedBackend manual({.segment = "pair", .bursting = bursting});
   ready();
-  if (bursting) return station.serve_bursts();
+  if (bursting) return manual.serve_bursts();
   while (true) {
-    station.iterate();
+    manual.iterate();
     pause_for_a_millisecond();
   }
 }
@@ -83,7 +83,7 @@ TEST_F(SuspendedTest, ABackendKeepsItsName) {
   ChildProcess backend([](const auto& ready) { be_a_backend(false, ready); });
   ASSERT_TRUE(backend.wait_until_ready());
   backend.stop_and_wait_until_stopped();
-  EXPECT_THAT(message_of<SegmentTaken>([] { Station(); }),
+  EXPECT_THAT(message_of<SegmentTaken>([] { ManualBackend(); }),
               HasSubstr("pid " + std::to_string(backend.pid())));
   EXPECT_THROW(clean("pair"), SegmentTaken);
   EXPECT_TRUE(clean_dead().empty());
@@ -130,10 +130,10 @@ void let_the_helper_ask() {
 TEST_F(SuspendedTest, AFrontendKeepsItsLaneAndItsCommandsLiveOnWhateverThePolicyForTheDead) {
   for (const Stale stale : {Stale::hold, Stale::purge, Stale::stop}) {
     // the movement of the child begins with the first iteration after its pulse
-    StartedStation station({.segment = "pair", .lanes = 1, .stale = stale});
+    StartedBackend manual({.segment = "pair", .lanes = 1, .stale = stale});
     SuspendedCommander commander(false);
     ASSERT_TRUE(commander.child().wait_until_ready());
-    station.run(10);
+    manual.run(10);
     commander.child().stop_and_wait_until_stopped();
     let_the_helper_ask();
 
@@ -142,9 +142,9 @@ TEST_F(SuspendedTest, AFrontendKeepsItsLaneAndItsCommandsLiveOnWhateverThePolicy
     add(other, 1, 1.0);
     EXPECT_THAT(message_of<NoLane>([&] { other.pulse(); }),
                 HasSubstr("pid " + std::to_string(commander.child().pid())));
-    station.run(90);
+    manual.run(90);
     EXPECT_EQ(desired(other.latest()), 100.0);
-    EXPECT_EQ(station.backend.failure(), "");
+    EXPECT_EQ(manual.backend.failure(), "");
 
     // and it learns of it when it goes on
     go_on(commander.child());
@@ -153,28 +153,28 @@ TEST_F(SuspendedTest, AFrontendKeepsItsLaneAndItsCommandsLiveOnWhateverThePolicy
 }
 
 TEST_F(SuspendedTest, AHolderOfControlKeepsItUntilItLetsGo) {
-  StartedStation station;
+  StartedBackend manual;
   SuspendedCommander commander(true);
   ASSERT_TRUE(commander.child().wait_until_ready());
-  station.run(10);
+  manual.run(10);
   commander.child().stop_and_wait_until_stopped();
   let_the_helper_ask();
 
   UntypedFrontend other("pair");
   const Batch refused = send(other, 1, 1.0);
-  station.run(90);
+  manual.run(90);
   EXPECT_THAT(refused.rejection(), HasSubstr("pid " + std::to_string(commander.child().pid())));
   go_on(commander.child());
-  station.run_until([&] {
+  manual.run_until([&] {
     const Batch batch = send(other, 1, 2.0);
-    station.run(1);
+    manual.run(1);
     return batch.rejection().empty();
   });
   EXPECT_EQ(commander.child().wait(), 0);
 }
 
 TEST_F(SuspendedTest, AFrontendInABurstDelaysNobodyOnceItsBurstIsDone) {
-  BurstingStation bursting;
+  BurstingBackend bursting;
   ChildProcess frontend([](const ChildProcess::Ready& ready) {
     UntypedFrontend own("pair", {.timeout = kPatience});
     const Burst burst = own.start_burst(1000);

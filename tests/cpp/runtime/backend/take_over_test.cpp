@@ -9,18 +9,18 @@
 #include <fstream>
 
 #include "memory/child_process.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
-class TakeOverTest : public StationTest {};
+class TakeOverTest : public ManualBackendTest {};
 
 void run_until_killed(const StandingProcess::Stand& stand) {
-  StartedStation station;
-  station.run(5);
+  StartedBackend manual;
+  manual.run(5);
   stand();
 }
 
@@ -43,14 +43,14 @@ TEST_F(TakeOverTest, SaysWhatBecameOfTheOldBackendByNameAndPid) {
   expect_every_verb_says<BackendKilled>(first, pid + ") was killed");
 
   {
-    StartedStation second;
+    StartedBackend second;
     expect_every_verb_says<BackendSuperseded>(first, pid + ") is gone and a new one has its name");
     UntypedFrontend of_second("pair");
     second.backend.end(BackendState::failed, "the elbow is too hot");
     expect_every_verb_says<BackendFailed>(of_second, "failed: the elbow is too hot");
     second.backend.end(BackendState::stopped);
   }
-  StartedStation third;
+  StartedBackend third;
   UntypedFrontend of_third("pair");
   third.backend.end(BackendState::stopped);
   expect_every_verb_says<BackendStopped>(of_third, "has stopped");
@@ -63,7 +63,7 @@ TEST_F(TakeOverTest, LetsAFrontendAttachAgainInItsOwnPlace) {
   killed.kill_now();
   EXPECT_THROW(old.wait(kPatience), BackendKilled);
 
-  StartedStation next;
+  StartedBackend next;
   EXPECT_THROW(old.wait(kPatience), BackendSuperseded);
   arm = UntypedFrontend("pair");
   const Batch batch = send(arm, 0, 1.0);
@@ -92,7 +92,7 @@ TEST_F(TakeOverTest, WaitsForNoPeriodOfThoseWhoWatch) {
     StandingProcess killed(run_until_killed);
     killed.kill_now();
     const double before = seconds_slept();
-    StartedStation next({.segment = "pair", .history = 100, .lane_blocks = 64});
+    StartedBackend next({.segment = "pair", .history = 100, .lane_blocks = 64});
     shortest = std::min(shortest, seconds_slept() - before);
   }
   EXPECT_LT(shortest, 0.02);

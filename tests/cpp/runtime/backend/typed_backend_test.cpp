@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "o80/runtime/typed_frontend.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -11,7 +11,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-class TypedBackendTest : public StationTest {};
+class TypedBackendTest : public ManualBackendTest {};
 
 TEST_F(TypedBackendTest, PublishesRowZeroFirstAndThenStepsAndPublishes) {
   Backend<Pair> backend({.segment = "pair"});

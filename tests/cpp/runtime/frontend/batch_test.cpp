@@ -7,7 +7,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-class BatchTest : public StationTest {};
+class BatchTest : public ManualBackendTest {};
 
 TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
   play({.segment = "pair"}, R"(0 to 1 over 2; 0 to 2 over 2; 1 to 5  # too fast: one a millisecond
@@ -16,10 +16,10 @@ TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
     run 1; a completed @2; run 1; a.1 active @3; a open; a ended -1
     run 2; a.3 rejected late; a.3 says came after; a ended 5; a waits 1 of 4)",
        [](Schema& schema) { schema.actuator(1).limits({.speed = 1000}); });
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0, {.pace = until(0)});
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(batch.handles().size(), 1U);
   EXPECT_THROW(batch.wait(kAtOnce), NotCompleted);
   batch.wait(kAtOnce, {}, {.check = false});
@@ -28,11 +28,11 @@ TEST_F(BatchTest, FollowsEachCommandFromQueuedToItsEnd) {
 
 // rule B11
 TEST_F(BatchTest, TellsHowLateItsDecisionWas) {
-  StartedStation station({.segment = "pair", .history = 8, .lane_blocks = 16});
+  StartedBackend manual({.segment = "pair", .history = 8, .lane_blocks = 16});
   UntypedFrontend frontend("pair");
-  station.run(2);
+  manual.run(2);
   const UntypedObservation seen = frontend.latest();
-  station.run(3);
+  manual.run(3);
   EXPECT_EQ(frontend.pulse({.seen = seen}).id(), 0U) << "nothing was decided";
   EXPECT_EQ(send(frontend, 0, 1.0).decision_latency(), std::nullopt);
   add(frontend, 0, 1.0);
@@ -41,14 +41,14 @@ TEST_F(BatchTest, TellsHowLateItsDecisionWas) {
   EXPECT_EQ(batch.seen(), row);
   EXPECT_EQ(batch.size(), 1U);
   EXPECT_EQ(batch.decision_latency(), std::nullopt) << "it was not taken yet";
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(batch.decision_latency(), (DecisionLatency{4, frontend.latest().time() - seen.time()}));
 
   // a row of the future, of an unknown run, of one whose clock is another
   const auto latency_of = [&](Seen claimed) {
     add(frontend, 0, 1.0);
     const Batch sent = frontend.pulse({.seen = claimed});
-    station.run(1);
+    manual.run(1);
     return sent.decision_latency();
   };
   const Clock other = row.clock == Clock::simulated ? Clock::monotonic : Clock::simulated;
@@ -63,7 +63,7 @@ TEST_F(BatchTest, TellsHowLateItsDecisionWas) {
   ASSERT_TRUE(known.has_value());
   EXPECT_EQ(known->iterations, 1);
 
-  station.run(60);
+  manual.run(60);
   EXPECT_EQ(batch.decision_latency()->iterations, 4);
   EXPECT_EQ(batch.decision_latency()->time, -1) << "its row was overwritten";
 
@@ -75,15 +75,15 @@ TEST_F(BatchTest, TellsHowLateItsDecisionWas) {
 }
 
 TEST_F(BatchTest, KeepsTheEndStatusesItSawAndForgetsTheRest) {
-  StartedStation station({.segment = "pair", .lane_blocks = 16});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   const Batch seen = send(frontend, 0, 1.0);
   const Batch unseen = send(frontend, 0, 2.0);
-  station.run(2);
+  manual.run(2);
   EXPECT_EQ(seen.handle(0).status, Status::completed);
   for (int i = 0; i < 100; ++i) {
     send(frontend, 0, i);
-    station.run(1);
+    manual.run(1);
   }
   EXPECT_EQ(seen.handle(0).status, Status::completed);
   EXPECT_EQ(unseen.handle(0).status, Status::forgotten);
@@ -91,17 +91,17 @@ TEST_F(BatchTest, KeepsTheEndStatusesItSawAndForgetsTheRest) {
 }
 
 TEST_F(BatchTest, TheEndOfAnOldCommandDisturbsNoNewOne) {
-  StartedStation station({.segment = "pair", .lane_blocks = 16});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0, {.pace = iterations(200)});
   Batch last;
   for (int i = 0; i < 199; ++i) {
     last = send(frontend, 1, i);
-    station.run(1);
+    manual.run(1);
   }
   std::vector<Batch> recent;
   for (int i = 0; i < 6; ++i) recent.push_back(send(frontend, 1, i));
-  station.run(8);  // in these the old one ends
+  manual.run(8);  // in these the old one ends
   for (const Batch& batch : recent) {
     EXPECT_EQ(batch.handle(0).status, Status::completed);
     batch.wait(kAtOnce);
@@ -110,28 +110,28 @@ TEST_F(BatchTest, TheEndOfAnOldCommandDisturbsNoNewOne) {
 
 // rule S3
 TEST_F(BatchTest, NeverForgetsWhatStillRunsHoweverMuchIsSentMeanwhile) {
-  StartedStation station({.segment = "pair", .lane_blocks = 16});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   const Batch slow = send(frontend, 0, 1.0, {.pace = iterations(500)});
   for (int i = 0; i < 499; ++i) {
     send(frontend, 1, i);
-    station.run(1);
+    manual.run(1);
     ASSERT_EQ(slow.handle(0).status, Status::active) << "iteration " << i;
     ASSERT_FALSE(slow.ended());
   }
   send(frontend, 1, 0.0);
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(slow.handle(0).status, Status::completed);
   EXPECT_EQ(slow.last_iteration(), 500);
 }
 
 TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   add(frontend, 0, 1.0, {.pace = iterations(300)});
   add(frontend, 1, 1.0, {.pace = iterations(500)});
   const Batch batch = frontend.pulse();
-  std::thread runner([&] { station.run(1000); });
+  std::thread runner([&] { manual.run(1000); });
   batch.wait(kPatience);
   EXPECT_GE(frontend.published(), 500);
   EXPECT_EQ(batch.last_iteration(), 500);
@@ -140,7 +140,7 @@ TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {
 }
 
 TEST_F(BatchTest, AWaitThatTakesTooLongSaysWhatToDo) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0);
   EXPECT_THAT(message_of<TimeoutError>([&] { batch.wait(kAtOnce); }), HasSubstr("purge"));

@@ -4,7 +4,7 @@
 #include <optional>
 #include <utility>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -13,12 +13,12 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class FrontendTest : public StationTest {};
+class FrontendTest : public ManualBackendTest {};
 
 // ------------------------------------------------------------------------------ adding
 
 TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
-  StartedStation station({.segment = "pair"}, [](Schema& schema) {
+  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.minimum = -1, .maximum = 1, .speed = 10});
   });
   UntypedFrontend frontend("pair");
@@ -40,18 +40,18 @@ TEST_F(FrontendTest, RefusesWhatTheRobotCannotFollowWhenItIsAdded) {
 }
 
 TEST_F(FrontendTest, TheLastStateOfATrajectoryIsNoDirectValue) {
-  StartedStation station({.segment = "pair"},
-                         [](Schema& schema) { schema.actuator(0).rests_at("", 0); });
+  StartedBackend manual({.segment = "pair"},
+                        [](Schema& schema) { schema.actuator(0).rests_at("", 0); });
   UntypedFrontend frontend("pair");
   const std::array<double, 2> rows{1, 2};
   frontend.add_trajectory(0, 2, std::as_bytes(std::span(rows)), {.mode = Mode::overwrite});
   frontend.pulse();
-  station.run(3);
+  manual.run(3);
   EXPECT_THAT(desired(frontend, 1, 3), ElementsAre(1, 2, 0));
 }
 
 TEST_F(FrontendTest, RefusesOptionsThatContradictEachOther) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const auto refusal = [&](const CommandOptions& options) {
     return message_of<InvalidArgument>([&] { add(frontend, 0, 1.0, options); });
@@ -66,7 +66,7 @@ TEST_F(FrontendTest, RefusesOptionsThatContradictEachOther) {
 }
 
 TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const std::array<double, 3> rows{1, 2, 4};
   constexpr std::int64_t kMs = 1'000'000;  // the period
@@ -90,7 +90,7 @@ TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
 // ------------------------------------------------------------------------------ sending
 
 TEST_F(FrontendTest, AnEmptyBatchReturnsAtOnce) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const Batch batch = frontend.pulse();
   EXPECT_TRUE(batch.empty());
@@ -103,12 +103,12 @@ TEST_F(FrontendTest, AnEmptyBatchReturnsAtOnce) {
 
 // rule B6
 TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
-  StartedStation station({.segment = "pair", .lane_blocks = 64});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 40; ++i) add(frontend, 0, i, {.pace = iterations(2)});
   const Batch first = frontend.pulse();
   for (int i = 0; i < 40; ++i) add(frontend, 1, i);
-  station.run(1);
+  manual.run(1);
   for (int tries = 0; tries < 1000; ++tries) {
     ASSERT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }),
                 AllOf(HasSubstr("takes 41 blocks"), HasSubstr("of 60 are free"),
@@ -116,9 +116,9 @@ TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
   }
   EXPECT_EQ(frontend.added(), 40U);
   EXPECT_EQ(desired(frontend.latest(), 1), 0);
-  station.run(44);
+  manual.run(44);
   const Batch second = frontend.pulse();
-  station.run(60);
+  manual.run(60);
   EXPECT_EQ(desired(frontend.latest(), 1), 39);
   EXPECT_TRUE(second.ended());
   EXPECT_EQ(first.handle(39).status, Status::completed) << "refused pulses age no status";
@@ -127,7 +127,7 @@ TEST_F(FrontendTest, AFullLaneIsAnErrorAndNothingIsSentAndNothingIsLost) {
 
 // rule B6
 TEST_F(FrontendTest, ALaneFullOfCommandsStillTakesAPurge) {
-  StartedStation station({.segment = "pair", .lane_blocks = 16});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   Batch endless;
   const auto fill = [&] {
@@ -140,15 +140,15 @@ TEST_F(FrontendTest, ALaneFullOfCommandsStillTakesAPurge) {
   frontend.forget_added();
   frontend.add_purge(kEveryActuator);
   frontend.pulse();
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(endless.handle(0).status, Status::purged);
   send(frontend, 0, 2.0);
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(desired(frontend.latest()), 2.0);
 }
 
 TEST_F(FrontendTest, ALaneFullOfWhatIsScheduledStillTakesABurst) {
-  StartedStation station({.segment = "pair", .bursting = true, .lane_blocks = 16});
+  StartedBackend manual({.segment = "pair", .bursting = true, .lane_blocks = 16});
   UntypedFrontend frontend("pair");
   const auto fill = [&] {
     while (true) {
@@ -159,36 +159,36 @@ TEST_F(FrontendTest, ALaneFullOfWhatIsScheduledStillTakesABurst) {
   EXPECT_THROW(fill(), LaneFull);
   frontend.forget_added();
   const Burst burst = frontend.start_burst(2);
-  while (!burst.done()) station.iterate();
+  while (!burst.done()) manual.iterate();
   EXPECT_EQ(desired(frontend.latest()), 3.0);
 }
 
 TEST_F(FrontendTest, ABatchLargerThanItsLaneSaysHowToSendIt) {
-  StartedStation station({.segment = "pair", .lane_blocks = 64});
+  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 64; ++i) add(frontend, 0, i);
   EXPECT_THAT(message_of<LaneFull>([&] { frontend.pulse(); }),
               AllOf(HasSubstr("has 60"), HasSubstr("in parts")));
   frontend.forget_added();
   send(frontend, 0, 1.0);
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(desired(frontend.latest()), 1.0);
 }
 
 TEST_F(FrontendTest, APureReaderTakesNoLaneAndMayBeReadOnly) {
-  StartedStation station({.segment = "pair", .lanes = 1});
+  StartedBackend manual({.segment = "pair", .lanes = 1});
   UntypedFrontend reader("pair", {.access = Access::read_only});
   UntypedFrontend another("pair");
   UntypedFrontend commander("pair");
   send(commander, 0, 1.0);
-  station.run(1);
+  manual.run(1);
   EXPECT_EQ(desired(reader.latest()), 1.0);
   EXPECT_EQ(reader.wait_for(1, kPatience).iteration(), 1);
   EXPECT_THROW(send(reader, 0, 1.0), ReadOnly);
 }
 
 TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
-  StartedStation station({.segment = "pair", .lanes = 1});
+  StartedBackend manual({.segment = "pair", .lanes = 1});
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(2)});
   frontend.close();
@@ -198,7 +198,7 @@ TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
   EXPECT_THROW(static_cast<void>(frontend.history(3)), Closed);
   UntypedFrontend next("pair");
   send(next, 1, 2.0);
-  station.run(2);
+  manual.run(2);
   EXPECT_EQ(desired(next.latest(), 0), 1.0) << "sent motion goes on";
   EXPECT_EQ(desired(next.latest(), 1), 2.0);
   EXPECT_EQ(batch.handle(0).status, Status::completed) << "a kept batch still answers";
@@ -208,9 +208,9 @@ TEST_F(FrontendTest, ClosedItRefusesAllAndGivesItsLaneBack) {
 
 // rule O5
 TEST_F(FrontendTest, ReadsRowsByTheirIteration) {
-  StartedStation station({.segment = "pair", .history = 10});
+  StartedBackend manual({.segment = "pair", .history = 10});
   UntypedFrontend frontend("pair");
-  station.run(25);
+  manual.run(25);
   EXPECT_EQ(frontend.published(), 25);
   EXPECT_EQ(frontend.oldest(), 16);
   EXPECT_EQ(frontend.wait_for(16, kAtOnce).iteration(), 16);
@@ -233,13 +233,13 @@ TEST_F(FrontendTest, ReadsRowsByTheirIteration) {
 }
 
 TEST_F(FrontendTest, ReadsOneRowAfterTheOtherAndCountsWhatItMissed) {
-  StartedStation station({.segment = "pair", .history = 5});
+  StartedBackend manual({.segment = "pair", .history = 5});
   const UntypedFrontend frontend("pair");
   UntypedObservation row(frontend.description());
   Iteration position = 0;
   EXPECT_EQ(frontend.wait_for_next(position, row.bytes(), kAtOnce), 0);
   EXPECT_EQ(position, 1);
-  station.run(20);
+  manual.run(20);
   EXPECT_EQ(frontend.wait_for_next(position, row.bytes(), kAtOnce), 15);
   EXPECT_EQ(row.iteration(), 16);
   EXPECT_EQ(frontend.wait_for_next(position, row.bytes(), kAtOnce), 0);
@@ -251,7 +251,7 @@ TEST_F(FrontendTest, ReadsOneRowAfterTheOtherAndCountsWhatItMissed) {
 
 // rule O6
 TEST_F(FrontendTest, AReaderThatIsOvertakenAllTheTimeStillReadsTrueRowsInOrder) {
-  StartedStation station({.segment = "pair", .history = 1});
+  StartedBackend manual({.segment = "pair", .history = 1});
   const UntypedFrontend frontend("pair");
   std::atomic<bool> done{false};
   std::thread reader([&] {
@@ -268,24 +268,24 @@ TEST_F(FrontendTest, AReaderThatIsOvertakenAllTheTimeStillReadsTrueRowsInOrder) 
     }
     done = true;
   });
-  while (!done) station.iterate();
+  while (!done) manual.iterate();
   reader.join();
 }
 
 TEST_F(FrontendTest, WaitsEndWithAnErrorThatSaysWhatBecameOfTheBackend) {
-  std::optional<Station> station(std::in_place);
-  station->start();
+  std::optional<ManualBackend> manual(std::in_place);
+  manual->start();
   UntypedFrontend frontend("pair");
   const Batch batch = send(frontend, 0, 1.0, {.pace = iterations(50)});
-  station->run(1);
-  std::thread ender([&] { station->backend.end(BackendState::failed, "the motor is hot"); });
+  manual->run(1);
+  std::thread ender([&] { manual->backend.end(BackendState::failed, "the motor is hot"); });
   EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(99, kPatience); }),
               AllOf(HasSubstr("pair"), HasSubstr("the motor is hot")));
   EXPECT_THROW(batch.wait(kPatience), BackendFailed);
   ender.join();
   EXPECT_EQ(frontend.latest().iteration(), 1) << "its history can still be read";
   EXPECT_EQ(frontend.life(), Life::failed);
-  station.reset();
+  manual.reset();
   EXPECT_EQ(frontend.history(10).count, 2U);
   EXPECT_THROW(UntypedFrontend("pair", {.timeout = kPatience}), BackendFailed);
   const UntypedFrontend late("pair", {.timeout = kPatience, .dead = true});
@@ -293,7 +293,7 @@ TEST_F(FrontendTest, WaitsEndWithAnErrorThatSaysWhatBecameOfTheBackend) {
 }
 
 TEST_F(FrontendTest, AWaitEndsWhenItsCallerSaysSo) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   int requested = 0;
   EXPECT_THROW(frontend.wait_for(99, kPatience, [&] { return ++requested < 2; }), Cancelled);

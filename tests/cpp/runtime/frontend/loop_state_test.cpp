@@ -5,7 +5,7 @@
 
 #include <thread>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 using ::testing::Eq;
 using ::testing::HasSubstr;
 using ::testing::Optional;
-using LoopStateTest = StationTest;
+using LoopStateTest = ManualBackendTest;
 
 constexpr std::int64_t kSecond = 1'000'000'000;
 
@@ -35,12 +35,12 @@ std::int64_t time_of(const UntypedFrontend& frontend, Iteration k) {
 }
 
 TEST_F(LoopStateTest, GivesTheRateAtWhichRowsCame) {
-  StartedStation station;
+  StartedBackend manual;
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
   Timing timing;
   for (timing.overruns = 1; timing.overruns <= 20; ++timing.overruns) {
-    station.backend.set_timing(timing);
-    ASSERT_EQ(station.iterate(), Step::run);
+    manual.backend.set_timing(timing);
+    ASSERT_EQ(manual.iterate(), Step::run);
   }
 
   const std::int64_t first = time_of(frontend, 0);
@@ -57,8 +57,8 @@ TEST_F(LoopStateTest, GivesTheRateAtWhichRowsCame) {
 }
 
 TEST_F(LoopStateTest, OfRowsThatStoppedComingHasARateOfZero) {
-  Station station;
-  station.start().iterate();
+  ManualBackend manual;
+  manual.start().iterate();
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
   const LoopState state = loop_state(frontend, time_of(frontend, 1) + 10 * kSecond);
 
@@ -68,7 +68,7 @@ TEST_F(LoopStateTest, OfRowsThatStoppedComingHasARateOfZero) {
 }
 
 TEST_F(LoopStateTest, OfABackendThatWaitsForABurstKnowsNeitherRateNorAge) {
-  StartedStation station({.segment = "pair", .bursting = true});
+  StartedBackend manual({.segment = "pair", .bursting = true});
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
   const LoopState state = loop_state(frontend, monotonic_now() + 10 * kSecond);
 
@@ -78,22 +78,22 @@ TEST_F(LoopStateTest, OfABackendThatWaitsForABurstKnowsNeitherRateNorAge) {
 }
 
 TEST_F(LoopStateTest, TellsAVerbThatHangsFromABackendThatStandsStill) {
-  StartedStation station({.segment = "pair", .bursting = true});
+  StartedBackend manual({.segment = "pair", .bursting = true});
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
-  station.backend.enter(Verb::read);
+  manual.backend.enter(Verb::read);
   while (loop_state(frontend).slow_verb == Verb::none) std::this_thread::yield();
 
   const LoopState state = loop_state(frontend, monotonic_now() + 10 * kSecond);
   EXPECT_EQ(state.slow_verb, Verb::read);
   EXPECT_THAT(state.trouble(), HasSubstr("read() of the driver has been running for 1"));
 
-  station.backend.leave();
+  manual.backend.leave();
   EXPECT_EQ(loop_state(frontend).trouble(), "");
 }
 
 TEST_F(LoopStateTest, IsKnownBeforeTheFirstRow) {
-  Station station;
-  station.backend.enter(Verb::start);
+  ManualBackend manual;
+  manual.backend.enter(Verb::start);
   const UntypedFrontend frontend("pair", {.access = Access::read_only, .starting = true});
   while (loop_state(frontend).slow_verb == Verb::none) std::this_thread::yield();
 

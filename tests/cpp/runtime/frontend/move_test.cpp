@@ -4,7 +4,7 @@
 #include <limits>
 #include <memory>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -20,23 +20,23 @@ std::span<const std::byte> bytes(const std::array<double, count>& states) {
   return std::as_bytes(std::span(states));
 }
 
-class MoveTest : public StationTest {};
+class MoveTest : public ManualBackendTest {};
 
-/// The plant of a bursting station follows what is desired with a lag: a half of the way in each
-/// iteration.
-void lag(Station& station) {
+/// The plant of a bursting manual backend follows what is desired with a lag: a half of the way in
+/// each iteration.
+void lag(ManualBackend& manual) {
   auto place = std::make_shared<std::array<double, 2>>();
-  station.before_publish = [&station, place] {
+  manual.before_publish = [&manual, place] {
     for (std::size_t i = 0; i < 2; ++i) {
-      (*place)[i] += 0.5 * (station.now[i] - (*place)[i]);
-      station.now[i] = (*place)[i];
+      (*place)[i] += 0.5 * (manual.now[i] - (*place)[i]);
+      manual.now[i] = (*place)[i];
     }
   };
 }
 
 // rule S5
 TEST_F(MoveTest, WaitsUntilTheRobotIsObservedAtItsTarget) {
-  BurstingStation bursting("pair", lag);
+  BurstingBackend bursting("pair", lag);
   UntypedFrontend frontend("pair");
   const UntypedObservation row =
       frontend.move_to(kShoulder, bytes(std::array{1.0}),
@@ -48,7 +48,7 @@ TEST_F(MoveTest, WaitsUntilTheRobotIsObservedAtItsTarget) {
 }
 
 TEST_F(MoveTest, LeavesWhatWasAddedAndNotPulsed) {
-  BurstingStation bursting;
+  BurstingBackend bursting;
   UntypedFrontend frontend("pair");
   add(frontend, 1, 5.0);
   const UntypedObservation row =
@@ -59,10 +59,10 @@ TEST_F(MoveTest, LeavesWhatWasAddedAndNotPulsed) {
 
 // rule S5
 TEST_F(MoveTest, SaysWhereTheRobotIsIfItIsNotThereInTime) {
-  Station station({.segment = "pair", .period = 1'000'000, .bursting = true});
-  station.before_publish = [&] { station.now[1] = 0.25; };  // it is stuck
-  station.start();
-  std::thread runner([&] { station.serve_bursts(); });
+  ManualBackend manual({.segment = "pair", .period = 1'000'000, .bursting = true});
+  manual.before_publish = [&] { manual.now[1] = 0.25; };  // it is stuck
+  manual.start();
+  std::thread runner([&] { manual.serve_bursts(); });
   UntypedFrontend frontend("pair");
   try {
     frontend.move_to(kBoth, bytes(std::array{1.0, 2.0}), {.tolerance = 0.5},
@@ -85,14 +85,14 @@ TEST_F(MoveTest, SaysWhereTheRobotIsIfItIsNotThereInTime) {
   }
   frontend.move_to(kBoth, bytes(std::array{1.0, 2.0}),
                    {.tolerances = {0.5, std::numeric_limits<double>::infinity()}}, kPatience);
-  station.backend.ask_to_stop();
+  manual.backend.ask_to_stop();
   runner.join();
 }
 
 TEST_F(MoveTest, ThrowsIfItsCommandDoesNotComplete) {
-  BurstingStation bursting("pair", [](Station& station) {
-    station.before_publish = [&station] {
-      if (station.backend.iteration() == 4) station.backend.interrupt(0);
+  BurstingBackend bursting("pair", [](ManualBackend& manual) {
+    manual.before_publish = [&manual] {
+      if (manual.backend.iteration() == 4) manual.backend.interrupt(0);
     };
   });
   UntypedFrontend frontend("pair");
@@ -104,35 +104,35 @@ TEST_F(MoveTest, ThrowsIfItsCommandDoesNotComplete) {
 }
 
 TEST_F(MoveTest, InRealTimeItWaitsForTheRowsAsTheyCome) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
-  station.before_publish = [&] {
-    if (station.backend.iteration() < 50) station.now[0] = 0;  // it begins to move late
+  manual.before_publish = [&] {
+    if (manual.backend.iteration() < 50) manual.now[0] = 0;  // it begins to move late
   };
   const Move move = frontend.start_move(kShoulder, bytes(std::array{1.0}), {.tolerance = 0.1});
   EXPECT_THAT(message_of<NotReached>([&] { frontend.wait_for_move(move, kAtOnce); }),
               HasSubstr("has not ended and continues"));
-  std::thread runner([&] { station.run(100); });
+  std::thread runner([&] { manual.run(100); });
   const UntypedObservation row = frontend.wait_for_move(move, kPatience);
   EXPECT_EQ(row.iteration(), 50);
   runner.join();
 }
 
 TEST_F(MoveTest, AHaltWhileItSettlesEndsIt) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
-  station.before_publish = [&] { station.now[0] = 0; };  // it is stuck
+  manual.before_publish = [&] { manual.now[0] = 0; };  // it is stuck
   const Move move = frontend.start_move(kShoulder, bytes(std::array{1.0}), {.tolerance = 0.1});
-  station.run(3);
+  manual.run(3);
   ASSERT_EQ(move.batch().handle(0).status, Status::completed);
-  station.backend.halt(HaltCause::driver, "it is hot");
-  station.run(1);
+  manual.backend.halt(HaltCause::driver, "it is hot");
+  manual.run(1);
   EXPECT_THAT(message_of<BackendHalted>([&] { frontend.wait_for_move(move, kPatience); }),
               HasSubstr("it is hot"));
 }
 
 TEST_F(MoveTest, RefusesTolerancesThatDoNotFit) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const auto told = [&](const MoveOptions& options) {
     return message_of<InvalidArgument>(

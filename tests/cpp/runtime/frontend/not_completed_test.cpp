@@ -1,6 +1,6 @@
 #include "o80/runtime/not_completed.hpp"
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
 
 namespace o80::test {
@@ -10,12 +10,12 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-using NotCompletedTraces = StationTest;
+using NotCompletedTraces = ManualBackendTest;
 
-class NotCompletedTest : public StationTest {
+class NotCompletedTest : public ManualBackendTest {
  protected:
-  Station station_;
-  Station& started_ = station_.start();  // before the frontends
+  ManualBackend manual_;
+  ManualBackend& started_ = manual_.start();  // before the frontends
   UntypedFrontend one_{"pair"};
   UntypedFrontend two_{"pair"};
 };
@@ -23,9 +23,9 @@ class NotCompletedTest : public StationTest {
 // rule S4
 TEST_F(NotCompletedTest, ACommandThatAnotherFrontendOverwroteIsAnError) {
   const Batch mine = send(one_, 1, 9.0, {.pace = iterations(9)});
-  station_.run(2);
+  manual_.run(2);
   send(two_, 1, 5.0, {.mode = Mode::overwrite});
-  station_.run(1);
+  manual_.run(1);
   try {
     mine.wait(kAtOnce);
     FAIL() << "it was overwritten";
@@ -106,14 +106,14 @@ TEST_F(NotCompletedTraces, AHaltIsAnErrorOfItsOwn) {
 
 TEST_F(NotCompletedTest, AnEmptyPulseAndWaitIsNoAnswerOfABackendThatHasEnded) {
   EXPECT_EQ(one_.pulse_and_wait(kAtOnce).iteration(), 0);
-  station_.backend.end(BackendState::stopped);
+  manual_.backend.end(BackendState::stopped);
   EXPECT_THROW(one_.pulse_and_wait(kAtOnce), BackendStopped);
 }
 
 TEST_F(NotCompletedTest, PulseAndWaitOfABurstingBackendThrowsToo) {
-  BurstingStation bursting("burster", [](Station& station) {
-    station.before_publish = [&station] {
-      if (station.backend.iteration() == 4) station.backend.interrupt(0);
+  BurstingBackend bursting("burster", [](ManualBackend& manual) {
+    manual.before_publish = [&manual] {
+      if (manual.backend.iteration() == 4) manual.backend.interrupt(0);
     };
   });
   UntypedFrontend frontend("burster");

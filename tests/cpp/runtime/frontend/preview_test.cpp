@@ -14,7 +14,7 @@
 #include "describe/described.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "o80/runtime/typed_frontend.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -176,7 +176,7 @@ bool is_in(const UntypedObservation& row, const std::vector<std::uint32_t>& actu
   });
 }
 
-class PreviewTest : public StationTest {};
+class PreviewTest : public ManualBackendTest {};
 
 // rule C24
 TEST_F(PreviewTest, IsWhatTheBackendThenDoesBitForBit) {
@@ -236,7 +236,7 @@ TEST_F(PreviewTest, IsWhatTheBackendThenDoesBitForBit) {
 
 // rule C4
 TEST_F(PreviewTest, IsExactForACommandThatOverwritesAPlannedMotion) {
-  StartedStation station({.segment = "pair"}, [](Schema& schema) {
+  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(0).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
     schema.actuator(1).limits({.speed = 3.0, .acceleration = 30.0});
   });
@@ -252,7 +252,7 @@ TEST_F(PreviewTest, IsExactForACommandThatOverwritesAPlannedMotion) {
     frontend.add_commands(both, states, options);
     frontend.pulse();
     const auto ran = static_cast<std::size_t>(dice.whole(1, preview.iterations()));
-    station.run(static_cast<int>(ran));
+    manual.run(static_cast<int>(ran));
     for (std::size_t k = 0; k < ran; ++k) {
       const auto row = frontend.wait_for(preview.rows.first + static_cast<Iteration>(k), kAtOnce);
       ASSERT_TRUE(is_in(row, {0, 1}, preview.rows.row(k)));
@@ -261,15 +261,15 @@ TEST_F(PreviewTest, IsExactForACommandThatOverwritesAPlannedMotion) {
 }
 
 TEST_F(PreviewTest, BeginsAtRestAfterAFreshStart) {
-  StartedStation station({.segment = "pair"}, [](Schema& schema) {
+  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(0).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
   });
   UntypedFrontend frontend("pair");
   send(frontend, 0, 1.0, {.pace = iterations(500)});
-  station.run(200);
+  manual.run(200);
   add_request(frontend, Reset{.seed = 3});
   frontend.pulse();
-  station.run(1);
+  manual.run(1);
   const std::uint32_t shoulder = 0;
   const double target = 3.1;
   const CommandOptions options{.pace = iterations(100)};
@@ -282,7 +282,7 @@ TEST_F(PreviewTest, BeginsAtRestAfterAFreshStart) {
 }
 
 TEST_F(PreviewTest, SaysByHowMuchLaterAndWhy) {
-  StartedStation station({.segment = "pair"}, [](Schema& schema) {
+  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.speed = 2.0, .acceleration = 15.0, .jerk = 500.0});
   });
   const UntypedFrontend frontend("pair", {.access = Access::read_only});
@@ -298,7 +298,7 @@ TEST_F(PreviewTest, SaysByHowMuchLaterAndWhy) {
 }
 
 TEST_F(PreviewTest, BeginsAfterTheRowThatIsGiven) {
-  StartedStation station;
+  StartedBackend manual;
   UntypedFrontend frontend("pair");
   const std::uint32_t shoulder = 0;
   const double target = 2.0;
@@ -316,10 +316,10 @@ TEST_F(PreviewTest, BeginsAfterTheRowThatIsGiven) {
 }
 
 TEST_F(PreviewTest, RefusesWhatAddRefusesAndWhatItCannotCompute) {
-  StartedStation station({.segment = "pair"}, [](Schema& schema) {
+  StartedBackend manual({.segment = "pair"}, [](Schema& schema) {
     schema.actuator(1).limits({.maximum = 1, .speed = 1});
   });
-  station.run(3);
+  manual.run(3);
   UntypedFrontend frontend("pair");
   const auto refusal = [&](double target, const PaceSpec& pace) {
     const std::uint32_t elbow = 1;

@@ -2,14 +2,14 @@
 
 #include <random>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
 
 using ::testing::HasSubstr;
 
-class RowsByTimeTest : public StationTest {};
+class RowsByTimeTest : public ManualBackendTest {};
 
 /// Simulated time: iteration i is at i milliseconds.
 BackendOptions millisecond(std::uint64_t history) {
@@ -18,12 +18,12 @@ BackendOptions millisecond(std::uint64_t history) {
 
 // rule O7
 TEST_F(RowsByTimeTest, AgreesWithASearchThroughAllRowsThatAreThere) {
-  StartedStation station(millisecond(32));
+  StartedBackend manual(millisecond(32));
   UntypedFrontend frontend("pair");
   std::mt19937_64 random(7);
   for (int round = 0; round < 50; ++round) {
     frontend.start_burst(std::uniform_int_distribution<std::int64_t>(1, 9)(random));
-    station.drive();
+    manual.drive();
     const Iteration oldest = frontend.oldest();
     const Iteration newest = frontend.published();
     const auto time = [&] {
@@ -57,10 +57,10 @@ TEST_F(RowsByTimeTest, AgreesWithASearchThroughAllRowsThatAreThere) {
 }
 
 TEST_F(RowsByTimeTest, SaysThatARowIsNoLongerThere) {
-  StartedStation station(millisecond(8));
+  StartedBackend manual(millisecond(8));
   UntypedFrontend frontend("pair");
   frontend.start_burst(100);
-  station.drive();
+  manual.drive();
   EXPECT_THAT(message_of<RowOverwritten>([&] { frontend.at_time(5'000'000); }),
               HasSubstr("the oldest one is row " + std::to_string(frontend.oldest())));
 }

@@ -2,7 +2,7 @@
 
 #include "describe/described.hpp"
 #include "o80/runtime/typed_backend.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -15,7 +15,7 @@ using described::MixedRobot;
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 
-class TypedTest : public StationTest {};
+class TypedTest : public ManualBackendTest {};
 
 /// Another idea of the mixed robot.
 struct OtherJoint {

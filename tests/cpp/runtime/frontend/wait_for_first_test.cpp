@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -10,14 +10,14 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-class WaitForFirstTest : public StationTest {
+class WaitForFirstTest : public ManualBackendTest {
  protected:
   std::vector<RowWish> wish(Iteration of_left, Iteration of_right) const {
     return {{&left_, of_left}, {&right_, of_right}};
   }
 
-  BurstingStation left_station_{"left"};
-  std::optional<BurstingStation> right_station_{std::in_place, "right"};
+  BurstingBackend left_manual_{"left"};
+  std::optional<BurstingBackend> right_manual_{std::in_place, "right"};
   UntypedFrontend left_{"left"};
   UntypedFrontend right_{"right"};
 };
@@ -40,7 +40,7 @@ TEST_F(WaitForFirstTest, SaysWhereEachOneStandsAfterATimeout) {
 }
 
 TEST_F(WaitForFirstTest, NamesTheBackendThatHasStopped) {
-  right_station_.reset();
+  right_manual_.reset();
   EXPECT_THAT(message_of<BackendStopped>([&] { wait_for_first(wish(1, 1), kPatience); }),
               HasSubstr("'right'"));
   EXPECT_THAT(wait_for_first(wish(0, 1), kPatience), ElementsAre(0));

@@ -28,21 +28,21 @@ std::vector<JournalKind> kinds_of(const std::vector<JournalEntry>& entries) {
 
 std::string this_process() { return "pid " + std::to_string(getpid()); }
 
-using JournalTraces = StationTest;
+using JournalTraces = ManualBackendTest;
 
 /// A backend, a commander, and a reader of the journal that may only observe.
-class JournalAuthorTest : public StationTest {
+class JournalAuthorTest : public ManualBackendTest {
  protected:
   explicit JournalAuthorTest(const BackendOptions& options = {.segment = "pair"})
-      : station(options) {
-    station.start();
+      : manual(options) {
+    manual.start();
     commander.emplace("pair");
     observer.emplace("pair", FrontendOptions{.access = Access::read_only});
     journal.emplace(*observer);
   }
   std::vector<JournalEntry> news() { return all_of(*journal); }
 
-  Station station;
+  ManualBackend manual;
   std::optional<UntypedFrontend> commander;
   std::optional<UntypedFrontend> observer;
   std::optional<Journal> journal;
@@ -52,12 +52,12 @@ TEST_F(JournalTraces, AnIterationWithoutCommandsWritesNothing) { play("run 10; j
 
 TEST_F(JournalAuthorTest, HoldsTheStateThatASnapshotKeeps) {
   for (std::size_t size = 0; size <= 20; ++size) {
-    station.kept.clear();
-    for (std::size_t i = 0; i < size; ++i) station.kept.push_back(static_cast<std::byte>(i + 1));
-    station.kept_slot = static_cast<std::uint32_t>(size);
+    manual.kept.clear();
+    for (std::size_t i = 0; i < size; ++i) manual.kept.push_back(static_cast<std::byte>(i + 1));
+    manual.kept_slot = static_cast<std::uint32_t>(size);
     add_request<Snapshot>(*commander);
     commander->pulse();
-    station.run(1);
+    manual.run(1);
     const std::vector<JournalEntry> entries = news();
     if (size == 0) {
       EXPECT_THAT(kinds_of(entries), ElementsAre(JournalKind::taken, JournalKind::status));
@@ -65,25 +65,25 @@ TEST_F(JournalAuthorTest, HoldsTheStateThatASnapshotKeeps) {
     }
     ASSERT_THAT(kinds_of(entries),
                 ElementsAre(JournalKind::taken, JournalKind::snapshot, JournalKind::status));
-    EXPECT_EQ(entries[1].kept, station.kept);
+    EXPECT_EQ(entries[1].kept, manual.kept);
     EXPECT_EQ(entries[1].slot, size);
     EXPECT_EQ(entries[1].iteration, entries[0].iteration);
   }
 }
 
 TEST_F(JournalAuthorTest, LeavesOutAStateThatIsLargerThanAnEntry) {
-  station.kept.resize(std::size_t{1} << 20);
+  manual.kept.resize(std::size_t{1} << 20);
   add_request<Snapshot>(*commander);
   commander->pulse();
-  station.run(1);
+  manual.run(1);
   EXPECT_THAT(kinds_of(news()), ElementsAre(JournalKind::taken, JournalKind::status));
 }
 
 TEST_F(JournalAuthorTest, ShowsWhoSentWhatAndWhenItWasTakenStartedAndEnded) {
-  station.run(2);
+  manual.run(2);
   add(*commander, 1, 0.5, {.pace = iterations(3), .profile = Profile::linear});
   commander->pulse();
-  station.run(5);
+  manual.run(5);
   const std::vector<JournalEntry> entries = news();
   ASSERT_EQ(entries.size(), 3U);
   const JournalEntry& taken = entries[0];
@@ -105,7 +105,7 @@ TEST_F(JournalAuthorTest, ShowsWhoSentWhatAndWhenItWasTakenStartedAndEnded) {
 }
 
 TEST_F(JournalAuthorTest, WhatABatchAnswersStandsInEachDecisionOnIt) {
-  station.run(2);
+  manual.run(2);
   const UntypedObservation row = commander->latest();
   const auto pulse = [&](PulseOptions options) {
     options.seen = row;
@@ -115,7 +115,7 @@ TEST_F(JournalAuthorTest, WhatABatchAnswersStandsInEachDecisionOnIt) {
   pulse({});
   pulse({.at = 5});
   pulse({.at = 1});  // late
-  station.run(4);
+  manual.run(4);
   std::vector<std::pair<JournalKind, Iteration>> decided;
   for (const JournalEntry& entry : news()) {
     if (entry.kind == JournalKind::status) continue;
@@ -134,7 +134,7 @@ TEST_F(JournalAuthorTest, BatchesOfSeveralLanesStandInTheOrderOfTheirTickets) {
     send(second, 0, i);
     send(*commander, 1, i);
   }
-  station.run(1);
+  manual.run(1);
   std::vector<std::uint32_t> lanes;
   for (const JournalEntry& entry : news()) {
     if (entry.kind == JournalKind::taken) lanes.push_back(entry.lane);
@@ -144,9 +144,9 @@ TEST_F(JournalAuthorTest, BatchesOfSeveralLanesStandInTheOrderOfTheirTickets) {
 
 TEST_F(JournalAuthorTest, ARejectedBatchComesWithItsRecordsAndAHaltWithItsText) {
   commander->halt("enough");
-  station.run(1);
+  manual.run(1);
   send(*commander, 0, 5.0);
-  station.run(1);
+  manual.run(1);
   const auto entries = news();
   ASSERT_THAT(kinds_of(entries), ElementsAre(JournalKind::halt, JournalKind::rejected));
   EXPECT_EQ(entries[0].halt, 1U);
@@ -182,7 +182,7 @@ TEST_F(JournalAuthorTest, ShowsRequestsWithTheirStructAndFreshStarts) {
   add_request(*commander, Reset{.seed = 7});
   add_request(*commander, Refuse{});
   commander->pulse();
-  station.run(1);
+  manual.run(1);
   const auto entries = news();
   ASSERT_THAT(kinds_of(entries), ElementsAre(JournalKind::taken, JournalKind::fresh_start,
                                              JournalKind::status, JournalKind::status));
@@ -202,10 +202,10 @@ TEST_F(JournalTraces, TheEndOfTheBackendIsItsLastEntry) {
 TEST_F(JournalAuthorTest, ReadsOnFromANumberWithoutLosingRecords) {
   add(*commander, 0, 1.0);
   commander->pulse({.at = 4});
-  station.run(1);
+  manual.run(1);
   const auto before = news();
   ASSERT_EQ(before.size(), 1U);
-  station.run(5);
+  manual.run(5);
   Journal other(*observer);
   other.seek(before.back().number + 1);
   const auto after = all_of(other);
@@ -243,7 +243,7 @@ TEST_F(SmallJournalTest, ABatchLargerThanHalfOfItIsRefusedBeforeItIsSent) {
   commander->forget_added();
   add_many(4095);
   commander->pulse();
-  station.run(8);
+  manual.run(8);
   const auto entries = news();
   ASSERT_FALSE(entries.empty());
   EXPECT_EQ(entries[0].kind, JournalKind::taken);
@@ -252,11 +252,11 @@ TEST_F(SmallJournalTest, ABatchLargerThanHalfOfItIsRefusedBeforeItIsSent) {
 
 TEST_F(SmallJournalTest, AReaderThatWasOvertakenIsToldHowMuchItMissedAndGoesOn) {
   send(*commander, 0, -1.0);
-  station.run(1);
+  manual.run(1);
   ASSERT_FALSE(news().empty());
   for (int i = 0; i < 10'000; ++i) {
     send(*commander, 0, i);
-    station.run(1);
+    manual.run(1);
   }
   const auto entries = news();
   ASSERT_GT(entries.size(), 1000U);
@@ -270,12 +270,12 @@ TEST_F(SmallJournalTest, AReaderThatWasOvertakenIsToldHowMuchItMissedAndGoesOn) 
   }
 }
 
-TEST_F(StationTest, ABackendMayHaveNoJournal) {
-  StartedStation station({.segment = "pair", .journal = 0});
+TEST_F(ManualBackendTest, ABackendMayHaveNoJournal) {
+  StartedBackend manual({.segment = "pair", .journal = 0});
   UntypedFrontend frontend("pair");
   for (int i = 0; i < 5000; ++i) add(frontend, 0, i);
   frontend.pulse();
-  station.run(10);
+  manual.run(10);
   Journal journal(frontend);
   JournalEntry entry;
   EXPECT_FALSE(journal.exists());
@@ -290,12 +290,12 @@ TEST_F(JournalAuthorTest, ShowsTheDeathOfACommander) {
     send(frontend, 0, 5.0, {.pace = iterations(1'000'000'000)});
     stand();
   });
-  station.run(1);
+  manual.run(1);
   const auto before = news();
   ASSERT_FALSE(before.empty());
   child.kill_now();
   std::vector<JournalEntry> entries;
-  station.run_until([&] {
+  manual.run_until([&] {
     for (const JournalEntry& entry : news()) entries.push_back(entry);
     return !entries.empty();
   });
@@ -330,7 +330,7 @@ class LateReaderTest : public JournalAuthorTest {
     for (int i = 0; i < 2000; ++i) {
       for (int k = 0; k < 8; ++k) add(other, 1, 0.5);
       other.pulse();
-      station.run(1);
+      manual.run(1);
     }
   }
   std::vector<JournalEntry> of_late_reader(JournalKind kind) {
@@ -345,17 +345,17 @@ class LateReaderTest : public JournalAuthorTest {
 TEST_F(LateReaderTest, FindsTheNameOfAHolderThatLostControl) {
   commander->add_take_control();
   commander->pulse();
-  station.run(1);
+  manual.run(1);
   flood();
   EXPECT_THAT(of_late_reader(JournalKind::control_taken), ::testing::IsEmpty());
   // in a lane of its own: the next owner of the holder's lane would take the place of its name
   UntypedFrontend other("pair");
   send(other, 0, 1.0);
-  station.run(1);
+  manual.run(1);
   commander->close();
   // the next batch finds that the holder has gone
   send(other, 0, 2.0);
-  station.run(1);
+  manual.run(1);
   const auto lost = of_late_reader(JournalKind::control_lost);
   ASSERT_EQ(lost.size(), 1U);
   EXPECT_EQ(lost[0].owner, 1U);
@@ -364,7 +364,7 @@ TEST_F(LateReaderTest, FindsTheNameOfAHolderThatLostControl) {
 
 TEST_F(LateReaderTest, FindsTheNamesOfAllBatchesInTheRing) {
   send(*commander, 0, 5.0);
-  station.run(1);
+  manual.run(1);
   flood();
   const auto taken = of_late_reader(JournalKind::taken);
   ASSERT_FALSE(taken.empty());

@@ -17,7 +17,7 @@
 
 #include "o80/base/error.hpp"
 #include "runtime/journal/recorded_journal.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -320,11 +320,11 @@ TEST(JournalCodecTest, ABatchWhoseBlocksWereMissedIsDropped) {
 // ------------------------------------------------------------------------------ unknown kinds
 
 /// A batch of one lane in a file of a later o80, and the decision on it.
-class LaterFileTest : public StationTest {
+class LaterFileTest : public ManualBackendTest {
  protected:
   void SetUp() override {
-    StationTest::SetUp();
-    StartedStation station;
+    ManualBackendTest::SetUp();
+    StartedBackend manual;
     description_ = UntypedFrontend("pair").description();
   }
   void begin_batch(std::uint32_t records, std::uint32_t blocks) {

@@ -8,7 +8,7 @@
 #include "o80/base/version.hpp"
 #include "runtime/backend/backend_options.hpp"
 #include "runtime/journal/provenance_bytes.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -98,11 +98,11 @@ TEST_F(ProvenanceTest, IsReadByFrontends) {
   Provenance given;
   given.robot = "arm";
   given.options = {{"gain", "2.5"}, {"address", "10.0.0.2\n"}};
-  StartedStation station({.segment = "pair", .bursting = true, .provenance = given});
+  StartedBackend manual({.segment = "pair", .bursting = true, .provenance = given});
   const UntypedFrontend observer("pair", {.access = Access::read_only});
 
   const Provenance found = observer.provenance();
-  EXPECT_EQ(found, station.backend.provenance());
+  EXPECT_EQ(found, manual.backend.provenance());
   EXPECT_EQ(found.robot, "arm");
   EXPECT_EQ(found.options, given.options);
   EXPECT_EQ(found.version, version());
@@ -112,7 +112,7 @@ TEST_F(ProvenanceTest, IsReadByFrontends) {
 }
 
 TEST_F(ProvenanceTest, HasTheEffectiveValuesOfOptionsThatWereNotGiven) {
-  StartedStation station({.segment = "pair", .lanes = 1, .lane_blocks = 100});
+  StartedBackend manual({.segment = "pair", .lanes = 1, .lane_blocks = 100});
   const Provenance found = UntypedFrontend("pair").provenance();
   EXPECT_EQ(found.robot, "pair");
   EXPECT_THAT(found.options, IsEmpty());
@@ -127,7 +127,7 @@ TEST_F(ProvenanceTest, HasTheEffectiveValuesOfOptionsThatWereNotGiven) {
 TEST_F(ProvenanceTest, LeadsFromTheTimeOfARowToTheWallClock) {
   for (const bool bursting : {false, true}) {
     const std::int64_t before = wall_clock_now();
-    StartedStation station({.segment = "pair", .bursting = bursting});
+    StartedBackend manual({.segment = "pair", .bursting = bursting});
     const std::int64_t after = wall_clock_now();
     const UntypedFrontend observer("pair", {.access = Access::read_only});
     const std::int64_t time =
@@ -139,7 +139,7 @@ TEST_F(ProvenanceTest, LeadsFromTheTimeOfARowToTheWallClock) {
 }
 
 TEST_F(ProvenanceTest, ThatIsDamagedIsAnErrorOfItsReaderOnly) {
-  StartedStation station;
+  StartedBackend manual;
   const UntypedFrontend frontend("pair");
   const SegmentOffsets& offsets = frontend.link()->segment.view().offsets;
   std::fstream file(segment_path("pair"), std::ios::binary | std::ios::in | std::ios::out);
@@ -153,9 +153,9 @@ TEST_F(ProvenanceTest, ThatIsDamagedIsAnErrorOfItsReaderOnly) {
 TEST_F(ProvenanceTest, RefusesMoreThanASegmentTakes) {
   Provenance given;
   given.options = {{"text", std::string(17U << 20, 'x')}};
-  EXPECT_THROW(Station({.segment = "pair", .provenance = given}), InvalidArgument);
+  EXPECT_THROW(ManualBackend({.segment = "pair", .provenance = given}), InvalidArgument);
   given.options.assign(5000, {"name", "text"});
-  EXPECT_THROW(Station({.segment = "pair", .provenance = given}), InvalidArgument);
+  EXPECT_THROW(ManualBackend({.segment = "pair", .provenance = given}), InvalidArgument);
 }
 
 }  // namespace

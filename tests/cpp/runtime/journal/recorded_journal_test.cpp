@@ -10,7 +10,7 @@
 #include "runtime/frontend/raw_journal.hpp"
 #include "runtime/journal/journal_author.hpp"
 #include "runtime/journal/recorded_decisions.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -33,11 +33,11 @@ auto facts_of(const std::vector<JournalEntry>& entries) {
   return facts;
 }
 
-class RecordedJournalTest : public StationTest {
+class RecordedJournalTest : public ManualBackendTest {
  protected:
   explicit RecordedJournalTest(std::int64_t journal = 1 << 20)
-      : station({.segment = "pair", .journal = journal}) {
-    station.start();
+      : manual({.segment = "pair", .journal = journal}) {
+    manual.start();
     commander.emplace("pair");
     observer.emplace("pair", FrontendOptions{.access = Access::read_only});
   }
@@ -50,13 +50,13 @@ class RecordedJournalTest : public StationTest {
       }
       if (i == batches / 2) add_request(*commander, Reset{.seed = 5});
       PulseOptions options;
-      if (i % 5 == 0) options.at = station.last() + 4;
+      if (i % 5 == 0) options.at = manual.last() + 4;
       commander->pulse(options);
-      station.run(2);
-      if (i % 7 == 0) station.backend.interrupt(1);
+      manual.run(2);
+      if (i % 7 == 0) manual.backend.interrupt(1);
     }
     commander->halt("enough");
-    station.run(2);
+    manual.run(2);
   }
   std::shared_ptr<const Description> description() const { return observer->description(); }
   std::vector<JournalEntry> entries_of(Journal journal) const {
@@ -65,7 +65,7 @@ class RecordedJournalTest : public StationTest {
     return entries;
   }
 
-  Station station;
+  ManualBackend manual;
   std::optional<UntypedFrontend> commander;
   std::optional<UntypedFrontend> observer;
 };
@@ -105,7 +105,7 @@ TEST_F(RecordedJournalTest, ASuccessorGoesOnWhereTheLastReadEnded) {
 TEST_F(RecordedJournalTest, ASuccessorGoesOnWithinALargeBatch) {
   for (int i = 0; i < 3000; ++i) add(*commander, 0, 0.001 * i);
   commander->pulse();
-  station.run(30);
+  manual.run(30);
   RawJournal raw(*observer, 0);
   std::vector<RawJournal::Entries> parts;
   for (RawJournal::Entries part; (part = raw.read(1)).next != part.first;) parts.push_back(part);

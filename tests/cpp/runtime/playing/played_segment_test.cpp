@@ -12,7 +12,7 @@
 #include "memory/ring/lane_sender.hpp"
 #include "memory/segment/segment_name.hpp"
 #include "runtime/frontend/loop_state.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 namespace {
@@ -21,18 +21,18 @@ using ::testing::HasSubstr;
 using ::testing::ThrowsMessage;
 
 /// Rows and description of a pair that ran before.
-class PlayedSegmentTest : public StationTest {
+class PlayedSegmentTest : public ManualBackendTest {
  protected:
   static constexpr Iteration kRows = 40;
 
   void SetUp() override {
-    StationTest::SetUp();
-    StartedStation station({.segment = "recorded", .bursting = true});
+    ManualBackendTest::SetUp();
+    StartedBackend manual({.segment = "recorded", .bursting = true});
     UntypedFrontend frontend("recorded");
     description_ = to_bytes(frontend.schema());
     add(frontend, 0, 1.0, {.pace = iterations(30)});
     const Burst burst = frontend.start_burst(kRows - 1);
-    station.drive();
+    manual.drive();
     rows_ = frontend.history(0, kRows - 1);
     ASSERT_EQ(rows_.count, static_cast<std::size_t>(kRows));
   }
@@ -196,14 +196,14 @@ TEST_F(PlayedSegmentTest, ALyingBursterDoesNotStopTheOthers) {
   played.publish(rows(0, 0), {});
   const AttachedSegment attached =
       AttachedSegment::attach("pair", Access::read_write, Deadline(kAtOnce));
-  LaneSender liar(attached);
+  LaneSender hostile(attached);
   std::array<Block, 2> blocks{};
   BatchRecord record;
   record.id = 1;
   record.records = 1;  // a command, which an honest frontend refuses to send
   record.blocks = 2;
   std::memcpy(blocks.data(), &record, sizeof record);
-  liar.send(std::as_bytes(std::span(blocks)), offsetof(BatchRecord, ticket));
+  hostile.send(std::as_bytes(std::span(blocks)), offsetof(BatchRecord, ticket));
   UntypedFrontend frontend("pair");
   std::thread player([&] { played.serve(rows(1, kRows - 1)); });
   EXPECT_EQ(frontend.burst(2, kPatience).iteration(), 2);
@@ -232,7 +232,7 @@ TEST_F(PlayedSegmentTest, ARobotDoesNotInheritAHaltOfARecording) {
     stand();
   });
   player.kill_now();
-  StartedStation robot;
+  StartedBackend robot;
   EXPECT_FALSE(UntypedFrontend("pair").halted());
 }
 
@@ -256,12 +256,12 @@ TEST_F(PlayedSegmentTest, AKilledPlayerIsSeenAndReplaced) {
 
 TEST_F(PlayedSegmentTest, DoesNotReplaceARobotThatLivesOrWasKilled) {
   {
-    StartedStation robot;
+    StartedBackend robot;
     EXPECT_THAT([&] { const PlayedSegment refused{options()}; },
                 ThrowsMessage<SegmentTaken>(HasSubstr("under another name with --prefix")));
   }
   StandingProcess robot([&](const StandingProcess::Stand& stand) {
-    StartedStation station;
+    StartedBackend manual;
     stand();
   });
   robot.kill_now();

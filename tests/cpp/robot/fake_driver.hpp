@@ -14,24 +14,24 @@
 #include "o80/robot/make_table.hpp"
 #include "o80/robot/plant_requests.hpp"
 #include "places.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 
-/// A request that the puppet serves as it is told to.
+/// A request that the fake driver serves as it is told to.
 struct Poke {
   std::uint32_t how = 0;  // 0 done, 1 rejected, 2 fresh start, 3 failed, 4 throws, 5 runs
 };
 O80_DESCRIBE(Poke, how);
 
-/// How often a puppet's parts were called.
-struct PuppetCalls {
+/// How often the parts of a fake driver were called.
+struct FakeDriverCalls {
   int constructed = 0, started = 0, written = 0, read = 0, stopped = 0, destroyed = 0, halted = 0,
       resumed = 0;
 };
 
 /// A driver whose every step can be made to fail; it counts what is called.
-class Puppet {
+class FakeDriver {
  public:
   enum class Fails : std::uint8_t {
     never,
@@ -57,19 +57,19 @@ class Puppet {
   using Extended = Sensors;
   using Requests = o80::Requests<Poke>;
 
-  static inline PuppetCalls calls;
-  static inline std::function<void(const Desired<Puppet>&)> on_write;
-  static inline std::function<void(Reading<Puppet>&)> on_read;
+  static inline FakeDriverCalls calls;
+  static inline std::function<void(const Desired<FakeDriver>&)> on_write;
+  static inline std::function<void(Reading<FakeDriver>&)> on_read;
   static inline std::function<Served()> on_resume;
   static inline Limits limits;
   static inline bool simulated = true;
   static inline std::int64_t own_gap = 0;  // [ns]; 0: by default
 
-  explicit Puppet(const Config& config) : config_(config) {
+  explicit FakeDriver(const Config& config) : config_(config) {
     if (config.fails == Fails::construct) throw std::runtime_error("no cable");
     ++calls.constructed;
   }
-  ~Puppet() { ++calls.destroyed; }
+  ~FakeDriver() { ++calls.destroyed; }
 
   void describe(Schema& schema) const {
     if (config_.fails == Fails::describe) throw std::runtime_error("no plan");
@@ -83,7 +83,7 @@ class Puppet {
     ++calls.started;
     if (config_.fails == Fails::start) throw std::runtime_error("no power");
   }
-  void write(const Desired<Puppet>& desired) {
+  void write(const Desired<FakeDriver>& desired) {
     ++calls.written;
     if (on_write) on_write(desired);
     if (config_.fails == Fails::write && desired.iteration() == 3) {
@@ -91,7 +91,7 @@ class Puppet {
     }
     now_ = desired.states;
   }
-  void read(Reading<Puppet>& reading) {
+  void read(Reading<FakeDriver>& reading) {
     ++calls.read;
     reading.observed = now_;
     reading.extended.seen = static_cast<double>(calls.read);
@@ -136,27 +136,27 @@ class Puppet {
   Config config_;
   std::array<double, 2> now_{};
 };
-O80_DESCRIBE_ENUM(Puppet::Fails, never, construct, describe, start, first_read, write, read, fault,
-                  odd, halt);
-O80_DESCRIBE(Puppet::Config, (fails, "when"), (gain, "of nothing [1/s]"), finish_at);
-O80_DESCRIBE(Puppet::Sensors, seen);
+O80_DESCRIBE_ENUM(FakeDriver::Fails, never, construct, describe, start, first_read, write, read,
+                  fault, odd, halt);
+O80_DESCRIBE(FakeDriver::Config, (fails, "when"), (gain, "of nothing [1/s]"), finish_at);
+O80_DESCRIBE(FakeDriver::Sensors, seen);
 
 /// More iterations than any test asks for.
 inline constexpr std::uint32_t kAll = 1'000'000;
 
-/// A test with puppets that have not been played with.
-class PuppetTest : public StationTest {
+/// A test with fake drivers whose calls are not counted yet.
+class FakeDriverTest : public ManualBackendTest {
  protected:
-  PuppetTest() {
-    Puppet::calls = {};
-    Puppet::on_write = {};
-    Puppet::on_read = {};
-    Puppet::on_resume = {};
-    Puppet::limits = {};
-    Puppet::simulated = true;
-    Puppet::own_gap = 0;
+  FakeDriverTest() {
+    FakeDriver::calls = {};
+    FakeDriver::on_write = {};
+    FakeDriver::on_read = {};
+    FakeDriver::on_resume = {};
+    FakeDriver::limits = {};
+    FakeDriver::simulated = true;
+    FakeDriver::own_gap = 0;
   }
-  static const RobotTable& table() { return *robot_table<Puppet>("puppet"); }
+  static const RobotTable& table() { return *robot_table<FakeDriver>("fake"); }
 };
 
 /// What a program did.

@@ -7,8 +7,8 @@
 
 #include "o80/robot/make_table.hpp"
 #include "o80/robot/plant_requests.hpp"
+#include "robot/fake_driver.hpp"
 #include "robot/group/inline_group.hpp"
-#include "robot/puppet.hpp"
 
 namespace o80::test {
 
@@ -20,7 +20,7 @@ O80_DESCRIBE(Dawdle, until);
 
 /// A simulated plant for groups: no state outside of the object, and an evolution in which every
 /// number depends on all that happened before.
-class Drifter {
+class FakeSimulator {
  public:
   struct Config {
     double start = 0;
@@ -34,7 +34,7 @@ class Drifter {
   using Extended = Sensors;
   using Requests = o80::Requests<Reset, Snapshot, Restore, Dawdle>;
 
-  explicit Drifter(const Config& config) : config_(config) { begin(0); }
+  explicit FakeSimulator(const Config& config) : config_(config) { begin(0); }
 
   void describe(Schema& schema) const {
     schema.simulated();
@@ -42,7 +42,7 @@ class Drifter {
     schema.actuator(1).name("right");
   }
   void start() {}
-  void write(const Desired<Drifter>& desired) {
+  void write(const Desired<FakeSimulator>& desired) {
     if (desired.states[0] > 100) throw std::runtime_error("left is too far");
     for (std::size_t i = 0; i < 2; ++i) {
       now_.random = now_.random * 6364136223846793005ULL + 1442695040888963407ULL;
@@ -52,7 +52,7 @@ class Drifter {
     now_.sensors.sum += now_.at[0] * now_.at[1];
     now_.sensors.odd = static_cast<std::uint8_t>(++now_.sensors.count % 2);
   }
-  void read(Reading<Drifter>& reading) {
+  void read(Reading<FakeSimulator>& reading) {
     reading.observed = now_.at;
     reading.extended = now_.sensors;
     if (dawdles_ != 0 && reading.runs<Dawdle>() && --dawdles_ == 0) {
@@ -97,10 +97,10 @@ class Drifter {
   std::map<std::uint32_t, State> saved_;
   std::uint32_t dawdles_ = 0;
 };
-O80_DESCRIBE(Drifter::Config, start);
-O80_DESCRIBE(Drifter::Sensors, sum, count, odd);
+O80_DESCRIBE(FakeSimulator::Config, start);
+O80_DESCRIBE(FakeSimulator::Sensors, sum, count, odd);
 
-inline const RobotTable& drifter() { return *robot_table<Drifter>("drifter"); }
+inline const RobotTable& fake() { return *robot_table<FakeSimulator>("fake"); }
 
 /// A group, and memory for its bursts.
 class GroupBurst {

@@ -51,17 +51,17 @@ inline constexpr Timeout kAtOnce = std::chrono::nanoseconds(0);
 inline constexpr Timeout kPatience = std::chrono::seconds(60);
 
 /// A backend driven by hand, iteration after iteration, with no clock.
-class Station : private RequestServer {
+class ManualBackend : private RequestServer {
  public:
-  virtual ~Station() = default;
-  Station& operator=(Station&&) = delete;
+  virtual ~ManualBackend() = default;
+  ManualBackend& operator=(ManualBackend&&) = delete;
 
-  explicit Station(const BackendOptions& options = {.segment = "pair"},
-                   const std::function<void(Schema&)>& describe = {})
+  explicit ManualBackend(const BackendOptions& options = {.segment = "pair"},
+                         const std::function<void(Schema&)>& describe = {})
       : backend(schema_of(describe), options, this) {}
 
   /// Row 0.
-  Station& start() {
+  ManualBackend& start() {
     publish();
     return *this;
   }
@@ -172,35 +172,35 @@ class Station : private RequestServer {
 };
 
 /// One whose row 0 is out.
-class StartedStation final : public Station {
+class StartedBackend final : public ManualBackend {
  public:
-  explicit StartedStation(const BackendOptions& options = {.segment = "pair"},
+  explicit StartedBackend(const BackendOptions& options = {.segment = "pair"},
                           const std::function<void(Schema&)>& describe = {})
-      : Station(options, describe) {
+      : ManualBackend(options, describe) {
     start();
   }
 };
 
-/// A station that serves bursts in a thread of its own.
-class BurstingStation {
+/// A manual backend that serves bursts in a thread of its own.
+class BurstingBackend {
  public:
-  explicit BurstingStation(const std::string& segment = "pair",
-                           const std::function<void(Station&)>& prepare = {},
+  explicit BurstingBackend(const std::string& segment = "pair",
+                           const std::function<void(ManualBackend&)>& prepare = {},
                            const std::function<void(Schema&)>& describe = {})
-      : station({.segment = segment, .bursting = true}, describe) {
-    if (prepare) prepare(station);
-    station.start();
-    thread_ = std::thread([this] { station.serve_bursts(); });
+      : manual({.segment = segment, .bursting = true}, describe) {
+    if (prepare) prepare(manual);
+    manual.start();
+    thread_ = std::thread([this] { manual.serve_bursts(); });
   }
-  BurstingStation& operator=(BurstingStation&&) = delete;
-  ~BurstingStation() { stop(); }
+  BurstingBackend& operator=(BurstingBackend&&) = delete;
+  ~BurstingBackend() { stop(); }
   /// The thread has ended; the segment is still there.
   void stop() {
-    station.backend.ask_to_stop();
+    manual.backend.ask_to_stop();
     if (thread_.joinable()) thread_.join();
   }
 
-  Station station;
+  ManualBackend manual;
 
  private:
   std::thread thread_;
@@ -245,7 +245,7 @@ inline std::vector<double> desired(const UntypedFrontend& frontend, Iteration fi
 }
 
 /// A test with its own folder of segments.
-class StationTest : public ::testing::Test {
+class ManualBackendTest : public ::testing::Test {
  protected:
   PrivateDirectory directory_;
 };

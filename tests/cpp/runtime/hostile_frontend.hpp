@@ -10,14 +10,14 @@
 
 #include "control/sending/batch_builder.hpp"
 #include "memory/ring/lane_sender.hpp"
-#include "runtime/station.hpp"
+#include "runtime/manual_backend.hpp"
 
 namespace o80::test {
 
 /// The pages that a frontend can write: its lane's and the bell's.
-class Liar {
+class HostileFrontend {
  public:
-  Liar()
+  HostileFrontend()
       : segment_(AttachedSegment::attach("pair", Access::read_write, Deadline(kPatience))),
         sender_(std::make_unique<LaneSender>(segment_)) {}
 
@@ -102,7 +102,7 @@ class Liar {
     head.id = sender_->next_id() + random() % 100 + place;
     head.payload_bytes = random() % 2 == 0 ? 8 : static_cast<std::uint32_t>(random());
     head.amount = static_cast<std::int64_t>(random() >> random() % 64);
-    // the requests of the station that break it are a frontend's right too
+    // the requests of the manual backend that break it are a frontend's right too
     if (head.kind == RecordKind::request) head.kind = RecordKind::command;
     if (random() % 8 == 0) head.kind = RecordKind::seen;
     constexpr double kTargets[] = {0.5,
@@ -123,13 +123,13 @@ class Liar {
   std::unique_ptr<LaneSender> sender_;
 };
 
-/// What a liar left in its lane is thrown away first.
-inline Batch pulse_as_soon_as_there_is_room(UntypedFrontend& frontend, Station& station) {
+/// What a hostile frontend left in its lane is thrown away first.
+inline Batch pulse_as_soon_as_there_is_room(UntypedFrontend& frontend, ManualBackend& manual) {
   for (int i = 0; i < 10'000; ++i) {
     try {
       return frontend.pulse();
     } catch (const LaneFull&) {
-      station.iterate();
+      manual.iterate();
     }
   }
   ADD_FAILURE() << "the lane stays full";

@@ -7,9 +7,9 @@
 #include <thread>
 
 #include "memory/child_process.hpp"
-#include "runtime/liar.hpp"
+#include "runtime/hostile_frontend.hpp"
+#include "runtime/manual_backend.hpp"
 #include "runtime/shared_scene.hpp"
-#include "runtime/station.hpp"
 
 namespace o80::test {
 namespace {
@@ -45,34 +45,34 @@ constexpr SelfDescription kLies[] = {
     {(1 << 20) + 1, 0, 0, 0, 0},
 };
 
-/// A liar in lane 0, an honest frontend in lane 1.
-class LyingOwnerTest : public StationTest {
+/// A hostile frontend in lane 0, an honest frontend in lane 1.
+class LyingOwnerTest : public ManualBackendTest {
  protected:
-  LyingOwnerTest() { station_.start(); }
+  LyingOwnerTest() { manual_.start(); }
 
   void honest_frontend_comes() {
     other_ = std::make_unique<UntypedFrontend>("pair");
     send(*other_, 0, 0.0);
     ASSERT_EQ(other_->link()->lane()->lane(), 1U);
-    station_.run(1);
+    manual_.run(1);
   }
   /// The next owners of lane 0: each is served, keeps its control, is known to have closed or died.
   void expect_an_ordinary_lane() {
     UntypedFrontend next("pair");
     next.add_take_control();
-    const Batch taken = pulse_as_soon_as_there_is_room(next, station_);
+    const Batch taken = pulse_as_soon_as_there_is_room(next, manual_);
     ASSERT_EQ(next.link()->lane()->lane(), 0U);
-    station_.run_until([&] { return taken.ended(); });
+    manual_.run_until([&] { return taken.ended(); });
     EXPECT_EQ(taken.handle(0).status, Status::completed);
     for (int i = 0; i < 3; ++i) {
       const Batch refused = send(*other_, 0, 1.0);
-      station_.run(1);
+      manual_.run(1);
       EXPECT_THAT(refused.rejection(), HasSubstr("exclusive control"));
     }
     next.add_release_control();
     add(next, 1, 1.0, {.pace = iterations(1'000'000)});
     next.pulse();
-    station_.run(2);
+    manual_.run(2);
     next.close();
 
     // its command goes on, since it closed, when the lane has its next owner; that one dies
@@ -81,14 +81,14 @@ class LyingOwnerTest : public StationTest {
       send(frontend, 0, 0.5, {.pace = iterations(1'000'000)});
       stand();
     });
-    station_.run(2);
-    EXPECT_EQ(*station_.backend.active() & 3, 3U) << "of the closed owner, and of the living one";
+    manual_.run(2);
+    EXPECT_EQ(*manual_.backend.active() & 3, 3U) << "of the closed owner, and of the living one";
     owner.kill_now();
-    station_.run_until([&] { return (*station_.backend.active() & 1) == 0; });
+    manual_.run_until([&] { return (*manual_.backend.active() & 1) == 0; });
     other_.reset();
   }
 
-  Station station_{{.segment = "pair", .lanes = 2, .lane_blocks = 64, .stale = Stale::purge}};
+  ManualBackend manual_{{.segment = "pair", .lanes = 2, .lane_blocks = 64, .stale = Stale::purge}};
   std::unique_ptr<UntypedFrontend> other_;
 };
 
@@ -97,12 +97,12 @@ TEST_F(LyingOwnerTest, ThatClosesLeavesAnOrdinaryLane) {
     for (const SelfDescription& lie : kLies) {
       SCOPED_TRACE(::testing::Message() << lie.incarnation << (seen ? ", seen" : ""));
       {
-        Liar liar;
+        HostileFrontend hostile;
         honest_frontend_comes();
-        lie.write(liar.page());
-        if (seen) station_.run(2);
-        liar.leave();
-        lie.write(liar.page());
+        lie.write(hostile.page());
+        if (seen) manual_.run(2);
+        hostile.leave();
+        lie.write(hostile.page());
       }
       expect_an_ordinary_lane();
       if (HasFatalFailure()) return;
@@ -115,19 +115,19 @@ TEST_F(LyingOwnerTest, ThatDiesLeavesAnOrdinaryLane) {
       SCOPED_TRACE(::testing::Message() << lie.incarnation << (seen ? ", seen" : ""));
       {
         const SharedScene scene;
-        ChildProcess liar([&](const ChildProcess::Ready& ready) {
-          Liar own;
+        ChildProcess hostile([&](const ChildProcess::Ready& ready) {
+          HostileFrontend own;
           ready();
           while (!scene->over) std::this_thread::yield();
           lie.write(own.page());
           ++scene->scribbles;
           pause_for_ever();
         });
-        ASSERT_TRUE(liar.wait_until_ready());
+        ASSERT_TRUE(hostile.wait_until_ready());
         honest_frontend_comes();
         scene->over = true;
         while (scene->scribbles == 0) std::this_thread::yield();
-        if (seen) station_.run(2);
+        if (seen) manual_.run(2);
       }
       expect_an_ordinary_lane();
       if (HasFatalFailure()) return;
