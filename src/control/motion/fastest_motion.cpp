@@ -4,7 +4,6 @@
 #include <cmath>
 #include <limits>
 
-#include "base/root.hpp"
 #include "base/whole.hpp"
 
 namespace o80 {
@@ -12,27 +11,22 @@ namespace {
 
 // rounding must not add an iteration
 constexpr double kTimeRounding = 1e-12;
-// tolerances of a root, as shares of the distance
-constexpr double kRootForTime = 1e-6;
-constexpr double kExact = 1e-16;
-constexpr double kBracket = 1e-3;
-constexpr int kMaxCorrections = 8;
 constexpr double kRounding = 4e-16;
-constexpr double kReached = 1e-13;
-constexpr int kGuesses = 4;
-constexpr int kNewtonSteps = 6;   // of Newton's method: it is exact once both counts stay
 constexpr double kMissed = 1e-9;  // beyond rounding; a share of the distance and of a step
+constexpr int kGuesses = 4;
+constexpr int kNewtonSteps = 6;  // the usual ones; then it halves
+constexpr int kMaxTries = 60;
 
 }  // namespace
 
-FastestMotion::FastestMotion(const Moment& start, double target, const Rates& rates) noexcept
+FastestMotion::FastestMotion(const Moment& start, double target, const Rates& rates,
+                             const VelocityChange& stop) noexcept
     : start_speed_(start.speed),
       start_acceleration_(std::isfinite(rates.jerk) ? start.acceleration : 0.0),
       distance_(target - start.position),
       rates_(rates),
       target_(target),
       position_(start.position) {
-  const VelocityChange stop(-start_speed_, start_acceleration_, rates_);
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
                           std::max(std::abs(start.position), std::abs(target));
   const double beyond = distance_ - stop.displacement();
@@ -54,13 +48,14 @@ FastestMotion::FastestMotion(const Moment& start, double target, const Rates& ra
   const double steps = size > 0.0 ? whole_below(size / rates_.jerk) : 0.0;
   const double fading =
       steps > 0.0 ? steps * size - rates_.jerk * steps * (steps + 1.0) / 2.0 : 0.0;
-  const double flat = start_speed_ + std::copysign(fading, start_acceleration_);
+  // not below it by rounding: from there on it may need an iteration more
+  const double flat = start_speed_ * (1.0 + kRounding) + std::copysign(fading, start_acceleration_);
   const double lowest = std::clamp(flat, 0.0, rates_.speed);
-  if (!solve(lowest)) search(lowest);
+  plan(lowest);
 }
 
 /// About the cruising speed of a motion in so many iterations, 0 for the fewest, without counting
-/// whole ones: four steps of Newton's method.
+/// whole ones.
 double FastestMotion::guess(double iterations, double highest) const noexcept {
   const double kink = rates_.acceleration * (rates_.acceleration / rates_.jerk);
   struct Time {
@@ -93,7 +88,12 @@ double FastestMotion::guess(double iterations, double highest) const noexcept {
     if (base > 0.0 && base * (time - time_for(base).value / 2.0) > way) begin(-1.0);
     cruise = std::clamp(way / time, 0.0, highest);
   } else {
-    // from the place where it has turned back
+    // at full acceleration, up and down
+    const double square =
+        kink * kink / 4.0 + rates_.acceleration * way + base * (base - kink) / 2.0;
+    cruise = std::sqrt(std::max(0.0, square)) - kink / 2.0;
+    if (cruise >= kink && cruise - base >= kink) return std::min(cruise, highest);
+    // else from the place where it has turned back
     const double back = std::min(base, 0.0);
     const double left = std::max(0.0, way + back * back / (2.0 * rates_.acceleration));
     const double far = std::sqrt(rates_.acceleration * left);
@@ -118,97 +118,56 @@ double FastestMotion::guess(double iterations, double highest) const noexcept {
   return cruise;
 }
 
-/// Plans the shortest motion by Newton's method: the distance is a piecewise linear and increasing
-/// function of the cruising speed. False if that does not find it.
-bool FastestMotion::solve(double lowest) noexcept {
-  double cruise = std::max(guess(0.0, rates_.speed), lowest);
-  for (int i = 0; i < kNewtonSteps; ++i) {
-    cruise_at(cruise);
-    const VelocityChange& up = to_cruise_;
-    const VelocityChange& down = to_rest_;
-    const double missing = up.displacement() + up.time() * cruise + down.displacement() - distance_;
-    const bool is_full = cruise == rates_.speed && missing <= 0.0;
-    if (is_full || std::abs(missing) <= kRootForTime * std::abs(distance_)) {
-      double before = whole_above(up.time() * (1.0 - kTimeRounding));
-      if (is_full) {
-        const double left = distance_ - up.displacement() - before * cruise - down.displacement();
-        before += std::max(0.0, whole_above(left / cruise * (1.0 - kTimeRounding)));
+/// Finds the cruising speed from `low` to `high` with which it gets to the target, from one nearby,
+/// by Newton's method. `before` gives the iterations before it slows down; where they do not depend
+/// on the cruise, the distance is piecewise linear in it. Returns 0, or by how much it goes too far
+/// at `low` (above 0) or not far enough at `high` (below 0).
+template <class Time>
+double FastestMotion::reach(double low, double high, Time&& before) noexcept {
+  const Span all{low, high};
+  for (int i = 0; i < kMaxTries; ++i) {
+    const Before time = before();
+    const double missing = distance(time.value) - distance_;
+    const bool is_linear = time.slope == 0.0;
+    const double rounding = is_linear ? kRounding : kTimeRounding / 10.0;
+    if (std::abs(missing) <= rounding * (std::abs(distance_) + time.value * cruise_)) return 0.0;
+    if (missing > 0.0 ? cruise_ == all.low : cruise_ == all.high) return missing;
+    (missing < 0.0 ? low : high) = cruise_;
+    const double slope = to_cruise_.slope() + time.value + cruise_ * time.slope - to_rest_.slope();
+    const double change = -missing / slope;
+    double next = cruise_ + change;
+    if (next > low && next < high) {
+      if (extend(change)) {
+        if (is_linear) return 0.0;
+        continue;
       }
-      before_ = static_cast<std::int64_t>(before);
-      if (reach(cruise, lowest, 0)) return true;
-      if (distance(lowest, before) <= distance_) return false;
-      mix(lowest);
-      settle();
-      return true;
+    } else {
+      next = i < kNewtonSteps ? std::clamp(next, low, high) : low + (high - low) / 2.0;
     }
-    const double slope = up.slope() + up.time() + cruise * up.time_slope() - down.slope();
-    if (!(slope > 0.0)) return false;
-    cruise = std::clamp(cruise - missing / slope, lowest, rates_.speed);
+    cruise_at(next);
   }
-  return false;
+  return 0.0;
 }
 
-/// The cruising speed with which it gets to the target exactly, from one that nearly does: in
-/// `before_` iterations before it slows down, or in so many iterations in total. False if there is
-/// none.
-bool FastestMotion::reach(double cruise, double lowest, std::int64_t iterations) noexcept {
-  for (int i = 1;; ++i) {
-    if (iterations > 0) before_ = iterations - to_rest_.steps();
-    const auto before = static_cast<double>(before_);
-    const double missing =
-        to_cruise_.displacement() + before * cruise + to_rest_.displacement() - distance_;
-    const double size = std::abs(distance_) + before * cruise;
-    const double slope = to_cruise_.slope() + before - to_rest_.slope();
-    if (!(slope > 0.0)) return false;
-    const double change = missing / slope;
-    if (std::abs(missing) <= kRounding * size || std::abs(change) <= kRounding * cruise ||
-        i == kNewtonSteps) {
-      if (to_cruise_.steps() > before_ || std::abs(missing) > kReached * size) return false;
-      cruise_ = cruise;
-      count();
-      return true;
-    }
-    cruise -= change;
-    if (!(cruise >= lowest && cruise <= rates_.speed)) return false;
-    cruise_at(cruise);
+/// Plans the shortest motion.
+void FastestMotion::plan(double lowest) noexcept {
+  cruise_at(std::max(guess(0.0, rates_.speed), lowest));
+  const double missing = reach(lowest, rates_.speed,
+                               [&] { return Before{to_cruise_.time(), to_cruise_.time_slope()}; });
+  double before = whole_above(to_cruise_.time() * (1.0 - kTimeRounding));
+  if (missing < 0.0) {  // at full speed, for longer
+    const double left = distance_ - distance(before);
+    before += std::max(0.0, whole_above(left / cruise_ * (1.0 - kTimeRounding)));
   }
-}
-
-/// The same as solve(), by searching.
-void FastestMotion::search(double lowest) noexcept {
-  const double most = whole_above(time_to(rates_.speed) * (1.0 - kTimeRounding));
-  const double at_most = distance(rates_.speed, most) - distance_;
-  if (at_most <= 0.0) {
-    // the target is farther: cruise at full speed
-    cruise_ = rates_.speed;
-    before_ = static_cast<std::int64_t>(
-        most + whole_above(-at_most / rates_.speed * (1.0 - kTimeRounding)));
-  } else {
-    // the target is nearer: reduce the cruising speed until there is no time to cruise
-    // for the number of iterations; the speed that fits them is found below, a little beyond it
-    cruise_ = cruise_for({}, lowest, rates_.speed, kRootForTime);
-    before_ = static_cast<std::int64_t>(whole_above(time_to(cruise_) * (1.0 - kTimeRounding)));
+  before_ = static_cast<std::int64_t>(before);
+  const auto whole = [&] { return Before{static_cast<double>(before_)}; };
+  double excess = reach(lowest, rates_.speed, whole);
+  while (excess <= 0.0 && to_cruise_.steps() > before_) {
+    ++before_;
+    excess = reach(lowest, rates_.speed, whole);
   }
-  if (distance(lowest, static_cast<double>(before_)) > distance_) {
-    mix(lowest);
-  } else {
-    const double highest = std::min(rates_.speed, cruise_ * (1.0 + kBracket));
-    cruise_ = cruise_for(static_cast<double>(before_), lowest, highest, kExact);
-  }
-  settle();
-  if (mixed_ || to_cruise_.steps() <= before_) return;
-  // it cannot get to this speed in that time: to a lower one, or it takes an iteration more
-  const auto time = static_cast<double>(before_);
-  const double reached = root([&](double v) { return time_to(v) - time; }, lowest, cruise_, 0.0);
-  const bool is_enough = distance(reached, time) >= distance_;
-  if (!is_enough) ++before_;
-  if (distance(lowest, static_cast<double>(before_)) > distance_) {
-    mix(lowest);
-  } else {
-    cruise_ =
-        cruise_for(static_cast<double>(before_), lowest, is_enough ? reached : cruise_, kExact);
-  }
-  settle();
+  if (excess > 0.0) mix(excess);
+  count();
 }
 
 FastestMotion::Stop FastestMotion::stop_after(std::int64_t eased) const noexcept {
@@ -224,20 +183,19 @@ FastestMotion::Stop FastestMotion::stop_after(std::int64_t eased) const noexcept
 }
 
 /// The target lies between the ends of two stops that reduce the deceleration for k and k + 1
-/// iterations; or between the farthest of these stops and the slowest cruise. The motion is the
-/// weighted mean of the two: it reaches the target because positions are linear in the
-/// accelerations, and keeps the limits because they are convex.
-void FastestMotion::mix(double lowest) noexcept {
+/// iterations; or between the farthest of these stops and the slowest cruise, which goes too far by
+/// `excess`. The motion is the weighted mean of the two: it reaches the target because positions
+/// are linear in the accelerations, and keeps the limits because they are convex.
+void FastestMotion::mix(double excess) noexcept {
   mixed_ = true;
-  cruise_ = lowest;
   nearer_ = stop_after(0);
-  auto most = static_cast<std::int64_t>(std::max(0.0, -start_acceleration_) / rates_.jerk);
+  const double ratio = std::max(0.0, -start_acceleration_) / rates_.jerk;
+  auto most = static_cast<std::int64_t>(ratio * (1.0 + kMissed));
   farther_ = stop_after(most);
   cruises_ = farther_.distance <= distance_;
   if (cruises_) {
     nearer_ = farther_;
-    const double at_lowest = distance(lowest, static_cast<double>(before_));
-    share_ = (at_lowest - distance_) / (at_lowest - nearer_.distance);
+    share_ = excess / (excess + (distance_ - nearer_.distance));
     return;
   }
   while (most - nearer_.eased > 1) {
@@ -252,42 +210,24 @@ void FastestMotion::mix(double lowest) noexcept {
   share_ = (farther_.distance - distance_) / (farther_.distance - nearer_.distance);
 }
 
-/// The cruising speed with which distance() is that to the target, up to a share of it.
-double FastestMotion::cruise_for(std::optional<double> before, double low, double high,
-                                 double tolerance) const noexcept {
-  return root([&](double cruise) { return distance(cruise, before) - distance_; }, low, high,
-              tolerance * distance_);
-}
-
 void FastestMotion::stretch(std::int64_t iterations) noexcept {
   if (iterations <= iterations_ || before_ == 0) return;
-  const FastestMotion shortest = *this;
-  if (!mixed_) {
-    const double cruise = guess(static_cast<double>(iterations), cruise_);
-    cruise_at(cruise);
-    if (reach(cruise, 0.0, iterations)) return;
+  const double shortest = cruise_;
+  const std::int64_t before = before_;
+  const auto all = static_cast<double>(iterations);
+  cruise_at(guess(all, shortest));
+  reach(0.0, shortest, [&] { return Before{all - static_cast<double>(to_rest_.steps())}; });
+  before_ = iterations - to_rest_.steps();
+  const double missed = std::abs(distance(static_cast<double>(before_)) - distance_);
+  if (to_cruise_.steps() > before_ || missed > kMissed * (std::abs(distance_) + cruise_)) {
+    // it has no time to get to its cruise, or does not get to the target
+    before_ = before;
+    return cruise_at(shortest);
   }
-  *this = shortest;
-  // a mean of two motions that happens to have the right length still needs its own cruising speed
-  bool exact = !mixed_;
   mixed_ = false;
   nearer_ = {};
   cruises_ = true;
-  settle();
-  for (int i = 0; i < kMaxCorrections && (iterations_ != iterations || !exact); ++i) {
-    exact = true;
-    before_ += iterations - iterations_;
-    if (before_ < 0) break;
-    cruise_ = cruise_for(static_cast<double>(before_), 0.0, cruise_, kExact);
-    settle();
-  }
-  // keep the shortest motion if the stretched one is too long, has no time to get to its cruise, or
-  // does not get to the target
-  const double missing = distance_ - distance(cruise_, static_cast<double>(before_));
-  if (iterations_ > iterations || to_cruise_.steps() > before_ ||
-      missing > kMissed * (std::abs(distance_) + cruise_)) {
-    *this = shortest;
-  }
+  count();
 }
 
 double FastestMotion::next() noexcept {

@@ -1,7 +1,7 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
-#include <optional>
 
 #include "control/motion/velocity_change.hpp"
 
@@ -16,9 +16,12 @@ namespace o80 {
 /// Realtime: yes, bounded time.
 class FastestMotion {
  public:
-  FastestMotion() = default;
-  /// `start` is the present motion. The limits of speed and acceleration must be finite.
-  FastestMotion(const Moment& start, double target, const Rates& rates) noexcept;
+  /// `start` is the present motion, `stop` its shortest stop. The limits of speed and acceleration
+  /// must be finite.
+  FastestMotion(const Moment& start, double target, const Rates& rates,
+                const VelocityChange& stop) noexcept;
+  FastestMotion(const Moment& start, double target, const Rates& rates) noexcept
+      : FastestMotion(start, target, rates, {-start.speed, start.acceleration, rates}) {}
 
   /// Number of iterations until it rests at the target, at least 1.
   std::int64_t iterations() const noexcept { return iterations_; }
@@ -42,30 +45,30 @@ class FastestMotion {
   };
 
   Stop stop_after(std::int64_t eased) const noexcept;
-  void mix(double lowest) noexcept;
-  /// Distance of a motion that slows down from `cruise` after `before` iterations, or at once.
-  double distance(double cruise, std::optional<double> before) const noexcept {
-    const VelocityChange to_cruise(cruise - start_speed_, start_acceleration_, rates_);
-    const VelocityChange to_rest(-cruise, 0.0, rates_);
-    return to_cruise.displacement() + (before ? *before : to_cruise.time()) * cruise +
-           to_rest.displacement();
-  }
-  double time_to(double cruise) const noexcept {
-    return VelocityChange(cruise - start_speed_, start_acceleration_, rates_).time();
+  void mix(double excess) noexcept;
+  /// Distance of the motion that slows down from the cruise after so many iterations.
+  double distance(double before) const noexcept {
+    return to_cruise_.displacement() + before * cruise_ + to_rest_.displacement();
   }
   double guess(double iterations, double highest) const noexcept;
-  bool solve(double lowest) noexcept;
-  bool reach(double cruise, double lowest, std::int64_t iterations) noexcept;
-  void search(double lowest) noexcept;
-  double cruise_for(std::optional<double> before, double low, double high,
-                    double tolerance) const noexcept;
+  void plan(double lowest) noexcept;
+  /// Iterations before the motion slows down, and their derivative with respect to the cruise.
+  struct Before {
+    double value;
+    double slope = 0.0;
+  };
+  template <class Time>
+  double reach(double low, double high, Time&& before) noexcept;
   void cruise_at(double speed) noexcept {
+    cruise_ = speed;
     to_cruise_ = VelocityChange(speed - start_speed_, start_acceleration_, rates_);
     to_rest_ = VelocityChange(-speed, 0.0, rates_);
   }
-  void settle() noexcept {
-    cruise_at(cruise_);
-    count();
+  /// Changes the cruising speed, if both changes of speed stay means of the same trapezoids. If
+  /// not, they are to be planned anew.
+  bool extend(double change) noexcept {
+    cruise_ += change;
+    return to_cruise_.extend(change) && to_rest_.extend(-change);
   }
   void count() noexcept {
     speed_ = start_speed_;

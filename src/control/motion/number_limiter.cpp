@@ -1,5 +1,7 @@
 #include "control/motion/number_limiter.hpp"
 
+#include "base/whole.hpp"
+
 namespace o80 {
 namespace {
 
@@ -12,7 +14,7 @@ constexpr int kHalvings = 16;
 double speed_for(double room, double acceleration) noexcept {
   if (room <= 0.0) return 0.0;
   if (!std::isfinite(room)) return room;
-  const double k = std::floor((std::sqrt(1.0 + 8.0 * room / acceleration) - 1.0) / 2.0);
+  const double k = whole_below((std::sqrt(1.0 + 8.0 * room / acceleration) - 1.0) / 2.0);
   return (room + acceleration * k * (k + 1.0) / 2.0) / (k + 1.0);
 }
 

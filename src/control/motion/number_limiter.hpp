@@ -42,18 +42,25 @@ class NumberLimiter {
            std::abs(now_.speed) <= rates_.jerk + tolerance &&
            std::abs(now_.speed + now_.acceleration) <= rates_.jerk + tolerance;
   }
-  /// Positions that the shortest stop visits.
-  Span stop() const noexcept {
+  /// The shortest stop from here.
+  VelocityChange stop() noexcept {
+    const bool has_begun = stop_known_ && stopped_ > 0;
+    if (has_begun || !std::isfinite(rates_.jerk)) return stop_from_here();
+    know_stop();
+    return stop_;
+  }
+  /// Positions that it visits.
+  Span stopping_span() noexcept {
     Span visited{now_.position, now_.position};
     if (stays()) return visited;
-    const VelocityChange stop(-now_.speed, now_.acceleration, rates_);
+    const VelocityChange stop = this->stop();
     visited.include(now_.position + stop.run_before_turn(now_.speed));
     visited.include(now_.position + stop.displacement());
     return visited;
   }
   /// True if these lie between minimum and maximum.
-  bool stops_inside() const noexcept {
-    const Span visited = stop();
+  bool stops_inside() noexcept {
+    const Span visited = stopping_span();
     return visited.low >= bounds_.low - rounding() && visited.high <= bounds_.high + rounding();
   }
 
@@ -186,7 +193,10 @@ class NumberLimiter {
     stop_known_ = true;
   }
   void know_stop() noexcept {
-    if (!stop_known_) know_stop(VelocityChange(-now_.speed, now_.acceleration, rates_));
+    if (!stop_known_) know_stop(stop_from_here());
+  }
+  VelocityChange stop_from_here() const noexcept {
+    return {-now_.speed, now_.acceleration, rates_};
   }
   void slow_down() noexcept;
   void stop_now() noexcept {

@@ -6,7 +6,8 @@ namespace o80 {
 
 std::int64_t NumberMotion::plan_for(const Requested& requested) noexcept {
   PlanTask task{requested, requested.start ? Moment{*requested.start} : guard_.moment(),
-                guard_.stop(), guard_.rates(), requested.start || guard_.stays()};
+                guard_.stopping_span(), guard_.rates(), requested.start || guard_.stays()};
+  if (accelerates() && !requested.start) task.stop = guard_.stop();
   task.span.include(requested.target);
   task.span.include(task.from.position);
   guard_.begin(task.span);

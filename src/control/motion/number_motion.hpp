@@ -89,7 +89,7 @@ class NumberMotion {
   /// Or they begin here.
   void start_from(const Moment& from, bool continues) noexcept {
     plan_.start_from(from);
-    Span span = guard_.stop();
+    Span span = guard_.stopping_span();
     span.include(from.position);
     continues ? guard_.reach(span) : guard_.begin(span);
     planned_ = follows_ = of_rows_ = true;

@@ -1,5 +1,7 @@
 #include "control/motion/number_plan.hpp"
 
+#include "base/whole.hpp"
+
 namespace o80 {
 namespace {
 
@@ -64,14 +66,15 @@ double between(double from, double to, double share) noexcept {
 
 std::int64_t iterations_of(double distance, double speed) noexcept {
   if (!std::isfinite(speed)) return 1;
-  const double up = std::ceil(std::abs(distance) / speed * (1.0 - kPlanRounding));
+  const double up = whole_above(std::abs(distance) / speed * (1.0 - kPlanRounding));
   if (!(up <= static_cast<double>(kLongestPlan))) return kLongestPlan + 1;
   return std::max<std::int64_t>(1, static_cast<std::int64_t>(up));
 }
 
 std::int64_t NumberPlan::propose(const PlanTask& task) noexcept {
   task_ = task;
-  has_fastest_ = false;
+  fastest_.reset();
+  smooth_for_ = 0;
   const std::int64_t requested = task.iterations;
   const bool is_smooth = task.profile == Profile::minimum_jerk;
   if (requested > 0 && is_smooth && std::isfinite(task.rates.acceleration) && smooth(requested)) {
@@ -84,18 +87,22 @@ std::int64_t NumberPlan::propose(const PlanTask& task) noexcept {
   return std::max(requested, least);
 }
 
-/// Plans the shortest smooth motion from rest, without a search: its peaks of speed, acceleration
-/// and jerk are known. False for other motions, or if the fewest iterations are not these.
+/// Plans the shortest smooth motion from rest: its peaks of speed, acceleration and jerk are nearly
+/// those of a continuous motion that takes two or three iterations longer. False for other motions,
+/// or if the fewest iterations are not found nearby.
 bool NumberPlan::smooth_from_rest() noexcept {
   if (task_.from.speed != 0.0 || task_.from.acceleration != 0.0) return false;
   const double way = std::abs(task_.target - task_.from.position);
   const Rates& most = task_.rates;
-  const double time = std::max({15.0 / 8.0 * way / std::min(most.speed, task_.cruise),
-                                std::sqrt(10.0 / std::sqrt(3.0) * way / most.acceleration),
-                                std::cbrt(60.0 * way / most.jerk), 1.0});
+  const double time = std::max({15.0 / 8.0 * way / std::min(most.speed, task_.cruise) - 2.0,
+                                std::sqrt(10.0 / std::sqrt(3.0) * way / most.acceleration) - 2.0,
+                                std::cbrt(60.0 * way / most.jerk) - 3.0, 1.0});
   if (!(time <= static_cast<double>(kLongestPlan))) return false;
-  const auto fewest = static_cast<std::int64_t>(std::ceil(time * (1.0 - kPlanRounding / 2.0)));
-  return !(fewest > 1 && smooth(fewest - 1)) && smooth(fewest);
+  auto fewest = static_cast<std::int64_t>(whole_above(time));
+  for (int i = 0; fewest > 1 && smooth(fewest - 1); ++i, --fewest) {
+    if (i == 2) return false;
+  }
+  return smooth(fewest) || smooth(fewest + 1);
 }
 
 /// The fewest iterations of a motion at full speed, or at the cruising speed asked for.
@@ -107,14 +114,14 @@ std::int64_t NumberPlan::fewest() noexcept {
     return iterations_of(task_.target - task_.line_start, rates.speed);
   }
   // no motion is shorter; beyond the range of the plan nothing is computed
-  const double least =
-      std::max({distance / rates.speed, std::sqrt(distance / rates.acceleration),
-                std::cbrt(distance / rates.jerk), std::abs(task_.from.speed) / rates.acceleration,
-                rates.acceleration / rates.jerk / 2.0});
-  if (!(least <= static_cast<double>(kLongestPlan))) return kLongestPlan + 1;
-  fastest_ = FastestMotion(task_.from, task_.target, rates);
-  has_fastest_ = true;
-  return fastest_.iterations();
+  constexpr auto kMost = static_cast<double>(kLongestPlan);
+  if (!(distance <= kMost * rates.speed && distance <= kMost * kMost * rates.acceleration &&
+        distance <= kMost * kMost * kMost * rates.jerk &&
+        std::abs(task_.from.speed) <= kMost * rates.acceleration &&
+        rates.acceleration <= 2.0 * kMost * rates.jerk)) {
+    return kLongestPlan + 1;
+  }
+  return fastest_.emplace(task_.from, task_.target, rates, task_.stop).iterations();
 }
 
 /// The fewest iterations, from about `least` on, in which a smooth motion keeps the speed asked for
@@ -125,13 +132,14 @@ std::int64_t NumberPlan::fewest_smooth(std::int64_t least) noexcept {
   for (int i = 0; !smooth(enough); ++i) {
     if (i == kMaxStrides) return least;
     few = enough;
-    enough = static_cast<std::int64_t>(std::ceil(static_cast<double>(enough) * kStride));
+    enough = static_cast<std::int64_t>(whole_above(static_cast<double>(enough) * kStride));
   }
   while (enough - few > 1) {
     const std::int64_t middle = few + (enough - few) / 2;
     (smooth(middle) ? enough : few) = middle;
   }
-  return smooth_for_ = enough;
+  smooth(enough);
+  return enough;
 }
 
 bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {
@@ -149,7 +157,7 @@ bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {
 }
 
 /// Plans a smooth motion; false if none keeps all limits in this number of iterations.
-bool NumberPlan::smooth(std::int64_t iterations) noexcept {
+bool NumberPlan::plan_smooth(std::int64_t iterations) noexcept {
   smooth_for_ = iterations;
   shape_ = Shape::smooth;
   smooth_ = SmoothMotion(task_.from, task_.target, iterations);
@@ -197,16 +205,16 @@ void NumberPlan::settle(std::int64_t iterations) noexcept {
   if (is_smooth && smooth(iterations)) return;
   shape_ = Shape::line;
   if (!accelerates) return;
-  if (!has_fastest_) fewest();
-  if (fastest_.iterations() > iterations && is_smooth && proposed > 0 && smooth(proposed)) return;
-  fastest_.stretch(iterations);
+  if (!fastest_) fewest();
+  if (fastest_->iterations() > iterations && is_smooth && proposed > 0 && smooth(proposed)) return;
+  fastest_->stretch(iterations);
   shape_ = Shape::fastest;
 }
 
 double NumberPlan::next() noexcept {
   ++done_;
   if (done_ >= iterations_) return task_.target;
-  return shape_ == Shape::fastest ? fastest_.next() : at(done_);
+  return shape_ == Shape::fastest ? fastest_->next() : at(done_);
 }
 
 /// The position after so many iterations, fewer than there are, of any shape but the fastest.

@@ -70,7 +70,8 @@ struct PlanTask : Requested {
   // acceleration: former target)
   Span span;
   Rates rates{};
-  bool stays = true;  // it may stop at once
+  bool stays = true;         // it may stop at once
+  VelocityChange stop = {};  // the shortest one, with a limit of acceleration
 };
 
 /// The way of one number to its target: a position for each iteration, within its limits of speed,
@@ -170,20 +171,24 @@ class NumberPlan {
   std::int64_t fewest() noexcept;
   std::int64_t fewest_smooth(std::int64_t least) noexcept;
   bool smooth_from_rest() noexcept;
-  bool smooth(std::int64_t iterations) noexcept;
+  bool smooth(std::int64_t iterations) noexcept {
+    if (iterations == smooth_for_) return is_smooth_;
+    return is_smooth_ = plan_smooth(iterations);
+  }
+  bool plan_smooth(std::int64_t iterations) noexcept;
   bool fits(const SmoothMotion& motion) const noexcept;
   bool stop_then_smooth(std::int64_t iterations) noexcept;
 
   PlanTask task_;
   Shape shape_ = Shape::line;
-  bool has_fastest_ = false;  // `fastest_` is the motion of task_
   std::int64_t iterations_ = 1;
   std::int64_t done_ = 0;
   std::int64_t stop_ = 0;        // iterations of `to_stop_`
-  std::int64_t smooth_for_ = 0;  // iterations of `smooth_`
+  std::int64_t smooth_for_ = 0;  // iterations of `smooth_`; 0: none was tried
+  bool is_smooth_ = false;       // these keep all limits
   SmoothMotion to_stop_;
   SmoothMotion smooth_;
-  FastestMotion fastest_;
+  std::optional<FastestMotion> fastest_;
   // of a row of a chunk: place and derivatives before and at it
   Moment from_;
   Moment to_;

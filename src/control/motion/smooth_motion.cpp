@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "base/whole.hpp"
 #include "control/motion/visit_block.hpp"
 
 namespace o80 {
@@ -18,7 +19,7 @@ struct Quadratic {
     const auto around = [&](double root) {
       // a root may be huge, infinite or NaN
       if (!(root > 0.0 && root < last + 1.0)) return;
-      const double below = std::floor(root);
+      const double below = whole_below(root);
       if (below >= 1.0) visit(below);
       if (below + 1.0 <= last) visit(below + 1.0);
     };
@@ -75,7 +76,7 @@ SmoothMotion::Extremes SmoothMotion::extremes() const noexcept {
   k.near_roots(n + 1.0, acceleration);
   jerk(1.0);
   jerk(n + 2.0);
-  const double vertex = std::floor(-0.5 * k.c[1] / k.c[2]);
+  const double vertex = whole_below(-0.5 * k.c[1] / k.c[2]);
   if (vertex >= 1.0 && vertex <= n + 1.0) {
     jerk(vertex);
     jerk(vertex + 1.0);

@@ -36,7 +36,7 @@ void VelocityChange::plan_without_jerk(double change) noexcept {
   // sum over i of v(i) - v(steps)
   displacement_ = sign_ * (acceleration_ * n * (n - 1.0) / 2.0 + (size - before) * n);
   slope_ = -n;
-  time_slope_ = -sign_ / acceleration_;
+  share_slope_ = sign_ / acceleration_;
 }
 
 /// The sums of trough(), for its three parts: down, along the limit, up.
@@ -135,7 +135,7 @@ void VelocityChange::mean(double change, const Sums& own, const Sums& other) noe
   const double range = own.change - other.change;
   if (range == 0.0) return;
   slope_ = (other.moment - own.moment) / range;
-  time_slope_ = crest_ ? 0.0 : sign_ / range;
+  share_slope_ = -sign_ / range;
 }
 
 double VelocityChange::acceleration(std::int64_t i) const noexcept {

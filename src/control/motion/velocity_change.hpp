@@ -68,7 +68,15 @@ class VelocityChange {
   /// Derivatives of displacement() and time() with respect to the change: both are piecewise linear
   /// in it.
   double slope() const noexcept { return slope_; }
-  double time_slope() const noexcept { return time_slope_; }
+  double time_slope() const noexcept { return crest_ ? 0.0 : -share_slope_; }
+  /// Changes the speed by `more`, too, if that is a mean of the same two trapezoids; else false.
+  bool extend(double more) noexcept {
+    const double share = share_ + more * share_slope_;
+    if (share_slope_ == 0.0 || !(share >= 0.0 && share < kMostShare)) return false;
+    share_ = share;
+    displacement_ += more * slope_;
+    return true;
+  }
   /// Largest change of the speed away from its target, in the direction of the present
   /// acceleration, signed; 0 if there is none.
   double detour() const noexcept { return detour_; }
@@ -77,6 +85,8 @@ class VelocityChange {
   double run_before_turn(double speed) const noexcept;
 
  private:
+  static constexpr double kMostShare = 1.0 - 1e-9;  // then an iteration less is enough
+
   struct Sums {
     double change = 0.0;  // sum of a(i)
     double moment = 0.0;  // sum of (i - 1) a(i)
@@ -109,7 +119,7 @@ class VelocityChange {
   double share_ = 0.0;        // weight of the other one
   double displacement_ = 0.0;
   double slope_ = 0.0;
-  double time_slope_ = 0.0;
+  double share_slope_ = 0.0;  // derivative of share_
   double detour_ = 0.0;
 };
 
