@@ -135,14 +135,15 @@ double FastestMotion::reach(double low, double high, Time&& before) noexcept {
     (missing < 0.0 ? low : high) = cruise_;
     const double slope = to_cruise_.slope() + time.value + cruise_ * time.slope - to_rest_.slope();
     const double change = -missing / slope;
+    const bool rises = slope > 0.0;
     double next = cruise_ + change;
-    if (next > low && next < high) {
+    if (rises && next > low && next < high) {
       if (extend(change)) {
         if (is_linear) return 0.0;
         continue;
       }
     } else {
-      next = i < kNewtonSteps ? std::clamp(next, low, high) : low + (high - low) / 2.0;
+      next = rises && i < kNewtonSteps ? std::clamp(next, low, high) : low + (high - low) / 2.0;
     }
     cruise_at(next);
   }
