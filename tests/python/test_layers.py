@@ -207,22 +207,22 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_233, 0),
+    "include, src": (34_176, 0),
     "python/bindings": (5_721, 0),
-    "python/o80": (29_895, 0),
+    "python/o80": (29_910, 0),
     "python/o80/hybrid": (2_403, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
     "devices": (8_852, 4_500),
     "gateways/lerobot": (530, 690),
-    "gateways/ros2": (900, 955),
+    "gateways/ros2": (904, 955),
     "robots/arms": (4_420, 3_141),
-    "robots/pam, robots/two_joints": (2_104, 1_184),
-    "simulators/mujoco": (5_369, 4_690),
+    "robots/pam, robots/two_joints": (2_108, 1_184),
+    "simulators/mujoco": (5_372, 4_685),
     "apps/table_tennis": (8_400, 4_400),
-    "benchmarks, tools": (4_426, 0),
+    "benchmarks, tools": (4_478, 0),
     "examples": (2_082, 0),
-    "tests, conftest.py": (0, 63_260),
+    "tests, conftest.py": (0, 63_319),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -71,9 +71,7 @@ def test_processes_and_inline_played_the_same(report: dict[str, Any]) -> None:
 
 def test_baselines_stand_beside_the_policy(report: dict[str, Any]) -> None:
     policies = report["policies"]
-    assert list(policies) == [
-        *("scripted", "learned", "still arm", "random, fine", "random, coarse")
-    ]
+    assert list(policies) == ["scripted", "learned", "still arm", "random, fine", "random, coarse"]
     for numbers in policies.values():
         assert numbers["balls"] == EPISODES
         low, high = numbers["returned_95_percent"]

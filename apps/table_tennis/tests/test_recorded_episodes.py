@@ -2,7 +2,7 @@
 
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
+from unittest.mock import patch
 
 import numpy as np
 import pytest
@@ -76,18 +76,16 @@ def check_rows(episode: RecordedEpisode) -> None:
     assert episode.times[-1] == pytest.approx((rows - 1) * episode.period)
 
 
-def test_each_environment_continues_the_file(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path, decoded = tmp_path / "run.mcap", Mock(side_effect=RecordedEpoch.history)
-    monkeypatch.setattr(RecordedEpoch, "history", lambda run: decoded(run))
+def test_each_environment_continues_the_file(tmp_path: Path) -> None:
+    path, history = tmp_path / "run.mcap", RecordedEpoch.history
     for pacing in (Pacing.INLINE, Pacing.PROCESSES):
         with opened(pacing, record=path) as environment:
             for _ in range(2):
                 environment.reset(seed=1)
                 played_out(environment)
 
-    episodes = recorded_episodes(path)
+    with patch.object(RecordedEpoch, "history", autospec=True, side_effect=history) as decoded:
+        episodes = recorded_episodes(path)
     assert decoded.call_count == 4, "each run of arm and twin once"
     found = [(each.pacing, each.summary.number) for each in episodes]
     assert found == [(pacing, n) for pacing in ("inline", "processes") for n in (0, 1)]

@@ -1,8 +1,7 @@
 """Tasks are exchanged without touching the environment: the named ones, and a user's own."""
 
-import threading
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,7 @@ STILL = np.zeros(MUSCLES, dtype=np.float32)
 class KeepStillTask(ReturnTask):
     """A user's own: each step costs the speed of the arm, whatever the ball does."""
 
-    lock: Any = field(default_factory=threading.Lock)  # cannot be copied
+    uncopied: Any = (number for number in ())
 
     def eventful(self, state: State) -> Any:
         return np.ones(np.shape(state.steps), np.bool_)

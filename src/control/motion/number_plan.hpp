@@ -19,7 +19,9 @@ namespace o80 {
 /// 1: a profile that the limiter follows.
 /// 2: each command is planned to rest at its target within the limits; set-points. Faults that were
 ///    mended since, of about one motion in a million, have not raised it.
-inline constexpr std::int64_t kMotionRules = 2;
+/// 3: starts without a search: one motion in ten thousand is shorter by some iterations, one in two
+///    hundred takes another way.
+inline constexpr std::int64_t kMotionRules = 3;
 
 /// The limit that kept a number from its wanted position, or that makes a motion long.
 enum class Limit : std::uint8_t {

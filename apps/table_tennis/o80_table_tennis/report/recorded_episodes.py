@@ -23,8 +23,7 @@ from o80.base.arrays import Float32Array, FloatArray
 from ..settings import RigSettings, TaskSettings
 from .episode_summary import EpisodeSummary
 
-MARK = "table_tennis"
-"""Name of the mark."""
+MARK = "table_tennis"  #: name of the mark
 
 
 def settings_mark(rig: RigSettings, task: TaskSettings, epochs: Sequence[int]) -> dict[str, Any]:
@@ -144,5 +143,4 @@ def _episode(
 
 def _rows(recording: o80.RecordingFile, segment: str, epoch: int) -> o80.History | None:
     """All rows of a run; None if it was not recorded."""
-    runs = (run for run in recording[segment].epochs if run.epoch == epoch)
-    return next((run.history() for run in runs), None)
+    return next((run.history() for run in recording[segment].epochs if run.epoch == epoch), None)
