@@ -411,7 +411,7 @@ def test_a_face_with_a_period_that_no_loop_has_is_refused(gripping: Path, period
         ("[" * 100_000, "holds no description"),
         ('{"groups": [{"count": 1e400}]}', "not complete"),
         ('{"groups": [{"name": "a", "count": 1, "array": 0, "type": {"name": "", "size": 8, '
-         '"fields": [{"name": "", "kind": {}, "size": 8, "shape": []}]}}]}', "not complete"),
+         '"fields": [{"name": "", "kind": {}, "size": 8, "shape": []}]}}]}', "wrong type"),
         ('{"groups": [{"name": "a", "count": 1, "array": 0, "type": {"name": "", "size": 0, '
          '"fields": [{"name": "", "kind": "enum", "size": 0, "shape": []}]}}]}', "not complete"),
     ],
