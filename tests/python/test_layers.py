@@ -216,7 +216,7 @@ CEILINGS = {
     "devices": (8_852, 4_500),
     "gateways/lerobot": (530, 690),
     "gateways/ros2": (904, 955),
-    "robots/arms": (4_420, 3_141),
+    "robots/arms": (4_420, 3_142),
     "robots/pam, robots/two_joints": (2_108, 1_184),
     "simulators/mujoco": (5_372, 4_685),
     "apps/table_tennis": (8_400, 4_400),

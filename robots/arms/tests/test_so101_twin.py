@@ -249,7 +249,7 @@ def test_the_tracker_of_the_example_stands_for_the_world() -> None:
     tracker = o80.robots.load(f"{EXAMPLE / 'tracked.py'}:Tracker")
     with (
         o80.robots.load("so101_twin").start("tracked_arm") as arm,
-        tracker.start("tracker", frequency=100, arm="tracked_arm"),
+        tracker.start("tracker", frequency=100, arm="tracked_arm") as process,
         make(module.Tracked, pacing="real_time", attach="tracked_arm", **patient) as environment,
     ):
         task: Any = environment.task
@@ -268,6 +268,7 @@ def test_the_tracker_of_the_example_stands_for_the_world() -> None:
             while own.row < first + 30:
                 own.read(SimpleNamespace())
             assert own.world.latest().iteration == own.row - first, "it mirrors each row once"
+            process.stop()
             arm.stop()
             with pytest.raises(Exception, match="the arm 'tracked_arm' has ended"):
                 own.read(Reading.__new__(Reading))
