@@ -218,7 +218,7 @@ CEILINGS = {
     "gateways/ros2": (904, 955),
     "robots/arms": (4_420, 3_142),
     "robots/pam, robots/two_joints": (2_108, 1_184),
-    "simulators/mujoco": (5_372, 4_685),
+    "simulators/mujoco": (5_372, 4_686),
     "apps/table_tennis": (8_400, 4_400),
     "benchmarks, tools": (4_478, 0),
     "examples": (2_082, 0),

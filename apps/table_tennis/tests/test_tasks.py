@@ -22,7 +22,7 @@ STILL = np.zeros(MUSCLES, dtype=np.float32)
 class KeepStillTask(ReturnTask):
     """A user's own: each step costs the speed of the arm, whatever the ball does."""
 
-    uncopied: Any = (number for number in ())
+    uncopied: Any = (letter for letter in "uncopied")
 
     def eventful(self, state: State) -> Any:
         return np.ones(np.shape(state.steps), np.bool_)

@@ -606,7 +606,8 @@ def test_a_recording_holds_the_episodes_and_replays(tmp_path: Path) -> None:
 
 
 def test_by_the_clock_too_an_episode_begins_with_its_first_step(tmp_path: Path) -> None:
-    file, options = tmp_path / "run.mcap", {"max_late": 10**6, "max_drift": 1e6, "max_steps": 2}
+    file = tmp_path / "run.mcap"
+    options: dict[str, Any] = {"max_late": 10**6, "max_drift": 1e6, "max_steps": 2}
     with make(Still, pacing="real_time", record=file, **options) as environment:
         environment.reset(seed=1)
         robot = environment.task.engine.frontends[0]
