@@ -209,7 +209,7 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 CEILINGS = {
     "include, src": (34_176, 0),
     "python/bindings": (5_721, 0),
-    "python/o80": (29_910, 0),
+    "python/o80": (29_917, 0),
     "python/o80/hybrid": (2_403, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (8_400, 4_400),
     "benchmarks, tools": (4_478, 0),
     "examples": (2_082, 0),
-    "tests, conftest.py": (0, 63_319),
+    "tests, conftest.py": (0, 63_321),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 import o80
+from o80.base.installation import check_version
 
 ROOT = Path(__file__).resolve().parents[2]
 INSTALLED = Path(o80.__file__).parent
@@ -69,6 +70,7 @@ def test_packages_of_another_version_than_o80_refuse_to_be_imported(tmp_path: Pa
 
     fits = f"does not fit o80 {o80.__version__}: install both in one version, pip install"
     assert said == [f"{name} 9.9 {fits} {name}=={o80.__version__}" for name in names]
+    check_version("sources-without-metadata")  # as in a frozen program
 
 
 def test_files_of_another_version_than_the_compiled_module_refuse_to_be_imported(

@@ -147,7 +147,7 @@ class TableTennisEnvironment(HybridEnvironment):
         return statistics_of(self._counts, of_rig, self.arm, step_seconds=step, rows=rows)
 
     def render(self) -> Any:
-        """Draws the newest rows (480, 640, 3) for `rgb_array`; None for `human`, see `Page`."""
+        """Draws the newest rows: (480, 640, 3) for `rgb_array`; None for `human`, see `Page`."""
         return None if self._page is not None else super().render()
 
     def close(self) -> None:

@@ -52,7 +52,7 @@ def test_the_command_compares_policies_and_draws_their_landings(
     assert result.exit_code == 0, result.output
     figures = json.loads((tmp_path / "evaluation.json").read_text())
     assert list(figures) == ["still", "random"]
-    assert "0 % to 65.8 %" in result.output, "Wilson's interval of no ball of two"
+    assert "0 to 65.8 %" in result.output, "Wilson's interval of no ball of two"
     assert all(each["balls"] == 2 for each in figures.values())
     assert (tmp_path / "landings.png").stat().st_size > 1000
 

@@ -40,7 +40,7 @@ def progress(text: str) -> None:
 
 
 def source_of(segments: str, cameras: Sequence[RigCamera]) -> ImageSource:
-    """Attaches to running cameras. Raises TimeoutError, or InvalidArgument without a segment."""
+    """Attaches to running cameras. Raises TimeoutError, InvalidArgument (no segment, no images)."""
     names = [name.strip() for name in segments.split(",") if name.strip()]
     if not names:
         raise InvalidArgument("name the segments of the cameras: --segment video_cameras")

@@ -105,7 +105,7 @@ class CameraSegment:
 
 
 class ImageSource:
-    """Reads the newest images of all segments; older ones than the newest are dropped.
+    """Reads each segment's newest images; drops those older than the newest by more than `skew`.
 
     skew: longest time between images that count as simultaneous [s].
     """

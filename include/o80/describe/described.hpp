@@ -154,7 +154,7 @@ constexpr bool crosses_memory() {
   }
 }
 
-/// Type of a shareable struct member; `Use` is any type.
+/// True if a member of type `T` may be shared as part of a struct; `Use` is any type.
 template <class T, class Use>
 inline constexpr bool kCrossesMemory = crosses_memory<T, Use>();
 

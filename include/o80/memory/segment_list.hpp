@@ -24,7 +24,7 @@ struct SegmentEntry {
   bool played = false;    // a recording is played into it
   std::string problem{};  // reason if not readable
 
-  /// State for a text; rows are not read, so that a hanging backend counts as running.
+  /// State as a text; rows are not read, so that a hanging backend counts as running.
   const char* state() const noexcept;
 };
 

@@ -46,7 +46,7 @@ struct DesiredView {
   std::int64_t time;    // [ns]
   std::int64_t period;  // [ns]
   /// First (order 1) or second difference, to the previous iteration, of the number at this offset
-  /// of the desired block; 0 for an inactive number. Null: no differences.
+  /// of the desired block; 0 if its actuator is inactive or it does not move. Null: no differences.
   double (*difference)(const void* context, std::uint32_t offset, std::uint32_t order) = nullptr;
   const void* context = nullptr;
 };

@@ -46,10 +46,17 @@ def _names_group(place: str, group: bytes) -> bool:
 
 
 def check_version(package: str) -> None:
-    """Raises ImportError unless the installed package has the version of o80."""
+    """Raises ImportError if the package is installed in another version than o80.
+
+    Sources in sys.path and frozen programs have no metadata: nothing is compared there.
+    """
     from importlib import metadata
 
-    if (found := metadata.version(package)) != version():
+    try:
+        found = metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return
+    if found != version():
         raise ImportError(
             f"{package} {found} does not fit o80 {version()}: install both in one version, "
             f"pip install {package}=={version()}"

@@ -42,7 +42,7 @@ def names_of(place: Literal["start", "inline", "backend"]) -> list[str]:
 
 
 def loop_texts(given: Mapping[str, Any], names: Iterable[str]) -> list[tuple[str, str]]:
-    """Converts the named options that are not None to names and texts.
+    """Converts the named options, unless None, False or an empty list, to names and texts.
 
     given: the arguments of a function. Raises InvalidArgument with the option's name and allowed
     values for a wrong value.

@@ -198,7 +198,7 @@ def _episode(
     fields: Sequence[str],
     left_out: list[str],
 ) -> Episode:
-    """Makes an episode. Raises InvalidArgument if it was dropped or rows are missing."""
+    """Makes an episode. Raises InvalidArgument if it was dropped, lacks rows or has no step."""
     mark = span.marks[0]
     where = f"episode {span.number} (mark at row {mark.rows[segment]})"
     if span.dropped:

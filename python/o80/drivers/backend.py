@@ -48,7 +48,7 @@ class Running:
 
 
 def check_end(answer: StartAfresh | None, rejected: str | None) -> None:
-    """Raises InvalidArgument for a wrong answer, a wrong text, or both together."""
+    """Raises InvalidArgument for a wrong answer or text, or if there is an answer and a text."""
     if answer is not None and not isinstance(answer, StartAfresh):
         raise InvalidArgument(
             f"answer must be None or o80.StartAfresh(...), got {answer!r}; to reject the "

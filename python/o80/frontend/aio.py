@@ -51,7 +51,7 @@ class Waits:
         seen: _core.Observation | _core.Seen | None = None,
         check: bool = True,
     ) -> _core.Observation:
-        """Sends all added commands and waits for their end; see `Frontend.pulse_and_wait`."""
+        """Sends all that was added and waits until it has ended; see `Frontend.pulse_and_wait`."""
         frontend = self._frontend
         try:
             if frontend._is_inline:  # iterations of an inline robot run in the calling thread

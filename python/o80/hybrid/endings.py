@@ -38,7 +38,7 @@ class Endings:
         self.arrays["running"][copies] = self.running[copies]
 
     def take(self, copies: NDArray[np.intp], outcome: Outcome, halted: Mask, late: Mask) -> Outcome:
-        """Combines the outcomes of all worlds, from `judge`, to those of these copies.
+        """Returns the outcome of these copies, from what `judge` returned for all their worlds.
 
         halted, late: (n,) copies that ended so. Raises InvalidArgument for a wrong shape or reward.
         """

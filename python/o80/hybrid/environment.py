@@ -102,7 +102,7 @@ class _Marks:
         """Marks an unfinished episode as dropped."""
         if self._runs:
             self.recording.mark("episode_dropped")
-        self._runs = False
+        self._runs, self._begins = False, {}
 
     def begin(self, seed: int | None, state: str, options: Mapping[str, Any]) -> None:
         """Prepares the mark of an episode; state: of the generator before the reset."""

@@ -127,10 +127,10 @@ class Teleoperation:
     def step(self) -> bool:
         """Waits for the next row of the leader and commands the follower; True if it follows.
 
-        If the leader is silent or halted meanwhile, the follower is halted, with the reason in
-        `why`; following continues once it is resumed and near again. If the leader jumps by more
-        than `near` from row to row, the follower stays at its last target until it is near again.
-        Raises BackendGone, and the exceptions of pulse.
+        If the leader is silent or halted while the follower follows, the follower is halted, with
+        the reason in `why`; following continues once that is resumed and near again. If the leader
+        jumps by more than `near` from row to row, the follower stays at its last target until it
+        is near again. Raises BackendGone, and the exceptions of pulse.
         """
         try:
             seen = self._next_row()

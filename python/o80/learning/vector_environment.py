@@ -196,7 +196,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
 
     @property
     def final_observations(self) -> Any:
-        """Returns (copies, ...) after the last step, before the resets in it; fresh.
+        """Returns observations (copies, ...) after the last step, before the resets in it; fresh.
 
         In SAME_STEP mode they include `infos["final_obs"]` of ended copies, as one array for all
         copies, to estimate the value of final states.

@@ -230,7 +230,7 @@ class Playback(Closeable):
                 each.stop()
 
     def _note_served(self) -> None:
-        """Counts a track that has published its last row; after the last one, playback is done."""
+        """Counts a track that published its last row; the last one ends playback, if not looped."""
         with self._lock:
             self._served += 1
             if self._served == len(self._players) and not self._loop:

@@ -66,7 +66,7 @@ class FoundRecording:
         return max((run.end for run in self.runs if run.rows), default=0)
 
     def has(self, text: str) -> bool:
-        """True if the path, a segment, a robot or a mark contains a text, in any case."""
+        """True if the path, a segment, a robot or a mark contains a text; case does not matter."""
         texts = [str(self.path)]
         texts += [each for run in self.runs for each in (run.segment, run.robot)]
         texts += [each for name, _, values in self.marks for each in (name, values)]

@@ -251,7 +251,7 @@ class History:
 
     @property
     def iteration(self) -> NDArray[np.int64]:
-        """Iterations: (T,), in steps of 1."""
+        """Iterations: (T,), rising; by 1, unless rows are missing or a slice has left some out."""
         return self._part("iteration")
 
     @property

@@ -246,7 +246,7 @@ def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]
 
 
 def first_fields(actuators: Sequence[int], layout: Layout) -> list[int]:
-    """Returns the mask of the numbers in an array of targets, like `states_of`."""
+    """Returns the mask, in the form of `states_of`, that selects the first field of each state."""
     kinds = state_types(actuators, layout)
     masks = [_mask_of(kind.names[:1], kind) if kind.names else [] for kind in kinds]
     if not any(masks):

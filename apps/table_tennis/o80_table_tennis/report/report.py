@@ -51,7 +51,7 @@ def print_table(console: Console, title: str, columns: Mapping[str, Mapping[str,
     grid = Grid(title=title, title_justify="left")
     grid.add_column("")
     for name in columns:
-        grid.add_column(escape(name), justify="right")
+        grid.add_column(escape(name), justify="right", max_width=44 // len(columns))
     for key in dict.fromkeys(key for figures in columns.values() for key in figures):
         name, _, percentile = key.rpartition("_p")
         if label := LABELS.get(key) or LABELS.get(name):
@@ -64,7 +64,7 @@ def _text(key: str, value: Any) -> str:
     if value is None:
         return ""
     if isinstance(value, list):
-        return " to ".join(_text(key, each) for each in value)
+        return " to ".join(_text(key, each) for each in value).replace(" % to", " to")
     if not isinstance(value, float):
         return str(value)
     return f"{100 * value:.3g} %" if key in SHARES else f"{value:g}"

@@ -41,8 +41,8 @@ class Training(Closeable):
     ) -> None:
         """settings: None for the settings of the training in the folder.
 
-        Raises InvalidArgument, before anything is written, if the folder holds a training but
-        `resume` is false, holds one with other settings, or holds none to resume.
+        Raises InvalidArgument, before anything is written, if the folder has none to resume or one
+        with other settings, or holds one although `settings` are given and `resume` is false.
         """
         self.folder = Path(folder)
         saved: dict[str, Any] | None = None

@@ -27,7 +27,7 @@ struct Targets {
   std::vector<std::byte> states;  // of mode actuated, as desired
 };
 
-/// Simulation of a model: joints are imposed or controlled, the engine integrates all else.
+/// Simulation of a model: the engine integrates everything but imposed joints and `Balls`.
 ///
 /// Move-only. Realtime: everything but the constructor; no allocation, no lock. A snapshot holds
 /// the complete state: a restored simulation continues bit for bit.

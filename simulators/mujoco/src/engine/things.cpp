@@ -32,7 +32,7 @@ void make_files_absolute(mjSpec& spec, const path& folder) {
   }
 }
 
-/// Suppresses the warning of repeated names, which are an error of the compilation.
+/// Attaches `things`, without the warning of repeated names: compilation reports them as errors.
 bool attached(mjsFrame& frame, const mjSpec& things) {
   static std::mutex swaps;  // copies are constructed by several threads
   const std::scoped_lock lock(swaps);
