@@ -207,7 +207,7 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_176, 0),
+    "include, src": (34_177, 0),
     "python/bindings": (5_721, 0),
     "python/o80": (29_917, 0),
     "python/o80/hybrid": (2_403, 0),
@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (8_400, 4_400),
     "benchmarks, tools": (4_478, 0),
     "examples": (2_082, 0),
-    "tests, conftest.py": (0, 63_321),
+    "tests, conftest.py": (0, 63_338),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

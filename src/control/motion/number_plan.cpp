@@ -206,6 +206,7 @@ void NumberPlan::settle(std::int64_t iterations) noexcept {
   shape_ = Shape::line;
   if (!accelerates) return;
   if (!fastest_) fewest();
+  if (!fastest_) return;  // too far for a plan: on a line the guard keeps the limits
   if (fastest_->iterations() > iterations && is_smooth && proposed > 0 && smooth(proposed)) return;
   fastest_->stretch(iterations);
   shape_ = Shape::fastest;

@@ -8,6 +8,7 @@
 #include <random>
 
 #include "control/motion/number_limiter.hpp"
+#include "control/motion/number_plan.hpp"
 
 namespace o80 {
 namespace {
@@ -21,6 +22,21 @@ TEST(FastestMotionTest, FromRestToRestTakesTheKnownTime) {
   // jerk only: 4 (d / 2 j)^(1/3)
   EXPECT_EQ(FastestMotion({}, -0.25, {10.0, 10.0, 1e-6}).iterations(), 200);
   EXPECT_EQ(FastestMotion({1.0}, 1.0, rates).iterations(), 1);
+}
+
+TEST(FastestMotionTest, ATargetTooFarForAPlanIsNotApproachedByTheMotionBefore) {
+  NumberPlan plan;
+  for (const double target : {-500.0, 1e6}) {
+    PlanTask task;
+    task.target = target;
+    task.rates = {1e-6, 1e-8, std::numeric_limits<double>::infinity()};
+    task.stop = VelocityChange(0.0, 0.0, task.rates);
+    task.iterations = 3'000'000'000;
+    plan.settle(plan.propose(task));
+    double reached = 0.0;
+    for (int i = 0; i < 1000; ++i) reached = plan.next();
+    EXPECT_GT(reached * target, 0.0) << target;
+  }
 }
 
 TEST(FastestMotionTest, LetsGoOfTheBrakeForATargetJustBeyondTheWayToRest) {
