@@ -16,7 +16,7 @@ from o80.robots.process import start_process
 # imports all lazily loaded names: an interrupt during `exec`, which creates dataclasses, makes
 # Python end with the status of an uncaught interrupt, and an interrupt while an import releases
 # its lock is lost
-for _name in o80.__all__:
+for _name in vars(o80)["__all__"]:
     getattr(o80, _name)
 
 
