@@ -228,7 +228,10 @@ class ActuatorQueue {
     return planned_ || (row_is_over && rows_left_ > 0);
   }
   bool end_late(Iteration iteration, std::uint32_t& late_budget) noexcept;
-  void give_way(Iteration iteration) noexcept { end(leave(), {Status::overwritten}, iteration); }
+  void give_way(Iteration iteration) noexcept {
+    if (iteration > motion_.last() + 1) carry_.reset();  // begins late: its time counts anew
+    end(leave(), {Status::overwritten}, iteration);
+  }
   void begin_command(const std::byte* observed) noexcept;
   const std::uint64_t* mask_of(BlockIndex record) noexcept;
   void begin_chunk() noexcept;

@@ -10,6 +10,16 @@ namespace {
 
 constexpr std::int64_t kPeriodNs = 1'000'000;
 
+/// True if rows that follow their limits may have given way in the iteration after they were due:
+/// what comes then has their exact time. `previous` can be null.
+bool gave_way_when_due(const ScriptWorld& world, const SentCommand* previous) {
+  if (previous == nullptr || previous->status != Status::overwritten) return false;
+  const auto& times = world.step_of(*previous).times;
+  if (times.empty()) return false;
+  const auto rows = static_cast<std::int64_t>(times.size());
+  return world.iteration <= previous->active_since + std::max(rows, times.back() / kPeriodNs + 1);
+}
+
 }  // namespace
 
 TimeWatch::TimeWatch(const ScriptWorld& world) { restart(world); }
@@ -73,7 +83,9 @@ void TimeWatch::begin(const ScriptWorld& world, std::size_t actuator) {
                         previous->status == Status::completed &&
                         world.actuators[actuator].dropped_at != world.iteration &&
                         world.step_of(*world.actuators[actuator].driver).head.mode == Mode::queue;
-  if (!unbroken) clocks_[actuator] = {(world.iteration - 1) * kPeriodNs, true};
+  if (!unbroken) {
+    clocks_[actuator] = {(world.iteration - 1) * kPeriodNs, !gave_way_when_due(world, previous)};
+  }
   if (world.actuators[actuator].maybe_dropped_at == world.iteration) {
     clocks_[actuator].known = false;
   }

@@ -116,6 +116,23 @@ TEST(Trajectory, ACurveThroughAParabolaHasItsSlopes) {
   }
 }
 
+/// Rows due at one time take an iteration each: what follows at once makes up for them.
+TEST(Trajectory, OnlyWhatFollowsAtOnceMakesUpForTheRoundingOfItsTimes) {
+  for (const Iteration sent : {Iteration{3}, Iteration{20}}) {
+    ChunkRig rig(limited_robot(limits_of(1.0, kNoLimit, kNoLimit)));
+    RecordHead head = paced(Pace::duration, 0);
+    head.profile = Profile::linear;
+    const std::int64_t time = kMillisecond / 2;
+    rig.add_rows(0, head, 4, {1.0, 1.0, 1.0, 1.0}, {time, time, time, time});
+    rig.pulse();
+    rig.run_to(sent);
+    rig.add(0, during(10 * kMillisecond), {rig.desired()});
+    const CommandId id = record_id(rig.pulse(), 0);
+    rig.run_to(60);
+    EXPECT_EQ(rig.witness.last(id).iteration, sent == 3 ? 11 : sent + 9);
+  }
+}
+
 /// Any rows and profiles, as far apart as a double allows, one motion taking over from another.
 TEST(Trajectory, HugeRowsStayFinite) {
   constexpr std::array kValues{-1.7e308, 1.7e308, 0.0, 1e-300};
