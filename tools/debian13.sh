@@ -3,11 +3,19 @@
 #   tools/debian13.sh                   as an ordinary user, who is first told what is missing
 #   tools/debian13.sh root              as root, for whom it is installed
 #   tools/debian13.sh USER COMMAND...   another command, in the copy of the checkout of `o80` or `root`
+#   tools/debian13.sh wheels [SUITE]    installs build/wheels in another chroot (build/wheels_SUITE, by default
+#                                       of trixie; bookworm is Debian 12), which has no compiler, and runs demos
 set -euo pipefail
 cd "$(dirname "$0")/.."
-user=${1:-o80} root=$PWD/build/debian13
+user=${1:-o80} suite=trixie root=$PWD/build/debian13 packages=ca-certificates,make,sudo
 command=(bash -ec 'make demo; make test')
 [ $# -le 1 ] || command=("${@:2}")
+if [ "$user" = wheels ]; then
+  user=o80 suite=${2:-trixie} packages=ca-certificates,python3-venv
+  root=$PWD/build/wheels_$suite
+  ls build/wheels/*.whl > /dev/null || { echo "run \`make wheel\` first" >&2; exit 1; }
+  command=(bash -e try_wheels.sh)
+fi
 [ "$(id -u)" -eq 0 ] || { echo "a chroot needs root: run \`make debian13\` as root" >&2; exit 1; }
 
 # in namespaces of its own: the kernel unmounts all and ends all processes, however this one ends
@@ -33,11 +41,12 @@ as_user() {
 if [ ! -e "$root/made" ]; then
   # the mirror from which this machine has its own packages
   mirror=$(apt-get indextargets --format '$(REPO_URI)' 'Created-By: Packages' 'Label: Debian' | head -n 1)
-  say "making build/debian13"
+  say "making ${root#"$PWD"/}"
   rm -rf "$root"
-  debootstrap --variant=minbase --include=ca-certificates,make,sudo trixie "$root" \
+  debootstrap --variant=minbase --include=$packages $suite "$root" \
     ${mirror:+"$mirror"} > build/debian13.log || { tail -n 20 build/debian13.log >&2; exit 1; }
   chroot "$root" useradd -m -s /bin/bash o80
+  mkdir -p "$root/etc/sudoers.d"
   echo 'o80 ALL=(ALL) NOPASSWD: ALL' > "$root/etc/sudoers.d/o80"
   touch "$root/made"
 fi
@@ -64,6 +73,12 @@ chown -R "$owner:$owner" "$home"/.[!.]* # programs write their settings there, t
 copy=$home/o80
 mkdir -p "$copy"
 find "$copy" -mindepth 1 -maxdepth 1 ! -name .venv ! -name build -exec rm -rf {} +
+if [ "${1-}" = wheels ]; then
+  cp -r build/wheels tools/try_wheels.sh "$copy"
+  chown -R "$owner:$owner" "$copy"
+  as_user "${command[@]}"
+  exit
+fi
 tar -c --exclude=./.git --exclude=./.venv --exclude=./build --owner="+$owner" --group="+$owner" . |
   tar -x -C "$copy"
 chown "$owner:$owner" "$copy"

@@ -200,6 +200,7 @@ with robot.start() as process, process.frontend() as arm:
     print(arm.pulse_and_wait(timeout=30).desired[1])
 """
     assert core.python(program) == "0.5"
+    assert "Type next" in core.run("o80", "demo")
     assert "two_joints" in core.run("o80", "run", "--help")
 
 

@@ -133,6 +133,18 @@ def test_every_page_and_section_that_a_source_names_exists() -> None:
     assert not broken
 
 
+def test_the_page_on_compatibility_names_the_formats_of_this_version() -> None:
+    page = (ROOT / "docs" / "compatibility.md").read_text()
+    for constant, file, phrase in (
+        ("kJournalCodec", "src/runtime/journal/journal_format.hpp", "format of the journal ({})"),
+        ("kMotionRules", "src/control/motion/number_plan.hpp", "motion rules ({} in 0.1.0)"),
+        ("kSegmentVersion", "src/memory/segment/segment_layout.hpp", "version ({} in 0.1.0)"),
+        ("kRobotTableVersion", "include/o80/robot/table.hpp", "built for ({} in 0.1.0)"),
+    ):
+        (number,) = re.findall(rf"\b{constant} = (\d+);", (ROOT / file).read_text())
+        assert phrase.format(number) in page
+
+
 # ---------------------------------------------------------------------------- the contract
 
 RULE = re.compile(r"^- \*\*([A-Z]\d+)\*\* .+ \((`[\w.]+`(?:, `[\w.]+`)*)\)$", re.MULTILINE)

@@ -209,7 +209,7 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 CEILINGS = {
     "include, src": (34_177, 0),
     "python/bindings": (5_721, 0),
-    "python/o80": (29_917, 0),
+    "python/o80": (30_022, 0),
     "python/o80/hybrid": (2_403, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
@@ -219,10 +219,10 @@ CEILINGS = {
     "robots/arms": (4_420, 3_142),
     "robots/pam, robots/two_joints": (2_108, 1_184),
     "simulators/mujoco": (5_372, 4_686),
-    "apps/table_tennis": (8_400, 4_400),
+    "apps/table_tennis": (8_400, 4_409),
     "benchmarks, tools": (4_478, 0),
     "examples": (2_082, 0),
-    "tests, conftest.py": (0, 63_338),
+    "tests, conftest.py": (0, 63_548),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -5,8 +5,10 @@ from pathlib import Path
 
 import gymnasium
 import pytest
-from pages import programs, run_programs
+from pages import DOCS, programs, run_programs
 from processes import run_python
+
+import o80
 
 
 def test_the_first_program_about_commands_runs(capsys: pytest.CaptureFixture[str]) -> None:
@@ -85,3 +87,21 @@ def test_the_programs_about_joining_run(capsys: pytest.CaptureFixture[str]) -> N
     assert int(time) > 0
     assert int(error) > 0
     assert int(epoch) >= 0
+
+
+def test_the_page_about_the_first_o80_names_verbs_of_a_frontend_that_exist() -> None:
+    (table,) = re.findall(
+        r"^## Frontends\n(.*?)^## ", (DOCS / "from_the_first_o80.md").read_text(), re.M | re.S
+    )
+    here = [line.split(" | ")[1] for line in table.splitlines()[2:] if line.count(" | ") > 1]
+    verbs = set(re.findall(r"(?<![.\w])(\w+)\(", "".join(here)))
+
+    assert len(here) >= 20
+    assert {"add_command", "burst", "history", "wait_for"} <= verbs
+    assert not [verb for verb in verbs if not hasattr(o80.Frontend, verb) and verb != "len"]
+
+
+def test_the_program_about_the_first_o80_runs(capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(programs("from_the_first_o80.md")[1], "from_the_first_o80.md", "exec"), {})
+
+    assert capsys.readouterr().out == "[0.  0.5]\n"

@@ -22,3 +22,12 @@ def test_the_program_says_what_it_does() -> None:
 
     assert done.returncode == 0, done.stderr
     assert "Plays table tennis in real time, then accelerated" in done.stdout
+
+
+def test_the_program_is_a_demo_of_o80() -> None:
+    o80 = Path(sys.executable).parent / "o80"
+    words = ("demo", "table_tennis", "--episodes", "0", "--real-time-episodes", "0")
+    done = subprocess.run([o80, *words], capture_output=True, text=True)
+
+    assert "nothing to play: ask for at least one episode" in done.stderr
+    assert "o80 demo table_tennis" in done.stderr

@@ -9,6 +9,7 @@ import o80._core as _core
 from o80.base import installation, progress
 
 COMMANDS = {
+    "demo": "demo.demo",
     "run": "run.run",
     "doctor": "doctor.doctor",
     "list": "list_segments.list_segments",
@@ -47,8 +48,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     suggest_commands=True,
     context_settings={"help_option_names": ["-h", "--help"]},
-    epilog="A first try: [bold]o80 run two_joints[/bold] here, [bold]o80 list[/bold] and "
-    "[bold]o80 echo two_joints[/bold] in another terminal.",
+    epilog="A first try: [bold]o80 demo[/bold]; then [bold]o80 run two_joints[/bold] here, "
+    "[bold]o80 list[/bold] and [bold]o80 echo two_joints[/bold] in another terminal.",
 )
 
 
@@ -83,8 +84,8 @@ def run_app(words: list[str]) -> None:
             continue
         module, function = COMMANDS[name].split(".")
         command = getattr(importlib.import_module(f"o80.cli.{module}"), function)
-        if name == "run":  # options of robots are not typer's
-            app.command(name, context_settings=RAW, add_help_option=False)(command)
+        if name in ("run", "demo"):  # options of robots and of packages are not typer's
+            app.command(name, context_settings=RAW, add_help_option=name != "run")(command)
         else:
             app.command(name)(command)
     app(words)

@@ -1,9 +1,10 @@
-"""Makes a recording of the present format: `python tests/data/recordings/make.py codec_1`.
+"""Makes a recording of the present format: `make.py codec_1` or `make.py kinds_1`, in this folder.
 
 The files stay as they are when o80 changes, so that later versions must read what this one wrote. A
 change of the format gets a file of its own. The JSON beside a file says what must be found in it.
 
 codec_1.mcap: journal in version 1
+kinds_1.mcap: fields of each kind, in a folder of several files, without compression
 """
 
 import dataclasses
@@ -12,6 +13,7 @@ import json
 import subprocess
 import sys
 from dataclasses import replace
+from enum import IntEnum
 from pathlib import Path
 from typing import Any
 
@@ -19,10 +21,12 @@ import numpy as np
 
 import o80
 from o80 import _core
+from o80.recording.file_writer import Form
+from o80.recording.reader import files_of
 from o80.recording.recorder import Recorder
 
 HERE = Path(__file__).parent
-SEGMENT, BENCH = "joints", "bench"
+SEGMENT, BENCH, KINDS = "joints", "bench", "kinds"
 MAX_NUMBERS = 16
 
 # ---------------------------------------------------------------------------- what is played
@@ -228,6 +232,47 @@ print('sent', flush=True)
 input()
 """
 
+
+class Tool(IntEnum):
+    NONE = 0
+    BRUSH = 3
+    HOOK = -2
+
+
+def record_kinds(path: Path) -> None:
+    """Fields of each kind, alone, in arrays and in structs, with padding between them."""
+    dtypes = ["?", "i1", "u8", "i2", "f4", "u1", "i8", "u2", "f8", "i4", "u4"]
+    cell = np.dtype([("on", "?"), ("force", "f8"), ("mode", "i2", (2,))])
+    sensors: dict[str, Any] = {f"n_{kind.replace('?', 'b')}": np.dtype(kind) for kind in dtypes}
+    sensors |= {"tool": Tool, "grid": ("f4", (2, 3)), "cells": (cell, (2,))}
+    hand = {"position": float, "tool": Tool, "inner": {"steps": np.int32, "force": np.float32}}
+    groups = {"wrist": (float, ["roll", "pitch"]), "hand": hand, "valve": bool, "tool": Tool}
+    with o80.Backend(KINDS, groups, extended=sensors, frequency=500.0) as backend:
+        backend.publish()
+        with o80.Frontend(KINDS) as arm:
+            recorder = Recorder(path, [KINDS], split="8k", form=Form(compression="none"))
+            while recorder.sources[KINDS].newest != 0:
+                recorder.catch_up()
+            arm.add_command("roll", 0.5, iterations=20)
+            arm.add_command("hand", {"position": 0.25, "tool": Tool.HOOK}, iterations=9)
+            arm.add_command("valve", True)
+            arm.add_command("tool", Tool.BRUSH)
+            arm.pulse()
+            for i in range(1, 61):
+                values: dict[str, Any] = {}
+                for name, kind in list(sensors.items())[: len(dtypes)]:
+                    values[name] = i % 2 == 1 if kind.kind == "b" else kind.type(i)
+                values["tool"] = list(Tool)[i % 3]
+                values["grid"] = np.arange(6, dtype="f4").reshape(2, 3) + i
+                values["cells"] = np.array([(i % 2, i, (i, -i)), (1, -i, (3, 4))], cell)
+                desired = backend.step()
+                assert desired is not None
+                backend.publish({name: desired[name] for name in groups}, values)
+                if i % 30 == 0:  # a file each
+                    recorder.poll()
+            recorder.finish()
+
+
 # ---------------------------------------------------------------------------- what must be found
 
 
@@ -294,17 +339,21 @@ def main() -> None:
     o80.Frontend.provenance = property(  # type: ignore[assignment,method-assign]
         lambda self: replace(told.fget(self), library=library if self.segment == SEGMENT else "")
     )
-    recorder = Recorder(path, [SEGMENT, BENCH])
-    play_two_runs(recorder)
-    play_bench(recorder)
-    recorder.finish()
+    if path.stem.startswith(KINDS):
+        record_kinds(path)
+    else:
+        recorder = Recorder(path, [SEGMENT, BENCH])
+        play_two_runs(recorder)
+        play_bench(recorder)
+        recorder.finish()
     write_facts(path)
 
 
 def write_facts(path: Path) -> None:
     text = json.dumps(found_in(path))
     path.with_suffix(".json").write_text(text + "\n")
-    print(f"{path.stat().st_size} bytes, {len(text)} bytes of JSON")
+    size = sum(file.stat().st_size for file in files_of(path))
+    print(f"{size} bytes, {len(text)} bytes of JSON")
 
 
 if __name__ == "__main__":

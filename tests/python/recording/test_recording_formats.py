@@ -5,16 +5,19 @@ import json
 import math
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import pytest
 from processes import WAIT
 
 import o80
 from o80 import _core
+from o80.recording.reader import files_of
 
 RECORDINGS = Path(__file__).resolve().parents[2] / "data" / "recordings"
 NAMES = [path.stem for path in sorted(RECORDINGS.glob("*.mcap"))]
-CODECS = {"codec_1": 1}
+CODECS = {"codec_1": 1, "kinds_1": 1}  # of their journals
+JOURNALS = [name for name in NAMES if name.startswith("codec")]
 
 
 @pytest.fixture(scope="module")
@@ -31,6 +34,12 @@ def make() -> ModuleType:
 def test_there_is_a_recording_of_each_version_of_the_format() -> None:
     assert sorted(CODECS) == sorted(NAMES)
     assert set(CODECS.values()) == set(range(1, _core.JOURNAL_CODEC + 1))
+    assert _core.MOTION_RULES in set(map(motion_rules, NAMES))  # else a replay shows nothing
+
+
+def motion_rules(name: str) -> int | None:
+    (segment, *_) = o80.open(RECORDINGS / f"{name}.mcap").segments.values()
+    return segment.epochs[0].provenance.motion_rules
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -44,12 +53,28 @@ def test_a_recording_of_an_earlier_version_is_read(name: str, make: ModuleType) 
             assert epoch.journal_codec == CODECS[name]
 
 
+@pytest.mark.parametrize("driver", [False, True])
 @pytest.mark.parametrize("name", NAMES)
-def test_a_replay_of_an_earlier_version_finds_no_difference(name: str) -> None:
-    assert not o80.replay(RECORDINGS / f"{name}.mcap", driver=False).difference
+def test_a_replay_of_an_earlier_version_finds_no_difference(name: str, driver: bool) -> None:
+    report = o80.replay(RECORDINGS / f"{name}.mcap", driver=driver)
+
+    assert not report.difference
+    assert report.identical or motion_rules(name) != _core.MOTION_RULES, report
 
 
-@pytest.mark.parametrize("name", NAMES)
+def test_a_recording_of_an_earlier_version_holds_fields_of_each_kind() -> None:
+    (epoch,) = o80.open(RECORDINGS / "kinds_1.mcap")["kinds"].epochs
+    row: Any = epoch.history()[-1]
+
+    assert len(files_of(RECORDINGS / "kinds_1.mcap")) == 2
+    assert {row.extended[f"n_{kind}"].item() for kind in ("u1", "i4", "u8", "f4")} == {60}
+    assert (row.desired.hand.tool.name, row.desired.tool.name) == ("HOOK", "BRUSH")
+    assert row.extended.grid.tolist() == [[60, 61, 62], [63, 64, 65]]
+    assert row.extended.cells[0].item() == (False, 60.0, pytest.approx([60, -60]))
+    assert (row.desired.wrist[0], row.desired.valve, row.extended.tool.name) == (0.5, True, "NONE")
+
+
+@pytest.mark.parametrize("name", JOURNALS)
 def test_the_recordings_hold_what_a_journal_can_tell(name: str) -> None:
     """Except what only a race or damage brings about: the tests of the codec have that."""
     (bench,) = o80.open(RECORDINGS / f"{name}.mcap")["bench"].epochs
@@ -85,7 +110,7 @@ def test_the_recordings_hold_what_a_journal_can_tell(name: str) -> None:
     assert "unknown" not in {command.kind for command in commands}
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", JOURNALS)
 def test_a_recording_of_an_earlier_version_is_played(name: str, segment: str) -> None:
     path, prefix = RECORDINGS / f"{name}.mcap", f"{segment}-"
     (*_, run) = o80.open(path)["joints"].epochs
