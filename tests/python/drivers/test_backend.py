@@ -17,22 +17,6 @@ def run(backend: o80.Backend) -> None:
         backend.publish(desired)
 
 
-NAN = float("nan")
-
-
-def test_a_first_reading_has_to_be_numbers(segment: str) -> None:
-    joint = [("position", float), ("velocity", float)]
-    with o80.Backend(segment, ["elbow"], joint) as backend:
-        with pytest.raises(o80.InvalidArgument, match="velocity of actuator 'elbow'"):
-            backend.publish(np.array([(1.0, NAN)], joint))
-        with pytest.raises(o80.InvalidArgument, match="row 0"):
-            backend.step()
-        backend.publish(np.array([(1.0, 2.0)], joint))
-        desired = backend.step()
-        assert desired is not None
-        assert desired["velocity"].tolist() == [2.0]
-
-
 class Running:
     """The loop of a bursting backend, in a thread of its own; what it raised is kept."""
 
@@ -161,29 +145,6 @@ def test_states_of_another_shape_are_refused(segment: str, observed: object) -> 
         pytest.raises(o80.InvalidArgument, match="observed"),
     ):
         backend.publish(observed)
-
-
-def test_bursting_steps_wait_for_a_grant(segment: str) -> None:
-    with o80.Backend(segment, ["a"], bursting=True) as backend:
-        backend.publish([0.0])
-        with pytest.raises(o80.TimeoutError, match=segment):
-            backend.step(timeout=0.01)
-        with Running(backend), o80.Frontend(segment) as frontend:
-            frontend.add_command(0, 1.0, iterations=4)
-            assert frontend.burst(2, timeout=WAIT).observed.tolist() == [0.5]
-            frontend.add_command(0, 0.0, iterations=4)
-            assert frontend.pulse_and_wait(timeout=WAIT).iteration == 8
-            assert frontend.latest().time == 8_000_000
-
-
-def test_a_stop_from_another_thread_ends_the_steps(segment: str) -> None:
-    with o80.Backend(segment, ["a"], bursting=True) as backend:
-        backend.publish([0.0])
-        with Running(backend) as running:
-            backend.stop()
-        assert running.raised is None
-        with o80.Frontend(segment, dead=True) as frontend:
-            assert frontend.latest().iteration == 0
 
 
 def test_an_interrupted_command_says_so(segment: str) -> None:
