@@ -63,15 +63,6 @@ def test_every_option_reaches_the_driver_and_the_provenance(segment: str) -> Non
     assert len(told.library_sha256) == 64
 
 
-def test_a_seed_that_is_not_given_is_drawn_and_recorded(segment: str) -> None:
-    seeds = set()
-    for _ in range(3):
-        with o80.robots.load(RoomSensor).inline(segment) as room:
-            seeds.add(int(room.latest().extended.seed))
-            assert room.provenance.options["seed"] == str(room.latest().extended.seed)
-    assert len(seeds) == 3
-
-
 def test_options_are_listed_like_those_of_any_robot() -> None:
     options = {each.name: each for each in o80.robots.load("room_sensor:RoomSensor").options}
     assert options["mean"].help == "of the room"

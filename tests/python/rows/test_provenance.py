@@ -63,13 +63,3 @@ def test_keeps_texts_that_are_not_utf_8(segment: str, tmp_path: Path) -> None:
     assert Path(found.library) == library
     assert o80.Provenance.from_json(found.as_json()) == found
     assert "two??joints.so" in told
-
-
-def test_info_shows_it(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, reach=2.5):
-        told = run_o80("info", segment).stdout
-        described = run_o80("info", segment, "--json").stdout
-    assert "reach=2.5" in told
-    assert "frequency=1000" in told
-    assert f"{o80.version()}, sources " in told
-    assert json.loads(described)["provenance"]["options"]["reach"] == "2.5"
