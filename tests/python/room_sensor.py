@@ -149,19 +149,6 @@ class Paced:
         reading.extended["due"] = self.due
 
 
-class Forks:
-    """Forks in iteration 10, and returns from `write` in both processes."""
-
-    actuators = ("joint",)
-
-    def write(self, desired: Desired) -> None:
-        if desired.iteration == 10:
-            os.fork()
-
-    def read(self, reading: Reading) -> None:
-        reading.observed[0] = os.getpid()
-
-
 class Spins:
     """Spins in iteration 3 until the thread has lost its real-time priority."""
 

@@ -125,27 +125,6 @@ def test_a_segment_that_is_not_there_is_waited_for_and_said(tmp_path: Path) -> N
     assert "nothing of 'nobody' was recorded" in said
 
 
-def test_repair_finishes_a_cut_file_once(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with o80.Recording(path, arm) as recording:
-        arm.burst(20)
-        recording.flush()
-    whole, end = path.read_bytes(), scan(path).end
-    path.write_bytes(whole[: end + 5])
-
-    assert not o80.open(path).finished
-    assert "5 bytes behind them removed" in run("repair", path)
-    repaired = path.read_bytes()
-    assert repaired[:end] == whole[:end]  # then it says that it was cut
-    assert o80.open(path).finished
-    assert "is complete" in run("repair", path)
-    assert path.read_bytes() == repaired
-
-    path.write_bytes(b"")
-    assert "held no rows" in run("repair", path)
-    assert o80.open(path).finished
-
-
 def test_info_describes_a_recording(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     for gain in (13.0, 13.0, 15.0):

@@ -15,15 +15,6 @@ def entry_of(segment: str) -> o80.Segment:
     return next(entry for entry in o80.segments() if entry.name == segment)
 
 
-def test_a_backend_is_stopped_by_its_name(process: o80.robots.Process, segment: str) -> None:
-    with process.frontend() as arm:
-        o80.stop(segment, timeout=WAIT)
-
-        assert process.wait(WAIT) == 0
-        with pytest.raises(o80.BackendStopped):
-            arm.wait_for_next(timeout=WAIT)
-
-
 def test_a_backend_that_does_not_stop_in_time_is_told_of(segment: str) -> None:
     program = (
         "import signal, o80\n"

@@ -482,11 +482,8 @@ def test_minari_reads_its_data_set(
 # ---------------------------------------------------------------------------- command
 
 
-@pytest.mark.parametrize(("form", "every"), [("lerobot", "10"), ("minari", "0.01")])
-def test_the_command_writes_a_data_set(
-    form: str, every: str, recorded: Path, tmp_path: Path
-) -> None:
-    options = ("-o", tmp_path / "set", "--format", form, "--every", every)
+def test_the_command_writes_a_data_set(recorded: Path, tmp_path: Path) -> None:
+    options = ("-o", tmp_path / "set", "--format", "minari", "--every", "0.01")
     said = run_o80("export", recorded, *options).stdout
     assert "3 episodes, 7 steps at 100 a second" in said
 

@@ -214,16 +214,3 @@ def test_runs_of_different_days_begin_at_zero_each() -> None:
     figure = plot({name: run.history for name, run in runs.items()}, origins=zeros)
     begins = [np.asarray(ax.get_lines()[0].get_xdata())[0] for ax in figure.axes]
     assert begins == pytest.approx([0, 0.005, 0, 0])
-
-
-def test_recordings_made_one_after_the_other_share_an_axis(segment: str, tmp_path: Path) -> None:
-    for name in ("a", "b"):
-        with (
-            o80.robots.load("two_joints").inline(segment) as arm,
-            o80.Recording(tmp_path / f"{name}.mcap", arm),
-        ):
-            arm.burst(20)
-    done = run_o80("plot", tmp_path / "a.mcap", tmp_path / "b.mcap", "-o", tmp_path / "run.png")
-
-    assert "different times" not in done.stderr  # recorded within ten seconds
-    assert "42 rows" in done.stdout

@@ -2,7 +2,6 @@
 
 import random
 import re
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -64,15 +63,6 @@ def test_every_option_reaches_the_driver_and_the_provenance(segment: str) -> Non
     assert len(told.library_sha256) == 64
 
 
-def test_a_seed_that_is_not_given_is_drawn_and_recorded(segment: str) -> None:
-    seeds = set()
-    for _ in range(3):
-        with o80.robots.load(RoomSensor).inline(segment) as room:
-            seeds.add(int(room.latest().extended.seed))
-            assert room.provenance.options["seed"] == str(room.latest().extended.seed)
-    assert len(seeds) == 3
-
-
 def test_options_are_listed_like_those_of_any_robot() -> None:
     options = {each.name: each for each in o80.robots.load("room_sensor:RoomSensor").options}
     assert options["mean"].help == "of the room"
@@ -115,19 +105,6 @@ def test_wrong_options_are_named(given: dict[str, Any], text: str, segment: str)
 
 
 # ---------------------------------------------------------------------- verbs
-
-
-def test_commands_limits_and_rows_are_those_of_any_robot(segment: str) -> None:
-    with o80.robots.load(Joint).inline(segment, gain=1.0) as joint:
-        assert [each.name for each in joint.actuators] == ["shoulder", "elbow"]
-        with pytest.raises(o80.InvalidArgument, match="elbow"):
-            joint.add_command("elbow", 1.5)
-        joint.add_command(["shoulder", "elbow"], [2.0, -0.5], iterations=4)
-        joint.burst(4)
-        rows = joint.history(4)
-        np.testing.assert_allclose(rows.observed[:, 0], [0.5, 1.0, 1.5, 2.0])
-        np.testing.assert_allclose(rows.observed, rows.desired)
-        assert rows.active.all()
 
 
 def test_requests_answer_like_those_of_a_driver_in_cpp(segment: str) -> None:
@@ -429,6 +406,10 @@ class OddOption:
         ({"requests": {"home": None}}, r"the method on_home\(self, fields\)"),
         ({"actuators": ["a"], "limits": {"b": (0, 1)}}, "no actuator 'b'"),
         ({"frequency": -1}, "frequency must be a positive number"),
+        *(
+            ({"gap": gap}, r"gap must be from 0\.000001 to 3600 s, got")
+            for gap in (0.0, float("nan"), 1e9, "long")
+        ),
         ({"simulated": "no"}, "simulated must be True or False"),
         ({"extended": {"image": object}}, "must be a number of 1 to 8 bytes"),
     ],
@@ -496,27 +477,6 @@ def test_the_thermometer_of_the_page_runs(segment: str, tmp_path: Path) -> None:
             room.burst(2)
 
 
-# ---------------------------------------------------------------------- gaps
-
-
-def test_a_driver_may_describe_a_shorter_gap(segment: str) -> None:
-    with o80.robots.load(Joint).inline(segment) as joint:
-        assert "gap" not in joint.schema
-
-    class Hasty(Joint):
-        gap = 0.02
-
-    with o80.robots.load(Hasty).inline(segment) as joint:
-        assert joint.schema["gap"] == 0.02
-    for wrong in (0.0, float("nan"), 1e9, "long"):
-        Hasty.gap = wrong  # type: ignore[assignment]
-        with pytest.raises(o80.DriverError, match=r"gap must be from 0\.000001 to 3600 s, got"):
-            o80.robots.load(Hasty).inline(segment)
-
-
-# ---------------------------------------------------------------------- readings
-
-
 # ---------------------------------------------------------------------- differences
 
 
@@ -527,6 +487,7 @@ class Follower:
     dtype = {"angle": float, "on": bool}  # noqa: RUF012
     limits = {"left": {"angle": o80.Limits(speed=2.0, acceleration=15.0)}}  # noqa: RUF012
     frequency = 500.0
+    gap = 0.02
 
     def __init__(self) -> None:
         self.sums = np.zeros(2)
@@ -550,6 +511,7 @@ class Follower:
 
 def test_rates_of_desired_states_sum_to_the_states(segment: str) -> None:
     with o80.robots.load(Follower).inline(segment) as robot:
+        assert robot.schema["gap"] == 0.02
         robot.add_command("left", {"angle": 0.3})
         robot.add_command("right", {"angle": 1.0, "on": True}, iterations=40)
         robot.burst(60)
@@ -583,22 +545,3 @@ def test_rates_that_are_not_there_are_a_fault_that_says_so(
     named = type("Mistaken", (Mistaken,), {"field": field})
     with pytest.raises(o80.Error, match=said), o80.robots.load(named).inline(segment) as robot:
         robot.burst(1)
-
-
-# ---------------------------------------------------------------------- forks
-
-
-@pytest.mark.parametrize("bursting", [False, True])
-def test_a_child_that_returns_into_the_loop_ends_there(segment: str, bursting: bool) -> None:
-    robot = o80.robots.load(room_sensor.Forks)
-    with robot.start(segment, bursting=bursting, gap=0) as process, process.frontend() as joint:
-        if bursting:
-            joint.burst(500, timeout=WAIT)
-        joint.wait_for(500, WAIT)
-        end = time.monotonic() + WAIT
-        while "'forks' forked in write" not in process.output and time.monotonic() < end:
-            time.sleep(0.001)
-        assert "os._exit" in process.output
-        assert set(joint.history().observed[:, 0]) == {process.pid}
-        process.stop()
-        assert joint.life == "stopped"

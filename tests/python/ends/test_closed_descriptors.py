@@ -1,7 +1,6 @@
 """Programs and hosts that were started with closed standard descriptors (cron, supervisors)."""
 
 import ast
-import itertools
 import json
 import re
 import subprocess
@@ -21,7 +20,7 @@ PACKAGES = (
     "robots/arms/python",
     "apps/table_tennis/o80_table_tennis",
 )
-SUBSETS = [subset for size in (1, 2, 3) for subset in itertools.combinations((0, 1, 2), size)]
+SUBSETS = [(0,), (1,), (2,), (0, 1, 2)]
 
 closed_subsets = pytest.mark.parametrize(
     "closed", SUBSETS, ids=lambda closed: "".join(map(str, closed))
@@ -53,14 +52,13 @@ def test_a_robot_is_recorded_halted_resumed_and_stopped(
             while not recording.exists():
                 arm.wait_for(arm.published + 1, timeout=WAIT)
                 assert recorder.poll() is None
-            for reason in ("one", "two"):
-                run(closed, "halt", segment, reason)
-                arm.wait_for(arm.published + 20, timeout=WAIT)  # the robot says so on its stderr
-                halt = arm.halted
-                assert halt is not None
-                assert halt.text == reason
-                run(closed, "resume", segment)
-                assert arm.halted is None
+            run(closed, "halt", segment, "hot")
+            arm.wait_for(arm.published + 20, timeout=WAIT)  # the robot says so on its stderr
+            halt = arm.halted
+            assert halt is not None
+            assert halt.text == "hot"
+            run(closed, "resume", segment)
+            assert arm.halted is None
             recorder.terminate()
             assert recorder.wait(WAIT) == 0
             run(closed, "stop", segment)

@@ -148,33 +148,6 @@ def test_a_supervisor_may_resume_on_purpose(segment: str) -> None:
 # ------------------------------------------------------------------------------ the verbs of a halt
 
 
-def test_a_halt_is_shown_refuses_and_is_resumed(process: o80.robots.Process) -> None:
-    with process.frontend() as arm, process.frontend() as other:
-        arm.add_command(0, 3.0, iterations=10**9)
-        batch = arm.pulse()
-        until(lambda: arm.latest().active[0])
-        number = other.halt("the ball is on the floor")
-        assert arm.halted is not None
-        with pytest.raises(o80.BackendHalted, match="the ball is on the floor"):
-            batch.wait(WAIT)
-        assert batch.handles[0].status == o80.Status.HALTED
-        halt = arm.halted
-        assert (halt.number, halt.cause) == (number, "frontend")
-        assert halt.text == "the ball is on the floor"
-        assert f"pid {os.getpid()}" in halt.who
-        arm.add_command(0, 1.0)
-        refused = arm.pulse()
-        with pytest.raises(o80.BackendHalted, match="the ball is on the floor"):
-            refused.wait(WAIT)
-        assert refused.handles[0].status == o80.Status.REJECTED
-        assert "the ball is on the floor" in refused.handles[0].text
-        with pytest.raises(o80.BackendHalted, match="no halt"):
-            arm.resume(number + 1)
-        arm.resume()
-        assert arm.halted is None
-        assert other.halted is None  # type: ignore[unreachable]
-
-
 def test_an_embedded_backend_halts_and_resumes(segment: str) -> None:
     told = []
     refuse = ["the door is open"]

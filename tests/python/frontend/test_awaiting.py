@@ -56,20 +56,6 @@ def test_an_inline_robot_is_awaited(arm: o80.Frontend) -> None:
     asyncio.run(move())
 
 
-def test_a_stream_gives_every_row_to_a_task(process: o80.robots.Process) -> None:
-    async def read() -> list[int]:
-        iterations = []
-        with process.frontend() as arm:
-            async for row in arm.stream(timeout=WAIT):
-                iterations.append(row.iteration)
-                if len(iterations) == 30:
-                    break
-        return iterations
-
-    iterations = asyncio.run(read())
-    assert iterations == list(range(iterations[0], iterations[0] + 30))
-
-
 CALLS: list[Callable[[o80.Frontend], Awaitable[object]]] = [
     lambda arm: arm.aio.wait_for(10**9),
     lambda arm: arm.aio.wait_for_next(),

@@ -1,18 +1,9 @@
 """A frontend: its life, what it knows of its robot, and what it leaves."""
 
-import builtins
-import warnings
-
 import pytest
 from processes import WAIT
 
 import o80
-
-
-def test_it_gives_up_after_its_timeout(segment: str) -> None:
-    with pytest.raises(o80.TimeoutError, match=segment) as raised:
-        o80.Frontend(segment, timeout=0.01)
-    assert isinstance(raised.value, builtins.TimeoutError)
 
 
 def test_it_knows_its_robot(arm: o80.Frontend, segment: str) -> None:
@@ -28,14 +19,6 @@ def test_it_knows_its_robot(arm: o80.Frontend, segment: str) -> None:
     assert arm.bursting
     assert arm.alive
     assert [field["name"] for field in arm.schema["extended"]["fields"]] == ["homing", "effort"]
-
-
-def test_what_was_pulsed_is_not_warned_about(segment: str) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        with o80.robots.load("two_joints").inline(segment) as arm:
-            arm.add_command(0, 1.0)
-            arm.pulse()
 
 
 def test_leaving_a_with_block_lets_motion_complete(process: o80.robots.Process) -> None:

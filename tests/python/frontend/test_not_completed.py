@@ -58,6 +58,9 @@ def test_every_wait_raises_for_a_command_that_is_too_late(
         assert end == (handle.iteration, handle.status, ("elbow",), handle.reason, handle.text)
         assert raised.value.observation.iteration >= 5
         assert isinstance(raised.value, o80.Error)
+        again = pickle.loads(pickle.dumps(raised.value))
+        assert (str(again), again.ends) == (str(raised.value), raised.value.ends)
+        assert again.observation.desired.tolist() == [0.0, 0.0]
 
 
 def test_with_check_false_they_only_wait(process: o80.robots.Process) -> None:
@@ -80,16 +83,3 @@ def test_a_burst_does_not_judge_commands(arm: o80.Frontend) -> None:
     assert arm.burst(2).iteration == 7
     arm.add_command("elbow", 0.5, until=3)
     assert o80.burst({arm: 2})[arm].iteration == 9
-
-
-def test_the_error_is_data(process: o80.robots.Process) -> None:
-    with process.frontend() as arm:
-        too_late(arm)
-        with pytest.raises(o80.NotCompleted) as raised:
-            arm.pulse_and_wait(WAIT)
-
-    error = pickle.loads(pickle.dumps(raised.value))
-    assert str(error) == str(raised.value)
-    assert error.ends == raised.value.ends
-    assert error.observation.iteration == raised.value.observation.iteration
-    assert error.observation.desired.tolist() == [0.0, 0.0]

@@ -47,14 +47,3 @@ def test_fields_without_a_default_must_be_given(segment: str) -> None:
             arm.burst(1, wait=False)
             backend.step(WAIT)
     assert taken == [(1.0, 2, 3)]
-
-
-def test_purge_needs_no_pulse(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0, iterations=100)
-    arm.add_command(1, 1.0, iterations=100)
-    batch = arm.pulse()
-    arm.burst(10)
-
-    arm.purge("shoulder")
-
-    assert batch.statuses == [o80.Status.PURGED, o80.Status.ACTIVE]

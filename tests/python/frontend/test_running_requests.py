@@ -46,22 +46,6 @@ def test_it_is_active_with_its_progress_until_it_ends(robot: ManualBackend) -> N
     assert not robot.backend.running("home")
 
 
-def test_it_may_be_ended_by_another_with_a_fresh_start_or_a_reason(robot: ManualBackend) -> None:
-    backend, frontend = robot.backend, robot.frontend
-    backend.on("abandon", lambda _: backend.end_request("home", rejected="abandoned"))
-    batch = home(frontend)
-    robot.run()
-    backend.end_request("home", o80.StartAfresh([1.0, 2.0]))
-    robot.run()
-    assert batch.statuses == [o80.Status.COMPLETED]
-    assert frontend.wait_for(batch.last_iteration).desired.tolist() == [1.0, 2.0]
-    batch = home(frontend)
-    robot.run()
-    frontend.add_request("abandon")
-    robot.run()
-    assert batch.handles[0].text == "abandoned"
-
-
 def test_what_is_no_answer_or_no_end_is_refused(robot: ManualBackend) -> None:
     backend = robot.backend
     with pytest.raises(o80.InvalidArgument, match="home, calibrate, abandon"):
@@ -71,6 +55,11 @@ def test_what_is_no_answer_or_no_end_is_refused(robot: ManualBackend) -> None:
     with pytest.raises(o80.InvalidArgument, match="not both"):
         backend.end_request("home", o80.StartAfresh([0, 0]), rejected="why")
     backend.end_request("home")  # it does not run: nothing happens
+    batch = home(robot.frontend)
+    robot.run()
+    backend.end_request("home", rejected="abandoned")
+    robot.run()
+    assert batch.handles[0].text == "abandoned"
 
     backend.on("abandon", lambda _: "soon")  # type: ignore[arg-type, return-value]
     robot.frontend.add_request("abandon")

@@ -58,24 +58,6 @@ def test_a_record_is_a_target(robot: ManualBackend) -> None:
     assert robot.desired("b", record).joints[1] == record
 
 
-def test_fields_in_order_are_a_target(robot: ManualBackend) -> None:
-    joint = robot.desired("b", (0.5, np.array([1, 2]), 3, True, (1.0, Control.TORQUE))).joints[1]
-
-    assert joint["position"] == 0.5
-    assert joint["on"]
-    assert joint["tool"]["kind"] == Control.TORQUE
-
-
-@pytest.mark.parametrize("number", [0.25, 1, np.float32(0.25), np.int8(-1), True])
-def test_a_number_is_the_first_field_of_a_larger_state(robot: ManualBackend, number: float) -> None:
-    robot.desired("a", {"position": 0.5, "count": 3, "gains": [1, 2]})
-
-    joint = robot.desired("a", number).joints[0]
-
-    assert joint["position"] == float(number)
-    assert (joint["count"], joint["gains"].tolist()) == (3, [1.0, 2.0])  # kept
-
-
 def test_a_first_field_that_is_no_number_takes_what_fits_it(segment: str) -> None:
     states = {"tool": {"kind": Control, "size": float}, "hand": {"fingers": (float, 3), "on": bool}}
     with ManualBackend(segment, states) as robot:
@@ -85,9 +67,30 @@ def test_a_first_field_that_is_no_number_takes_what_fits_it(segment: str) -> Non
             robot.frontend.add_command("hand", 0.5)
 
 
-@pytest.mark.parametrize("label", ["TORQUE", Control.TORQUE, 5, np.int64(5)])
-def test_labels_are_given_by_name_or_value(robot: ManualBackend, label: object) -> None:
-    assert robot.desired("mode", label).mode == Control.TORQUE
+@pytest.mark.parametrize(
+    ("actuator", "target", "desired"),
+    [
+        *(("mode", label, "TORQUE") for label in ("TORQUE", Control.TORQUE, 5, np.int64(5))),
+        *(("valve", on, True) for on in (True, np.True_, 1, 1.0)),
+        *(("gear", seven, 7) for seven in (7, 7.0, np.float64(7), np.uint8(7), np.array(7))),
+        *(("a", one, {"position": 1.0}) for one in (1, 1.0, np.float32(1), np.int8(1), True)),
+        (["a"], [{"position": 0.8}], {"position": 0.8}),
+        ("a", (0.5, np.array([1, 2]), 3, True, (1.0, 5)), {"position": 0.5, "on": True}),
+    ],
+)
+def test_a_value_is_given_in_each_form_that_it_has(
+    robot: ManualBackend, actuator: str | list[str], target: object, desired: Any
+) -> None:
+    """Fields that a target does not name keep what was desired."""
+    before = {"gains": [3.0, 4.0], "count": 3}
+    robot.desired("a", before)
+    row = robot.desired(actuator, target)
+    if not isinstance(desired, dict):
+        assert row[actuator] == desired
+        return
+    kept = {} if isinstance(target, tuple) else before
+    joint = row.joints[0]
+    assert {name: joint[name].tolist() for name in desired | kept} == desired | kept
 
 
 @pytest.mark.parametrize(
@@ -123,33 +126,6 @@ def test_a_refusal_names_the_actuator_the_field_and_what_there_is(
     assert robot.frontend.added == 0
 
 
-@pytest.mark.parametrize("target", [True, np.True_, 1, 1.0])
-def test_booleans_are_given_as_such_or_as_one_and_zero(
-    robot: ManualBackend, target: object
-) -> None:
-    assert robot.desired("valve", target).valve
-
-
-@pytest.mark.parametrize("target", [7, 7.0, np.float64(7), np.uint8(7), np.array(7)])
-def test_whole_numbers_are_integers(robot: ManualBackend, target: object) -> None:
-    assert robot.desired("gear", target).gear == 7
-
-
-# ---------------------------------------------------------------------------- trajectories
-
-
-# ---------------------------------------------------------------------------- several at once
-
-
-def test_several_actuators_move_by_one_command(arm: o80.Frontend) -> None:
-    arm.add_command(["elbow", np.int64(0)], [0.4, 0.2], iterations=2)
-    batch = arm.pulse()
-    arm.burst(3, timeout=WAIT)
-
-    assert batch.statuses == ["completed"]
-    assert arm.history(3).desired.tolist() == [[0.1, 0.2], [0.2, 0.4], [0.2, 0.4]]
-
-
 NOT_ONE_EACH = (
     0.5,
     [0.1],
@@ -183,13 +159,6 @@ def test_one_that_cannot_be_refuses_all(
     assert arm.added == 0
 
 
-def test_states_of_several_types_may_be_given_in_part(robot: ManualBackend) -> None:
-    row = robot.desired(["a", "valve"], [{"position": 0.8}, True])
-
-    assert row.joints["position"][0] == 0.8
-    assert row.valve
-
-
 @pytest.mark.parametrize(
     ("options", "last", "third"),  # iteration of the last row, place in iteration 3
     [
@@ -221,19 +190,6 @@ def test_profiles_of_rows_are_refused_where_they_cannot_be(arm: o80.Frontend) ->
     with pytest.raises(o80.InvalidArgument, match="profile"):
         arm.add_command("elbow", 1.0, profile=cast(ProfileWord, "smooth"))
     assert arm.added == 0
-
-
-def test_a_trajectory_of_chosen_actuators(arm: o80.Frontend) -> None:
-    arm.add_trajectory([[1.0, 2.0]], ["elbow", 0])
-
-    assert arm.pulse_and_wait(timeout=WAIT).desired.tolist() == [2.0, 1.0]
-
-
-def test_a_trajectory_may_overwrite(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0, iterations=100)
-    arm.add_trajectory([0.5], 0, mode=o80.Mode.OVERWRITE)
-
-    assert arm.pulse_and_wait(timeout=WAIT).desired[0] == 0.5
 
 
 @pytest.mark.parametrize(

@@ -27,22 +27,8 @@ def test_it_gives_the_rows_that_are_there(pair: tuple[o80.Frontend, o80.Frontend
     rows = o80.wait_for_first(iter(pair), timeout=WAIT)
     assert {member: row.iteration for member, row in rows.items()} == {left: 1, right: 2}
     assert right.wait_for_next(WAIT).iteration == 3
-
-
-def test_it_waits_for_given_iterations(pair: tuple[o80.Frontend, o80.Frontend]) -> None:
-    left, right = pair
-    left.burst(2)
     rows = o80.wait_for_first({left: 5, right: 0}, timeout=WAIT)
     assert {member: row.iteration for member, row in rows.items()} == {right: 0}
-
-
-def test_it_says_what_was_missed(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, history=4) as frontend:
-        with pytest.raises(o80.TimeoutError):
-            o80.wait_for_first([frontend], timeout=0.0)
-        frontend.burst(20)
-        row = o80.wait_for_first([frontend])[frontend]
-        assert (row.iteration, row.missed) == (frontend.oldest, frontend.oldest - 1)
 
 
 @pytest.mark.parametrize("wrong", [[], {}])

@@ -2,7 +2,6 @@
 
 import os
 import pickle
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -237,6 +236,7 @@ def test_refuses_wrong_arguments(group: o80.InlineGroup) -> None:
         (lambda: robot.inline(threads=2), "give copies too"),
         (lambda: robot.inline("arm", copies=2), "leave out segment"),
         (lambda: group.prepared_burst(65), "history=65"),
+        (lambda: group.prepared_burst(5, delay=5), "delay of a burst of 5 iterations must be"),
         (lambda: setattr(burst, "targets", np.zeros((5, 2))), r"steps, actuators\) = \(5, 1, 2\)"),
         (lambda: burst.run([5]), "copies 0 to 4"),
         (lambda: burst.run([-1]), "copies 0 to 4"),
@@ -297,41 +297,9 @@ def test_ctrl_c_ends_a_call_between_two_iterations() -> None:
     assert ended.stdout == "interrupted\n", ended.stderr
 
 
-def test_its_threads_release_the_interpreter(group: o80.InlineGroup) -> None:
-    """Another Python thread runs while a call of the group waits for it."""
-    ended = threading.Event()
-
-    def end() -> None:
-        while frontend.published < 50:
-            pass
-        frontend.halt("a test")
-        ended.set()
-
-    frontend = group[0]
-    burst = group.prepared_burst(30)
-    burst.targets = np.full((COPIES, 1, 2), 0.4)
-    burst.run()
-    thread = threading.Thread(target=end)
-    thread.start()
-    with pytest.raises(o80.CopyFailed, match="it is halted since"):
-        group.request("home", copies=[0], speed=1e-9)
-    thread.join()
-    assert ended.is_set()
-
-
 def test_a_slice_names_copies(group: o80.InlineGroup) -> None:
     burst = group.prepared_burst(3)
     burst.targets = np.zeros((COPIES, 1, 2))
     burst.run(slice(None))
     burst.run(slice(None, None, 2))
     assert [row["iteration"] for row in group.latest()] == [6, 3, 6, 3, 6]
-
-
-def test_delayed_targets_are_taken_within_the_burst(group: o80.InlineGroup) -> None:
-    burst = group.prepared_burst(5, mode="overwrite", delay=2)
-    burst.targets = np.linspace(0.1, 1, 2 * COPIES).reshape(COPIES, 1, 2)
-    burst.run()
-    assert (burst.rows["desired"][:, :2] == 0).all()
-    assert (burst.rows["desired"][:, 2:] == burst.targets).all()
-    with pytest.raises(o80.InvalidArgument, match="delay of a burst of 5 iterations must be"):
-        group.prepared_burst(5, delay=5)

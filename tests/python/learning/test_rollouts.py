@@ -101,10 +101,6 @@ def test_the_means_are_those_of_the_network() -> None:
     assert policy.means(seen) == pytest.approx(expected, abs=1e-4)
 
 
-def test_the_same_seed_gives_the_same_rollouts(tmp_path: Path) -> None:
-    assert_same_rollouts(collected(tmp_path, 3), collected(tmp_path, 3))
-
-
 def test_after_an_exception_a_collector_begins_anew_and_repeats_the_iteration(
     tmp_path: Path,
 ) -> None:

@@ -190,11 +190,6 @@ def test_a_living_robot_keeps_its_name(recorded: Path, segment: str) -> None:
             assert playback.names == [f"{segment}-b"]
 
 
-def test_a_robot_cannot_start_where_a_recording_is_played(recorded: Path, segment: str) -> None:
-    with o80.play(recorded, speed=math.inf), pytest.raises(o80.SegmentTaken):
-        o80.robots.load("two_joints").inline(segment)
-
-
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -149,7 +149,7 @@ def test_a_replay_of_a_damaged_journal_ends_in_order(segment: str) -> None:
     size = next(run.blocks()).rows.itemsize
     loop = [("bursting", "true"), ("lane_blocks", "1024"), ("history", "1024")]
     told = 0
-    for seed in range(300):
+    for seed in range(150):
         choose = random.Random(seed)
         damaged = bytearray(rows)
         for _ in range(choose.randrange(3)):
@@ -167,13 +167,13 @@ def test_a_replay_of_a_damaged_journal_ends_in_order(segment: str) -> None:
         finally:
             replay.close()
             _core.clean(name)
-    assert 0 < told < 300
+    assert 0 < told < 150
 
 
 def test_a_damaged_description_is_told() -> None:
     table = runs_in(o80.open(RECORDING))[0].description.table()
     told = 0
-    for seed in range(300):
+    for seed in range(150):
         choose = random.Random(seed)
         damaged = bytearray(table)
         for _ in range(choose.randrange(1, 4)):
@@ -219,7 +219,7 @@ def test_a_file_damaged_anywhere_is_read_or_refused_in_a_sentence(
 ) -> None:
     whole = record(tmp_path / "run.mcap", segment).read_bytes()
     sentences = set()
-    for seed in range(400):
+    for seed in range(200):
         path = tmp_path / f"{seed}" / "damaged.mcap"
         path.parent.mkdir()
         path.write_bytes(damaged(whole, random.Random(seed)))

@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import run_o80
 
 import o80
 from o80.recording.recorded_epoch import RecordedEpoch
@@ -90,20 +89,3 @@ def test_decisions_without_a_row_after_them_are_recorded(segment: str, tmp_path:
             backend.step()
             recording.flush()
             assert [entry.kind for entry in recorded(path).journal()] == ["taken"]
-
-
-def test_the_command_prints_the_decisions_in_a_file(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with o80.Recording(path, arm):
-        arm.add_command("elbow", 0.25, iterations=5)
-        arm.burst(5)
-        arm.halt("enough")
-        arm.burst(1)
-    said = run_o80("echo", path, "--commands").stdout
-    last = run_o80("echo", path, "--commands", "--count", "1").stdout
-    rows = run_o80("echo", path, code=1)
-
-    assert "elbow to 0.25 in 5 iterations: completed" in said
-    assert "HALT 1 (frontend by pid" in said
-    assert last.splitlines() == said.splitlines()[-1:]
-    assert "is a recording: `o80 echo --commands" in " ".join(rows.stderr.split())

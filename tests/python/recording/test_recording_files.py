@@ -24,7 +24,7 @@ from o80.recording.recorder import Recorder
 from o80.recording.scan import scan
 from o80.rows.journal import command_ends
 
-CUTS = 60
+CUTS = 30
 
 
 @pytest.fixture

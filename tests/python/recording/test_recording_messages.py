@@ -3,7 +3,6 @@
 from mixed_robots import Mode, recorded
 
 import o80
-from o80.recording.message_plan import MessagePlan
 from o80.recording.message_types import row_type
 
 
@@ -12,12 +11,6 @@ def test_an_enumeration_has_constants_and_a_field_its_unit(arm: o80.Frontend) ->
 
     assert "int64 MODE_HOLD=-2" in text
     assert "# what is asked less what is there [rad]" in row_type(arm._layout).definition
-
-
-def test_numbers_that_are_adjacent_are_copied_together(arm: o80.Frontend) -> None:
-    plan = MessagePlan(row_type(arm._layout), arm._layout.size)
-
-    assert len(plan._copies) <= 4  # as many as padding and masks leave, and the floats behind
 
 
 def test_names_become_valid_in_messages_and_stay_different() -> None:

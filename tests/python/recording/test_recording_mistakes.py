@@ -88,26 +88,6 @@ def test_a_forked_child_that_drops_its_copy_of_a_recording_says_nothing(
     assert capfd.readouterr().err == ""
 
 
-def test_a_forked_child_does_not_keep_a_finished_file_from_its_next_recorder(
-    arm: o80.Frontend, tmp_path: Path
-) -> None:
-    path = tmp_path / "run.mcap"
-    theirs, ours = os.pipe()
-    recorder = Recorder(path, [arm.segment])
-    child = os.fork()
-    if child == 0:
-        os.close(ours)
-        os.read(theirs, 1)  # until the parent has closed its end
-        os._exit(0)
-    try:
-        recorder.finish()
-        opened(path, proceed=True).finish()
-    finally:
-        os.close(ours)
-        os.waitpid(child, 0)
-        os.close(theirs)
-
-
 def test_a_forked_child_does_not_keep_the_file_of_a_killed_recorder(
     arm: o80.Frontend, tmp_path: Path
 ) -> None:

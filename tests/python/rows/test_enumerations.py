@@ -22,7 +22,7 @@ from processes import run_o80
 import o80
 from o80.datasets.export import write
 from o80.rows.enumerations import Enumeration, enumeration_of, labelled
-from o80.rows.layout import Layout, labels_of_type
+from o80.rows.layout import labels_of_type
 
 WORDS = st.from_regex(r"[a-z][a-z0-9]{0,8}", fullmatch=True).filter(lambda word: word != "mro")
 KINDS = st.sampled_from([f"{sign}{size}" for sign in "iu" for size in (1, 2, 4, 8)])
@@ -268,18 +268,6 @@ def test_the_page_says_what_works(segment: str) -> None:
             exec(block, made)
             assert made["good"].tolist() == [False]
             frontend.forget_added()
-
-
-def test_the_classes_of_rows_are_those_of_the_frontend(segment: str) -> None:
-    class Status(IntEnum):
-        OK = 0
-
-    with o80.Backend(segment, ["elbow"], extended={"status": Status}) as backend:
-        backend.publish([0.0], {"status": "OK"})
-        with o80.Frontend(segment) as frontend:
-            assert frontend.latest().extended.status is frontend.enums["status"].OK
-            assert frontend.enums["status"]("OK") is frontend.enums["status"].OK
-            assert isinstance(frontend._layout, Layout)
 
 
 GEARS: Any = IntEnum("GEARS", {"low": 0, "high": 2})

@@ -84,17 +84,6 @@ def test_of_a_backend_that_has_failed_the_journal_is_still_there(segment: str) -
         assert "it broke" in late.journal()[-1].text
 
 
-def test_a_request_comes_with_its_values(arm: o80.Frontend) -> None:
-    arm.request("reset", seed=7)
-    (taken,) = [
-        entry
-        for entry in of_kind(arm.journal(), "taken")
-        if entry.commands and entry.commands[0].kind == "request"
-    ]
-    assert taken.commands[0].request == "reset"
-    assert taken.commands[0].fields == {"seed": 7}
-
-
 def test_there_is_nothing_after_the_newest_entry(arm: o80.Frontend) -> None:
     assert arm.journal(since=2**80) == []
 

@@ -48,18 +48,6 @@ def test_states_of_one_number_are_a_float_array(arm: o80.Frontend) -> None:
     assert observation.clamped.tolist() == [False, False]
 
 
-def test_an_observation_changes_no_more(arm: o80.Frontend) -> None:
-    before = arm.latest()
-    observed = before.observed
-    arm.add_command(0, 1.0)
-    arm.burst(5)
-
-    assert observed.tolist() == [0.0, 0.0]
-    assert before.iteration == 0
-    observed[0] = 7.0
-    assert arm.latest().observed[0] != 7.0
-
-
 def test_groups_of_different_types_have_names(mixed: o80.Backend) -> None:
     with o80.Frontend(mixed.segment) as frontend:
         observed = frontend.latest().observed
@@ -117,30 +105,7 @@ def test_a_pure_sensor_has_no_actuators(segment: str) -> None:
             assert "force" in repr(observation)
 
 
-def test_a_robot_without_sensors_has_no_extended_values(segment: str) -> None:
-    with o80.Backend(segment, ["a"]) as backend:
-        backend.publish([0.5])
-        with o80.Frontend(segment) as frontend:
-            assert len(frontend.latest().extended) == 0
-            assert frontend.latest().flat().tolist() == [0.5]
-            assert len(frontend.history().extended) == 0
-
-
 # ---------------------------------------------------------------------------- history
-
-
-def test_the_last_n_or_from_one_to_another(arm: o80.Frontend) -> None:
-    arm.burst(20)
-
-    assert arm.history(3).iteration.tolist() == [18, 19, 20]
-    assert arm.history(since=18).iteration.tolist() == [18, 19, 20]
-    assert arm.history(until=1).iteration.tolist() == [0, 1]
-    assert arm.history(since=4, until=6).iteration.tolist() == [4, 5, 6]
-    assert len(arm.history()) == 21
-    assert len(arm.history(1000)) == 21
-    assert len(arm.history(0)) == 0
-    assert len(arm.history(since=30)) == 0
-    assert len(arm.history(since=6, until=4)) == 0
 
 
 def test_a_history_is_a_sequence_of_observations(arm: o80.Frontend) -> None:
@@ -159,13 +124,13 @@ def test_a_history_is_a_sequence_of_observations(arm: o80.Frontend) -> None:
     assert "no observation" in repr(arm.history(0))
 
 
-def test_histories_share_no_memory(arm: o80.Frontend) -> None:
+def test_rows_share_no_memory(arm: o80.Frontend) -> None:
     arm.burst(3)
-    one, other = arm.history(), arm.history()
-
-    one.observed[:] = 7.0
-
-    assert not other.observed.any()
+    for read in (arm.history, arm.latest):
+        one, other = read(), read()
+        one.observed[:] = 7.0
+        assert not other.observed.any()
+        assert not read().observed.any()
 
 
 # ---------------------------------------------------------------------------- waiting
@@ -178,12 +143,3 @@ def test_a_stream_may_begin_in_the_past(arm: o80.Frontend) -> None:
     assert [next(stream).iteration for _ in range(8)] == list(range(3, 11))
     with pytest.raises(o80.TimeoutError):
         next(stream)
-
-
-def test_streams_have_positions_of_their_own(arm: o80.Frontend) -> None:
-    one, other = arm.stream(timeout=0.0), arm.stream(timeout=0.0)
-    arm.burst(3)
-
-    assert [next(one).iteration for _ in range(3)] == [1, 2, 3]
-    assert [next(other).iteration for _ in range(3)] == [1, 2, 3]
-    assert next(arm.stream(since=2)).iteration == 2

@@ -26,18 +26,6 @@ def test_of_an_inline_robot_has_the_effective_options(segment: str) -> None:
     assert found.library_sha256 == hashlib.sha256(Path(found.library).read_bytes()).hexdigest()
 
 
-def test_of_a_process_has_the_options_of_its_loop(segment: str) -> None:
-    robot = o80.robots.load("two_joints")
-    with robot.start(segment, frequency=250, stale="purge", silence=50, journal=1) as process:
-        found = process.frontend(read_only=True).provenance
-    assert found.run_options["frequency"] == "250"
-    assert found.run_options["stale"] == "purge"
-    assert found.run_options["silence"] == "50"
-    assert found.run_options["journal"] == "1"
-    assert found.run_options["policy"] == "other"
-    assert "max_overruns" not in found.run_options
-
-
 def test_of_a_backend_in_a_program_has_its_options(segment: str) -> None:
     with o80.Backend(segment, ["a"], robot="gripper", frequency=100, journal=0) as backend:
         backend.publish([0.0])
@@ -75,13 +63,3 @@ def test_keeps_texts_that_are_not_utf_8(segment: str, tmp_path: Path) -> None:
     assert Path(found.library) == library
     assert o80.Provenance.from_json(found.as_json()) == found
     assert "two??joints.so" in told
-
-
-def test_info_shows_it(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, reach=2.5):
-        told = run_o80("info", segment).stdout
-        described = run_o80("info", segment, "--json").stdout
-    assert "reach=2.5" in told
-    assert "frequency=1000" in told
-    assert f"{o80.version()}, sources " in told
-    assert json.loads(described)["provenance"]["options"]["reach"] == "2.5"

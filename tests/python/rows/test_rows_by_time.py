@@ -39,15 +39,20 @@ def test_the_row_at_a_time_is_the_newest_at_or_before_it(old: o80.Frontend, time
 
 
 @settings(deadline=None)
-@given(st.one_of(st.none(), TIMES), st.one_of(st.none(), TIMES), st.integers(60, 110))
+@given(
+    st.one_of(st.none(), TIMES),
+    st.one_of(st.none(), TIMES),
+    st.integers(60, 110),
+    st.integers(60, 110),
+)
 def test_rows_between_times_are_those_that_numpy_finds(
-    old: o80.Frontend, first: int | None, last: int | None, since: int
+    old: o80.Frontend, first: int | None, last: int | None, since: int, until: int
 ) -> None:
     history = old.history()
-    wanted = history.iteration >= since
+    wanted = (history.iteration >= since) & (history.iteration <= until)
     wanted &= history.time >= (first if first is not None else -(10**18))
     wanted &= history.time <= (last if last is not None else 10**18)
-    arguments = {"since": since, "from_time": first, "to_time": last}
+    arguments = {"since": since, "until": until, "from_time": first, "to_time": last}
     for rows in (old.history(**arguments), history.select(**arguments)):
         assert rows.iteration.tolist() == history.iteration[wanted].tolist()
 
@@ -59,6 +64,8 @@ def test_the_last_seconds_count_from_the_newest_row(old: o80.Frontend, seconds: 
     wanted = history.time > history.time[-1] - round(seconds * 1e9)
     for rows in (old.history(seconds=seconds), history.select(seconds=seconds)):
         assert rows.iteration.tolist() == history.iteration[wanted].tolist()
+    n = round(seconds * 200)
+    assert old.history(n).iteration.tolist() == history.select(n).iteration.tolist()
 
 
 @settings(deadline=None)

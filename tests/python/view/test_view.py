@@ -39,7 +39,7 @@ def test_a_view_shows_frontends_names_and_recordings(arm: o80.Frontend, tmp_path
     path = tmp_path / "run.mcap"
     with o80.Recording(path, arm):
         arm.burst(10)
-    shown: list[Any] = [arm, arm.segment, [arm, path], path, str(path), o80.open(path)]
+    shown: list[Any] = [[arm, path], arm.segment, o80.open(path)]
     for what in shown:
         with o80.View(what) as view:
             assert look(view.url)["last"] == pytest.approx(0.01)
@@ -67,7 +67,7 @@ def test_a_view_ends_with_its_block_and_may_be_closed_twice(arm: o80.Frontend) -
         look(view.url)
 
 
-@pytest.mark.parametrize("end", ["pass", "os.kill(os.getpid(), signal.SIGKILL)", "os._exit(3)"])
+@pytest.mark.parametrize("end", ["pass", "os.kill(os.getpid(), signal.SIGKILL)"])
 def test_a_view_ends_with_its_program(end: str) -> None:
     program = (
         f"import o80, os, signal\nview = o80.View()\nprint(view._popen.pid, flush=True)\n{end}"
