@@ -41,10 +41,7 @@ def recordings(
     ] = "",
     as_json: Annotated[bool, typer.Option("--json", help="All of it, for tools.")] = False,
 ) -> None:
-    """List the recordings below a folder: robots, times, how runs ended, marks.
-
-    The index .o80-recordings.sqlite, which is written there, makes the next call quick.
-    """
+    """List the recordings below a folder: robots, times, how runs ended, marks."""
     from o80.recording.catalogue import recordings as find
 
     with warnings.catch_warnings(record=True) as remarks:
