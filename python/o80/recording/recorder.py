@@ -297,16 +297,22 @@ def _weakly(make_room: Callable[[int], None]) -> Callable[[int], None]:
     return call
 
 
+def size_of(text: str, name: str) -> float:
+    """Parses a size such as "50G" [bytes]. Raises InvalidArgument, with the argument's name."""
+    try:
+        size = Split.of(text).bytes
+    except InvalidArgument:
+        size = math.inf
+    if size == math.inf:
+        raise InvalidArgument(f"{name} must be a size such as 50G, got '{text}'")
+    return size
+
+
 def _most(keep: str, split: "Split | None") -> float:
     """Parses a size such as "50G" [bytes]. Raises InvalidArgument if wrong or too small."""
     if split is None:
         raise InvalidArgument("keep needs split: it deletes whole files, such as with --split 1G")
-    try:
-        most = Split.of(keep).bytes
-    except InvalidArgument:
-        most = math.inf
-    if most == math.inf:
-        raise InvalidArgument(f"keep must be a size such as 50G, got '{keep}'")
+    most = size_of(keep, "keep")
     if split.bytes < math.inf and most < 2 * split.bytes:
         raise InvalidArgument(
             f"keep must be at least two files of {bytes_text(split.bytes)} (split), got '{keep}'"
