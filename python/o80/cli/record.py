@@ -4,7 +4,7 @@ import sys
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
@@ -18,12 +18,6 @@ if TYPE_CHECKING:
     from o80.recording.source import Source
 
 _BETWEEN_REPORTS = 0.5  # [s]
-
-
-def _on_or_off(text: str) -> str:
-    if text not in ("on", "off"):
-        raise typer.BadParameter(f"joint states are on or off, got '{text}'")
-    return text
 
 
 def record(
@@ -70,11 +64,8 @@ def record(
     ] = False,
     compression: Annotated[str, typer.Option(help="zstd, lz4 or none.")] = "zstd",
     joint_states: Annotated[
-        str,
-        typer.Option(
-            callback=_on_or_off,
-            help="on or off: rows of robots with joints also as sensor_msgs/JointState.",
-        ),
+        Literal["on", "off"],
+        typer.Option(help="Rows of robots with joints also as sensor_msgs/JointState."),
     ] = "on",
 ) -> None:
     """Record rows and decisions of robots to an MCAP file until Ctrl-C.
@@ -87,7 +78,7 @@ def record(
     form = Form(compression, joint_states == "on")
     most = None if size is None else size_of(size, "size")
     end = StopRequest()
-    warnings.showwarning = _say_warning
+    warnings.showwarning = lambda message, *_, **__: complain(str(message))
     recorder = Recorder(
         output,
         names,
@@ -117,10 +108,6 @@ def record(
     finally:
         recorder.finish()
     report.show(last=True)
-
-
-def _say_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    complain(str(message))
 
 
 def _replay_text(source: "Source", frontend: "Frontend", from_now: bool) -> str:

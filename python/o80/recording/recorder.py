@@ -137,7 +137,8 @@ class Recorder:
         """Writes rows and entries since the last call as a chunk; returns the message count."""
         self._polled = time.monotonic()
         with self.writing():
-            if self._is_full():
+            full = self._split is not None and self._split.is_due(self.file.size, self._file_begun)
+            if full and self.file.found.chunks:
                 self._continue_in_next_file()
             if self._patterns and time.monotonic() >= self._search_at:
                 self._search()
@@ -215,12 +216,6 @@ class Recorder:
     def _close_sources(self) -> None:
         for source in self.sources.values():
             source.close()
-
-    def _is_full(self) -> bool:
-        """True if the next rows belong in another file."""
-        if self._split is None or not self.file.found.chunks:
-            return False
-        return self._split.is_due(self.file.size, self._file_begun)
 
     def _continue_in_next_file(self) -> None:
         """Switches to the next file; one of the two is always locked against other recorders."""
