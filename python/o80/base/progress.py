@@ -5,7 +5,7 @@ import time
 import warnings
 from typing import Self
 
-from o80.base.screen import complain
+from o80.base.screen import complain, overwrite
 
 AFTER = 1.0  # time after which progress is shown [s]
 BETWEEN = 0.2  # interval of figures on a terminal [s]
@@ -45,4 +45,4 @@ class Progress:
 
     def _show(self, figure: str) -> None:
         if of_a_command and sys.stderr.isatty():
-            print(f"\r\033[K{figure}", end="", file=sys.stderr, flush=True)
+            overwrite(figure)

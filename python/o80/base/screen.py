@@ -102,6 +102,12 @@ def complain(text: str) -> None:
         print(f"{style('o80:', 'red', sys.stderr)} {said}", file=sys.stderr, flush=True)
 
 
+def overwrite(text: str, end: str = "") -> None:
+    """Prints a text on stderr; on a terminal it replaces the line that was printed before."""
+    begin = "\r\033[K" if sys.stderr.isatty() else ""
+    print(f"{begin}{text}", end=end, file=sys.stderr, flush=True)
+
+
 @functools.cache
 def complain_once(text: str) -> None:
     """Prints a remark on stderr unless this process has already printed it."""

@@ -15,6 +15,7 @@ from o80.base.finite import json_text
 from o80.base.screen import complain, complain_once, emit, style
 from o80.cli.attach import attach
 from o80.cli.journal_lines import follow, print_recorded
+from o80.cli.numbers import not_negative, positive
 from o80.cli.values import RowValues, text
 from o80.frontend.backend_texts import halt_text, pace_text
 from o80.frontend.frontend import Frontend
@@ -23,28 +24,14 @@ _LOOK = 1.0  # between two checks of a loop that publishes no row [s]
 _BETWEEN_REMARKS = 10.0  # between two remarks about one trouble [s]
 
 
-def _rate(value: float) -> float:
-    if not (value > 0 and math.isfinite(value)):
-        raise typer.BadParameter(
-            f"rate must be positive, got {value:g}; --every prints every row", param_hint="--rate"
-        )
-    return value
-
-
-def _timeout(value: float | None) -> float | None:
-    if value is not None and not value >= 0:
-        raise typer.BadParameter(
-            f"timeout must not be negative, got {value:g}", param_hint="--timeout"
-        )
-    return value
-
-
 def echo(
     segment: Annotated[
         str,
         typer.Argument(help="Name of a segment; see o80 list. With --commands also a recording."),
     ],
-    rate: Annotated[float, typer.Option(callback=_rate, help="Most rows printed a second.")] = 10.0,
+    rate: Annotated[
+        float, typer.Option(callback=positive, help="Most rows printed a second.")
+    ] = 10.0,
     count: Annotated[
         int, typer.Option(min=0, help="Stop after this number of rows; 0: never.")
     ] = 0,
@@ -64,7 +51,7 @@ def echo(
     ] = False,
     timeout: Annotated[
         float | None,
-        typer.Option(callback=_timeout, help="Seconds to wait for a row (default: for ever)."),
+        typer.Option(callback=not_negative, help="Seconds to wait for a row (default: for ever)."),
     ] = None,
 ) -> None:
     """Print rows: iteration, time, states, sensor values, active and braking actuators.

@@ -8,26 +8,14 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from o80.base.errors import InvalidArgument
+from o80.base.screen import overwrite
 from o80.base.stop_request import StopRequest
+from o80.cli.numbers import not_negative, positive
 
 if TYPE_CHECKING:
     from o80.playing.playback import Playback
 
 _BETWEEN_REPORTS = 0.5  # [s]
-
-
-def _speed(value: float | None) -> float | None:
-    if value is not None and not value > 0:
-        raise typer.BadParameter(f"speed must be positive, got {value:g}", param_hint="--speed")
-    return value
-
-
-def _begin(value: float) -> float:
-    if not (value >= 0 and math.isfinite(value)):
-        raise typer.BadParameter(
-            f"give a number of seconds from 0, got {value:g}", param_hint="--from"
-        )
-    return value
 
 
 def play(
@@ -36,7 +24,7 @@ def play(
         list[str] | None, typer.Option(help="Only this segment; may be given several times.")
     ] = None,
     speed: Annotated[
-        float | None, typer.Option(callback=_speed, help="0.5: half as fast as recorded.")
+        float | None, typer.Option(callback=positive, help="0.5: half as fast as recorded.")
     ] = None,
     fast: Annotated[
         bool, typer.Option("--fast", help="All rows at once; they stay until Ctrl-C.")
@@ -50,7 +38,9 @@ def play(
     ] = False,
     begin: Annotated[
         float,
-        typer.Option("--from", callback=_begin, help="Begin so many seconds after the first row."),
+        typer.Option(
+            "--from", callback=not_negative, help="Begin so many seconds after the first row."
+        ),
     ] = 0.0,
     end: Annotated[
         float | None, typer.Option("--to", help="End so many seconds after the first row.")
@@ -130,11 +120,8 @@ def _head(playback: "Playback", bursts: bool) -> str:
 
 def _follow(playback: "Playback", stop: StopRequest) -> None:
     """Prints the progress of a playback, repeatedly on a terminal."""
-    terminal = sys.stderr.isatty()
     while not stop.requested and not playback.wait(0.05):
-        if terminal:
-            line = f"{playback.position:.1f} of {playback.duration:.1f} s, {playback.rows} rows"
-            print(f"\r\033[K{line}", end="", file=sys.stderr, flush=True)
+        if sys.stderr.isatty():
+            overwrite(f"{playback.position:.1f} of {playback.duration:.1f} s, {playback.rows} rows")
             stop.wait(_BETWEEN_REPORTS)
-    begin = "\r\033[K" if terminal else ""
-    print(f"{begin}{playback.rows} rows", file=sys.stderr, flush=True)
+    overwrite(f"{playback.rows} rows", end="\n")

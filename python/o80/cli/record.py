@@ -1,16 +1,16 @@
 """``o80 record``: writes rows and journals of segments to a file."""
 
-import math
 import sys
 import time
 import warnings
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
 
-from o80.base.screen import bytes_text, complain
+from o80.base.screen import bytes_text, complain, overwrite
 from o80.base.stop_request import StopRequest
+from o80.cli.numbers import positive
 
 if TYPE_CHECKING:
     from o80.frontend.frontend import Frontend
@@ -18,35 +18,6 @@ if TYPE_CHECKING:
     from o80.recording.source import Source
 
 _BETWEEN_REPORTS = 0.5  # [s]
-_SUFFIXES = {"k": 1e3, "M": 1e6, "G": 1e9}
-
-
-def _seconds(value: float | None) -> float | None:
-    if value is not None and not (value > 0 and math.isfinite(value)):
-        raise typer.BadParameter(f"seconds must be positive, got {value:g}")
-    return value
-
-
-def _size(text: str | None) -> float | None:
-    """Parses "500M", "2G" or a plain number as bytes."""
-    if text is None:
-        return None
-    number, factor = (text[:-1], _SUFFIXES[text[-1]]) if text[-1:] in _SUFFIXES else (text, 1.0)
-    try:
-        size = float(number) * factor
-    except ValueError:
-        size = 0.0
-    if not (size > 0 and math.isfinite(size)):
-        raise typer.BadParameter(
-            f"size must be a number of bytes such as 500M or 2G, got '{text}'", param_hint="--size"
-        )
-    return size
-
-
-def _on_or_off(text: str) -> str:
-    if text not in ("on", "off"):
-        raise typer.BadParameter(f"joint states are on or off, got '{text}'")
-    return text
 
 
 def record(
@@ -58,7 +29,7 @@ def record(
         typer.Option("--output", "-o", help="File to write, NAME.mcap; a folder with --split."),
     ],
     seconds: Annotated[
-        float | None, typer.Option(callback=_seconds, help="Stop after this many seconds.")
+        float | None, typer.Option(callback=positive, help="Stop after this many seconds.")
     ] = None,
     size: Annotated[
         str | None, typer.Option(help="Stop when the recording has this size, for example 2G.")
@@ -78,7 +49,7 @@ def record(
     snapshots: Annotated[
         float | None,
         typer.Option(
-            callback=_seconds,
+            callback=positive,
             help="Seconds between two snapshots of a simulation: a replay can begin there.",
         ),
     ] = None,
@@ -93,11 +64,8 @@ def record(
     ] = False,
     compression: Annotated[str, typer.Option(help="zstd, lz4 or none.")] = "zstd",
     joint_states: Annotated[
-        str,
-        typer.Option(
-            callback=_on_or_off,
-            help="on or off: rows of robots with joints also as sensor_msgs/JointState.",
-        ),
+        Literal["on", "off"],
+        typer.Option(help="Rows of robots with joints also as sensor_msgs/JointState."),
     ] = "on",
 ) -> None:
     """Record rows and decisions of robots to an MCAP file until Ctrl-C.
@@ -105,12 +73,12 @@ def record(
     Waits for robots that have not started; a robot that restarts continues in the same file.
     """
     from o80.recording.file_writer import Form
-    from o80.recording.recorder import Recorder
+    from o80.recording.recorder import Recorder, size_of
 
     form = Form(compression, joint_states == "on")
-    most = _size(size)
+    most = None if size is None else size_of(size, "size")
     end = StopRequest()
-    warnings.showwarning = _say_warning
+    warnings.showwarning = lambda message, *_, **__: complain(str(message))
     recorder = Recorder(
         output,
         names,
@@ -140,10 +108,6 @@ def record(
     finally:
         recorder.finish()
     report.show(last=True)
-
-
-def _say_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    complain(str(message))
 
 
 def _replay_text(source: "Source", frontend: "Frontend", from_now: bool) -> str:
@@ -206,8 +170,7 @@ class _Report:
                 line += f", {rate:.0f} a second, {behind} behind"
             line += f", {recorder.missed} missed" if recorder.missed else ""
             line += f", {bytes_text(recorder.size)} in {recorder.path}"
-            begin = "\r\033[K" if self._terminal else ""
-            print(f"{begin}{line}", end="\n" if last else "", file=sys.stderr, flush=True)
+            overwrite(line, end="\n" if last else "")
 
     def _say_what_begins(self) -> None:
         for name, source in self._recorder.sources.items():

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from o80.base import local_time
-from o80.base.screen import Column, bytes_text, complain, plain, print_json, print_table
+from o80.base.screen import Column, bytes_text, complain, overwrite, plain, print_json, print_table
 from o80.frontend.backend_texts import age_text
 
 if TYPE_CHECKING:
@@ -41,10 +41,7 @@ def recordings(
     ] = "",
     as_json: Annotated[bool, typer.Option("--json", help="All of it, for tools.")] = False,
 ) -> None:
-    """List the recordings below a folder: robots, times, how runs ended, marks.
-
-    The index .o80-recordings.sqlite, which is written there, makes the next call quick.
-    """
+    """List the recordings below a folder: robots, times, how runs ended, marks."""
     from o80.recording.catalogue import recordings as find
 
     with warnings.catch_warnings(record=True) as remarks:
@@ -56,8 +53,7 @@ def recordings(
             text=text,
             progress=_show if sys.stderr.isatty() else None,
         )
-    if sys.stderr.isatty():
-        print("\r\033[K", end="", file=sys.stderr)
+    overwrite("")
     for remark in remarks:
         complain(str(remark.message))
     if as_json:
@@ -103,4 +99,4 @@ def _fields(found: "FoundRecording") -> dict[str, object]:
 
 
 def _show(number: int, of: int) -> None:
-    print(f"\r\033[K{number} of {of} recordings read", end="", file=sys.stderr, flush=True)
+    overwrite(f"{number} of {of} recordings read")

@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from o80.base.errors import Error
-from o80.base.screen import complain, plain
+from o80.base.screen import complain, overwrite, plain
 from o80.cli.diff import _tolerances
 from o80.frontend.frontend import Frontend
 
@@ -84,8 +84,7 @@ def replay(
     except Error as error:  # 1 means that a row differs
         complain(str(error))
         raise typer.Exit(2) from None
-    if sys.stderr.isatty():
-        print("\r\033[K", end="", file=sys.stderr)
+    overwrite("")
     for run in report:
         print(plain(str(run)))
         for note in run.notes:
@@ -133,4 +132,4 @@ def _options(texts: list[str] | None) -> dict[str, str]:
 
 
 def _show(segment: str, rows: int, of: int) -> None:
-    print(f"\r\033[K{segment}: {rows} of {of} rows", end="", file=sys.stderr, flush=True)
+    overwrite(f"{segment}: {rows} of {of} rows")

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from o80.base.errors import BackendGone
-from o80.base.screen import complain
+from o80.base.screen import complain, overwrite
 from o80.base.stop_request import StopRequest
 from o80.cli.attach import attach
 
@@ -76,7 +76,7 @@ def teleop(
                     controls.close()
                     controls.enter_context(arm.control())
         except BackendGone as error:
-            session.clear()
+            overwrite("")
             complain(str(error))
             raise typer.Exit(1) from None
         finally:
@@ -145,23 +145,18 @@ class _Session:
         if shown == self._reported or (terminal and now < self._report_at):
             return
         self._reported, self._report_at = shown, now + _BETWEEN_REPORTS / 5
-        begin, end = ("\r\033[K", "") if terminal else ("", "\n")
-        print(f"{begin}{state}", end=end, file=sys.stderr, flush=True)
+        overwrite(state, end="" if terminal else "\n")
 
     def end(self) -> None:
         """Prints the delay of the follower. Drops a demonstration that no key has ended."""
         with contextlib.suppress(BackendGone):
             self._throw_away()
-        self.clear()
+        overwrite("")
         delay = None
         with contextlib.suppress(BackendGone):
             delay = self._robots.delay()
         measured = "not measured: too little motion" if delay is None else str(delay)
         print(f"{self._demonstrations()}; delay from hand to motor {measured}")
-
-    def clear(self) -> None:
-        """Clears the line of the state, on a terminal."""
-        print(end="\r\033[K" if sys.stderr.isatty() else "", file=sys.stderr, flush=True)
 
     def _demonstrations(self) -> str:
         return f"{self._shown} demonstration{'' if self._shown == 1 else 's'}"

@@ -40,11 +40,9 @@ def running_texts(running: list[tuple[str, int, str, str]]) -> list[str]:
 
 def rate_text(rate: float | None, frequency: float) -> str:
     """Formats the reached rate and the requested frequency [1/s]."""
-    return f"{frequency:g} Hz" if rate is None else f"{_rounded(rate)} of {frequency:g} Hz"
-
-
-def _rounded(rate: float) -> str:
-    return f"{rate:.0f}" if rate >= 100 else f"{rate:.3g}"
+    if rate is None:
+        return f"{frequency:g} Hz"
+    return f"{rate:.{'0f' if rate >= 100 else '3g'}} of {frequency:g} Hz"
 
 
 def pace_text(loop: _core.LoopState) -> str:

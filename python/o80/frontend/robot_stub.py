@@ -377,7 +377,7 @@ class Module:
                     default = ast.Constant(...) if "default" in field else None
                     arguments.kw_defaults.append(default)
             lines = self._verb(called, {"name": literal([request["name"]])}, ROW)
-            uses.append([*lines, *_help(request["help"])])
+            uses.append([*lines, *(f"    # {line}" for line in request["help"].splitlines())])
         yield from _overloaded(uses or [self._verb(verb, {"name": "Never"}, ROW)])
 
     def _verb(
@@ -404,10 +404,6 @@ def _returns(verb: ast.FunctionDef, types: Mapping[str, str]) -> bool:
 
 def _is_argument(name: str, taken: set[str]) -> bool:
     return name.isidentifier() and not keyword.iskeyword(name) and name not in {*taken, "self"}
-
-
-def _help(text: str) -> list[str]:
-    return [f"    # {line}" for line in text.splitlines()]
 
 
 def _overloaded(uses: list[list[str]]) -> Iterator[str]:

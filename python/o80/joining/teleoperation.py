@@ -147,7 +147,8 @@ class Teleoperation:
         is_new, self._last = seen.iteration != self._last, seen.iteration
         why = self._refused()
         if why or not self.engaged:  # else a pulse does both
-            self._raise_if_the_follower_has_ended()
+            with contextlib.suppress(TimeoutError):
+                self.follower.wait_for(self.follower.published + 1, 0.0)  # raises if it has ended
             self.follower.keep_alive()
         if why:
             self.engaged, self._near_since, self.why = False, None, why
@@ -211,10 +212,6 @@ class Teleoperation:
     def _wait_for_row(self, after: int, timeout: float) -> None:
         if self.leader.published < self._last + after:
             self.leader.wait_for(self._last + after, timeout)
-
-    def _raise_if_the_follower_has_ended(self) -> None:
-        with contextlib.suppress(TimeoutError):
-            self.follower.wait_for(self.follower.published + 1, 0.0)
 
     def _refused(self) -> str:
         """Returns why the follower takes no commands; empty if it does."""

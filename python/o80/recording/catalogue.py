@@ -1,17 +1,11 @@
-"""The recordings below a folder, with an index that makes the next search quick.
-
-The index is a SQLite file in the folder. It is only a copy: if it is damaged or missing, it is made
-anew. A recording is read again if its size or its time of change differs.
-"""
+"""The recordings below a folder."""
 
 import contextlib
-import json
 import os
-import sqlite3
 import struct
 import warnings
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
@@ -20,13 +14,10 @@ from o80.base.finite import json_text
 from o80.recording.reader import RecordingFile
 from o80.recording.recorded_epoch import RecordedEpoch
 
-INDEX = ".o80-recordings.sqlite"
-VERSION = 2  # version of the index
-MARKS = 200  # most marks that the index keeps of each recording
+MARKS = 200  # most marks listed of each recording
 _DAMAGED = (RecordingError, OSError, ValueError, LookupError, TypeError, struct.error)
 
 Progress = Callable[[int, int], None]
-Stamp = tuple[int, int]  # size [bytes] and time of the last change [ns]
 
 
 @dataclass(frozen=True)
@@ -87,31 +78,23 @@ def recordings(
         segments, robots or marks contain this text, in any case. progress: called with the numbers
         of recordings that were read and that must be read.
 
-    A recording that cannot be read has a `problem`. Writes the index `.o80-recordings.sqlite` into
-    the folder, which makes the next call quick; warns (RuntimeWarning) where that is not possible.
-    Raises InvalidArgument if there is no such folder.
+    A recording that cannot be read has a `problem`; warns (RuntimeWarning) of a folder that cannot
+    be read. Raises InvalidArgument if there is no such folder.
     """
     root = Path(folder)
     if not root.is_dir() or root.suffix == ".mcap":
         raise InvalidArgument(f"{root} is not a folder of recordings")
-    known = _read(root)
-    there = dict(_stamps(root))
-    new = [name for name, stamp in there.items() if name not in known or known[name][0] != stamp]
-    texts = {}
-    for number, name in enumerate(new, 1):
-        texts[name] = _summary(root / name)
-        known[name] = there[name], _found(root / name, there[name], texts[name])
+    sizes = dict(_sizes(root))
+    found = []
+    for number, path in enumerate(sorted(sizes), 1):
+        found.append(_found(path, sizes[path]))
         if progress is not None:
-            progress(number, len(new))
-    gone = known.keys() - there.keys()
-    if new or gone:
-        kept = (name for name in new if not known[name][1].problem or _is_readable(root / name))
-        _write(root, [(name, *there[name], texts[name]) for name in kept], gone)
+            progress(number, len(sizes))
     first = 0 if begin is None else _nanoseconds(begin)
     last = 2**63 if end is None else _nanoseconds(end)
     chosen = [
         each
-        for each in (known[name][1] for name in sorted(there))
+        for each in found
         if each.has(text) and (each.problem or (each.begin <= last and each.end >= first))
     ]
     return sorted(chosen, key=lambda each: each.begin)
@@ -125,67 +108,46 @@ def _nanoseconds(time: datetime) -> int:
         return 0 if time.year < 1970 else 2**63
 
 
-def _stamps(root: Path) -> Iterator[tuple[str, Stamp]]:
-    """Yields path below the root and stamp of each recording; a folder NAME.mcap counts as one."""
-    waiting = [root]
-    while waiting:
-        folder = waiting.pop()
-        try:
-            entries = [*os.scandir(folder)]
-        except OSError as error:
-            warnings.warn(
-                f"{folder} cannot be read ({error.strerror}): what it holds is not listed",
-                RuntimeWarning,
-                stacklevel=3,
-            )
-            continue
-        for entry in entries:
+def _sizes(root: Path) -> Iterator[tuple[Path, int]]:
+    """Yields path and size of each recording; a folder NAME.mcap counts as one."""
+    for folder, folders, files in os.walk(root, onerror=_warn):
+        for path in (Path(folder, name) for name in folders + files if name.endswith(".mcap")):
             with contextlib.suppress(OSError):  # removed meanwhile
-                name = str(Path(entry.path).relative_to(root))
-                if not entry.name.endswith(".mcap"):
-                    if entry.is_dir(follow_symlinks=False):  # links may form a circle
-                        waiting.append(Path(entry.path))
-                elif entry.is_dir():
-                    files = [*_statuses(entry)]
-                    changed = max((each.st_mtime_ns for each in files), default=0)
-                    yield name, (sum(each.st_size for each in files), changed + len(files))
-                elif entry.is_file():  # reading a pipe could last for ever
-                    status = entry.stat()
-                    yield name, (status.st_size, status.st_mtime_ns)
+                if path.is_dir():
+                    yield path, sum(map(_size, path.iterdir()))
+                elif path.is_file():  # reading a pipe could last for ever
+                    yield path, _size(path)
+        folders[:] = [name for name in folders if not name.endswith(".mcap")]
 
 
-def _statuses(folder: os.DirEntry[str]) -> Iterator[os.stat_result]:
-    """Yields the status of each file, except files that a recorder (keep) deletes meanwhile."""
-    for each in os.scandir(folder):
-        with contextlib.suppress(FileNotFoundError):
-            yield each.stat()
+def _warn(error: OSError) -> None:
+    what = f"{error.filename} cannot be read ({error.strerror}): what it holds is not listed"
+    warnings.warn(what, RuntimeWarning, stacklevel=5)
 
 
-def _is_readable(path: Path) -> bool:
-    """Whether this user may read a recording; if not, its problem is not stored for others."""
-    return all(os.access(each, os.R_OK) for each in (path, *path.glob("*")))
+def _size(file: Path) -> int:
+    with contextlib.suppress(FileNotFoundError):  # deleted by a recorder (keep) meanwhile
+        return file.stat().st_size
+    return 0
 
 
-def _summary(path: Path) -> str:
-    """Reads a recording and returns its contents as JSON."""
+def _found(path: Path, size: int) -> FoundRecording:
+    """Reads a recording."""
     try:
         recording = RecordingFile(path)
-        runs = [
-            asdict(run_found(name, number, epoch))
+        runs = tuple(
+            run_found(name, number, epoch)
             for name in recording
             for number, epoch in enumerate(recording[name].epochs)
-        ]
+        )
         every = recording.marks
-        skipped = max(len(every) - MARKS, 0)
-        marks = [
+        marks = tuple(
             (mark.name, mark.row_time, json_text(mark.values)[:1000])
-            for mark in (every[: MARKS // 2] + every[MARKS // 2 + skipped :])
-        ]
-        found = {"finished": recording.finished, "runs": runs, "marks": marks}
-        return json_text(found | {"mark_count": len(every), "problem": ""})
+            for mark in every[: MARKS // 2] + every[MARKS // 2 :][-MARKS // 2 :]
+        )
+        return FoundRecording(path, size, "", recording.finished, runs, marks, len(every))
     except _DAMAGED as error:
-        nothing = {"finished": False, "runs": [], "marks": [], "mark_count": 0}
-        return json_text(nothing | {"problem": str(error) or repr(error)})
+        return FoundRecording(path, size, str(error) or repr(error), False, (), (), 0)
 
 
 def run_found(segment: str, number: int, epoch: RecordedEpoch) -> FoundRun:
@@ -202,66 +164,3 @@ def run_found(segment: str, number: int, epoch: RecordedEpoch) -> FoundRun:
         missing=epoch.missing,
         ended=epoch.end or ("missing" if is_cut else ""),
     )
-
-
-def _found(path: Path, stamp: Stamp, text: str) -> FoundRecording:
-    read = json.loads(text)
-    return FoundRecording(
-        path=path,
-        size=stamp[0],
-        problem=read["problem"],
-        finished=read["finished"],
-        runs=tuple(FoundRun(**run) for run in read["runs"]),
-        marks=tuple((name, time, values) for name, time, values in read["marks"]),
-        mark_count=read["mark_count"],
-    )
-
-
-# ---------------------------------------------------------------------- the index
-
-
-def _read(root: Path) -> dict[str, tuple[Stamp, FoundRecording]]:
-    """Reads the index, by path; removes an index of another version or a damaged one."""
-    index = root / INDEX
-    if not index.exists():
-        return {}
-    try:
-        place = f"{index.absolute().as_uri()}?mode=ro"
-        with contextlib.closing(sqlite3.connect(place, uri=True)) as db:
-            (version,) = db.execute("PRAGMA user_version").fetchone()
-            if version != VERSION:
-                raise ValueError("another version")
-            return {
-                os.fsdecode(name): (
-                    (size, changed),
-                    _found(root / os.fsdecode(name), (size, changed), text),
-                )
-                for name, size, changed, text in db.execute("SELECT * FROM recordings")
-            }
-    except (sqlite3.Error, ValueError, TypeError, LookupError):
-        for path in (index, index.with_name(f"{INDEX}-journal")):
-            with contextlib.suppress(OSError):
-                path.unlink(missing_ok=True)
-        return {}
-
-
-def _write(root: Path, new: list[tuple[str, int, int, str]], gone: set[str]) -> None:
-    try:
-        with contextlib.closing(sqlite3.connect(root / INDEX)) as db, db:
-            db.execute("PRAGMA synchronous = OFF")  # a lost index can be built again
-            db.execute(f"PRAGMA user_version = {VERSION}")
-            db.execute(
-                "CREATE TABLE IF NOT EXISTS recordings"
-                "(name BLOB PRIMARY KEY, size INTEGER, changed INTEGER, found TEXT)"
-            )
-            rows = ((os.fsencode(name), *rest) for name, *rest in new)  # names may be any bytes
-            db.executemany("INSERT OR REPLACE INTO recordings VALUES (?, ?, ?, ?)", rows)
-            names = ((os.fsencode(name),) for name in gone)
-            db.executemany("DELETE FROM recordings WHERE name = ?", names)
-    except sqlite3.Error as error:
-        warnings.warn(
-            f"{root / INDEX} cannot be written ({error}): the next call reads these recordings "
-            f"again",
-            RuntimeWarning,
-            stacklevel=3,
-        )

@@ -110,11 +110,6 @@ class EpochNote:
         """
         return f"{self.segment}/{self.number}/{what}"
 
-    def not_before(self, first_time: int, log_time: int) -> "EpochNote":
-        """Returns this note, shifted if needed to log `first_time` later than `log_time`."""
-        offset = max(self.wall_offset, log_time + 1 - first_time)
-        return replace(self, wall_offset=offset)
-
 
 @dataclass
 class WallClock:
@@ -131,7 +126,8 @@ class WallClock:
             note = replace(note, wall_offset=self.offsets[note.boot])
         elif note.boot:
             last_log_time = max(last_log_time, self.after)
-        note = note.not_before(first_time, last_log_time)
+        offset = max(note.wall_offset, last_log_time + 1 - first_time)
+        note = replace(note, wall_offset=offset)
         if note.boot:
             self.offsets.setdefault(note.boot, note.wall_offset)
         return note

@@ -115,8 +115,9 @@ class Predecessor:
         epochs: dict[int, Written] = {}
         for path, found in self._files():
             self._add(epochs, path, found, segment)
-            if epochs and _is_known(max(epochs.values(), key=lambda each: each.note.number)):
-                break
+            newest = max(epochs.values(), key=lambda each: each.note.number, default=None)
+            if newest and newest.last >= 0 and (newest.journal_next > 0 or not newest.has_journal):
+                break  # older files hold nothing more of it
         return epochs
 
     def _files(self) -> Iterator[tuple[Path, Scan]]:
@@ -146,8 +147,3 @@ class Predecessor:
             if known.journal_next == 0 and (last := part.last_entries()) is not None:
                 known = replace(known, journal_next=last.next)
             epochs[note.epoch] = known
-
-
-def _is_known(epoch: Written) -> bool:
-    """True if older files hold nothing more of an epoch."""
-    return epoch.last >= 0 and (epoch.journal_next > 0 or not epoch.has_journal)

@@ -59,7 +59,10 @@ def write_part(
     offsets = _offsets_in(chain.from_iterable(sources))
     # files of one recording stay in order, even against time: robots have clocks of their own
     in_order = sorted(
-        (each for each in sources if each), key=lambda files: _begin_of(files, offsets)
+        (each for each in sources if each),
+        key=lambda files: min(
+            found.chunks.start + _largest(_shifts(found, offsets)) for _, found in files
+        ),
     )
     file = opened(output, proceed=False)
     try:
@@ -91,10 +94,6 @@ def _epochs_in(recordings: Sequence[RecordingFile]) -> Iterator[tuple[Run, Recor
         for name in recording:
             for epoch in recording[name].epochs:
                 yield (name, epoch.epoch), epoch
-
-
-def _begin_of(files: list[tuple[Path, Scan]], offsets: dict[str, int]) -> int:
-    return min(found.chunks.start + _largest(_shifts(found, offsets)) for _, found in files)
 
 
 def _notes_in(found: Scan) -> Iterator[EpochNote]:

@@ -137,7 +137,8 @@ class Recorder:
         """Writes rows and entries since the last call as a chunk; returns the message count."""
         self._polled = time.monotonic()
         with self.writing():
-            if self._is_full():
+            full = self._split is not None and self._split.is_due(self.file.size, self._file_begun)
+            if full and self.file.found.chunks:
                 self._continue_in_next_file()
             if self._patterns and time.monotonic() >= self._search_at:
                 self._search()
@@ -216,12 +217,6 @@ class Recorder:
         for source in self.sources.values():
             source.close()
 
-    def _is_full(self) -> bool:
-        """True if the next rows belong in another file."""
-        if self._split is None or not self.file.found.chunks:
-            return False
-        return self._split.is_due(self.file.size, self._file_begun)
-
     def _continue_in_next_file(self) -> None:
         """Switches to the next file; one of the two is always locked against other recorders."""
         full, self.file = self.file, next_file(self.file)
@@ -297,16 +292,22 @@ def _weakly(make_room: Callable[[int], None]) -> Callable[[int], None]:
     return call
 
 
+def size_of(text: str, name: str) -> float:
+    """Parses a size such as "50G" [bytes]. Raises InvalidArgument, with the argument's name."""
+    try:
+        size = Split.of(text).bytes
+    except InvalidArgument:
+        size = math.inf
+    if size == math.inf:
+        raise InvalidArgument(f"{name} must be a size such as 50G, got '{text}'")
+    return size
+
+
 def _most(keep: str, split: "Split | None") -> float:
     """Parses a size such as "50G" [bytes]. Raises InvalidArgument if wrong or too small."""
     if split is None:
         raise InvalidArgument("keep needs split: it deletes whole files, such as with --split 1G")
-    try:
-        most = Split.of(keep).bytes
-    except InvalidArgument:
-        most = math.inf
-    if most == math.inf:
-        raise InvalidArgument(f"keep must be a size such as 50G, got '{keep}'")
+    most = size_of(keep, "keep")
     if split.bytes < math.inf and most < 2 * split.bytes:
         raise InvalidArgument(
             f"keep must be at least two files of {bytes_text(split.bytes)} (split), got '{keep}'"

@@ -11,14 +11,10 @@ from o80.rows.journal import JournalCommand, JournalEntry
 _MAX_NUMBERS = 8  # of a target
 
 
-def _without_style(text: str, _style: str) -> str:
-    return text
-
-
 class JournalText:
     """Describes entries in words; keeps commands that have not ended, to name them at their end."""
 
-    def __init__(self, style: Callable[[str, str], str] = _without_style) -> None:
+    def __init__(self, style: Callable[[str, str], str] = lambda text, _: text) -> None:
         """style: formats a text, as `o80.base.screen.style`."""
         self._style = style
         self._open: dict[tuple[int | None, int], str] = {}

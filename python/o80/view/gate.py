@@ -106,10 +106,13 @@ class Gate:
             except BlockingIOError:
                 return
             except OSError as error:
-                if error.errno in NO_MORE:
-                    self._free_one()
-                    return
-                continue  # it was closed before it was accepted
+                if error.errno not in NO_MORE:
+                    continue  # it was closed before it was accepted
+                if self._strangers:  # the process has no descriptor left: frees one
+                    self._drop_oldest()
+                else:
+                    time.sleep(TICK)
+                return
             connection = _Connection(accepted, time.monotonic() + HEAD_WITHIN)
             self._strangers[connection] = None
             self._read(connection)
@@ -118,13 +121,6 @@ class Gate:
     def _make_room(self) -> None:
         while len(self._strangers) > self._most_strangers:
             self._drop_oldest()
-
-    def _free_one(self) -> None:
-        """Frees a descriptor, because the process has none left."""
-        if self._strangers:
-            self._drop_oldest()
-        else:
-            time.sleep(TICK)
 
     def _drop_oldest(self) -> None:
         oldest = next(iter(self._strangers))

@@ -83,9 +83,9 @@ def test_a_field_that_is_not_there_is_answered_with_the_nearest(
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        *((f"--rate={rate}", f"rate must be positive, got {rate}") for rate in ("0", "nan", "inf")),
+        *((f"--rate={each}", f"a positive number, got {each}") for each in ("0", "nan", "inf")),
         ("--count=-1", "'--count'"),
-        ("--timeout=nan", "timeout must not be negative, got nan"),
+        ("--timeout=nan", "must not be negative, got nan"),
     ],
 )
 def test_odd_numbers_are_refused(words: str, said: str) -> None:

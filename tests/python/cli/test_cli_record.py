@@ -104,16 +104,17 @@ def test_a_recorder_that_continues_says_where_it_goes_on(arm: o80.Frontend, tmp_
 
 
 @pytest.mark.parametrize(
-    ("words", "said"),
+    ("words", "said", "code"),
     [
-        (["--seconds", "-1"], "seconds must be positive"),
-        (["--seconds", "nan"], "seconds must be positive"),
-        (["--size", "many"], "a number of bytes such as 500M"),
-        (["--size", "0"], "a number of bytes such as 500M"),
+        (["--seconds", "-1"], "must be a positive number", 2),
+        (["--seconds", "nan"], "must be a positive number", 2),
+        (["--size", "many"], "size must be a size such as 50G", 1),
+        (["--size", "0"], "size must be a size such as 50G", 1),
     ],
 )
-def test_wrong_options_are_named(words: list[str], said: str, tmp_path: Path) -> None:
-    assert said in " ".join(run("record", "arm", "-o", tmp_path / "a.mcap", *words, code=2).split())
+def test_wrong_options_are_named(words: list[str], said: str, code: int, tmp_path: Path) -> None:
+    printed = run("record", "arm", "-o", tmp_path / "a.mcap", *words, code=code)
+    assert said in " ".join(printed.split())
     assert not (tmp_path / "a.mcap").exists()
 
 

@@ -140,17 +140,6 @@ def test_statistics_are_those_of_the_observations_of_all_rollouts(tmp_path: Path
     assert statistics.var == pytest.approx(np.concatenate(seen).var(axis=0), abs=1e-3)
 
 
-def test_numbers_that_are_not_visible_change_nothing(tmp_path: Path) -> None:
-    visible = np.array([1, 1, 1, 1, 0, 0])
-    with collector_of(tmp_path) as collector:
-        told = Told(collector)
-        model_of(collector, steps=STEPS, visible=visible).learn(2 * STEPS * COPIES, callback=told)
-    for rollout, buffer in zip(told.rollouts, told.buffers, strict=True):
-        assert not buffer["observations"][..., 4:].any()
-        assert buffer["observations"][..., :4].any()
-        assert buffer["log_probs"] == pytest.approx(rollout.log_probabilities, abs=1e-4)
-
-
 class Guess(gymnasium.Env[Any, Any]):
     """Episodes of one step, worth most for the actions (0.4, -0.6)."""
 

@@ -1,21 +1,17 @@
-"""An index of the recordings below a folder: `o80.recordings` and `o80 recordings`."""
+"""The recordings below a folder: `o80.recordings` and `o80 recordings`."""
 
 import json
 import os
 import shutil
-import sqlite3
 import warnings
 from datetime import datetime, timedelta
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 import o80
-import o80.recording.catalogue as catalogue
 from o80.base.local_time import instant as time_of
 from o80.cli.recordings import recordings as command
-from o80.recording.catalogue import INDEX
 
 NAMES = ("a.mcap", "monday/b.mcap", "c.mcap")
 
@@ -73,55 +69,6 @@ def test_recordings_are_found_with_their_runs_and_marks(folder: Path, segment: s
     assert o80.recordings(folder, begin=c + timedelta(days=1)) == []
 
 
-def test_only_what_has_changed_is_read_again(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    read: list[str] = []
-    summary = catalogue._summary
-
-    def noted(path: Path) -> str:
-        read.append(path.name)
-        return summary(path)
-
-    monkeypatch.setattr(catalogue, "_summary", noted)
-
-    def reads() -> list[str]:
-        read.clear()
-        o80.recordings(folder)
-        return sorted(read)
-
-    everything = ["a.mcap", "b.mcap", "c.mcap"]
-    assert reads() == everything
-    first = o80.recordings(folder)
-    assert (reads(), o80.recordings(folder)) == ([], first)
-    os.utime(folder / "a.mcap", ns=(0, 1))
-    assert reads() == ["a.mcap"]
-    shutil.copy(folder / "a.mcap", folder / "d.mcap")
-    assert reads() == ["d.mcap"]
-    (folder / "d.mcap").unlink()
-    (folder / "c.mcap" / "0000.mcap").unlink()
-    assert reads() == ["c.mcap"]
-    assert len(o80.recordings(folder)) == 3
-    index = folder / INDEX
-    for spoil in (
-        index.unlink,
-        lambda: index.write_bytes(b"no database" * 1000),
-        lambda: index.write_bytes(index.read_bytes()[:5000]),
-        lambda: index.write_bytes(b""),
-        lambda: changed(index, "PRAGMA user_version = 99"),
-        lambda: changed(index, "UPDATE recordings SET found = '{}'"),
-        lambda: changed(index, "DROP TABLE recordings"),
-        lambda: changed(index, "UPDATE recordings SET found = 7, size = 'x'"),
-    ):
-        spoil()
-        assert reads() == everything
-        assert reads() == []
-
-
-def changed(index: Path, statement: str) -> None:
-    with sqlite3.connect(index) as database:
-        database.execute(statement)
-    database.close()
-
-
 def test_damaged_and_strange_files_are_listed_with_their_reason(
     folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -165,20 +112,6 @@ def test_links_pipes_and_names_of_any_bytes_are_no_obstacle(folder: Path, tmp_pa
     fewer = o80.recordings(folder)
     assert [each.path.name for each in fewer] == ["a.mcap", "b.mcap", "c.mcap"]
     assert fewer[-1].runs[0].rows < found[-1].runs[0].rows
-
-
-def test_a_folder_that_cannot_be_written_works_and_says_so_once(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
-    def connect(*words: Any, **options: Any) -> Any:
-        raise sqlite3.OperationalError("unable to open database file")
-
-    monkeypatch.setattr(sqlite3, "connect", connect)
-    with pytest.warns(RuntimeWarning, match="cannot be written") as remarks:
-        assert len(o80.recordings(folder)) == 3
-    assert len(remarks) == 1
-    command(folder)
-    assert capsys.readouterr().err.count("cannot be written") == 1
 
 
 def test_the_command_lists_filters_and_gives_json(

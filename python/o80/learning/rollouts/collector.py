@@ -126,13 +126,15 @@ class Collector(Closeable):
             raise
 
     def _collected(self, policy: Policy, steps: int) -> Rollout:
-        environments = self._environments
+        environments, space = self._environments, self._environments.single_action_space
         generator = policy_generator(self.seed, self.number, self.iteration)
         recorder = Recorder(environments, steps, self._infos)
         for step in range(steps):
             actions, log_probabilities = policy.sample(self._observations, generator)
             recorder.acted(step, self._observations, actions, log_probabilities)
-            result = environments.step(_inside(environments.single_action_space, actions))
+            if isinstance(space, Box):
+                actions = np.clip(actions, space.low, space.high).astype(space.dtype, copy=False)
+            result = environments.step(actions)
             recorder.stepped(step, result, self._sums)
             self._observations = result[0]
         return recorder.rollout(self._observations)
@@ -148,12 +150,6 @@ def environment_seeds(seed: int, number: int, iteration: int, copies: int) -> li
 def policy_generator(seed: int, number: int, iteration: int) -> np.random.Generator:
     """Makes the random generator of the policy in the rollout of `iteration`."""
     return np.random.default_rng((seed, number, iteration, 1))
-
-
-def _inside(space: Any, actions: NDArray[Any]) -> NDArray[Any]:
-    if isinstance(space, Box):
-        actions = np.clip(actions, space.low, space.high).astype(space.dtype, copy=False)
-    return actions
 
 
 def _refuse_unless_collectable(environments: VectorEnv[Any, Any, Any]) -> None:

@@ -85,14 +85,8 @@ class RolloutPPO(PPO):
     the number of updates; for a loaded model the collector restarts in its iteration.
     """
 
-    def __init__(
-        self, *arguments: Any, visible: NDArray[Any] | None = None, **options: Any
-    ) -> None:
-        """visible: (M,) 0 for numbers of an observation that are hidden from the policy, else 1.
-
-        Other arguments: those of PPO.
-        """
-        self._visible = visible
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        """arguments, options: those of PPO."""
         super().__init__(*arguments, **options)
         if not self.verbose and self.tensorboard_log is None:
             self.set_logger(Logger(None, []))  # the default one leaves a folder in /tmp
@@ -104,7 +98,7 @@ class RolloutPPO(PPO):
                 f"norm_reward=False), got {self.env!r}"
             )
         self._collector = inner.collector
-        gaussian_policy(self.policy, self._vec_normalize_env, self._visible)  # may refuse
+        gaussian_policy(self.policy, self._vec_normalize_env)  # may refuse
 
     def _excluded_save_params(self) -> list[str]:
         return [*super()._excluded_save_params(), "_collector"]
@@ -131,17 +125,18 @@ class RolloutPPO(PPO):
         self.policy.set_training_mode(False)
         rollout_buffer.reset()
         callback.on_rollout_start()
-        rollout = _Visible(self._collected(n_rollout_steps), self._visible)
+        rollout = self._collected(n_rollout_steps)
+        over, ends = rollout.terminated | rollout.truncated, _Ends(rollout)
         steps = len(rollout.rewards)  # more than requested, if the collector ends episodes
         if steps != rollout_buffer.buffer_size:
             rollout_buffer.buffer_size = steps
             rollout_buffer.reset()
-        rewards, values, log_probabilities = self._valued(rollout)
+        rewards, values, log_probabilities = self._valued(rollout, ends)
         starts = self._last_episode_starts
         normalised = self._normalised(rollout.observations)
         for step in range(steps):
             self.num_timesteps += self.n_envs
-            dones, infos = rollout.over[step], rollout.infos(step)
+            dones, infos = over[step], ends.infos(step)
             known = {"rewards": rollout.rewards[step], "dones": dones, "infos": infos}
             callback.update_locals(known)
             if not callback.on_step():
@@ -170,7 +165,7 @@ class RolloutPPO(PPO):
         iteration = self.num_timesteps // (steps * self.n_envs)
         if self._collector.iteration != iteration:
             self._collector.restart(iteration)
-        policy = gaussian_policy(self.policy, self._vec_normalize_env, self._visible)
+        policy = gaussian_policy(self.policy, self._vec_normalize_env)
         return self._collector.collect(policy, steps=steps)
 
     def _normalised(self, observations: NDArray[Any]) -> NDArray[Any]:
@@ -179,7 +174,7 @@ class RolloutPPO(PPO):
         normalised: Any = self._vec_normalize_env.normalize_obs(observations)
         return normalised  # type: ignore[no-any-return]
 
-    def _valued(self, rollout: "_Visible") -> tuple[NDArray[Any], Any, Any]:
+    def _valued(self, rollout: Rollout, ends: "_Ends") -> tuple[NDArray[Any], Any, Any]:
         """Returns rewards (T, N), with the values of the last states of truncated episodes added;
         values (T + 1, N); and log-probabilities (T, N) by torch, to compare with the update's own.
         """
@@ -190,7 +185,7 @@ class RolloutPPO(PPO):
             seen = self._tensor(self._normalised(rollout.observations[:-1])).flatten(0, 1)
             acted = self._tensor(rollout.actions).flatten(0, 1)
             _, log_probabilities, _ = self.policy.evaluate_actions(seen, acted)
-            cut, last = rollout.cut_off()
+            cut, last = ends.cut_off()
             if len(last):
                 rewards[cut] += self.gamma * self._values(last).numpy()
         return rewards, values, log_probabilities.reshape(steps, count)
@@ -205,14 +200,11 @@ class RolloutPPO(PPO):
         return torch.as_tensor(np.array(array), dtype=torch.float32, device=self.device)
 
 
-class _Visible:
-    """A rollout without the numbers that are hidden from the learner."""
+class _Ends:
+    """The ends of the episodes of a rollout, as Stable-Baselines3 names what belongs to them."""
 
-    def __init__(self, rollout: Rollout, visible: NDArray[Any] | None) -> None:
-        self._rollout, self._visible = rollout, visible
-        self.observations = self._seen(rollout.observations)
-        self.actions, self.rewards = rollout.actions, rollout.rewards
-        self.over = rollout.terminated | rollout.truncated
+    def __init__(self, rollout: Rollout) -> None:
+        self._rollout = rollout
         self._infos: dict[int, dict[int, Info]] = {}
         for step, copy, info in self._ends():
             self._infos.setdefault(step, {})[copy] = info
@@ -220,7 +212,7 @@ class _Visible:
     def infos(self, step: int) -> list[Info]:
         """Returns infos of all copies for Stable-Baselines3, with entries for ended episodes."""
         ended = self._infos.get(step, {})
-        return [ended.get(copy, {}) for copy in range(self.rewards.shape[1])]
+        return [ended.get(copy, {}) for copy in range(self._rollout.rewards.shape[1])]
 
     def cut_off(self) -> tuple[tuple[list[int], list[int]], NDArray[Any]]:
         """Returns index (steps, copies) and last observations of merely truncated episodes."""
@@ -237,11 +229,8 @@ class _Visible:
         for number in range(len(ends.steps)):
             step, copy = int(ends.steps[number]), int(ends.copies[number])
             info = {name: values[number] for name, values in ends.infos.items()}
-            info["terminal_observation"] = self._seen(ends.observations[number])
+            info["terminal_observation"] = ends.observations[number]
             info["TimeLimit.truncated"] = not terminated[step, copy]
             reward, length = float(ends.rewards[number]), int(ends.lengths[number])
             info["episode"] = {"r": reward, "l": length}
             yield step, copy, info
-
-    def _seen(self, observations: NDArray[Any]) -> NDArray[Any]:
-        return observations if self._visible is None else observations * self._visible

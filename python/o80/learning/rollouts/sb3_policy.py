@@ -9,10 +9,8 @@ from o80.base.errors import InvalidArgument
 from o80.learning.rollouts.gaussian_policy import GaussianPolicy
 
 
-def gaussian_policy(
-    policy: Any, normalisation: Any, visible: NDArray[Any] | None
-) -> GaussianPolicy:
-    """policy: of a PPO; normalisation: its VecNormalize, or None; visible: as in RolloutPPO.
+def gaussian_policy(policy: Any, normalisation: Any) -> GaussianPolicy:
+    """policy: of a PPO; normalisation: its VecNormalize, or None.
 
     Raises InvalidArgument for a policy that GaussianPolicy cannot represent.
     """
@@ -39,8 +37,6 @@ def gaussian_policy(
         statistics = normalisation.obs_rms
         mean, scale = statistics.mean, 1.0 / np.sqrt(statistics.var + normalisation.epsilon)
         clip = float(normalisation.clip_obs)
-    if visible is not None:
-        scale = scale * visible
     return GaussianPolicy(
         np.asarray(mean, np.float32),
         np.asarray(scale, np.float32),

@@ -44,7 +44,7 @@ class Learner(RolloutPPO):
 
     def network(self) -> GaussianPolicy:
         """Returns the current policy."""
-        return gaussian_policy(self.policy, self._vec_normalize_env, None)
+        return gaussian_policy(self.policy, self._vec_normalize_env)
 
     def state(self) -> dict[str, Any]:
         """Copies all state that decides the further training: numbers, texts and tensors."""
