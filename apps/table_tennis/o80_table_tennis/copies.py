@@ -301,10 +301,9 @@ class TableTennisCopies(HybridTask):
 
     def _by_world(self, values: Any) -> Any:
         """Reshapes values of balls (n * worlds, ...) to (n, worlds, ...) for several worlds."""
-        values = np.asarray(values)
         if self._endings is None:
             return values
-        return values.reshape(-1, self.worlds, *values.shape[1:])
+        return np.reshape(values, (-1, self.worlds, *np.shape(values)[1:]))
 
     # ------------------------------------------------------------------ results
 

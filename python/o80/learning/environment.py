@@ -53,7 +53,9 @@ class Environment(gymnasium.Env[Any, Any]):
         actions = batch_of_one(self.action_space, action)
         self._ready = False
         stepped = episodes.step(self.task, actions, EVERY)
-        info = infos.of_one(stepped.info) | infos.of_one(stepped.judged_info)
+        info = infos.of_one(stepped.info)
+        if stepped.judged_info:
+            info |= infos.of_one(stepped.judged_info)
         if stepped.halted.size:
             info |= infos.of_one(stepped.halt_info)
         terminated, truncated = bool(stepped.terminated[0]), bool(stepped.truncated[0])

@@ -92,7 +92,11 @@ def _some(value: Any, rows: NDArray[Any]) -> Any:
 def of_one(values: Mapping[str, Any]) -> Info:
     """Makes the info of a single copy."""
     return {
-        name: of_one(value) if isinstance(value, Mapping) else _first(_array(value))
+        name: _first(value)
+        if type(value) is np.ndarray
+        else of_one(value)
+        if isinstance(value, Mapping)
+        else _first(np.asarray(value))
         for name, value in values.items()
     }
 
@@ -110,6 +114,6 @@ def _empty(like: NDArray[Any], count: int) -> NDArray[Any]:
 def _first(array: NDArray[Any]) -> Any:
     value = array[0] if array.ndim else array[()]
     if isinstance(value, np.ndarray):
-        return value.copy()
+        return _array(value).copy()
     # Gymnasium makes arrays of objects for np.bool_
-    return bool(value) if isinstance(value, np.bool_) else value
+    return value.item() if isinstance(value, np.bool_ | np.str_) else value

@@ -1,8 +1,8 @@
 """Tasks: actions, observations and rewards of copies of a robot in episodes."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -32,6 +32,18 @@ class Outcome:
     """Something outside the task ended the episode, such as a time limit."""
     info: Mapping[str, Any] = field(default_factory=dict)
     """Further entries of Gymnasium's info, for these copies only."""
+
+
+class _UntilHalted(AbstractContextManager[None]):
+    def __init__(self, task: "Task") -> None:
+        self._task = task
+
+    def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> bool:
+        if error is None or not isinstance(error, BackendHalted | CopyFailed | NotCompleted):
+            return False
+        halted = halts_of(self._task.robots, self._task.copies).keys()
+        failed = error.errors.keys() if isinstance(error, CopyFailed) else halted
+        return bool(halted) and failed <= halted
 
 
 class Task(ABC):
@@ -116,16 +128,9 @@ class Task(ABC):
     def step(self, actions: Any, copies: Index) -> None:
         """Executes the actions (n, ...) of these n copies."""
 
-    @contextmanager
-    def until_halted(self) -> Iterator[None]:
+    def until_halted(self) -> AbstractContextManager[None]:
         """Encloses a burst of a group in `step`: the step continues although copies are halted."""
-        try:
-            yield
-        except (BackendHalted, CopyFailed, NotCompleted) as error:
-            halted = halts_of(self.robots, self.copies).keys()
-            failed = error.errors.keys() if isinstance(error, CopyFailed) else halted
-            if not halted or not failed <= halted:
-                raise
+        return _UntilHalted(self)
 
     def clipped(self, actions: Any) -> Any:
         """Clips actions (n, ...) into the action space. Raises InvalidArgument if it is no Box."""

@@ -94,5 +94,6 @@ class Observer:
         return within.astype(np.float32)
 
     def _of_task(self, state: State, seen: Perceived) -> Float32Array:
-        state = replace(state, ball=seen.ball, pressures=seen.pressures)
+        if seen.ball is not state.ball or seen.pressures is not state.pressures:
+            state = replace(state, ball=seen.ball, pressures=seen.pressures)
         return self.clip(self._task.observe(state))
