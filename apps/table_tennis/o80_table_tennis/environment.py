@@ -81,7 +81,7 @@ class TableTennisEnvironment(HybridEnvironment):
         self._twin_first, self._number = self.task.twin_row, self._number + 1
         self._paid, self._begun_at = 0.0, math.nan
         self._summary, self._observed = None, [observation.copy()]
-        return observation, _plain(info)
+        return observation, info
 
     def step(self, action: Action) -> Outcome:
         """Runs five iterations of arm and worlds, times `repeat`, times `action_steps`."""
@@ -98,7 +98,7 @@ class TableTennisEnvironment(HybridEnvironment):
             self._page.after_step()
         if end is not End.RUNNING:
             self._finish(end)
-        return observation, reward, terminated, truncated, _plain(info)
+        return observation, reward, terminated, truncated, info
 
     def _finish(self, end: End) -> None:
         """Summarises an ended episode, and marks it in the recording."""
@@ -157,11 +157,3 @@ class TableTennisEnvironment(HybridEnvironment):
                 self._page.close()
         finally:
             super().close()
-
-
-def _plain(info: Info) -> Info:
-    """Converts the arrays of an info to plain numbers."""
-    return {
-        name: value.item() if isinstance(value, np.generic) else value
-        for name, value in info.items()
-    }

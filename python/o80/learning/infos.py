@@ -112,8 +112,10 @@ def _empty(like: NDArray[Any], count: int) -> NDArray[Any]:
 
 
 def _first(array: NDArray[Any]) -> Any:
+    # as Python's numbers and texts: Gymnasium makes arrays of objects for np.bool_
+    if array.ndim == 1 and array.dtype.char in "dl?U":
+        return array.item(0)
     value = array[0] if array.ndim else array[()]
     if isinstance(value, np.ndarray):
         return _array(value).copy()
-    # Gymnasium makes arrays of objects for np.bool_
     return value.item() if isinstance(value, np.bool_ | np.str_) else value
