@@ -212,6 +212,8 @@ TEST_F(LoopHaltTest, AVerbThatDoesNotReturnIsSeenFromOutside) {
 class ReadingTest : public LoopHaltTest {
  protected:
   void begin(const Limits& limits) {
+    frontend_.reset();
+    loop_.reset();
     FakeDriver::limits = limits;
     FakeDriver::on_write = [this](const Desired<FakeDriver>& desired) { written_ = desired[0]; };
     FakeDriver::on_read = [this](Reading<FakeDriver>& reading) {
@@ -292,8 +294,6 @@ TEST_F(ReadingTest, AResumeRefusesOneThatCannotBe) {
       EXPECT_EQ(resume(again).status, Status::completed) << i << ": " << resume(again).text;
     }
     EXPECT_EQ(written_, before);
-    frontend_.reset();
-    loop_.reset();
   }
 }
 
@@ -335,8 +335,6 @@ TEST_F(ReadingTest, ARobotThatIsRightIsNeverRefused) {
     const Handle handle = resume(number);
     EXPECT_EQ(handle.status, Status::completed) << handle.text;
     moved_ = 0.0;
-    frontend_.reset();
-    loop_.reset();
   }
 }
 
@@ -352,8 +350,6 @@ TEST_F(ReadingTest, TheNoiseThatADriverDescribesIsAllowedAndNoMore) {
       fresh_offset_ = step * reach;
       EXPECT_EQ(resume(number).status == Status::completed, std::abs(step) < 1.0) << step;
       fresh_offset_ = 0.0;
-      frontend_.reset();
-      loop_.reset();
     }
   }
 }
@@ -390,8 +386,6 @@ TEST_F(ReadingTest, ARobotOfTheWorldCannotComeFarByARequest) {
       const std::uint64_t number = frontend_->halted()->number;
       EXPECT_EQ(resume(number, true).status, Status::completed);
     }
-    frontend_.reset();
-    loop_.reset();
   }
 }
 
