@@ -34,6 +34,8 @@ TEST_F(TypedBackendTest, ServesRequestsAndReadsAfresh) {
   EXPECT_EQ(fresh.extended().total, 9);
   EXPECT_EQ(batch.handle(1).text, "no");
   EXPECT_THAT(batch.handle(2).text, HasSubstr("this request has no handler"));
+  EXPECT_EQ(frontend.schema().requests[0].help.view(), Reset::kHelp);
+  EXPECT_EQ(frontend.schema().requests[3].help.view(), "") << "a struct without kHelp";
 }
 
 TEST_F(TypedBackendTest, ARequestThatThrowsEndsItAsFailed) {
