@@ -63,12 +63,8 @@ target_compile_definitions(o80_killed PUBLIC O80_CRASH_POINTS)
 target_compile_options(o80_killed PRIVATE ${test_options})
 target_link_libraries(o80_killed PRIVATE o80_private_headers o80_warnings)
 
-# BusyMachineTest proves something on a real-time machine only: `make rt` runs it. A sanitizer sees
-# nothing in a compiler.
+# BusyMachineTest proves something on a real-time machine only: `make rt` runs it.
 set(elsewhere "BusyMachineTest.*")
-if(O80_SANITIZE)
-  string(APPEND elsewhere ":Describe.Refuses*WhenItIsCompiled")
-endif()
 
 foreach(folder IN LISTS test_folders)
   if(folder STREQUAL "mujoco" AND NOT TARGET mujoco_driver)

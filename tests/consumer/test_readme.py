@@ -1,4 +1,4 @@
-"""The README's programs run as they stand there."""
+"""The programs of the README and of docs/drivers.md run as they stand there."""
 
 import re
 import subprocess
@@ -9,11 +9,12 @@ import o80
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 README = (ROOT / "README.md").read_text()
+DRIVERS = (ROOT / "docs" / "drivers.md").read_text()
 
 
-def blocks(language: str) -> list[str]:
+def blocks(language: str, page: str = README) -> list[str]:
     """The code blocks of a language, in order."""
-    return re.findall(rf"```{language}\n(.*?)```", README, re.DOTALL)
+    return re.findall(rf"```{language}\n(.*?)```", page, re.DOTALL)
 
 
 def run(*command: str, folder: Path) -> str:
@@ -58,3 +59,15 @@ def test_the_robot_in_cpp(tmp_path: Path) -> None:
         wheels.halt("a wall")
         halted = wheels.wait_for(wheels.published + 10, timeout=20.0)
         assert halted.desired["speed"][0] == 0.0
+
+
+def test_the_complete_driver_is_built_and_commanded_as_shown(tmp_path: Path) -> None:
+    (tmp_path / "arm.cpp").write_text(blocks("cpp", DRIVERS)[0])
+    (tmp_path / "CMakeLists.txt").write_text(blocks("cmake", DRIVERS)[0])
+    run("cmake", "-B", "build", f"-Do80_ROOT={o80.prefix()}", folder=tmp_path)
+    run("cmake", "--build", "build", folder=tmp_path)
+    robot = o80.robots.load(tmp_path / "build" / "arm.so")
+    with robot.start(frequency=500, gain=30.0, gap=0) as process:
+        printed = run(sys.executable, "-c", blocks("python", DRIVERS)[0], folder=tmp_path)
+        assert "0.49" in printed or "0.5" in printed
+        process.wait(timeout=20.0)

@@ -2,9 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include <cstdlib>
-#include <filesystem>
-#include <fstream>
 #include <vector>
 
 #include "describe/described.hpp"
@@ -14,7 +11,6 @@ namespace {
 using namespace described;  // NOLINT(google-build-using-namespace)
 using ::testing::Each;
 using ::testing::ElementsAre;
-using ::testing::HasSubstr;
 
 const o80::FieldRow& field(const o80::Schema& schema, std::uint32_t type, std::uint32_t index) {
   return schema.fields.at(schema.types.at(type).first_field + index);
@@ -141,17 +137,6 @@ TEST(Describe, NamesRequestsInSnakeCase) {
   EXPECT_EQ(o80::request_name<LaunchBall>(), "launch_ball");
 }
 
-TEST(Pack, LeavesThePaddingAlone) {
-  Padded value;
-  std::memset(static_cast<void*>(&value), 0xAB, sizeof value);
-  value.small = 0;
-  value.large = 0;
-  value.middle = 0;
-  std::vector<std::byte> bytes(sizeof(Padded));
-  o80::pack(value, bytes.data());
-  EXPECT_THAT(bytes, Each(std::byte{0}));
-}
-
 TEST(Pack, LeavesThePaddingOfNestedArraysAlone) {
   Sensors value;
   std::memset(static_cast<void*>(&value), 0xAB, sizeof value);
@@ -188,45 +173,6 @@ TEST(Pack, GivesBackWhatItGot) {
 TEST(Pack, OfNothingTouchesNothing) {
   o80::pack(o80::NoActuators{}, nullptr);
   static_cast<void>(o80::unpack<o80::NoActuators>(nullptr));
-}
-
-/// What the compiler says of a source; empty if it compiles.
-std::string compile(const std::string& source) {
-  char folder[] = "/tmp/o80-compile-XXXXXX";
-  EXPECT_NE(mkdtemp(folder), nullptr);
-  const std::string file = std::string(folder) + "/source.cpp";
-  const std::string said = std::string(folder) + "/said";
-  std::ofstream(file) << "#include <array>\n#include \"o80/describe/describe.hpp\"\n" << source;
-  const std::string command = std::string(O80_TEST_COMPILER) +
-                              " -std=c++20 -fsyntax-only -I" O80_TEST_SOURCE "/include " + file +
-                              " 2> " + said;
-  const int code = std::system(command.c_str());  // NOLINT(bugprone-command-processor)
-  std::ifstream stream(said);
-  std::string text((std::istreambuf_iterator<char>(stream)), {});
-  std::filesystem::remove_all(folder);
-  EXPECT_EQ(code == 0, text.empty()) << text;
-  return text;
-}
-
-TEST(Describe, RefusesAForgottenFieldWhenItIsCompiled) {
-#ifdef O80_TEST_EMULATOR
-  GTEST_SKIP() << "the compiler is not emulated";
-#endif
-  const std::string joint = "struct Joint { double position, velocity; };\n";
-  EXPECT_EQ(compile(joint + "O80_DESCRIBE(Joint, position, velocity);\n"), "");
-  EXPECT_THAT(compile(joint + "O80_DESCRIBE(Joint, position);\n"),
-              HasSubstr("Joint: describe every field, once"));
-  EXPECT_THAT(compile(joint + "O80_DESCRIBE(Joint, position, velocity, position);\n"),
-              HasSubstr("Joint: describe every field, once"));
-}
-
-TEST(Describe, RefusesAFieldThatCannotBeSharedWhenItIsCompiled) {
-#ifdef O80_TEST_EMULATOR
-  GTEST_SKIP() << "the compiler is not emulated";
-#endif
-  EXPECT_THAT(compile("struct Bad { int* pointer; };\nO80_DESCRIBE(Bad, pointer);\n"
-                      "void f() { o80::Schema s; o80::describing::type_of<Bad>(s); }\n"),
-              HasSubstr("a field must be a number, a described enum or struct"));
 }
 
 }  // namespace

@@ -110,11 +110,5 @@ TEST(Options, ListWhatThereIs) {
               HasSubstr("this robot has none"));
 }
 
-TEST(Options, AnArrayIsPartedByCommas) {
-  Config config;
-  set_option(config, "offsets", "1,-2.5,3e2");
-  EXPECT_THAT(config.offsets, ElementsAre(1, -2.5, 300));
-}
-
 }  // namespace
 }  // namespace o80

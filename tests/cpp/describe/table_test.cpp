@@ -3,9 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <cstring>
-#include <random>
 
-#include "cases.hpp"
 #include "describe/described.hpp"
 #include "o80/describe/layout.hpp"
 
@@ -233,14 +231,6 @@ TEST(Table, RefusesForeignAndTruncatedBytes) {
   EXPECT_THAT(read(bytes), HasSubstr("no schema"));
 }
 
-/// Reads every part of a schema that bytes have given.
-void use(const Schema& schema) {
-  difference(schema_of<MixedRobot>(), schema);
-  layout_difference(schema_of<MixedRobot>(), schema);
-  row_layout(schema);
-  for (const ActuatorRow& actuator : schema.actuators) schema.scalar_count(actuator.type);
-}
-
 TEST(Table, TheOriginOfAFieldIsKeptAndAnUnknownOneIsRefused) {
   Schema schema;
   schema.head.extended = describing::type_of<described::Origins>(schema);
@@ -255,32 +245,6 @@ TEST(Table, TheOriginOfAFieldIsKeptAndAnUnknownOneIsRefused) {
 
   origin(0) = static_cast<Origin>(4);
   EXPECT_THROW(schema_from_bytes(to_bytes(schema)), Error);
-}
-
-TEST(Table, GarbageIsRefusedAndNeverCrashes) {
-  const std::vector<std::byte> robots[] = {to_bytes(schema_of<MixedRobot>()),
-                                           to_bytes(shown_robot())};
-  std::mt19937 random(7);  // NOLINT(bugprone-random-generator-seed)
-  int survived = 0;
-  for (int round = 0; round < test::cases(5000); ++round) {
-    std::vector<std::byte> bytes = robots[round % 2];
-    const int changes = 1 + static_cast<int>(random() % 4);
-    for (int i = 0; i < changes; ++i) {
-      const std::size_t at = random() % (bytes.size() - 4);
-      // single bits, bytes and whole numbers, small and huge
-      const std::uint32_t kinds[] = {static_cast<std::uint32_t>(random()), 0xFFFFFFFFU, 0, 1,
-                                     0x80000000U};
-      const std::uint32_t value = kinds[random() % 5];
-      std::memcpy(&bytes[random() % 2 == 0 ? at / 4 * 4 : at], &value, random() % 2 == 0 ? 4 : 1);
-    }
-    try {
-      use(schema_from_bytes(bytes));
-      ++survived;
-    } catch (const Error&) {
-      // refused
-    }
-  }
-  EXPECT_GT(survived, 0) << "some changes do no harm";
 }
 
 }  // namespace

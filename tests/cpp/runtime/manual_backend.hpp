@@ -95,6 +95,7 @@ class ManualBackend : private RequestServer {
   Iteration last() const { return backend.iteration() - 1; }
 
   std::array<double, 2> now{};
+  std::array<double, 2> offset{};  // of each reading
   double total = 0;
   std::function<void()> before_publish;
   std::function<void()> on_refuse;  // while a request `refuse` is served
@@ -127,8 +128,9 @@ class ManualBackend : private RequestServer {
     if (before_publish) before_publish();
     publish();
   }
+  std::array<double, 2> reading() const { return {now[0] + offset[0], now[1] + offset[1]}; }
   void publish() {
-    pack(now, backend.observed());
+    pack(reading(), backend.observed());
     pack(total, backend.extended());
     backend.publish();
   }
@@ -162,7 +164,7 @@ class ManualBackend : private RequestServer {
     }
   }
   bool read_fresh(FreshReading& reading) noexcept override {
-    pack(now, reading.observed);
+    pack(this->reading(), reading.observed);
     pack(total, reading.extended);
     ++fresh_starts;
     return true;

@@ -31,11 +31,11 @@ namespace o80::test {
 ///     purge, purge 0, purge own, take, release, note         adds one of these
 ///     reset 5, snapshot, refuse, break, home, calibrate      adds a request
 ///     a = 0 to 5, a = pulse at 20 late      sends what was added, with that command or without
-///     a = resume 1                  sends the resume of a halt
+///     a = resume 1 accepting        sends the resume of a halt, accepting the reading or not
 ///     a = burst 5 at 3, a = to end  sends what was added with a burst, or one until its end
 ///     run 3, drive                  iterates so often; until it stands still
 ///     cancel a, cut                 calls a burst off; the backend cuts the one under way
-///     missed 100, read 0 1.5, close, alive, halt enough, burst 5   the last until it stands
+///     missed 100, read 0 1.5, offset 0 6, close, alive, halt enough, burst 5   the last until it stands
 ///     interrupt 0, driver halts hot, end stopped, end failed hot, stop   what the driver does
 ///     home ends, home ends rejected why, home progress text  of a request that runs
 ///     in 4 STATEMENT                is played in the row of iteration 4, before it is published
@@ -137,7 +137,7 @@ class Trace {
     PulseOptions options;
     if (find("at") > 0) options.at = whole(find("at") + 1);
     if (find("late") > 0) options.late = PulseOptions::Late::now;
-    if (words_[0] == "resume") return send_resume(frontend, small(1));
+    if (words_[0] == "resume") return send_resume(frontend, small(1), find("accepting") > 0);
     if (begins("to end ")) return frontend.pulse_to_end();
     if (words_[0] == "burst") {
       bursts_.insert_or_assign(name, frontend.start_burst(whole(1), options));
@@ -220,6 +220,8 @@ class Trace {
       backend.set_timing({.skipped = small(1)});
     } else if (verb == "read") {
       manual.now.at(small(1)) = number(2);
+    } else if (verb == "offset") {
+      manual.offset.at(small(1)) = number(2);
     } else if (verb == "alive") {
       frontend.keep_alive();
     } else if (verb == "halt") {

@@ -107,9 +107,8 @@ std::optional<Failure> EndWatch::idle(const ScriptWorld& world, std::size_t actu
     const NumberSpec& number = spec.numbers[n];
     const NumberTrack& place = track.numbers[n];
     if (spec.follow && !number.resting) {
-      std::array<std::byte, 8> bytes{};
-      store_as(number.kind, place.reading.value_or(0.0), bytes.data());
-      const long double seen = place.reading ? load_as(number.kind, bytes.data()) : place.before;
+      const long double seen =
+          place.reading ? as_stored(number.kind, *place.reading) : place.before;
       const long double expected = std::isfinite(seen) ? seen : place.before;
       if (place.now == expected) continue;
       return Failure{"following", world.where(actuator, n) + positions(place.now, expected)};
@@ -118,9 +117,7 @@ std::optional<Failure> EndWatch::idle(const ScriptWorld& world, std::size_t actu
     // at rest: a resting field that no direct command left where it is
     const bool was_left = was_direct && world.names(*track.last, n);
     if (number.resting && track.last != nullptr && !was_left && !spec.blend) {
-      std::array<std::byte, 8> bytes{};
-      store_as(number.kind, number.rest, bytes.data());
-      const long double rest = load_as(number.kind, bytes.data());
+      const long double rest = as_stored(number.kind, number.rest);
       // the rules do not say whether an interrupt after the end of a direct command leaves the
       // field where it is
       const bool unsaid = world.step_of(*track.last).head.pace == Pace::direct &&

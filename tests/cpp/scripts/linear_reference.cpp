@@ -1,7 +1,6 @@
 #include "scripts/linear_reference.hpp"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 
@@ -9,12 +8,6 @@ namespace o80::test {
 namespace {
 
 constexpr std::int64_t kPeriodNs = 1'000'000;
-
-long double as_stored(Kind kind, double value) {
-  std::array<std::byte, 8> bytes{};
-  store_as(kind, value, bytes.data());
-  return load_as(kind, bytes.data());
-}
 
 bool is_wide(Kind kind) { return kind == Kind::int64 || kind == Kind::uint64; }
 

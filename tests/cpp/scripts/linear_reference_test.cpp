@@ -74,7 +74,7 @@ class Comparison {
   LinearReference reference_;
 };
 
-// rule C12
+// rules C1, C12, C20
 TEST(LinearReference, AgreesWithTheControllerBitForBit) {
   const char* wanted = std::getenv("O80_REFERENCE_ITERATIONS");
   const std::int64_t most = wanted == nullptr ? kIterationsOfEachRun : std::stoll(wanted);

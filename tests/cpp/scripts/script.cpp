@@ -1,33 +1,29 @@
 #include "scripts/script.hpp"
 
+#include <array>
 #include <cmath>
 #include <cstring>
 #include <limits>
 #include <numbers>
+#include <type_traits>
+
+#include "describe/visit_number.hpp"
 
 namespace o80::test {
 namespace {
 
 template <class T>
-void store_integer_as(double value, std::byte* at) {
+T rounded_to(double value) {
   using Range = std::numeric_limits<T>;
-  const double whole = std::round(value);
-  T stored = 0;
-  if (whole >= static_cast<double>(Range::max())) {
-    stored = Range::max();
-  } else if (whole <= static_cast<double>(Range::min())) {
-    stored = Range::min();
-  } else if (whole == whole) {
-    stored = static_cast<T>(whole);
+  if constexpr (std::is_floating_point_v<T>) {
+    constexpr auto kMax = static_cast<double>(Range::max());
+    return static_cast<T>(std::isfinite(value) ? std::fmin(std::fmax(value, -kMax), kMax) : value);
+  } else {
+    const double whole = std::round(value);
+    if (whole >= static_cast<double>(Range::max())) return Range::max();
+    if (whole <= static_cast<double>(Range::min())) return Range::min();
+    return whole == whole ? static_cast<T>(whole) : T{0};
   }
-  std::memcpy(at, &stored, sizeof stored);
-}
-
-template <class T>
-long double loaded(const std::byte* at) {
-  T value;
-  std::memcpy(&value, at, sizeof value);
-  return static_cast<long double>(value);
 }
 
 struct Polar {
@@ -56,63 +52,26 @@ bool NumberSpec::limited() const { return bounded() || std::isfinite(limits.spee
 std::uint32_t bytes_of_kind(Kind kind) { return kind == Kind::enumeration ? 1 : size_of(kind); }
 
 void store_as(Kind kind, double value, std::byte* at) {
-  switch (kind) {
-    case Kind::float64:
-      std::memcpy(at, &value, sizeof value);
-      return;
-    case Kind::float32: {
-      constexpr double kMax = std::numeric_limits<float>::max();
-      const auto narrow = static_cast<float>(
-          std::isfinite(value) ? std::fmin(std::fmax(value, -kMax), kMax) : value);
-      std::memcpy(at, &narrow, sizeof narrow);
-      return;
-    }
-    case Kind::int8:
-      return store_integer_as<std::int8_t>(value, at);
-    case Kind::int16:
-      return store_integer_as<std::int16_t>(value, at);
-    case Kind::int32:
-      return store_integer_as<std::int32_t>(value, at);
-    case Kind::int64:
-      return store_integer_as<std::int64_t>(value, at);
-    case Kind::uint16:
-      return store_integer_as<std::uint16_t>(value, at);
-    case Kind::uint32:
-      return store_integer_as<std::uint32_t>(value, at);
-    case Kind::uint64:
-      return store_integer_as<std::uint64_t>(value, at);
-    case Kind::boolean:
-      return store_integer_as<std::uint8_t>(value >= 0.5 ? 1.0 : 0.0, at);
-    case Kind::enumeration:  // labels 0, 1 and 2
-      return store_integer_as<std::uint8_t>(std::fmin(value, 2.0), at);
-    default:
-      return store_integer_as<std::uint8_t>(value, at);
-  }
+  if (kind == Kind::boolean) value = value >= 0.5 ? 1.0 : 0.0;
+  if (kind == Kind::enumeration) value = std::fmin(value, 2.0);  // labels 0, 1 and 2
+  visit_number(kind, [&]<class T>(T) {
+    const T stored = rounded_to<T>(value);
+    std::memcpy(at, &stored, sizeof stored);
+  });
 }
 
 long double load_as(Kind kind, const std::byte* at) {
-  switch (kind) {
-    case Kind::float64:
-      return loaded<double>(at);
-    case Kind::float32:
-      return loaded<float>(at);
-    case Kind::int8:
-      return loaded<std::int8_t>(at);
-    case Kind::int16:
-      return loaded<std::int16_t>(at);
-    case Kind::int32:
-      return loaded<std::int32_t>(at);
-    case Kind::int64:
-      return loaded<std::int64_t>(at);
-    case Kind::uint16:
-      return loaded<std::uint16_t>(at);
-    case Kind::uint32:
-      return loaded<std::uint32_t>(at);
-    case Kind::uint64:
-      return loaded<std::uint64_t>(at);
-    default:
-      return loaded<std::uint8_t>(at);
-  }
+  return visit_number(kind, [&]<class T>(T) {
+    T value;
+    std::memcpy(&value, at, sizeof value);
+    return static_cast<long double>(value);
+  });
+}
+
+long double as_stored(Kind kind, double value) {
+  std::array<std::byte, 8> bytes{};
+  store_as(kind, value, bytes.data());
+  return load_as(kind, bytes.data());
 }
 
 Schema Script::schema() const {

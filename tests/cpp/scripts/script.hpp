@@ -81,6 +81,8 @@ struct Script {
 void store_as(Kind kind, double value, std::byte* at);
 /// A number as it lies in a block.
 long double load_as(Kind kind, const std::byte* at);
+/// A value as a field of this kind has it.
+long double as_stored(Kind kind, double value);
 /// Size of a field of this kind in a script's robot [bytes].
 std::uint32_t bytes_of_kind(Kind kind);
 

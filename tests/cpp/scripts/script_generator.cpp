@@ -5,9 +5,11 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
+#include "describe/visit_number.hpp"
 #include "dice.hpp"
 
 namespace o80::test {
@@ -27,30 +29,15 @@ struct Range {
 };
 
 Range range_of_kind(Kind kind) {
-  switch (kind) {
-    case Kind::boolean:
-      return {0.0, 1.0};
-    case Kind::enumeration:
-      return {0.0, 2.0};
-    case Kind::int8:
-      return {-128.0, 127.0};
-    case Kind::uint8:
-      return {0.0, 255.0};
-    case Kind::uint16:
-      return {0.0, 65535.0};
-    case Kind::uint32:
-      return {0.0, 4294967295.0};
-    case Kind::uint64:
-      return {0.0, 1.8e19};
-    case Kind::int16:
-      return {-32768.0, 32767.0};
-    case Kind::int32:
-      return {-2147483648.0, 2147483647.0};
-    case Kind::int64:
-      return {-9.2e18, 9.2e18};
-    default:
-      return {-1e30, 1e30};
-  }
+  if (kind == Kind::boolean) return {0.0, 1.0};
+  if (kind == Kind::enumeration) return {0.0, 2.0};
+  return visit_number(kind, []<class T>(T) -> Range {
+    if constexpr (std::is_floating_point_v<T>) return {-1e30, 1e30};
+    constexpr double kFar = std::is_signed_v<T> ? 9.2e18 : 1.8e19;  // of 64 bits
+    using Whole = std::numeric_limits<T>;
+    return {std::max(static_cast<double>(Whole::min()), -kFar),
+            std::min(static_cast<double>(Whole::max()), kFar)};
+  });
 }
 
 class Generator {

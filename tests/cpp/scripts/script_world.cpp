@@ -359,9 +359,7 @@ long double ScriptWorld::target(const SentCommand& command, std::size_t row,
                                 std::size_t number) const {
   const ScriptStep& step = step_of(command);
   const auto& numbers = script.actuators[step.actuator].numbers;
-  std::byte bytes[8] = {};
-  store_as(numbers[number].kind, step.values[row * numbers.size() + number], bytes);
-  return load_as(numbers[number].kind, bytes);
+  return as_stored(numbers[number].kind, step.values[row * numbers.size() + number]);
 }
 
 std::string ScriptWorld::where(std::size_t actuator, std::size_t number) const {

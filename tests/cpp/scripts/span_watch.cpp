@@ -124,13 +124,12 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
     Span span{place, place};
     if (step.head.start == Start::observed && track.reading && world.names(command, n) &&
         std::isfinite(*track.reading)) {
-      std::array<std::byte, 8> bytes{};
       const Kind kind = world.script.actuators[actuator].numbers[n].kind;
-      store_as(kind, *track.reading, bytes.data());
-      span.include(load_as(kind, bytes.data()));
+      const long double reading = as_stored(kind, *track.reading);
+      span.include(reading);
       // limits count from the last desired state
       if (!world.script.actuators[actuator].numbers[n].limited()) {
-        number.from = load_as(kind, bytes.data());
+        number.from = reading;
       }
     }
     if (taken_over) {
@@ -151,9 +150,7 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
         targets.include(world.target(command, row, n));
       }
     } else if (const NumberSpec& spec = world.script.actuators[actuator].numbers[n]; spec.resting) {
-      std::array<std::byte, 8> bytes{};
-      store_as(spec.kind, spec.rest, bytes.data());
-      targets.include(load_as(spec.kind, bytes.data()));
+      targets.include(as_stored(spec.kind, spec.rest));
     }
     span.include(targets);
     if (step.head.profile == Profile::smooth && world.names(command, n)) {

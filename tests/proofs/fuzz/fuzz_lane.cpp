@@ -140,33 +140,16 @@ class HostileFrontend {
   void write_page(Bytes& bytes) {
     const auto which = bytes.below(9);
     const std::uint64_t word = bytes.word();
-    switch (which) {
-      case 0:
-        page_.committed.store(word);
-        break;
-      case 1:
-        page_.committed.fetch_add(bytes.below(kBlocks + 2));
-        break;
-      case 2:
-        page_.incarnation.store(word);
-        break;
-      case 3:
-        page_.closed.store(word);
-        break;
-      case 4:
-        page_.successor_begin.store(word);
-        break;
-      case 5:
-        page_.owner_begin.store(word);
-        break;
-      case 6:
-        page_.next_id.store(word);
-        break;
-      case 7:
-        page_.dead_incarnation.store(word);
-        break;
-      default:
-        page_.owner[word % 8].store(bytes.word());
+    std::atomic<std::uint64_t>* const words[] = {&page_.committed,       nullptr,
+                                                 &page_.incarnation,     &page_.closed,
+                                                 &page_.successor_begin, &page_.owner_begin,
+                                                 &page_.next_id,         &page_.dead_incarnation};
+    if (which == 1) {
+      page_.committed.fetch_add(bytes.below(kBlocks + 2));
+    } else if (which < std::size(words)) {
+      words[which]->store(word);
+    } else {
+      page_.owner[word % 8].store(bytes.word());
     }
   }
   void write_bell(Bytes& bytes) {

@@ -76,46 +76,30 @@ void resize(Bytes& bytes, std::vector<Row>& rows) {
   rows.resize(bytes.number<std::uint8_t>() % 8, rows.empty() ? Row{} : rows.front());
 }
 
+/// Calls `change` with the rows of this place in the list.
+template <class Change, class... Rows>
+void change_one(std::size_t place, Change&& change, Rows&... rows) {
+  std::size_t i = 0;
+  ((i++ == place ? change(rows) : void()), ...);
+}
+
 /// A good schema with bytes of its rows changed: as a robot library may bring it.
 Schema edited(Bytes& bytes) {
   Schema schema = schema_of_robot();
   while (!bytes.empty()) {
-    switch (bytes.number<std::uint8_t>() % 11) {
-      case 0:
-        edit(bytes, schema.types);
-        break;
-      case 1:
-        edit(bytes, schema.fields);
-        break;
-      case 2:
-        edit(bytes, schema.labels);
-        break;
-      case 3:
-        edit(bytes, schema.groups);
-        break;
-      case 4:
-        edit(bytes, schema.actuators);
-        break;
-      case 5:
-        edit(bytes, schema.limits);
-        break;
-      case 6:
-        edit(bytes, schema.requests);
-        break;
-      case 7:
-        resize(bytes, schema.groups);
-        break;
-      case 8:
-        resize(bytes, schema.actuators);
-        break;
-      case 9:
-        resize(bytes, schema.requests);
-        break;
-      default: {
-        std::vector<SchemaHead> head{schema.head};
-        edit(bytes, head);
-        schema.head = head.front();
-      }
+    const std::size_t what = bytes.number<std::uint8_t>() % 11;
+    if (what < 7) {
+      change_one(
+          what, [&](auto& rows) { edit(bytes, rows); }, schema.types, schema.fields, schema.labels,
+          schema.groups, schema.actuators, schema.limits, schema.requests);
+    } else if (what < 10) {
+      change_one(
+          what - 7, [&](auto& rows) { resize(bytes, rows); }, schema.groups, schema.actuators,
+          schema.requests);
+    } else {
+      std::vector<SchemaHead> head{schema.head};
+      edit(bytes, head);
+      schema.head = head.front();
     }
   }
   return schema;

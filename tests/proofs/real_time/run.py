@@ -32,9 +32,6 @@ LEFT_OUT = (
     "InlineRobotTest.WaitsForNothingOfItsOwn",
     "GroupEqualityTest.HoldsForTheBundledRobot",
     "RobotProvenanceTest.OfARobotSaysHowToStartItAgain",
-    # a compiler, and Python
-    "Describe.Refuses*WhenItIsCompiled",
-    "Json.*",
     # shorter than a few steps of an emulated processor
     "SpinnerAmongOthers.*",
     # computation only, minutes of it where the processor is emulated

@@ -237,22 +237,6 @@ TEST(Arrival, VelocitiesAreReachedAndHeld) {
   EXPECT_NEAR(way, 0.9645, 0.01 * 0.9645);
 }
 
-TEST(Arrival, TheSameMoveTakesTheSameTimeAgainAndAgain) {
-  for (const std::int64_t every : {0, 20}) {
-    Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));
-    std::vector<Iteration> took;
-    for (int i = 0; i < 20; ++i) {
-      rig.add(0, smoothly(paced(Pace::direct, every * kMillisecond)), {i % 2 == 0 ? 0.1 : 0.0});
-      const CommandId command = rig.pulse() + 2;
-      const Iteration first = rig.next;
-      while (!is_end(rig.witness.status(command))) rig.run(1);
-      took.push_back(rig.next - first);
-      rig.run(i % 4);
-    }
-    for (const Iteration each : took) EXPECT_EQ(each, 99) << every;
-  }
-}
-
 /// A learner that queues targets for each step of a simulation is never further behind.
 TEST(Arrival, ThousandsOfQueuedRowsOfSetPointsDoNotLagMoreAndMore) {
   Rig rig(limited_robot(500, {.speed = 2.0, .acceleration = 15.0, .jerk = 500.0}));

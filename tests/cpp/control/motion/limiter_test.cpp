@@ -4,52 +4,11 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "control/rig.hpp"
 
 namespace o80::test {
 namespace {
-
-using testing::ElementsAre;
-
-TEST(Limiter, TargetsOutsideTheBoundsAreRejected) {
-  Schema schema = plain_robot(2);
-  schema.actuator(0).limits({.minimum = -1.0, .maximum = 2.5});
-  Rig rig(schema);
-  rig.add(1, over(4), {4.0});
-  rig.add(0, over(4), {4.0});
-  const CommandId batch = rig.pulse();
-  rig.run(4);
-  EXPECT_EQ(rig.desired(0), 0.0);
-  EXPECT_EQ(rig.desired(1), 4.0);
-  EXPECT_EQ(rig.witness.last(batch + 2).status, Status::completed);
-  EXPECT_EQ(rig.witness.last(batch + 3).status, Status::rejected);
-  EXPECT_EQ(rig.witness.last(batch + 3).reason, Reason::invalid);
-}
-
-TEST(Limiter, ATrajectoryIsFollowedInsideItsSpanToItsLastRow) {
-  Schema schema = plain_robot(1);
-  schema.actuator(0).limits({.speed = 1000.0, .acceleration = 100'000.0});
-  Rig rig(schema);
-  // half a unit an iteration, five iterations until it is that fast
-  rig.add_rows(0, over(10), 2, {5.0, 10.0});
-  rig.add(0, over(20), {0.0});
-  const CommandId batch = rig.pulse();
-  bool was_clamped = false;
-  double furthest = 0.0;
-  for (int i = 0; i < 60 && !is_end(rig.witness.status(batch + 2)); ++i) {
-    rig.step();
-    was_clamped = was_clamped || rig.clamped();
-    furthest = std::max(furthest, rig.desired());
-  }
-  EXPECT_TRUE(was_clamped) << "a straight line begins with a jump of velocity";
-  EXPECT_LE(furthest, 10.0);
-  EXPECT_EQ(rig.witness.status(batch + 2), Status::overwritten) << "behind its rows it gives way";
-  rig.run(60);
-  EXPECT_EQ(rig.witness.status(batch + 3), Status::completed);
-  EXPECT_EQ(rig.desired(), 0.0);
-}
 
 // rule L4
 TEST(Limiter, ATrajectoryGoesOnUntilItsLastRowIsReached) {
@@ -162,37 +121,6 @@ TEST(Limiter, ASpeedPaceAtTheMaximumIsNotClampedByRounding) {
       EXPECT_EQ(rig.witness.status(batch + 2), Status::completed);
     }
   }
-}
-
-TEST(Limiter, IntegersAndFloatsStayInsideTheirLimits) {
-  Schema schema;
-  schema.head.period = kMillisecond;
-  const auto type = schema.add_type(
-      "State", {scalar_field("i32", Kind::int32), scalar_field("f32", Kind::float32),
-                scalar_field("flag", Kind::boolean)});
-  schema.add_actuators("joint", type, 1);
-  schema.actuator(0).limits("i32", {.minimum = -3.5, .maximum = 3.5, .speed = 100.0});
-  schema.actuator(0).limits("f32", {.maximum = 0.1, .speed = 20.0});
-  schema.actuator(0).limits("flag", {.maximum = 0.0});
-  Rig rig(schema);
-  struct {
-    std::int32_t i32 = 3;
-    float f32 = std::nextafter(0.1F, 0.0F);  // the largest below the maximum
-    bool flag = true;
-  } target;
-  std::vector<std::byte> bytes(12);
-  std::memcpy(bytes.data(), &target.i32, 4);
-  std::memcpy(bytes.data() + 4, &target.f32, 4);
-  bytes[8] = std::byte{1};
-  rig.batch.command(direct(), bytes);
-  rig.pulse();
-  for (int i = 1; i <= 50; ++i) {
-    rig.step();
-    EXPECT_EQ(rig.desired_as<std::int32_t>(0), std::round(std::min(i, 30) * 0.1)) << "to nearest";
-    EXPECT_LE(static_cast<double>(rig.desired_as<float>(4)), 0.1);
-    EXPECT_EQ(rig.desired_as<std::uint8_t>(8), 1) << "a boolean has no limits";
-  }
-  EXPECT_EQ(rig.desired_as<float>(4), target.f32);
 }
 
 }  // namespace

@@ -130,27 +130,6 @@ TEST(ChunkLimits, ATakeOverTakesTheTimeThatLimitsNeed) {
   EXPECT_EQ(take_over(1.5, 0).begun.row, 29U);
 }
 
-TEST(ChunkLimits, PlansAreHeldAtTheBoundsAndThatIsSaid) {
-  for (const double acceleration : {kNoLimit, 4000.0}) {
-    Schema schema = plain_robot(1);
-    schema.actuator(0).limits(
-        {.minimum = -1.0, .maximum = 1.0, .speed = 1e3, .acceleration = acceleration});
-    ChunkRig rig(std::move(schema));
-    rig.run_to(101);
-    std::vector<double> rows;
-    for (int i = 0; i < 200; ++i) rows.push_back(i / 7 % 2 == 0 ? 1.0 : -1.0);
-    rig.chunk(rows, every(10, rows.size()), {.anchor = 100, .ease = 10});
-    int clamped = 0;
-    while (rig.next < 2200) {
-      rig.run_to(rig.next + 1);
-      ASSERT_LE(std::abs(rig.desired()), 1.0);
-      clamped += rig.clamped() ? 1 : 0;
-    }
-    EXPECT_GT(clamped, 100);
-    EXPECT_EQ(rig.desired(), rows.back());
-  }
-}
-
 /// Random chunks under random limits: all differences within them, all ends at the last row.
 // rule K10
 TEST(ChunkLimits, RandomScriptsStayWithinLimitsAndEndAtTheirLastRow) {

@@ -86,21 +86,6 @@ TEST(Controller, ABatchMayBeRejectedAfterItWasChecked) {
   EXPECT_EQ(rig.witness.changes.size(), 24U);
 }
 
-TEST(Controller, ABatchCheckedBitByBitIsTakenAsIfAtOnce) {
-  Rig rig(plain_robot(2));
-  for (int i = 0; i < 10; ++i) rig.add(0, direct(), {1.0 + i});
-  for (int i = 0; i < 10; ++i) rig.add(1, direct(), {2.0 + i});
-  const BlockIndex batch = rig.send();
-  int calls = 1;
-  while (!rig.check(0, batch, 3)) ++calls;
-  EXPECT_GE(calls, 6);
-  EXPECT_LE(calls, 20);
-  EXPECT_TRUE(rig.witness.changes.empty()) << "nothing has happened yet";
-  rig.controller.take(0, batch, rig);
-  EXPECT_THAT(rig.run(3), ElementsAre(1.0, 2.0, 3.0));
-  EXPECT_EQ(rig.desired(1), 4.0);
-}
-
 TEST(Controller, TheRowsOfOneLongTrajectoryAreCheckedBitByBitToo) {
   for (const double last : {7.0, std::nan("")}) {
     Rig rig(plain_robot(1, 2), 10'000);
@@ -197,6 +182,20 @@ TEST(Controller, ARobotWithoutActuatorsIteratesAndServesRequests) {
   rig.step();
   EXPECT_EQ(rig.witness.status(batch + 1), Status::completed);
   EXPECT_FALSE(rig.controller.active());
+}
+
+TEST(Controller, ManyActuatorsEachHaveTheirOwnQueue) {
+  Rig rig(plain_robot(130));
+  for (std::uint32_t i = 0; i < 130; i += 3) rig.add(i, over(1 + i), {1.0 + i});
+  rig.pulse();
+  for (int iteration = 1; iteration <= 130; ++iteration) {
+    rig.step();
+    for (std::uint32_t i = 0; i < 130; ++i) {
+      const bool commanded = i % 3 == 0;
+      ASSERT_EQ(rig.active(i), commanded && iteration <= static_cast<int>(i) + 1);
+      ASSERT_DOUBLE_EQ(rig.desired(i), commanded ? std::min<double>(iteration, 1.0 + i) : 0.0);
+    }
+  }
 }
 
 TEST(Controller, AStateWithoutNumbersIsRefusedWhenTheControllerIsMade) {

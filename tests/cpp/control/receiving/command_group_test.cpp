@@ -46,21 +46,6 @@ TEST(CommandGroup, TakesTheFastestWayThatAllCanKeep) {
   EXPECT_EQ(iterations_of({0, 1}, {0.8, 0.1}), slow);
 }
 
-TEST(CommandGroup, TimesOfItsRowsOweTheSameRoundingForAll) {
-  Rig rig(plain_robot(2));
-  std::vector<double> targets;
-  for (int i = 0; i < 20; ++i) targets.push_back(i % 10);
-  std::vector<std::int64_t> times;
-  for (std::int64_t i = 1; i <= 10; ++i) times.push_back(i * 1'700'000);
-  add_group(rig, {0, 1}, during(times.back()), targets, 10, times);
-  const CommandId timed = rig.pulse();
-  const Iteration begun = rig.next;
-  rig.run(30);
-  EXPECT_EQ(rig.witness.status(record_id(timed, 0)), Status::completed);
-  EXPECT_NEAR(static_cast<double>(rig.witness.last(record_id(timed, 0)).iteration - begun + 1),
-              17.0, 1.0);
-}
-
 TEST(CommandGroup, IsInvalidWholeIfOneMemberIs) {
   const auto refused = [](auto&& spoil) {
     Rig rig(plain_robot(2));

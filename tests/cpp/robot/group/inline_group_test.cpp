@@ -15,7 +15,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class InlineGroupTest : public ManualBackendTest {
@@ -313,19 +312,6 @@ TEST_F(InlineGroupTest, RaisesTheSoftLimitOfOpenFilesOrNamesTheHardOne) {
     _exit(now.rlim_cur > 100 && named ? 0 : 1);
   });
   EXPECT_EQ(child.wait(), 0);
-}
-
-TEST_F(InlineGroupTest, LeavesNothingBehindWhenItIsKilled) {
-  ChildProcess child([](const ChildProcess::Ready& ready) {
-    InlineGroup group(fake(), {}, group_of(4));
-    GroupBurst burst(group, 2, 1, 3);
-    burst.run();
-    ready();
-    while (true) burst.run();
-  });
-  ASSERT_TRUE(child.wait_until_ready());
-  child.kill_now();
-  EXPECT_EQ(directory_.files(), 0U);
 }
 
 TEST_F(InlineGroupTest, BelongsToTheParentOfAForkedChild) {

@@ -31,6 +31,7 @@ std::vector<std::byte> play(UntypedFrontend& frontend) {
   return frontend.history(1'000'000).bytes;
 }
 
+// rule G6
 TEST_F(InlineRobotTest, GivesTheSameRowsBitForBitAsABurstingProcess) {
   Program process({kRunProgram, kTwoJoints, "--bursting", "--gain", "30", "--segment", "process"});
   UntypedFrontend frontend("process", {.timeout = kPatience});

@@ -66,18 +66,6 @@ TEST(WorkerPoolTest, GivesATaskToTheSameThreadInEveryCall) {
   EXPECT_EQ(first[0], std::this_thread::get_id());
 }
 
-TEST(WorkerPoolTest, RunsTasksInSeveralThreadsAtOnce) {
-  // every task waits for all others
-  WorkerPool pool(3);
-  std::atomic<int> arrived{0};
-  const auto task = [&](std::uint32_t) {
-    ++arrived;
-    while (arrived < 4) std::this_thread::yield();
-  };
-  pool.run(4, task, kNothing);
-  EXPECT_EQ(arrived, 4);
-}
-
 TEST(WorkerPoolTest, LooksAroundWhileItWaitsForAWorker) {
   WorkerPool pool(1);
   const std::thread::id caller = std::this_thread::get_id();

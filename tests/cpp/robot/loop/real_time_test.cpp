@@ -28,19 +28,6 @@ std::vector<std::string> set_up(const RealTimeOptions& options) {
 
 TEST(RealTime, AsksForNothingUnlessTold) { EXPECT_THAT(set_up({}), IsEmpty()); }
 
-TEST(RealTime, RunsOnTheProcessorsItIsGiven) {
-  std::thread([] {
-    cpu_set_t allowed;
-    ASSERT_EQ(sched_getaffinity(0, sizeof allowed, &allowed), 0);
-    int first = 0;
-    while (!CPU_ISSET(first, &allowed)) ++first;
-    RealTimeOptions options;
-    options.processors = {first};
-    EXPECT_THAT(set_up_real_time(options), IsEmpty());
-    EXPECT_EQ(sched_getcpu(), first);
-  }).join();
-}
-
 TEST(RealTime, NamesTheProcessorThatIsNotThereBesideOneThatIs) {
   std::thread([] {
     const int here = sched_getcpu();

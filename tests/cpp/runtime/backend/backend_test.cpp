@@ -1,6 +1,5 @@
 #include "o80/runtime/backend.hpp"
 #include <optional>
-#include <utility>
 
 #include "runtime/manual_backend.hpp"
 #include "runtime/trace.hpp"
@@ -114,17 +113,6 @@ TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
   EXPECT_EQ(desired(frontend.latest()), kCommands);
   EXPECT_EQ(large.last_iteration(), taken + kCommands - 1) << "no idle iteration";
   EXPECT_TRUE(behind.ended());
-}
-
-TEST_F(BackendTest, GivesTheMemoryOfALaneBackForEver) {
-  StartedBackend manual({.segment = "pair", .lanes = 2, .lane_blocks = 64});
-  UntypedFrontend frontend("pair");
-  for (int round = 0; round < 2000; ++round) {
-    for (int i = 0; i < 10; ++i) add(frontend, i % 2, round, {.mode = Mode::overwrite});
-    const Batch batch = frontend.pulse();
-    manual.run(2);
-    ASSERT_TRUE(batch.ended()) << round;
-  }
 }
 
 // rule C23

@@ -159,17 +159,6 @@ TEST_F(BurstTest, OfAGroupLetsAllRunBeforeItWaits) {
   EXPECT_EQ(rows[1].iteration(), 3);
 }
 
-TEST_F(BurstTest, EndsWithAnErrorWhenTheBackendStopsInIt) {
-  BurstingBackend bursting;
-  UntypedFrontend frontend("pair");
-  const Burst burst = frontend.start_burst(1'000'000'000);
-  wait_until_it_runs(frontend);
-  bursting.stop();
-  bursting.manual.backend.end(BackendState::stopped);
-  EXPECT_THROW(burst.wait(kPatience), BackendStopped);
-  EXPECT_FALSE(burst.done());
-}
-
 TEST_F(BurstTest, ThatIsRejectedBecauseTheBackendEndsSaysWhyItEnded) {
   for (const BackendState state : {BackendState::stopped, BackendState::failed}) {
     StartedBackend manual({.segment = "pair", .bursting = true});
@@ -223,24 +212,6 @@ TEST_F(BurstTest, AFrontendThatDiesInABurstLeavesTheBackendUsable) {
   EXPECT_EQ(frontend.published(), row.iteration()) << "it stands still again";
   ::close(gate[0]);
   ::close(gate[1]);
-}
-
-// rule G6
-TEST_F(BurstTest, TwoRunsOfTheSameScriptGiveHistoriesIdenticalBitForBit) {
-  const auto history = [] {
-    BurstingBackend bursting;
-    UntypedFrontend frontend("pair");
-    for (int i = 0; i < 20; ++i) {
-      add(frontend, 0, 0.1 * i, {.pace = iterations(3), .profile = Profile::minimum_jerk});
-      add(frontend, 1, 1.0 / (i + 1), {.pace = speed(30), .mode = Mode::overwrite});
-      frontend.burst(1 + i % 7, kPatience);
-    }
-    return frontend.history(1'000'000).bytes;
-  };
-  const std::vector<std::byte> once = history();
-  const std::vector<std::byte> again = history();
-  ASSERT_GT(once.size(), 0U);
-  EXPECT_EQ(once, again);
 }
 
 TEST_F(BurstTest, AStepWithinATimeGivesUpStanding) {

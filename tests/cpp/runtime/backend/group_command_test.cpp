@@ -96,30 +96,6 @@ TEST_F(GroupCommandTest, FillsItsLaneAsItsBlocksSay) {
   }
 }
 
-TEST_F(GroupCommandTest, ABatchStagedOverSeveralIterationsActsWhole) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
-  constexpr int kGroups = 2000;
-  for (int i = 1; i <= kGroups; ++i) add_both(frontend, i, -i);
-  const Batch batch = frontend.pulse();
-  Iteration begun = 0;
-  while (batch.first_iteration() < 0) {
-    ASSERT_LT(begun, 100);
-    EXPECT_EQ(desired(frontend.latest(), 0), 0.0);
-    manual.run(1);
-    ++begun;
-  }
-  EXPECT_GT(begun, 3) << "it was staged";
-  manual.run(kGroups);
-  ASSERT_TRUE(batch.ended());
-  for (int i = 1; i <= kGroups; ++i) {
-    ASSERT_EQ(batch.handle(static_cast<std::size_t>(i - 1)).iteration, begun + i - 1);
-    const UntypedObservation row = frontend.wait_for(begun + i - 1, kAtOnce);
-    ASSERT_EQ(desired(row, 0), i);
-    ASSERT_EQ(desired(row, 1), -i);
-  }
-}
-
 // ------------------------------------------------------------------------------ losing members
 
 TEST_F(GroupCommandTest, EndsAtOnceWhenAllItsMembersDo) {

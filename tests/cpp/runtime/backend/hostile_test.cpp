@@ -6,11 +6,9 @@
 #include <atomic>
 #include <cmath>
 #include <cstddef>
-#include <fstream>
 #include <limits>
 #include <random>
 #include <thread>
-#include <vector>
 
 #include "control/sending/batch_builder.hpp"
 #include "memory/child_process.hpp"
@@ -59,39 +57,6 @@ void scribble_until_over(const SharedScene& scene, std::uint64_t seed,
     const Iteration now = published;
     if (random() % 2 == 0) continue;
     while (published == now && !scene->over) std::this_thread::yield();
-  }
-}
-
-TEST_F(HostileTest, EveryReadOfDamagedCountersEnds) {
-  StartedBackend manual;
-  manual.run(20);
-  UntypedFrontend reader("pair", {.access = Access::read_only});
-  std::fstream file(segment_path("pair"), std::ios::binary | std::ios::in | std::ios::out);
-  const auto put = [&](std::size_t counter, Iteration value) {
-    file.seekp(
-        static_cast<std::streamoff>(reader.link()->segment.view().offsets.counters + counter));
-    file.write(reinterpret_cast<const char*>(&value), sizeof value).flush();
-  };
-  constexpr Iteration kBeyond = Iteration{1} << 60;
-  constexpr Iteration kValues[] = {
-      std::numeric_limits<Iteration>::min(), -1, 0, 7, kBeyond - 1, kBeyond, kBeyond + 1,
-      std::numeric_limits<Iteration>::max()};
-  std::vector<std::byte> row(reader.layout().size);
-  for (const Iteration begun : kValues) {
-    for (const Iteration published : kValues) {
-      for (const Iteration first : kValues) {
-        put(offsetof(Counters, begun), begun);
-        put(offsetof(Counters, published), published);
-        put(offsetof(Counters, first), first);
-        Iteration position = 0;
-        for (int i = 0; i < 4; ++i) {
-          try {
-            reader.wait_for_next(position, row.data(), kAtOnce);
-          } catch (const Error&) {
-          }
-        }
-      }
-    }
   }
 }
 

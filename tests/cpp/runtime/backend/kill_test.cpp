@@ -58,18 +58,31 @@ TEST_F(KillTest, TheBackendGoesOnWhenACommandingFrontendIsKilledAndTheNextOneCom
   EXPECT_EQ(desired(next.latest()), -1.0);
 }
 
-TEST_F(KillTest, PurgesTheCommandsOfADeadFrontendIfToldSo) {
-  Commander commander;
-  StartedBackend manual({.segment = "pair", .stale = Stale::purge});
-  UntypedFrontend reader("pair");
-  commander.command();
-  manual.run(3);
-  EXPECT_TRUE(reader.latest().active(0));
-  commander.kill_now();
-  manual.run_until([&] { return !reader.latest().active(0); });
-  // nor is what it had sent for later taken
-  while (manual.last() < 500'010) manual.iterate();
-  EXPECT_EQ(desired(reader.latest(), 1), 0.0);
+// rule W5
+TEST_F(KillTest, ADeadCommanderPurgesHaltsOrStopsAsToldSo) {
+  for (const Stale stale : {Stale::purge, Stale::halt, Stale::stop}) {
+    SCOPED_TRACE(static_cast<int>(stale));
+    Commander commander;
+    StartedBackend manual({.segment = "pair", .stale = stale});
+    UntypedFrontend reader("pair");
+    commander.command();
+    manual.run(3);
+    EXPECT_TRUE(reader.latest().active(0));
+    commander.kill_now();
+    Step step = Step::run;
+    manual.run_until([&] {
+      if (step != Step::ended) step = manual.iterate();
+      return stale == Stale::stop ? step == Step::ended : !reader.latest().active(0);
+    });
+    EXPECT_EQ(step, stale == Stale::stop ? Step::ended : Step::run);
+    EXPECT_EQ(manual.backend.failure(), stale == Stale::stop ? "a commanding frontend died" : "");
+    EXPECT_EQ(reader.halted().value_or(Halt{}).cause,
+              stale == Stale::halt ? HaltCause::dead_frontend : HaltCause::none);
+    if (stale != Stale::purge) continue;
+    // nor is what it had sent for later taken
+    while (manual.last() < 500'010) manual.iterate();
+    EXPECT_EQ(desired(reader.latest(), 1), 0.0);
+  }
 }
 
 TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
@@ -92,20 +105,6 @@ TEST_F(KillTest, WhatADeadFrontendSentForLaterIsDroppedWhoeverHasItsLaneByNow) {
     EXPECT_EQ(desired(reader.latest(), 0), 0.0);
     EXPECT_EQ(desired(reader.latest(), 1), 1.0) << "the batch of its successor is carried out";
   }
-}
-
-TEST_F(KillTest, StopsWhenACommandingFrontendDiesIfToldSo) {
-  Commander commander;
-  StartedBackend manual({.segment = "pair", .stale = Stale::stop});
-  commander.command();
-  manual.run(3);
-  commander.kill_now();
-  Step step = Step::run;
-  manual.run_until([&] {
-    if (step != Step::ended) step = manual.iterate();
-    return step == Step::ended;
-  });
-  EXPECT_EQ(manual.backend.failure(), "a commanding frontend died");
 }
 
 }  // namespace

@@ -9,6 +9,7 @@
 #include "cases.hpp"
 #include "o80/runtime/typed_backend.hpp"
 #include "runtime/manual_backend.hpp"
+#include "runtime/trace.hpp"
 
 namespace o80::test {
 namespace {
@@ -80,6 +81,52 @@ TEST_F(EmbeddedReadingTest, IsAcceptedIfTheProgramSaysSo) {
 TEST_F(EmbeddedReadingTest, OfASimulationMayBeAnything) {
   UntypedBackend backend(pair_with(kLimits), {.segment = "pair", .bursting = true});
   EXPECT_TRUE(publish(backend, 5.0));
+}
+
+// ------------------------------------------------------------------------- resumes
+
+using ResumedReadingTest = ManualBackendTest;
+
+/// Plays a trace of a bursting pair whose shoulder has these limits; of the world, or a simulation.
+void play_with(const Limits& limits, const std::string& script, bool of_the_world = true) {
+  play({.segment = "pair", .bursting = true, .has_loop = true}, script, [&](Schema& schema) {
+    schema.actuator(0).limits(limits);
+    schema.head.of_the_world = of_the_world ? 3 : 2;
+  });
+}
+
+// rule R4
+TEST_F(ResumedReadingTest, OneTurnOffInEveryRowIsRefusedUntilItIsAccepted) {
+  play_with({.speed = 2.0, .error = 0.3}, R"(burst 10; offset 0 6.283; burst 1; burst 5000
+    halted error; a = resume 1; drive; a rejected reading
+    a says 'shoulder' was read at 6.283 after 0; a says resume with --accept-reading
+    0 is 0; b = resume 1 accepting; drive; b completed; 0 is 6.283)");
+}
+
+TEST_F(ResumedReadingTest, TheNoiseThatADriverDescribesIsAllowedAndNoMore) {
+  // with a limit of speed, beside it; without, alone
+  for (const Limits& limits : {Limits{.speed = 2.0, .error = 5.0, .noise = 0.05},
+                               Limits{.error = 5.0, .noise = 0.05}, Limits{.noise = 0.05}}) {
+    const double reach = 0.05 + (std::isfinite(limits.speed) ? 0.002 : 0.0);
+    for (const double step : {0.99, -0.99, 1.01, -1.01}) {
+      play_with(limits, "halt; burst 1; burst 3; offset 0 " + std::to_string(step * reach) +
+                            "; a = resume 1; drive; a " +
+                            (std::abs(step) < 1.0 ? "completed" : "rejected reading"));
+    }
+  }
+}
+
+// rule R1
+TEST_F(ResumedReadingTest, ARobotOfTheWorldCannotComeFarByARequest) {
+  play_with({.speed = 2.0}, R"(burst 10; a = reset 7; burst 3; halted; a says was read at 7 after 0
+    0 is 0; b = resume 1 accepting; drive; b completed)");
+  play_with({.speed = 2.0}, "burst 10; a = reset 7; burst 3; running; 0 is 7", false);
+}
+
+TEST_F(ResumedReadingTest, AFreshStartBeforeAHaltIsNoStep) {
+  play_with({.speed = 2.0}, R"(burst 10; a = reset 7; drive; halt; burst 1; burst 3; b = resume 1
+    drive; b completed)",
+            false);
 }
 
 /// A pair whose shoulder follows, moved by hand.

@@ -165,28 +165,9 @@ TEST_F(RunningRequestTest, ABurstUntilTheEndLastsUntilItsEndOrItsFreshStart) {
 }
 
 TEST_F(RunningRequestTest, ThousandsOfThemLeaveNoBlockBehind) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
-  UntypedFrontend frontend("pair");
-  for (int i = 0; i < 2000; ++i) {
-    const Batch batch = ask_home(frontend, manual);
-    manual.backend.end_request(frontend.request_index("home"), Served::done());
-    manual.run(1);
-    ASSERT_EQ(batch.handle(0).status, Status::completed) << i;
-  }
-}
-
-TEST_F(RunningRequestTest, ItsStatusIsNotForgottenWhileOthersComeAndGo) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 64});
-  UntypedFrontend frontend("pair");
-  const Batch batch = ask_home(frontend, manual);
-  for (int i = 0; i < 2000; ++i) {
-    send(frontend, 0, 1.0 * i);
-    manual.run(1);
-  }
-  EXPECT_EQ(batch.handle(0).status, Status::active);
-  manual.backend.end_request(frontend.request_index("home"), Served::done());
-  manual.run(1);
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
+  std::string many;
+  for (int i = 0; i < 2000; ++i) many += "a = home; run 1; home ends; run 1; a completed;";
+  play({.segment = "pair", .lane_blocks = 64}, many);
 }
 
 /// What the functions of Backend<R> add: names by type, and a halt that is reported after the end.

@@ -2,7 +2,6 @@
 
 #include <gmock/gmock.h>
 
-#include "memory/child_process.hpp"
 #include "o80/base/error.hpp"
 #include "runtime/hostile_frontend.hpp"
 #include "runtime/manual_backend.hpp"
@@ -55,24 +54,11 @@ TEST_F(SilenceTest, AStarvedPlanActsAndAClosedOneDoesNot) {
 
 // rule W7
 TEST_F(SilenceTest, CountsPeriodsThatTheLoopMissedAfterWhatCameMeanwhile) {
-  StartedBackend manual(watched(Stale::purge, 50));
-  UntypedFrontend silent("pair");
-  UntypedFrontend lively("pair");
-  const Batch batch = send(silent, 0, 1000.0, {.pace = iterations(1000)});
-  const Batch other = send(lively, 1, 1000.0, {.pace = iterations(1000)});
-  manual.run(5);
-  const double before = desired(silent.latest());
-  manual.backend.set_timing({.skipped = 100});
-  manual.run(1);
-  EXPECT_EQ(desired(silent.latest()), before + 1.0) << "a plan counts no missed periods";
-  lively.keep_alive();
-  const auto grace = static_cast<int>(10'000'000 / manual.backend.schema().head.period) + 2;
-  manual.run(grace);
-  EXPECT_EQ(batch.handle(0).status, Status::purged);
-  EXPECT_EQ(batch.handle(0).reason, Reason::silence);
-  EXPECT_EQ(other.handle(0).status, Status::active) << "its sign of life came after the gap";
-  manual.run(30);
-  EXPECT_EQ(other.handle(0).status, Status::active);
+  // ten milliseconds of grace after the gap
+  play(watched(Stale::purge, 50), R"(a = 0 to 1000 over 1000; B: b = 1 to 1000 over 1000; run 5
+    missed 100; run 1; 0 rows 5: 5 6  # a plan counts no missed periods
+    B: alive; run 12; a purged silence; b active  # its sign of life came after the gap
+    run 30; b active)");
 }
 
 TEST_F(SilenceTest, CountsNoPeriodsThatWereMissedWhileHalted) {
@@ -140,31 +126,18 @@ TEST_F(SilenceTest, LifeCountsFromWhenItWasShown) {
 
 // rule W2
 TEST_F(SilenceTest, ReadingIsNoLife) {
-  StartedBackend manual(watched(Stale::purge));
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 100.0, {.pace = iterations(100)});
-  for (int i = 0; i < 8; ++i) {
-    manual.run(1);
-    frontend.latest();
-    frontend.wait_for(manual.last(), kPatience);
-    frontend.halted();
-    batch.handle(0);
+  std::string reads;
+  for (const std::string i : {"1", "2", "3", "4", "5", "6"}) {
+    reads += "run 1; 0 is " + i + "; 0 rows " + i + ": " + i + "; running; a active;";
   }
-  EXPECT_EQ(batch.handle(0).status, Status::purged);
+  play(watched(Stale::purge), "a = 0 to 100 over 100;" + reads + "run 2; a purged");
 }
 
 // rule W2
 TEST_F(SilenceTest, AWaitForOnesOwnBatchIsLife) {
-  StartedBackend manual(watched(Stale::purge, 3));
-  UntypedFrontend frontend("pair");
-  const Batch batch = send(frontend, 0, 20.0, {.pace = iterations(20)});
-  // each look of a wait that does not wait
-  while (!batch.ended()) {
-    manual.run(1);
-    EXPECT_THROW(batch.wait(kAtOnce), TimeoutError);
-    if (manual.last() > 18) break;
-  }
-  EXPECT_EQ(batch.handle(0).status, Status::active);
+  std::string waits;  // each look of a wait that does not wait
+  for (int i = 0; i < 19; ++i) waits += "run 1; a raises TimeoutError;";
+  play(watched(Stale::purge, 3), "a = 0 to 20 over 20;" + waits + "a active");
 }
 
 TEST_F(SilenceTest, NothingThatActsNoSilence) {
@@ -244,21 +217,6 @@ TEST_F(SilenceTest, HaltsUnlessAnotherPolicyIsAskedFor) {
   EXPECT_EQ(frontend.schema().head.silence, 7);
   EXPECT_EQ(frontend.schema().head.stale, Stale::halt);
   EXPECT_EQ(ManualBackend({.segment = "other"}).backend.schema().head.stale, Stale::hold);
-}
-
-// rule W5
-TEST_F(SilenceTest, ADeadCommanderHaltsIfToldSo) {
-  StartedBackend manual({.segment = "pair", .stale = Stale::halt});
-  StandingProcess child([](const StandingProcess::Stand& stand) {
-    UntypedFrontend frontend("pair");
-    send(frontend, 0, 1e6, {.pace = iterations(1'000'000)});
-    stand();
-  });
-  manual.run(2);
-  child.kill_now();
-  UntypedFrontend frontend("pair");
-  manual.run_until([&] { return frontend.halted().has_value(); });
-  EXPECT_EQ(frontend.halted()->cause, HaltCause::dead_frontend);
 }
 
 }  // namespace

@@ -75,54 +75,19 @@ TEST_F(BatchTest, TellsHowLateItsDecisionWas) {
 }
 
 TEST_F(BatchTest, KeepsTheEndStatusesItSawAndForgetsTheRest) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 16});
-  UntypedFrontend frontend("pair");
-  const Batch seen = send(frontend, 0, 1.0);
-  const Batch unseen = send(frontend, 0, 2.0);
-  manual.run(2);
-  EXPECT_EQ(seen.handle(0).status, Status::completed);
-  for (int i = 0; i < 100; ++i) {
-    send(frontend, 0, i);
-    manual.run(1);
-  }
-  EXPECT_EQ(seen.handle(0).status, Status::completed);
-  EXPECT_EQ(unseen.handle(0).status, Status::forgotten);
-  unseen.wait(kAtOnce);
-}
-
-TEST_F(BatchTest, TheEndOfAnOldCommandDisturbsNoNewOne) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 16});
-  UntypedFrontend frontend("pair");
-  send(frontend, 0, 1.0, {.pace = iterations(200)});
-  Batch last;
-  for (int i = 0; i < 199; ++i) {
-    last = send(frontend, 1, i);
-    manual.run(1);
-  }
-  std::vector<Batch> recent;
-  for (int i = 0; i < 6; ++i) recent.push_back(send(frontend, 1, i));
-  manual.run(8);  // in these the old one ends
-  for (const Batch& batch : recent) {
-    EXPECT_EQ(batch.handle(0).status, Status::completed);
-    batch.wait(kAtOnce);
-  }
+  std::string more;
+  for (int i = 0; i < 100; ++i) more += "c = 0 to " + std::to_string(i) + "; run 1;";
+  play({.segment = "pair", .lane_blocks = 16},
+       "seen = 0 to 1; unseen = 0 to 2; run 2; seen completed;" + more +
+           "seen completed; unseen forgotten; unseen waits");
 }
 
 // rule S3
 TEST_F(BatchTest, NeverForgetsWhatStillRunsHoweverMuchIsSentMeanwhile) {
-  StartedBackend manual({.segment = "pair", .lane_blocks = 16});
-  UntypedFrontend frontend("pair");
-  const Batch slow = send(frontend, 0, 1.0, {.pace = iterations(500)});
-  for (int i = 0; i < 499; ++i) {
-    send(frontend, 1, i);
-    manual.run(1);
-    ASSERT_EQ(slow.handle(0).status, Status::active) << "iteration " << i;
-    ASSERT_FALSE(slow.ended());
-  }
-  send(frontend, 1, 0.0);
-  manual.run(1);
-  EXPECT_EQ(slow.handle(0).status, Status::completed);
-  EXPECT_EQ(slow.last_iteration(), 500);
+  std::string more;
+  for (int i = 0; i < 499; ++i) more += "b = 1 to 1; run 1; a active; a open;";
+  play({.segment = "pair", .lane_blocks = 16},
+       "a = 0 to 1 over 500;" + more + "b = 1 to 0; run 1; a completed; a ended 500");
 }
 
 TEST_F(BatchTest, WaitsUntilTheLastOfItsCommandsHasEndedAndItsRowIsThere) {

@@ -132,31 +132,6 @@ TEST_F(TypedTest, AcceptsNamesAndLimitsThatTheBackendGives) {
   EXPECT_THROW(frontend.add_command("base", Joint{.position = 1.5}), InvalidArgument);
 }
 
-TEST_F(TypedTest, SendsRequestsWithAndWithoutFields) {
-  Backend<MixedRobot> backend({.segment = "mixed"});
-  double launched = 0;
-  int homed = 0;
-  backend.on<LaunchBall>([&](const LaunchBall& launch) {
-    launched = launch.speed;
-    return Served::done();
-  });
-  backend.on<described::Home>([&](const described::Home&) {
-    ++homed;
-    return Served::done();
-  });
-  backend.publish({});
-  Frontend<MixedRobot> frontend("mixed");
-  frontend.add_request(LaunchBall{.speed = 7, .mode = ControlMode::position});
-  frontend.add_request(described::Home{});
-  const Batch batch = frontend.pulse();
-  ASSERT_TRUE(backend.step());
-  backend.publish({});
-  EXPECT_EQ(batch.handle(0).status, Status::completed);
-  EXPECT_EQ(batch.handle(1).status, Status::completed);
-  EXPECT_EQ(launched, 7);
-  EXPECT_EQ(homed, 1);
-}
-
 TEST_F(TypedTest, RowsOfPaddedStatesCompareBitForBit) {
   const auto run = [] {
     Backend<MixedRobot> backend({.segment = "mixed", .bursting = true});

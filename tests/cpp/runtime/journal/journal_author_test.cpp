@@ -128,20 +128,6 @@ TEST_F(JournalAuthorTest, WhatABatchAnswersStandsInEachDecisionOnIt) {
                                             std::pair(rejected, 3), std::pair(taken, 5)));
 }
 
-TEST_F(JournalAuthorTest, BatchesOfSeveralLanesStandInTheOrderOfTheirTickets) {
-  UntypedFrontend second("pair");
-  for (int i = 0; i < 5; ++i) {
-    send(second, 0, i);
-    send(*commander, 1, i);
-  }
-  manual.run(1);
-  std::vector<std::uint32_t> lanes;
-  for (const JournalEntry& entry : news()) {
-    if (entry.kind == JournalKind::taken) lanes.push_back(entry.lane);
-  }
-  EXPECT_THAT(lanes, ElementsAre(0, 1, 0, 1, 0, 1, 0, 1, 0, 1));
-}
-
 TEST_F(JournalAuthorTest, ARejectedBatchComesWithItsRecordsAndAHaltWithItsText) {
   commander->halt("enough");
   manual.run(1);

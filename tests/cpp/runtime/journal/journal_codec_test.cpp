@@ -256,26 +256,6 @@ TEST(JournalCodecTest, FindsTheTextsOfMarksHoweverTheirBlocksAreRead) {
   EXPECT_GT(marks, 50U);
 }
 
-TEST(JournalCodecTest, DamagedAndCutBytesAreDecodedOrRefused) {
-  int refused = 0;
-  for (std::uint32_t seed = 0; seed < 2000; ++seed) {
-    Draw draw(seed);
-    std::vector<std::byte> bytes = encoded(draw.journal(20));
-    for (std::uint64_t i = draw.below(4); i > 0; --i)
-      bytes[draw.below(bytes.size())] = static_cast<std::byte>(draw.number());
-    if (seed % 3 == 0) bytes.resize(draw.below(bytes.size()));
-    try {
-      const std::vector<JournalItem> found = decoded(bytes);
-      for (const JournalItem& item : found)
-        ASSERT_EQ(item.payload.size() + sizeof item.head, item.head.words * 8U);
-    } catch (const InvalidArgument& error) {
-      EXPECT_THAT(error.what(), HasSubstr("the journal is damaged: invalid entry at byte "));
-      ++refused;
-    }
-  }
-  EXPECT_GT(refused, 500);
-}
-
 TEST(JournalCodecTest, ACutEntryIsRefused) {
   const std::vector<JournalItem> items = Draw(1).journal(12);
   const std::vector<std::byte> bytes = encoded(items);

@@ -88,20 +88,6 @@ TEST_F(RecordedJournalTest, PartsOfAnySizeGiveTheSameEntriesAsTheRing) {
   }
 }
 
-TEST_F(RecordedJournalTest, ASuccessorGoesOnWhereTheLastReadEnded) {
-  play(10);
-  const RawJournal::Entries first = RawJournal(*observer, 0).read(1000);
-  play(10);
-  const RawJournal::Entries second = RawJournal(*observer, first.next).read(kMuch);
-  EXPECT_EQ(second.first, first.next);
-
-  RecordedJournal journal(description());
-  std::vector<JournalEntry> entries;
-  journal.decode(first.bytes, entries);
-  journal.decode(second.bytes, entries);
-  EXPECT_EQ(facts_of(entries), facts_of(entries_of(Journal(*observer))));
-}
-
 TEST_F(RecordedJournalTest, ASuccessorGoesOnWithinALargeBatch) {
   for (int i = 0; i < 3000; ++i) add(*commander, 0, 0.001 * i);
   commander->pulse();
