@@ -86,5 +86,32 @@ TEST_F(ForkTest, LeavesFileLockAndLaneToTheParentWhenTheChildEndsInOrder) {
   EXPECT_EQ(owner.state(), BackendState::running);
 }
 
+TEST_F(ForkTest, DoesNotKeepADeadBackendAliveInItsChild) {
+  int test_lives[2];
+  ASSERT_EQ(pipe(test_lives), 0);
+  ChildProcess backend([&](const ChildProcess::Ready& ready) {
+    ::close(test_lives[1]);
+    const OwnedSegment owner = running_segment();
+    if (fork() == 0) {
+      // lives on after its parent, with all that it inherited, until the test is over
+      ready();
+      char byte;
+      while (read(test_lives[0], &byte, 1) > 0) {
+      }
+      _exit(0);
+    }
+    pause_for_ever();
+  });
+  ::close(test_lives[0]);
+  ASSERT_TRUE(backend.wait_until_ready());
+  const AttachedSegment segment = attach();
+  EXPECT_EQ(segment.life(), Life::running);
+  backend.kill_now();
+
+  EXPECT_EQ(segment.life(), Life::killed);
+  EXPECT_NO_THROW(running_segment());
+  ::close(test_lives[1]);
+}
+
 }  // namespace
 }  // namespace o80

@@ -111,6 +111,59 @@ TEST_F(LaneTest, DoesNotWaitForATicketThatWasDrawnAndNeverUsed) {
   EXPECT_THAT(take_all(), ElementsAre(1));
 }
 
+TEST_F(LaneTest, TakesWhatOneProcessCausedAnotherToSendAfterItsCause) {
+  constexpr std::uint64_t kRounds = 2000;
+  const AttachedSegment other = attach();
+  std::atomic<std::uint64_t> sent{0};
+  const auto play = [&](const AttachedSegment& segment, std::uint64_t parity) {
+    LaneSender sender(segment);
+    for (std::uint64_t number = 1 + parity; number <= kRounds; number += 2) {
+      while (sent.load() != number - 1) std::this_thread::yield();
+      while (sender.free_blocks() == 0) std::this_thread::yield();
+      send(sender, number);
+      sent = number;
+    }
+    const auto all_ended = [&] { return sender.status(kRounds).known == Known::yes; };
+    EXPECT_EQ(sender.wait_until(all_ended, patient()), Waited::ready);
+  };
+  std::thread ping([&] { play(attached_, 0); });
+  std::thread pong([&] { play(other, 1); });
+
+  std::vector<std::uint64_t> order;
+  while (order.size() < kRounds) {
+    for (const std::uint64_t number : take_all()) order.push_back(number);
+    give_back(0);
+    give_back(1);
+  }
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    lanes_[i].set_status(kRounds, {.status = 3});
+    lanes_[i].flag();
+  }
+  flush();
+  ping.join();
+  pong.join();
+
+  for (std::uint64_t i = 0; i < kRounds; ++i) ASSERT_EQ(order[i], i + 1);
+}
+
+TEST_F(LaneTest, CommitsABatchAtOnceWhateverTheReceiverIsDoing) {
+  constexpr std::uint64_t kBatches = 3000;
+  std::thread frontend([&] {
+    LaneSender sender(attached_);
+    for (std::uint64_t number = 1; number <= kBatches; ++number) {
+      const std::size_t count = 1 + number % 9;
+      while (sender.free_blocks() < count) std::this_thread::yield();
+      send(sender, number, count);
+    }
+  });
+  std::uint64_t next = 1;
+  while (next <= kBatches) {
+    for (const std::uint64_t number : take_all()) ASSERT_EQ(number, next++);
+    give_back(0);
+  }
+  frontend.join();
+}
+
 TEST_F(LaneTest, RefusesAFrontendTooManyNamingTheHolders) {
   const AttachedSegment second_process = attach(), third_process = attach();
   const LaneSender first(attached_), second(second_process);
@@ -188,6 +241,19 @@ TEST_F(LaneTest, TakesABatchWhoseTicketNobodyDrew) {
   EXPECT_THAT(take_all(), ElementsAre(1));
 }
 
+TEST_F(LaneTest, ForgetsGarbageWhenToldTo) {
+  LaneSender sender(attached_);
+  send(sender, 1, 3);
+  ASSERT_TRUE(lanes_.poll());
+  ASSERT_TRUE(lanes_.next());
+  lanes_[0].reset();
+  flush();
+  EXPECT_FALSE(lanes_.next());
+  EXPECT_EQ(sender.free_blocks(), 16U);
+  send(sender, 2);
+  EXPECT_THAT(take_all(), ElementsAre(2));
+}
+
 TEST_F(LaneTest, KeepsTheBatchOfASuccessorBehindTheGarbageOfItsPredecessor) {
   for (const bool successor_comes_late : {false, true}) {
     {
@@ -260,6 +326,28 @@ TEST_F(LaneTest, ForgetsAStatusWhosePlaceWasAboutToBeAnothers) {
   EXPECT_EQ(sender.status(later).known, Known::yes);
 }
 
+TEST_F(LaneTest, NeverMixesTheStatusesOfTwoIds) {
+  constexpr std::uint64_t kLast = 40'000;
+  LaneSender sender(attached_);
+  std::atomic<bool> mixed{false};
+  std::thread reader([&] {
+    while (sender.status(kLast).known != Known::yes)
+      for (std::uint64_t base = 1; base <= 32; ++base)
+        // the slot of `base` holds ids of the same remainder: ask for the one that is there
+        for (std::uint64_t id = base; id <= kLast; id += 32) {
+          const auto answer = sender.status(id);
+          if (answer.known == Known::yes && answer.word.iteration != static_cast<Iteration>(id))
+            mixed = true;
+          if (answer.known == Known::not_yet) break;
+        }
+  });
+  for (std::uint64_t id = 1; id <= kLast; ++id)
+    for (std::uint8_t status = 1; status < 4; ++status)
+      lanes_[0].set_status(id, {.status = status, .iteration = static_cast<Iteration>(id)});
+  reader.join();
+  EXPECT_FALSE(mixed);
+}
+
 TEST_F(LaneTest, KeepsTheTextsOfTheLastIds) {
   LaneSender sender(attached_);
   for (std::uint64_t id = 1; id <= kMessages + 1; ++id)
@@ -282,6 +370,24 @@ TEST_F(LaneTest, AnswersForTheLastBursts) {
   lanes_[0].set_burst_done(2 * kBurstsKept + 2, 1);
   EXPECT_EQ(sender.burst(2).known, Known::forgotten);
   EXPECT_EQ(sender.burst(4).row, 40);
+}
+
+TEST_F(LaneTest, WakesThoseWhoWaitForABurst) {
+  LaneSender sender(attached_);
+  std::atomic<Iteration> row{-1};
+  std::vector<std::thread> waiters;
+  waiters.reserve(3);
+  for (int i = 0; i < 3; ++i)
+    waiters.emplace_back([&] {
+      EXPECT_EQ(sender.wait_until([&] { return sender.burst(2).known == Known::yes; }, patient()),
+                Waited::ready);
+      row = sender.burst(2).row;
+    });
+  while (segment_.view().lane(0).waiting.load() == 0) std::this_thread::yield();
+  lanes_[0].set_burst_done(2, 99);
+  flush();
+  for (std::thread& waiter : waiters) waiter.join();
+  EXPECT_EQ(row, 99);
 }
 
 TEST_F(LaneTest, MovesItsEventsOnceAFlushAndOnlyWithCause) {

@@ -78,6 +78,15 @@ TEST_F(HaltWordTest, TextsThatAreTooLongAreCut) {
   EXPECT_EQ(latch_.halt().reason(), std::string(247, 'x'));
 }
 
+TEST_F(HaltWordTest, AHaltNeedsNoLane) {
+  const AttachedSegment first = attach();
+  const AttachedSegment second = attach();
+  const LaneSender one(first);
+  const LaneSender two(second);  // that is all of them
+  request_halt(attach().view(), HaltCause::frontend, "", "");
+  EXPECT_TRUE(latch_.poll());
+}
+
 TEST_F(HaltWordTest, ACounterThatIsTurnedBackIsAHaltToo) {
   segment_.view().bell().halts = 5;
   ASSERT_TRUE(latch_.poll());
@@ -147,6 +156,17 @@ TEST_F(HaltWordTest, AForkedChildMayHalt) {
   ASSERT_TRUE(latch_.poll());
   EXPECT_TRUE(latch_.show(0));
   EXPECT_EQ(latch_.halt().who_text(), "the child");
+}
+
+TEST_F(HaltWordTest, TheHaltOfAKilledProcessStands) {
+  StandingProcess child([&](const StandingProcess::Stand& stand) {
+    request_halt(attach().view(), HaltCause::frontend, "gone", "last word");
+    stand();
+  });
+  child.kill_now();
+  ASSERT_TRUE(latch_.poll());
+  EXPECT_TRUE(latch_.show(0));
+  EXPECT_EQ(latch_.halt().reason(), "last word");
 }
 
 // killed between the count and the reason: it halts, and says nothing of itself
