@@ -213,6 +213,7 @@ CEILINGS = {
     "python/o80/hybrid": (2_403, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
+    "docs": (570, 0),
     "devices": (8_852, 4_500),
     "gateways/lerobot": (530, 690),
     "gateways/ros2": (904, 955),

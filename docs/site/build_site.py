@@ -1,0 +1,101 @@
+"""Builds the site from the pages of the tree and the reference: build/site.
+
+A comment `<!-- search: words, other words -->` makes the search find a page by words that its text
+does not have.
+"""
+
+import re
+import shutil
+import sys
+from pathlib import Path
+
+from sphinx.cmd.build import build_main
+
+from reference import write_reference
+
+ROOT = Path(__file__).resolve().parents[2]
+HERE = Path(__file__).parent
+PAGES = ROOT / "build" / "site_pages"
+SITE = ROOT / "build" / "site"
+LINK = re.compile(r"(!?\[(?:[^\[\]]|\[[^\]]*\])*\])\(([^)#\s]+)(#[^)\s]+)?\)")
+NAME = re.compile(r"`(o80(?:_\w+)?\.\w[\w.]*)(?:\(\))?`")
+FOUND_BY = re.compile(r"<!-- search: (.*?) -->")
+ASIDE = {"build", ".venv", "tests", ".git"}
+
+
+def sources() -> list[Path]:
+    """The pages of the tree, but those for its tests."""
+    found = (page.relative_to(ROOT) for page in ROOT.rglob("*.md"))
+    proofs = [Path("tests/proofs/README.md"), Path("tests/proofs/models/README.md")]
+    return [*sorted(page for page in found if not ASIDE & set(page.parts)), *proofs]
+
+
+class Assembly:
+    """Copies pages with what they link to; a program of examples becomes a page."""
+
+    def __init__(self) -> None:
+        self._pages = {ROOT / page for page in sources()}
+
+    def write(self) -> None:
+        shutil.rmtree(PAGES, ignore_errors=True)
+        write_reference(PAGES / "reference")
+        for page in sorted(self._pages):
+            at = HERE if page.is_relative_to(HERE) else ROOT
+            text = page.read_text()
+            if at is ROOT:
+                parts = re.split(r"(^```.*?^```)", text, flags=re.DOTALL | re.MULTILINE)
+                text = "".join(self._linked(page, part) for part in parts)
+            file = PAGES / page.relative_to(at)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+
+    def _linked(self, page: Path, text: str) -> str:
+        if text.startswith("```"):
+            return text
+        text = FOUND_BY.sub(
+            lambda found: f"```{{index}} !{found[1].replace(', ', ', !')}\n```", text
+        )
+        text = NAME.sub(r"{py:obj}`\1`", text)
+        return LINK.sub(lambda match: self._link(page, *match.groups()), text)
+
+    def _link(self, page: Path, text: str, target: str, anchor: str | None) -> str:
+        file = (page.parent / target).resolve()
+        if ":" in target or file in self._pages:
+            return f"{text}({target}{anchor or ''})"
+        if file.is_dir():
+            inside = file / "README.md" in self._pages
+            return f"{text}({target.rstrip('/')}/README.md)" if inside else text[1:-1]
+        copy = PAGES / file.relative_to(ROOT)
+        copy.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy2(file, copy)
+        if file.is_relative_to(ROOT / "examples"):
+            language = {".py": "python", ".service": "ini", ".xml": "xml"}.get(file.suffix, "cpp")
+            shown = f"```{{literalinclude}} {file.name}\n:language: {language}\n```\n"
+            head = f"---\norphan: true\n---\n\n# {file.relative_to(ROOT)}\n\n"
+            copy.with_name(f"{file.name}.md").write_text(head + shown)
+            target += ".md"
+        return f"{text}({target})"
+
+
+def main() -> int:
+    Assembly().write()
+    shutil.rmtree(SITE, ignore_errors=True)
+    options = [
+        "-W",
+        "--keep-going",
+        "-q",
+        "-j",
+        "auto",
+        "-c",
+        str(HERE),
+        "-d",
+        str(PAGES / ".doctrees"),
+    ]
+    failed = build_main([*options, str(PAGES), str(SITE)])
+    size = sum(file.stat().st_size for file in SITE.rglob("*") if file.is_file())
+    print(f"{SITE}/index.html: {size / 1e6:.1f} MB")
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
