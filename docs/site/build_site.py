@@ -4,6 +4,7 @@ A comment `<!-- search: words, other words -->` makes the search find a page by 
 does not have.
 """
 
+import json
 import re
 import shutil
 import sys
@@ -68,11 +69,19 @@ class Assembly:
         copy = PAGES / file.relative_to(ROOT)
         copy.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(file, copy)
-        if file.is_relative_to(ROOT / "examples"):
+        shown = ""
+        if file.suffix == ".ipynb":
+            for cell in json.loads(file.read_text())["cells"]:
+                code = cell["cell_type"] == "code"
+                shown += ("```python\n{}\n```\n\n" if code else "{}\n\n").format(
+                    "".join(cell["source"])
+                )
+        elif file.is_relative_to(ROOT / "examples"):
             language = {".py": "python", ".service": "ini", ".xml": "xml"}.get(file.suffix, "cpp")
-            shown = f"```{{literalinclude}} {file.name}\n:language: {language}\n```\n"
-            head = f"---\norphan: true\n---\n\n# {file.relative_to(ROOT)}\n\n"
-            copy.with_name(f"{file.name}.md").write_text(head + shown)
+            shown = f"# {file.relative_to(ROOT)}\n\n"
+            shown += f"```{{literalinclude}} {file.name}\n:language: {language}\n```\n"
+        if shown:
+            copy.with_name(f"{file.name}.md").write_text(f"---\norphan: true\n---\n\n{shown}")
             target += ".md"
         return f"{text}({target})"
 
