@@ -1,4 +1,4 @@
-"""Builds the site from the pages of the tree and the reference: build/site.
+"""Builds the site from the pages of the tree and the reference: build/site, or FOLDER/site.
 
 A comment `<!-- search: words, other words -->` makes the search find a page by words that its text
 does not have.
@@ -16,26 +16,26 @@ from reference import write_reference
 
 ROOT = Path(__file__).resolve().parents[2]
 HERE = Path(__file__).parent
-PAGES = ROOT / "build" / "site_pages"
-SITE = ROOT / "build" / "site"
+FOLDER = Path(sys.argv[1]) if sys.argv[1:] else ROOT / "build"
+PAGES, SITE = FOLDER / "site_pages", FOLDER / "site"
 LINK = re.compile(r"(!?\[(?:[^\[\]]|\[[^\]]*\])*\])\(([^)#\s]+)(#[^)\s]+)?\)")
 NAME = re.compile(r"`(o80(?:_\w+)?\.\w[\w.]*)(?:\(\))?`")
 FOUND_BY = re.compile(r"<!-- search: (.*?) -->")
 ASIDE = {"build", ".venv", "tests", ".git"}
 
 
-def sources() -> list[Path]:
+def sources() -> set[Path]:
     """The pages of the tree, but those for its tests."""
-    found = (page.relative_to(ROOT) for page in ROOT.rglob("*.md"))
-    proofs = [Path("tests/proofs/README.md"), Path("tests/proofs/models/README.md")]
-    return [*sorted(page for page in found if not ASIDE & set(page.parts)), *proofs]
+    folders = [path for path in ROOT.iterdir() if path.is_dir() and path.name not in ASIDE]
+    pages = [*ROOT.glob("*.md"), *(page for folder in folders for page in folder.rglob("*.md"))]
+    return {*pages, *(ROOT / "tests/proofs").rglob("README.md")}
 
 
 class Assembly:
     """Copies pages with what they link to; a program of examples becomes a page."""
 
     def __init__(self) -> None:
-        self._pages = {ROOT / page for page in sources()}
+        self._pages = sources()
 
     def write(self) -> None:
         shutil.rmtree(PAGES, ignore_errors=True)

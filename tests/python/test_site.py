@@ -13,7 +13,6 @@ import o80
 pytestmark = pytest.mark.check
 
 ROOT = Path(__file__).resolve().parents[2]
-SITE = ROOT / "build" / "site"
 LARGEST = 15e6  # [bytes]
 # what a browser fetches by itself
 LOADED = re.compile(
@@ -24,11 +23,12 @@ LOADED = re.compile(
 
 
 @pytest.fixture(scope="module")
-def site() -> Path:
-    command = [sys.executable, str(ROOT / "docs/site/build_site.py")]
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, str(ROOT / "docs/site/build_site.py"), str(folder)]
     done = subprocess.run(command, capture_output=True, text=True)
     assert (done.returncode, done.stderr) == (0, "")
-    return SITE
+    return folder / "site"
 
 
 def test_it_is_small_and_has_all_parts(site: Path) -> None:
