@@ -129,14 +129,16 @@ def public_names(module: str) -> list[str]:
 
 
 def escaped(text: str) -> str:
-    """A text as reStructuredText: `code` stays code."""
-    parts = re.split(r"(`[^`]+`)", re.sub(r"``([^`]+)``", r"`\1`", text))
-    return "".join(
-        f"`{part}`"
-        if part[:1] == "`" and part[-1:] == "`"
-        else re.sub(r"([*_|\\`])", r"\\\1", part)
-        for part in parts
-    )
+    """A text as reStructuredText: `code` stays code, docs/page.md becomes a link."""
+
+    def part(match: re.Match[str]) -> str:
+        code, page, section, plain = match.groups()
+        if page:
+            return f":doc:`{page}.md{section} </{page}>`"
+        return f"``{code}``" if code else re.sub(r"([*_|\\`])", r"\\\1", plain)
+
+    parts = r"`{1,2}([^`]+)`{1,2}|\b(docs/[\w/]+)\.md((?:#[\w-]+)?)|(.)"
+    return re.sub(parts, part, text, flags=re.DOTALL)
 
 
 def is_code(text: str) -> bool:
@@ -158,7 +160,8 @@ def prose(text: str) -> list[str]:
             continue
         item = False
         for line in paragraph.splitlines():
-            if match := re.match(r"(- |[a-z_*]\w*(?:, [a-z_*]\w*)*: )(.*)", line):
+            match = re.match(r"(- |[a-z_*]\w*(?:, [a-z_*]\w*)*: )(.*)", line)
+            if match and (item or not lines or lines[-1][-1:] in ("", ".", ":")):
                 begin = "" if match[1] == "- " else f"``{match[1][:-2]}``: "
                 lines += ["", f"- {begin}{escaped(match[2])}"]
                 item = True
