@@ -371,7 +371,7 @@ def entities(text: str) -> Iterator[tuple[str, list[str]]]:
         if line.partition(" //")[0].rstrip()[-1] in ";}" or line[0] == "#":
             head = [each for each in lines if not re.match(r"(/|template|requires|  )", each)]
             match = next(filter(None, map(NAMED.search, head)), None)
-            forward = re.match(r"(class|struct) \w+;|friend", head[0])
+            forward = re.match(r"(enum )?(class|struct) [\w :]+;|friend", head[0])
             elsewhere = re.match(r".*\w::~?\w+$", head[0].partition("(")[0])  # of a class above
             private = forward or elsewhere or (line[0] == "#" and lines[0][0] == "#")
             if match and not private:
