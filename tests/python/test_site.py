@@ -10,7 +10,7 @@ from sphinx.util.inventory import InventoryFile
 
 import o80
 
-pytestmark = pytest.mark.check
+pytestmark = [pytest.mark.check, pytest.mark.timeout(900)]
 
 ROOT = Path(__file__).resolve().parents[2]
 LARGEST = 15e6  # [bytes]
