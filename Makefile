@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo setup learn test check soak wheel scripts torture model fuzz rt systemd debian13 bench format clean distclean
+.PHONY: demo setup learn test check soak wheel site scripts torture model fuzz rt systemd debian13 bench format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -36,6 +36,11 @@ soak:
 wheel:
 	@tools/setup.sh wheels
 	@.venv/bin/python tools/wheels.py $(ARGS)
+
+# the pages, with search and the reference: build/site/index.html
+site:
+	@tools/setup.sh site
+	@.venv/bin/python docs/site/build_site.py
 
 # random scripts of motion, 100 000 of each kind by default: ARGS="--count 1000000 --seed 5000000"
 scripts:

@@ -34,7 +34,7 @@ PACKAGES = (
     "o80_ros2",
 )
 TYPED = (  # folders beside the packages, grouped so that module names are unique
-    "conftest.py tools benchmarks examples tests/processes tests/tools robots/pam/tests"
+    "conftest.py tools benchmarks examples docs/site tests/processes tests/tools robots/pam/tests"
     " simulators/mujoco/tests apps/table_tennis/studies apps/table_tennis/tests",
     "tests/proofs tests/python tests/consumer",
     "devices/tests",

@@ -4,13 +4,13 @@
 #   environment   an empty .venv, and Debian's packages for test
 #   tools         what testing needs but the packages of this repository, which C++ tests do not use
 #   test, check   what testing and checking needs
-#   demo, learn, bench, wheels, systemd, debian13
+#   demo, learn, bench, wheels, site, systemd, debian13
 # Nothing is done twice; stamps of what was done lie in .venv/stamps. Each message begins with the
 # seconds since the start, or since O80_SINCE (seconds of the epoch) if that is set.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 PATH=$PATH:/usr/sbin:/sbin # ldconfig, for users whose path lacks them
-purpose=${1:?setup, environment, demo, learn, tools, test, check, wheels, bench, systemd or debian13}
+purpose=${1:?setup, environment, demo, learn, tools, test, check, wheels, site, bench, systemd or debian13}
 since=${O80_SINCE:-$(date +%s)}
 
 say() { printf '== %3d s: %s\n' $(($(date +%s) - since)) "$*" >&2; }
@@ -227,7 +227,7 @@ need_renderer() { has_renderer || need_packages libosmesa6 || say "continuing wi
 
 # before anything else, so that a user knows at once what is missing
 case $purpose in
-  demo | learn | wheels) need_packages ;;
+  demo | learn | wheels | site) need_packages ;;
   setup | environment | tools | test | check)
     packages=(g++ ccache libgtest-dev libgmock-dev libaravis-0.8-0 aravis-tools)
     [ "$purpose" != setup ] || has_renderer || packages+=(libosmesa6)
@@ -265,13 +265,13 @@ has_environment || make_environment
 [ "$purpose" = environment ] && exit
 case $purpose in
   tools | test) group=test ;;
-  check | wheels) group=$purpose ;;
+  check | wheels | site) group=$purpose ;;
   *) group= ;;
 esac
 # extras for the purposes that use or test them
 case $purpose in
   demo) extras=rendering ;;
-  wheels) extras= ;;
+  wheels | site) extras= ;;
   bench) extras="rendering zeromq cameras" ;;
   test | tools) extras="zeromq motioncapture" ;;
   check) extras="rendering learn zeromq cameras motioncapture" ;;

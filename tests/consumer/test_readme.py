@@ -10,6 +10,7 @@ import o80
 ROOT = Path(__file__).resolve().parent.parent.parent
 README = (ROOT / "README.md").read_text()
 DRIVERS = (ROOT / "docs" / "drivers.md").read_text()
+TYPES = (ROOT / "docs" / "drivers" / "which_type.md").read_text()
 
 
 def blocks(language: str, page: str = README) -> list[str]:
@@ -71,3 +72,33 @@ def test_the_complete_driver_is_built_and_commanded_as_shown(tmp_path: Path) -> 
         printed = run(sys.executable, "-c", blocks("python", DRIVERS)[0], folder=tmp_path)
         assert "0.49" in printed or "0.5" in printed
         process.wait(timeout=20.0)
+
+
+def test_the_groups_of_the_page_about_types_are_commanded_apart(tmp_path: Path) -> None:
+    driver = """
+struct Arm {
+  struct Config { double gain = 1; };
+  using Actuators = Commanded;
+  explicit Arm(const Config&) {}
+  void start() {}
+  void write(const o80::Desired<Arm>& desired) { now = desired.states; }
+  void read(o80::Reading<Arm>& reading) { reading.observed = now; }
+  void stop() noexcept {}
+  Commanded now{};
+};
+O80_DESCRIBE(Arm::Config, (gain, "of nothing"));
+O80_ROBOT(arm, Arm)
+"""
+    groups = '#include <array>\n#include "o80/robot.hpp"\n' + blocks("cpp", TYPES)[0]
+    (tmp_path / "arm.cpp").write_text(groups + driver)
+    (tmp_path / "CMakeLists.txt").write_text(blocks("cmake", DRIVERS)[0])
+    run("cmake", "-B", "build", f"-Do80_ROOT={o80.prefix()}", folder=tmp_path)
+    run("cmake", "--build", "build", folder=tmp_path)
+    with o80.robots.load(tmp_path / "build" / "arm.so").inline() as arm:
+        arm.add_command("joints", [0.1] * 6, iterations=10)
+        arm.burst(5)
+        arm.add_command("torques", [0.5] * 6)
+        row = arm.burst(5)
+        assert row.observed.joints.tolist() == [0.1] * 6
+        assert row.observed.torques.tolist() == [0.5] * 6
+        assert (float(row.observed.gripper), arm.actuators[0].name) == (0.0, "joints_0")

@@ -1,4 +1,4 @@
-"""Runs the programs of the pages in docs/."""
+"""Runs the programs of the pages in docs/: those of commands.md, then those in docs/commands."""
 
 import re
 from pathlib import Path
@@ -7,8 +7,9 @@ DOCS = Path(__file__).resolve().parents[2] / "docs"
 
 
 def programs(page: str) -> list[str]:
-    """Returns the Python blocks of a page."""
-    text = (DOCS / page).read_text()
+    """Returns the Python blocks of a page, and of the pages in the folder of its name."""
+    pages = [DOCS / page, *sorted((DOCS / page).with_suffix("").glob("*.md"))]
+    text = "".join(file.read_text() for file in pages)
     return re.findall(r"^```python\n(.*?)^```", text, re.MULTILINE | re.DOTALL)
 
 

@@ -154,6 +154,13 @@ TEST = re.compile(r"^(?:TEST\w*\(\s*(\w+),\s*(\w+)\)|(?:async )?def (test_\w+)\(
 SIZES = {"docs/semantics.md": 24, "docs/decisions.md": 8}  # [KiB]
 
 
+@pytest.mark.parametrize(
+    "page", [page for page in PAGES if page.is_relative_to(ROOT / "docs")], ids=name_of
+)
+def test_a_guide_is_one_task(page: Path) -> None:
+    assert len(page.read_text().splitlines()) <= 150
+
+
 @pytest.mark.parametrize("name", SIZES)
 def test_a_page_has_the_size_that_a_reader_has_time_for(name: str) -> None:
     assert (ROOT / name).stat().st_size <= SIZES[name] * 1024

@@ -207,12 +207,13 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_177, 0),
+    "include, src": (34_178, 0),
     "python/bindings": (5_721, 0),
     "python/o80": (30_022, 0),
     "python/o80/hybrid": (2_403, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_480, 0),
     "python/o80/view/page": (1_225, 0),
+    "docs": (570, 0),
     "devices": (8_852, 4_500),
     "gateways/lerobot": (530, 690),
     "gateways/ros2": (904, 955),

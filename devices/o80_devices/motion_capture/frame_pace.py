@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-MAX_AHEAD = 3.0  # periods; the loop allows ten, see docs/drivers.md
+MAX_AHEAD = 3.0  # periods; the loop allows ten, see docs/drivers/own_clock.md
 
 
 class FramePace:

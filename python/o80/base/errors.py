@@ -29,7 +29,7 @@ class Error(Exception):
 
 
 class InvalidArgument(Error, ValueError):
-    """An argument has a value that cannot be used."""
+    """An argument has a value that cannot be used; the text names it and what is allowed."""
 
 
 class TimeoutError(Error, builtins.TimeoutError):
@@ -131,35 +131,47 @@ class MissingExtra(Error, ImportError):
 
 
 class SegmentTaken(Error):
-    """A living backend has the segment's name."""
+    """A living backend has the segment's name: stop it (`o80 stop`), or choose another name."""
 
 
 class SegmentError(Error):
-    """A file is not a segment of this version of o80, or cannot be created."""
+    """A segment cannot be created, opened or listed.
+
+    The text says why, and what to do: another version of o80, no room, no right, another owner.
+    """
 
 
 class SchemaMismatch(Error):
-    """The robot is described differently than expected."""
+    """The robot is described differently than expected; the text has the differences.
+
+    Open a new frontend, make the module of `o80 stub` again, or start the robot that was meant.
+    """
 
 
 class BackendGone(Error):
-    """The backend no longer iterates."""
+    """The backend no longer iterates: start the robot again, then call `reattach`."""
 
 
 class BackendHalted(Error):
-    """The backend is halted: commands end or are rejected until a frontend resumes it."""
+    """The backend is halted: commands end or are rejected until a frontend resumes it.
+
+    The text has the reason of the halt. Remove it, then `o80 resume NAME NUMBER`, or `resume`.
+    """
 
 
 class BackendStopped(BackendGone):
-    """The backend ended in order."""
+    """The backend ended in order: start the robot again."""
 
 
 class BackendFailed(BackendGone):
-    """The driver reported a fault."""
+    """The driver reported a fault, which is the text: remove it, then start the robot again."""
 
 
 class BackendKilled(BackendGone):
-    """The process of the backend died."""
+    """The process of the backend died. Its successor starts halted if commands acted.
+
+    `o80 save` keeps the last rows, if it comes before the robot is started again.
+    """
 
 
 class BackendSuperseded(BackendGone):
@@ -167,31 +179,34 @@ class BackendSuperseded(BackendGone):
 
 
 class RowOverwritten(Error, LookupError):
-    """The history no longer holds that iteration."""
+    """The history no longer holds that iteration: read earlier, or give a longer `history`."""
 
 
 class LaneFull(Error):
-    """The lane has no room for the batch; nothing was sent."""
+    """The lane has no room for the batch; nothing was sent, and what was added stays added.
+
+    Wait until earlier batches have ended, or start the robot with more `lane_blocks`.
+    """
 
 
 class NoLane(Error):
-    """All lanes of the segment are in use by other frontends."""
+    """All lanes of the segment are in use by other frontends: close one, or give more `lanes`."""
 
 
 class NotBursting(Error, RuntimeError):
-    """A burst was requested from a backend that runs in real time."""
+    """A burst was requested from a backend that runs in real time: start it with `bursting`."""
 
 
 class ReadOnly(Error, RuntimeError):
-    """The frontend was opened with read_only=True."""
+    """The frontend may only read: `read_only=True`, its permission, or a recording being played."""
 
 
 class UsedAfterFork(Error, RuntimeError):
-    """The object belongs to the parent process."""
+    """The object belongs to the parent process: open a frontend in the child."""
 
 
 class Closed(Error, RuntimeError):
-    """The object was closed."""
+    """The object was closed: open a new one."""
 
 
 class Cancelled(Error):
@@ -199,7 +214,7 @@ class Cancelled(Error):
 
 
 class DriverError(Error, RuntimeError):
-    """A robot library or its driver failed."""
+    """A robot library or its driver failed; the text is that of the driver or of the loader."""
 
 
 class CopyFailed(Error):
@@ -224,7 +239,7 @@ class RequestRejected(Error):
 
 
 class ControlTaken(Error):
-    """Another frontend has exclusive control."""
+    """Another frontend has exclusive control: wait until it releases it."""
 
 
 class RecordingError(Error):

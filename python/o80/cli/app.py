@@ -79,13 +79,18 @@ def run_app(words: list[str]) -> None:
     named = words[0] if words else ""
     added = {} if named in COMMANDS else installation.announced("o80.commands")
     for name in [named] if named in COMMANDS or named in added else [*COMMANDS, *added]:
-        if name in added:
-            app.add_typer(added[name].load(), name=name)
-            continue
-        module, function = COMMANDS[name].split(".")
-        command = getattr(importlib.import_module(f"o80.cli.{module}"), function)
-        if name in ("run", "demo"):  # options of robots and of packages are not typer's
-            app.command(name, context_settings=RAW, add_help_option=name != "run")(command)
-        else:
-            app.command(name)(command)
+        register(name)
     app(words)
+
+
+def register(name: str) -> None:
+    """Imports a command of o80 or of an installed package, and adds it to `app`."""
+    if name not in COMMANDS:
+        app.add_typer(installation.announced("o80.commands")[name].load(), name=name)
+        return
+    module, function = COMMANDS[name].split(".")
+    command = getattr(importlib.import_module(f"o80.cli.{module}"), function)
+    if name in ("run", "demo"):  # options of robots and of packages are not typer's
+        app.command(name, context_settings=RAW, add_help_option=name != "run")(command)
+    else:
+        app.command(name)(command)

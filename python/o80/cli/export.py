@@ -68,7 +68,8 @@ def export(
 ) -> None:
     """Export rows: one column for each number, named as in observed.elbow or extended.force[2].
 
-    With --format, the episodes of a recording as a data set for learning: see docs/recording.md.
+    With --format, the episodes of a recording as a data set for learning: see
+    docs/recording/exporting.md.
     """
     of_lerobot = {
         "state": _listed(state),

@@ -1,6 +1,6 @@
 """Finds the episodes of a recording by the marks of the recording program.
 
-The rules are in docs/recording.md, Export for learning.
+The rules are in docs/recording/exporting.md#export-for-learning.
 """
 
 import functools

@@ -11,7 +11,7 @@ attributes `actuators`, `dtype`, `extended`, `requests`, `limits`, `rests_at`, `
 `while_halted`, `model` and `joints`, of the class or of the object, describe its rows, as the
 arguments of `o80.Backend` do; `gap` is the longest time between two rows that does not halt it [s],
 if that is less than by default. A simulation says `simulated = True`: every other driver is of the
-world. See docs/drivers.md.
+world. See docs/drivers/in_python.md.
 """
 
 from o80.drivers.option import Seed, option

@@ -29,7 +29,7 @@ class HybridEnvironment(Environment):
     | `episode_end` | after the last step | actions, rewards, rows, how it ended |
     | `episode_dropped` | in a reset before the end | |
 
-    Data sets are made from these marks, see docs/recording.md.
+    Data sets are made from these marks, see docs/recording/exporting.md.
     """
 
     task: Any

@@ -19,7 +19,9 @@ class Column(NamedTuple):
     dtype: np.dtype[Any]
     offset: int  #: offset in the row [bytes]
     labels: dict[str, int] | None  #: labels of an enumeration; None: none
-    origin: str = "robot"  #: source of the value: "robot", "clock" or "world" (docs/drivers.md)
+    origin: str = (
+        "robot"  #: source of the value: "robot", "clock" or "world" (docs/drivers/simulators.md)
+    )
     unit: str = ""
     help: str = ""
 

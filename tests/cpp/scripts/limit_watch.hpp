@@ -9,7 +9,7 @@
 
 namespace o80::test {
 
-/// Every desired number is finite and keeps its limits (docs/commands.md#limits).
+/// Every desired number is finite and keeps its limits (docs/commands/limits.md#limits).
 ///
 /// Rates are held against differences of the published positions: the first one against the speed,
 /// the second against the acceleration, the third against the jerk, all per iteration. A field

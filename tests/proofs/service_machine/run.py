@@ -2,7 +2,7 @@
 
 The unit is examples/systemd/o80@.service, the robot the arm of examples/udp_arm with its fake. The
 service is started, killed, crashed, halted, stopped and started with wrong flags. Ends with 1, and
-shows what was printed, if anything is not as docs/real_time.md says.
+shows what was printed, if anything is not as docs/real_time/service.md says.
 """
 
 import argparse

@@ -461,10 +461,9 @@ def test_a_simulation_in_python_is_replayed_from_its_segment(segment: str, tmp_p
 
 
 def test_the_thermometer_of_the_page_runs(segment: str, tmp_path: Path) -> None:
-    page = Path(__file__).parents[3] / "docs" / "drivers.md"
-    section = page.read_text().split("## A driver in Python")[1]
+    page = Path(__file__).parents[3] / "docs" / "drivers" / "in_python.md"
     file = tmp_path / "room_of_the_page.py"
-    file.write_text(re.findall(r"```python\n(.*?)```", section, re.DOTALL)[0])
+    file.write_text(re.findall(r"```python\n(.*?)```", page.read_text(), re.DOTALL)[0])
     assert len([line for line in file.read_text().splitlines() if line.strip()]) <= 30
     (tmp_path / "line").write_text("20.5\n21.0\n70.0\n20.0\n20.0\n")
     robot = o80.robots.load(f"{file}:Thermometer")

@@ -37,7 +37,7 @@ from o80.learning.training.learner import load
 
 pytestmark = pytest.mark.check  # needs torch, which only `make check` installs
 
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "learning.md"
+DOCS = Path(__file__).resolve().parents[3] / "docs"
 SMALL = {"rollout": 48, "batch_size": 16, "n_epochs": 2, "hidden": 8}
 SETTINGS = TrainingSettings(Guess, seed=4, copies=4, decisions=480, ppo=SMALL)
 
@@ -273,10 +273,10 @@ def test_on_the_clock_no_step_follows_an_update_within_an_episode(
 def test_the_commands_and_the_program_of_the_page_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    text = PAGE.read_text()
-    (tmp_path / "reach.py").write_text(re.findall(r"```python\n(.*?)```", text, re.DOTALL)[0])
-    section = text[text.index("## Train a task by one command") :]
-    commands, program = re.findall(r"```\n(.*?)```", section, re.DOTALL)[:2]
+    task = re.findall(r"```python\n(.*?)```", (DOCS / "learning.md").read_text(), re.DOTALL)[0]
+    (tmp_path / "reach.py").write_text(task)
+    text = (DOCS / "learning" / "training.md").read_text()
+    commands, program = re.findall(r"```(?:python)?\n(.*?)```", text, re.DOTALL)[:2]
     short = commands.replace("--copies 16", "--copies 16 --decisions 2000")
     for command in short.replace("python", sys.executable).splitlines():
         done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)

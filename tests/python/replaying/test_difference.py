@@ -36,7 +36,7 @@ def test_the_first_iteration_and_field_are_told(segment: str) -> None:
 
 
 def test_a_field_of_the_clock_is_left_out(segment: str) -> None:
-    """The description is the only thing that says so: see docs/drivers.md."""
+    """The description is the only thing that says so: see docs/drivers/simulators.md."""
     history = run_of(0.5, segment)
     other = changed(history, 3, history.schema["row"]["extended"])
     assert first_difference(history, other) is not None

@@ -3,7 +3,7 @@
 with Collector(make, seed=1) as collector:
     rollout = collector.collect(policy, steps=64)
 
-See docs/learning.md.
+See docs/learning/rollouts.md.
 """
 
 from o80.learning.rollouts.collector import Collector, Make, Policy

@@ -4,7 +4,7 @@ with Collector(make, seed=1) as collector:
     model = RolloutPPO("MlpPolicy", VecNormalize(CollectorEnv(collector), norm_reward=False))
     model.learn(1_000_000)
 
-Needs the extra `stable-baselines3`. See docs/learning.md.
+Needs the extra `stable-baselines3`. See docs/learning/rollouts.md.
 """
 
 from collections.abc import Iterator

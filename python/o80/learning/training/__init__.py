@@ -3,7 +3,8 @@
 with Training(TrainingSettings(Reach, decisions=200_000), "build/reach") as training:
     policy = training.run()
 
-Training needs the extra `stable-baselines3`; playing a policy does not. See docs/learning.md.
+Training needs the extra `stable-baselines3`; playing a policy does not. See
+docs/learning/training.md.
 """
 
 from typing import TYPE_CHECKING, Any

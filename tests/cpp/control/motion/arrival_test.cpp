@@ -1,4 +1,4 @@
-// Every command ends at its target, within the limits (docs/commands.md#limits): the commands that
+// Every command ends at its target, within the limits (docs/commands/limits.md#limits): the commands that
 // users have sent, and streams of set-points.
 #include <gtest/gtest.h>
 

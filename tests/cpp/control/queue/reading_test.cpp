@@ -1,5 +1,5 @@
 // What a robot reads may be nonsense, or outside its limits: neither reaches desired
-// (docs/commands.md#limits).
+// (docs/commands/limits.md#limits).
 #include <gtest/gtest.h>
 
 #include <cmath>
