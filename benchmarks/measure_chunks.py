@@ -7,10 +7,9 @@ players, with outliers and losses; the policy is asked again when it has answere
 chunks: Frontend.chunks, all rows in their iterations (`fixed`).
 queue: the rule of LeRobot's ActionQueue (0.4.4) with real-time chunking: drops as many actions as
     the latency has steps, rounded up. Its own class gives the same figures.
-consumed: the same with the rule of lerobot#4454: never more than were consumed meanwhile.
 naive: each answer is played from its first action on.
 
-The last three show one action a step, in straight lines between them, as LeRobot 0.6 does.
+The last two show one action a step, in straight lines between them, as LeRobot 0.6 does.
 """
 
 import math
@@ -123,25 +122,21 @@ def by_chunks(world: World) -> Played:
     return played
 
 
-def by_queue(world: World, rule: str) -> Played:
-    """One action a step, interpolated in straight lines. rule: latency, consumed or none."""
+def by_queue(world: World, *, drops: bool) -> Played:
+    """One action a step, interpolated in straight lines. drops: what came too late."""
     played = Played()
     queue: list[tuple[int, float]] = []  # actions with their numbers
     arrivals = iter([*world.answers, Answer(0, 10 * LENGTH, np.zeros(0))])
     coming = next(arrivals)
     newest: Answer | None = None
-    consumed = [0]  # actions until each tick
     place = 0.0
     for tick in range(0, LENGTH - world.step, world.step):
         while coming.at <= tick:
             latency = math.ceil((coming.at - coming.seen) / world.step)
-            meanwhile = consumed[-1] - consumed[min(coming.seen // world.step, len(consumed) - 1)]
-            delay = {"latency": latency, "consumed": min(latency, meanwhile), "none": 0}[rule]
             if len(coming.actions):
-                queue = list(enumerate(coming.actions))[delay:]
+                queue = list(enumerate(coming.actions))[latency if drops else 0 :]
                 newest = coming
             coming = next(arrivals)
-        consumed.append(consumed[-1] + bool(queue))
         after = tick + world.step
         if not queue or newest is None:
             played.starved += world.step
@@ -158,9 +153,8 @@ def by_queue(world: World, rule: str) -> Played:
 
 PLAYERS: dict[str, Callable[[World], Played]] = {
     "chunks": by_chunks,
-    "queue": partial(by_queue, rule="latency"),
-    "consumed": partial(by_queue, rule="consumed"),
-    "naive": partial(by_queue, rule="none"),
+    "queue": partial(by_queue, drops=True),
+    "naive": partial(by_queue, drops=False),
 }
 
 

@@ -6,10 +6,10 @@ are read from all packages that define them.
 
 import sys
 import tomllib
-from pathlib import Path
 from typing import Any
 
-ROOT = Path(__file__).resolve().parent.parent
+from sources import ROOT
+
 PACKAGES = (
     ".",
     "simulators/mujoco",

@@ -7,6 +7,7 @@ The check fails if a test was skipped, here or by `make test`, and passed in no 
 import argparse
 import sys
 
+from build_requirements import PACKAGES, pyproject
 from outcomes import Outcomes
 from sources import ROOT
 from steps import (
@@ -23,16 +24,7 @@ from steps import (
 )
 
 PROOF = [sys.executable, "tests/proofs/run.py"]
-PACKAGES = (
-    "o80",
-    "o80_mujoco",
-    "o80_pam",
-    "o80_arms",
-    "o80_devices",
-    "o80_table_tennis",
-    "lerobot_robot_o80",
-    "o80_ros2",
-)
+MODULES = [pyproject(folder)["project"]["name"].replace("-", "_") for folder in PACKAGES]
 TYPED = (  # folders beside the packages, grouped so that module names are unique
     "conftest.py tools benchmarks examples docs/site tests/processes tests/tools robots/pam/tests"
     " simulators/mujoco/tests apps/table_tennis/studies apps/table_tennis/tests",
@@ -51,7 +43,7 @@ STEPS: dict[str, list[list[str]]] = {
     "ruff": [["ruff", "check", "."]],
     "workflow": [["check-jsonschema", "--builtin-schema", "vendor.github-workflows", WORKFLOW]],
     "mypy": [
-        [*PYTHON, "mypy", *(word for name in PACKAGES for word in ("-p", name))],
+        [*PYTHON, "mypy", *(word for name in MODULES for word in ("-p", name))],
         *([*PYTHON, "mypy", *folders.split()] for folders in TYPED),
     ],
     "cpp": [ctest("cpp", "dev", "-L", "^check$")],

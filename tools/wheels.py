@@ -14,8 +14,8 @@ import sys
 from pathlib import Path
 
 from build_requirements import PACKAGES, pyproject, requirements
+from sources import ROOT
 
-ROOT = Path(__file__).resolve().parent.parent
 PLATFORM = f"manylinux_2_35_{platform.machine()}"
 PIP = [sys.executable, "-m", "pip", "-q", "--disable-pip-version-check"]
 CCACHE = {  # as in tools/setup.sh

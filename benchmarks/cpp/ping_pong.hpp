@@ -14,9 +14,8 @@ namespace o80::bench {
 /// Two lines, one for each way; the answering thread spins on the first all its life.
 class PingPong {
  public:
-  explicit PingPong(int processor = -1) {
-    answerer_ = std::thread([this, processor] {
-      if (processor >= 0) pin(processor);
+  PingPong() {
+    answerer_ = std::thread([this] {
       std::uint64_t seen = 0;
       while (seen != kOver) {
         const std::uint64_t now = ping_.load(std::memory_order_acquire);

@@ -30,7 +30,7 @@ def plot(
     each.
     """
     from o80.joining import plot as plots
-    from o80.joining.plot import Placed, origins
+    from o80.joining.plot import origins
     from o80.rows.journal import command_ends, decisions
     from o80.rows.plans import planned_by_chunks
 
@@ -44,7 +44,7 @@ def plot(
         raise InvalidArgument(f"{', '.join(sources)}: no rows to plot")
     offset_of: dict[str, int | None] = {}  # one for each boot: the wall clock may have been set
     placed = {
-        name: Placed(each.history, offset_of.setdefault(each.boot or name, each.wall_offset))
+        name: (each.history, offset_of.setdefault(each.boot or name, each.wall_offset))
         for name, each in found.items()
     }
     zeros, axes = origins(placed)

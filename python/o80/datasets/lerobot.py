@@ -284,34 +284,20 @@ def _write_frames(path: Path, frames: list[Columns], features: Mapping[str, Any]
     import pyarrow as arrow
     import pyarrow.parquet as parquet
 
-    kinds = {
-        "float32": arrow.float32(),
-        "float64": arrow.float64(),
-        "int64": arrow.int64(),
-        "bool": arrow.bool_(),
-    }
-    schema = arrow.schema(
-        [
-            (
-                name,
-                kinds[each["dtype"]]
-                if each["shape"] == [1]  # LeRobot reads these as plain numbers
-                else arrow.list_(kinds[each["dtype"]], each["shape"][0]),
-            )
-            for name, each in features.items()
-        ]
-    )
+    fields = []
+    for name, each in features.items():
+        kind, size = arrow.type_for_alias(each["dtype"]), each["shape"][0]
+        # LeRobot reads columns of one number as plain numbers
+        fields.append((name, kind if size == 1 else arrow.list_(kind, size)))
+    schema = arrow.schema(fields)
     with parquet.ParquetWriter(path, schema) as writer:
         for columns in frames:
-            arrays = [
-                arrow.array(columns[field.name].reshape(-1), kinds[features[field.name]["dtype"]])
-                for field in schema
-            ]
-            for i, field in enumerate(schema):
-                if arrow.types.is_fixed_size_list(field.type):
-                    arrays[i] = arrow.FixedSizeListArray.from_arrays(
-                        arrays[i], field.type.list_size
-                    )
+            arrays = []
+            for name, kind in fields:
+                flat = arrow.array(columns[name].reshape(-1))
+                is_list = arrow.types.is_fixed_size_list(kind)
+                made = arrow.FixedSizeListArray.from_arrays(flat, type=kind) if is_list else flat
+                arrays.append(made)
             writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
 
 

@@ -188,7 +188,7 @@ class Chunks(Managed):
         anchor = self._anchor(seen)
         if isinstance(rows, Sized) and len(rows) == 0:
             raise InvalidArgument("a chunk needs a row")
-        states, count, masks = states_of(rows, self._actuators, self._single, self._arm._layout)
+        states, count, masks = states_of(rows, self._actuators, self._arm._layout)
         first = _from_to(first, "first", 0, count - 1)
         after = self._due(count) if due is None else _iterations(due, "due") - anchor
         if due is not None or after[-1] > _LATEST:

@@ -220,8 +220,8 @@ class Commander(Reader):
             )
         if times is None and speed is None and iterations is None:
             iterations = 1
-        chosen, single = self._chosen(actuators)
-        states, rows, masks = states_of(targets, chosen, single, self._layout)
+        chosen, _ = self._chosen(actuators)
+        states, rows, masks = states_of(targets, chosen, self._layout)
         ends = None if times is None else times_of(times)
         options = _core.CommandOptions(
             speed=speed,

@@ -256,21 +256,16 @@ def _shade(
 APART = 10_000_000_000  # runs further apart have axes of their own [ns]
 
 
-class Placed(NamedTuple):
-    """A history, and wall-clock minus row time [ns]; None: not known."""
-
-    history: History
-    wall_offset: int | None
-
-
-def origins(runs: Mapping[str, Placed]) -> tuple[dict[str, int], int]:
+def origins(runs: Mapping[str, tuple[History, int | None]]) -> tuple[dict[str, int], int]:
     """Returns the row time [ns] at 0 of each run's axis, and the number of axes.
+
+    runs: by name, a history and wall-clock minus row time [ns]; None: not known.
 
     Runs that overlap on the wall clock, or follow each other within ten seconds, share an axis,
     which begins with their first row. Other runs, and runs of unknown wall-clock time, begin at 0
     each.
     """
-    known: list[tuple[int, int, str]] = []
+    known: list[tuple[int, int, int, str]] = []
     found: dict[str, int] = {}
     for name, (history, offset) in runs.items():
         if not len(history):
@@ -278,15 +273,14 @@ def origins(runs: Mapping[str, Placed]) -> tuple[dict[str, int], int]:
         elif offset is None:
             found[name] = int(history.time[0])
         else:
-            known.append((int(history.time[0]) + offset, int(history.time[-1]) + offset, name))
-    axes = sum(1 for run in runs.values() if run.wall_offset is None and len(run.history))
+            first, last = int(history.time[0]) + offset, int(history.time[-1]) + offset
+            known.append((first, last, offset, name))
+    axes = sum(1 for history, offset in runs.values() if offset is None and len(history))
     zero = end = None
-    for first, last, name in sorted(known):
+    for first, last, offset, name in sorted(known):
         if zero is None or end is None or first > end + APART:
             zero, end = first, last
             axes += 1
         end = max(end, last)
-        offset = runs[name].wall_offset
-        assert offset is not None
         found[name] = zero - offset
     return found, axes

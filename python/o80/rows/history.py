@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Self, TypedDict, overload
+from typing import TYPE_CHECKING, Any, Self, TypedDict, Unpack, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -185,23 +185,14 @@ class History:
             )
         return self[place]
 
-    def select(
-        self,
-        n: int | None = None,
-        *,
-        since: int | None = None,
-        until: int | None = None,
-        seconds: float | None = None,
-        from_time: int | None = None,
-        to_time: int | None = None,
-    ) -> "History":
+    def select(self, n: int | None = None, **selection: Unpack[Range]) -> "History":
         """Returns a part of this history, without a copy; arguments as for `Frontend.history`."""
-        selection = Selection.checked(n, since, until, seconds, from_time, to_time)
+        wanted = Selection.checked(n, **selection)
         if not len(self):
             return self
-        if selection.n is not None:
-            return self[max(0, len(self) - selection.n) :]
-        first, last = selection.range(
+        if wanted.n is not None:
+            return self[max(0, len(self) - wanted.n) :]
+        first, last = wanted.range(
             int(self.iteration[0]),
             int(self.iteration[-1]),
             self._iteration_at,

@@ -1,6 +1,7 @@
 """Converts targets of trajectories from Python values to bytes of each actuator."""
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -16,47 +17,13 @@ Rows: TypeAlias = "ArrayLike | Mapping[str, Any]"
 
 
 def states_of(
-    targets: Rows,
-    actuators: Sequence[int],
-    single: bool,
-    layout: Layout,
+    targets: Rows, actuators: Sequence[int], layout: Layout
 ) -> tuple[NDArray[np.uint8], int, list[int]]:
     """Returns bytes of all rows of the first actuator, then of the second, and so on; number of
     rows; words with a bit for each number of a state that is given, actuator by actuator, or no
     words if all numbers are given.
     """
-    kinds = state_types(actuators, layout)
-    fields = kinds[0].names or ()
-    by_field = not isinstance(targets, Mapping) or set(targets) <= set(fields) or not targets
-    if len(set(kinds)) > 1 or not by_field:
-        return _states_of_parts(targets, actuators, kinds, layout)
-    kind, labels = kinds[0], labels_of(actuators[0], layout)
-    if not isinstance(targets, Mapping) and _are_first_fields(targets, kind):
-        targets = {fields[0]: targets}
-    given: Sequence[str] = fields
-    if isinstance(targets, Mapping):
-        array = _from_fields(targets, kind, labels)
-        given = list(targets)
-    else:
-        array = states_from(numbers_of(labels, targets), kind)
-    if single and array.ndim == 1:
-        array = array[:, np.newaxis]
-    if array.ndim != 2 or array.shape[1] != len(actuators):
-        expected = "(T,)" if single else f"(T, {len(actuators)})"
-        raise InvalidArgument(
-            f"the targets of {len(actuators)} actuators are {expected}, not {array.shape}"
-        )
-    states = np.zeros(array.T.shape, kind)  # a copy would hold anything in its padding
-    states[...] = array.T
-    masks = _mask_of(given, kind) * len(actuators)
-    return states.reshape(-1).view(np.uint8), len(array), masks
-
-
-def _states_of_parts(
-    targets: Rows, actuators: Sequence[int], kinds: list[np.dtype[Any]], layout: Layout
-) -> tuple[NDArray[np.uint8], int, list[int]]:
-    """Does the same for actuators of different types, or for a mapping of their names."""
-    parts = _Parts(actuators, kinds, layout)
+    parts = _Parts(actuators, state_types(actuators, layout), layout)
     if isinstance(targets, Mapping):
         for key, values in targets.items():
             parts.add(key, values)
@@ -104,6 +71,11 @@ class _Parts:
 
     def fill(self, places: list[int], field: str | None, values: Any) -> None:
         """Sets a field of these actuators (None: the first field) from (T, actuators), or (T,)."""
+        if field is None and len({self._kinds[place] for place in places}) == 1:
+            kind, labels = self._kinds[places[0]], labels_of_type(self._types[places[0]])
+            if _numbers_in(kind) > 1:
+                with suppress(InvalidArgument):  # states in tuples; else numbers of the first field
+                    values = states_from(numbers_of(labels, values), kind)
         array = np.asarray(values)
         if array.dtype.kind in "OUT":  # not as texts: numbers may stand beside labels
             array = np.asarray(values, object)
@@ -143,18 +115,19 @@ class _Parts:
         if len(counts) != 1:
             raise InvalidArgument(f"the targets have different numbers of rows: {sorted(counts)}")
         (count,) = counts
-        parts: list[bytes] = []
+        whole = np.zeros(count * sum(kind.itemsize for kind in self._kinds), np.uint8)
         masks: list[list[int]] = []
+        end = 0
         for kind, columns in zip(self._kinds, self._columns, strict=True):
-            states = np.zeros(count, kind)
+            begin, end = end, end + count * kind.itemsize
+            states = whole[begin:end].view(kind)
             for name, column in columns.items():
                 (states[name] if name else states)[...] = column
-            parts.append(states.tobytes())
             masks.append(_mask_of([*columns] if "" not in columns else kind.names or (), kind))
         numbers = [_numbers_in(kind) for kind in self._kinds]
         words = [mask or _words((1 << n) - 1, n) for mask, n in zip(masks, numbers, strict=True)]
         given = [word for each in words for word in each] if any(masks) else []
-        return np.frombuffer(b"".join(parts), np.uint8), count, given
+        return whole, count, given
 
 
 def _field_of(kind: np.dtype[Any], name: str) -> np.dtype[Any]:
@@ -200,20 +173,6 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
                 f"a mapping from each field to an array, or a structured array"
             )
     return array
-
-
-def _are_first_fields(targets: ArrayLike, kind: np.dtype[Any]) -> bool:
-    """True for numbers, or labels, of states with several fields: each is the first field."""
-    if kind.names is None or _numbers_in(kind) == 1:
-        return False
-    try:
-        array = np.asarray(targets)
-    except ValueError:  # of mixed lengths: states in tuples
-        return False
-    try:
-        return array.dtype.names is None and array.shape == np.asarray(targets, kind).shape
-    except (TypeError, ValueError):
-        return array.dtype.kind == "U"
 
 
 def _numbers_in(kind: np.dtype[Any]) -> int:
@@ -266,30 +225,6 @@ def _type_of(actuator: int, layout: Layout) -> dict[str, Any]:
     schema = layout.schema
     described: dict[str, Any] = schema["groups"][schema["actuators"][actuator]["group"]]["type"]
     return described
-
-
-def _from_fields(
-    targets: Mapping[str, ArrayLike], kind: np.dtype[Any], labels: Any
-) -> NDArray[Any]:
-    """Makes a structured array from an array for each field; 0 in fields that are left out."""
-    names = kind.names or ()
-    if not targets or not set(targets) <= set(names):
-        there = ", ".join(names) or "none, it is a plain number"
-        raise InvalidArgument(
-            f"a trajectory needs fields of the state ({there}), not {', '.join(targets) or 'none'}"
-        )
-    columns = {
-        name: np.asarray(numbers_of(labels.get(name), values)) for name, values in targets.items()
-    }
-    assert kind.fields is not None
-    inner = {name: len(kind.fields[name][0].shape) for name in targets}
-    shapes = {column.shape[: column.ndim - inner[name]] for name, column in columns.items()}
-    if len(shapes) != 1:
-        raise InvalidArgument(f"the fields have different numbers of targets: {sorted(shapes)}")
-    array = np.zeros(shapes.pop(), kind)
-    for name, column in columns.items():
-        array[name] = column
-    return array
 
 
 def times_of(times: ArrayLike) -> NDArray[np.int64]:

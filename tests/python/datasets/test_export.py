@@ -14,7 +14,7 @@ from processes import run_o80
 import o80
 from o80.cli.histories import histories
 from o80.datasets.export import write
-from o80.joining.plot import Placed, origins
+from o80.joining.plot import origins
 from o80.plot import plot
 from o80.rows.history import columns_in
 from o80.rows.journal import command_ends
@@ -199,10 +199,10 @@ def test_runs_of_different_days_begin_at_zero_each() -> None:
     history = recorded({"joints": ({"position": "f8"}, 1)}, {}, 5)
     first = int(history.time[0])
     runs = {
-        "arm": Placed(history, 1000),
-        "ball": Placed(history, 1000 + 5_000_000),
-        "arm/1": Placed(history, 1000 + DAY),
-        "live": Placed(history, None),
+        "arm": (history, 1000),
+        "ball": (history, 1000 + 5_000_000),
+        "arm/1": (history, 1000 + DAY),
+        "live": (history, None),
     }
     zeros, axes = origins(runs)
 
@@ -211,6 +211,6 @@ def test_runs_of_different_days_begin_at_zero_each() -> None:
     assert zeros["ball"] == first - 5_000_000  # the same axis, 5 ms later
     assert zeros["arm/1"] == first
     assert zeros["live"] == first
-    figure = plot({name: run.history for name, run in runs.items()}, origins=zeros)
+    figure = plot(dict.fromkeys(runs, history), origins=zeros)
     begins = [np.asarray(ax.get_lines()[0].get_xdata())[0] for ax in figure.axes]
     assert begins == pytest.approx([0, 0.005, 0, 0])

@@ -157,6 +157,6 @@ def test_padding_of_targets_is_zero(segment: str) -> None:
         for count in (2, 20, 200):
             targets = np.zeros((count, 2), [("on", bool), ("position", float)])
             for given in (targets, {name: targets[name] for name in ("on", "position")}):
-                copied = partial(states_of, given, [0, 1], False, backend._layout)
+                copied = partial(states_of, given, [0, 1], backend._layout)
                 states, *_ = after_other_values(copied)
                 assert not states.any()
