@@ -207,7 +207,7 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_177, 0),
+    "include, src": (34_178, 0),
     "python/bindings": (5_721, 0),
     "python/o80": (30_022, 0),
     "python/o80/hybrid": (2_403, 0),
