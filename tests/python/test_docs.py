@@ -136,7 +136,11 @@ def test_every_page_and_section_that_a_source_names_exists() -> None:
 def test_the_page_on_compatibility_names_the_formats_of_this_version() -> None:
     page = (ROOT / "docs" / "compatibility.md").read_text()
     for constant, file, phrase in (
-        ("kJournalCodec", "src/runtime/journal/journal_format.hpp", "format of the journal ({})"),
+        (
+            "kJournalCodec",
+            "src/runtime/journal/journal_format.hpp",
+            "format of its own ({} in 0.1.0)",
+        ),
         ("kMotionRules", "src/control/motion/number_plan.hpp", "motion rules ({} in 0.1.0)"),
         ("kSegmentVersion", "src/memory/segment/segment_layout.hpp", "version ({} in 0.1.0)"),
         ("kRobotTableVersion", "include/o80/robot/table.hpp", "built for ({} in 0.1.0)"),
