@@ -43,14 +43,6 @@ def test_an_error_in_a_with_block_purges_what_the_frontend_sent(
         assert kept.statuses == [o80.Status.ACTIVE]
 
 
-def test_motion_may_go_on_after_an_error(bursting: o80.robots.Process) -> None:
-    with bursting.frontend() as other:
-        batch = fail_in(bursting.frontend(on_error="continue"))
-        other.burst(1)
-
-        assert batch.statuses == [o80.Status.ACTIVE]
-
-
 def fail_in(frontend: o80.Frontend) -> o80.Batch:
     """Sends a command of many iterations and leaves its block by an exception."""
     with pytest.raises(ZeroDivisionError), frontend as arm:  # noqa: PT012
@@ -59,11 +51,6 @@ def fail_in(frontend: o80.Frontend) -> o80.Batch:
         arm.add_command(0, 2.0)  # never pulsed, and not worth a warning any more
         raise ZeroDivisionError
     return batch
-
-
-def test_the_word_for_errors_is_checked(process: o80.robots.Process) -> None:
-    with pytest.raises(o80.InvalidArgument, match="continue"):
-        process.frontend(on_error="ignore")
 
 
 def test_control_within_control_changes_nothing(process: o80.robots.Process) -> None:

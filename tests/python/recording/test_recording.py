@@ -194,31 +194,6 @@ def test_a_chunk_is_due_when_the_journal_fills(segment: str, tmp_path: Path) -> 
         assert journal.missed == 0
 
 
-def test_a_recording_says_how_each_run_ended(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [segment])
-
-    def look() -> None:
-        recorder.sources[segment]._attempt_at = 0.0  # now
-        recorder.catch_up()
-
-    for reason in ("", "the sensor is off"):
-        with contextlib.suppress(ArithmeticError), o80.Backend(segment, 2) as backend:
-            backend.publish([0.0, 0.0])
-            look()
-            if reason:
-                raise ArithmeticError(reason)
-        look()
-    with o80.Backend(segment, 2) as backend:
-        backend.publish([0.0, 0.0])
-        look()
-        recorder.finish()
-    ends = [epoch.end for epoch in o80.open(path)[segment].epochs]
-    assert ends[0] == "stopped"
-    assert "the sensor is off" in ends[1]
-    assert ends[2] == "", "recorded no further"
-
-
 def test_a_closed_recording_says_so(arm: o80.Frontend, tmp_path: Path) -> None:
     recording = o80.Recording(tmp_path / "run.mcap", arm)
     recording.close()
