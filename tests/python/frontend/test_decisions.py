@@ -116,8 +116,8 @@ def test_the_journal_says_it_and_echo_prints_it(arm: o80.Frontend, tmp_path: Pat
         "p95": 4,
         "max": 4,
     }
-    said = run_o80("echo", str(tmp_path / "run.mcap"), code=1).stderr
-    assert "is a recording: `o80 echo --commands" in " ".join(said.split())
+    refused = run_o80("echo", str(tmp_path / "run.mcap"), code=1).stderr
+    assert "is a recording: `o80 echo --commands" in " ".join(refused.split())
     lines = run_o80("echo", "--commands", str(tmp_path / "run.mcap")).stdout
     assert "elbow to 0.01, decided 4 iterations before" in lines
     said = run_o80("echo", "--commands", "--json", str(tmp_path / "run.mcap")).stdout.splitlines()
