@@ -92,21 +92,6 @@ def test_it_refuses_to_attach_again_to_another_robot(segment: str) -> None:
     arm.close()
 
 
-def test_a_robot_may_have_a_frontend_of_its_own(segment: str) -> None:
-    class TwoJoints(o80.Frontend):
-        def add_elbow(self, angle: float) -> None:
-            self.add_command("elbow", angle)
-
-    o80.register_frontend("two_joints_of_its_own", TwoJoints)
-    with o80.Backend(segment, ["elbow"], robot="two_joints_of_its_own") as backend:
-        backend.publish([0.0])
-        with o80.Frontend(segment) as arm:
-            assert isinstance(arm, TwoJoints)
-            arm.add_elbow(0.5)
-            arm.pulse()
-            assert backend.step() == [0.5]
-
-
 def test_a_frontend_of_a_halted_robot_says_so(segment: str) -> None:
     with o80.robots.load("two_joints").inline(segment, frequency=500) as arm:
         assert repr(arm).endswith("(two_joints), bursting at 500 Hz>")

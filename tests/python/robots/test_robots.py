@@ -92,20 +92,6 @@ def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str
 # ---------------------------------------------------------------------------- processes
 
 
-def test_a_process_runs_until_its_block_ends(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment, frequency=500.0) as process:
-        assert process.alive
-        with process.frontend() as arm:
-            assert arm.frequency == 500.0
-            arm.add_command("elbow", 0.5, duration=0.01)
-            assert arm.pulse_and_wait(timeout=WAIT).desired[1] == 0.5
-        assert str(process.pid) in repr(process)
-
-    assert not process.alive
-    assert process.wait() == 0  # type: ignore[unreachable]
-    assert segment not in [entry.name for entry in o80.segments()]
-
-
 def test_the_segment_has_the_name_of_the_robot_unless_another_is_given() -> None:
     with o80.robots.load("two_joints").start() as process:
         assert process.segment == "two_joints"
