@@ -45,6 +45,10 @@ class Running:
 
 def test_the_two_verbs_make_a_robot(segment: str) -> None:
     with o80.Backend(segment, ["a", "b"], frequency=100.0) as backend:
+        with pytest.raises(o80.InvalidArgument, match="row 0"):
+            backend.step()
+        with pytest.raises(o80.InvalidArgument, match="actuator 'b'"):
+            backend.publish([0.5, float("nan")])
         backend.publish([0.5, -0.5])
         with o80.Frontend(segment) as frontend:
             frontend.add_command("a", 1.0, iterations=2)

@@ -189,6 +189,24 @@ def test_rows_know_their_run_wherever_they_went(
         assert (told.iteration, told.epoch) == (again.iteration, again.epoch) == (3, epoch)
 
 
+def test_after_a_reattach_rows_are_of_the_new_run(segment: str) -> None:
+    arm = o80.robots.load("two_joints")
+    first = arm.start(segment, bursting=True)
+    with o80.Frontend(segment) as frontend:
+        before = frontend.latest().epoch
+        first.stop()
+        with arm.start(segment, bursting=True):
+            frontend.reattach()
+            row = frontend.burst(1)
+            assert row.epoch == frontend.history().epoch == frontend.history()[-1].epoch
+            assert row.epoch != before
+            frontend.add_command("elbow", 0.1)
+            batch = frontend.pulse(seen=row)
+            frontend.burst(1)
+            assert batch.decision_latency is not None
+            assert batch.decision_latency.iterations == 1
+
+
 def test_a_device_s_row_counts_from_its_capture(segment: str) -> None:
     sensor = {"capture_time": np.int64, "x": np.float64}
     with (

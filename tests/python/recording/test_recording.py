@@ -134,14 +134,14 @@ def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_pa
         arm.mark("first")
         arm.burst(20)
         with o80.Frontend(arm.segment) as other:
-            other.mark("second")
+            other.mark("second: \u00bd l")
         arm.burst(5)
     file = o80.open(path)
     epoch = file[arm.segment].epochs[0]
     assert [(mark.name, mark.rows) for mark in file.marks] == [
         ("before", {arm.segment: 1}),
         ("first", {arm.segment: 31}),
-        ("second", {arm.segment: 51}),
+        ("second: \u00bd l", {arm.segment: 51}),
     ]
     times = epoch.history().time
     with path.open("rb") as content:
