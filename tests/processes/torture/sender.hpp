@@ -30,7 +30,6 @@ class Sender {
   bool pulse(const o80::PulseOptions& options = {});
   /// Sends them with a burst of so many iterations; 0: until they have ended.
   std::optional<o80::Burst> burst(std::int64_t iterations);
-  void burst_ended(o80::Iteration last_row);
   /// The batch sent last.
   const o80::Batch& last() const { return open_.back().batch; }
   SentBatch& entry() { return *open_.back().entry; }

@@ -149,17 +149,3 @@ def test_info_describes_a_recording(tmp_path: Path) -> None:
     assert all(mark.endswith("...") for mark in marks)  # that a value goes on is said
     told = json.loads(run("info", path, "--json"))
     assert [each["rows"] for each in told] == [each.rows for each in o80.open(path)["arm"].epochs]
-
-
-def test_info_tells_what_a_damaged_recording_is(tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    with o80.robots.load("two_joints").inline("arm") as arm, o80.Recording(path, arm):
-        arm.burst(100)
-    whole = path.read_bytes()
-
-    path.write_bytes(whole[: len(whole) - 20])
-    assert "o80 repair" in run("info", path)
-    path.write_bytes(b"not this")
-    for command in ("info", "repair"):
-        assert "is not an MCAP file" in run(command, path, code=1)
-        assert "there is no file" in run(command, tmp_path / "other.mcap", code=1)

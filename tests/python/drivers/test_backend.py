@@ -45,6 +45,10 @@ class Running:
 
 def test_the_two_verbs_make_a_robot(segment: str) -> None:
     with o80.Backend(segment, ["a", "b"], frequency=100.0) as backend:
+        with pytest.raises(o80.InvalidArgument, match="row 0"):
+            backend.step()
+        with pytest.raises(o80.InvalidArgument, match="actuator 'b'"):
+            backend.publish([0.5, float("nan")])
         backend.publish([0.5, -0.5])
         with o80.Frontend(segment) as frontend:
             frontend.add_command("a", 1.0, iterations=2)
@@ -149,24 +153,6 @@ def test_states_of_another_shape_and_unknown_fields_are_refused(
             backend.publish(extended={"missing": {"amr": True}})
 
 
-def test_an_interrupted_command_says_so(segment: str) -> None:
-    with o80.Backend(segment, ["a", "b"]) as backend:
-        backend.publish([0.0, 0.0])
-        with o80.Frontend(segment) as frontend:
-            frontend.add_command("a", 1.0, iterations=10)
-            frontend.add_command("b", 1.0, iterations=10)
-            batch = frontend.pulse()
-            backend.step()
-            backend.interrupt("b")
-            backend.publish([0.0, 0.0])
-
-            assert batch.statuses == [o80.Status.ACTIVE, o80.Status.INTERRUPTED]
-            with pytest.raises(o80.InvalidArgument, match="a, b"):
-                backend.interrupt("c")
-            with pytest.raises(o80.InvalidArgument):
-                backend.interrupt(2)
-
-
 # ---------------------------------------------------------------------------- requests
 
 
@@ -251,12 +237,13 @@ def test_a_handler_that_fails_ends_the_backend(
     assert isinstance(running.raised, ZeroDivisionError)
 
 
-def test_only_known_requests_have_handlers(segment: str) -> None:
-    with (
-        o80.Backend(segment, ["a"], requests=REQUESTS) as backend,
-        pytest.raises(o80.InvalidArgument, match="reset, home, brake"),
-    ):
-        backend.on("launch", lambda _: None)
+def test_only_known_requests_have_handlers_and_only_actuators_are_interrupted(segment: str) -> None:
+    with o80.Backend(segment, ["a"], requests=REQUESTS) as backend:
+        with pytest.raises(o80.InvalidArgument, match="reset, home, brake"):
+            backend.on("launch", lambda _: None)
+        for wrong in ("c", 1):
+            with pytest.raises(o80.InvalidArgument, match="there are: a"):
+                backend.interrupt(wrong)
 
 
 # ---------------------------------------------------------------------------- its end

@@ -39,6 +39,7 @@ def test_a_wait_that_times_out_carries_the_batch(process: o80.robots.Process) ->
         with pytest.raises(o80.TimeoutError) as caught:
             arm.pulse_and_wait(timeout=0.01)
 
+        assert isinstance(caught.value, TimeoutError)
         batch = caught.value.batch
         assert batch is not None
         assert batch.handles[0].status in (o80.Status.QUEUED, o80.Status.ACTIVE)

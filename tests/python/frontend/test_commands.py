@@ -35,10 +35,3 @@ def test_a_command_may_start_from_the_observed_state(arm: o80.Frontend) -> None:
     arm.add_command(0, 1.0, iterations=2, start=o80.Start.OBSERVED)
 
     assert arm.burst(1).desired[0] == pytest.approx((observed + 1.0) / 2)
-
-
-def test_initial_states_are_those_before_anything_was_asked(arm: o80.Frontend) -> None:
-    arm.add_command(0, 1.0)
-    arm.burst(10)
-
-    assert arm.initial_states.tolist() == [0.0, 0.0]

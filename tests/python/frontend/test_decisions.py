@@ -116,8 +116,8 @@ def test_the_journal_says_it_and_echo_prints_it(arm: o80.Frontend, tmp_path: Pat
         "p95": 4,
         "max": 4,
     }
-    said = run_o80("echo", str(tmp_path / "run.mcap"), code=1).stderr
-    assert "is a recording: `o80 echo --commands" in " ".join(said.split())
+    refused = run_o80("echo", str(tmp_path / "run.mcap"), code=1).stderr
+    assert "is a recording: `o80 echo --commands" in " ".join(refused.split())
     lines = run_o80("echo", "--commands", str(tmp_path / "run.mcap")).stdout
     assert "elbow to 0.01, decided 4 iterations before" in lines
     said = run_o80("echo", "--commands", "--json", str(tmp_path / "run.mcap")).stdout.splitlines()
@@ -187,6 +187,24 @@ def test_rows_know_their_run_wherever_they_went(
         assert told is not None
         assert again is not None
         assert (told.iteration, told.epoch) == (again.iteration, again.epoch) == (3, epoch)
+
+
+def test_after_a_reattach_rows_are_of_the_new_run(segment: str) -> None:
+    arm = o80.robots.load("two_joints")
+    first = arm.start(segment, bursting=True)
+    with o80.Frontend(segment) as frontend:
+        before = frontend.latest().epoch
+        first.stop()
+        with arm.start(segment, bursting=True):
+            frontend.reattach()
+            row = frontend.burst(1)
+            assert row.epoch == frontend.history().epoch == frontend.history()[-1].epoch
+            assert row.epoch != before
+            frontend.add_command("elbow", 0.1)
+            batch = frontend.pulse(seen=row)
+            frontend.burst(1)
+            assert batch.decision_latency is not None
+            assert batch.decision_latency.iterations == 1
 
 
 def test_a_device_s_row_counts_from_its_capture(segment: str) -> None:

@@ -43,14 +43,6 @@ def test_an_error_in_a_with_block_purges_what_the_frontend_sent(
         assert kept.statuses == [o80.Status.ACTIVE]
 
 
-def test_motion_may_go_on_after_an_error(bursting: o80.robots.Process) -> None:
-    with bursting.frontend() as other:
-        batch = fail_in(bursting.frontend(on_error="continue"))
-        other.burst(1)
-
-        assert batch.statuses == [o80.Status.ACTIVE]
-
-
 def fail_in(frontend: o80.Frontend) -> o80.Batch:
     """Sends a command of many iterations and leaves its block by an exception."""
     with pytest.raises(ZeroDivisionError), frontend as arm:  # noqa: PT012
@@ -59,11 +51,6 @@ def fail_in(frontend: o80.Frontend) -> o80.Batch:
         arm.add_command(0, 2.0)  # never pulsed, and not worth a warning any more
         raise ZeroDivisionError
     return batch
-
-
-def test_the_word_for_errors_is_checked(process: o80.robots.Process) -> None:
-    with pytest.raises(o80.InvalidArgument, match="continue"):
-        process.frontend(on_error="ignore")
 
 
 def test_control_within_control_changes_nothing(process: o80.robots.Process) -> None:
@@ -103,21 +90,6 @@ def test_it_refuses_to_attach_again_to_another_robot(segment: str) -> None:
         with pytest.raises(o80.SchemaMismatch, match="open a new frontend"):
             arm.reattach()
     arm.close()
-
-
-def test_a_robot_may_have_a_frontend_of_its_own(segment: str) -> None:
-    class TwoJoints(o80.Frontend):
-        def add_elbow(self, angle: float) -> None:
-            self.add_command("elbow", angle)
-
-    o80.register_frontend("two_joints_of_its_own", TwoJoints)
-    with o80.Backend(segment, ["elbow"], robot="two_joints_of_its_own") as backend:
-        backend.publish([0.0])
-        with o80.Frontend(segment) as arm:
-            assert isinstance(arm, TwoJoints)
-            arm.add_elbow(0.5)
-            arm.pulse()
-            assert backend.step() == [0.5]
 
 
 def test_a_frontend_of_a_halted_robot_says_so(segment: str) -> None:

@@ -94,6 +94,7 @@ def test_names_each_of_its_files_in_the_table() -> None:
         (lambda arm: arm.halt(1, 2), "halt() takes from 1 to 2 positional arguments"),
         (lambda arm: arm.add_trajectory([[0, 0]], frequency=50), ". It takes targets, actuators"),
         (lambda arm: arm.add_trajectory(), "add_trajectory() missing 1 required positional"),
+        (lambda arm: arm.move_to(0, 1.0), "tolerance"),
         (lambda arm: arm.resume(1, 2.0), "give the rest by name"),
     ],
 )

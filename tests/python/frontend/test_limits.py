@@ -72,3 +72,37 @@ def test_bounds_of_an_integral_reach_the_frontend(segment: str) -> None:
     with ManualBackend(segment, ["joint"], JOINT, limits=limits, rests_at=rests) as robot:
         position, found = robot.frontend.actuators[0].numbers
     assert (position.rest, found.rest, found.limits) == (None, 0.0, velocity)
+
+
+@pytest.mark.parametrize(
+    ("velocity", "said"),
+    [
+        ({"integral": o80.IntegralBounds("place")}, "position"),
+        ({"integral": o80.IntegralBounds("velocity")}, "another field"),
+        ({"integral": o80.IntegralBounds("position", 1.0, -1.0)}, "must not exceed the maximum"),
+        ({"integral": o80.IntegralBounds("position", reaction=-0.1)}, "reaction"),
+        (
+            {
+                "speed": 1.0,
+                "acceleration": 1.0,
+                "jerk": 1.0,
+                "integral": o80.IntegralBounds("position"),
+            },
+            "no limit of jerk",
+        ),
+        ({"minimum": 0.5, "integral": o80.IntegralBounds("position")}, "rest at 0"),
+    ],
+)
+def test_bounds_of_an_integral_that_cannot_be_are_refused(
+    segment: str, velocity: dict[str, Any], said: str
+) -> None:
+    rests = {} if "minimum" in velocity else {"joint": {"velocity": 0.0}}
+    with pytest.raises(o80.InvalidArgument, match=said):
+        o80.Backend(
+            segment,
+            ["joint"],
+            JOINT,
+            frequency=1000.0,
+            limits={"joint": {"velocity": o80.Limits(**velocity)}},
+            rests_at=rests,
+        )

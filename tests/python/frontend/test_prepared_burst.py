@@ -45,19 +45,6 @@ def test_what_was_not_filled_is_refused(arm: o80.Frontend) -> None:
     assert arm.added == 0
 
 
-def test_it_bursts_a_robot_in_another_process(bursting: o80.robots.Process) -> None:
-    with bursting.frontend() as arm:
-        burst = arm.prepared_burst(5)
-        burst.targets[...] = 0.5
-        assert [burst.run(WAIT) for _ in range(3)] == [5, 10, 15]
-        assert burst.rows["iteration"].tolist() == [11, 12, 13, 14, 15]
-
-
-def test_it_is_not_pickled(arm: o80.Frontend) -> None:
-    with pytest.raises(TypeError, match="cannot be pickled"):
-        pickle.dumps(arm.prepared_burst(1))
-
-
 def test_an_array_that_is_assigned_is_copied_into_its_targets(arm: o80.Frontend) -> None:
     burst = arm.prepared_burst(1, steps=1)
     action = np.array([[0.3, -0.6]])
@@ -80,3 +67,5 @@ def test_targets_of_another_shape_or_type_and_rows_cannot_be_assigned(arm: o80.F
             burst.targets = wrong  # type: ignore[assignment]
     with pytest.raises(AttributeError):
         burst.rows = np.zeros(1)  # type: ignore[misc]
+    with pytest.raises(TypeError, match="cannot be pickled"):
+        pickle.dumps(burst)

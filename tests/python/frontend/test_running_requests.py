@@ -60,6 +60,12 @@ def test_what_is_no_answer_or_no_end_is_refused(robot: ManualBackend) -> None:
     backend.end_request("home", rejected="abandoned")
     robot.run()
     assert batch.handles[0].text == "abandoned"
+    batch = home(robot.frontend)
+    robot.run()
+    backend.end_request("home", o80.StartAfresh([1.0, 2.0]))
+    robot.run()
+    assert batch.statuses == [o80.Status.COMPLETED]
+    assert robot.frontend.wait_for(batch.last_iteration).desired.tolist() == [1.0, 2.0]
 
     backend.on("abandon", lambda _: "soon")  # type: ignore[arg-type, return-value]
     robot.frontend.add_request("abandon")

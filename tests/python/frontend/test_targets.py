@@ -74,12 +74,12 @@ def test_a_first_field_that_is_no_number_takes_what_fits_it(segment: str) -> Non
         *(("valve", on, True) for on in (True, np.True_, 1, 1.0)),
         *(("gear", seven, 7) for seven in (7, 7.0, np.float64(7), np.uint8(7), np.array(7))),
         *(("a", one, {"position": 1.0}) for one in (1, 1.0, np.float32(1), np.int8(1), True)),
-        (["a"], [{"position": 0.8}], {"position": 0.8}),
+        ([np.int64(0), "valve"], [{"position": 0.8}, True], {"position": 0.8}),
         ("a", (0.5, np.array([1, 2]), 3, True, (1.0, 5)), {"position": 0.5, "on": True}),
     ],
 )
 def test_a_value_is_given_in_each_form_that_it_has(
-    robot: ManualBackend, actuator: str | list[str], target: object, desired: Any
+    robot: ManualBackend, actuator: Any, target: object, desired: Any
 ) -> None:
     """Fields that a target does not name keep what was desired."""
     before = {"gains": [3.0, 4.0], "count": 3}
@@ -220,6 +220,12 @@ def test_a_trajectory_is_added_whole_or_not_at_all(
         arm.add_trajectory(targets, **options)  # type: ignore[arg-type]
 
     assert arm.added == 0
+
+
+def test_a_trajectory_of_chosen_actuators(arm: o80.Frontend) -> None:
+    arm.add_trajectory([[1.0, 2.0]], ["elbow", 0])
+
+    assert arm.pulse_and_wait(timeout=WAIT).desired.tolist() == [2.0, 1.0]
 
 
 def test_a_trajectory_of_states_with_fields(robot: ManualBackend) -> None:

@@ -31,13 +31,19 @@ def test_it_gives_the_rows_that_are_there(pair: tuple[o80.Frontend, o80.Frontend
     assert {member: row.iteration for member, row in rows.items()} == {right: 0}
 
 
-@pytest.mark.parametrize("wrong", [[], {}])
-def test_nothing_to_wait_for_is_refused(wrong: object) -> None:
-    with pytest.raises(o80.InvalidArgument, match="needs a row"):
-        o80.wait_for_first(wrong)  # type: ignore[arg-type]
+def test_it_says_what_was_missed(segment: str) -> None:
+    with o80.robots.load("two_joints").inline(segment, history=4) as frontend:
+        with pytest.raises(o80.TimeoutError):
+            o80.wait_for_first([frontend], timeout=0.0)
+        frontend.burst(20)
+        row = o80.wait_for_first([frontend])[frontend]
+        assert (row.iteration, row.missed) == (frontend.oldest, frontend.oldest - 1)
 
 
 def test_members_are_frontends(arm: o80.Frontend) -> None:
+    nothing: list[o80.Frontend] = []
+    with pytest.raises(o80.InvalidArgument, match="needs a row"):
+        o80.wait_for_first(nothing)
     with pytest.raises(o80.InvalidArgument, match="frontends of o80, got 'arm'"):
         o80.wait_for_first([arm, "arm"])  # type: ignore[list-item]
     with pytest.raises(o80.InvalidArgument, match="must be a whole number, got 'soon'"):

@@ -67,6 +67,18 @@ def engage(robots: o80.Teleoperation) -> None:
     raise AssertionError(robots.why)
 
 
+def play(
+    robots: o80.Teleoperation, hand: o80.Frontend, arm: o80.Frontend, *, steps: int, iterations: int
+) -> list[bool]:
+    """Runs both robots beside the steps; returns whether the follower followed in each."""
+    followed = []
+    for _ in range(steps):
+        hand.burst(iterations)
+        followed.append(robots.step())
+        arm.burst(iterations)
+    return followed
+
+
 @pytest.mark.parametrize(
     ("text", "joint"),
     [
@@ -99,10 +111,7 @@ def test_it_follows_a_hand_within_its_limits(hand: o80.Frontend, arm: o80.Fronte
         hand.burst(5)
         assert robots.step()
         arm.burst(5)
-    for _ in range(600):  # the hand rests
-        hand.burst(5)
-        robots.step()
-        arm.burst(5)
+    play(robots, hand, arm, steps=600, iterations=5)  # the hand rests
     wrist, elbow, _ = hand.latest().observed
     assert arm.latest().observed.tolist() == [np.clip(elbow, -1, 1), 0, np.clip(wrist, -1, 1)]
     rows = arm.history()
@@ -115,10 +124,7 @@ def test_it_follows_a_hand_within_its_limits(hand: o80.Frontend, arm: o80.Fronte
 def test_scale_and_offset_and_near(segment: str, hand: o80.Frontend, arm: o80.Frontend) -> None:
     joints = [o80.Joint("gripper", "lamp", -2.0, 0.6)]
     robots = o80.Teleoperation(hand, arm, joints=joints, near=0.1)
-    for _ in range(100):
-        hand.burst(10)
-        assert not robots.step()
-        arm.burst(10)
+    assert not any(play(robots, hand, arm, steps=100, iterations=10))
     assert robots.far == {"gripper": (0.6, 0.0)}
     assert robots.why == "move the leader to where the follower is"
     assert arm.latest().desired.tolist() == [0, 0, 0], "nothing moves before"
@@ -127,10 +133,7 @@ def test_scale_and_offset_and_near(segment: str, hand: o80.Frontend, arm: o80.Fr
     engage(robots)
     assert robots.far == {}
     hand.add_command("lamp", 0.1, iterations=200)
-    for _ in range(200):
-        hand.burst(5)
-        robots.step()
-        arm.burst(5)
+    play(robots, hand, arm, steps=200, iterations=5)
     assert arm.latest().observed[1] == pytest.approx(0.4)
     # a halt ends it; after the resume both have to be near again
     number = arm.halt("enough")
@@ -141,10 +144,7 @@ def test_scale_and_offset_and_near(segment: str, hand: o80.Frontend, arm: o80.Fr
     assert robots.why == f"'{arm.segment}' is halted: enough"
     arm.resume(number)
     arm.burst(1)
-    for _ in range(100):
-        hand.burst(10)
-        assert not robots.step()
-        arm.burst(10)
+    assert not any(play(robots, hand, arm, steps=100, iterations=10))
     assert list(robots.far) == ["gripper"]
     assert arm.latest().observed[1] == pytest.approx(0.4)
 
@@ -198,10 +198,7 @@ def test_a_leader_that_jumps_is_not_followed(hand: o80.Frontend, arm: o80.Fronte
     robots = o80.Teleoperation(hand, arm)
     engage(robots)
     hand.add_command("elbow", 0.8)  # an encoder that lost a turn, a reset
-    for _ in range(200):
-        hand.burst(5)
-        assert not robots.step()
-        arm.burst(5)
+    assert not any(play(robots, hand, arm, steps=200, iterations=5))
     assert robots.far == {"elbow": (0.8, 0.0)}
     assert arm.latest().desired.tolist() == [0, 0, 0]
 
@@ -227,10 +224,7 @@ def test_a_follower_that_another_controls_does_not_follow(
 ) -> None:
     with o80.Frontend(arm.segment) as other:
         robots = o80.Teleoperation(hand, other)
-        for _ in range(100):
-            hand.burst(10)
-            robots.step()
-            arm.burst(10)
+        play(robots, hand, arm, steps=100, iterations=10)
         assert robots.engaged
         with arm.control():
             hand.burst(1)
@@ -311,10 +305,7 @@ def test_a_follower_that_ends_ends_it(segment: str, how: str) -> None:
         arm = o80.robots.load(Follower).inline(f"{segment}-2")
         with arm, o80.Frontend(f"{segment}-2") as other:
             robots = o80.Teleoperation(seen, other)
-            for _ in range(100):
-                hand.burst(10)
-                robots.step()
-                arm.burst(10)
+            play(robots, hand, arm, steps=100, iterations=10)
             if how == "far":
                 hand.add_command("elbow", 0.8)
                 hand.burst(1)
@@ -370,10 +361,7 @@ def test_demonstrations_are_of_a_robot_that_follows(
         session = _Session(robots, "episode: wave")
         arm.burst(1)
         session.press(" ")  # nothing follows yet
-        for _ in range(100):
-            hand.burst(10)
-            arm.burst(10)
-            robots.step()
+        play(robots, hand, arm, steps=100, iterations=10)
         assert robots.engaged
         for how in ("kept", "halted", "thrown away", "open at the end"):
             session.press(" ")

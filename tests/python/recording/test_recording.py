@@ -134,14 +134,14 @@ def test_marks_of_frontends_are_recorded_at_their_rows(arm: o80.Frontend, tmp_pa
         arm.mark("first")
         arm.burst(20)
         with o80.Frontend(arm.segment) as other:
-            other.mark("second")
+            other.mark("second: \u00bd l")
         arm.burst(5)
     file = o80.open(path)
     epoch = file[arm.segment].epochs[0]
     assert [(mark.name, mark.rows) for mark in file.marks] == [
         ("before", {arm.segment: 1}),
         ("first", {arm.segment: 31}),
-        ("second", {arm.segment: 51}),
+        ("second: \u00bd l", {arm.segment: 51}),
     ]
     times = epoch.history().time
     with path.open("rb") as content:
@@ -192,31 +192,6 @@ def test_a_chunk_is_due_when_the_journal_fills(segment: str, tmp_path: Path) -> 
         journal = recorder.sources[segment]._journal
         assert journal is not None
         assert journal.missed == 0
-
-
-def test_a_recording_says_how_each_run_ended(segment: str, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    recorder = Recorder(path, [segment])
-
-    def look() -> None:
-        recorder.sources[segment]._attempt_at = 0.0  # now
-        recorder.catch_up()
-
-    for reason in ("", "the sensor is off"):
-        with contextlib.suppress(ArithmeticError), o80.Backend(segment, 2) as backend:
-            backend.publish([0.0, 0.0])
-            look()
-            if reason:
-                raise ArithmeticError(reason)
-        look()
-    with o80.Backend(segment, 2) as backend:
-        backend.publish([0.0, 0.0])
-        look()
-        recorder.finish()
-    ends = [epoch.end for epoch in o80.open(path)[segment].epochs]
-    assert ends[0] == "stopped"
-    assert "the sensor is off" in ends[1]
-    assert ends[2] == "", "recorded no further"
 
 
 def test_a_closed_recording_says_so(arm: o80.Frontend, tmp_path: Path) -> None:

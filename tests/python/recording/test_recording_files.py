@@ -167,12 +167,6 @@ def test_what_a_copy_lacks_is_named(segment: str, tmp_path: Path) -> None:
         o80.Recording(copy, segment, proceed=True)
 
 
-def test_an_unknown_compression_is_refused(arm: o80.Frontend, tmp_path: Path) -> None:
-    with pytest.raises(o80.InvalidArgument, match="zstd, lz4, none, got 'gzip'"):
-        o80.Recording(tmp_path / "run.mcap", arm, compression="gzip")
-    assert not list(tmp_path.iterdir())
-
-
 FORMS = [("zstd", None), ("lz4", "10k"), ("none", "20k")]
 
 
@@ -444,15 +438,6 @@ def test_a_long_scan_is_told(
     assert len(figures) > 2
     assert 0 < figures[0] < figures[-1] <= 100
     assert figures == sorted(figures)
-
-
-def test_a_file_that_exists_is_not_overwritten(arm: o80.Frontend, tmp_path: Path) -> None:
-    path = tmp_path / "run.mcap"
-    path.write_bytes(b"precious")
-
-    with pytest.raises(o80.RecordingError, match="exists"):
-        Recorder(path, [arm.segment])
-    assert path.read_bytes() == b"precious"
 
 
 def test_a_disk_without_room_for_the_beginning_of_a_file_is_left_without_it(tmp_path: Path) -> None:

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,30 +29,58 @@ def refused(*words: str | Path, code: int = 1) -> str:
 # ---------------------------------------------------------------------- names
 
 
-@pytest.mark.parametrize("name", ["run", "run.npz", "", "run.mcap.gz"])
-def test_a_file_that_the_commands_would_take_for_a_segment_is_refused(
-    name: str, arm: o80.Frontend, tmp_path: Path
+@pytest.mark.parametrize(
+    ("name", "options", "said"),
+    [
+        *((name, {}, r"must end in \.mcap") for name in ("run", "run.npz", "", "run.mcap.gz")),
+        ("folder/run.mcap", {}, "there is no folder .*folder"),
+        ("run.mcap", {"compression": "gzip"}, "zstd, lz4, none, got 'gzip'"),
+        *(
+            ("run.mcap", {"split": text}, "split must be a size such as 500M")
+            for text in ("", "1", "M", "-1M", "0s", "nans", "10 parsec", "1e400G")
+        ),
+        ("run.mcap", {"keep": "1G"}, "keep needs split"),
+        ("run.mcap", {"split": "1M", "keep": "10min"}, "a size such as 50G"),
+        ("run.mcap", {"split": "1M", "keep": "1M"}, "at least two files"),
+    ],
+)
+def test_what_cannot_be_recorded_is_refused_and_leaves_no_file(
+    name: str, options: dict[str, Any], said: str, arm: o80.Frontend, tmp_path: Path
 ) -> None:
-    with pytest.raises(o80.RecordingError, match=r"must end in \.mcap"):
-        o80.Recording(tmp_path / name, arm)
+    with pytest.raises(o80.Error, match=said):
+        o80.Recording(tmp_path / name, arm, **options)
     assert not list(tmp_path.iterdir())
 
 
-def test_a_folder_as_file_and_a_missing_folder_are_named(tmp_path: Path) -> None:
-    (tmp_path / "run.mcap").mkdir()
-
-    for proceed in (False, True):
-        with pytest.raises(o80.RecordingError, match="is a folder"):
-            Recorder(tmp_path / "run.mcap", ["arm"], proceed=proceed)
-    with pytest.raises(o80.RecordingError, match=r"there is no folder .*results"):
-        Recorder(tmp_path / "results" / "run.mcap", ["arm"])
-    with pytest.raises(o80.InvalidArgument, match="at least one segment"):
-        o80.Recording(tmp_path / "other.mcap", [])
+@pytest.mark.parametrize(
+    ("content", "options", "said"),
+    [
+        (b"precious", {}, "exists"),
+        (b"", {"split": "1M", "proceed": True}, "is a file"),
+        (None, {}, "is a folder"),
+        (None, {"proceed": True}, "is a folder"),
+        (None, {"split": "1M"}, "exists"),
+    ],
+)
+def test_what_is_there_is_not_written_to(
+    content: bytes | None, options: dict[str, Any], said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "run.mcap"
+    path.mkdir() if content is None else path.write_bytes(content)
+    with pytest.raises(o80.RecordingError, match=said):
+        Recorder(path, ["arm"], **options)
+    assert content is None or path.read_bytes() == content
+    if content is None:
+        with pytest.raises(o80.RecordingError, match="holds no recording"):
+            o80.open(path)
 
 
 def test_a_wrong_name_of_a_segment_leaves_no_file(tmp_path: Path) -> None:
-    with pytest.raises(o80.Error, match="'two/joints' cannot name a segment"):
-        o80.Recording(tmp_path / "run.mcap", ["two/joints"])
+    for split in (None, "1M"):
+        with pytest.raises(o80.Error, match="'two/joints' cannot name a segment"):
+            o80.Recording(tmp_path / "run.mcap", ["two/joints"], split=split)
+    with pytest.raises(o80.InvalidArgument, match="at least one segment"):
+        o80.Recording(tmp_path / "run.mcap", [])
     assert "no segment matches 'nobody-*'" in refused(
         "save", "nobody-*", "-o", tmp_path / "run.mcap"
     )

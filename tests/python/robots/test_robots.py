@@ -3,7 +3,6 @@
 import gc
 import importlib
 import os
-import shutil
 import tomllib
 from pathlib import Path
 
@@ -34,49 +33,6 @@ def test_robots_that_are_shipped_say_that_they_are_simulated_or_are_hardware() -
         if "def read(self, reading" in text and "simulated = True" not in text:
             silent.add(str(file.relative_to(devices).with_suffix("")))
     assert silent == hardware
-
-
-def test_a_robot_is_loaded_by_path() -> None:
-    path = o80.robots.load("two_joints").path
-
-    assert o80.robots.load(path).name == "two_joints"
-    assert o80.robots.load(str(path)).path == path
-
-
-@pytest.mark.parametrize(
-    ("name", "text"),
-    [
-        ("three_joints", "two_joints"),
-        ("mujco", "Did you mean 'mujoco'"),
-        ("/nowhere/robot.so", "no robot library"),
-    ],
-)
-def test_an_unknown_robot_is_refused_with_what_there_is(name: str, text: str) -> None:
-    with pytest.raises(o80.DriverError, match=text):
-        o80.robots.load(name)
-
-
-def test_robots_of_further_folders_are_found(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    shutil.copy(o80.robots.load("two_joints").path, tmp_path / "other_joints.so")
-    monkeypatch.setenv("O80_ROBOT_PATH", str(tmp_path))
-
-    assert "other_joints" in [robot.name for robot in o80.robots.list()]
-    assert o80.robots.load("other_joints").path.parent == tmp_path
-
-
-@pytest.mark.parametrize(
-    ("name", "package"),
-    [("mujoco", "o80-mujoco"), ("pam", "o80-pam"), ("so101", "o80-arms"), ("koch", "o80-arms")],
-)
-def test_a_robot_whose_package_is_missing_names_it(
-    name: str, package: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("o80.robots.robot.announced", lambda group: {})
-
-    with pytest.raises(o80.DriverError, match=f"`pip install {package}`.*O80_ROBOT_PATH"):
-        o80.robots.load(name)
 
 
 def test_a_package_that_fails_does_not_hide_other_robots(tmp_path: Path) -> None:
@@ -134,20 +90,6 @@ def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str
 
 
 # ---------------------------------------------------------------------------- processes
-
-
-def test_a_process_runs_until_its_block_ends(segment: str) -> None:
-    with o80.robots.load("two_joints").start(segment, frequency=500.0) as process:
-        assert process.alive
-        with process.frontend() as arm:
-            assert arm.frequency == 500.0
-            arm.add_command("elbow", 0.5, duration=0.01)
-            assert arm.pulse_and_wait(timeout=WAIT).desired[1] == 0.5
-        assert str(process.pid) in repr(process)
-
-    assert not process.alive
-    assert process.wait() == 0  # type: ignore[unreachable]
-    assert segment not in [entry.name for entry in o80.segments()]
 
 
 def test_the_segment_has_the_name_of_the_robot_unless_another_is_given() -> None:

@@ -4,7 +4,6 @@ import contextlib
 
 import numpy as np
 from manual_backend import ManualBackend
-from processes import WAIT
 
 import o80
 from o80.frontend.reader import Journal
@@ -13,22 +12,6 @@ from o80.rows.journal import JournalEntry
 
 def of_kind(entries: list[JournalEntry], *kinds: str) -> list[JournalEntry]:
     return [entry for entry in entries if entry.kind in kinds]
-
-
-def test_shows_who_sent_what_and_when_it_began_and_ended(arm: o80.Frontend) -> None:
-    arm.add_command(1, 0.5, iterations=3, profile="linear")
-    arm.pulse()
-    arm.burst(5)
-    entries = arm.journal()
-    (taken,) = of_kind(entries, "taken")[:1]
-    (command,) = taken.commands
-    assert taken.sender.startswith("pid ")
-    assert command.actuators == (arm.actuators[1].name,)
-    assert (command.pace, command.amount, command.mode) == ("iterations", 3, "queue")
-    begin, end = [entry for entry in entries if entry.kind == "status" and entry.id == command.id]
-    assert (begin.status, end.status) == ("active", "completed")
-    assert end.iteration == begin.iteration + 2
-    assert begin.iteration == taken.iteration
 
 
 def test_targets_have_the_fields_that_were_given(segment: str) -> None:
@@ -86,17 +69,3 @@ def test_of_a_backend_that_has_failed_the_journal_is_still_there(segment: str) -
 
 def test_there_is_nothing_after_the_newest_entry(arm: o80.Frontend) -> None:
     assert arm.journal(since=2**80) == []
-
-
-def test_a_mark_is_noted_at_the_iteration_in_which_it_is_taken(arm: o80.Frontend) -> None:
-    arm.burst(7)
-    mark = arm.mark("the cup is full: \u00bd l")
-    assert len(mark) == 1
-    assert arm.latest().iteration == 7
-    arm.burst(2)
-    mark.wait(WAIT)
-    (taken,) = [entry for entry in of_kind(arm.journal(), "taken") if entry.commands]
-    (command,) = taken.commands
-    assert (command.kind, command.text) == ("mark", "the cup is full: \u00bd l")
-    assert mark[0].status == "completed"
-    assert taken.iteration == mark[0].iteration == 8

@@ -57,6 +57,7 @@ def test_groups_of_different_types_have_names(mixed: o80.Backend) -> None:
         assert observed["gripper"] == 0.25
         assert observed.mode == Control.POSITION
         assert observed.mode == frontend.enums["mode"].POSITION
+        assert frontend.enums["mode"]("POSITION") is frontend.enums["mode"].POSITION
         assert list(observed) == ["joints", "gripper", "mode"]
         with pytest.raises(AttributeError, match="joints, gripper, mode"):
             _ = observed.wrist

@@ -89,11 +89,8 @@ def test_a_row_of_a_history_is_found_by_its_iteration(old: o80.Frontend) -> None
         history[:0].at_iteration(95)
     with pytest.raises(o80.RowOverwritten, match="which is empty"):
         history[:0].at_time(0)
-
-
-def test_a_history_stays_oldest_first(old: o80.Frontend) -> None:
     with pytest.raises(o80.InvalidArgument, match="step of a slice must be positive, got -1"):
-        old.history()[::-1]
+        history[::-1]
 
 
 @pytest.mark.parametrize(

@@ -92,18 +92,6 @@ def test_a_row_that_was_overwritten_is_replaced_by_the_oldest(segment: str) -> N
         assert answer["iteration"] >= arm.oldest
 
 
-def test_curves_show_every_peak_with_few_points(arm: o80.Frontend) -> None:
-    arm.burst(1500)
-    arm.add_command("elbow", 1.0)
-    arm.add_command("elbow", 0.0)
-    arm.burst(1500)
-    curves = looks_at(arm.segment)(curves=True, panels=["elbow"], window=10.0)["curves"]
-    seconds, values = (numbers(text) for text in curves["panels"]["elbow"]["desired"])
-    assert len(seconds) == len(values) <= 1600
-    assert values.max() == 1.0, "one row of 3000"
-    assert (np.diff(seconds) > 0).all()
-
-
 @pytest.mark.parametrize("seed", range(8))
 def test_a_curve_is_that_of_all_rows_within_one_pixel(seed: int) -> None:
     random = np.random.default_rng(seed)
