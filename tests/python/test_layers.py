@@ -209,21 +209,21 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 CEILINGS = {
     "include, src": (34_178, 0),
     "python/bindings": (5_721, 0),
-    "python/o80": (29_748, 0),
+    "python/o80": (29_771, 0),
     "python/o80/hybrid": (2_403, 0),
-    "python/o80/learning/training, python/o80/learning/__main__.py": (1_478, 0),
+    "python/o80/learning/training, python/o80/learning/__main__.py": (1_479, 0),
     "python/o80/view/page": (1_225, 0),
-    "docs": (570, 0),
+    "docs": (571, 0),
     "devices": (8_852, 4_500),
     "gateways/lerobot": (530, 690),
     "gateways/ros2": (904, 955),
     "robots/arms": (4_420, 3_142),
     "robots/pam, robots/two_joints": (2_108, 1_184),
     "simulators/mujoco": (5_372, 4_686),
-    "apps/table_tennis": (8_400, 4_409),
+    "apps/table_tennis": (8_392, 4_409),
     "benchmarks, tools": (4_463, 0),
     "examples": (2_082, 0),
-    "tests, conftest.py": (0, 63_548),
+    "tests, conftest.py": (0, 61_583),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
