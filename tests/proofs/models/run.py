@@ -16,7 +16,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from checkout import ROOT
@@ -275,6 +275,7 @@ def main() -> int:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("names", nargs="*", help="models; all by default")
+    parser.add_argument("--no-mutants", action="store_true", help="only the models themselves")
     parser.add_argument("--long", action="store_true", help="many more executions, larger models")
     arguments = parser.parse_args()
     names = set(arguments.names)
@@ -283,6 +284,8 @@ def main() -> int:
     try:
         models = Relacy().models(names, 10_000_000 if arguments.long else 20_000)
         models += Spin().models(names, long=arguments.long)
+        if arguments.no_mutants:
+            models = [replace(model, mutants={}) for model in models]
         with ThreadPoolExecutor(JOBS) as pool:
             trials = [Trial(model, pool) for model in models]
             wrong = [line for trial in trials for line in judge(trial)]
