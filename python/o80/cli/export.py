@@ -2,9 +2,8 @@
 
 import sys
 from collections.abc import Mapping
-from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import typer
 
@@ -13,12 +12,7 @@ from o80.base.screen import complain
 from o80.base.unwritable import writing
 from o80.cli.histories import histories
 
-
-class Format(StrEnum):
-    """Formats of data sets for learning."""
-
-    LEROBOT = "lerobot"
-    MINARI = "minari"
+Format = Literal["lerobot", "minari"]
 
 
 def export(
@@ -78,7 +72,7 @@ def export(
         "action_is": action_is,
     }
     of_lerobot = {name: given for name, given in of_lerobot.items() if given}
-    if of_lerobot and form is not Format.LEROBOT:
+    if of_lerobot and form != "lerobot":
         name = next(iter(of_lerobot)).replace("_", "-")
         raise InvalidArgument(f"--{name} is for data sets of LeRobot: give --format lerobot too")
     if form is not None:
@@ -132,7 +126,7 @@ def _export_episodes(
     from o80.datasets.episodes import episodes_of
     from o80.recording.reader import open as open_recording
 
-    is_lerobot = form is Format.LEROBOT
+    is_lerobot = form == "lerobot"
     fields = [] if is_lerobot else sensors
     episodes = episodes_of(open_recording(source), segment, every=every, fields=fields)
     with writing(output):
@@ -147,5 +141,5 @@ def _export_episodes(
         f"{episodes.segment}: {len(episodes.all)} episodes, {steps} steps at "
         f"{episodes.frequency:g} a second in {output}"
     )
-    if form is Format.MINARI:
+    if not is_lerobot:
         print(f"read it with minari.MinariDataset('{output}/data')", file=sys.stderr)
