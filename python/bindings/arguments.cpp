@@ -15,26 +15,23 @@
 namespace nb = nanobind;
 using o80::InvalidArgument;
 
+std::string repr_of(nb::handle value) { return nb::cast<std::string>(nb::repr(value)); }
+
+void refuse(const std::string& what, const std::string& needed, nb::handle value) {
+  PyErr_Clear();
+  throw InvalidArgument(what + " must be " + needed + ", got " + repr_of(value));
+}
+
 bool truth_of(nb::handle value, const char* name) {
-  if (!PyBool_Check(value.ptr())) {
-    throw InvalidArgument(std::string(name) + " must be True or False, got " +
-                          nb::cast<std::string>(nb::repr(value)));
-  }
+  if (!PyBool_Check(value.ptr())) refuse(name, "True or False", value);
   return value.ptr() == Py_True;
 }
 
 std::string string_of(nb::handle value, const char* name) {
-  if (!PyUnicode_Check(value.ptr())) {
-    throw InvalidArgument(std::string(name) + " must be a string, got " +
-                          nb::cast<std::string>(nb::repr(value)));
-  }
+  if (!PyUnicode_Check(value.ptr())) refuse(name, "a string", value);
   Py_ssize_t size = 0;
   const char* text = PyUnicode_AsUTF8AndSize(value.ptr(), &size);
-  if (text == nullptr) {  // a lone surrogate
-    PyErr_Clear();
-    throw InvalidArgument(std::string(name) + " must be valid Unicode, got " +
-                          nb::cast<std::string>(nb::repr(value)));
-  }
+  if (text == nullptr) refuse(name, "valid Unicode", value);  // a lone surrogate
   return {text, static_cast<std::size_t>(size)};
 }
 
@@ -56,9 +53,7 @@ std::string shown_text(nb::handle value, const char* otherwise) noexcept {
 double number_of(nb::handle value, const char* name) {
   const double number = PyFloat_AsDouble(value.ptr());
   if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
-    PyErr_Clear();
-    throw InvalidArgument(std::string(name) + " must be a number, got " +
-                          nb::cast<std::string>(nb::repr(value)));
+    refuse(name, "a number", value);
   }
   return number;
 }
@@ -68,8 +63,7 @@ std::int64_t count_of(nb::handle value, const char* name) {
   std::int64_t number = 0;
   if (!index.is_valid() || !nb::try_cast<std::int64_t>(index, number)) {
     PyErr_Clear();
-    throw InvalidArgument(std::string(name) + " must be a whole number, got " +
-                          nb::cast<std::string>(nb::repr(value)) +
+    throw InvalidArgument(std::string(name) + " must be a whole number, got " + repr_of(value) +
                           (PyFloat_Check(value.ptr()) != 0
                                ? ": it counts iterations, which are seconds x frequency"
                                : ""));
@@ -92,9 +86,7 @@ o80::Timeout timeout_of(nb::handle seconds) {
   if (seconds.is_none()) return {};
   const double number = PyFloat_AsDouble(seconds.ptr());
   if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
-    PyErr_Clear();
-    throw InvalidArgument("timeout must be a number of seconds, or None for ever; got " +
-                          nb::cast<std::string>(nb::repr(seconds)));
+    refuse("timeout", "a number of seconds, or None for ever", seconds);
   }
   if (number > kLongest) return {};
   return std::chrono::nanoseconds(std::llround(std::fmax(number, 0.0) * 1e9));
@@ -131,16 +123,12 @@ void set_every(o80::PaceSpec& pace, nb::handle every, std::int64_t period) {
   }
   const bool counts = PyIndex_Check(every.ptr()) != 0;
   if (PyBool_Check(every.ptr()) != 0 || (counts && count_of(every, "every") > INT64_MAX / period)) {
-    throw o80::InvalidArgument("every must be seconds or a number of iterations, got " +
-                               nb::cast<std::string>(nb::repr(every)));
+    refuse("every", "seconds or a number of iterations", every);
   }
   const std::chrono::nanoseconds time =
       counts ? std::chrono::nanoseconds(count_of(every, "every") * period)
              : nanoseconds_of(every, "every");
-  if (time.count() <= 0) {
-    throw o80::InvalidArgument("every must be positive, got " +
-                               nb::cast<std::string>(nb::repr(every)));
-  }
+  if (time.count() <= 0) refuse("every", "positive", every);
   pace = o80::direct(time);
 }
 
@@ -187,10 +175,10 @@ std::optional<o80::Seen> seen_of(nb::handle seen) {
   } else if (nb::isinstance<o80::Seen>(seen)) {
     found = *nb::inst_ptr<o80::Seen>(seen);
   } else {
-    throw InvalidArgument(
-        "seen must be the observation by which you decided, as latest(), wait_for_next() or "
-        "history()[i] returns it, got " +
-        nb::cast<std::string>(nb::repr(seen.type())));
+    refuse("seen",
+           "the observation by which you decided, as latest(), wait_for_next() or history()[i] "
+           "returns it",
+           seen.type());
   }
   return found;
 }

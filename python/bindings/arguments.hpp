@@ -11,6 +11,11 @@
 
 // Conversions of Python arguments to C++. Each throws InvalidArgument with the argument's name.
 
+std::string repr_of(nanobind::handle value);  // repr()
+/// Throws InvalidArgument: `what` must be `needed`, got `value`. Clears an error of Python.
+[[noreturn]] void refuse(const std::string& what, const std::string& needed,
+                         nanobind::handle value);
+
 bool truth_of(nanobind::handle value, const char* name);
 std::string string_of(nanobind::handle value, const char* name);
 /// str() of any object, made printable, or `otherwise`; for texts that are only shown. Bytes that

@@ -288,10 +288,9 @@ void bind_backend(nb::module_& m) {
       .def_rw("serve_with", &Backend::serve_with, nb::arg().none())
       .def_prop_ro("description",
                    [](const Backend& self) {
-                     auto description = std::make_shared<o80::Description>();
-                     description->schema = self.checked().schema();
-                     description->layout = self.checked().layout();
-                     return description;
+                     const o80::UntypedBackend& backend = self.checked();
+                     return std::make_shared<o80::Description>(
+                         o80::Description{backend.schema(), backend.layout()});
                    })
       .def_prop_ro("observed", &Backend::observed)
       .def_prop_ro("extended", &Backend::extended)
@@ -324,8 +323,7 @@ void bind_backend(nb::module_& m) {
           [](const Backend& self, std::uint32_t request, nb::handle text) {
             self.in_its_thread().show_progress(request, shown_text(text));
           },
-          "request"_a, "text"_a,
-          nb::sig("def show_progress(self, request: int, text: str) -> None"))
+          "request"_a, "text"_a)
       .def(
           "end_request",
           [](const Backend& self, std::uint32_t request, bool afresh, nb::handle rejected) {
@@ -334,20 +332,18 @@ void bind_backend(nb::module_& m) {
                          : afresh            ? o80::Served::start_afresh()
                                              : o80::Served::done());
           },
-          "request"_a, "afresh"_a, "rejected"_a.none(),
-          nb::sig(
-              "def end_request(self, request: int, afresh: bool, rejected: str | None) -> None"))
+          "request"_a, "afresh"_a, "rejected"_a.none())
       .def(
           "halt",
           [](const Backend& self, nb::handle text) {
             self.checked().halt(o80::HaltCause::driver, shown_text(text, ""));
           },
-          "text"_a, nb::sig("def halt(self, text: object) -> None"))
+          "text"_a)
       .def("ask_to_stop", [](const Backend& self) { self.checked().ask_to_stop(); })
       .def(
           "end",
           [](Backend& self, bool failed, nb::handle text) { self.end(failed, shown_text(text)); },
-          "failed"_a, "text"_a, nb::sig("def end(self, failed: bool, text: str) -> None"))
+          "failed"_a, "text"_a)
       .def_prop_ro("failure", &Backend::failure)
       .def_prop_ro("iteration", [](const Backend& self) { return self.checked().iteration(); })
       .def_prop_ro("time", [](const Backend& self) { return self.checked().time(); });

@@ -5,6 +5,7 @@
 
 #include <string>
 
+#include "arguments.hpp"
 #include "o80/base/error.hpp"
 
 namespace nb = nanobind;
@@ -25,9 +26,7 @@ Value parse(nb::handle word, const std::array<Value, N>& values, const char* nam
     }
     there += (there.empty() ? "'" : ", '") + std::string(known) + "'";
   }
-  PyErr_Clear();
-  throw o80::InvalidArgument(std::string(name) + " must be one of " + there + ", got " +
-                             nb::cast<std::string>(nb::repr(word)));
+  refuse(name, "one of " + there, word);
 }
 
 /// The member of a Python enumeration, looked up once and kept until the process ends.

@@ -68,9 +68,7 @@ std::uint32_t Frontend::actuator(nb::handle named) const {
   std::int64_t number = 0;
   if (PyBool_Check(named.ptr()) || !index.is_valid() ||
       !nb::try_cast<std::int64_t>(index, number)) {
-    PyErr_Clear();
-    throw InvalidArgument("an actuator must be given by its index or its name, got " +
-                          nb::cast<std::string>(nb::repr(named)));
+    refuse("an actuator", "given by its index or its name", named);
   }
   return frontend->command_check().actuator(number);
 }
@@ -152,7 +150,7 @@ Targets Frontend::of_each(nb::handle named, nb::handle targets) const {
   if (length_of(targets) != static_cast<Py_ssize_t>(chosen.size())) {
     throw InvalidArgument("a command for " + std::to_string(chosen.size()) +
                           " actuators needs a target for each, in their order, got " +
-                          nb::cast<std::string>(nb::repr(targets)));
+                          repr_of(targets));
   }
   std::vector<std::byte> states;
   std::vector<std::uint64_t> masks;

@@ -59,10 +59,8 @@ void set_tolerances(const o80::Schema& schema, nb::handle given, const Targets& 
   const bool is_one = is_mapping(given);
   if (!is_one && (PySequence_Check(given.ptr()) == 0 || PyUnicode_Check(given.ptr()) != 0 ||
                   nb::len(given) != targets.actuators.size())) {
-    throw o80::InvalidArgument(
-        "tolerance must be a number, a mapping from fields to numbers, or one of these for each "
-        "actuator, got " +
-        nb::cast<std::string>(nb::repr(given)));
+    refuse("tolerance",
+           "a number, a mapping from fields to numbers, or one of these for each actuator", given);
   }
   const std::uint64_t* mask = targets.masks.empty() ? nullptr : targets.masks.data();
   for (std::size_t i = 0; i < targets.actuators.size(); ++i) {
@@ -103,6 +101,5 @@ void bind_moving(nb::module_& m, nb::class_<Frontend>& frontend) {
   frontend
       .def("_start_move", &start_move, "actuators"_a.none(), "targets"_a.none(),
            "tolerance"_a.none(), "timeout"_a.none(), "options"_a)
-      .def("_wait_for_move", &wait_for_move, "move"_a, "timeout"_a.none(),
-           nb::sig("def _wait_for_move(self, move: Move, timeout: float | None) -> Observation"));
+      .def("_wait_for_move", &wait_for_move, "move"_a, "timeout"_a.none());
 }

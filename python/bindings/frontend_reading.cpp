@@ -122,16 +122,6 @@ Stream open_stream(const Frontend& self, nb::handle since, nb::handle timeout) {
   return {self.shared(), self.decoder(), std::max<Iteration>(first, 0), timeout_of(timeout)};
 }
 
-Observation at_time(const Frontend& self, std::int64_t time) {
-  const auto frontend = self.shared();
-  const auto decoder = self.decoder();
-  return Observation(decoder, frontend->at_time(time));
-}
-
-Iteration iteration_at(const Frontend& self, std::int64_t time) {
-  return self.untyped().iteration_at(time);
-}
-
 /// Fills an array of rows; returns the first iteration and the number of rows.
 std::pair<Iteration, std::size_t> read_rows(const Frontend& self, Iteration first,
                                             nb::handle array) {
@@ -186,9 +176,7 @@ void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend) {
            [](const Frontend& self) { return self.untyped().published(); });
   def_noun(frontend, "oldest", verbs::oldest,
            [](const Frontend& self) { return self.untyped().oldest(); });
-  m.def("wait_for_first", &wait_for_first, "wanted"_a, "timeout"_a.none(),
-        nb::sig("def wait_for_first(wanted: collections.abc.Sequence[tuple[Frontend, int | None]], "
-                "timeout: float | None) -> list[tuple[Frontend, Observation]]"));
+  m.def("wait_for_first", &wait_for_first, "wanted"_a, "timeout"_a.none());
   frontend.def_prop_ro("_next", &next_of)
       .def(
           "_await_row",
@@ -196,9 +184,16 @@ void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend) {
             const std::shared_ptr<UntypedFrontend> alive = self.shared();
             await_row(*alive, k, timeout_of(timeout));
           },
-          "iteration"_a, "timeout"_a.none(),
-          nb::sig("def _await_row(self, iteration: int, timeout: float | None) -> None"))
-      .def("_iteration_at", &iteration_at, "time"_a)
-      .def("_at_time", &at_time, "time"_a)
+          "iteration"_a, "timeout"_a.none())
+      .def(
+          "_iteration_at",
+          [](const Frontend& self, std::int64_t time) { return self.untyped().iteration_at(time); },
+          "time"_a)
+      .def(
+          "_at_time",
+          [](const Frontend& self, std::int64_t time) {
+            return Observation(self.decoder(), self.shared()->at_time(time));
+          },
+          "time"_a)
       .def("_read_rows", &read_rows, "first"_a, "array"_a);
 }

@@ -5,6 +5,7 @@
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/string_view.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <algorithm>
@@ -77,8 +78,9 @@ o80::UntypedObservation row_with(const Frontend& self, nb::handle actuators, nb:
 }
 
 /// How much later, why, and the desired blocks.
-nb::tuple preview(const Frontend& self, nb::handle actuators, nb::handle target, nb::handle initial,
-                  const o80::CommandOptions& options) {
+std::tuple<std::int64_t, std::string, nb::bytes> preview(const Frontend& self, nb::handle actuators,
+                                                         nb::handle target, nb::handle initial,
+                                                         const o80::CommandOptions& options) {
   const auto frontend = self.shared();
   const Targets to = self.targets_of(actuators, target);
   std::optional<o80::UntypedObservation> row;
@@ -87,7 +89,7 @@ nb::tuple preview(const Frontend& self, nb::handle actuators, nb::handle target,
     return row ? frontend->preview_from(*row, to.actuators, to.states, options, to.masks)
                : frontend->preview(to.actuators, to.states, options, to.masks);
   });
-  return nb::make_tuple(preview.late, preview.text, bytes_of(preview.rows.bytes));
+  return {preview.late, preview.text, bytes_of(preview.rows.bytes)};
 }
 
 /// Rows of targets for several actuators: all rows of the first, then all rows of the second, and
@@ -386,8 +388,7 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
       [](const Frontend& self, nb::handle text) {
         const std::string line = string_of(text, "the text of a mark");
         if (o80::printable(line) != line) {
-          throw o80::InvalidArgument("a mark is one line of printable text, got " +
-                                     nb::cast<std::string>(nb::repr(text)));
+          refuse("the text of a mark", "one line of printable text", text);
         }
         return send_alone(self, [&](o80::BatchBuilder& batch) { batch.mark(line); });
       },
@@ -442,31 +443,17 @@ void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend) {
              return send_alone(self, [](o80::BatchBuilder& batch) { batch.release_control(); });
            })
       .def("_preview", &preview, "actuators"_a.none(), "target"_a.none(), "initial"_a.none(),
-           "options"_a,
-           nb::sig("def _preview(self, actuators: typing.Any, target: typing.Any, initial: "
-                   "typing.Any, options: CommandOptions) -> tuple[int, str, bytes]"))
+           "options"_a)
       .def("_index", &Frontend::actuator, "named"_a.none())
       .def("_send_request", &send_request, "name"_a.none(), "fields"_a, "seen"_a.none())
       .def("_wait_until_ended", &wait_until_ended, "batch"_a, "timeout"_a.none())
-      .def("_pulse_to_end", &pulse_to_end, "at"_a.none(), "late"_a.none(), "seen"_a.none(),
-           nb::sig("def _pulse_to_end(self, at: int | None, late: str, "
-                   "seen: Observation | Seen | None) -> Batch"))
-      .def("_wait_for_end", &wait_for_end, "batch"_a, "timeout"_a.none(), "check"_a.none(),
-           nb::sig("def _wait_for_end(self, batch: Batch, timeout: float | None, check: bool) -> "
-                   "Observation"))
+      .def("_pulse_to_end", &pulse_to_end, "at"_a.none(), "late"_a.none(), "seen"_a.none())
+      .def("_wait_for_end", &wait_for_end, "batch"_a, "timeout"_a.none(), "check"_a.none())
       .def("_burst", &burst, "iterations"_a.none(), "timeout"_a.none(), "at"_a.none(),
-           "late"_a.none(), "seen"_a.none(),
-           nb::sig("def _burst(self, iterations: int, timeout: float | None, at: int | None, "
-                   "late: str, seen: Observation | Seen | None) -> Observation"))
+           "late"_a.none(), "seen"_a.none())
       .def("_start_burst", &start_burst, "iterations"_a.none(), "at"_a.none(), "late"_a.none(),
-           "seen"_a.none(),
-           nb::sig("def _start_burst(self, iterations: int, at: int | None, late: str, "
-                   "seen: Observation | Seen | None) -> Burst"));
+           "seen"_a.none());
 
-  m.def("start_bursts", &start_bursts, "members"_a, "seen"_a.none(),
-        nb::sig("def start_bursts(members: collections.abc.Sequence[tuple[Frontend, int]], "
-                "seen: Observation | Seen | None) -> list[Burst]"));
-  m.def("wait_for_bursts", &wait_for_bursts, "bursts"_a, "timeout"_a.none(),
-        nb::sig("def wait_for_bursts(bursts: collections.abc.Sequence[Burst], "
-                "timeout: float | None) -> list[Observation]"));
+  m.def("start_bursts", &start_bursts, "members"_a, "seen"_a.none());
+  m.def("wait_for_bursts", &wait_for_bursts, "bursts"_a, "timeout"_a.none());
 }

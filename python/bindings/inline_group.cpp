@@ -3,12 +3,14 @@
 
 #include "robot/group/inline_group.hpp"
 
+#include <nanobind/stl/map.h>
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 #include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
+#include <map>
 #include <optional>
 #include <tuple>
 #include <utility>
@@ -21,6 +23,7 @@
 #include "loop_options.hpp"
 #include "pickling.hpp"
 #include "robot/driver/library.hpp"
+#include "schema_builder.hpp"
 #include "states.hpp"
 #include "waiting.hpp"
 
@@ -87,20 +90,11 @@ class PreparedBurst {
   o80::InlineGroup::BurstPlan plan_;
 };
 
-/// Offset in the row and type of a number, as NumPy names it.
+/// Offset in the row and kind of a number.
 using NumberPlace = std::tuple<std::uint32_t, std::string>;
 
 o80::RowNumber row_number(const NumberPlace& place) {
-  using o80::Kind;
-  constexpr std::pair<const char*, Kind> kKinds[] = {
-      {"f8", Kind::float64}, {"f4", Kind::float32}, {"i1", Kind::int8},    {"i2", Kind::int16},
-      {"i4", Kind::int32},   {"i8", Kind::int64},   {"u1", Kind::uint8},   {"u2", Kind::uint16},
-      {"u4", Kind::uint32},  {"u8", Kind::uint64},  {"b1", Kind::boolean},
-  };
-  for (const auto& [name, kind] : kKinds) {
-    if (std::get<1>(place) == name) return {std::get<0>(place), kind};
-  }
-  throw o80::InvalidArgument("'" + std::get<1>(place) + "' is not a type of numbers");
+  return {std::get<0>(place), kind_of(std::get<1>(place))};
 }
 
 o80::EventFlag::Compare compare_of(const std::string& word) {
@@ -161,11 +155,9 @@ class Group {
                    filled.writable());
   }
   /// By copy.
-  nb::dict halted() const {
-    nb::dict found;
-    for (const auto& [copy, halt] : group_->halted()) {
-      found[nb::int_(copy)] = nb::cast(*halt_fields(halt));
-    }
+  std::map<std::size_t, HaltFields> halted() const {
+    std::map<std::size_t, HaltFields> found;
+    for (const auto& [copy, halt] : group_->halted()) found.emplace(copy, *halt_fields(halt));
     return found;
   }
   void resume(nb::handle copies, nb::handle timeout) const {
@@ -251,9 +243,7 @@ void bind_inline_group(nb::module_& m) {
            "first"_a, "group"_a, "following"_a, "feeds"_a, nb::keep_alive<1, 2>(),
            nb::keep_alive<1, 3>(), nb::keep_alive<1, 4>())
       .def("run", &PreparedBurst::run, "frontend"_a, "timeout"_a.none(), "at"_a.none(), "late"_a,
-           "seen"_a.none(),
-           nb::sig("def run(self, frontend: Frontend, timeout: float | None, at: int | None, "
-                   "late: str, seen: Observation | Seen | None) -> int"));
+           "seen"_a.none());
 
   nb::class_<Group> group(m, "InlineGroup", "The compiled half of o80.InlineGroup.");
   refuse_to_pickle(group, "an inline group", "its rows");
@@ -273,8 +263,7 @@ void bind_inline_group(nb::module_& m) {
       .def("request_index", &Group::request_index, "name"_a)
       .def("request", &Group::request, "request"_a, "copies"_a, "payloads"_a, "rows"_a,
            "timeout"_a.none())
-      .def("halted", &Group::halted,
-           nb::sig("def halted(self) -> dict[int, tuple[int, str, int, str, str]]"))
+      .def("halted", &Group::halted)
       .def("resume", &Group::resume, "copies"_a, "timeout"_a.none())
       .def("latest", &Group::latest, "copies"_a, "rows"_a)
       .def("gather", &Group::gather, "numbers"_a, "flags"_a, "observations"_a, "raised"_a)

@@ -2,13 +2,15 @@
 
 #include <nanobind/nanobind.h>
 #include <nanobind/stl/optional.h>
+#include <nanobind/stl/pair.h>
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/tuple.h>
 #include <nanobind/stl/vector.h>
 
 #include <memory>
-#include <span>
 #include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -59,30 +61,24 @@ std::vector<o80::JournalEntry> entries_of(o80::Journal& journal, std::size_t mos
 }
 
 /// Actuator, number, and place, slope and curvature of each.
-nb::list starts_of(const o80::JournalEntry& self) {
-  nb::list starts;
+auto starts_of(const o80::JournalEntry& self) {
+  std::vector<std::tuple<std::uint32_t, std::uint32_t, std::tuple<double, double, double>>> starts;
   for (const o80::ChunkStart& each : self.starts) {
-    starts.append(nb::make_tuple(each.actuator, each.number,
-                                 nb::make_tuple(each.place, each.slope, each.curvature)));
+    starts.emplace_back(each.actuator, each.number,
+                        std::tuple{each.place, each.slope, each.curvature});
   }
   return starts;
 }
 
-/// The text of a mark, which may be any bytes.
-nb::str text_of(const std::string& bytes) {
-  const std::string clean = o80::printable(bytes);
-  return nb::str(clean.data(), clean.size());
-}
-
 /// Bytes, number of the first entry, number after the last one, whether there may be more, text and
 /// iteration of the marks in them, whether entries are notable.
-nb::tuple read_raw(o80::RawJournal& journal, std::size_t most) {
+auto read_raw(o80::RawJournal& journal, std::size_t most) {
   const o80::RawJournal::Entries entries = journal.read(most);
-  nb::list marks;
+  std::vector<std::pair<std::string, o80::Iteration>> marks;
   for (const auto& mark : entries.marks)
-    marks.append(nb::make_tuple(text_of(mark.text), mark.iteration));
-  return nb::make_tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more, marks,
-                        entries.notable);
+    marks.emplace_back(o80::printable(mark.text), mark.iteration);
+  return std::tuple(bytes_of(entries.bytes), entries.first, entries.next, entries.more, marks,
+                    entries.notable);
 }
 
 std::vector<o80::JournalEntry> decoded(o80::RecordedJournal& journal, const nb::bytes& bytes,
@@ -103,9 +99,7 @@ void bind_raw(nb::module_& m) {
           "frontend"_a, "first"_a)
       .def_prop_ro("exists", &o80::RawJournal::exists)
       .def_prop_ro("unread", &o80::RawJournal::unread)
-      .def("read", &read_raw, "most"_a,
-           nb::sig("def read(self, most: int) "
-                   "-> tuple[bytes, int, int, bool, list[tuple[str, int]], bool]"));
+      .def("read", &read_raw, "most"_a);
   nb::class_<o80::RecordedJournal>(m, "RecordedJournal")
       .def(nb::init<std::shared_ptr<const o80::Description>, std::uint64_t, bool>(),
            "description"_a, "first"_a, "rests"_a = false)
@@ -143,9 +137,7 @@ void bind_record(nb::module_& m) {
       .def_ro("only_own", &JournalRecord::only_own)
       .def_ro("request", &JournalRecord::request)
       .def_prop_ro("payload", [](const JournalRecord& self) { return bytes_of(self.payload); })
-      .def_prop_ro(
-          "text", [](const JournalRecord& self) { return text_of(self.text); },
-          nb::sig("def text(self) -> str"))
+      .def_prop_ro("text", [](const JournalRecord& self) { return o80::printable(self.text); })
       .def_ro("halt", &JournalRecord::halt)
       .def_ro("unknown", &JournalRecord::unknown);
 }
@@ -163,7 +155,6 @@ void bind_journal(nb::module_& m) {
       .def_ro("missed", &JournalEntry::missed)
       .def_ro("iteration", &JournalEntry::iteration)
       .def_ro("lane", &JournalEntry::lane)
-      .def_ro("owner", &JournalEntry::owner)
       .def_ro("who", &JournalEntry::who)
       .def_ro("id", &JournalEntry::id)
       .def_ro("ticket", &JournalEntry::ticket)
@@ -175,14 +166,12 @@ void bind_journal(nb::module_& m) {
       .def_ro("clipped", &JournalEntry::clipped)
       .def_ro("row", &JournalEntry::row)
       .def_ro("shift", &JournalEntry::shift)
-      .def_prop_ro("starts", &starts_of,
-                   nb::sig("def starts(self) -> list[tuple[int, int, tuple[float, float, float]]]"))
+      .def_prop_ro("starts", &starts_of)
       .def_prop_ro("blocks", [](const JournalEntry& self) { return bytes_of(self.blocks); })
       .def_prop_ro("status", enumeration(&JournalEntry::status),
                    nb::sig("def status(self) -> Status"))
       .def_prop_ro("reason", enumeration(&JournalEntry::reason),
                    nb::sig("def reason(self) -> Reason"))
-      .def_ro("detail", &JournalEntry::detail)
       .def_ro("halt", &JournalEntry::halt)
       .def_prop_ro("cause", word(&JournalEntry::cause))
       .def_ro("cut", &JournalEntry::cut)

@@ -83,8 +83,6 @@ void bind_loop_state(nb::module_& m) {
       .def_ro("skipped", &LoopState::skipped)
       .def_ro("starvations", &LoopState::starvations)
       .def_ro("rate", &LoopState::rate)
-      .def_ro("recent_rows", &LoopState::recent_rows)
-      .def_ro("recent_overruns", &LoopState::recent_overruns)
       .def_prop_ro("row_age", [](const LoopState& self) { return seconds(self.row_age); })
       .def_prop_ro("slow_verb", &slow_verb)
       .def_ro("process_stopped", &LoopState::process_stopped)

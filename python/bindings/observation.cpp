@@ -73,11 +73,9 @@ nb::tuple reduce(nb::handle self) {
 }
 
 std::shared_ptr<o80::Description> description_from(nb::bytes schema, std::uint64_t epoch) {
-  auto description = std::make_shared<o80::Description>();
-  description->schema = o80::schema_from_bytes(span_of(schema));
-  description->layout = o80::row_layout(description->schema);
-  description->epoch = epoch;
-  return description;
+  o80::Schema read = o80::schema_from_bytes(span_of(schema));
+  const o80::RowLayout layout = o80::row_layout(read);
+  return std::make_shared<o80::Description>(o80::Description{std::move(read), layout, epoch});
 }
 
 struct Part {
@@ -114,8 +112,7 @@ void bind_observation(nb::module_& m) {
           "schema", [](const o80::Description& self) { return o80::tables_of(self.schema); },
           nb::sig("def schema(self) -> dict[str, typing.Any]"))
       .def("table", &table_of)
-      .def("model", [](const o80::Description& self) { return self.schema.shown.mjcf; })
-      .def("hash", [](const o80::Description& self) { return o80::hash(self.schema); });
+      .def("model", [](const o80::Description& self) { return self.schema.shown.mjcf; });
 
   nb::class_<Decoder>(m, "Decoder", "Converts rows of one robot to arrays.")
       .def(nb::new_([](std::shared_ptr<o80::Description> description, nb::object layout) {

@@ -89,7 +89,6 @@ void bind_played_segment(nb::module_& m) {
   bound
       .def(nb::new_(&make_played), "segment"_a, "description"_a, "provenance"_a, "bursting"_a,
            "simulated"_a, "history"_a, "journal"_a, "permission"_a)
-      .def_prop_ro("row_bytes", &PlayedSegment::row_bytes)
       .def("publish", &publish, "rows"_a, "due"_a,
            "Rows as bytes, and the due time of each as int64 [ns] (empty: at once). Returns how "
            "many were published before ask_to_stop().")

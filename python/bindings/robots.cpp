@@ -56,11 +56,9 @@ Attachment start_inline(const o80::RobotLibrary& library, const std::string& seg
 /// Description of a robot with these options. The robot is constructed, but not started.
 std::shared_ptr<o80::Description> description_of(const o80::RobotLibrary& library,
                                                  const o80::OptionValues& options) {
-  auto description = std::make_shared<o80::Description>();
-  description->schema = o80::DriverInstance(*library.table, options).describe();
-  o80::check(description->schema);
-  description->layout = o80::row_layout(description->schema);
-  return description;
+  const o80::Schema schema = o80::DriverInstance(*library.table, options).describe();
+  o80::check(schema);
+  return std::make_shared<o80::Description>(o80::Description{schema, o80::row_layout(schema)});
 }
 
 }  // namespace

@@ -24,8 +24,6 @@ namespace nb = nanobind;
 using namespace nb::literals;
 using o80::InvalidArgument;
 
-namespace {
-
 o80::Kind kind_of(const std::string& name) {
   const auto* const last = std::begin(o80::kKindNames) + static_cast<int>(o80::Kind::text);
   const auto* const found = std::find(std::begin(o80::kKindNames), last, name);
@@ -33,6 +31,8 @@ o80::Kind kind_of(const std::string& name) {
   throw InvalidArgument("a field must be a number, a boolean, an enum or a struct, got '" + name +
                         "'");
 }
+
+namespace {
 
 template <class T>
 T value_of(const nb::dict& from, const char* key) {

@@ -32,4 +32,6 @@ struct SchemaBuilder {
   void add_labels(o80::FieldRow& field, const nanobind::dict& labels);
 };
 
+/// From its name in kKindNames. Throws InvalidArgument.
+o80::Kind kind_of(const std::string& name);
 void bind_schema_builder(nanobind::module_& m);

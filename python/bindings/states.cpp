@@ -23,13 +23,6 @@ using o80::Schema;
 
 namespace {
 
-std::string text_of(nb::handle value) { return nb::cast<std::string>(nb::repr(value)); }
-
-[[noreturn]] void refuse(const std::string& what, const std::string& needed, nb::handle value) {
-  PyErr_Clear();
-  throw InvalidArgument(what + " must be " + needed + ", got " + text_of(value));
-}
-
 template <class T>
 void store(std::byte* to, T value) {
   std::memcpy(to, &value, sizeof value);
@@ -57,9 +50,7 @@ void write_integer(nb::handle value, std::byte* to, const std::string& what) {
   constexpr auto kMax = std::numeric_limits<T>::max();
   T number{};
   if (!nb::try_cast<T>(whole, number)) {
-    PyErr_Clear();
-    throw InvalidArgument(what + " must be " + std::to_string(kMin) + " to " +
-                          std::to_string(kMax) + ", got " + text_of(value));
+    refuse(what, std::to_string(kMin) + " to " + std::to_string(kMax), value);
   }
   store(to, number);
 }
@@ -181,7 +172,7 @@ class Writer {
         known = known || name.equal(nb::str(text.data(), text.size()));
       }
       if (!known) {
-        throw InvalidArgument(what + " has no field " + text_of(name) + ": " +
+        throw InvalidArgument(what + " has no field " + repr_of(name) + ": " +
                               fields_of(schema_, row));
       }
     }

@@ -134,4 +134,4 @@ def _value_of(value: Any, column: Column, flag: str) -> float:
 
 
 def _place(column: Column) -> _Place:
-    return column.offset, column.dtype.str[1:]
+    return column.offset, column.dtype.name
