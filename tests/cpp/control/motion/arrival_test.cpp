@@ -1,5 +1,5 @@
-// Every command ends at its target, within the limits (docs/commands/limits.md#limits): the commands that
-// users have sent, and streams of set-points.
+// Every command ends at its target, within the limits (docs/commands/limits.md#limits): the
+// commands that users have sent, and streams of set-points.
 #include <gtest/gtest.h>
 
 #include <algorithm>

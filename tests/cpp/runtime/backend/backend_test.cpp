@@ -7,7 +7,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
 class BackendTest : public ManualBackendTest {};
@@ -91,28 +90,11 @@ TEST_F(BackendTest, WhatEndsInARowThatIsNeverMadeIsNotCompleted) {
 
 // rule B1
 TEST_F(BackendTest, StagesALargeBatchOverSeveralIterationsAndThenTakesItWhole) {
-  StartedBackend manual;
-  UntypedFrontend frontend("pair");
-  UntypedFrontend other("pair");
-  constexpr int kCommands = 3000;  // of a block each: three iterations of 1024
-  for (int i = 0; i < kCommands; ++i) add(frontend, 0, i + 1);
-  add(frontend, 1, -1.0);
-  const Batch large = frontend.pulse();
-  const Batch behind = send(other, 1, -2.0);
-  for (int i = 0; i < 10 && large.first_iteration() < 0; ++i) manual.run(1);
-  manual.run(1);
-  EXPECT_GE(large.first_iteration(), 3) << "1024 blocks an iteration";
-  const Iteration taken = large.first_iteration();
-  for (Iteration i = 1; i < taken; ++i) {
-    EXPECT_THAT(desired(frontend, i, i, 0), ElementsAre(0));
-    EXPECT_THAT(desired(frontend, i, i, 1), ElementsAre(0));
-  }
-  EXPECT_THAT(desired(frontend, taken, taken, 0), ElementsAre(1));
-  EXPECT_THAT(desired(frontend, taken, taken + 1, 1), ElementsAre(-1, -2)) << "in order";
-  manual.run(kCommands);
-  EXPECT_EQ(desired(frontend.latest()), kCommands);
-  EXPECT_EQ(large.last_iteration(), taken + kCommands - 1) << "no idle iteration";
-  EXPECT_TRUE(behind.ended());
+  std::string many;  // of a block each: more than two iterations of 1024
+  for (int i = 1; i <= 3000; ++i) many += "0 to " + std::to_string(i) + ";";
+  play(many + R"(1 to -1; a = pulse; B: b = 1 to -2; run 5; a taken -1; run 3000; a taken 6
+    0 rows 1: 0 0 0 0 0 1; 1 rows 1: 0 0 0 0 0 -1 -2  # in order
+    0 is 3000; a ended 3005; b completed  # no idle iteration)");
 }
 
 // rule C23

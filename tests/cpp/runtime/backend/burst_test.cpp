@@ -6,7 +6,6 @@
 namespace o80::test {
 namespace {
 
-using ::testing::ElementsAre;
 using ::testing::ElementsAreArray;
 using ::testing::HasSubstr;
 
@@ -78,16 +77,9 @@ TEST_F(BurstTest, TwoFrontendsBurstOneAfterTheOther) {
 }
 
 TEST_F(BurstTest, StagesAllThatWasSentBeforeIt) {
-  StartedBackend manual({.segment = "pair", .bursting = true});
-  UntypedFrontend one("pair");
-  UntypedFrontend two("pair");
-  for (int i = 0; i < 5000; ++i) add(one, 0, i + 1);
-  const Batch large = one.pulse();
-  two.start_burst(3);
-  manual.drive();
-  EXPECT_EQ(large.first_iteration(), 1);
-  EXPECT_THAT(desired(one, 1, 3), ElementsAre(1, 2, 3));
-  EXPECT_EQ(one.published(), 3);
+  std::string many;
+  for (int i = 1; i <= 5000; ++i) many += "0 to " + std::to_string(i) + ";";
+  play(many + "a = pulse; B: b = burst 3; drive; a taken 1; 0 rows 1: 1 2 3; last 3");
 }
 
 // rule G4

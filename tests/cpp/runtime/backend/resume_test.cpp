@@ -17,6 +17,10 @@ namespace {
 using ::testing::HasSubstr;
 using ResumeTest = ManualBackendTest;
 
+void limit_shoulder(Schema& schema) {
+  schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});  // 0.1, 0.01 an iteration
+}
+
 // rule H10
 TEST_F(ResumeTest, StartsAfreshFromWhereTheRobotIs) {
   play(R"(a = 0 to 10 over 10; run 3; halt; run 1; read 0 1.5; read 1 -2.5  # somebody moved it
@@ -33,23 +37,10 @@ TEST_F(ResumeTest, OfAHaltThatWasRequestedInTheSameStepClearsIt) {
 // rule H10
 TEST_F(ResumeTest, IsRefusedUntilTheRobotHasBraked) {
   // a backend that stands still latches a halt without an iteration in which it could brake
-  BurstingBackend bursting("pair", {}, [](Schema& schema) {
-    schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});
-  });
-  UntypedFrontend frontend("pair");
-  add(frontend, 0, 10.0, {.pace = fastest()});
-  frontend.burst(5, kPatience);
-  const double speed = desired(frontend.latest()) - desired(frontend.wait_for(4, kAtOnce));
-  ASSERT_GT(speed, 0.03);
-  const std::uint64_t number = frontend.halt("");
-  while (frontend.halted()->iteration < 0) std::this_thread::yield();  // it is latched
-  EXPECT_THAT(message_of<BackendHalted>([&] { frontend.resume(number, kPatience); }),
-              HasSubstr("still brakes"));
-  frontend.burst(10, kPatience);
-  EXPECT_NEAR(desired(frontend.wait_for(6, kAtOnce)) - desired(frontend.wait_for(5, kAtOnce)),
-              speed - 0.01, 1e-9);
-  frontend.resume(number, kPatience);
-  EXPECT_EQ(desired(frontend.latest()), desired(frontend.wait_for(15, kAtOnce)));
+  play({.segment = "pair", .bursting = true}, R"(0 to 10 fastest; burst 5; halt; drive
+    r = resume 1; drive; r rejected; r says still brakes; halted
+    burst 10; r = resume 1; drive; r completed; running)",
+       limit_shoulder);
 }
 
 // rule H9
@@ -61,10 +52,6 @@ TEST_F(ResumeTest, ClearsNoHaltThatCameAfterTheOneItNames) {
 // rule H9
 TEST_F(ResumeTest, LosesAgainstALaterHaltInTheSameIteration) {
   play("halt; run 1; r = resume 1; halt; run 1; r rejected; halted");
-}
-
-void limit_shoulder(Schema& schema) {
-  schema.actuator(0).limits({.speed = 100.0, .acceleration = 10'000.0});  // 0.1, 0.01 an iteration
 }
 
 TEST_F(ResumeTest, NamesAHaltHoweverSoonItIsSent) {
