@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterator
 from functools import cache
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -60,10 +61,8 @@ def statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 def definitions(module: str, body: list[ast.stmt]) -> Iterator[tuple[str, Found]]:
     """All definitions of a body by name; an overloaded name comes several times."""
     file = file_of(module)
-    assert file is not None
-    lines = file.read_text().splitlines()
-    found = [*statements(body)]
-    for node, following in zip(found, [*found[1:], None], strict=True):
+    lines = file.read_text().splitlines() if file else []
+    for node, following in pairwise([*statements(body), None]):
         if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             yield node.name, Found(module, node, ast.get_docstring(node) or "")
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
@@ -79,26 +78,22 @@ def definitions(module: str, body: list[ast.stmt]) -> Iterator[tuple[str, Found]
 
 
 @cache
-def tree(module: str) -> ast.Module | None:
+def tree(module: str) -> ast.Module:
     file = file_of(module)
-    return None if file is None else ast.parse(file.read_text())
+    return ast.parse(file.read_text() if file else "")
 
 
 @cache
 def top_level(module: str) -> list[tuple[str, Found]]:
-    parsed = tree(module)
-    return [] if parsed is None else [*definitions(module, parsed.body)]
+    return [*definitions(module, tree(module).body)]
 
 
 def find(module: str, name: str) -> list[Found]:
     """Definitions of a name, wherever the module has it from."""
-    parsed = tree(module)
-    if parsed is None:
-        return []
     if here := [found for key, found in top_level(module) if key == name]:
         return here
     first, _, rest = name.partition(".")
-    for node in statements(parsed.body):
+    for node in statements(tree(module).body):
         for alias in node.names if isinstance(node, (ast.Import, ast.ImportFrom)) else ():
             if first != (alias.asname or alias.name):
                 continue
@@ -112,10 +107,8 @@ def find(module: str, name: str) -> list[Found]:
 
 def public_names(module: str) -> list[str]:
     """The names of `__all__`, or those that the module defines or passes on."""
-    parsed = tree(module)
-    assert parsed is not None, module
     names: list[str] = []
-    for node in statements(parsed.body):
+    for node in statements(tree(module).body):
         match node:
             case ast.Assign(targets=[ast.Name(id="__all__")], value=ast.List(elts=elements)):
                 return [ast.literal_eval(each) for each in elements]
@@ -224,8 +217,7 @@ def members(found: Found) -> dict[str, list[Found]]:
         own: dict[str, list[Found]] = {}
         for name, member in definitions(base.module, base.node.body):
             own.setdefault(name, []).append(member)
-        for name, several in own.items():
-            named.setdefault(name, several)
+        named |= {name: several for name, several in own.items() if name not in named}
     return named
 
 
@@ -258,11 +250,9 @@ def describe(name: str, several: list[Found], *, method: bool = False) -> list[s
         return lines
     if isinstance(node, (ast.Assign, ast.AnnAssign)):
         value = ast.unparse(node.value) if node.value else ""
-        options = (
-            [f":type: {annotation(node.annotation)}"] if isinstance(node, ast.AnnAssign) else []
-        )
-        if value and len(value) < 200:
-            options.append(f":value: {value}")
+        options = [f":value: {value}"] if 0 < len(value) < 200 else []
+        if isinstance(node, ast.AnnAssign):
+            options.append(f":type: {annotation(node.annotation)}")
         return entry("attribute" if method else "data", [name], text, *options)
     functions = [found.node for found in several if isinstance(found.node, FUNCTIONS)]
     decorators = [{ast.unparse(each) for each in each.decorator_list} for each in functions]
@@ -282,7 +272,7 @@ def titled(title: str) -> list[str]:
 
 def head(page: str) -> list[str]:
     """Title and text of a module's page; of a room of o80 one sentence, as the rest is on files."""
-    text = ast.get_docstring(tree(page) or ast.Module([], [])) or ""
+    text = ast.get_docstring(tree(page)) or ""
     text = text if page in MODULES else text.split("\n\n")[0]
     module = [] if page == "o80" else [f".. py:module:: {page}", ""]
     return [*titled(page), *module, *prose(text)]
