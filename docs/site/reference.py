@@ -19,6 +19,7 @@ from o80.cli import app
 MODULES = (
     *("o80", "o80.robots", "o80.drivers", "o80.learning", "o80.learning.training"),
     *("o80.learning.rollouts", "o80.hybrid", "o80.testing", "o80.plot", "o80.difference"),
+    *("o80.datasets.episodes", "o80.datasets.lerobot", "o80.datasets.minari"),
     *("o80_mujoco", "o80_mujoco.balls", "o80_arms", "o80_arms.fakes", "o80_pam"),
     *("o80_devices.motion_capture", "o80_devices.ball_tracking", "o80_devices.ball_launcher"),
     *("o80_devices.clock", "o80_table_tennis", "lerobot_robot_o80"),
@@ -74,7 +75,8 @@ def definitions(module: str, body: list[ast.stmt]) -> Iterator[tuple[str, Found]
             match following:
                 case ast.Expr(value=ast.Constant(value=str(below))):
                     text = [inspect.cleandoc(below)]
-            yield ast.unparse(target), Found(module, node, "\n".join(text))
+            for name in re.findall(r"\w+", ast.unparse(target)):  # of BEGIN, END = ... both
+                yield name, Found(module, node, "\n".join(text))
 
 
 @cache
@@ -114,8 +116,9 @@ def public_names(module: str) -> list[str]:
                 return [ast.literal_eval(each) for each in elements]
             case ast.ImportFrom(names=aliases):
                 names += [each.name for each in aliases if each.asname == each.name]
-    names += [name for name, _ in top_level(module)]
-    return [n for n in dict.fromkeys(names) if n[0] != "_" or n == "__version__"]
+    described = ast.ClassDef, *FUNCTIONS  # values only if a text says what they are
+    names += [n for n, each in top_level(module) if each.text or isinstance(each.node, described)]
+    return [*(["__version__"] if module == "o80" else []), *(n for n in names if n[0] != "_")]
 
 
 # ------------------------------------------------------------------------------------- text
