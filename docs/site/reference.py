@@ -324,7 +324,8 @@ def command(name: str, found: Any) -> list[str]:
         if each.name == "help":
             continue
         shown = each.human_readable_name if each.param_type_name == "argument" else None
-        word = "" if getattr(each, "is_flag", False) else f" <{each.type.name}>"
+        choices = "|".join(str(getattr(c, "value", c)) for c in getattr(each.type, "choices", ()))
+        word = "" if getattr(each, "is_flag", False) else f" <{choices or each.type.name}>"
         lines += [f".. option:: {shown or ', '.join(option + word for option in each.opts)}", ""]
         default = each.default
         known = default not in (None, False, "", ()) and not callable(default)
