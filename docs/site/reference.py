@@ -7,6 +7,7 @@ import textwrap
 from collections.abc import Iterator
 from functools import cache
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -18,6 +19,7 @@ from o80.cli import app
 MODULES = (
     *("o80", "o80.robots", "o80.drivers", "o80.learning", "o80.learning.training"),
     *("o80.learning.rollouts", "o80.hybrid", "o80.testing", "o80.plot", "o80.difference"),
+    *("o80.datasets.episodes", "o80.datasets.lerobot", "o80.datasets.minari"),
     *("o80_mujoco", "o80_mujoco.balls", "o80_arms", "o80_arms.fakes", "o80_pam"),
     *("o80_devices.motion_capture", "o80_devices.ball_tracking", "o80_devices.ball_launcher"),
     *("o80_devices.clock", "o80_table_tennis", "lerobot_robot_o80"),
@@ -60,10 +62,8 @@ def statements(body: list[ast.stmt]) -> Iterator[ast.stmt]:
 def definitions(module: str, body: list[ast.stmt]) -> Iterator[tuple[str, Found]]:
     """All definitions of a body by name; an overloaded name comes several times."""
     file = file_of(module)
-    assert file is not None
-    lines = file.read_text().splitlines()
-    found = [*statements(body)]
-    for node, following in zip(found, [*found[1:], None], strict=True):
+    lines = file.read_text().splitlines() if file else []
+    for node, following in pairwise([*statements(body), None]):
         if isinstance(node, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             yield node.name, Found(module, node, ast.get_docstring(node) or "")
         elif isinstance(node, (ast.Assign, ast.AnnAssign)):
@@ -75,30 +75,27 @@ def definitions(module: str, body: list[ast.stmt]) -> Iterator[tuple[str, Found]
             match following:
                 case ast.Expr(value=ast.Constant(value=str(below))):
                     text = [inspect.cleandoc(below)]
-            yield ast.unparse(target), Found(module, node, "\n".join(text))
+            for name in re.findall(r"\w+", ast.unparse(target)):  # of BEGIN, END = ... both
+                yield name, Found(module, node, "\n".join(text))
 
 
 @cache
-def tree(module: str) -> ast.Module | None:
+def tree(module: str) -> ast.Module:
     file = file_of(module)
-    return None if file is None else ast.parse(file.read_text())
+    return ast.parse(file.read_text() if file else "")
 
 
 @cache
 def top_level(module: str) -> list[tuple[str, Found]]:
-    parsed = tree(module)
-    return [] if parsed is None else [*definitions(module, parsed.body)]
+    return [*definitions(module, tree(module).body)]
 
 
 def find(module: str, name: str) -> list[Found]:
     """Definitions of a name, wherever the module has it from."""
-    parsed = tree(module)
-    if parsed is None:
-        return []
     if here := [found for key, found in top_level(module) if key == name]:
         return here
     first, _, rest = name.partition(".")
-    for node in statements(parsed.body):
+    for node in statements(tree(module).body):
         for alias in node.names if isinstance(node, (ast.Import, ast.ImportFrom)) else ():
             if first != (alias.asname or alias.name):
                 continue
@@ -112,17 +109,16 @@ def find(module: str, name: str) -> list[Found]:
 
 def public_names(module: str) -> list[str]:
     """The names of `__all__`, or those that the module defines or passes on."""
-    parsed = tree(module)
-    assert parsed is not None, module
     names: list[str] = []
-    for node in statements(parsed.body):
+    for node in statements(tree(module).body):
         match node:
             case ast.Assign(targets=[ast.Name(id="__all__")], value=ast.List(elts=elements)):
                 return [ast.literal_eval(each) for each in elements]
             case ast.ImportFrom(names=aliases):
                 names += [each.name for each in aliases if each.asname == each.name]
-    names += [name for name, _ in top_level(module)]
-    return [n for n in dict.fromkeys(names) if n[0] != "_" or n == "__version__"]
+    described = ast.ClassDef, *FUNCTIONS  # values only if a text says what they are
+    names += [n for n, each in top_level(module) if each.text or isinstance(each.node, described)]
+    return [*(["__version__"] if module == "o80" else []), *(n for n in names if n[0] != "_")]
 
 
 # ------------------------------------------------------------------------------------- text
@@ -224,8 +220,7 @@ def members(found: Found) -> dict[str, list[Found]]:
         own: dict[str, list[Found]] = {}
         for name, member in definitions(base.module, base.node.body):
             own.setdefault(name, []).append(member)
-        for name, several in own.items():
-            named.setdefault(name, several)
+        named |= {name: several for name, several in own.items() if name not in named}
     return named
 
 
@@ -258,11 +253,9 @@ def describe(name: str, several: list[Found], *, method: bool = False) -> list[s
         return lines
     if isinstance(node, (ast.Assign, ast.AnnAssign)):
         value = ast.unparse(node.value) if node.value else ""
-        options = (
-            [f":type: {annotation(node.annotation)}"] if isinstance(node, ast.AnnAssign) else []
-        )
-        if value and len(value) < 200:
-            options.append(f":value: {value}")
+        options = [f":value: {value}"] if 0 < len(value) < 200 else []
+        if isinstance(node, ast.AnnAssign):
+            options.append(f":type: {annotation(node.annotation)}")
         return entry("attribute" if method else "data", [name], text, *options)
     functions = [found.node for found in several if isinstance(found.node, FUNCTIONS)]
     decorators = [{ast.unparse(each) for each in each.decorator_list} for each in functions]
@@ -282,7 +275,7 @@ def titled(title: str) -> list[str]:
 
 def head(page: str) -> list[str]:
     """Title and text of a module's page; of a room of o80 one sentence, as the rest is on files."""
-    text = ast.get_docstring(tree(page) or ast.Module([], [])) or ""
+    text = ast.get_docstring(tree(page)) or ""
     text = text if page in MODULES else text.split("\n\n")[0]
     module = [] if page == "o80" else [f".. py:module:: {page}", ""]
     return [*titled(page), *module, *prose(text)]
@@ -331,7 +324,8 @@ def command(name: str, found: Any) -> list[str]:
         if each.name == "help":
             continue
         shown = each.human_readable_name if each.param_type_name == "argument" else None
-        word = "" if getattr(each, "is_flag", False) else f" <{each.type.name}>"
+        choices = "|".join(str(getattr(c, "value", c)) for c in getattr(each.type, "choices", ()))
+        word = "" if getattr(each, "is_flag", False) else f" <{choices or each.type.name}>"
         lines += [f".. option:: {shown or ', '.join(option + word for option in each.opts)}", ""]
         default = each.default
         known = default not in (None, False, "", ()) and not callable(default)
