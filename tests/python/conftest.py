@@ -4,6 +4,7 @@ import itertools
 import json
 import os
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -52,3 +53,18 @@ def bursting(segment: str) -> Iterator[o80.robots.Process]:
     """Two joints in another process, in bursting mode."""
     with o80.robots.load("two_joints").start(segment, bursting=True) as started:
         yield started
+
+
+@pytest.fixture
+def recorded(segment: str, tmp_path: Path) -> Path:
+    """A recording of a moving arm of two joints, named as the test's segment: 201 rows."""
+    path = tmp_path / "run.mcap"
+    with (
+        o80.robots.load("two_joints").inline(segment) as arm,
+        o80.Recording(path, arm) as recording,
+    ):
+        arm.add_command("elbow", 0.5, iterations=100)
+        arm.burst(150)
+        recording.flush()
+        arm.burst(50)
+    return path

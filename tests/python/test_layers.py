@@ -5,6 +5,7 @@ import graphlib
 import re
 import statistics
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -156,9 +157,7 @@ def test_a_python_room_uses_only_those_below_it_and_nothing_uses_the_face() -> N
 
 
 def test_python_modules_import_in_no_circle() -> None:
-    graph = IMPORTS
-
-    assert [*graphlib.TopologicalSorter(graph).static_order()]  # raises CycleError
+    assert [*graphlib.TopologicalSorter(IMPORTS).static_order()]  # raises CycleError
 
 
 def reached_from(header: str) -> set[str]:
@@ -223,19 +222,20 @@ CEILINGS = {
     "apps/table_tennis": (8_392, 4_409),
     "benchmarks, tools": (4_463, 0),
     "examples": (2_082, 0),
-    "tests, conftest.py": (0, 61_586),
+    "tests, conftest.py": (0, 61_569),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
 LARGEST_FILE, MEDIAN_FILE = 620, 100
 
 
+@cache
 def lines_by_file() -> dict[Path, int]:
     """Lines of each source, by its path below the root."""
-    found = (path for path in ROOT.rglob("*") if path.suffix in LANGUAGES and path.is_file())
-    below = {path.relative_to(ROOT): path for path in found}
-    ours = {name: path for name, path in below.items() if name.parts[0] not in ("build", ".venv")}
-    return {name: path.read_bytes().count(b"\n") for name, path in ours.items()}
+    beside = [path for path in ROOT.iterdir() if path.name not in ("build", ".git", ".venv")]
+    found = (file for path in beside for file in [path, *path.rglob("*")])
+    ours = (file for file in found if file.suffix in LANGUAGES and file.is_file())
+    return {file.relative_to(ROOT): file.read_bytes().count(b"\n") for file in ours}
 
 
 def folder_room(source: Path) -> str:

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import pytest
 from processes import O80, WAIT, run_o80
 
 import o80
@@ -31,22 +30,13 @@ def playing(*words: str | Path) -> Iterator[subprocess.Popen[str]]:
             player.kill()
 
 
-@pytest.fixture
-def recorded(segment: str, tmp_path: Path) -> Path:
-    path = tmp_path / "run.mcap"
-    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm):
-        arm.add_command("elbow", 0.5, iterations=100)
-        arm.burst(150)
-    return path
-
-
 def test_other_commands_see_the_rows(recorded: Path, segment: str, tmp_path: Path) -> None:
     copy = tmp_path / "copy.mcap"
     with playing(recorded, "--fast"):
         with o80.Frontend(segment, WAIT) as arm:
-            arm.wait_for(150, timeout=WAIT)
+            arm.wait_for(200, timeout=WAIT)
         assert "played" in run("list")
-        assert " 150 " in run("echo", segment, "--count", "1")
+        assert " 200 " in run("echo", segment, "--count", "1")
         said = run("info", segment)
         assert "a recording of 1000 Hz is played" in said
         assert "robot two_joints, played, rows" in said
@@ -60,7 +50,7 @@ def test_other_commands_see_the_rows(recorded: Path, segment: str, tmp_path: Pat
 def test_it_ends_with_the_last_row(recorded: Path) -> None:
     said = run("play", recorded, "--speed", "2")
     assert "playing 0.1 s" in said or "playing 0.2 s" in said
-    assert "151 rows" in said
+    assert "201 rows" in said
 
 
 def test_bursts_are_served(recorded: Path, segment: str) -> None:

@@ -15,21 +15,6 @@ from o80.difference import first_difference
 
 
 @pytest.fixture
-def recorded(segment: str, tmp_path: Path) -> Path:
-    """201 rows of a moving arm, named as the test's segment."""
-    path = tmp_path / "run.mcap"
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
-        arm.add_command("elbow", 0.5, iterations=100)
-        arm.burst(150)
-        recording.flush()
-        arm.burst(50)
-    return path
-
-
-@pytest.fixture
 def real_time(segment: str, tmp_path: Path) -> Path:
     """Rows of an arm in real time, 1000 a second."""
     path = tmp_path / "real.mcap"
