@@ -211,7 +211,7 @@ def main() -> None:
     if sys.argv[1:2] == ["--plot"]:
         return plot(sys.argv[2])
     print_table = sys.argv[1:2] == ["--table"]
-    worst = {"wrong": 0.0, "gain": math.inf}
+    worst = {"wrong": 0.0, "share": 0.0}
     most: dict[tuple[str, int], float] = {}  # of changes of velocity, for a rate of actions
     for case, (delay, disagreement, actions) in enumerate(cases()):
         world = world_of(case, delay, disagreement, actions)
@@ -226,13 +226,13 @@ def main() -> None:
         for part in ("take-over [rad/s]", "rest [rad/s]"):
             most[part, actions] = max(most.get((part, actions), 0.0), ours[part])
         if delay == 0.3:
-            gain = found["queue"]["take-over [rad/s]"] / ours["take-over [rad/s]"]
-            worst["gain"] = min(worst["gain"], gain)
+            share = ours["take-over [rad/s]"] / found["queue"]["take-over [rad/s]"]
+            worst["share"] = max(worst["share"], share)
     if not print_table:
         sample("chunks_wrong", "%", worst["wrong"])
         ratios = (most["take-over [rad/s]", n] / most["rest [rad/s]", n] for n in (20, 50))
         sample("chunks_take_over", "x", max(ratios))
-        sample("chunks_gain", "x", worst["gain"])
+        sample("chunks_take_over_share", "x", worst["share"])
 
 
 if __name__ == "__main__":

@@ -6,13 +6,13 @@ Every budget is a row of rows.csv:
 |---|---|
 | name | for --rows |
 | program, measured | a program that measures (command_of), and the name of its sample |
-| limit, of | a fixed limit, or a factor of a baseline `of` that the same program measures |
+| limit, of | a fixed limit, or one of the ratio to a baseline `of` of the same program |
 | plain | of USUAL: scales a fixed limit of time by what the plain loop takes here |
-| at_least | yes: more is better |
 | row, budget | the same in words |
 
-A program prints a line a sample: name, unit, value, with tabs between. Its first argument is how
-often each measurement is repeated, alternating with its baseline.
+A program prints a line a sample: name, unit, value, with tabs between; or name, SKIPPED, reason.
+Its first argument is the number of rounds: in each it measures everything once, in turn. A ratio is
+that of a round. A budget is missed if the lower quartile of the rounds is above the limit.
 """
 
 import argparse
@@ -25,7 +25,7 @@ import sys
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
-from statistics import median
+from statistics import median, quantiles
 from typing import Any
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -34,6 +34,7 @@ RESULTS = ROOT / "build" / "bench" / "results.json"
 LONGEST = 300  # of one program [s]
 ROUNDS = 21
 ROUNDS_QUICK = 3
+SKIPPED = "skipped"
 USUAL = {"plain_cpp": 12.0, "plain_python": 34.0}
 """Times of a plain loop on the machine for which fixed limits are meant [ns].
 
@@ -44,12 +45,13 @@ HEAD = """\
 # Results: benchmarks
 
 This page has one run of [the benchmarks](../../benchmarks/README.md). `make bench ARGS=--page`
-writes it; do not edit it. Each figure is a median. A limit is a factor of a baseline that the same
-run measured, or a fixed figure, scaled by a plain loop that was measured beside it.
+writes it; do not edit it. Each figure is a median of rounds, with their quartiles. A ratio (x) is
+to what is named beside it, measured in turn with it. A fixed limit is scaled by a plain loop that
+was measured beside it. A budget is missed if the lower quartile is above its limit.
 """
 
 Samples = dict[str, tuple[str, list[float]]]
-"""Units and values of samples by name."""
+"""Units and values of samples by name; without values the unit is why it was skipped."""
 Row = dict[str, str]
 """A line of rows.csv by column."""
 Result = dict[str, Any]
@@ -81,7 +83,10 @@ def run(program: str, rounds: int, built: Path) -> Samples:
     samples: Samples = {}
     for line in ended.stdout.splitlines():
         name, unit, value = line.split("\t")
-        samples.setdefault(name, (unit, []))[1].append(float(value))
+        if unit == SKIPPED:
+            samples[name] = (value, [])
+        else:
+            samples.setdefault(name, (unit, []))[1].append(float(value))
     if ended.returncode != 0:
         last_words = (ended.stderr.strip() or "it said nothing").splitlines()[-1].strip()
         if not samples:
@@ -107,26 +112,31 @@ def measure(rows: Sequence[Row], rounds: int, built: Path) -> list[Result]:
 
 
 def result_of(row: Row, samples: Samples | str) -> Result:
-    """Holds the medians of a program, and of plain loops beside it, against the budget of a row."""
-    result: Result = dict.fromkeys(("unit", "measured", "limit", "met", "best", "not_measured"))
-    result |= {"row": row["row"], "budget": row["budget"], "rounds": 0, "baseline": {}}
+    """Holds the rounds of a program, and of plain loops beside it, against the budget of a row."""
+    result: Result = dict.fromkeys(("unit", "measured", "limit", "met", "not_measured"))
+    result |= {"row": row["row"], "budget": row["budget"], "quartiles": [], "baseline": {}}
     if isinstance(samples, str):
         return result | {"not_measured": samples}
     for name in filter(None, (row["measured"], row["of"])):
-        if name not in samples:
-            return result | {"not_measured": f"no '{name}' was given"}
+        reason, there = samples.get(name, (f"no '{name}' was given", []))
+        if not there:
+            return result | {"not_measured": reason}
+    unit, values = samples[row["measured"]]
     limit, beside = float(row["limit"]), row["of"] or row["plain"]
     if beside in samples:
         result["baseline"][beside] = base = median(samples[beside][1])
-        limit *= base if row["of"] else base / USUAL[beside]
-    unit, values = samples[row["measured"]]
-    value, at_least = median(values), row["at_least"] == "yes"
+        limit *= 1 if row["of"] else base / USUAL[beside]
+    if row["of"]:
+        others = samples[row["of"]][1]
+        unit, values = "x", [each / other for each, other in zip(values, others, strict=False)]
+    once = len(values) == 1
+    low, middle, high = values * 3 if once else quantiles(values, n=4, method="inclusive")
     return result | {
         "unit": unit,
-        "measured": value,
+        "measured": middle,
+        "quartiles": [low, high],
         "limit": limit,
-        "met": value >= limit if at_least else value <= limit,
-        "best": max(values) if at_least else min(values),
+        "met": low <= limit,
         "rounds": len(values),
     }
 
@@ -159,10 +169,12 @@ def line_of(result: Result) -> str:
     row, budget = (result[key].replace("|", "\\|") for key in ("row", "budget"))
     if result["measured"] is None:
         return f"| {row} | not measured: {result['not_measured']} | | | | |"
-    both = (result[key] for key in ("measured", "limit"))
-    shown = " | ".join(f"{each:.3g}" if abs(each) < 1000 else f"{each:.0f}" for each in both)
+    low, high, middle, limit = (
+        f"{each:.3g}" if abs(each) < 1000 else f"{each:.0f}"
+        for each in (*result["quartiles"], result["measured"], result["limit"])
+    )
     met = "yes" if result["met"] else "**no**"
-    return f"| {row} | {shown} | {result['unit']} | {budget} | {met} |"
+    return f"| {row} | {middle} [{low} {high}] | {limit} | {result['unit']} | {budget} | {met} |"
 
 
 def page_of(results: Sequence[Result], where: str) -> str:

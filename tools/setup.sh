@@ -266,6 +266,7 @@ has_environment || make_environment
 case $purpose in
   tools | test) group=test ;;
   check | wheels | site) group=$purpose ;;
+  bench) group=peers ;;
   *) group= ;;
 esac
 # extras for the purposes that use or test them

@@ -1,7 +1,8 @@
-// What it costs to start a planned command for one number, and each iteration after that. Of the
-// random starts a round gives the median and, beside it, the 99th percentile.
+// What it costs to start a planned command, and each iteration after that: one number, with the
+// 99th percentile of random starts; one number and seven that arrive together beside ruckig.
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -11,100 +12,89 @@
 
 #include "benchmarks/cpp/sample.hpp"
 #include "control/motion/number_motion.hpp"
+#ifdef O80_HAS_RUCKIG
+#include <ruckig/ruckig.hpp>
+#endif
 
 namespace o80::bench {
 namespace {
 
-constexpr int kStarts = 2000;
+constexpr int kStarts = 500;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
+constexpr double kPeriod = 1e-3;  // [s]
+constexpr double kSpeed = 2.6;
+constexpr double kAcceleration = 10.0;
+constexpr double kJerk = 5000.0;
 
-/// Limits of one number, in seconds.
-struct Joint {
-  double speed;
-  double acceleration;
-  double jerk;
-  double frequency;
+template <std::size_t N>
+using Targets = std::array<double, N>;
+using Motions = std::vector<NumberMotion>;
 
-  NumberMotion at_rest() const {
-    const double t = 1.0 / frequency;
-    NumberMotion motion(
-        NumberLimiter(-kInfinity, kInfinity, {speed * t, acceleration * t * t, jerk * t * t * t}),
-        std::nullopt);
-    motion.restart(0.0);
-    return motion;
-  }
-};
-
-constexpr Joint kJoints[] = {{2.0, 15.0, 500.0, 500.0}, {2.6, 10.0, 5000.0, 1000.0}};
-
-std::int64_t start(NumberMotion& motion, double target, std::int64_t least = 0) {
+/// The command of all of them: the fewest iterations, or `least`.
+std::int64_t start(Motions& motions, const double* targets, std::int64_t least = 0) {
   Requested requested;
-  requested.target = target;
   requested.iterations = least;
-  motion.begin();
-  const std::int64_t iterations = motion.propose(requested);
-  motion.settle(iterations);
+  std::int64_t iterations = 0;
+  for (std::size_t i = 0; i < motions.size(); ++i) {
+    requested.target = targets[i];
+    motions[i].begin();
+    iterations = std::max(iterations, motions[i].propose(requested));
+  }
+  for (NumberMotion& motion : motions) motion.settle(iterations);
   return iterations;
 }
 
-/// A command that starts from rest, or in an iteration of another one.
+/// Starts from rest, or in an iteration of a motion to other targets.
+template <std::size_t N>
 struct Start {
-  Joint joint;
-  double first = 0.0;    // target of the other one
-  std::int64_t cut = 0;  // the iteration; 0: from rest
-  double target = 0.0;
-  std::int64_t requested = 0;
+  Targets<N> first{};
+  std::int64_t cut = 0;  // 0: from rest
+  Targets<N> target{};
+  std::int64_t least = 0;
 
-  NumberMotion before() const {
-    NumberMotion motion = joint.at_rest();
-    if (cut > 0) start(motion, first);
-    for (std::int64_t i = 0; i < cut; ++i) motion.step(-kInfinity, kInfinity);
-    return motion;
+  Motions before() const {
+    const Rates rates{kSpeed * kPeriod, kAcceleration * kPeriod * kPeriod,
+                      kJerk * kPeriod * kPeriod * kPeriod};
+    Motions motions;
+    for (std::size_t i = 0; i < N; ++i) {
+      motions.emplace_back(NumberLimiter(-kInfinity, kInfinity, rates), std::nullopt);
+      motions.back().restart(0.0);
+    }
+    if (cut > 0) start(motions, first.data());
+    for (std::int64_t k = 0; k < cut; ++k) {
+      for (NumberMotion& motion : motions) motion.step(-kInfinity, kInfinity);
+    }
+    return motions;
   }
 };
 
-class Draw {
- public:
-  Start at_rest() { return {.joint = kJoints[random_() % 2], .target = real(-1.0, 1.0)}; }
-  Start moving() {
-    Start one = at_rest();
-    one.first = real(-1.0, 1.0);
-    NumberMotion motion = one.joint.at_rest();
-    one.cut = 1 + some_of(start(motion, one.first));
-    one.target += one.before().position();
-    return one;
-  }
-  /// In up to twice the fewest iterations.
-  Start stretched() {
-    Start one = moving();
-    NumberMotion motion = one.before();
-    const std::int64_t fewest = start(motion, one.target);
-    one.requested = fewest + 1 + some_of(fewest);
-    return one;
-  }
+enum class From { rest, motion, motion_stretched };
 
- private:
-  double real(double low, double high) {
-    return std::uniform_real_distribution<double>(low, high)(random_);
+template <std::size_t N>
+std::vector<Start<N>> draw(From from) {
+  std::mt19937_64 random(1);  // NOLINT(bugprone-random-generator-seed)
+  std::uniform_real_distribution<double> place(-1.0, 1.0);
+  std::vector<Start<N>> starts(kStarts);
+  for (Start<N>& one : starts) {
+    for (std::size_t i = 0; i < N; ++i) {
+      one.first[i] = place(random);
+      one.target[i] = place(random);
+    }
+    if (from != From::rest) one.cut = 1 + static_cast<std::int64_t>(random() % 200);
+    if (from != From::motion_stretched) continue;
+    Motions motions = one.before();
+    const std::int64_t fewest = start(motions, one.target.data());
+    one.least = fewest + 1 + static_cast<std::int64_t>(random() % 1'000'000) % fewest;
   }
-  std::int64_t some_of(std::int64_t iterations) {
-    return static_cast<std::int64_t>(real(0.0, 1.0) * static_cast<double>(iterations));
-  }
-  std::mt19937_64 random_{1};  // NOLINT(bugprone-random-generator-seed)
-};
-
-template <class One>
-std::vector<Start> many(One&& one) {
-  std::vector<Start> all(kStarts);
-  std::generate(all.begin(), all.end(), one);
-  return all;
+  return starts;
 }
 
-void measure_starts(const std::string& name, const std::vector<Start>& starts) {
+/// Median and 99th percentile of the starts of one number.
+void measure_starts(const std::string& name, const std::vector<Start<1>>& starts) {
   std::vector<double> times;
-  for (const Start& each : starts) {
-    NumberMotion motion = each.before();
-    times.push_back(nanoseconds([&] { start(motion, each.target, each.requested); }) / 1e3);
+  for (const Start<1>& one : starts) {
+    Motions motions = one.before();
+    times.push_back(nanoseconds([&] { start(motions, one.target.data(), one.least); }) / 1e3);
   }
   std::sort(times.begin(), times.end());
   sample(name.c_str(), "us", times[times.size() / 2]);
@@ -112,32 +102,90 @@ void measure_starts(const std::string& name, const std::vector<Start>& starts) {
 }
 
 /// To the end of each motion.
-void measure_iterations(const std::vector<Start>& starts) {
+void measure_iterations(const std::vector<Start<1>>& starts) {
   std::vector<double> times;
-  for (const Start& each : starts) {
-    NumberMotion motion = each.before();
-    const std::int64_t iterations = start(motion, each.target, each.requested);
+  for (const Start<1>& one : starts) {
+    Motions motions = one.before();
+    const std::int64_t iterations = start(motions, one.target.data());
     const double time = nanoseconds([&] {
-      for (std::int64_t i = 0; i < iterations; ++i) motion.step(-kInfinity, kInfinity);
+      for (std::int64_t i = 0; i < iterations; ++i) motions[0].step(-kInfinity, kInfinity);
     });
     times.push_back(time / static_cast<double>(iterations));
   }
   sample("plan_iteration", "ns", median(times));
 }
 
+#ifdef O80_HAS_RUCKIG
+/// The same starts as calculations of ruckig, each cut out of ruckig's own motion.
+template <std::size_t N>
+class Ruckig {
+ public:
+  explicit Ruckig(const std::vector<Start<N>>& starts) {
+    for (const Start<N>& one : starts) {
+      Input input;
+      input.max_velocity.fill(kSpeed);
+      input.max_acceleration.fill(kAcceleration);
+      input.max_jerk.fill(kJerk);
+      if (one.cut > 0) {
+        input.target_position = one.first;
+        calculator_.calculate(input, trajectory_);
+        trajectory_.at_time(static_cast<double>(one.cut) * kPeriod, input.current_position,
+                            input.current_velocity, input.current_acceleration);
+      }
+      input.target_position = one.target;
+      inputs_.push_back(input);
+    }
+  }
+  void calculate() {
+    for (const Input& input : inputs_) calculator_.calculate(input, trajectory_);
+  }
+
+ private:
+  using Input = ruckig::InputParameter<N>;
+  ruckig::Ruckig<N> calculator_;
+  ruckig::Trajectory<N> trajectory_;
+  std::vector<Input> inputs_;
+};
+#endif
+
+/// Means over all starts, in turn: `name` and ruckig_<name>.
+template <std::size_t N>
+void measure_beside_ruckig(const std::string& name, From from, int rounds) {
+  const std::vector<Start<N>> starts = draw<N>(from);
+#ifdef O80_HAS_RUCKIG
+  Ruckig<N> peer(starts);
+#else
+  std::printf("ruckig_%s\tskipped\truckig is not installed\n", name.c_str());
+#endif
+  for (int round = -1; round < rounds; ++round) {  // the first one warms up
+    std::vector<Motions> motions;
+    for (const Start<N>& one : starts) motions.push_back(one.before());
+    const double ours = nanoseconds([&] {
+      for (std::size_t i = 0; i < motions.size(); ++i) start(motions[i], starts[i].target.data());
+    });
+    if (round >= 0) sample(name.c_str(), "us", ours / kStarts / 1e3);
+#ifdef O80_HAS_RUCKIG
+    const double others = nanoseconds([&] { peer.calculate(); });
+    if (round >= 0) sample(("ruckig_" + name).c_str(), "us", others / kStarts / 1e3);
+#endif
+  }
+}
+
 void measure(int rounds) {
   take_priority();
   pin(0);
-  Draw draw;
-  const std::vector<Start> from_rest = many([&] { return draw.at_rest(); });
-  const std::vector<Start> moving = many([&] { return draw.moving(); });
-  const std::vector<Start> stretched = many([&] { return draw.stretched(); });
+  const auto from_rest = draw<1>(From::rest);
+  const auto moving = draw<1>(From::motion);
+  const auto stretched = draw<1>(From::motion_stretched);
   for (int round = 0; round < rounds; ++round) {
     measure_starts("plan_from_rest", from_rest);
     measure_starts("plan_moving", moving);
     measure_starts("plan_stretched", stretched);
     measure_iterations(moving);
   }
+  measure_beside_ruckig<1>("start_rest", From::rest, rounds);
+  measure_beside_ruckig<1>("start_moving", From::motion, rounds);
+  measure_beside_ruckig<7>("start_7_moving", From::motion, rounds);
 }
 
 }  // namespace

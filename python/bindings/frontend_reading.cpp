@@ -122,15 +122,20 @@ Stream open_stream(const Frontend& self, nb::handle since, nb::handle timeout) {
   return {self.shared(), self.decoder(), std::max<Iteration>(first, 0), timeout_of(timeout)};
 }
 
-/// Fills an array of rows; returns the first iteration and the number of rows.
-std::pair<Iteration, std::size_t> read_rows(const Frontend& self, Iteration first,
-                                            nb::handle array) {
+/// Fills an array of rows; returns the first iteration and the number of rows. With parts (those of
+/// HistoryReader, as numbers) a row of the array has `packed` bytes.
+std::pair<Iteration, std::size_t> read_rows(const Frontend& self, Iteration first, nb::handle array,
+                                            nb::handle parts, std::size_t packed) {
+  using Part = o80::HistoryReader::Part;
   const Bytes bytes(array, PyBUF_WRITABLE);
+  const std::span<std::byte> to = bytes.writable();
+  const auto wanted = parts.is_none() ? std::vector<Part>() : numbers_in<Part>(parts);
   const auto frontend = self.shared();
+  const o80::HistoryReader& history = frontend->link()->history;
   const Waiting waiting;
-  const std::size_t rows = bytes.span().size() / frontend->layout().size;
   const o80::HistoryReader::Range range =
-      frontend->link()->history.read_range(first, rows, static_cast<std::byte*>(bytes.view.buf));
+      wanted.empty() ? history.read_range(first, to.size() / history.row_bytes(), to.data())
+                     : history.read_parts(first, to.size() / packed, wanted, packed, to.data());
   return {range.first, range.count};
 }
 
@@ -195,5 +200,5 @@ void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend) {
             return Observation(self.decoder(), self.shared()->at_time(time));
           },
           "time"_a)
-      .def("_read_rows", &read_rows, "first"_a, "array"_a);
+      .def("_read_rows", &read_rows, "first"_a, "array"_a, "parts"_a = nb::none(), "packed"_a = 0);
 }

@@ -3,6 +3,7 @@
 #include <nanobind/stl/shared_ptr.h>
 #include <nanobind/stl/string.h>
 
+#include <algorithm>
 #include <cstring>
 #include <span>
 
@@ -19,8 +20,8 @@ using namespace nb::literals;
 Decoder::Decoder(std::shared_ptr<const o80::Description> what, nb::object how)
     : description(std::move(what)),
       layout(std::move(how)),
-      desired(layout.attr("desired")),
-      observed(layout.attr("observed")),
+      desired(layout.attr("way_to")("desired")),
+      observed(layout.attr("way_to")("observed")),
       extended(layout.attr("extended")),
       active(layout.attr("active")),
       clamped(layout.attr("clamped")),
@@ -29,6 +30,37 @@ Decoder::Decoder(std::shared_ptr<const o80::Description> what, nb::object how)
       off_plan(layout.attr("off_plan")),
       flat(layout.attr("flat")),
       text(layout.attr("text")) {}
+
+Numpy::Numpy() {
+  const nb::object capsule =
+      nb::module_::import_("numpy._core._multiarray_umath").attr("_ARRAY_API");
+  void** const table = static_cast<void**>(PyCapsule_GetPointer(capsule.ptr(), nullptr));
+  if (table == nullptr) throw nb::python_error();
+  type_ = static_cast<PyTypeObject*>(table[2]);
+  make_ = reinterpret_cast<decltype(make_)>(table[94]);           // PyArray_NewFromDescr
+  set_base_ = reinterpret_cast<decltype(set_base_)>(table[282]);  // PyArray_SetBaseObject
+}
+
+nb::object Numpy::view(nb::handle row, nb::handle way) const {
+  constexpr int kBehaved = 0x500;   // aligned, writable
+  constexpr std::size_t kMost = 8;  // more dimensions than any states have
+  const nb::handle shape(PyTuple_GET_ITEM(way.ptr(), 0));
+  const nb::handle dtype(PyTuple_GET_ITEM(way.ptr(), 1));
+  const std::size_t offset = PyLong_AsSize_t(PyTuple_GET_ITEM(way.ptr(), 2));
+  Py_intptr_t lengths[kMost] = {};
+  const auto count = std::min<std::size_t>(nb::len(shape), kMost);
+  for (std::size_t i = 0; i < count; ++i) {
+    lengths[i] = PyLong_AsSsize_t(PyTuple_GET_ITEM(shape.ptr(), i));
+  }
+  std::byte* const data = nb::inst_ptr<Observation>(row)->row.bytes() + offset;
+  // it takes over a reference to the dtype
+  PyObject* const array = make_(type_, nb::object(nb::borrow(dtype)).release().ptr(),
+                                static_cast<int>(count), lengths, nullptr, data, kBehaved, nullptr);
+  if (array == nullptr) throw nb::python_error();
+  nb::object made = nb::steal(array);
+  if (set_base_(array, nb::object(nb::borrow(row)).release().ptr()) != 0) throw nb::python_error();
+  return made;
+}
 
 namespace {
 
@@ -56,7 +88,10 @@ Observation* from_bytes(std::shared_ptr<Decoder> decoder, nb::handle bytes, std:
 
 nb::object decoded(nb::handle self, nb::object Decoder::* how) {
   const Decoder& decoder = *nb::inst_ptr<Observation>(self)->decoder;
-  return call_python([&] { return (decoder.*how)(self); });
+  const nb::handle way = decoder.*how;
+  return call_python([&]() -> nb::object {
+    return PyTuple_CheckExact(way.ptr()) != 0 ? decoder.numpy.view(self, way) : way(self);
+  });
 }
 
 nb::bytes table_of(const o80::Description& description) {

@@ -7,11 +7,28 @@
 
 #include "o80/runtime/observation.hpp"
 
-/// Converts rows of one robot to arrays: the methods of its o80.rows.layout.Layout, looked up once.
+/// Makes arrays by the table of functions that NumPy gives to compiled modules, whose places do not
+/// change: numpy.ndarray takes twice as long.
+class Numpy {
+ public:
+  Numpy();
+  /// An array over a row. `way`: its shape, dtype and offset in the row.
+  nanobind::object view(nanobind::handle row, nanobind::handle way) const;
+
+ private:
+  PyTypeObject* type_;
+  PyObject* (*make_)(PyTypeObject*, PyObject* dtype, int dimensions, const Py_intptr_t* lengths,
+                     const Py_intptr_t* strides, void* data, int flags, PyObject* like);
+  int (*set_base_)(PyObject* array, PyObject* base);
+};
+
+/// Converts rows of one robot to arrays: the methods of its o80.rows.layout.Layout, looked up once,
+/// or the way to a plain array.
 struct Decoder {
   Decoder(std::shared_ptr<const o80::Description> description, nanobind::object layout);
 
   std::shared_ptr<const o80::Description> description;
+  Numpy numpy;
   nanobind::object layout, desired, observed, extended, active, clamped, braking, starved, off_plan,
       flat, text;
 };

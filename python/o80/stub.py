@@ -11,3 +11,4 @@ from o80.frontend.chunks import Chunks as Chunks
 from o80.frontend.commander import Tolerance as Tolerance
 from o80.frontend.robot_stub import check as check
 from o80.rows.enumerations import EnumerationArray as EnumerationArray
+from o80.rows.history import Range as Range

@@ -149,6 +149,12 @@ def check_every_reader(
     expected = expect(len(live))
     assert len(live) == 8
     Readers(live, expected).check()
+    names = tuple(expected)
+    same(expected, dict(zip(names, frontend.history(fields=names), strict=True)))
+    for some in (*names[::5], names[-1].partition(".")[0]):
+        column = frontend.history(fields=some)
+        assert column.dtype == live[some].dtype
+        assert column.tobytes() == live[some].tobytes()
 
     epoch = o80.open(path)[frontend.segment].epochs[0]
     recorded = epoch.history()

@@ -35,6 +35,8 @@ def use(arm: o80.Frontend) -> float:
     assert_type(observation.iteration, int)
     history = arm.history(seconds=2.0)
     assert_type(history, o80.History)
+    assert_type(arm.history(5, fields="observed"), NDArray[Any])
+    assert_type(arm.history(since=5, fields=["time", "observed"]), tuple[NDArray[Any], ...])
     assert_type(history.observed, o80.States)
     first: NDArray[Any] = history.observed["position"][:, 0]
     assert_type(history.time, NDArray[np.int64])
@@ -81,7 +83,7 @@ BAD = [
     ("joints: str = arm.latest().observed.joints['position']", "Incompatible types"),
     ("many: str = arm.history(3).observed['position']", "Incompatible types"),
     ("force: str = arm.latest().extended.force", "Incompatible types"),
-    ("arm.history(since=1.5)", "since"),
+    ("arm.history(since=1.5)", "history"),
     ("arm.add_command(0.5, 0.5)", "add_command"),
     ("o80.Mode.REPLACE", "REPLACE"),
     ("arm.pulse_and_wait(timeout='5')", "timeout"),

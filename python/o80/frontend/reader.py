@@ -4,16 +4,17 @@ Modules that most processes never need are imported when they are first used: ea
 first attach up to 3 ms slower.
 """
 
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack, overload
 
 import numpy as np
+from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base.argument_checks import whole
+from o80.base.argument_checks import sequence, whole
 from o80.base.cached import cached
 from o80.base.errors import Error
 from o80.base.signatures import explains
-from o80.rows.history import History, Selection
+from o80.rows.history import History, Range, Selection
 from o80.rows.layout import Layout
 
 _MOST = 4096  # native entries of a journal converted at a time
@@ -212,6 +213,22 @@ class Reader(_core.Frontend):
             timeout: longest wait for one of them [s].
             """
 
+    @overload
+    def history(
+        self, n: int | None = None, *, fields: None = None, **selection: Unpack[Range]
+    ) -> History: ...
+    @overload
+    def history(
+        self, n: int | None = None, *, fields: str, **selection: Unpack[Range]
+    ) -> NDArray[Any]: ...
+    @overload
+    def history(
+        self,
+        n: int | None = None,
+        *,
+        fields: list[str] | tuple[str, ...],
+        **selection: Unpack[Range],
+    ) -> tuple[NDArray[Any], ...]: ...
     def history(
         self,
         n: int | None = None,
@@ -221,13 +238,16 @@ class Reader(_core.Frontend):
         seconds: float | None = None,
         from_time: int | None = None,
         to_time: int | None = None,
-    ) -> History:
+        fields: str | list[str] | tuple[str, ...] | None = None,
+    ) -> History | NDArray[Any] | tuple[NDArray[Any], ...]:
         """Returns many observations at once; without an argument all in the history.
 
         n: the last n observations.
         seconds: observations of the last seconds before the newest one [s].
         since, until: first and last iteration, both included.
         from_time, to_time: first and last time, both included [ns], as in `Observation.time`.
+        fields: paths, as in `history["observed.elbow"]`. Only these numbers are copied: the result
+            is the array of a path, or a tuple with an array for each of several paths.
 
         Give n, or seconds, or any of the other four. Iterations that are overwritten or not yet
         published are left out. Raises InvalidArgument.
@@ -236,7 +256,10 @@ class Reader(_core.Frontend):
         first, last = selection.range(
             self.oldest, self.published, self._iteration_at, lambda: self.latest().time
         )
-        return self._read(first, max(0, last + 1 - first))
+        if fields is None:
+            return self._read(first, max(0, last + 1 - first))
+        arrays = self._read_fields(first, max(0, last + 1 - first), fields)
+        return arrays[0] if isinstance(fields, str) else arrays
 
     def at_time(self, time: int) -> _core.Observation:
         """Returns the newest observation at or before a time [ns], as in `Observation.time`.
@@ -249,6 +272,23 @@ class Reader(_core.Frontend):
         rows = np.empty(count, self._layout.row)
         _, found = self._read_rows(first, rows.view(np.uint8)) if count else (first, 0)
         return History(self._decoder, rows[:found])
+
+    def _read_fields(
+        self, first: int, count: int, fields: str | list[str] | tuple[str, ...]
+    ) -> tuple[NDArray[Any], ...]:
+        from o80.rows.columns import columns_at, packing_of  # late: most processes never need it
+
+        paths = [fields] if isinstance(fields, str) else sequence(fields, "fields", "['observed']")
+        columns = [self._layout.columns_at(path, columns_at) for path in paths]
+        packing = self._layout.packings.get(key := tuple(paths))
+        if packing is None:
+            packing = self._layout.packings[key] = packing_of(columns)
+        rows = np.empty(count, packing.dtype)
+        if not rows.nbytes:
+            return packing.arrays(rows)
+        where = rows.view(np.uint8), packing.parts, rows.itemsize
+        _, found = self._read_rows(first, *where)
+        return packing.arrays(rows[:found])
 
     @property
     def initial_states(self) -> "States":

@@ -41,6 +41,7 @@ from typing import (
     SupportsIndex,
     TypeAlias,
     TypedDict,
+    Unpack,
     cast,
     overload,
 )
@@ -49,7 +50,7 @@ import numpy as np
 import o80
 import o80.stub
 from numpy.typing import ArrayLike, NDArray
-from o80.stub import Chunks, IdleWord, LateWord, ModeWord, OnErrorWord, ProfileWord, RowsWord
+from o80.stub import Chunks, IdleWord, LateWord, ModeWord, OnErrorWord, ProfileWord, Range, RowsWord
 from o80.stub import StartWord, Tolerance
 {imports}
 DESCRIBED = "{digest}"  # of what was described when this module was made

@@ -5,11 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.errors import InvalidArgument
 from o80.base.loop_options import did_you_mean
-from o80.rows.layout import Layout, dtype_of_field, labels_of_field
+from o80.rows.layout import HEAD, Layout, dtype_of_field, labels_of_field
 
 
 class Column(NamedTuple):
@@ -68,7 +69,7 @@ def numbers_below(
 
 
 def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:
-    """Returns the numbers at a path: "observed", "observed.elbow", "extended.force[2]", a group.
+    """Returns the numbers at a path: "observed.elbow", "extended.force[2]", a group, "time".
 
     Raises InvalidArgument if there is none.
     """
@@ -76,6 +77,8 @@ def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:
     found = [column for column in columns if is_within(column.name, path)]
     if not found:
         found = [c for c in columns if _group_path(c, schema) == path]
+    if not found and path in ("iteration", "time"):
+        found = [Column(path, np.dtype(dict(HEAD)[path]), schema["row"][path], None)]
     if not found:
         names = [column.name for column in columns]
         part, _, rest = path.partition(".")
@@ -94,6 +97,47 @@ def _group_path(column: Column, schema: Mapping[str, Any]) -> str:
         if is_within(rest, actuator["name"]):
             return f"{part}.{schema['groups'][actuator['group']]['name']}"
     return ""
+
+
+class Packing(NamedTuple):
+    """Numbers that are copied out of rows, side by side."""
+
+    dtype: np.dtype[np.void]  #: of the numbers of a row
+    parts: NDArray[np.uint64]  #: (n, 3): place in a row, size, place among the numbers [bytes]
+    numbers: list[list[tuple[np.dtype[Any], int]]]  #: kind and offset of each number, by path
+
+    def arrays(self, rows: NDArray[np.void]) -> tuple[NDArray[Any], ...]:
+        """Returns the numbers of each path: (T,) of one number, (T, n) of several."""
+        return tuple(self._array(rows, numbers) for numbers in self.numbers)
+
+    @staticmethod
+    def _array(rows: NDArray[np.void], numbers: list[tuple[np.dtype[Any], int]]) -> NDArray[Any]:
+        kind, offset = numbers[0]
+        if len(numbers) == 1:
+            return rows.getfield(kind, offset)
+        if all(each == kind for each, _ in numbers):
+            return rows.getfield(np.dtype((kind, (len(numbers),))), offset)
+        return np.stack([rows.getfield(*number) for number in numbers], axis=1)
+
+
+def packing_of(columns_by_path: Sequence[Sequence[Column]]) -> Packing:
+    """Places the numbers of each path one behind the other, each aligned."""
+    parts: list[list[int]] = []
+    numbers: list[list[tuple[np.dtype[Any], int]]] = []
+    end, largest = 0, 1
+    for columns in columns_by_path:
+        numbers.append([])
+        for column in columns:
+            size = column.dtype.itemsize
+            place = -(-end // size) * size
+            numbers[-1].append((column.dtype, place))
+            if parts and (sum(parts[-1][:2]), sum(parts[-1][1:])) == (column.offset, place):
+                parts[-1][1] += size
+            else:
+                parts.append([column.offset, size, place])
+            end, largest = place + size, max(largest, size)
+    packed = -(-end // largest) * largest
+    return Packing(np.dtype((np.void, packed)), np.array(parts, np.uint64), numbers)
 
 
 def value_of(row: Any, column: Column) -> Any:

@@ -209,6 +209,7 @@ class Layout:
         self.extended_labels = labels_of_type(schema["extended"]) if "extended" in schema else {}
         self._is_plain_array = self._is_array and not self.labels
         self._columns: dict[str, list[Any]] = {}
+        self.packings: dict[tuple[str, ...], Any] = {}  #: of the paths of a history, for Reader
 
     def columns_at(self, path: str, find: Callable[[dict[str, Any], str], list[Any]]) -> list[Any]:
         """Returns the columns at a path; caches the results of `o80.rows.columns.columns_at`."""
@@ -302,6 +303,12 @@ class Layout:
 
     desired = partialmethod(_states, "desired")
     observed = partialmethod(_states, "observed")
+
+    def way_to(self, part: str) -> Any:
+        """Shape, dtype and offset of states that are a plain array; else the method for them."""
+        if self._is_plain_array:
+            return self._shape, self._element, self._at[part]
+        return getattr(self, part)
 
     def extended(self, row: Any) -> Record:
         return Record(np.ndarray((), self.extras, row, self._at["extended"]), self.extended_labels)

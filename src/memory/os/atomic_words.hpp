@@ -43,6 +43,22 @@ inline void load_words(std::byte* to, const std::byte* shared, std::size_t bytes
   }
 }
 
+/// The same from any place: bytes begin .. begin + size - 1 behind `shared`.
+inline void load_bytes(std::byte* to, const std::byte* shared, std::size_t begin,
+                       std::size_t size) noexcept {
+  if (begin % 8 == 0 && size % 8 == 0) return load_words(to, shared + begin, size);
+  while (size > 0) {
+    const std::size_t skipped = begin % 8;
+    const std::size_t got = skipped + size < 8 ? size : 8 - skipped;
+    std::byte word[8];
+    load_words(word, shared + begin - skipped, 8);
+    std::memcpy(to, word + skipped, got);
+    begin += got;
+    to += got;
+    size -= got;
+  }
+}
+
 inline constexpr std::size_t kMostTextWords = 128;
 
 /// Writes a text with a terminating zero, made printable; excess characters are dropped. Release:

@@ -21,7 +21,24 @@ namespace {
 // above any iteration of a backend; counters of a damaged file are clamped to it, to exclude
 // overflows
 constexpr Iteration kFarthest = Iteration{1} << 60;
+constexpr std::size_t kRowsAtOnce = 64;
 constexpr int kReadings = 100;  // attempts while `published` does not change
+
+/// Copies a part of adjacent rows.
+void copy_part(const HistoryReader::Part& part, const std::byte* from, std::size_t row_bytes,
+               std::byte* to, std::size_t packed, std::size_t rows) noexcept {
+  const std::size_t begin = part.begin;
+  const std::size_t size = part.size;
+  to += part.to;
+  const bool is_word = begin % 8 == 0 && size == 8;  // known to the compiler, it is a tight loop
+  for (; rows > 0; --rows, from += row_bytes, to += packed) {
+    if (is_word) {
+      load_words(to, from + begin, 8);
+    } else {
+      load_bytes(to, from, begin, size);
+    }
+  }
+}
 
 }  // namespace
 
@@ -129,8 +146,9 @@ Iteration HistoryReader::latest(std::byte* to) const noexcept {
   return -1;
 }
 
-HistoryReader::Range HistoryReader::read_range(Iteration first, std::size_t count,
-                                               std::byte* to) const noexcept {
+template <class Copy>
+HistoryReader::Range HistoryReader::read_by(Iteration first, std::size_t count, std::size_t packed,
+                                            std::byte* to, Copy copy) const noexcept {
   const Iteration newest = published();
   const std::uint64_t behind = first < 0 ? -static_cast<std::uint64_t>(first) : 0;
   if (count <= behind) return {0, 0};
@@ -145,15 +163,40 @@ HistoryReader::Range HistoryReader::read_range(Iteration first, std::size_t coun
   // slots => to, in two runs at most
   const std::uint64_t slot_of_begin = static_cast<std::uint64_t>(begin) % slots_;
   const std::uint64_t before_end = std::min(rows, slots_ - slot_of_begin);
-  load_words(to, slot(begin), before_end * row_bytes_);
-  load_words(to + before_end * row_bytes_, slots_begin_, (rows - before_end) * row_bytes_);
+  copy(slot(begin), before_end, to);
+  copy(slots_begin_, rows - before_end, to + before_end * packed);
 
   // drop rows that the writer may have overwritten during the copy
   const Iteration kept = std::max({begin, first_intact(), first_available()});
   const auto lost = static_cast<std::uint64_t>(kept - begin);
   if (lost >= rows) return {kept, 0};
-  if (lost > 0) std::memmove(to, to + lost * row_bytes_, (rows - lost) * row_bytes_);
+  if (lost > 0) std::memmove(to, to + lost * packed, (rows - lost) * packed);
   return {kept, rows - lost};
+}
+
+HistoryReader::Range HistoryReader::read_range(Iteration first, std::size_t count,
+                                               std::byte* to) const noexcept {
+  return read_by(first, count, row_bytes_, to,
+                 [this](const std::byte* from, std::size_t rows, std::byte* at) {
+                   load_words(at, from, rows * row_bytes_);
+                 });
+}
+
+HistoryReader::Range HistoryReader::read_parts(Iteration first, std::size_t count,
+                                               std::span<const Part> parts, std::size_t packed,
+                                               std::byte* to) const noexcept {
+  return read_by(first, count, packed, to,
+                 [&](const std::byte* from, std::size_t rows, std::byte* at) {
+                   // few rows at a time: they stay in the cache for the next part
+                   for (std::size_t i = 0; i < rows; i += kRowsAtOnce) {
+                     const std::byte* const begin = from + i * row_bytes_;
+                     std::byte* const row = at + i * packed;
+                     const std::size_t some = std::min(rows - i, kRowsAtOnce);
+                     for (const Part& part : parts) {
+                       copy_part(part, begin, row_bytes_, row, packed, some);
+                     }
+                   }
+                 });
 }
 
 }  // namespace o80

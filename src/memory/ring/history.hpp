@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <span>
 
 #include "memory/segment/segment_layout.hpp"
 #include "o80/base/time.hpp"
@@ -46,6 +47,13 @@ class HistoryReader {
     std::size_t count;  // number of rows
   };
 
+  /// Bytes `begin` to `begin + size - 1` of each row, and their place in a row of the result.
+  struct Part {
+    std::uint64_t begin;
+    std::uint64_t size;
+    std::uint64_t to;
+  };
+
   explicit HistoryReader(const SegmentView& view) noexcept;
 
   std::size_t row_bytes() const noexcept { return row_bytes_; }
@@ -64,8 +72,16 @@ class HistoryReader {
   /// Copies those of the rows first .. first + count - 1 that the history holds, packed at the
   /// start of `to`.
   Range read_range(Iteration first, std::size_t count, std::byte* to) const noexcept;
+  /// Likewise, but copies only parts of each row, which must lie within it; a row of the result has
+  /// `packed` bytes.
+  Range read_parts(Iteration first, std::size_t count, std::span<const Part> parts,
+                   std::size_t packed, std::byte* to) const noexcept;
 
  private:
+  /// `copy(from, rows, to)` copies adjacent slots to rows of `packed` bytes.
+  template <class Copy>
+  Range read_by(Iteration first, std::size_t count, std::size_t packed, std::byte* to,
+                Copy copy) const noexcept;
   const std::byte* slot(Iteration k) const noexcept;
   /// The row that is being written; else the newest.
   Iteration begun() const noexcept;

@@ -2,6 +2,7 @@
 
 import pickle
 from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
 from enum import IntEnum
 
 import numpy as np
@@ -123,6 +124,67 @@ def test_a_history_is_a_sequence_of_observations(arm: o80.Frontend) -> None:
         history[11]
     assert "0 to 10" in repr(history)
     assert "no observation" in repr(arm.history(0))
+
+
+def test_fields_are_columns_of_the_whole_history(arm: o80.Frontend) -> None:
+    arm.add_command("elbow", 1.0, iterations=10)
+    arm.burst(10)
+    history = arm.history(8)
+
+    iteration, elbow = arm.history(8, fields=["iteration", "desired.elbow"])
+    assert iteration.tolist() == [*range(3, 11)]
+    assert elbow.tolist() == history.desired[:, 1].tolist()
+    both = arm.history(8, fields="observed")
+    assert both.tolist() == history.observed.tolist()
+    assert both.flags.c_contiguous
+    both[:] = 7.0
+    assert not (arm.history(8, fields="observed") == 7.0).any()
+
+
+def test_fields_are_selected_as_rows_are(segment: str) -> None:
+    with o80.Backend(segment, ["a"], history=10) as backend:
+        for k in range(35):
+            backend.publish([float(k)])
+        with o80.Frontend(segment) as frontend:
+
+            def rows(*given: int, **selection: int) -> list[float]:
+                return [*frontend.history(*given, fields="observed", **selection)]
+
+            assert rows() == [*range(25, 35)]
+            assert rows(3) == [32, 33, 34]
+            assert rows(since=0, until=26) == [25, 26]
+            assert rows(from_time=frontend.wait_for(33).time) == [33, 34]
+            assert rows(0) == rows(since=40) == rows(until=20) == []
+            assert frontend.history(0, fields="time").dtype == np.int64
+            assert frontend.history(fields=[]) == ()
+
+
+def test_a_wrong_field_is_refused_with_the_nearest_name(arm: o80.Frontend) -> None:
+    with pytest.raises(o80.InvalidArgument, match=r"'observed\.elbov'.*'observed\.elbow'"):
+        arm.history(fields="observed.elbov")
+    with pytest.raises(o80.InvalidArgument, match="desired"):
+        arm.history(fields=["observed", "elbow"])
+    for wrong in (3, [3], {"observed": 1}):
+        with pytest.raises(o80.InvalidArgument, match=r"fields|path"):
+            arm.history(fields=wrong)  # type: ignore[arg-type]
+
+
+def test_fields_of_rows_that_are_overwritten_meanwhile_are_whole(segment: str) -> None:
+    with o80.Backend(segment, 8, history=500) as backend, ThreadPoolExecutor(1) as pool:
+        backend.publish(np.zeros(8))
+        with o80.Frontend(segment) as frontend:
+            names = [f"observed.{frontend.actuators[i].name}" for i in (0, 7)]
+
+            def read() -> None:
+                while frontend.published < 20_000:
+                    iteration, *numbers = frontend.history(fields=["iteration", *names])
+                    assert all(np.array_equal(each, iteration) for each in numbers)
+                    assert (np.diff(iteration) == 1).all()
+
+            reading = pool.submit(read)
+            for k in range(1, 20_001):
+                backend.publish(np.full(8, float(k)))
+            reading.result()
 
 
 def test_rows_share_no_memory(arm: o80.Frontend) -> None:

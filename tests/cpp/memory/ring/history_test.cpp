@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <atomic>
+#include <cstring>
 #include <limits>
 #include <thread>
 
@@ -83,6 +84,32 @@ TEST_F(HistoryTest, ReadsManyRowsAtOnceAcrossTheSeamOfTheRing) {
     EXPECT_THAT(rows[i], Each(8 + static_cast<Iteration>(i)));
 }
 
+TEST_F(HistoryTest, ReadsPartsOfRowsAtAnyPlace) {
+  constexpr std::size_t kPacked = 48;
+  using Packed = std::array<std::byte, kPacked>;
+  constexpr std::array<HistoryReader::Part, 6> kParts = {
+      {{0, 1, 3}, {5, 2, 0}, {14, 12, 4}, {32, 16, 16}, {252, 4, 32}, {8, 8, 40}}};
+  std::vector<Row> rows(17);
+  for (std::size_t k = 0; k < rows.size(); ++k) {
+    for (std::size_t i = 0; i < kWords; ++i) {
+      rows[k][i] = static_cast<std::int64_t>((k + 1) * (i + 1) * 0x9E3779B97F4A7C15U);
+    }
+    writer_.publish(static_cast<Iteration>(k), bytes(rows[k]));
+  }
+  std::vector<Packed> found(20);
+
+  const auto range = reader_.read_parts(0, found.size(), kParts, kPacked, found[0].data());
+
+  EXPECT_EQ(range.first, 7);
+  ASSERT_EQ(range.count, 10U) << "across the seam of the ring";
+  for (std::size_t i = 0; i < range.count; ++i) {
+    for (const HistoryReader::Part& part : kParts) {
+      const std::byte* of_row = bytes(rows[7 + i]) + part.begin;
+      EXPECT_EQ(std::memcmp(found[i].data() + part.to, of_row, part.size), 0) << part.begin;
+    }
+  }
+}
+
 TEST_F(HistoryTest, GivesWhatThereIsOfARangeThatIsNot) {
   publish(0, 16);
   std::vector<Row> rows(11);
@@ -144,6 +171,7 @@ TEST_F(HistoryTest, IsNeverTornWhenReadersAreOvertaken) {
   std::atomic<bool> torn{false};
   std::atomic<int> reading{0};
   const auto whole = [](const Row& row, Iteration k) { return row == row_of(k); };
+  constexpr std::array<HistoryReader::Part, 2> ends = {{{0, 8, 0}, {sizeof(Row) - 8, 8, 8}}};
   const auto read_everything = [&] {
     std::vector<Row> rows(12);
     ++reading;
@@ -156,6 +184,10 @@ TEST_F(HistoryTest, IsNeverTornWhenReadersAreOvertaken) {
       const auto range = reader_.read_range(oldest, rows.size(), bytes(rows[0]));
       for (std::size_t i = 0; i < range.count; ++i)
         if (!whole(rows[i], range.first + static_cast<Iteration>(i))) torn = true;
+      const auto some = reader_.read_parts(oldest, rows.size(), ends, 16, bytes(rows[0]));
+      const std::int64_t* const packed = rows[0].data();
+      for (std::size_t i = 0; i < 2 * some.count; ++i)
+        if (packed[i] != some.first + static_cast<Iteration>(i / 2)) torn = true;
     }
   };
   std::vector<std::thread> readers;
