@@ -18,7 +18,7 @@ html_theme = "furo"
 html_static_path = ["site.css"]
 html_css_files = ["site.css"]
 html_copy_source = False
-html_show_sphinx = False
+html_show_sphinx = html_show_copyright = False
 suppress_warnings = ["ref.python"]  # several classes have a Config
 
 

@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (8_392, 4_409),
     "benchmarks, tools": (4_373, 0),
     "examples": (2_082, 0),
-    "tests, conftest.py": (0, 61_569),
+    "tests, conftest.py": (0, 61_685),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -2,6 +2,7 @@
 
 import itertools
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -52,7 +53,12 @@ def test_rows_between_times_are_those_that_numpy_finds(
     wanted = (history.iteration >= since) & (history.iteration <= until)
     wanted &= history.time >= (first if first is not None else -(10**18))
     wanted &= history.time <= (last if last is not None else 10**18)
-    arguments = {"since": since, "until": until, "from_time": first, "to_time": last}
+    arguments: dict[str, Any] = {
+        "since": since,
+        "until": until,
+        "from_time": first,
+        "to_time": last,
+    }
     for rows in (old.history(**arguments), history.select(**arguments)):
         assert rows.iteration.tolist() == history.iteration[wanted].tolist()
 

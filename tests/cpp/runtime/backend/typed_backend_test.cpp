@@ -1,5 +1,7 @@
 #include "o80/runtime/typed_backend.hpp"
 
+#include <cmath>
+
 #include "o80/runtime/typed_frontend.hpp"
 #include "runtime/manual_backend.hpp"
 
@@ -49,6 +51,27 @@ TEST_F(TypedBackendTest, ARequestThatThrowsEndsItAsFailed) {
   backend.reset();
   EXPECT_THAT(message_of<BackendFailed>([&] { frontend.wait_for(1, kPatience); }),
               HasSubstr("sparks"));
+}
+
+TEST_F(TypedBackendTest, IsNotResumedWhileItsReadingIsNoNumber) {
+  Backend<Pair> backend({.segment = "pair"});
+  backend.publish({});
+  Frontend<Pair> frontend("pair");
+  const auto resume = [&] {
+    const Batch batch = send_resume(frontend, 1);
+    EXPECT_TRUE(backend.step());
+    return batch.handle(0);
+  };
+  backend.halt("the belt slipped");
+  ASSERT_TRUE(backend.step());
+  backend.publish({std::nan(""), 0});
+  const Handle refused = resume();
+  EXPECT_EQ(refused.status, Status::rejected);
+  EXPECT_THAT(refused.text, HasSubstr("actuator 'actuator_0'"));
+  EXPECT_TRUE(frontend.halted());
+  backend.publish({1.5, 0});
+  EXPECT_EQ(resume().status, Status::completed);
+  EXPECT_EQ(frontend.latest().desired()[0], 1.5);
 }
 
 }  // namespace
