@@ -9,7 +9,10 @@ from pathlib import Path
 from sources import ROOT
 
 PACKAGES = {
-    tests.parent.name: tests for group in ("", "*/") for tests in ROOT.glob(f"{group}*/tests")
+    tests.parent.name: tests
+    for group in ("", "*/")
+    for tests in ROOT.glob(f"{group}*/tests")
+    if ROOT / "build" not in tests.parents
 }
 #: Folders of tests in C++ by the name of their program, o80_test_<name>.
 CPP = {folder.name: folder for folder in ROOT.glob("tests/cpp/*/")} | {
