@@ -57,7 +57,7 @@ void become_limited_to_priority(rlim_t priority) {
 
 void expect_that_all_held(ChildProcess& child) {
   const int code = child.wait();
-  if (code == kNotGranted) GTEST_SKIP() << "no user may be given a limit here";
+  if (code == kNotGranted) GTEST_SKIP() << "no user may be given a limit here; make rt runs it";
   EXPECT_EQ(code, 0);
 }
 

@@ -131,7 +131,7 @@ TEST(RealTime, SaysThatNoHigherPriorityThanTheLoopsIsLeftForTheHelper) {
     _exit(said ? 0 : 1);
   });
   const int code = child.wait();
-  if (code == 77) GTEST_SKIP() << "no user may be given a real-time priority here";
+  if (code == 77) GTEST_SKIP() << "no user may be given a real-time priority here; make rt runs it";
   EXPECT_EQ(code, 0);
 }
 
