@@ -21,9 +21,9 @@ _BEFORE = 10  # entries of a living backend that are printed at the start
 
 
 def follow(frontend: Frontend, count: int, as_json: bool, timeout: float | None) -> None:
-    """Prints the last entries, then new ones; ends after `count` entries in total, 0: never.
+    """Prints the last journal entries, then new ones, `count` in total (0: without an end).
 
-    For a dead backend it then raises the reason of the backend's end.
+    If the backend is dead, prints its last entries and raises the error with the reason.
     """
     journal = Journal(frontend)
     if not journal.exists:

@@ -63,7 +63,7 @@ def starved_text(starvations: int) -> str:
 
 
 def clipped_text(entries: "Iterable[JournalEntry | _core.JournalEntry]") -> str:
-    """Returns how many numbers `clip` has moved into bounds, in how many batches, or nothing."""
+    """Returns a text with the counts of clipped numbers and of their batches; empty without any."""
     counts = [each.clipped for each in entries if each.kind == "taken" and each.clipped]
     batches = "1 batch" if len(counts) == 1 else f"{len(counts)} batches"
     return f"{sum(counts)} numbers of targets were clipped, in {batches}" if counts else ""

@@ -351,11 +351,11 @@ class Chunks(Managed):
     def wait(
         self, lead: float = 0, timeout: float | None = None, *, grid: bool = False
     ) -> _core.Observation:
-        """Waits until the last sent chunk was decided and at most `lead` is planned.
+        """Waits until the backend has decided on the last chunk and at most `lead` of plan is left.
 
-        Returns the newest observation, or, with `grid`, the newest that lies whole steps after the
-        one on which the last chunk is based; in real time never the same one twice. A bursting
-        backend runs until then.
+        Returns the newest observation; with `grid`, the newest one that is a whole number of steps
+        after the observation of the last chunk. In real time, each call returns another one. A
+        bursting backend runs until then.
 
         lead: iterations, or as a float the time [s]. timeout: longest wait [s]. Raises
         TimeoutError, BackendGone, BackendHalted.

@@ -178,7 +178,7 @@ class Single:
 
     @property
     def lateness(self) -> int:
-        """Rows of the robot since the newest one that was used."""
+        """Number of rows that the robot has published since the last row that a step used."""
         return self._robot.published - self._row
 
     @property

@@ -99,7 +99,7 @@ class EpochPart:
         return 0 if place is None else place.create_time
 
     def last_entries(self) -> Entries | None:
-        """Reads the last part of the journal. Raises RecordingError for a damaged file."""
+        """Reads the newest journal entries, if any. Raises RecordingError for a damaged file."""
         if self.journal is None:
             return None
         with self.reading() as file:

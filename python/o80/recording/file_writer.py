@@ -127,7 +127,7 @@ class FileWriter:
 
     @property
     def found(self) -> Scan:
-        """Contents of the file so far, except messages."""
+        """Scan of the file as written so far: all records except messages."""
         return self._found
 
     def add_schema(self, name: str, definition: str, *, encoding: str = "ros2msg") -> int:

@@ -107,7 +107,7 @@ class MotionRules:
         return self.recorded != self.now
 
     def moved_otherwise(self, entry: _core.JournalEntry) -> str:
-        """Returns the first actuator that a taken batch may move differently; empty: none."""
+        """Returns the name of the first actuator that this entry may move differently, or ""."""
         if not self.differ or entry.kind != "taken":
             return ""
         for record in entry.records:

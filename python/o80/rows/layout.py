@@ -165,7 +165,7 @@ def field_at(
 ) -> tuple[np.dtype[Any], int]:
     """Returns dtype and offset [bytes] of a field, named by a path with dots.
 
-    Raises InvalidArgument if there is no `what` of that name.
+    Raises InvalidArgument if there is no such field; its text calls the path `what`.
     """
     offset = 0
     for name in path.split("."):

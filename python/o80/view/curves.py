@@ -72,8 +72,8 @@ class Panels:
         rows: History,
         begin: int,
     ) -> int:
-        """Adds the plans of chunks to curves() of these rows, each behind a gap; returns the time
-        [ns] at which the last plan ends.
+        """Adds the planned positions of chunks to the curves of `rows`, a gap before each plan, and
+        returns the time [ns] at which the last plan ends.
         """
         last = 0
         for panel, of in plans.items():
