@@ -157,10 +157,11 @@ def service() -> Any:
 
 def serve() -> None:
     """Answers until it is terminated, polling."""
-    signal(SIGTERM, lambda *_: sys.exit())  # it removes its files
+    ended: list[int] = []  # an exception in the handler can be lost in a destructor
+    signal(SIGTERM, lambda number, _: ended.append(number))  # it removes its files
     server = service().server_builder().create()
     print(flush=True)
-    while True:
+    while not ended:
         if (request := server.receive()) is not None:
             request.payload()
             request.send_copy(Answered())

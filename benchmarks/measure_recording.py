@@ -20,7 +20,7 @@ from sampling import rounds, sample
 
 SEGMENTS = (1, 4, 16)
 ACTUATORS = 8
-SENSORS = np.dtype([("force", "f8", 38)])  # makes a row of 512 bytes
+SENSORS = np.dtype([("force", "f8", 34)])  # makes a row of 512 bytes
 PERIOD = 1e-3  # [s]
 SECONDS = 2.0  # of a measurement
 
@@ -28,7 +28,7 @@ SECONDS = 2.0  # of a measurement
 def publish(count: int) -> None:
     """Publishes until its input ends."""
     random = np.random.default_rng(1)
-    values = random.standard_normal((997, 46))
+    values = random.standard_normal((997, 42))
     names = [f"bench-recording-{i}" for i in range(count)]
     backends = [
         o80.Backend(name, ACTUATORS, extended=SENSORS, frequency=1 / PERIOD, history=4000)

@@ -123,6 +123,7 @@ class Ruckig {
   explicit Ruckig(const std::vector<Start<N>>& starts) {
     for (const Start<N>& one : starts) {
       Input input;
+      input.current_position.fill(0.0);
       input.max_velocity.fill(kSpeed);
       input.max_acceleration.fill(kAcceleration);
       input.max_jerk.fill(kJerk);
