@@ -73,6 +73,6 @@ def mapping(value: Any, name: str, holds: str) -> Mapping[Any, Any]:
 
 def sequence(value: Any, name: str, example: str) -> Sequence[Any]:
     """Converts a sequence to a list. Raises InvalidArgument for a string or another value."""
-    if isinstance(value, str) or not isinstance(value, (Sequence, np.ndarray)):
+    if isinstance(value, str | bytes) or not isinstance(value, (Sequence, np.ndarray)):
         raise InvalidArgument(f"{name} must be a list such as {example}, got {value!r}")
     return list(value)

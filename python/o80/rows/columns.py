@@ -20,9 +20,8 @@ class Column(NamedTuple):
     dtype: np.dtype[Any]
     offset: int  #: offset in the row [bytes]
     labels: dict[str, int] | None  #: labels of an enumeration; None: none
-    origin: str = (
-        "robot"  #: source of the value: "robot", "clock" or "world" (docs/drivers/simulators.md)
-    )
+    #: source of the value: "robot", "clock" or "world" (docs/drivers/simulators.md)
+    origin: str = "robot"
     unit: str = ""
     help: str = ""
 
@@ -75,7 +74,7 @@ def columns_at(schema: Mapping[str, Any], path: str) -> list[Column]:
     """
     columns = list(columns_of(schema))
     found = [column for column in columns if is_within(column.name, path)]
-    if not found:
+    if not found and path[-1:] not in ("", "."):  # a group without a name has no path
         found = [c for c in columns if _group_path(c, schema) == path]
     if not found and path in ("iteration", "time"):
         found = [Column(path, np.dtype(dict(HEAD)[path]), schema["row"][path], None)]

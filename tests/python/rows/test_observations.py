@@ -164,8 +164,8 @@ def test_a_wrong_field_is_refused_with_the_nearest_name(arm: o80.Frontend) -> No
         arm.history(fields="observed.elbov")
     with pytest.raises(o80.InvalidArgument, match="desired"):
         arm.history(fields=["observed", "elbow"])
-    for wrong in (3, [3], {"observed": 1}):
-        with pytest.raises(o80.InvalidArgument, match=r"fields|path"):
+    for wrong in (3, [3], {"observed": 1}, "", "observed.", b"observed"):
+        with pytest.raises(o80.InvalidArgument, match=r"fields must|a path|has no number"):
             arm.history(fields=wrong)  # type: ignore[arg-type]
 
 
