@@ -1,5 +1,6 @@
 """``o80 demo``: the first minute with a robot."""
 
+import os
 import sys
 import textwrap
 from typing import TYPE_CHECKING, Annotated, Any
@@ -21,7 +22,7 @@ PROGRAM = """\
 import o80
 
 robot = o80.robots.load("two_joints")
-with robot.start("demo", gain=5.0) as process, process.frontend() as arm:
+with robot.start("{segment}", gain=5.0) as run, run.frontend() as arm:
     arm.add_command("shoulder", 1.0, duration=0.8)  # [rad], [s]
     arm.add_command("shoulder", 0.2, speed=1.0)  # queued behind the first
     arm.add_command("elbow", -0.6, duration=1.6, profile="minimum_jerk")
@@ -48,9 +49,10 @@ def demo(
         _run_demo_of_package(name, context.args)
         return
     print("This program starts a simulated robot as a process of its own, and moves it:\n")
-    print(textwrap.indent(PROGRAM, "    "))
+    program = PROGRAM.format(segment=f"demo-{os.getpid()}")  # several users may run it at once
+    print(textwrap.indent(program, "    "))
     names: dict[str, Any] = {}
-    exec(compile(PROGRAM, "<o80 demo>", "exec"), names)
+    exec(compile(program, "<o80 demo>", "exec"), names)
     rows = names["rows"]
     seconds = (rows.time - rows.time[0]) * 1e-9
     print(f"{len(rows)} iterations in {seconds[-1]:.1f} s, {rows.overruns[-1]} of them late.")
