@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (8_392, 4_409),
     "benchmarks, tools": (4_384, 0),
     "examples": (2_082, 0),
-    "tests, conftest.py": (0, 61_694),
+    "tests, conftest.py": (0, 61_699),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
