@@ -206,10 +206,10 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_253, 0),
+    "include, src": (34_280, 0),
     "python/bindings": (5_706, 0),
-    "python/o80": (29_859, 0),
-    "python/o80/hybrid": (2_403, 0),
+    "python/o80": (29_877, 0),
+    "python/o80/hybrid": (2_456, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_479, 0),
     "python/o80/view/page": (1_222, 0),
     "docs": (571, 0),
@@ -219,7 +219,7 @@ CEILINGS = {
     "robots/arms": (4_420, 3_142),
     "robots/pam, robots/two_joints": (2_108, 1_184),
     "simulators/mujoco": (5_372, 4_686),
-    "apps/table_tennis": (8_392, 4_409),
+    "apps/table_tennis": (8_400, 4_409),
     "benchmarks, tools": (4_384, 0),
     "examples": (2_082, 0),
     "tests, conftest.py": (0, 61_699),

@@ -1,12 +1,7 @@
 """Table tennis as a task of o80.hybrid: one arm with any pacing, or N copies inline.
 
-One step, with the arm's iterations as the only clock; k is the newest row used:
-1. actions => eight pressures of each arm, sent for iteration k + 1 + delay (late ones in real time
-are executed at once, and counted); of a chunk, row j is for the five iterations from
-k + 1 + delay + 5 j on (late rows are skipped, and counted);
-2. by the clock: wait for row k + 5; else all arms burst by 5;
-3. the arm's rows k + 1 to k + 5 are replayed to its worlds, which all burst by 5 at once;
-4. the arm's row k + 5 and the world's row of the same instant => observation, contact, reward.
+A step is that of a HybridTask, of five iterations: actions become eight pressures of each arm; of a
+chunk, row j is for the five iterations from k + 1 + delay + 5 j on.
 """
 
 from __future__ import annotations
@@ -24,6 +19,7 @@ from o80.base.arrays import Float32Array, FloatArray
 from o80.hybrid import EVERY, HybridTask, Index, Outcome
 from o80.hybrid.single import Single
 from o80.learning.halts import halts_of
+from o80.rows.layout import with_padding
 from o80.view.pictures import Pictures
 
 from .arguments import refuse_unless_for_copies, refuse_wrong_balls, refuse_wrong_options
@@ -37,7 +33,7 @@ from .settings import RigSettings, TaskSettings
 from .task.actions import changed_pressures
 from .task.end import End, terminated
 from .task.state import State
-from .world.arm import MUSCLES
+from .world.arm import JOINTS, MUSCLES
 from .world.timing import ITERATIONS
 
 Numbers = NDArray[np.intp]
@@ -121,7 +117,9 @@ class TableTennisCopies(HybridTask):
         """Newest rows, with names."""
         self.range, self.home_of_arm = self.rows.range, Home(self.arm)
         self._gathered: list[Float32Array] = []
+        self._launch: o80.GroupBurst | None = None
         if isinstance(arms, o80.InlineGroup) and self.worlds == 1:
+            self._launch = self._worlds.prepared_burst(1, [*range(JOINTS + 1)])  # and the ball
             bounds = self.observer.low, self.observer.high
             plays = self.observer.is_ball_play
             self._gathered = self.rows.gather(arms, self._worlds, bounds if plays else None)
@@ -176,22 +174,24 @@ class TableTennisCopies(HybridTask):
     ) -> None:
         """Resets arms and worlds, with drawn balls, or with the ball of `options`."""
         refuse_wrong_options(options, period=self.rig_settings.period)
-        extra = self.worlds - 1
+        more = {"extra": self.worlds - 1, **options}
         self.draws = draws = [
-            drawn_episode(self.task, self._balls, each, extra=extra, **options)
-            for each in generators
+            drawn_episode(self.task, self._balls, rng, **more) for rng in generators
         ]
         if self._clocked and self.returns_at_reset:
             self.home_of_arm.go()
         self.engine.reset(copies, [(draw.arm_seed, draw.twin_seed) for draw in draws])
         if self._endings is not None:
             self._endings.begin(copies)
-        self.begin(copies, generators, options)
-        self.engine.mirror(copies)
-        self.twin_row = self.rows.iteration
+        if self._launch is None or any(len(each.flights[0].positions) > 1 for each in draws):
+            self.begin(copies, generators, options)
+            self.engine.mirror(copies)
+        else:
+            self._launch_balls(copies, self._launch)
+        self.twin_row = self.rows.iteration.item()
         self._asked[copies] = self.commanded(copies)
         balls = np.arange(len(self._ends))[self._balls_of(copies)]
-        self.state.goal[balls] = np.repeat([draw.goal for draw in draws], self.worlds, axis=0)
+        self.state.goal[balls] = [draw.goal for draw in draws for _ in range(self.worlds)]
         self._ends[balls] = End.RUNNING
         self._update_state()
         if not self._gathered:
@@ -215,6 +215,15 @@ class TableTennisCopies(HybridTask):
                 else:
                     world.add_trajectory(states, self.rows.ball)
                 world.pulse()
+
+    def _launch_balls(self, copies: Numbers, launch: o80.GroupBurst) -> None:
+        """Does the same as `begin` and `mirror`, in one call."""
+        numbers = launch.targets.view(np.float64).reshape(self.copies, -1)
+        joints, motion = numbers[:, : 2 * JOINTS], self.rows.motion[copies]
+        joints[copies, ::2], joints[copies, 1::2] = motion[:, :JOINTS], motion[:, JOINTS:]
+        numbers[copies, 2 * JOINTS :] = [draw.flights[0].states[0] for draw in self.draws]
+        launch.run(copies)
+        with_padding(self.world.rows)[copies, 0] = with_padding(launch.rows)[copies]
 
     def commanded(self, copies: Index = EVERY) -> FloatArray:
         """Normalised desired pressures (n, 8) of the last rows, a fresh array."""
@@ -258,7 +267,7 @@ class TableTennisCopies(HybridTask):
     def _move(self, targets: FloatArray | None, copies: Index) -> None:
         """Runs a step of the rig; targets None: sends nothing."""
         self.engine.step(targets, copies, self.until_halted)
-        self.twin_row = self.rows.iteration
+        self.twin_row = self.rows.iteration.item()
         if self.after_step is not None and not self.engine.stalled:
             self.after_step()
 
@@ -331,8 +340,9 @@ class TableTennisCopies(HybridTask):
         state, balls = self._of(copies), self._balls_of(copies)
         ends = self.task.end(state)
         by_event = terminated(ends)
-        halted = np.repeat(np.isin(copies, [*self.halts]), self.worlds)
-        self._ends[balls] = np.where(halted, End.HALTED, ends)
+        self._ends[balls] = ends
+        if self.halts:
+            self._ends[self._balls_of(np.intersect1d(copies, [*self.halts]))] = End.HALTED
         cut = ~by_event & (ends != End.RUNNING)
         return Outcome(*map(self._by_world, (self.task.reward(state), by_event, cut)))
 

@@ -45,7 +45,9 @@ def drawn_episode(
     `ball`, a number of the source, or `flight` replaces the played ball, without a change of the
     number of draws. Raises IndexError for a number that is not in the source.
     """
-    numbers = _drawn(rng, len(source), 1 + extra)
+    count = len(source)
+    drawn = rng.choice(count, 1 + extra, replace=extra >= count) if extra else rng.integers(count)
+    numbers = np.atleast_1d(drawn).tolist()
     if ball is not None and ball in numbers:  # the drawn ball takes the place of the given one
         numbers[numbers.index(ball)] = numbers[0]
     if ball is not None:
@@ -55,11 +57,3 @@ def drawn_episode(
     flights = [flight or source.flight(numbers[0]), *map(source.flight, numbers[1:])]
     goal = task.begin(rng)
     return EpisodeDraw(numbers, flights, goal, int(rng.integers(SEEDS)), int(rng.integers(SEEDS)))
-
-
-def _drawn(rng: np.random.Generator, available: int, wanted: int) -> list[int]:
-    """Draws `wanted` numbers below `available`, without repetition if there are enough."""
-    if wanted == 1:
-        return [int(rng.integers(available))]
-    drawn = rng.choice(available, wanted, replace=wanted > available)
-    return [int(number) for number in drawn]

@@ -127,8 +127,10 @@ def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.u
         raise InvalidArgument(
             f"copies must be a list of numbers of copies or a mask of bools, got {copies!r}"
         )
-    if given.size and not 0 <= given.min() <= given.max() < len(everybody):
-        raise InvalidArgument(f"there are copies 0 to {len(everybody) - 1}, got {copies!r}")
+    if given.size:
+        low, high = (given[0],) * 2 if given.size == 1 else (given.min(), given.max())
+        if not 0 <= low <= high < len(everybody):
+            raise InvalidArgument(f"there are copies 0 to {len(everybody) - 1}, got {copies!r}")
     return np.ascontiguousarray(given, np.uint32)
 
 

@@ -14,7 +14,7 @@ from o80.hybrid.mirror import Motion
 from o80.hybrid.plan import Plan
 from o80.hybrid.rig import World, robot_of
 from o80.hybrid.sides import Side, desired_of
-from o80.hybrid.starts import Home, Starts
+from o80.hybrid.starts import BURST, Home, Starts
 from o80.hybrid.worlds import Worlds
 from o80.learning.task import Index
 from o80.robots.robot import Robot
@@ -34,11 +34,11 @@ class Copies:
         rig = plan.rig
         robot = robot_of(rig.robot)
         with ExitStack() as stack:
-            history = max(64, 2 * plan.iterations)
+            history = max(8 if home.place is None else BURST, 2 * plan.iterations)  # in the cache
             self._robots = self._group(
                 stack, robot, rig.frequency, history, threads, copies, rig.robot_options
             )
-            period = self._robots[0].period
+            self.period = period = self._robots[0].period
             world = World(rig, plan.folder, self._robots[0].schema, robot.name)
             worlds = self._group(
                 stack,
@@ -55,7 +55,6 @@ class Copies:
             self._stack = stack.pop_all()
         self.members, self.counts = (self._robots, worlds), self._worlds.counts
         self.first = desired_of(self._robots[0])
-        self.period = period
 
     def _prepare(self, plan: Plan, home: Home, copies: int) -> None:
         rig = plan.rig
@@ -64,7 +63,9 @@ class Copies:
             plan.iterations, targets, mode="overwrite", delay=0 if plan.chunk_size else rig.delay
         )
         self._both, self._all = self._worlds.after(self._burst), np.arange(copies)
+        self._targets, self._played = self._burst.targets, plan.iterations * self.period
         self.robot, self.world = Side(self._robots, self._burst.rows), self._worlds.side
+        self._worlds.feed(self._burst.rows)
         self._starts = Starts(self._robots, self.robot, copies, home)
         self.resets = self._starts.resets
         self._plans: list[Chunks] = []
@@ -96,13 +97,14 @@ class Copies:
     def reset(self, copies: Numbers, seeds: Sequence[tuple[int, int]]) -> None:
         """Resets robots and worlds, each world with the positions of its robot."""
         self._starts.begin(copies, [pair[0] for pair in seeds], self.period)
-        newest = with_padding(self._robots.latest(copies))
-        with_padding(self.robot.rows)[copies] = newest[:, np.newaxis]
-        self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot.last[copies])
+        if not self._starts.shows:
+            newest = with_padding(self._robots.latest(copies))
+            with_padding(self.robot.rows)[copies] = newest[:, np.newaxis]
+        self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot)
 
     def mirror(self, copies: Numbers) -> None:
         """Runs one iteration of these worlds, with the positions of their robots' newest rows."""
-        self._worlds.mirror(copies, self.robot.last[copies])
+        self._worlds.mirror(copies, self.robot)
 
     def step(
         self, targets: Any, copies: Index, until_halted: Callable[[], AbstractContextManager[None]]
@@ -114,10 +116,10 @@ class Copies:
                 seen = int(self.robot.last["iteration"][copy]) + self._delay
                 self._plans[copy].send(rows, seen=seen, fixed=True)
         else:
-            self._burst.targets[copies, 0] = targets
+            self._targets[copies, 0] = targets
         if self._both is not None:
             self._worlds.counts.steps += 1
-            self._worlds.counts.play += chosen.size * self._burst.rows.shape[1] * self.period
+            self._worlds.counts.play += chosen.size * self._played
             with until_halted():
                 self._both.run(copies)
             return

@@ -152,18 +152,35 @@ def _spread(
     )
 
 
+class Reader:
+    """Reads the numbers (..., numbers) of columns from rows (...), in double precision."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        runs = joined((column.dtype, column.offset, 1) for column in columns)
+        self._parts = [(np.dtype((kind, (count,))), offset) for kind, offset, count in runs]
+
+    def __call__(self, rows: NDArray[Any]) -> FloatArray:
+        parts = [rows.getfield(dtype, offset) for dtype, offset in self._parts]
+        if not parts:
+            return np.zeros((*rows.shape, 0))
+        return np.concatenate(parts, axis=-1, dtype=np.float64, casting="unsafe")
+
+
 class Motion:
     """Tracks positions and velocities of the mirrored numbers of n robots, from row to row."""
 
     def __init__(self, mirror: Mirror, pairs: Sequence[Pair], copies: int, schema: Any) -> None:
-        self._positions = [pair.position for pair in pairs]
-        self._velocities = [pair.velocity for pair in pairs if pair.velocity is not None]
+        self._positions = Reader([pair.position for pair in pairs])
+        self._velocities = Reader([pair.velocity for pair in pairs if pair.velocity is not None])
+        self._joints = len(pairs)
         self._named = [i for i, pair in enumerate(pairs) if pair.velocity is not None]
         self._fresh = None if mirror.fresh is None else columns_at(schema, mirror.fresh)[0]
         self._has_velocity = mirror.velocity is not None
         self._over = 0  # rows of a difference; 0: all velocities are read
         if self._has_velocity and len(self._named) < len(pairs):
             self._over = mirror.velocity.rows if isinstance(mirror.velocity, difference) else 3
+        self.tracks = bool(self._over or self._fresh)
+        """Whether a row depends on rows before."""
         self.paths: dict[str, str] | None = None
         """Paths in a row of numbers that are mirrored unchanged; None if some are computed."""
         dropped = isinstance(mirror.names, Mapping) and None in mirror.names.values()
@@ -179,32 +196,34 @@ class Motion:
         """Number of rows of all copies without a new reading."""
 
     def begin(self, copies: NDArray[np.intp], rows: NDArray[Any]) -> None:
-        """Begins episodes of these copies at these rows (n,)."""
+        """Begins episodes of these copies at these rows (n,). Not needed unless it `tracks`."""
         self.missed[copies], self._good[copies] = 0, 1
-        self._past[copies, -1] = read(rows, self._positions)
+        self._past[copies, -1] = self._positions(rows)
 
     def standing(self, rows: NDArray[Any]) -> tuple[FloatArray, FloatArray | None]:
         """Returns positions and velocities (n, 1, joints) of rows (n,) before an episode."""
-        positions = read(rows, self._positions)[:, np.newaxis]
+        positions = self._positions(rows)[:, np.newaxis]
         return positions, self._read_velocities(rows)[:, np.newaxis] if self._has_velocity else None
 
     def _read_velocities(self, rows: NDArray[Any]) -> FloatArray:
         """Reads velocities (..., joints) from rows (...): 0 where they are differences."""
-        velocities = np.zeros((*rows.shape, len(self._positions)))
-        velocities[..., self._named] = read(rows, self._velocities)
+        found = self._velocities(rows)
+        if len(self._named) == self._joints:
+            return found
+        velocities = np.zeros((*rows.shape, self._joints))
+        velocities[..., self._named] = found
         return velocities
 
     def follow(
         self, copies: NDArray[np.intp], rows: NDArray[Any], period: float
     ) -> tuple[FloatArray, FloatArray | None]:
         """Returns positions and velocities (n, iterations, joints) of rows (n, iterations)."""
-        positions = read(rows, self._positions)
+        positions = self._positions(rows)
         velocities = self._read_velocities(rows) if self._has_velocity else None
         fresh = None
         if self._fresh is not None:
             fresh = rows.getfield(self._fresh.dtype, self._fresh.offset).astype(bool)
-        if fresh is None and not self._over:
-            self._past[copies, -1] = positions[:, -1]
+        if not self.tracks:
             return positions, velocities
         for i in range(positions.shape[1]):
             self._follow_row(copies, positions[:, i], velocities, i, fresh, period)
@@ -238,12 +257,3 @@ class Motion:
         self._past[copies], self._good[copies] = past, good
         self.missed[copies] = np.where(lost, missed + 1, 0)
         self.all_missed += int(np.count_nonzero(lost))
-
-
-def read(rows: NDArray[Any], columns: Sequence[Column]) -> FloatArray:
-    """Reads the numbers (..., numbers) of these columns of rows (...), in double precision."""
-    runs = joined((column.dtype, column.offset, 1) for column in columns)
-    parts = [rows.getfield(np.dtype((kind, (count,))), at) for kind, at, count in runs]
-    if not parts:
-        return np.zeros((*rows.shape, 0))
-    return np.concatenate(parts, axis=-1, dtype=np.float64, casting="unsafe")

@@ -190,11 +190,11 @@ class Recorded:
     def reset(self, copies: NDArray[np.intp], seeds: Sequence[tuple[int, int]]) -> None:
         """Resets the worlds."""
         self.robot.rows[...] = self._rows(self._reset, 1)
-        self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot.last)
+        self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot)
 
     def mirror(self, copies: NDArray[np.intp]) -> None:
         """Runs one iteration of the worlds."""
-        self._worlds.mirror(copies, self.robot.last)
+        self._worlds.mirror(copies, self.robot)
 
     def rows_of_step(self) -> NDArray[Any]:
         """Returns the robot's rows (iterations,) of the next step."""

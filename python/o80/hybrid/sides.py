@@ -9,10 +9,12 @@ from numpy.typing import NDArray
 from o80.base.arrays import FloatArray
 from o80.base.errors import InvalidArgument
 from o80.frontend.frontend import Frontend
+from o80.groups.group_burst import GroupRequest
 from o80.groups.inline_group import InlineGroup
-from o80.hybrid.mirror import read
+from o80.hybrid.mirror import Reader
 from o80.learning.task import Index
 from o80.rows.columns import columns_at
+from o80.rows.layout import with_padding
 
 
 class Side:
@@ -29,6 +31,7 @@ class Side:
     ) -> None:
         """member: None for recorded rows. worlds: per robot, if numbers have this axis."""
         self._member, self._schema = member, schema
+        self._repeated: dict[str, tuple[GroupRequest, NDArray[Any]]] = {}
         self.worlds = worlds
         self.simulated = simulated
         """False for a world that is only read: a person must place the things of `begin`."""
@@ -37,6 +40,8 @@ class Side:
         them. After a reset all rows of a copy are its newest row."""
         self.last = rows[..., -1]
         """The newest rows, a view of `rows`."""
+        self._bytes = with_padding(rows)
+        self._flat = self._bytes.reshape(-1, rows.shape[-1])  # by the numbers of the group
 
     @property
     def schema(self) -> Mapping[str, Any]:
@@ -72,9 +77,38 @@ class Side:
         else:
             member.request(name, **fields)
 
+    def serves(self, request: str) -> bool:
+        """Returns whether the robot serves a request of this name."""
+        return any(each["name"] == request for each in self.schema["requests"])
+
+    def repeat(self, name: str, at: NDArray[np.intp], /, **fields: Any) -> None:
+        """Sends a request as `request`, quicker for groups; all rows are then the newest row.
+
+        fields: integers, one for all copies, or an array (n,), for worlds (n, worlds).
+        """
+        member = self._member
+        if not isinstance(member, InlineGroup):
+            self.request(name, at, **fields)
+            return
+        if name not in self._repeated:
+            request = member.prepared_request(name, **dict.fromkeys(fields, 0))
+            self._repeated[name] = request, with_padding(request.rows)[:, np.newaxis]
+        request, rows = self._repeated[name]
+        numbers = numbers_of_worlds(at, len(self._flat) // len(self._bytes))
+        for field, values in fields.items():
+            request.fields[field][numbers] = np.ravel(values)
+        request.run(numbers)
+        self._flat[numbers] = rows[numbers]
+
+    def newest(self, copies: NDArray[np.intp]) -> NDArray[Any]:
+        """Returns the newest rows (n,) or (n, worlds) of these copies, as a copy."""
+        return self._bytes[copies, ..., -1].view(self.rows.dtype)
+
 
 def numbers_of_worlds(copies: NDArray[np.intp], each: int) -> NDArray[np.intp]:
     """Returns the numbers of all worlds of these copies, within their group."""
+    if each == 1:
+        return copies
     return (np.asarray(copies)[:, np.newaxis] * each + np.arange(each)).ravel()
 
 
@@ -96,26 +130,25 @@ class Numbers:
             raise InvalidArgument(f"a list of paths is needed, such as ['{paths}']")
         self._side = side
         schema = side.schema
-        self._columns = [column for path in paths for column in columns_at(schema, _whole(path))]
-        self.names = [column.name for column in self._columns]
+        columns = [column for path in paths for column in columns_at(schema, _whole(path))]
+        self.names, self._read = [column.name for column in columns], Reader(columns)
 
     def __len__(self) -> int:
-        return len(self._columns)
+        return len(self.names)
 
     def read(self, at: Index) -> FloatArray:
         """Reads (n, numbers) of these copies, or (n, worlds, numbers)."""
         rows = self._side.last[at]
         if self._side.worlds is None and rows.ndim > 1:
             rows = rows[:, 0]
-        return read(rows, self._columns)
+        return self._read(rows)
 
 
 def desired_of(robot: Frontend) -> FloatArray:
     """Returns (actuators,), the first number of each desired state in the newest row."""
     names = [actuator["name"] for actuator in robot.schema["actuators"]]
     columns = [columns_at(robot.schema, f"desired.{name}")[0] for name in names]
-    numbers: FloatArray = read(robot.history(1).rows, columns)[0]
-    return numbers
+    return Reader(columns)(robot.history(1).rows)[0]  # type: ignore[no-any-return]
 
 
 def _whole(path: str) -> str:

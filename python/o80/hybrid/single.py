@@ -173,7 +173,7 @@ class Single:
             self._starts.begin(_ONLY, [robot_seed], self.period)
         self.robot.rows[...] = self._robot.history(1).rows
         self._row = self._reset_row = int(self.robot.last["iteration"][0])
-        self._worlds.reset(_ONLY, [world_seed], self.robot.last)
+        self._worlds.reset(_ONLY, [world_seed], self.robot)
         self.stalled, self.moved, self._begins = "", False, True
 
     @property
@@ -188,7 +188,7 @@ class Single:
 
     def mirror(self, _copies: NDArray[np.intp]) -> None:
         """Runs one iteration of the world, with the positions of the robot's newest row."""
-        self._worlds.mirror(_ONLY, self.robot.last, self._seen)
+        self._worlds.mirror(_ONLY, self.robot, self._seen)
 
     @property
     def _seen(self) -> _core.Seen | None:

@@ -1,22 +1,22 @@
 """Returns robots that are stepped to the start of an episode."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
 from o80.frontend.frontend import Frontend
 from o80.groups.inline_group import InlineGroup
-from o80.hybrid.mirror import read
+from o80.hybrid.mirror import Reader
 from o80.hybrid.sides import Side
 from o80.rows.columns import columns_at
 
 Numbers = NDArray[np.intp]
-_BURST = 20
+BURST = 20
 """Iterations of a burst on the way home: equal for each pacing, for equal bits."""
 
 
@@ -42,8 +42,9 @@ class Starts:
     def __init__(self, member: InlineGroup | Frontend, side: Side, copies: int, home: Home) -> None:
         self._member, self._side, self._home = member, side, home
         schema = side.schema
-        served = [request["name"] for request in schema["requests"]]
-        self.resets, self._restores = "reset" in served, "restore" in served
+        self.resets, self._restores = side.serves("reset"), side.serves("restore")
+        self.shows = self._restores if home.place is not None else self.resets
+        """Whether `begin` leaves the newest rows in `side`."""
         self._settled = np.zeros(copies, np.bool_)
         if home.place is None:
             return
@@ -52,25 +53,29 @@ class Starts:
                 f"home must have a number for each of the {len(schema['actuators'])} actuators, "
                 f"got {home.place!r}"
             )
-        self._burst: Any = member.prepared_burst(_BURST, mode="overwrite")
+        self._burst: Any = member.prepared_burst(BURST, mode="overwrite")
         self._burst.targets[...] = home.place
 
     def begin(self, copies: Numbers, seeds: Sequence[int], period: float) -> None:
         """Begins episodes of these copies. Raises InvalidArgument if one does not reach home."""
         if self._home.place is None:
-            reset(self._side, copies, seeds)
+            self._reset(copies, seeds)
             return
         away = copies[~self._settled[copies]]
         if away.size:
-            reset(self._side, away, [0] * len(away))
-            for _ in range(math.ceil(self._home.duration / period / _BURST)):
+            self._reset(away, [0] * len(away))
+            for _ in range(math.ceil(self._home.duration / period / BURST)):
                 self._run(away)
             self._check(away)
         if self._restores:
             if away.size:
                 self._side.request("snapshot", away, slot=0)
                 self._settled[away] = True
-            self._side.request("restore", copies, slot=0)
+            self._side.repeat("restore", copies, slot=0)
+
+    def _reset(self, copies: Numbers, seeds: Sequence[int]) -> None:
+        if self.resets:
+            self._side.repeat("reset", copies, seed=seeds)
 
     def _run(self, copies: Numbers) -> None:
         if isinstance(self._member, InlineGroup):
@@ -80,7 +85,7 @@ class Starts:
 
     def _check(self, copies: Numbers) -> None:
         rows = self._burst.rows[copies] if self._burst.rows.ndim > 1 else self._burst.rows[None]
-        there = read(rows[:, -1], columns_at(self._side.schema, "observed"))
+        there = Reader(columns_at(self._side.schema, "observed"))(rows[:, -1])
         wanted = np.asarray(self._home.place)
         if there.shape[1:] != wanted.shape:
             return  # states of several numbers
@@ -91,10 +96,3 @@ class Starts:
                 f"{self._home.duration:g} s: give a longer home_duration, or a larger "
                 "home_tolerance"
             )
-
-
-def reset(side: Side, copies: Numbers, seeds: ArrayLike) -> None:
-    """Sends the request reset, if the robot serves it."""
-    schema: Mapping[str, Any] = side.schema
-    if any(request["name"] == "reset" for request in schema["requests"]):
-        side.request("reset", copies, seed=seeds)

@@ -35,10 +35,11 @@ class Tracked:
         plain = Mirror(mirror.position, fresh=mirror.fresh)
         self.motion = Motion(plain, pairs, 1, robot.schema)
 
-    def reset(self, copies: NDArray[np.intp], _seeds: Sequence[int], rows: NDArray[Any]) -> None:
-        """Begins an episode at this row of the robot. Raises BackendGone for a dead tracker."""
+    def reset(self, copies: NDArray[np.intp], _seeds: Sequence[int], robot: Side) -> None:
+        """Begins an episode at the robot's newest row. Raises BackendGone for a dead tracker."""
         self.member.wait_for(self.member.published + 1, timeout=TIMEOUT)
-        self.motion.begin(copies, rows)
+        if self.motion.tracks:
+            self.motion.begin(copies, robot.newest(copies))
 
     def feed(self, _rows: NDArray[Any]) -> None:
         """Does nothing: `follow` gets all rows."""
@@ -46,9 +47,9 @@ class Tracked:
     def see_newest(self) -> None:
         """Does nothing: the newest row is that of the last step."""
 
-    def mirror(self, _copies: NDArray[np.intp], rows: NDArray[Any], _seen: object = None) -> None:
-        """Selects the row for this row of the robot."""
-        self.side.rows[...] = self._beside(rows)[-1]
+    def mirror(self, _copies: NDArray[np.intp], robot: Side, _seen: object = None) -> None:
+        """Selects the row for the robot's newest row."""
+        self.side.rows[...] = self._beside(robot.last)[-1]
 
     def follow(
         self, copies: NDArray[np.intp], rows: NDArray[Any], period: float, _seen: object = None

@@ -12,17 +12,15 @@ from numpy.typing import NDArray
 import o80._core as _core
 from o80.base.errors import CopyFailed, InvalidArgument
 from o80.frontend.frontend import Frontend
-from o80.frontend.prepared_burst import BurstArrays
 from o80.groups.group_burst import GroupBurst
 from o80.groups.inline_group import InlineGroup
 from o80.hybrid.mirror import Motion
 from o80.hybrid.rig import World
 from o80.hybrid.sides import Side, numbers_of_worlds
-from o80.hybrid.starts import reset
 from o80.rows.layout import field_view, with_padding
 
 Numbers = NDArray[np.intp]
-Feeds = list[tuple[NDArray[Any], NDArray[Any]]]
+Feeds = list[tuple[Sequence[NDArray[Any]], NDArray[Any]]]
 TIMEOUT = 20.0
 """Longest wait for a row [s]."""
 
@@ -73,9 +71,12 @@ class Worlds:
         self._follow: Any = member.prepared_burst(iterations, world.joints, steps=iterations)
         self._one: Any = member.prepared_burst(1, world.joints)
         self._shape = copies, self._each
+        self._targets = [self._by_copy(burst.targets) for burst in (self._one, self._follow)]
         self._first = with_padding(self._by_copy(self._one.rows))
+        self._rows = with_padding(self._by_copy(self._follow.rows))
         self._feeds: Feeds = []
         self.side = Side(member, self._by_copy(self._follow.rows), each)
+        self._resets = self.side.serves("reset")
         self.motion, self.counts = motion, Counts()
 
     def _by_copy(self, array: NDArray[Any]) -> NDArray[Any]:
@@ -83,20 +84,27 @@ class Worlds:
         shape = array.shape[1:] if isinstance(self.member, InlineGroup) else array.shape
         return array.reshape(*self._shape, *shape)
 
-    def reset(self, copies: Numbers, seeds: Sequence[int], rows: NDArray[Any]) -> None:
-        """Resets the worlds of these copies; episodes begin at these rows (n,) of robots.
+    def reset(self, copies: Numbers, seeds: Sequence[int], robots: Side) -> None:
+        """Resets the worlds of these copies; episodes begin at the newest rows of robots.
 
         World j of a copy gets the seed of the copy + j.
         """
-        own = (np.array(seeds)[:, np.newaxis] + np.arange(self._each)) % 2**32
-        reset(self.side, copies, own)
-        self.motion.begin(copies, rows)
+        own: Any = seeds
+        if self._each > 1:
+            own = (np.array(seeds)[:, np.newaxis] + np.arange(self._each)) % 2**32
+        if self._resets:
+            self.side.repeat("reset", copies, seed=own)
+        if self.motion.tracks:
+            self.motion.begin(copies, robots.newest(copies))
 
-    def mirror(self, copies: Numbers, rows: NDArray[Any], seen: _core.Seen | None = None) -> None:
-        """Runs one iteration of these worlds, with the positions in rows (n,) of their robots."""
-        self._put(self._one, copies, *self.motion.standing(rows))
+    def mirror(self, copies: Numbers, robots: Side, seen: _core.Seen | None = None) -> None:
+        """Runs one iteration of these worlds, with the positions in the newest rows of robots."""
+        for targets, numbers in self._feeds:
+            targets[0][copies] = numbers[copies, :, -1:]
+        if not self._feeds:
+            self._put(self._targets[0], copies, *self.motion.standing(robots.newest(copies)))
         self._run(self._one, copies, seen)
-        with_padding(self.side.rows)[copies] = self._first[copies]
+        self._rows[copies] = self._first[copies]
 
     def follow(
         self, copies: Numbers, rows: NDArray[Any], period: float, seen: _core.Seen | None = None
@@ -106,23 +114,25 @@ class Worlds:
         counts.steps += 1
         counts.play += rows.size * period
         for targets, numbers in self._feeds:
-            targets[...] = numbers
+            targets[1][...] = numbers
         if not self._feeds:
-            self._put(self._follow, copies, *self.motion.follow(copies, rows, period))
+            self._put(self._targets[1], copies, *self.motion.follow(copies, rows, period))
             counts.missed = self.motion.all_missed
         self._run(self._follow, copies, seen)
         counts.world_time += (time.monotonic() - begun - counts.world_time) / counts.steps
 
     def feed(self, rows: NDArray[Any]) -> None:
-        """Makes `follow` read these rows (copies, iterations) of robots, always the same memory."""
-        targets = self._by_copy(self._follow.targets)
+        """Makes `mirror` and `follow` read these rows (copies, iterations) of robots, always the
+        same memory.
+        """
         feeds: Feeds = []
         with suppress(InvalidArgument):
             for name, path in (self.motion.paths or {}).items():
                 numbers = field_view(rows, path)[:, np.newaxis]
-                if numbers.shape[-1] != targets.shape[-1]:
+                if numbers.shape[-1] != self._targets[0].shape[-1]:
                     return  # states of several numbers
-                feeds.append((targets[name] if self._named else targets, numbers))
+                targets = [each[name] if self._named else each for each in self._targets]
+                feeds.append((targets, numbers))
             self._feeds = feeds
 
     def see_newest(self) -> None:
@@ -142,8 +152,7 @@ class Worlds:
         except InvalidArgument:
             return None
 
-    def _put(self, burst: BurstArrays, copies: Numbers, positions: Any, velocities: Any) -> None:
-        targets = self._by_copy(burst.targets)
+    def _put(self, targets: NDArray[Any], copies: Numbers, positions: Any, velocities: Any) -> None:
         if not self._named:
             targets[copies] = positions[:, np.newaxis]
             return

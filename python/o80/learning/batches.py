@@ -33,10 +33,11 @@ def put(batch: Any, copies: Index, values: Any) -> None:
 
 def fresh(space: Space[Any], values: Any) -> Any:
     """Copies values into the types of `space`. Raises InvalidArgument for another shape."""
-    if isinstance(space, spaces.Dict):
-        return {name: fresh(each, values[name]) for name, each in space.items()}
-    if isinstance(space, spaces.Tuple):
-        return tuple(fresh(each, value) for each, value in zip(space, values, strict=True))
+    if not isinstance(space, spaces.Box):  # seldom: the two questions below are slow
+        if isinstance(space, spaces.Dict):
+            return {name: fresh(each, values[name]) for name, each in space.items()}
+        if isinstance(space, spaces.Tuple):
+            return tuple(fresh(each, value) for each, value in zip(space, values, strict=True))
     made = np.array(values, space.dtype)
     if made.shape[1:] != space.shape:
         raise InvalidArgument(
@@ -48,13 +49,16 @@ def fresh(space: Space[Any], values: Any) -> Any:
 
 def checked_actions(space: Space[Any], actions: Any, copies: int) -> Any:
     """Converts actions of all copies to arrays. Raises InvalidArgument for a wrong shape."""
-    if isinstance(space, spaces.Dict):
-        return {name: checked_actions(each, actions[name], copies) for name, each in space.items()}
-    if isinstance(space, spaces.Tuple):
-        return tuple(
-            checked_actions(each, action, copies)
-            for each, action in zip(space, actions, strict=True)
-        )
+    if not isinstance(space, spaces.Box):
+        if isinstance(space, spaces.Dict):
+            return {
+                name: checked_actions(each, actions[name], copies) for name, each in space.items()
+            }
+        if isinstance(space, spaces.Tuple):
+            return tuple(
+                checked_actions(each, action, copies)
+                for each, action in zip(space, actions, strict=True)
+            )
     given = np.asarray(actions)
     if given.shape != (copies, *(space.shape or ())):
         raise InvalidArgument(

@@ -1,7 +1,6 @@
 """Runs the parts of a step and of a reset in order, for one copy and for many."""
 
 from collections.abc import Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass
 from typing import Any
 
@@ -86,7 +85,7 @@ def step(task: Task, actions: Any, copies: Index) -> Stepped:
         judged,
         judged_info,
         halted,
-        {"halt": [task.halts[copy] for copy in halted.tolist()]},
+        {"halt": [task.halts[copy] for copy in halted.tolist()]} if halted.size else {},
     )
 
 
@@ -101,7 +100,10 @@ def no_step(task: Task) -> Stepped:
 def _carried_out(task: Task, actions: Any, copies: Index) -> NDArray[np.intp]:
     """Runs a step; returns the numbers of its copies that are halted afterwards."""
     # with one copy an incomplete step affects no other copy
-    with task.until_halted() if task.copies == 1 else nullcontext():
+    if task.copies == 1:
+        with task.until_halted():
+            task.step(actions, copies)
+    else:
         task.step(actions, copies)
     task.halts = halts = halts_of(task.robots, task.copies)
     if not halts:

@@ -45,7 +45,8 @@ def resume(
         each = max(1, robot.copies // of) if isinstance(robot, InlineGroup) else 1
         try:
             if isinstance(robot, InlineGroup):
-                robot.resume((copies[:, np.newaxis] * each + np.arange(each)).ravel())
+                if robot.halted:
+                    robot.resume((copies[:, np.newaxis] * each + np.arange(each)).ravel())
             else:
                 _resume(robot, resumes)
         except CopyFailed as failed:

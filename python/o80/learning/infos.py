@@ -4,6 +4,7 @@ The result equals that of Gymnasium's `VectorEnv._add_info` for infos of single 
 """
 
 from collections.abc import Mapping
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,8 @@ def add(infos: Info, values: Mapping[str, Any], copies: Index, count: int) -> No
         # the usual case: it happens in every step
         _add_all(infos, values, count)
         return
+    mask = np.zeros(count, np.bool_)
+    mask[copies] = True
     for name, value in values.items():
         there = infos.get(name)
         if type(value) is not np.ndarray and isinstance(value, Mapping):
@@ -30,18 +33,17 @@ def add(infos: Info, values: Mapping[str, Any], copies: Index, count: int) -> No
             if there is None:
                 there = _empty(array, count)
             there[copies] = array
-        mask = infos.get(f"_{name}")
-        if mask is None:
-            mask = np.zeros(count, np.bool_)
-        mask[copies] = True
-        infos[name], infos[f"_{name}"] = there, mask
+        infos[name] = there
+        known = infos.get("_" + name)
+        infos["_" + name] = mask.copy() if known is None else known | mask
 
 
 def _add_all(infos: Info, values: Mapping[str, Any], count: int) -> None:
     """Adds values of all copies to an empty info."""
-    masks = np.ones((len(values), count), np.bool_)
-    for mask, (name, value) in zip(masks, values.items(), strict=True):
-        if type(value) is np.ndarray and value.dtype.kind != "U" and value.shape[:1] == (count,):
+    masks = iter(_masks(len(values), count).copy())
+    for name, value in values.items():
+        plain = type(value) is np.ndarray and value.dtype.char != "U" and value.ndim
+        if plain and len(value) == count:
             infos[name] = value.copy()
         elif isinstance(value, Mapping):
             infos[name] = nested = Info()
@@ -50,7 +52,12 @@ def _add_all(infos: Info, values: Mapping[str, Any], count: int) -> None:
             array = _array(value)
             infos[name] = there = _empty(array, count)
             there[...] = array
-        infos[f"_{name}"] = mask
+        infos["_" + name] = next(masks)
+
+
+@lru_cache
+def _masks(names: int, count: int) -> NDArray[np.bool_]:
+    return np.ones((names, count), np.bool_)
 
 
 def add_split(
@@ -108,7 +115,7 @@ def _array(value: Any) -> NDArray[Any]:
 
 def _empty(like: NDArray[Any], count: int) -> NDArray[Any]:
     shape = count, *like.shape[1:]
-    return np.full(shape, None, object) if like.dtype == object else np.zeros(shape, like.dtype)
+    return np.zeros(shape, like.dtype) if like.dtype != object else np.empty(shape, object)  # None
 
 
 def _first(array: NDArray[Any]) -> Any:

@@ -170,14 +170,16 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
 
     def _step_others(self, actions: Any, beginning: Numbers, info: infos.Info) -> StepResult:
         """Steps all copies except some, which begin an episode instead."""
-        stepping = np.delete(self._everybody, beginning)
+        others = np.ones(self.num_envs, np.bool_)
+        others[beginning] = False
+        stepping = others.nonzero()[0]
         if stepping.size:
             stepped = episodes.step(self.task, rows(actions, stepping), stepping)
             put(self._observations, stepping, stepped.observations)
             self._report(stepped, stepping, info)
         else:
             stepped = episodes.no_step(self.task)
-        self._ended = np.flatnonzero(stepped.terminated | stepped.truncated)
+        self._ended = (stepped.terminated | stepped.truncated).nonzero()[0]
         self._begin(beginning, {}, info, _NOBODY)
         return self._result(stepped, info)
 

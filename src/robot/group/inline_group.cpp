@@ -159,6 +159,7 @@ BackendOptions InlineGroup::default_options() {
 InlineGroup::InlineGroup(const RobotTable& table, const OptionValues& options, const Options& group,
                          const KeepWaiting& keep_waiting)
     : name_(table.name),
+      halted_(std::make_shared<std::vector<std::atomic<bool>>>(group.copies)),
       otherwise_(keep_waiting),
       may_continue_([this] { return may_continue(); }),
       pool_(group.sharing != nullptr ? group.sharing->pool_
@@ -183,7 +184,8 @@ void InlineGroup::add_copy(const RobotTable& table, const OptionValues& options,
   own.segment = name_ + "[" + std::to_string(copies_.size()) + "]";
   own.anonymous = true;
   copies_.push_back(std::make_unique<Copy>(std::make_shared<InlineRobot>(
-      std::make_unique<DriverInstance>(table, options), std::move(own), may_continue_)));
+      std::make_unique<DriverInstance>(table, options), std::move(own), may_continue_,
+      std::shared_ptr<std::atomic<bool>>(halted_, &(*halted_)[copies_.size()]))));
   const auto schema_of = [](const Copy& copy) { return copy.frontend.link()->segment.schema(); };
   if (!std::ranges::equal(schema_of(*copies_.back()), schema_of(*copies_.front()))) {
     throw DriverError("copy " + std::to_string(copies_.size() - 1) + " of '" + name_ +
@@ -217,6 +219,7 @@ std::shared_ptr<UntypedFrontend> InlineGroup::attach(std::size_t copy) const {
 void InlineGroup::publish_as(std::size_t copy, const std::string& name) {
   const Call call(*this);
   at(copy).robot->publish_as(name);
+  published_ = true;
 }
 
 InlineGroup::Copy& InlineGroup::at(std::size_t copy) const {
@@ -516,9 +519,16 @@ void InlineGroup::throw_unless_completed(std::uint32_t request, const Batch& bat
   throw Error(text);
 }
 
+/// False if certainly no copy is halted. Reads no segment: those of other threads are not cached.
+bool InlineGroup::may_be_halted() const noexcept {
+  return published_ ||
+         std::ranges::any_of(*halted_, [](const std::atomic<bool>& each) { return each.load(); });
+}
+
 std::vector<std::pair<std::size_t, Halt>> InlineGroup::halted() const {
   check_usable();
   std::vector<std::pair<std::size_t, Halt>> found;
+  if (!may_be_halted()) return found;
   for (std::size_t i = 0; i < copies_.size(); ++i) {
     if (const std::optional<Halt> halt = copies_[i]->frontend.halted())
       found.emplace_back(i, *halt);

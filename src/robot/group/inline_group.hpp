@@ -134,7 +134,8 @@ class InlineGroup {
   void request(std::uint32_t request, std::span<const std::uint32_t> chosen,
                std::span<const std::byte> payloads, Timeout timeout = {},
                const KeepWaiting& keep_waiting = {}, std::span<std::byte> rows = {});
-  /// The halts that are in force or requested, by copy.
+  /// The halts that are in force or requested, by copy. One that a thread of a driver has requested
+  /// since the last iteration of its copy is in force, and seen, from the next one on.
   std::vector<std::pair<std::size_t, Halt>> halted() const;
   /// Ends the halts of the chosen copies: each runs until it is at rest, then starts afresh where
   /// it is. A copy that is not halted does nothing. Throws as burst(); a resume that is refused is
@@ -161,6 +162,7 @@ class InlineGroup {
   void add_copy(const RobotTable& table, const OptionValues& options,
                 const BackendOptions& backend);
   Copy& at(std::size_t copy) const;
+  bool may_be_halted() const noexcept;
   bool runs_here() const noexcept;
   bool may_continue();
   void poll() noexcept;
@@ -181,6 +183,9 @@ class InlineGroup {
 
   std::string name_;
   std::vector<std::unique_ptr<Copy>> copies_;
+  // by copy, after its last iteration; robots may outlive the group
+  std::shared_ptr<std::vector<std::atomic<bool>>> halted_;
+  bool published_ = false;  // a copy has a name: other processes may halt it
   RowGather gather_;
   Gathered gathered_;
   KeepWaiting otherwise_;     // asked in bursts that are no call of the group

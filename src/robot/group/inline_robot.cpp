@@ -42,6 +42,7 @@ class InlineRobot::Turn {
   Turn& operator=(Turn&&) = delete;
   ~Turn() {
     robot_.runner_.store(std::thread::id(), std::memory_order_relaxed);
+    robot_.show_halt();
     if (robot_.turn_.exchange(0, std::memory_order_release) == 2) {  // sync turn
       futex_wake(robot_.turn_, 1);
     }
@@ -52,11 +53,19 @@ class InlineRobot::Turn {
 };
 
 InlineRobot::InlineRobot(std::unique_ptr<DriverInstance> robot, BackendOptions options,
-                         KeepWaiting keep_waiting)
+                         KeepWaiting keep_waiting, std::shared_ptr<std::atomic<bool>> halted)
     : keep_waiting_(std::move(keep_waiting)),
+      halted_(std::move(halted)),
       at_once_(keep_waiting_ ? 1 : kMaxAtOnce),
       loop_(std::move(robot), bursting(std::move(options))) {
   loop_.start();
+  show_halt();
+}
+
+void InlineRobot::show_halt() noexcept {
+  if (!halted_) return;
+  const bool halted = loop_.backend().halted().number != 0;
+  if (*halted_ != halted) *halted_ = halted;  // seldom written: a group reads those of all copies
 }
 
 void InlineRobot::run() {

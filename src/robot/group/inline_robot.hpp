@@ -22,9 +22,10 @@ namespace o80 {
 class InlineRobot final : public InlineRunner {
  public:
   /// Starts the robot. `keep_waiting` is called about every 50 ms of a burst; if it returns false
-  /// or throws, the rest of the burst is cancelled. Throws as Loop.
+  /// or throws, the rest of the burst is cancelled. `halted`, if any, tells after each run whether
+  /// a halt is in force. Throws as Loop.
   InlineRobot(std::unique_ptr<DriverInstance> robot, BackendOptions options,
-              KeepWaiting keep_waiting = {});
+              KeepWaiting keep_waiting = {}, std::shared_ptr<std::atomic<bool>> halted = {});
 
   /// Runs granted iterations; threads take turns. Throws DriverError, and Closed after `stop`.
   void run() override;
@@ -48,12 +49,14 @@ class InlineRobot final : public InlineRunner {
   class Turn;
   void poll();
   void throw_if_ended(Step step);
+  void show_halt() noexcept;
 
   std::atomic<std::uint32_t> turn_{0};     // futex lock of Turn: 0 free, 1 held, 2 contended
   std::atomic<std::thread::id> runner_{};  // the thread that runs iterations
   std::atomic<bool> stopping_{false};
   ForkGuard guard_;
   KeepWaiting keep_waiting_;
+  std::shared_ptr<std::atomic<bool>> halted_;
   std::int64_t poll_at_ = 0;    // time of the next call of `keep_waiting` [ns]
   std::int64_t polled_at_ = 0;  // time of the last read of the clock [ns]
   std::uint32_t at_once_;       // iterations between reads of the clock

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from enum import Enum
 from itertools import pairwise
 
-from ..physics.prediction import BOUNCED, STATE, TIME, flight_nodes
+from ..physics.prediction import BOUNCED, STATE, STEP, TIME, flight_nodes
 from ..world.arm import FOREARM, SHOULDER, UPPER_ARM
 from ..world.ball import BALL_RADIUS
 from ..world.table import NET_HEIGHT, TABLE
@@ -16,7 +16,8 @@ REACH = UPPER_ARM + FOREARM + 0.063
 """Largest distance of a playable ball from the shoulder [m]: the recorded shots of the ball gun can
 all be returned, and pass it at 0.51 to 0.79 m; the blade reaches 0.094 m beyond its centre."""
 DURATION = 2.0
-"""Time after which a flight counts as out of reach [s]."""
+"""Time after which a flight counts as out of reach [s]; most are decided by `USUAL`."""
+USUAL = 0.9
 PASSED = -0.8
 """Largest y of a ball that has passed the arm [m]."""
 
@@ -36,9 +37,11 @@ class Verdict(Enum):
     OUT_OF_REACH = "it does not come within reach"
 
 
-def verdict(launch: Launch) -> Verdict:
+def verdict(launch: Launch, duration: float = USUAL) -> Verdict:
     """Judges a shot by its predicted flight until it comes within reach."""
-    nodes = flight_nodes(launch.position, launch.velocity, launch.spin, DURATION)
+    nodes = flight_nodes(launch.position, launch.velocity, launch.spin, duration)
+    if duration < DURATION:  # the last step may be shorter than in the whole flight
+        nodes = nodes[nodes[:, TIME] <= duration - STEP]
     bounced = False
     for before, after in pairwise(nodes.tolist()):
         if after[BOUNCED]:
@@ -56,6 +59,9 @@ def verdict(launch: Launch) -> Verdict:
             return Verdict.NO_BOUNCE
         if after[_Y] < PASSED:
             break
+    else:
+        if duration < DURATION:
+            return verdict(launch, DURATION)
     return Verdict.OUT_OF_REACH if bounced else Verdict.NO_BOUNCE
 
 

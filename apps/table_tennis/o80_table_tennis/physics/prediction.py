@@ -80,7 +80,7 @@ def flight_nodes(
 
     A bounce gives two states of the same time, before and after; the second one is marked.
     """
-    ball = np.array([*position, *velocity, *spin], np.float64)
+    ball = np.concatenate((position, velocity, spin), dtype=np.float64)
     if not np.isfinite(ball).all():
         raise ValueError(f"position {position} and velocity {velocity} must be finite")
     on = None if table is None else platform(table)

@@ -44,7 +44,8 @@ class RigRows:
         self.desired, self.observed = arms["desired"], arms["observed"]
         """(N, 8) raw pressures: desired, and in the muscles."""
         flat = worlds.reshape(-1)
-        self._iteration = flat["iteration"][:1]
+        self.iteration: NDArray[np.int64] = flat["iteration"][:1]
+        """(1,) of the first world"""
         self.balls: FloatArray = field_view(flat, "observed.balls")[:, :SEEN_NUMBERS]
         """(N * worlds, 6) position [m] and velocity [m/s]"""
         assert np.shares_memory(self.balls, worlds)
@@ -53,11 +54,6 @@ class RigRows:
         self.read_records: Callable[[], BallRecord] = BallRecords(self.records).read
         """Reads the records of all balls."""
         self._muscles = [actuator.name for actuator in arm.actuators]
-
-    @property
-    def iteration(self) -> int:
-        """Iteration of the first world."""
-        return int(self._iteration.item())
 
     def gather(
         self,

@@ -49,7 +49,9 @@ class State:
         return self.motion[..., JOINTS:]
 
     def at(self, index: Any) -> State:
-        """Selects some of N episodes by an index or a mask (N,)."""
+        """Selects some of N episodes by an index or a mask (N,); one of them as views."""
+        if isinstance(index, np.ndarray) and index.size == 1 and index.dtype != np.bool_:
+            index = slice(int(index[0]), int(index[0]) + 1)
         names = [name for name in self.__slots__ if name not in ("steps", "record")]
         arrays = {name: getattr(self, name)[index] for name in names}
         return State(np.asarray(self.steps)[index], record=self.record.at(index), **arrays)
