@@ -9,10 +9,8 @@ python -m o80.learning evaluate build/training --task examples/hybrid_push/track
     --copies 1 --option pacing=real_time --option attach=arm
 """
 
-import sys
 from dataclasses import dataclass, replace
 from enum import IntEnum
-from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
@@ -20,9 +18,7 @@ import numpy as np
 import o80
 from o80.drivers import Reading
 from o80.hybrid import Index, attach
-
-sys.path.insert(0, str(Path(__file__).parent))
-from push import Push
+from o80_arms.push import Push
 
 NOISE = {"tip": 0.001, "puck_place": 0.001, "puck_velocity": 0.005}  # [m], [m], [m/s]
 LATE = 1  # delay in rows of the arm; up to a row of the tracker is added
@@ -57,7 +53,7 @@ class Tracker:
         self.arm = o80.Frontend(self.config.arm, read_only=True)
         options = {
             "model": self.arm.schema["model"]["file"],
-            "things": Path(__file__).with_name("puck.xml"),
+            "things": Push.rig.things,
         }
         self.world = o80.robots.load("mujoco").inline(frequency=1 / self.arm.period, **options)
         self.row = self.arm.latest().iteration

@@ -216,12 +216,12 @@ CEILINGS = {
     "devices": (8_852, 4_500),
     "gateways/lerobot": (530, 690),
     "gateways/ros2": (904, 955),
-    "robots/arms": (4_420, 3_142),
+    "robots/arms": (4_563, 3_153),
     "robots/pam, robots/two_joints": (2_108, 1_184),
     "simulators/mujoco": (5_372, 4_686),
     "apps/table_tennis": (8_400, 4_409),
     "benchmarks, tools": (4_384, 0),
-    "examples": (2_082, 0),
+    "examples": (1_985, 0),
     "tests, conftest.py": (0, 61_699),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""

