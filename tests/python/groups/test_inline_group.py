@@ -259,6 +259,25 @@ def test_refuses_wrong_arguments(group: o80.InlineGroup) -> None:
             pickle.dumps(thing)
 
 
+def test_knows_each_halt_of_a_copy(group: o80.InlineGroup) -> None:
+    def halted() -> set[int]:
+        assert {i for i in range(len(group)) if group[i].halted} == {*group.halted}
+        return {*group.halted}
+
+    assert halted() == set()
+    group[1].halt("by a frontend of the copy")
+    assert halted() == {1}
+    group.resume()
+    name = f"test-{os.getpid()}-copy"
+    group.publish(3, name)
+    assert halted() == set()
+    with o80.Frontend(name) as other:  # as another process would
+        other.halt("by another frontend")
+    assert halted() == {3}, "before the copy runs again"
+    group.resume([3])
+    assert halted() == set()
+
+
 def test_a_group_that_is_never_closed_is_warned_about_and_stopped() -> None:
     held = [o80.robots.load("two_joints").inline(copies=2)]
     held[0].publish(0, "forgotten")
