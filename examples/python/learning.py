@@ -23,12 +23,12 @@ class Reach(GroupTask):
             observation_space=Box(-3, 3, (4,), np.float32),
             action_space=Box(-1, 1, (2,), np.float32),
             max_steps=50,
+            reset=group.prepared_request("reset"),
         )
         self.goals = np.zeros((copies, 2))
 
     def begin(self, copies: Any, generators: Sequence[np.random.Generator], options: Any) -> None:
         self.goals[copies] = [generator.uniform(-1, 1, 2) for generator in generators]
-        self.group.request("reset", copies=copies)
 
     def observe(self, copies: Index) -> Any:
         return np.hstack([self.seen.observations[copies], self.goals[copies]])

@@ -122,12 +122,17 @@ class Group {
     const Waiting waiting;
     group_->publish_as(copy, name);
   }
-  void burst(const PreparedBurst& burst, nb::handle copies, nb::handle timeout) const {
+  /// `instead`: for each copy of the group whether it runs a request; `payloads`: for each copy.
+  void burst(const PreparedBurst& burst, nb::handle copies, nb::handle timeout, nb::handle instead,
+             std::uint32_t request, nb::handle payloads) const {
     const Bytes chosen(copies);
+    const Bytes others(instead);
+    const Bytes given(payloads);
     const o80::Timeout patience = timeout_of(timeout);
     const auto group = group_;
     const Waiting waiting;
-    group->burst(burst.plan(), numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting);
+    group->burst(burst.plan(), numbers_of<std::uint32_t>(chosen), patience, kKeepWaiting,
+                 {numbers_of<std::uint8_t>(others), request, given.span()});
   }
   /// The bytes of requests with these fields, one after the other. `each`: a mapping for each.
   nb::bytes payloads(std::uint32_t request, const std::vector<nb::object>& each) const {
@@ -258,7 +263,8 @@ void bind_inline_group(nb::module_& m) {
       .def("publish", &Group::publish, "copy"_a, "name"_a)
       .def("check",
            [](const Group& self, const PreparedBurst& given) { self.inner().check(given.plan()); })
-      .def("burst", &Group::burst, "burst"_a, "copies"_a, "timeout"_a.none())
+      .def("burst", &Group::burst, "burst"_a, "copies"_a, "timeout"_a.none(),
+           "instead"_a = nb::bytes("", 0), "request"_a = 0, "payloads"_a = nb::bytes("", 0))
       .def("payloads", &Group::payloads, "request"_a, "each"_a)
       .def("request_index", &Group::request_index, "name"_a)
       .def("request", &Group::request, "request"_a, "copies"_a, "payloads"_a, "rows"_a,

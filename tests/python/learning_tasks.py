@@ -16,7 +16,14 @@ class Reach(GroupTask):
 
     metadata = {"render_modes": ["rgb_array"], "render_fps": 50}  # noqa: RUF012
 
-    def __init__(self, copies: int = 1, threads: int | None = None, max_steps: int = 9) -> None:
+    def __init__(
+        self,
+        copies: int = 1,
+        threads: int | None = None,
+        max_steps: int = 9,
+        *,
+        joined: bool = False,
+    ) -> None:
         group = o80.robots.load("two_joints").inline(copies=copies, threads=threads, gain=60.0)
         super().__init__(
             group,
@@ -28,6 +35,7 @@ class Reach(GroupTask):
             observation_space=Box(-9, 9, (6,), np.float32),
             action_space=Box(-1, 1, (4,), np.float32),
             max_steps=max_steps,
+            reset=group.prepared_request("reset", seed=3) if joined else None,
         )
         self.goals = np.zeros((copies, 2))
         self.generators: list[Any] = [None] * copies
@@ -41,7 +49,8 @@ class Reach(GroupTask):
         for copy, generator in zip(copies.tolist(), generators, strict=True):
             self.generators[copy] = generator
             self.goals[copy] = options.get("goal", generator.uniform(-1, 1, 2))
-        self.group.request("reset", copies=copies, seed=[3] * len(copies))
+        if self.reset is None:
+            self.group.request("reset", copies=copies, seed=[3] * len(copies))
 
     def observe(self, copies: Index) -> Any:
         seen = self.seen.observations[copies]
@@ -68,6 +77,13 @@ class Reach(GroupTask):
 
     def render(self, copy: int) -> Any:
         return np.full((2, 3, 3), self.steps[copy], np.uint8)
+
+
+class Joined(Reach):
+    """Reach whose episodes begin in the call of the burst of the other copies."""
+
+    def __init__(self, copies: int = 1, threads: int | None = None) -> None:
+        super().__init__(copies, threads, max_steps=6, joined=True)
 
 
 class Goal(Reach):

@@ -33,10 +33,18 @@ class GroupBurst(BurstArrays):
         self._group, self._everybody, self._all = group, everybody, everybody.view(np.uint8)
         group.check(self._compiled)
 
-    def run(self, copies: Copies = None, *, timeout: float | None = None) -> None:
+    def run(
+        self,
+        copies: Copies = None,
+        *,
+        instead: "tuple[Copies, GroupRequest] | None" = None,
+        timeout: float | None = None,
+    ) -> None:
         """Sends the targets, with all else that was added, and bursts; fills `rows`.
 
         copies: numbers of the copies that run, a slice, or a mask (None: all).
+        instead: some of these copies, and a request that they run instead in the same call, such
+            as a reset; all their rows are then their newest row.
         timeout: for all copies together [s].
 
         Raises CopyFailed with the exception of each copy that failed (for example targets that the
@@ -47,7 +55,18 @@ class GroupBurst(BurstArrays):
         chosen = self._all
         if copies is not None:
             chosen = chosen_copies(copies, self._everybody).view(np.uint8)
-        self._group.burst(self._compiled, chosen, timeout)
+        if instead is None:
+            self._group.burst(self._compiled, chosen, timeout)
+            return
+        others, request = instead
+        if not (isinstance(others, np.ndarray) and others.dtype == np.bool_):
+            numbers = chosen_copies(others, self._everybody)
+            others = np.zeros(len(self._everybody), np.bool_)
+            others[numbers] = True
+        if request._group is not self._group:
+            raise InvalidArgument("the request and the burst must be of the same group")
+        payloads = request._fields.view(np.uint8)
+        self._group.burst(self._compiled, chosen, timeout, others, request._request, payloads)
 
     def then(self, following: "GroupBurst", numbers: str | Mapping[str, str]) -> "GroupBurst":
         """Returns a burst that runs this one and then `following` of another group, copy by copy.

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from o80.base.errors import InvalidArgument
 from o80.learning.batches import fresh
+from o80.learning.group_task import GroupTask
 from o80.learning.halts import halts_of
-from o80.learning.task import Index, Outcome, Task
+from o80.learning.task import EVERY, Index, Outcome, Task
 
 _NOBODY: NDArray[np.intp] = np.zeros(0, np.intp)
 
@@ -51,12 +52,41 @@ def begin(
 
 def step(task: Task, actions: Any, copies: Index) -> Stepped:
     """Runs a step of some copies."""
-    halted = _carried_out(task, actions, copies)
-    task.steps[copies] += 1
+    # with one copy an incomplete step affects no other copy
+    if task.copies == 1:
+        with task.until_halted():
+            task.step(actions, copies)
+    else:
+        task.step(actions, copies)
+    return _stepped(task, copies)
+
+
+def step_others(
+    task: GroupTask,
+    actions: Any,
+    beginning: NDArray[np.intp],
+    generators: Sequence[np.random.Generator],
+) -> Stepped:
+    """Runs a step of some copies while all others begin an episode; returns what all show."""
+    task.steps[beginning] = 0
+    task.begin(beginning, generators, {})
+    mask = np.zeros(task.copies, np.bool_)
+    mask[beginning] = True
+    task.step_others(actions, mask)
+    return _stepped(task, EVERY, ~mask)
+
+
+def _stepped(task: Task, copies: Index, stepped: NDArray[np.bool_] | None = None) -> Stepped:
+    """Judges these copies after a step, except those that are not `stepped` (copies,)."""
+    halted = _halted(task, copies)
+    if stepped is None:
+        task.steps[copies] += 1
+    else:
+        task.steps += stepped
     rewards = np.zeros(task.copies)
     terminated, truncated = np.zeros(task.copies, np.bool_), np.zeros(task.copies, np.bool_)
     judged_info: Mapping[str, Any] = {}
-    judged, late = _to_be_judged(task, copies, halted)
+    judged, late = _to_be_judged(task, copies, halted, stepped)
     if judged.size:
         outcome: object = task.outcome(judged)
         if not isinstance(outcome, Outcome):
@@ -70,10 +100,11 @@ def step(task: Task, actions: Any, copies: Index) -> Stepped:
                 "be finite, or a policy that learns from it is lost"
             )
         terminated[judged] = outcome.terminated
-        terminated[halted] = True
+        if halted.size:
+            terminated[halted] = True
         truncated[judged] = outcome.truncated
         if late is not None:
-            truncated |= late
+            truncated[judged] |= late[judged]
         judged_info = outcome.info
     observed, info = task.shown(copies)
     return Stepped(
@@ -97,14 +128,8 @@ def no_step(task: Task) -> Stepped:
     )
 
 
-def _carried_out(task: Task, actions: Any, copies: Index) -> NDArray[np.intp]:
-    """Runs a step; returns the numbers of its copies that are halted afterwards."""
-    # with one copy an incomplete step affects no other copy
-    if task.copies == 1:
-        with task.until_halted():
-            task.step(actions, copies)
-    else:
-        task.step(actions, copies)
+def _halted(task: Task, copies: Index) -> NDArray[np.intp]:
+    """Returns the numbers of the copies that are halted after a step."""
     task.halts = halts = halts_of(task.robots, task.copies)
     if not halts:
         return _NOBODY
@@ -113,7 +138,7 @@ def _carried_out(task: Task, actions: Any, copies: Index) -> NDArray[np.intp]:
 
 
 def _to_be_judged(
-    task: Task, copies: Index, halted: NDArray[np.intp]
+    task: Task, copies: Index, halted: NDArray[np.intp], stepped: NDArray[np.bool_] | None
 ) -> tuple[NDArray[np.intp], NDArray[np.bool_] | None]:
     """Returns copies to judge, and a mask of copies that are out of steps (None: no limit)."""
     flagged, late = task.flagged(), None
@@ -126,6 +151,6 @@ def _to_be_judged(
     if not isinstance(copies, slice):
         stepped = np.zeros(task.copies, np.bool_)
         stepped[copies] = True
+    if stepped is not None:
         flagged = flagged & stepped
-        late = None if late is None else late & stepped
     return flagged.nonzero()[0], late

@@ -1,5 +1,6 @@
 """A task on one inline group."""
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -7,8 +8,9 @@ from gymnasium import Space
 from numpy.typing import NDArray
 
 from o80.base.arrays import Image
+from o80.base.errors import CopyFailed
 from o80.groups.gather import Gather
-from o80.groups.group_burst import GroupBurst
+from o80.groups.group_burst import GroupBurst, GroupRequest
 from o80.groups.inline_group import InlineGroup
 from o80.learning.task import Index, Task
 from o80.view.pictures import Pictures
@@ -33,10 +35,14 @@ class GroupTask(Task):
         observation_space: Space[Any],
         action_space: Space[Any],
         max_steps: int | None = None,
+        reset: GroupRequest | None = None,
     ) -> None:
         """burst: the burst of a step, from `group.prepared_burst`.
 
         seen: observations and flags, from `group.gather`.
+        reset: request that begins an episode, from `group.prepared_request`. It is sent after
+            `begin`, which may set its fields; if episodes begin while other copies step, in the
+            call of their burst.
         max_steps: steps after which an episode is truncated (None: no limit).
         """
         super().__init__(
@@ -45,8 +51,10 @@ class GroupTask(Task):
             action_space=action_space,
             max_steps=max_steps,
         )
-        self.group, self.burst, self.seen = group, burst, seen
+        self.group, self.burst, self.seen, self.reset = group, burst, seen, reset
         self.robots = (group,)
+        own = type(self).step, type(self).restart
+        self._joins = reset is not None and own == (GroupTask.step, GroupTask.restart)
         self._has_flags = seen.flags.shape[1] > 0
         self._pictures: Pictures | None = None
         if "model" in group[0].schema and type(self).render is GroupTask.render:
@@ -62,6 +70,36 @@ class GroupTask(Task):
         By default these are the actions themselves, clipped into the action space.
         """
         return self.clipped(actions).reshape(len(actions), *self.burst.targets.shape[1:])
+
+    def restart(
+        self,
+        copies: NDArray[np.intp],
+        generators: Sequence[np.random.Generator],
+        options: dict[str, Any],
+    ) -> None:
+        """Calls `begin`, and sends the request `reset`, if there is one."""
+        super().restart(copies, generators, options)
+        if self.reset is not None:
+            self.reset.run(copies)
+
+    @property
+    def joins(self) -> bool:
+        """Whether `step_others` is possible now: no copy is halted, no method is replaced."""
+        return self._joins and not self.group.halted
+
+    def step_others(self, actions: Any, beginning: NDArray[np.bool_]) -> None:
+        """Runs a step of all copies but some, and in the same call the request `reset` of these.
+
+        beginning: (copies,) whether a copy begins an episode.
+        """
+        assert self.reset is not None
+        self.burst.targets[...] = self.targets(actions)
+        try:
+            self.burst.run(instead=(beginning, self.reset))
+        except CopyFailed as failed:
+            begun = failed.errors.keys().isdisjoint(beginning.nonzero()[0].tolist())
+            if not (begun and self.until_halted().__exit__(None, failed, None)):
+                raise
 
     def step(self, actions: Any, copies: Index) -> None:
         """Sends the targets of these copies, and runs a burst of these copies."""

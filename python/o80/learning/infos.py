@@ -17,6 +17,8 @@ Info = dict[str, Any]
 
 def add(infos: Info, values: Mapping[str, Any], copies: Index, count: int) -> None:
     """Adds values (n, ...) of n of `count` copies, and keeps the values of other copies."""
+    if not values:
+        return
     if not infos and isinstance(copies, slice):
         # the usual case: it happens in every step
         _add_all(infos, values, count)

@@ -15,6 +15,7 @@ from o80.learning import episodes, halts, infos
 from o80.learning.batches import checked_actions, put, rows
 from o80.learning.environment import checked_render_mode
 from o80.learning.generators import Generators, Seed
+from o80.learning.group_task import GroupTask
 from o80.learning.task import EVERY, Index, Task
 
 Mask = NDArray[np.bool_]
@@ -170,6 +171,11 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
 
     def _step_others(self, actions: Any, beginning: Numbers, info: infos.Info) -> StepResult:
         """Steps all copies except some, which begin an episode instead."""
+        if isinstance(task := self.task, GroupTask) and task.joins:
+            generators = self._generators.of(beginning)
+            stepped = episodes.step_others(task, actions, beginning, generators)
+            self._observations = stepped.observations
+            return self._after(stepped, info)
         others = np.ones(self.num_envs, np.bool_)
         others[beginning] = False
         stepping = others.nonzero()[0]

@@ -385,14 +385,31 @@ void InlineGroup::check_following(const BurstPlan& plan) const {
 }
 
 void InlineGroup::burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen,
-                        Timeout timeout, const KeepWaiting& keep_waiting) {
+                        Timeout timeout, const KeepWaiting& keep_waiting, const Instead& instead) {
   const Following* const then = plan.then;
+  const std::size_t size = instead.payloads.size() / copies();
+  const auto payload_of = [&](std::uint32_t i) { return instead.payloads.subspan(i * size, size); };
+  if (!instead.copies.empty()) {
+    if (then != nullptr) throw InvalidArgument("a burst that another one follows takes no request");
+    refuse_size("choice", instead.copies.size(), copies(), "flags");
+    const CommandCheck& robot = copies_.front()->frontend.command_check();
+    for (std::uint32_t i = 0; i < copies(); ++i) {
+      if (instead.copies[i] != 0) robot.request(instead.request, payload_of(i));
+    }
+  }
   const bool may_be_direct = this->may_be_direct(plan);
   const bool follows_directly = then != nullptr && then->group->may_be_direct(*then->plan);
   const FollowingCall following(*this, then == nullptr ? nullptr : then->group);
   for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy&) {
-    burst_copy(plan, may_be_direct, chosen[place]);
-    if (then != nullptr) follow(plan, follows_directly, chosen[place]);
+    const std::uint32_t i = chosen[place];
+    if (!instead.copies.empty() && instead.copies[i] != 0) {
+      request_copy(instead.request, payload_of(i), i);
+      const std::size_t rows = plan.rows.size() / copies();
+      show_last_row(i, plan.rows.subspan(i * rows, rows));
+      return;
+    }
+    burst_copy(plan, may_be_direct, i);
+    if (then != nullptr) follow(plan, follows_directly, i);
   });
 }
 
@@ -425,7 +442,7 @@ void InlineGroup::burst_copy(const BurstPlan& plan, bool may_be_direct, std::uin
   read_gathered(i, own.data() + rows - description().layout.size);
 }
 
-/// A halt has ended the burst of a copy: all that it shows is its last row.
+/// After a request, or a halt that has ended a burst: all that a copy shows is its last row.
 void InlineGroup::show_last_row(std::uint32_t i, std::span<std::byte> rows) {
   Copy& copy = *copies_[i];
   const std::size_t size = description().layout.size;
@@ -498,31 +515,27 @@ void InlineGroup::request(std::uint32_t request, std::span<const std::uint32_t> 
   for (std::size_t i = 0; i < chosen.size(); ++i) {
     robot.request(request, payloads.subspan(i * size, size));
   }
-  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy& copy) {
-    BatchBuilder batch;
-    batch.request(static_cast<std::uint16_t>(request), payloads.subspan(place * size, size));
-    const Batch sent = copy.frontend.pulse_to_end(batch);
-    copy.frontend.wait_until_ended(sent, {}, may_continue_);
-    throw_unless_completed(request, sent);
-    copy.frontend.latest(copy.bytes());
-    read_gathered(chosen[place], copy.bytes());
-    if (!rows.empty()) std::memcpy(rows.data() + chosen[place] * row, copy.bytes(), row);
+  for_each(chosen, timeout, keep_waiting, [&](std::uint32_t place, Copy&) {
+    request_copy(request, payloads.subspan(place * size, size), chosen[place]);
+    const std::span<std::byte> newest =
+        rows.empty() ? rows : rows.subspan(chosen[place] * row, row);
+    show_last_row(chosen[place], newest);
   });
 }
 
-void InlineGroup::throw_unless_completed(std::uint32_t request, const Batch& batch) const {
-  const Handle handle = batch.handle(0);
+void InlineGroup::request_copy(std::uint32_t request, std::span<const std::byte> payload,
+                               std::uint32_t i) {
+  UntypedFrontend& frontend = copies_[i]->frontend;
+  BatchBuilder batch;
+  batch.request(static_cast<std::uint16_t>(request), payload);
+  const Batch sent = frontend.pulse_to_end(batch);
+  frontend.wait_until_ended(sent, {}, may_continue_);
+  const Handle handle = sent.handle(0);
   if (handle.status == Status::completed) return;
   const std::string text = "request '" + description().schema.requests[request].name.str() +
                            "' was not completed: " + handle.text;
   if (handle.status == Status::halted) throw BackendHalted(text);
   throw Error(text);
-}
-
-/// False if certainly no copy is halted. Reads no segment: those of other threads are not cached.
-bool InlineGroup::may_be_halted() const noexcept {
-  return published_ ||
-         std::ranges::any_of(*halted_, [](const std::atomic<bool>& each) { return each.load(); });
 }
 
 std::vector<std::pair<std::size_t, Halt>> InlineGroup::halted() const {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
@@ -90,6 +91,12 @@ class InlineGroup {
     const BurstPlan* plan = nullptr;  // its own `then` is ignored
     std::span<const Feed> feeds;
   };
+  /// A request that some copies of a call run instead of a burst.
+  struct Instead {
+    std::span<const std::uint8_t> copies;  // for each copy of the group whether; none: no copy
+    std::uint32_t request;
+    std::span<const std::byte> payloads;  // for each copy of the group
+  };
   /// Memory for what a RowGather reads of each copy.
   struct Gathered {
     std::span<float> observations;
@@ -124,9 +131,10 @@ class InlineGroup {
   /// copies of the group that follows, if any. `chosen`: their numbers, each once. Copies between
   /// two iterations when it throws: CopyFailed; TimeoutError, Cancelled and what `keep_waiting`
   /// throws, after which copies whose turn had not come have run nothing. All rows of a copy that a
-  /// halt has ended are its last one.
+  /// halt has ended are its last one. Those of `instead` run a request, as request() does;
+  /// all their rows are then their newest one.
   void burst(const BurstPlan& plan, std::span<const std::uint32_t> chosen, Timeout timeout = {},
-             const KeepWaiting& keep_waiting = {});
+             const KeepWaiting& keep_waiting = {}, const Instead& instead = {});
   /// Sends a request to the chosen copies, with a payload for each, and runs each until its request
   /// has ended. Throws as burst(); a request that is not completed is a failure of its copy.
   /// `rows`: if not empty, a row for each copy of the group, in which those that were chosen get
@@ -162,7 +170,12 @@ class InlineGroup {
   void add_copy(const RobotTable& table, const OptionValues& options,
                 const BackendOptions& backend);
   Copy& at(std::size_t copy) const;
-  bool may_be_halted() const noexcept;
+  /// False if certainly no copy is halted. Reads no segment: those that other threads have written
+  /// are not in the cache of this one.
+  bool may_be_halted() const noexcept {
+    const auto is_halted = [](const std::atomic<bool>& each) { return each.load(); };
+    return published_ || std::ranges::any_of(*halted_, is_halted);
+  }
   bool runs_here() const noexcept;
   bool may_continue();
   void poll() noexcept;
@@ -171,8 +184,8 @@ class InlineGroup {
                 const KeepWaiting& keep_waiting, Each&& each);
   void choose(std::span<const std::uint32_t> chosen);
   [[noreturn]] void throw_failures();
-  void throw_unless_completed(std::uint32_t request, const Batch& batch) const;
   void check_following(const BurstPlan& plan) const;
+  void request_copy(std::uint32_t request, std::span<const std::byte> payload, std::uint32_t i);
   void burst_copy(const BurstPlan& plan, bool may_be_direct, std::uint32_t i);
   void follow(const BurstPlan& plan, bool may_be_direct, std::uint32_t i);
   void show_last_row(std::uint32_t i, std::span<std::byte> rows);

@@ -189,6 +189,32 @@ def test_a_prepared_request_does_what_a_request_does_bit_for_bit(group: o80.Inli
         assert reset.rows.tobytes() == other.latest().tobytes()
 
 
+def test_a_request_instead_of_the_burst_is_both_calls_in_one(group: o80.InlineGroup) -> None:
+    with o80.robots.load("two_joints").inline(copies=COPIES, threads=1) as other:
+        bursts = [each.prepared_burst(10) for each in (group, other)]
+        resets = [each.prepared_request("reset", seed=4) for each in (group, other)]
+        for others in ([1, 4], np.array([False, True, False, False, True])):
+            for burst in bursts:
+                burst.targets = np.linspace(-1, 1, burst.targets.size).reshape(burst.targets.shape)
+            bursts[0].run(instead=(others, resets[0]))
+            bursts[1].run([0, 2, 3])
+            resets[1].run([1, 4])
+            assert group.latest().tobytes() == other.latest().tobytes()
+            rows = [with_padding(burst.rows) for burst in bursts]
+            assert rows[0][[0, 2, 3]].tobytes() == rows[1][[0, 2, 3]].tobytes()
+            newest = with_padding(group.latest([1, 4]))[:, np.newaxis]
+            assert rows[0][[1, 4]].tobytes() == np.repeat(newest, 10, axis=1).tobytes()
+        with pytest.raises(o80.InvalidArgument, match="of the same group"):
+            bursts[0].run(instead=([1], resets[1]))
+        with pytest.raises(o80.InvalidArgument, match="copies 0 to 4"):
+            bursts[0].run(instead=([5], resets[0]))
+        restore = group.prepared_request("restore", slot=9)  # there are slots 0 to 7
+        with pytest.raises(o80.CopyFailed, match="copy 2 of 'two_joints' failed"):
+            bursts[0].run(instead=([2], restore))
+        done = bursts[0].rows["iteration"][:, -1] == group.latest()["iteration"]
+        assert done[[0, 1, 3, 4]].all(), "all other copies are done"
+
+
 def test_a_prepared_request_refuses_what_a_request_refuses(group: o80.InlineGroup) -> None:
     with pytest.raises(o80.InvalidArgument, match=r"'rest'.*Did you mean 'reset'"):
         group.prepared_request("rest")

@@ -12,7 +12,7 @@ import pytest
 from gymnasium.error import ResetNeeded
 from gymnasium.utils.env_checker import check_env
 from gymnasium.vector import AutoresetMode
-from learning_tasks import Goal, Reach
+from learning_tasks import Goal, Joined, Reach
 from vector_equality import MODES, assert_same, beside, both
 
 import o80
@@ -28,7 +28,7 @@ def random_policy(environment: VectorEnvironment, seed: int) -> Any:
 
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("seed", [7, 8, 9])
-@pytest.mark.parametrize("task", [Reach, Goal])
+@pytest.mark.parametrize("task", [Reach, Goal, Joined])
 def test_equals_a_sync_vector_env_of_single_ones(task: type[Reach], mode: Any, seed: int) -> None:
     with VectorEnvironment(task(COPIES, threads=2), autoreset_mode=mode) as vector:
         policy = random_policy(vector, seed)
@@ -130,6 +130,23 @@ def test_a_step_that_raises_needs_a_reset() -> None:
             vector.step(np.zeros((3, 4), np.float32))
         vector.reset()
         vector.step(np.zeros((3, 4), np.float32))
+
+
+def test_a_reset_that_fails_beside_the_steps_of_others_raises() -> None:
+    with VectorEnvironment(Joined(3)) as environments:
+        environments.reset(seed=1)
+        task: Any = environments.task
+        stay, reset = np.zeros((3, 4), np.float32), task.reset
+        while not np.logical_or(*environments.step(stay)[2:4]).any():
+            pass
+        task.reset = task.group.prepared_request("restore", slot=9)  # there are slots 0 to 7
+        with pytest.raises(o80.CopyFailed, match="'restore' was not completed"):
+            environments.step(stay)
+        task.reset = reset
+        with pytest.raises(gymnasium.error.ResetNeeded):
+            environments.step(stay)
+        environments.reset(seed=2)
+        environments.step(stay)
 
 
 def test_mistakes_are_named() -> None:
