@@ -65,7 +65,7 @@ class GroupBurst(BurstArrays):
             others[numbers] = True
         if request._group is not self._group:
             raise InvalidArgument("the request and the burst must be of the same group")
-        payloads = request._fields.view(np.uint8)
+        payloads = request._payloads
         self._group.burst(self._compiled, chosen, timeout, others, request._request, payloads)
 
     def then(self, following: "GroupBurst", numbers: str | Mapping[str, str]) -> "GroupBurst":
@@ -104,7 +104,8 @@ class GroupRequest:
     ) -> None:
         self._group, self._request = group, request
         self._everybody = np.arange(len(rows), dtype=np.uint32)
-        self._fields, self._rows, self._bytes = fields, rows, rows.view(np.uint8)
+        self._fields, self._payloads = fields, fields.view(np.uint8)
+        self._rows, self._bytes = rows, rows.view(np.uint8)
 
     @property
     def fields(self) -> NDArray[Any]:
