@@ -292,10 +292,12 @@ std::optional<Failure> SpanWatch::step(const ScriptWorld& world) {
     const ActuatorTrack& actuator = world.actuators[a];
     const bool begun = actuator.driver != nullptr && actuator.driver != actuator.previous;
     if (begun) {
-      // behind a purge it goes on, too, if it comes before an iteration without a command
-      const bool taken_over =
-          actuator.previous != nullptr && (actuator.previous->status == Status::overwritten ||
-                                           actuator.previous->status == Status::purged);
+      // behind a purge or an interrupt it goes on, too, if it comes before an iteration without a
+      // command
+      const Status before =
+          actuator.previous != nullptr ? actuator.previous->status : Status::completed;
+      const bool taken_over = before == Status::overwritten || before == Status::purged ||
+                              before == Status::interrupted;
       begin(world, a, taken_over);
       plan(world, a);
     }
