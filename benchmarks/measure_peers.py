@@ -208,8 +208,8 @@ def files() -> None:
         calls: dict[str, Callable[[], object]] = {}
 
         def ours() -> None:
-            history = o80.open(path)["bench-peers"].history()
-            assert all(len(history[column]) == ROWS + 1 for column in COLUMNS)
+            columns = o80.open(path)["bench-peers"].history(fields=COLUMNS)
+            assert all(len(column) == ROWS + 1 for column in columns)
 
         calls["recorded_columns"] = ours
         with needing("h5py", "h5py_columns"):

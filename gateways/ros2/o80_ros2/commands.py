@@ -138,7 +138,7 @@ class Commands:
         anchor = min(anchor, newest.iteration)
         rows, due = rows[due > anchor], due[due > anchor]
         numbers = [self._desired[each] for each in chosen]
-        now = np.array([np.ndarray((), each.kind, newest, each.offset) for each in numbers])
+        now = np.array([np.ndarray((), each.dtype, newest, each.offset) for each in numbers])
         start = [] if stamp else [(anchor, now)]  # the position at a future stamp is unknown
         self._check_speeds(names, chosen, [*start, *zip(due, rows, strict=True)])
         if chosen not in self._plans:

@@ -9,7 +9,8 @@ from numpy.typing import NDArray
 
 import o80
 from o80.errors import Error
-from o80.recording.joint_states import Number, joints_of
+from o80.recording.joint_states import joints_of
+from o80.rows.columns import Column, columns_of_part, is_within
 from o80.view.urdf import WORLD, Links, Place
 from o80_ros2 import ros
 from o80_ros2.sensors import Sensor, png, sensors_of
@@ -41,7 +42,7 @@ class Topics:
         self.time = 0  #: time of the newest published row [ns]
         self._images: dict[str, int] = {}  # time of each topic's last image [ns]
         self._made: list[Any] = []
-        self._states: list[tuple[Any, list[str], dict[str, tuple[Number, ...]]]] = []
+        self._states: list[tuple[Any, list[str], dict[str, tuple[Column, ...]]]] = []
         joints, names = joints_of(robot._layout), dict[int, str]()
         if joints is not None:
             texts = settings.joints(joints.names)
@@ -84,10 +85,9 @@ class Topics:
         captures = "capture_time" in [each["name"] for each in extended["fields"]]
         captured = rows["extended"]["capture_time"] if captures else rows["time"]
         times = np.where(captured, captured, rows["time"]).tolist()
-        raw = rows.view(np.uint8).reshape(len(rows), rows.itemsize)
         kind = ros.of(STATE)
         for publisher, names, members in self._states:
-            values = {name: _numbers_of(raw, each) for name, each in members.items() if each}
+            values = {name: _numbers_of(rows, each) for name, each in members.items() if each}
             for i, time in enumerate(times):
                 message = kind(header=self._header(time), name=names)
                 for member, numbers in values.items():
@@ -151,15 +151,14 @@ def _message(kind: str, header: Any, values: Sequence[NDArray[Any]], frame: str 
     return message
 
 
-def _numbers_of(raw: NDArray[np.uint8], numbers: Iterable[Number]) -> NDArray[np.float64]:
-    """Reads numbers from raw rows: (n, bytes of a row) => (n, numbers)."""
-    columns = [np.ndarray((len(raw),), n.kind, raw, n.offset, raw.strides[:1]) for n in numbers]
-    return np.stack(columns, axis=1).astype(float)
+def _numbers_of(rows: NDArray[Any], columns: Iterable[Column]) -> NDArray[np.float64]:
+    """Reads numbers from rows: (n,) => (n, numbers)."""
+    found = [rows.getfield(each.dtype, each.offset) for each in columns]
+    return np.stack(found, axis=1).astype(float)
 
 
-def desired_numbers(schema: dict[str, Any]) -> Iterator[Number]:
-    """Locates the first number of each actuator's desired state."""
+def desired_numbers(schema: dict[str, Any]) -> Iterator[Column]:
+    """Finds the first number of each actuator's desired state."""
+    columns = columns_of_part(schema, "desired")
     for actuator in schema["actuators"]:
-        first = schema["groups"][actuator["group"]]["type"]["fields"][0]
-        kind = first["kind"] if first["kind"] != "enum" else f"u{first['size']}"
-        yield Number(schema["row"]["desired"] + actuator["offset"] + first["offset"], kind)
+        yield next(each for each in columns if is_within(each.name, f"desired.{actuator['name']}"))

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
-from o80.base.argument_checks import sequence, whole
+from o80.base.argument_checks import whole
 from o80.base.cached import cached
 from o80.base.errors import Error
 from o80.base.signatures import explains
@@ -276,13 +276,9 @@ class Reader(_core.Frontend):
     def _read_fields(
         self, first: int, count: int, fields: str | list[str] | tuple[str, ...]
     ) -> tuple[NDArray[Any], ...]:
-        from o80.rows.columns import columns_at, packing_of  # late: most processes never need it
+        from o80.rows.columns import packing_at  # late: most processes never need it
 
-        paths = [fields] if isinstance(fields, str) else sequence(fields, "fields", "['observed']")
-        columns = [self._layout.columns_at(path, columns_at) for path in paths]
-        packing = self._layout.packings.get(key := tuple(paths))
-        if packing is None:
-            packing = self._layout.packings[key] = packing_of(columns)
+        packing = packing_at(self._layout, fields)
         rows = np.empty(count, packing.dtype)
         if not rows.nbytes:
             return packing.arrays(rows)

@@ -1,7 +1,7 @@
-"""Parts of an MCAP chunk: many messages of one channel as one array, or a few messages."""
+"""Parts of an MCAP chunk: messages of one channel as one array of bytes."""
 
 import struct
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,23 +18,25 @@ MESSAGE_HEAD = np.dtype(
     ]
 )
 """Head before the data of a message; packed."""
+MESSAGE_STRUCT = struct.Struct("<BQHIQQ")  #: the same
 LENGTH_ENDS_AT = 9  # opcode and length are not counted in a record's length
 MESSAGE, MESSAGE_INDEX = 0x05, 0x07
 
 
 @dataclass(frozen=True)
 class Block:
-    """Messages of one channel, of equal size, as records of a chunk."""
+    """Messages of one channel, as records of a chunk."""
 
     channel: int
-    log_times: NDArray[np.uint64]  #: (n,) [ns]
-    records: NDArray[np.uint8]  #: (n, bytes of a record)
+    log_times: NDArray[np.uint64]  #: (n,) [ns]; not empty
+    records: NDArray[np.uint8]  #: all bytes
+    begins: NDArray[np.uint64]  #: (n,) place of each record in `records`
 
     @classmethod
     def reserved(
         cls, channel: int, log_times: NDArray[np.uint64], sequence: int, size: int
-    ) -> "Block":
-        """Makes records with heads but with empty messages of `size` bytes each."""
+    ) -> tuple["Block", NDArray[np.uint8]]:
+        """Makes records with empty messages of `size` bytes each; returns these, (n, size), too."""
         records = np.empty((len(log_times), MESSAGE_HEAD.itemsize + size), np.uint8)
         heads = np.zeros(len(log_times), MESSAGE_HEAD)
         heads["opcode"] = MESSAGE
@@ -43,76 +45,25 @@ class Block:
         heads["sequence"] = np.arange(sequence, sequence + len(log_times)) % 2**32
         heads["log_time"] = heads["publish_time"] = log_times
         records[:, : MESSAGE_HEAD.itemsize] = heads.view(np.uint8).reshape(len(heads), -1)
-        return cls(channel, log_times, records)
+        begins = np.arange(len(records), dtype=np.uint64) * np.uint64(records.shape[1])
+        return cls(channel, log_times, records, begins), records[:, MESSAGE_HEAD.itemsize :]
 
-    @property
-    def messages(self) -> NDArray[np.uint8]:
-        """The data of the messages (n, size), a view."""
-        return self.records[:, MESSAGE_HEAD.itemsize :]
-
-    @property
-    def content(self) -> bytes:
-        """All records."""
-        return self.records.tobytes()
-
-    @property
-    def count(self) -> int:
-        """Number of messages."""
-        return len(self.records)
-
-    @property
-    def time_range(self) -> tuple[int, int]:
-        """First and last log time [ns]."""
-        return int(self.log_times[0]), int(self.log_times[-1])
+    @classmethod
+    def of(cls, channel: int, messages: Sequence[tuple[int, bytes]]) -> "Block":
+        """Makes records of messages of any sizes: log time [ns] and data of each; not empty."""
+        content, begins = bytearray(), []
+        for time, data in messages:
+            begins.append(len(content))
+            length = MESSAGE_HEAD.itemsize - LENGTH_ENDS_AT + len(data)
+            content += MESSAGE_STRUCT.pack(MESSAGE, length, channel, 0, time, time) + data
+        times = np.array([time for time, _ in messages], np.uint64)
+        return cls(channel, times, np.frombuffer(content, np.uint8), np.array(begins, np.uint64))
 
     def index(self, offset: int) -> bytes:
         """Returns the message index of this block, which begins at `offset` in its chunk."""
-        entries = np.empty((len(self.log_times), 2), "<u8")
-        entries[:, 0] = self.log_times
-        entries[:, 1] = offset + np.arange(len(entries)) * self.records.shape[1]
-        return _index(self.channel, entries)
-
-
-@dataclass(frozen=True)
-class Messages:
-    """A few messages of one channel, of any sizes."""
-
-    channel: int
-    messages: Sequence[tuple[int, bytes]]  #: log time [ns] and data of each; not empty
-
-    @property
-    def content(self) -> bytes:
-        return b"".join(self._records())
-
-    @property
-    def count(self) -> int:
-        return len(self.messages)
-
-    @property
-    def time_range(self) -> tuple[int, int]:
-        times = [time for time, _ in self.messages]
-        return min(times), max(times)
-
-    def index(self, offset: int) -> bytes:
-        entries = []
-        for (time, _), record in zip(self.messages, self._records(), strict=True):
-            entries.append((time, offset))
-            offset += len(record)
-        return _index(self.channel, np.array(entries, "<u8"))
-
-    def _records(self) -> Iterator[bytes]:
-        for time, data in self.messages:
-            length = MESSAGE_HEAD.itemsize - LENGTH_ENDS_AT + len(data)
-            yield struct.pack("<BQHIQQ", MESSAGE, length, self.channel, 0, time, time) + data
-
-
-MessageBlock = Block | Messages
-
-
-def _index(channel: int, entries: NDArray[np.uint64]) -> bytes:
-    """Encodes the message index of a channel; entries: (n, 2), log time and offset in the chunk."""
-    content = entries.tobytes()
-    return struct.pack("<BQHI", MESSAGE_INDEX, 6 + len(content), channel, len(content)) + content
+        entries = np.stack((self.log_times, self.begins + np.uint64(offset)), axis=1).astype("<u8")
+        head = struct.pack("<BQHI", MESSAGE_INDEX, 6 + entries.nbytes, self.channel, entries.nbytes)
+        return head + entries.tobytes()
 
 
 def stamps_of(times: NDArray[np.uint64]) -> NDArray[np.uint8]:

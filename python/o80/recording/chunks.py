@@ -2,9 +2,9 @@
 
 import struct
 from array import array
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from io import BytesIO
-from typing import Any, overload
+from typing import Any
 
 from mcap.data_stream import ReadDataStream, RecordBuilder
 from mcap.records import ChunkIndex, McapRecord
@@ -22,7 +22,7 @@ def bytes_of(*records: McapRecord) -> bytes:
     return bytes(builder.end())
 
 
-class Chunks(Sequence[ChunkIndex]):
+class Chunks:
     """Chunk indexes in file order, decoded on access: a recording of days has very many."""
 
     def __init__(self) -> None:
@@ -75,13 +75,10 @@ class Chunks(Sequence[ChunkIndex]):
     def __len__(self) -> int:
         return len(self._begins)
 
-    @overload
-    def __getitem__(self, number: int) -> ChunkIndex: ...
-    @overload
-    def __getitem__(self, number: slice) -> "list[ChunkIndex]": ...
-    def __getitem__(self, number: int | slice) -> "ChunkIndex | list[ChunkIndex]":
-        if isinstance(number, slice):
-            return [self[each] for each in range(len(self))[number]]
+    def __iter__(self) -> Iterator[ChunkIndex]:
+        return map(self.__getitem__, range(len(self)))
+
+    def __getitem__(self, number: int) -> ChunkIndex:
         at = self._begins[number]
         _, length = HEAD.unpack_from(self.records, at)
         record = bytes(self.records[at + HEAD.size : at + HEAD.size + length])

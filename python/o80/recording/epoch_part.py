@@ -1,20 +1,21 @@
 """Part of a run in one file of a recording."""
 
-import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
+import numpy as np
 from mcap.records import AttachmentIndex, ChunkIndex
+from numpy.typing import NDArray
 
 from o80.base.errors import RecordingError
 from o80.recording.blocks import messages_in
 from o80.recording.epoch import EpochNote, channels_of, iteration_in
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import Entries, entries_in
-from o80.recording.scan import CUT, Scan, attachment_of, content_of, index_of, unreadable
+from o80.recording.scan import CUT, DAMAGED, Scan, attachment_of, content_of, index_of, unreadable
 
 UNFINISHED = "the recorder still runs, or was killed"
 
@@ -60,9 +61,17 @@ class EpochPart:
         """Iteration of the last row. There must be rows."""
         chunk = self.last_chunk
         assert chunk is not None
+        return iteration_in(self.messages(chunk)[-1].tobytes())
+
+    def index(self, chunk: ChunkIndex) -> NDArray[np.uint64]:
+        """Reads log times and places of the rows in a chunk (n, 2). Raises RecordingError."""
         with self.reading() as file:
-            messages = messages_in(content_of(file, chunk), index_of(file, chunk, self.channel))
-        return iteration_in(messages[-1].tobytes())
+            return index_of(file, chunk, self.channel)
+
+    def messages(self, chunk: ChunkIndex) -> NDArray[np.uint8]:
+        """Decompresses the rows in a chunk: messages (n, size). Raises RecordingError."""
+        with self.reading() as file:
+            return messages_in(content_of(file, chunk), index_of(file, chunk, self.channel))
 
     @property
     def last_chunk(self) -> "ChunkIndex | None":
@@ -81,11 +90,10 @@ class EpochPart:
     @property
     def log_times(self) -> tuple[int, int]:
         """Log times of the first and the last row [ns]. There must be rows."""
-        chunks, channel = self.found.chunks, self.channel
-        with self.reading() as file:
-            first = index_of(file, next(chunks.having(channel)), channel)[0, 0]
-            last = index_of(file, next(chunks.having(channel, newest_first=True)), channel)[-1, 0]
-        return int(first), int(last)
+        first, last = next(self.found.chunks.having(self.channel)), self.last_chunk
+        assert last is not None
+        with self.reading():
+            return int(self.index(first)[0, 0]), int(self.index(last)[-1, 0])
 
     @property
     def _description(self) -> AttachmentIndex | None:
@@ -121,8 +129,8 @@ class EpochPart:
                 yield file
         except OSError as error:
             raise RecordingError(unreadable(self.path, error)) from error
-        except (ValueError, struct.error) as error:
-            raise RecordingError(f"{self.path}: {error}") from error
+        except DAMAGED as error:
+            raise RecordingError(f"{self.path}: {str(error) or repr(error)}") from error
 
 
 def parts_of(path: Path, found: Scan) -> Iterator[EpochPart]:

@@ -28,13 +28,15 @@ from mcap.records import (
 
 import o80._core as _core
 from o80.base.errors import InvalidArgument, RecordingError
-from o80.recording.blocks import MessageBlock
+from o80.recording.blocks import Block
 from o80.recording.chunks import HEAD, bytes_of
 from o80.recording.locked_file import LockedFile, reserve
 from o80.recording.scan import CUT, MAGIC, Scan, place_of, scan
 from o80.recording.summary import end_of_file, room_for_end
 
 PROFILE = "ros2"
+JOINT_STATES = "joint_states"  #: content of the channels of joint states, in their metadata
+LARGE = 1 << 18  # size above which rows and joint states do not compress better together [bytes]
 _COMPRESS: dict[str, Callable[[], Callable[[bytes], bytes]]] = {
     "zstd": lambda: zstandard.ZstdCompressor(level=1).compress,
     "lz4": lambda: lz4.frame.compress,
@@ -189,13 +191,27 @@ class FileWriter:
         self._found.metadata.append(metadata)
         self._append(record)
 
-    def add_chunk(self, blocks: Sequence[MessageBlock]) -> None:
-        """Adds messages, each channel at most once. If it raises OSError, nothing was added."""
-        content = b"".join(block.content for block in blocks)
+    def add_messages(self, blocks: Sequence[Block]) -> None:
+        """Adds messages as a chunk, each channel at most once.
+
+        Large joint states are a second chunk, so that readers of rows need not decompress them.
+        If it raises OSError, nothing was added, or all but these.
+        """
+        apart = [each for each in blocks if self._is_apart(each)]
+        for chunk in ([each for each in blocks if not self._is_apart(each)], apart):
+            if chunk:
+                self._add_chunk(chunk)
+
+    def _is_apart(self, block: Block) -> bool:
+        texts = self._found.channels[block.channel].metadata
+        return texts.get("content") == JOINT_STATES and block.records.nbytes >= LARGE
+
+    def _add_chunk(self, blocks: list[Block]) -> None:
+        content = b"".join(block.records.data for block in blocks)
         compressed = self._compress(content)
         compression = "" if self.form.compression == "none" else self.form.compression
-        start = min(block.time_range[0] for block in blocks)
-        end = max(block.time_range[1] for block in blocks)
+        start = min(int(block.log_times.min()) for block in blocks)
+        end = max(int(block.log_times.max()) for block in blocks)
         named = compression.encode()
         head = CHUNK_HEAD.pack(
             Opcode.CHUNK,
@@ -211,7 +227,7 @@ class FileWriter:
         for block in blocks:
             offsets[block.channel] = self.size + len(chunk) + len(indexes)
             indexes += block.index(at)
-            at += len(block.content)
+            at += block.records.nbytes
         index = ChunkIndex(
             chunk_length=len(chunk),
             chunk_start_offset=self.size,
@@ -227,7 +243,7 @@ class FileWriter:
         self._found.chunks.append(index)
         for block in blocks:
             counts = self._found.counts
-            counts[block.channel] = counts.get(block.channel, 0) + block.count
+            counts[block.channel] = counts.get(block.channel, 0) + len(block.log_times)
 
     def _append(self, *pieces: bytes | bytearray, last: bool = False) -> None:
         """Writes a group whole, or restores the file and raises OSError."""

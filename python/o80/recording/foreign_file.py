@@ -8,7 +8,7 @@ from mcap.stream_reader import StreamReader
 
 from o80.base.errors import RecordingError
 from o80.base.progress import Progress
-from o80.recording.blocks import Messages
+from o80.recording.blocks import Block
 from o80.recording.file_writer import FileWriter, Form
 from o80.recording.scan import CopiedFile, Scan, scan
 
@@ -75,5 +75,5 @@ class _Copier:
 
     def _flush(self) -> None:
         if self._waiting:
-            self._writer.add_chunk([Messages(*each) for each in self._waiting.items()])
+            self._writer.add_messages([Block.of(*each) for each in self._waiting.items()])
         self._waiting, self._bytes = {}, 0

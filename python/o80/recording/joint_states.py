@@ -8,20 +8,19 @@ Velocities and efforts come from the same place: numbers `velocity` and `effort`
 the state, arrays of sensor values with one number for each joint.
 """
 
-import struct
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from o80.recording.blocks import Block, stamps_of
-from o80.recording.cdr import ENCAPSULATION, CdrWriter
+from o80.recording.cdr import CdrWriter
 from o80.recording.epoch import EpochNote, topic_of
-from o80.recording.file_writer import FileWriter
+from o80.recording.file_writer import JOINT_STATES, FileWriter
 from o80.recording.message_types import HEADER
-from o80.rows.layout import Layout, is_plain
+from o80.rows.columns import Column, columns_of
+from o80.rows.layout import Layout
 
 TYPE = "sensor_msgs/msg/JointState"
 DEFINITION = f"""\
@@ -31,22 +30,12 @@ float64[] position
 float64[] velocity
 float64[] effort
 {HEADER}"""
-CONTENT = "joint_states"  #: name of this content in the metadata of the channel
 QUANTITIES = {
     "position": ("position",),
     "velocity": ("velocity",),
     "effort": ("effort", "torque"),
 }
 """Names of the fields of a state, for each member of the message."""
-FLOATS = ("float32", "float64")
-
-
-@dataclass(frozen=True)
-class Number:
-    """A number of a row."""
-
-    offset: int  #: [bytes]
-    kind: str
 
 
 @dataclass(frozen=True)
@@ -54,61 +43,43 @@ class Joints:
     """Where the rows of a robot hold positions, velocities and efforts of its joints."""
 
     names: tuple[str, ...]
-    numbers: dict[str, tuple[Number, ...]]  #: by member of the message; empty: not in the rows
+    numbers: dict[str, tuple[Column, ...]]  #: by member of the message; empty: not in the rows
 
 
 def joints_of(layout: Layout) -> Joints | None:
     """Finds the joints of a robot; None if the robot has none."""
-    found = _actuators_that_are_joints(layout)
-    if found:
-        names = tuple(name for name, _ in found)
-        numbers = {
-            quantity: tuple(each[quantity] for _, each in found)
-            if all(quantity in each for _, each in found)
-            else ()
-            for quantity in QUANTITIES
-        }
-    else:
-        positions = _sensor(layout, "position", None)
-        if not positions:
-            return None
-        names = tuple(f"joint_{i}" for i in range(len(positions)))
-        numbers = {"position": positions, "velocity": (), "effort": ()}
-    for quantity in QUANTITIES:
-        numbers[quantity] = numbers[quantity] or _sensor(layout, quantity, len(names))
-    return Joints(names, numbers)
-
-
-def _actuators_that_are_joints(layout: Layout) -> list[tuple[str, dict[str, Number]]]:
-    schema = layout.schema
-    found = []
-    for i, actuator in enumerate(schema["actuators"]):
-        described = schema["groups"][actuator["group"]]["type"]
-        numbers = dict(_numbers_of(described, schema["row"]["observed"] + actuator["offset"]))
+    columns = {each.name: each for each in columns_of(layout.schema) if each.dtype.kind == "f"}
+    names, found = [], []
+    for i, actuator in enumerate(layout.schema["actuators"]):
+        numbers = dict(_numbers_of(columns, f"observed.{actuator['name']}"))
         if "position" in numbers:
-            found.append((actuator["name"] or f"joint_{i}", numbers))
-    return found
+            names.append(actuator["name"] or f"joint_{i}")
+            found.append(numbers)
+    of_all = {
+        quantity: tuple(each[quantity] for each in found if quantity in each)
+        for quantity in QUANTITIES
+    }
+    if not found:
+        of_all["position"] = _sensor(columns, "position", None)
+        names = [f"joint_{i}" for i in range(len(of_all["position"]))]
+    for quantity, numbers_of_all in of_all.items():
+        if len(numbers_of_all) < len(names):
+            of_all[quantity] = _sensor(columns, quantity, len(names))
+    return Joints(tuple(names), of_all) if names else None
 
 
-def _numbers_of(described: dict[str, Any], offset: int) -> Iterator[tuple[str, Number]]:
+def _numbers_of(columns: Mapping[str, Column], path: str) -> Iterator[tuple[str, Column]]:
     """Yields quantity and place of the numbers of one state."""
-    for field in described["fields"]:
-        if field["kind"] not in FLOATS or field["shape"]:
-            continue
-        number = Number(offset + field["offset"], field["kind"])
-        if is_plain(described):
-            if field["unit"] in ("rad", "m"):
-                yield "position", number
-            return
-        for quantity, names in QUANTITIES.items():
-            if field["name"] in names:
-                yield quantity, number
+    if path in columns and columns[path].unit in ("rad", "m"):
+        yield "position", columns[path]
+    for quantity, names in QUANTITIES.items():
+        for name in reversed(names):  # the first one counts
+            if (field := f"{path}.{name}") in columns:
+                yield quantity, columns[field]
 
 
-def _sensor(layout: Layout, quantity: str, length: int | None) -> tuple[Number, ...]:
+def _sensor(columns: Mapping[str, Column], quantity: str, length: int | None) -> tuple[Column, ...]:
     """Finds an array of sensor values for a quantity, with this length; empty if there is none."""
-    if "extended" not in layout.schema:
-        return ()
     plural = {"position": "positions", "velocity": "velocities"}
     wanted = set()
     for name in QUANTITIES[quantity]:
@@ -116,15 +87,14 @@ def _sensor(layout: Layout, quantity: str, length: int | None) -> tuple[Number, 
         wanted |= {f"joint_{several}", several}
         if length is not None:
             wanted.add(name)
-    begin = layout.schema["row"]["extended"]
-    for field in layout.schema["extended"]["fields"]:
-        if field["name"] not in wanted or field["kind"] not in FLOATS or len(field["shape"]) != 1:
-            continue
-        (count,) = field["shape"]
-        if length is None or count == length:
-            first, size = begin + field["offset"], field["size"]
-            return tuple(Number(first + i * size, field["kind"]) for i in range(count))
-    return ()
+    arrays: dict[str, list[Column]] = {}
+    for path, column in columns.items():
+        part, _, name = path.partition(".")
+        field, _, place = name.partition("[")
+        if part == "extended" and field in wanted and place[:-1].isdecimal():
+            arrays.setdefault(field, []).append(column)
+    fitting = (each for each in arrays.values() if length in (None, len(each)))
+    return tuple(next(fitting, ()))
 
 
 class JointWriter:
@@ -140,8 +110,8 @@ class JointWriter:
             return None
         if channel is None:
             schema = file.add_schema(TYPE, DEFINITION)
-            texts = note.channel_texts(CONTENT)
-            channel = file.add_channel(topic_of(note.segment, CONTENT), schema, texts)
+            texts = note.channel_texts(JOINT_STATES)
+            channel = file.add_channel(topic_of(note.segment, JOINT_STATES), schema, texts)
         return cls(joints, channel)
 
     def __init__(self, joints: Joints, channel: int) -> None:
@@ -150,30 +120,23 @@ class JointWriter:
         self._stamp = cdr.stamp(0)
         cdr.text("")
         cdr.texts(joints.names)
-        self._values: list[tuple[int, tuple[Number, ...]]] = []
+        self._values: list[tuple[int, tuple[Column, ...]]] = []
         for numbers in joints.numbers.values():
             cdr.numbers("I", len(numbers))
             if numbers:
                 self._values.append((cdr.numbers("d", *[0.0] * len(numbers)), numbers))
         self._template = cdr.data
 
-    def block(self, raw: NDArray[np.uint8], log_times: NDArray[np.uint64], first: int) -> Block:
-        """Converts rows (n, bytes of a row) to messages; first: iteration of the first row."""
-        block = Block.reserved(self.channel, log_times, first, len(self._template))
-        messages = block.messages
+    def block(self, raw: NDArray[np.uint8], log_times: NDArray[np.uint64]) -> Block:
+        """Converts rows (n, bytes of a row) to messages."""
+        first = int(raw[0, :8].view("<i8")[0])  # iteration
+        block, messages = Block.reserved(self.channel, log_times, first, len(self._template))
         messages[:] = np.frombuffer(self._template, np.uint8)
         messages[:, self._stamp : self._stamp + 8] = stamps_of(log_times)
         for place, numbers in self._values:
             values = np.empty((len(raw), len(numbers)), "<f8")
-            for i, number in enumerate(numbers):
-                values[:, i] = np.ndarray(
-                    (len(raw),), number.kind, raw, number.offset, (raw.strides[0],)
-                )
+            for i, each in enumerate(numbers):
+                part = raw[:, each.offset : each.offset + each.dtype.itemsize]
+                values[:, i] = part.view(each.dtype)[:, 0]
             messages[:, place : place + values.shape[1] * 8] = values.view(np.uint8)
         return block
-
-
-def stamped(message: bytes, log_time: int) -> bytes:
-    """Returns a message with another time [ns] in the header at its begin."""
-    begin = len(ENCAPSULATION)
-    return message[:begin] + struct.pack("<II", *divmod(log_time, 10**9)) + message[begin + 8 :]

@@ -115,5 +115,5 @@ def entries_in(
     codec = codec_of(found, channel)
     for chunk in found.chunks.having(channel, newest_first=newest_first):
         messages = [*messages_of(file, chunk, channel)]
-        for message in reversed(messages) if newest_first else messages:
+        for _, message in reversed(messages) if newest_first else messages:
             yield Entries.of(message, codec)

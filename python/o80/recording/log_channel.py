@@ -12,7 +12,7 @@ import o80._core as _core
 from o80.base.errors import Error
 from o80.base.words import Status
 from o80.frontend.frontend import Frontend
-from o80.recording.blocks import Messages
+from o80.recording.blocks import Block
 from o80.recording.cdr import CdrWriter
 from o80.recording.file_writer import FileWriter
 from o80.recording.journal_channel import Entries
@@ -75,10 +75,10 @@ class Line:
         return bytes(cdr.data)
 
 
-def added_lines(file: FileWriter, lines: Sequence[Line]) -> Messages:
+def added_lines(file: FileWriter, lines: Sequence[Line]) -> Block:
     """Makes messages of lines (at least one) and adds the channel if needed."""
     channel = file.add_topic(TOPIC, TYPE, DEFINITION)
-    return Messages(channel, [(each.time, each.message()) for each in lines])
+    return Block.of(channel, [(each.time, each.message()) for each in lines])
 
 
 class JournalLog:

@@ -14,10 +14,10 @@ import numpy as np
 
 from o80.base.finite import json_text
 from o80.base.screen import html
-from o80.recording.blocks import Messages
+from o80.recording.blocks import Block
 from o80.recording.cdr import CdrReader, CdrWriter
 from o80.recording.file_writer import FileWriter
-from o80.recording.scan import Scan, index_of, messages_of
+from o80.recording.scan import Scan, messages_of
 
 TOPIC = "/o80/marks"
 TYPE = "o80/msg/Mark"
@@ -90,23 +90,21 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"a mark must be a value that JSON can hold, got {value!r:.60}")
 
 
-def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Messages:
+def added_marks(file: FileWriter, marks: Sequence[tuple[int, Mark]]) -> Block:
     """Makes messages of marks (at least one), each with the log time of its newest row [ns]."""
     channel = file.add_topic(TOPIC, TYPE, DEFINITION)
-    return Messages(channel, [(time, mark.message()) for time, mark in marks])
+    return Block.of(channel, [(time, mark.message()) for time, mark in marks])
 
 
 def marks_in(file: IO[bytes], found: Scan) -> list[Mark]:
     """Reads all marks of a file, in order."""
     channels = [each.id for each in found.channels.values() if each.topic == TOPIC]
     return [
-        replace(Mark.of(message), row_time=int(row_time))
+        replace(Mark.of(message), row_time=row_time)
         for chunk in found.chunks.having(*channels)
         for number in channels
         if number in chunk.message_index_offsets
-        for (row_time, _), message in zip(
-            index_of(file, chunk, number), messages_of(file, chunk, number), strict=True
-        )
+        for row_time, message in messages_of(file, chunk, number)
     ]
 
 

@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from o80.recording.cdr import ENCAPSULATION
-from o80.recording.message_types import MessageType, row_type
-from o80.rows.layout import Layout
+from o80.recording.message_types import MessageType
 
 Bytes = NDArray[np.uint8]
 
@@ -38,15 +37,14 @@ class Mask(NamedTuple):
 class MessagePlan:
     """Encodes and decodes rows of one robot; both copy each adjacent range of bytes once."""
 
-    def __init__(self, message: MessageType, row_size: int) -> None:
-        self.row_size = row_size  #: [bytes]
+    def __init__(self, message: MessageType) -> None:
         self._at = 0
         self._masks: list[Mask] = []
         self._copies = _merged(self._walk(message, 0))
         self.size = len(ENCAPSULATION) + self._at  #: size of a message [bytes]
 
     def encode(self, rows: Bytes, messages: Bytes) -> None:
-        """Encodes rows (n, row_size) into messages (n, size), which may be a view."""
+        """Encodes rows (n, bytes of a row) into messages (n, size), which may be a view."""
         messages[:] = 0
         messages[:, : len(ENCAPSULATION)] = np.frombuffer(ENCAPSULATION, np.uint8)
         for copy in self._copies:
@@ -59,18 +57,32 @@ class MessagePlan:
                 bits, axis=1, count=mask.bits, bitorder="little"
             )
 
-    def decode(self, messages: Bytes) -> Bytes:
-        """Decodes messages (n, size) to rows (n, row_size); padding is zero, as in a segment."""
-        rows = np.zeros((len(messages), self.row_size), np.uint8)
-        for copy in self._copies:
+    def decode(self, messages: Bytes, rows: Bytes, copies: list[Copy] | None = None) -> None:
+        """Decodes messages (n, size) into rows (n, bytes of a row), without their padding.
+
+        copies: from `packed`, for rows of only these numbers. Raises ValueError for another size.
+        """
+        if messages.shape[1] != self.size:
+            raise ValueError(
+                f"a row has {messages.shape[1]} bytes here, and {self.size} by its description"
+            )
+        for copy in self._copies if copies is None else copies:
             rows[:, copy.row : copy.row + copy.length] = messages[
                 :, copy.message : copy.message + copy.length
             ]
-        for mask in self._masks:
+        for mask in self._masks if copies is None else ():
             values = messages[:, mask.message : mask.message + mask.bits]
             packed = np.packbits(values, axis=1, bitorder="little")
             rows[:, mask.row : mask.row + packed.shape[1]] = packed
-        return rows
+
+    def packed(self, parts: NDArray[np.uint64]) -> list[Copy]:
+        """Plans rows that hold only some numbers. parts: of `o80.rows.columns.Packing`."""
+        return [
+            Copy(place + begin - row, copy.message + begin - copy.row, end - begin)
+            for row, size, place in parts.tolist()
+            for copy in self._copies
+            if (begin := max(row, copy.row)) < (end := min(row + size, copy.row + copy.length))
+        ]
 
     # message type => copies, in the order of the message
 
@@ -93,14 +105,6 @@ class MessagePlan:
         begin = -(-self._at // alignment) * alignment
         self._at = begin + length
         return len(ENCAPSULATION) + begin
-
-
-def plan_of_rows(layout: Layout, size: int) -> MessagePlan:
-    """Plans a robot's recorded rows. Raises ValueError unless messages have `size` bytes."""
-    plan = MessagePlan(row_type(layout), layout.size)
-    if plan.size != size:
-        raise ValueError(f"rows of '{layout.schema['robot']}' have another size")
-    return plan
 
 
 def _merged(copies: Iterator[Copy]) -> list[Copy]:

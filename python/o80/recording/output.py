@@ -6,10 +6,9 @@ from pathlib import Path
 
 from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
-from o80.recording import joint_states
 from o80.recording.epoch import EpochNote, WallClock, channels_of
 from o80.recording.epoch_part import parts_of
-from o80.recording.file_writer import USUAL, FileWriter, Form
+from o80.recording.file_writer import JOINT_STATES, USUAL, FileWriter, Form
 from o80.recording.reader import files_of, in_order
 from o80.recording.scan import NotARecordingError, Scan, has_end, scan
 
@@ -129,7 +128,7 @@ class Predecessor:
 
     def _add(self, epochs: dict[int, Written], path: Path, found: Scan, segment: str) -> None:
         """Adds the epochs of the next older file."""
-        joints = channels_of(found, joint_states.CONTENT)
+        joints = channels_of(found, JOINT_STATES)
         for part in parts_of(path, found):
             note, journal = part.note, part.journal
             if note.segment != segment:

@@ -8,21 +8,22 @@ from itertools import chain
 from pathlib import Path
 from typing import IO
 
+import numpy as np
 from mcap.records import Channel, ChunkIndex
 
 from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
-from o80.recording import joint_states
-from o80.recording.blocks import Block, MessageBlock, Messages
-from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote, iteration_in
-from o80.recording.file_writer import FileWriter
+from o80.recording.blocks import Block
+from o80.recording.epoch import GAP, OVERWRITTEN, EpochNote, channels_of, iteration_in
+from o80.recording.file_writer import JOINT_STATES, FileWriter
+from o80.recording.joint_states import JointWriter
 from o80.recording.journal_channel import CONTENT as JOURNAL
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries
 from o80.recording.output import opened
 from o80.recording.reader import RecordingFile
 from o80.recording.recorded_epoch import RecordedEpoch
-from o80.recording.scan import Scan, attachment_of, index_of, messages_of
+from o80.recording.scan import Scan, attachment_of, messages_of
 from o80.recording.transforms import TOPIC as TRANSFORMS
 from o80.recording.transforms import Poses, TransformWriter
 
@@ -67,8 +68,8 @@ def write_part(
     file = opened(output, proceed=False)
     try:
         writer = _PartWriter(file, selection, offsets)
-        for run, epoch in _epochs_in(read) if selection.transforms else ():
-            writer.add_poses(run, epoch, poses(run[0], epoch))
+        for run, epoch in _epochs_in(read):
+            writer.add_run(run, epoch, poses(run[0], epoch) if selection.transforms else None)
         for path, found in chain.from_iterable(in_order):
             with found.opened(path) as content:
                 try:
@@ -135,19 +136,20 @@ class _PartWriter:
         self._next: dict[int, int] = {}  # next row or entry by new channel, to skip duplicates
         self._row_channels: dict[Run, int] = {}
         self._seen: set[tuple[str, int, bytes]] = set()
-        self._poses: dict[Run, tuple[RecordedEpoch, Poses]] = {}
-        self._transforms: dict[Run, TransformWriter] = {}
+        self._runs: dict[Run, tuple[RecordedEpoch, Poses | None]] = {}
+        self._derivers: dict[Run, list[JointWriter | TransformWriter]] = {}
         self._is_over: set[int] = set()  # journals that hold all entries up to the end
 
     def add(self, content: IO[bytes], found: Scan) -> None:
         """Adds the selected part of a file. Raises ValueError if the file is damaged."""
         self._found, self._content = found, content
+        self._joint_channels = channels_of(found, JOINT_STATES)
         self._shifts = _shifts(found, self._offsets)
         for chunk in found.chunks:
             if chunk.message_end_time + _largest(self._shifts) >= self._selection.begin:
                 blocks = [*self._blocks(chunk)]
                 if blocks:
-                    self._file.add_chunk(blocks)
+                    self._file.add_messages(blocks)
         for channel in found.channels.values():  # a journal may have no entry
             if (
                 channel.metadata.get("content") == JOURNAL
@@ -155,20 +157,27 @@ class _PartWriter:
             ):
                 self._channel(channel)
 
-    def add_poses(self, run: Run, epoch: RecordedEpoch, poses: Poses | None) -> None:
-        """Registers the bodies of a run, whose transforms are added with its rows; None: none."""
-        if poses is not None and poses.bodies:
-            self._poses[run] = epoch, poses
+    def add_run(self, run: Run, epoch: RecordedEpoch, poses: Poses | None) -> None:
+        """Registers a run. poses: its bodies, whose transforms are added with its rows."""
+        self._runs[run] = epoch, poses
 
-    def _transforms_of(self, run: Run, rows: Sequence[tuple[int, bytes]]) -> Block | None:
-        if run not in self._poses:
-            return None
-        if run not in self._transforms:
-            epoch, poses = self._poses[run]
-            self._transforms[run] = TransformWriter(
-                self._file, run[0], epoch.layout, poses, self._selection.transforms
-            )
-        return self._transforms[run].block(rows)
+    def _derived(self, note: EpochNote, rows: list[tuple[int, bytes]]) -> Iterator[Block]:
+        """Yields joint states of rows, if their file has joint states, and due transforms."""
+        run = note.segment, note.epoch
+        epoch, poses = self._runs[run]
+        if run not in self._derivers:
+            derivers = self._derivers[run] = []
+            if (note.segment, note.number) in self._joint_channels:
+                new = replace(note, number=self._numbers[run])
+                joints = JointWriter.added_to(self._file, epoch.layout, new, None)
+                derivers += [joints] if joints else []
+            if poses is not None and poses.bodies:
+                rate = self._selection.transforms
+                derivers.append(TransformWriter(self._file, note.segment, poses, rate))
+        if self._derivers[run]:
+            times = np.array([time for time, _ in rows], np.uint64)
+            raw = epoch.decoded([message for _, message in rows])
+            yield from filter(None, (each.block(raw, times) for each in self._derivers[run]))
 
     def add_end(self, run: Run, epoch: RecordedEpoch) -> None:
         """Adds the end of a run: how it ended, that its end is missing, or that it was cut."""
@@ -183,10 +192,9 @@ class _PartWriter:
         name = f"{run[0]}/{self._numbers[run]}/end"
         self._file.add_metadata(name, texts | self._run_texts(run))
 
-    def _blocks(self, chunk: ChunkIndex) -> Iterator[MessageBlock]:
+    def _blocks(self, chunk: ChunkIndex) -> Iterator[Block]:
         found, content = self._found, self._content
-        kept: dict[Run, set[int]] = {}  # log times of kept rows
-        transforms: list[Block] = []
+        derived: list[Block] = []
         for number in sorted(chunk.message_index_offsets):
             channel = found.channels[number]
             note, run = EpochNote.of(channel.metadata), _run_of(channel)
@@ -194,25 +202,17 @@ class _PartWriter:
                 continue
             if channel.topic == TRANSFORMS and self._selection.transforms:
                 continue
+            if number in self._joint_channels.values():  # they are derived from rows
+                continue
             # marks and the log belong to no run: they get the shift of the file's newest boot
             shift = _largest(self._shifts) if run is None else self._shifts.get(run, 0)
-            times = [int(time) + shift for time in index_of(content, chunk, number)[:, 0]]
-            messages: Iterable[tuple[int, bytes]] = zip(
-                times, messages_of(content, chunk, number), strict=True
-            )
+            found_there = messages_of(content, chunk, number)
+            messages: Iterable[tuple[int, bytes]] = ((time + shift, m) for time, m in found_there)
             if note is not None and run is not None:
-                messages = self._rows(channel, note, messages)
-                kept[run] = {time for time, _ in messages}
-                if (block := self._transforms_of(run, messages)) is not None:
-                    transforms.append(block)
+                messages = rows = self._rows(channel, note, messages)
+                derived += self._derived(note, rows) if rows else ()
             elif channel.metadata.get("content") == JOURNAL and run is not None:
                 messages = self._entries(channel, messages)
-            elif channel.metadata.get("content") == joint_states.CONTENT and run in kept:
-                messages = [
-                    (time, joint_states.stamped(message, time) if shift else message)
-                    for time, message in messages
-                    if time in kept[run]
-                ]
             else:  # marks and the log, which recordings of the same time hold twice
                 messages = [
                     each
@@ -221,8 +221,8 @@ class _PartWriter:
                 ]
                 self._seen.update((channel.topic, *each) for each in messages)
             if messages:
-                yield Messages(self._channel(channel), [*messages])
-        yield from transforms
+                yield Block.of(self._channel(channel), [*messages])
+        yield from derived
 
     def _rows(
         self, channel: Channel, note: EpochNote, messages: Iterable[tuple[int, bytes]]

@@ -1,21 +1,19 @@
 """Reads a recording: the same histories and journals as from a live frontend."""
 
 import os
-import struct
 from bisect import bisect
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any
 
 from o80.base.cached import cached
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.recording.epoch_part import UNFINISHED, EpochPart, parts_of
 from o80.recording.foreign_file import copied
 from o80.recording.marks import Mark, Marks, marks_in
-from o80.recording.recorded_epoch import RecordedEpoch
-from o80.recording.scan import MAGIC, NotARecordingError, Scan, scan, unreadable
-from o80.rows.history import History, Range
+from o80.recording.recorded_epoch import Histories, RecordedEpoch
+from o80.recording.scan import DAMAGED, MAGIC, NotARecordingError, Scan, scan, unreadable
 
 
 class RecordingFile:
@@ -78,7 +76,7 @@ class RecordingFile:
                     marks += marks_in(file, found)
             except OSError as error:
                 raise RecordingError(unreadable(path, error)) from error
-            except (ValueError, TypeError, RecursionError, struct.error) as error:
+            except (*DAMAGED, TypeError, RecursionError) as error:
                 raise RecordingError(f"{path}: {error}") from error
         return marks
 
@@ -204,24 +202,21 @@ def _epochs_of(runs: list[list[EpochPart]], cut_at: Path | None) -> Iterator[Rec
         yield RecordedEpoch(parts, after or killed)
 
 
-class RecordedSegment:
+class RecordedSegment(Histories):
     """The rows of one segment: one epoch for each run of its backend."""
 
     def __init__(self, name: str, epochs: list[RecordedEpoch]) -> None:
         self.name = name
         self.epochs = epochs
 
-    def history(self, n: int | None = None, **selection: Unpack[Range]) -> History:
-        """Returns rows of the only epoch; the arguments are those of `Frontend.history`.
-
-        Raises InvalidArgument if there are several epochs: choose one of `epochs`.
-        """
+    @property
+    def _run(self) -> RecordedEpoch:
         if len(self.epochs) != 1:
             raise InvalidArgument(
                 f"segment '{self.name}' has {len(self.epochs)} epochs, because its robot was "
                 f"restarted: choose one, for example .epochs[-1].history()"
             )
-        return self.epochs[0].history(n, **selection)
+        return self.epochs[0]
 
     @property
     def schema(self) -> dict[str, Any]:

@@ -1,11 +1,16 @@
 """One run of a backend in a recording: its rows and its journal, as from a live frontend."""
 
-from collections.abc import Callable, Iterable, Iterator
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from itertools import accumulate
 from pathlib import Path
-from typing import Any, TypeVar, Unpack
+from typing import Any, TypeVar, Unpack, overload
 
 import numpy as np
 from mcap.records import ChunkIndex
+from numpy.typing import NDArray
 
 import o80._core as _core
 from o80.base.argument_checks import whole
@@ -13,21 +18,57 @@ from o80.base.cached import cached
 from o80.base.errors import InvalidArgument, RecordingError, SegmentError
 from o80.base.machine import Machine
 from o80.recording.blocks import messages_in
-from o80.recording.epoch import GAP, OVERWRITTEN, Gap, Interruption
+from o80.recording.epoch import GAP, OVERWRITTEN, Gap, Interruption, iteration_in
 from o80.recording.epoch_part import EpochPart
 from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of, entries_in
-from o80.recording.message_plan import MessagePlan, plan_of_rows
-from o80.recording.scan import content_of, index_of
+from o80.recording.message_plan import Bytes, Copy, MessagePlan
+from o80.recording.message_types import row_type
+from o80.recording.scan import content_of
+from o80.rows.columns import packing_at
 from o80.rows.history import History, Range, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
 from o80.rows.layout import Layout, decoder_of
 from o80.rows.provenance import Provenance
 
 T = TypeVar("T")
+Paths = list[str] | tuple[str, ...]
+RowChunk = tuple[EpochPart, ChunkIndex, NDArray[np.uint64]]  # with the message index of its rows
 
 
-class RecordedEpoch:
+class Histories:
+    """Gives the rows of one run, as a live frontend does."""
+
+    @property
+    def _run(self) -> "RecordedEpoch":
+        raise NotImplementedError
+
+    @overload
+    def history(self, n: int | None = None, **selection: Unpack[Range]) -> History: ...
+    @overload
+    def history(
+        self, n: int | None = None, *, fields: str, **selection: Unpack[Range]
+    ) -> NDArray[Any]: ...
+    @overload
+    def history(
+        self, n: int | None = None, *, fields: Paths, **selection: Unpack[Range]
+    ) -> tuple[NDArray[Any], ...]: ...
+    def history(
+        self, n: int | None = None, *, fields: str | Paths | None = None, **selection: Unpack[Range]
+    ) -> History | NDArray[Any] | tuple[NDArray[Any], ...]:
+        """Returns many observations at once; the arguments are those of `Frontend.history`.
+
+        Raises RecordingError if this part of the file is damaged, InvalidArgument if the segment
+        has several epochs: choose one of `epochs`.
+        """
+        run, wanted = self._run, Selection.checked(n, **selection)
+        if fields is None:
+            return run._rows(run._chunks(wanted)).select(n, **selection)
+        arrays = run._columns(wanted, fields)
+        return arrays[0] if isinstance(fields, str) else arrays
+
+
+class RecordedEpoch(Histories):
     """Reads the rows and the journal of one run of a backend."""
 
     def __init__(self, parts: list[EpochPart], lacks_end: str = "") -> None:
@@ -35,6 +76,10 @@ class RecordedEpoch:
         self._parts = parts
         self._lacks_end = lacks_end
         self._note = parts[0].note
+
+    @property
+    def _run(self) -> "RecordedEpoch":
+        return self
 
     @property
     def epoch(self) -> int:
@@ -221,20 +266,13 @@ class RecordedEpoch:
 
     # ------------------------------------------------------------------ rows
 
-    def history(self, n: int | None = None, **selection: Unpack[Range]) -> History:
-        """Returns many observations at once; the arguments are those of `Frontend.history`.
-
-        Raises RecordingError if this part of the file is damaged.
-        """
-        wanted = Selection.checked(n, **selection)
-        blocks: Iterable[History]
-        if wanted.n is not None:
-            blocks = self._last_blocks(wanted.n)
-        elif wanted.duration is not None and self.rows:
-            blocks = self._blocks(self.time_range[1] - wanted.duration, None)
-        else:
-            blocks = self._blocks(wanted.from_time, wanted.to_time)
-        return History._joined(self._decoder, blocks).select(n, **selection)
+    def _columns(self, wanted: Selection, fields: str | Paths) -> tuple[NDArray[Any], ...]:
+        packing = packing_at(self.layout, fields, "iteration", "time")
+        copies = self._plan.packed(packing.parts)
+        rows = self._read(self._chunks(wanted), packing.dtype.itemsize, copies)
+        *arrays, iterations, times = packing.arrays(rows.view(packing.dtype)[:, 0])
+        kept = wanted.place(iterations, times)
+        return tuple(each[kept] for each in arrays)
 
     def blocks(
         self, *, from_time: int | None = None, to_time: int | None = None
@@ -243,7 +281,8 @@ class RecordedEpoch:
 
         For recordings larger than the memory. Raises RecordingError if this part is damaged.
         """
-        for block in self._blocks(from_time, to_time):
+        for part, chunk in self._having(from_time, to_time):
+            block = self._rows([(part, chunk, part.index(chunk))])
             history = block.select(from_time=from_time, to_time=to_time)
             if len(history):
                 yield history
@@ -262,40 +301,67 @@ class RecordedEpoch:
         """Wall-clock time at which recording of the run began [ns since 1970]."""
         return self._parts[0].began_at
 
-    def _blocks(
+    def _having(
         self, from_time: int | None, to_time: int | None, *, newest_first: bool = False
-    ) -> Iterator[History]:
-        """Yields the rows of each chunk that may have rows of these times."""
-        offset = self.wall_offset
-        start = 0 if from_time is None else from_time + offset
-        end = 2**64 if to_time is None else to_time + offset
+    ) -> Iterator[tuple[EpochPart, ChunkIndex]]:
+        """Yields chunks that may have rows of these times, each with its part."""
+        start = 0 if from_time is None else from_time + self.wall_offset
+        end = 2**64 if to_time is None else to_time + self.wall_offset
         for part in reversed(self._parts) if newest_first else self._parts:
-            chunks = part.found.chunks.having(
+            for chunk in part.found.chunks.having(
                 part.channel, start=start, end=end, newest_first=newest_first
-            )
-            for raw in self._decoded_rows(part, chunks):
-                yield History(self._decoder, raw.view(self.layout.row).reshape(len(raw)))
+            ):
+                yield part, chunk
 
-    def _last_blocks(self, n: int) -> list[History]:
-        """Returns the rows of the last chunks: at least n rows, or all."""
-        blocks: list[History] = []
-        for block in self._blocks(None, None, newest_first=True):
-            if n <= 0:
+    def _chunks(self, wanted: Selection) -> list[RowChunk]:
+        """Returns the chunks that hold the selected rows, in order."""
+        begin, left = wanted.from_time, math.inf if wanted.n is None else wanted.n
+        if wanted.duration is not None and self.rows:
+            begin = self.time_range[1] - wanted.duration
+        found = []
+        for part, chunk in self._having(begin, wanted.to_time, newest_first=True):
+            if left <= 0:
                 break
-            blocks.append(block)
-            n -= len(block)
-        return blocks[::-1]
+            found.append((part, chunk))
+            left -= len(part.index(chunk)) if wanted.n is not None else 0
+        found.reverse()
+        if wanted.until is not None:
+            found = found[: bisect_right(found, wanted.until, key=_first_row)]
+        if wanted.since is not None:
+            found = found[max(0, bisect_right(found, wanted.since, key=_first_row) - 1) :]
+        return [(part, chunk, part.index(chunk)) for part, chunk in found]
 
-    def _decoded_rows(self, part: EpochPart, chunks: "Iterator[ChunkIndex]") -> Iterator[Any]:
-        """Yields the rows (n, bytes) of each chunk."""
-        plan: MessagePlan | None = None
-        with part.reading() as file:
-            for chunk in chunks:
-                index = index_of(file, chunk, part.channel)
-                messages = messages_in(content_of(file, chunk), index)
-                if plan is None or plan.size != messages.shape[1]:
-                    plan = plan_of_rows(self.layout, messages.shape[1])
-                yield np.ascontiguousarray(plan.decode(messages))
+    def _rows(self, chunks: Sequence[RowChunk]) -> History:
+        rows = self._read(chunks, self.layout.size)
+        return History(self._decoder, rows.view(self.layout.row)[:, 0])
+
+    def _read(
+        self, chunks: Sequence[RowChunk], size: int, copies: list[Copy] | None = None
+    ) -> Bytes:
+        """Decompresses and decodes chunks to rows (n, size), in two threads."""
+        plan, ends = self._plan, [*accumulate(len(index) for *_, index in chunks)]
+        rows = np.zeros((ends[-1] if ends else 0, size), np.uint8)  # padding is zero
+
+        def decode(chunk: RowChunk, end: int) -> None:
+            part, place, index = chunk
+            with part.reading() as file:
+                messages = messages_in(content_of(file, place), index)
+                plan.decode(messages, rows[end - len(messages) : end], copies)
+
+        with ThreadPoolExecutor(2) as threads:
+            _ = [*(threads.map if len(chunks) > 1 else map)(decode, chunks, ends)]
+        return rows
+
+    @cached
+    def _plan(self) -> MessagePlan:
+        return MessagePlan(row_type(self.layout))
+
+    def decoded(self, messages: Sequence[bytes]) -> Bytes:
+        """Decodes messages to rows (n, bytes of a row). Raises ValueError if they are damaged."""
+        encoded = np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), -1)
+        rows = np.zeros((len(messages), self.layout.size), np.uint8)
+        self._plan.decode(encoded, rows)
+        return rows
 
     @property
     def first_row(self) -> int:
@@ -425,3 +491,9 @@ class RecordedEpoch:
 
     def __repr__(self) -> str:
         return f"<epoch of {self._note.segment}: {self.rows} rows>"
+
+
+def _first_row(chunk: tuple[EpochPart, ChunkIndex]) -> int:
+    """Reads the iteration of a chunk's first row."""
+    part, place = chunk
+    return iteration_in(part.messages(place)[0].tobytes())

@@ -143,7 +143,7 @@ class Recorder:
             if self._patterns and time.monotonic() >= self._search_at:
                 self._search()
             blocks = [block for source in self.sources.values() for block in source.poll()]
-            count = sum(block.count for block in blocks)
+            count = sum(len(block.log_times) for block in blocks)
             marks, lines = [], []
             for source in self.sources.values():
                 for text, iteration in source.marks:
@@ -157,7 +157,7 @@ class Recorder:
             if lines:
                 blocks.append(added_lines(self.file, lines))
             if blocks:
-                self.file.add_chunk(blocks)
+                self.file.add_messages(blocks)
             self._check_name()
         return count
 
@@ -196,7 +196,7 @@ class Recorder:
             log_time = max(log_times, default=now)
             line = Line("", log_time, INFO, f"mark {name}")
             blocks = added_marks(self.file, [(log_time, mark)]), added_lines(self.file, [line])
-            self.file.add_chunk(blocks)
+            self.file.add_messages(blocks)
 
     def catch_up(self) -> None:
         """Polls until rows and decisions that were published before the call are written."""

@@ -6,7 +6,6 @@ checksums; the message indexes are rebuilt.
 
 import mmap
 import re
-import struct
 import zlib
 from collections.abc import Iterator
 from contextlib import suppress
@@ -21,7 +20,7 @@ from mcap.stream_reader import get_chunk_data_stream
 
 from o80.base.errors import RecordingError
 from o80.base.unwritable import reason
-from o80.recording.blocks import LENGTH_ENDS_AT, MESSAGE, Messages
+from o80.recording.blocks import LENGTH_ENDS_AT, MESSAGE, MESSAGE_STRUCT, Block
 from o80.recording.chunks import HEAD
 from o80.recording.epoch import GAP, EpochNote, iteration_in
 from o80.recording.file_writer import FileWriter
@@ -31,7 +30,7 @@ from o80.recording.journal_channel import Entries
 from o80.recording.locked_file import LockedFile
 from o80.recording.output import opened
 from o80.recording.reader import errors_explained
-from o80.recording.scan import CUT, MAGIC, Scan, damage_in, has_end, has_summary, scan
+from o80.recording.scan import CUT, MAGIC, Scan, damage_in, has_end, scan
 
 REASON = "damaged"
 _KEPT: dict[Opcode, Any] = {
@@ -43,7 +42,6 @@ _KEPT: dict[Opcode, Any] = {
 }
 _MADE_ANEW = {*Opcode} - _KEPT.keys()
 _HEADS = re.compile(rb"[\x03\x04\x06\x09\x0c].{4}\0{4}", re.DOTALL)  # heads of kept records
-_MESSAGE = struct.Struct("<BQHIQQ")
 
 
 class Part(NamedTuple):
@@ -70,7 +68,7 @@ def repaired(path: Path, *, is_last: bool) -> list[str]:
                 raise RecordingError("\n".join(f"{path}: {each}" for each in damage))
             if found is None or damage or _has_data_behind(path, found):
                 return _salvaged(path, found, is_last)
-            if found.finished and (found.foreign or has_summary(path)):
+            if found.finished and (found.foreign or found.summarized):
                 return []
     file = opened(path, proceed=True)
     kept = file.kept
@@ -194,8 +192,8 @@ def _messages(chunk: Chunk) -> Iterator[tuple[int, int, bytes]]:
     stream, length = get_chunk_data_stream(chunk, validate_crc=True)
     content, at = stream.read(length), 0
     while at < length:
-        opcode, size, channel, _, time, _ = _MESSAGE.unpack_from(content, at)
-        begin, at = at + _MESSAGE.size, at + LENGTH_ENDS_AT + size
+        opcode, size, channel, _, time, _ = MESSAGE_STRUCT.unpack_from(content, at)
+        begin, at = at + MESSAGE_STRUCT.size, at + LENGTH_ENDS_AT + size
         if opcode != MESSAGE or not begin <= at <= length:
             raise ValueError
         yield channel, time, content[begin:at]
@@ -264,8 +262,8 @@ class _Salvage:
                 kept.setdefault(number, []).append((time, message))
                 self._last[number] = end
         if kept:
-            blocks = [Messages(self._new[number], each) for number, each in kept.items()]
-            self._file.add_chunk(blocks)
+            blocks = [Block.of(self._new[number], each) for number, each in kept.items()]
+            self._file.add_messages(blocks)
 
     def _is_next(self, number: int, message: bytes) -> bool:
         """False if later rows or entries were written already. Notes a hole before the message."""

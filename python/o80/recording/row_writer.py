@@ -25,7 +25,7 @@ class RowWriter:
         self.note = note
         self.channel = channel
         self._joints = joints
-        self._plan = MessagePlan(row_type(layout), layout.size)
+        self._plan = MessagePlan(row_type(layout))
 
     @classmethod
     def added_to(cls, file: "FileWriter", frontend: "Reader", note: EpochNote) -> "RowWriter":
@@ -48,8 +48,6 @@ class RowWriter:
         raw = np.ascontiguousarray(rows).view(np.uint8).reshape(len(rows), -1)
         log_times = (rows["time"] + self.note.wall_offset).astype(np.uint64)
         first = int(rows["iteration"][0])
-        block = Block.reserved(self.channel, log_times, first, self._plan.size)
-        self._plan.encode(raw, block.messages)
-        if self._joints is None:
-            return [block]
-        return [block, self._joints.block(raw, log_times, first)]
+        block, messages = Block.reserved(self.channel, log_times, first, self._plan.size)
+        self._plan.encode(raw, messages)
+        return [block] if self._joints is None else [block, self._joints.block(raw, log_times)]

@@ -50,7 +50,7 @@ CHUNK_HEAD = struct.Struct("<QQQIL")
 FOOTER_LENGTH = HEAD.size + 20 + len(MAGIC)
 DATA_END_LENGTH = HEAD.size + 4
 BETWEEN_FIGURES = 5000  # records between two reports of progress
-_DAMAGED = (EndOfFile, ValueError, OverflowError, LookupError, MemoryError, struct.error)
+DAMAGED = (EndOfFile, ValueError, OverflowError, LookupError, MemoryError, struct.error)
 
 
 class NotARecordingError(ValueError):
@@ -70,6 +70,7 @@ class Scan:
     counts: dict[int, int] = field(default_factory=dict)  #: number of messages, by channel
     end: int = 0  #: end of the last whole group [bytes]
     finished: bool = False  #: the file has a summary and a footer
+    summarized: bool = False  #: the summary is complete
     library: str = ""
     #: messages outside of chunks, chunks without indexes or with channels of their own: another
     #: program has written them
@@ -133,12 +134,6 @@ def has_end(path: str | os.PathLike[str]) -> bool:
         return _footer(file, os.fstat(file.fileno()).st_size) is not None
 
 
-def has_summary(path: str | os.PathLike[str]) -> bool:
-    """Whether a file has a complete summary. Raises OSError."""
-    with Path(path).open("rb") as file:
-        return _by_summary(file, os.fstat(file.fileno()).st_size) is not None
-
-
 def _footer(file: IO[bytes], size: int) -> Footer | None:
     """Reads the footer; None if the file has no summary."""
     file.seek(max(0, size - FOOTER_LENGTH))
@@ -153,7 +148,7 @@ def _by_summary(file: IO[bytes], size: int) -> Scan | None:
     """Scan from the file's summary; None if that is missing or incomplete."""
     try:
         return _summary(file, size)
-    except _DAMAGED:  # a scan of all records reports where
+    except DAMAGED:  # a scan of all records reports where
         return None
 
 
@@ -162,7 +157,7 @@ def _scanned(file: IO[bytes], size: int, path: str | os.PathLike[str]) -> Scan:
         return _Scanner(file, size, path).run()
     except RecordingError:
         raise
-    except _DAMAGED as error:
+    except DAMAGED as error:
         raise RecordingError(f"{path} is damaged, and its summary too") from error
 
 
@@ -176,7 +171,7 @@ def damage_in(path: Path, found: Scan) -> Iterator[str]:
                 if HEAD.unpack(file.read(HEAD.size)) != head:
                     raise ValueError(f"the head of the chunk at byte {at} is damaged")
                 _check_indexes(file, chunk, content_of(file, chunk))
-            except _DAMAGED as error:
+            except DAMAGED as error:
                 yield str(error)
         for place in found.attachments:
             file.seek(place.offset + HEAD.size)
@@ -208,7 +203,7 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
         return None
     if zlib.crc32(data[DATA_END_LENGTH:behind]) != footer.summary_crc:
         return None
-    found = Scan(end=end, finished=True)
+    found = Scan(end=end, finished=True, summarized=True)
     statistics: Statistics | None = None
     at = DATA_END_LENGTH
     while at < behind:
@@ -269,15 +264,14 @@ def index_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> NDArray[np.uin
     return np.frombuffer(file.read(length), "<u8").reshape(-1, 2)
 
 
-def messages_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> Iterator[bytes]:
-    """Yields the data of a channel's messages, of any size. Raises ValueError if damaged."""
+def messages_of(file: IO[bytes], chunk: ChunkIndex, channel: int) -> Iterator[tuple[int, bytes]]:
+    """Yields log time [ns] and data of a channel's messages. Raises ValueError if damaged."""
     content = content_of(file, chunk)
-    for _, offset in index_of(file, chunk, channel):
-        begin = int(offset)
+    for time, begin in index_of(file, chunk, channel).tolist():
         if begin + MESSAGE_HEAD.itemsize > len(content):
             raise ValueError("a message index leads out of its chunk")
         (length,) = struct.unpack_from("<Q", content, begin + 1)
-        yield content[begin + MESSAGE_HEAD.itemsize : begin + LENGTH_ENDS_AT + length]
+        yield time, content[begin + MESSAGE_HEAD.itemsize : begin + LENGTH_ENDS_AT + length]
 
 
 def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:
@@ -286,7 +280,7 @@ def attachment_of(file: IO[bytes], place: AttachmentIndex) -> Attachment:
     try:
         stream = ReadDataStream(BytesIO(file.read(place.length - HEAD.size)))
         attachment: Attachment = Attachment.read(stream)
-    except _DAMAGED as error:
+    except DAMAGED as error:
         raise ValueError(f"the record at byte {place.offset} is damaged") from error
     return attachment
 
@@ -336,7 +330,7 @@ class _Scanner:
                 break
             try:
                 belongs = self._take(opcode, at, length)
-            except _DAMAGED as error:
+            except DAMAGED as error:
                 raise RecordingError(f"{self._path}: the record at byte {at} is damaged") from error
             if not belongs:
                 break

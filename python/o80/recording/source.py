@@ -7,7 +7,7 @@ from time import monotonic, time_ns
 import o80._core as _core
 from o80.base.errors import BackendGone, RecordingError, SegmentError, TimeoutError
 from o80.frontend.frontend import Frontend
-from o80.recording.blocks import Block, MessageBlock, Messages
+from o80.recording.blocks import Block
 from o80.recording.epoch import EARLIER_FILE, GAP, WallClock, note_of
 from o80.recording.file_writer import FileWriter
 from o80.recording.joint_states import JointWriter
@@ -121,7 +121,7 @@ class Source:
             return newest >= self._next
         return self._journal is not None and self._journal.unread >= share
 
-    def poll(self) -> list[MessageBlock]:
+    def poll(self) -> list[Block]:
         """Returns rows and decisions since the last call; rows of at most LARGEST_BLOCK bytes."""
         if self._frontend is None and not self._attach():
             return []
@@ -137,9 +137,9 @@ class Source:
                 blocks = self._read(self._frontend)
         return blocks
 
-    def _read(self, frontend: Frontend) -> list[MessageBlock]:
+    def _read(self, frontend: Frontend) -> list[Block]:
         """Reads rows, then the journal, so that it has the decisions of all these rows."""
-        blocks: list[MessageBlock] = [*self._read_rows(frontend)]
+        blocks = self._read_rows(frontend)
         journal = self._read_journal()
         return blocks if journal is None else [*blocks, journal]
 
@@ -248,10 +248,10 @@ class Source:
         self.rows += len(rows)
         self.behind = newest - last
         blocks = self._writer.blocks(rows)
-        self._last_log_time = blocks[0].time_range[1]
+        self._last_log_time = int(blocks[0].log_times[-1])
         return blocks
 
-    def _read_journal(self) -> Messages | None:
+    def _read_journal(self) -> Block | None:
         if self._journal is None:
             return None
         entries, gap = self._journal.read()
@@ -265,7 +265,7 @@ class Source:
         for iteration, level, text in self._journal_log.lines(entries, self._journal.notable):
             self._note(iteration, level, text)
         time = self._last_log_time or time_ns()
-        return Messages(self._journal.channel, [(time, entries.message())])
+        return Block.of(self._journal.channel, [(time, entries.message())])
 
     def _note_end(self, frontend: Frontend) -> None:
         """Records the end of a run: a killed backend could not write it into the journal."""

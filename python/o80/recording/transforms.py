@@ -1,7 +1,7 @@
 """Poses of a robot's bodies as tf2_msgs/TFMessage, which ROS tools and Foxglove show in 3D."""
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 from o80.recording.blocks import Block, stamps_of
 from o80.recording.cdr import CdrWriter
 from o80.recording.file_writer import FileWriter
-from o80.recording.message_plan import plan_of_rows
+from o80.recording.message_plan import Bytes
 from o80.recording.message_types import HEADER, SEPARATOR
-from o80.rows.layout import Layout
 
 TOPIC = "/tf"
 TYPE = "tf2_msgs/msg/TFMessage"
@@ -55,12 +54,9 @@ class Poses(Protocol):
 class TransformWriter:
     """Writes one message in each period."""
 
-    def __init__(
-        self, file: FileWriter, segment: str, layout: Layout, poses: Poses, rate: float
-    ) -> None:
+    def __init__(self, file: FileWriter, segment: str, poses: Poses, rate: float) -> None:
         """rate: frequency of the messages [Hz]."""
         self._poses, self._rate = poses, rate
-        self._layout = layout
         self._last = -1.0  # number of the period of the last message
         self._count = 0
         self._channel = file.add_topic(TOPIC, TYPE, DEFINITION)
@@ -74,24 +70,15 @@ class TransformWriter:
             self._places.append(cdr.numbers("d", *[0.0] * 7))
         self._template = cdr.data
 
-    def block(self, rows: Sequence[tuple[int, bytes]]) -> Block | None:
-        """Encodes the due ones of rows (log time [ns], message); None if no message is due."""
-        chosen = []
-        for time, message in rows:
-            period = time * self._rate // 1_000_000_000
-            if period > self._last:
-                self._last = period
-                chosen.append((time, message))
-        if not chosen:
+    def block(self, raw: Bytes, log_times: NDArray[np.uint64]) -> Block | None:
+        """Encodes the due ones of rows (n, bytes of a row); None if no message is due."""
+        periods = np.append(self._last, log_times * self._rate // 1_000_000_000)
+        due = np.diff(np.maximum.accumulate(periods)) > 0
+        if not due.any():
             return None
-        log_times = np.array([time for time, _ in chosen], np.uint64)
-        encoded = np.frombuffer(b"".join(message for _, message in chosen), np.uint8).reshape(
-            len(chosen), -1
-        )
-        raw = plan_of_rows(self._layout, encoded.shape[1]).decode(encoded)
-        block = Block.reserved(self._channel, log_times, self._count, len(self._template))
-        self._count += len(chosen)
-        messages: Any = block.messages
+        raw, log_times, self._last = raw[due], log_times[due], periods.max()
+        block, messages = Block.reserved(self._channel, log_times, self._count, len(self._template))
+        self._count += len(raw)
         messages[:] = np.frombuffer(self._template, np.uint8)
         for at in self._stamps:
             messages[:, at : at + 8] = stamps_of(log_times)

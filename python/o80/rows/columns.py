@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 import o80._core as _core
+from o80.base.argument_checks import sequence
 from o80.base.errors import InvalidArgument
 from o80.base.loop_options import did_you_mean
 from o80.rows.layout import HEAD, Layout, dtype_of_field, labels_of_field
@@ -137,6 +138,16 @@ def packing_of(columns_by_path: Sequence[Sequence[Column]]) -> Packing:
             end, largest = place + size, max(largest, size)
     packed = -(-end // largest) * largest
     return Packing(np.dtype((np.void, packed)), np.array(parts, np.uint64), numbers)
+
+
+def packing_at(layout: Layout, fields: str | Sequence[str], *more: str) -> Packing:
+    """Returns the packing of a history's fields and of more paths. Raises InvalidArgument."""
+    paths = [fields] if isinstance(fields, str) else sequence(fields, "fields", "['observed']")
+    columns = [layout.columns_at(path, columns_at) for path in (*paths, *more)]
+    packing: Packing | None = layout.packings.get(key := (*paths, *more))
+    if packing is None:
+        packing = layout.packings[key] = packing_of(columns)
+    return packing
 
 
 def value_of(row: Any, column: Column) -> Any:

@@ -100,6 +100,23 @@ class Selection:
             last = min(last, iteration_at(self.to_time))
         return first, last
 
+    def place(self, iterations: NDArray[np.int64], times: NDArray[np.int64]) -> slice:
+        """Returns the positions of the selected ones of observations, given in rising order."""
+        count = len(iterations)
+        if self.n is not None or not count:
+            return slice(max(0, count - (self.n or 0)), count)
+        oldest, newest = int(iterations[0]), int(iterations[-1])
+
+        def iteration_at(time: int) -> int:
+            at = int(np.searchsorted(times, time, side="right")) - 1
+            return int(iterations[at]) if at >= 0 else oldest - 1
+
+        first, last = self.range(oldest, newest, iteration_at, lambda: int(times[-1]))
+        if (first, last) == (oldest, newest):
+            return slice(0, count)
+        begin = int(np.searchsorted(iterations, first))
+        return slice(begin, max(begin, int(np.searchsorted(iterations, last, side="right"))))
+
 
 class History:
     """Consecutive observations, oldest first: arrays with a first dimension (T,).
@@ -178,7 +195,7 @@ class History:
         Raises RowOverwritten if all observations of this history are later.
         """
         time = whole(time, "time")
-        place = self._place_of(time)
+        place = int(np.searchsorted(self.time, time, side="right")) - 1
         if place < 0:
             raise RowOverwritten(
                 f"no row of {time} ns or before is in this history, {self._extent}"
@@ -187,29 +204,7 @@ class History:
 
     def select(self, n: int | None = None, **selection: Unpack[Range]) -> "History":
         """Returns a part of this history, without a copy; arguments as for `Frontend.history`."""
-        wanted = Selection.checked(n, **selection)
-        if not len(self):
-            return self
-        if wanted.n is not None:
-            return self[max(0, len(self) - wanted.n) :]
-        first, last = wanted.range(
-            int(self.iteration[0]),
-            int(self.iteration[-1]),
-            self._iteration_at,
-            lambda: int(self.time[-1]),
-        )
-        begin = int(np.searchsorted(self.iteration, first))
-        end = int(np.searchsorted(self.iteration, last, side="right"))
-        return self[begin : max(begin, end)]
-
-    def _place_of(self, time: int) -> int:
-        """Returns the position of the newest observation at or before a time; -1: all are later."""
-        return int(np.searchsorted(self.time, time, side="right")) - 1
-
-    def _iteration_at(self, time: int) -> int:
-        """Returns the iteration of that observation; one before the first if all are later."""
-        place = self._place_of(time)
-        return int(self.iteration[place]) if place >= 0 else int(self.iteration[0]) - 1
+        return self[Selection.checked(n, **selection).place(self.iteration, self.time)]
 
     @property
     def _extent(self) -> str:

@@ -11,6 +11,7 @@ import o80
 from o80.recording.epoch import topic_of
 from o80.recording.joint_states import joints_of
 from o80.recording.recorder import Recorder
+from o80.recording.scan import scan
 
 JOINT = np.dtype([("position", "f8"), ("velocity", "f4"), ("torque", "f8")])
 
@@ -87,3 +88,14 @@ def test_a_successor_goes_on_in_the_same_channel(arm: o80.Frontend, tmp_path: Pa
     assert len(joint_states(path, arm.segment)) == 21
     with AnyReader([path]) as reader:
         assert sum(each.topic.endswith("/joint_states") for each in reader.connections) == 1
+
+
+def test_many_rows_are_read_without_decompressing_their_joint_states(
+    arm: o80.Frontend, tmp_path: Path
+) -> None:
+    for count, apart in ((300, False), (3000, True)):
+        arm.burst(count)
+        assert len(recorded(arm.segment, tmp_path / f"{count}.mcap")) >= count
+        found = scan(tmp_path / f"{count}.mcap")
+        (own,) = (n for n, c in found.channels.items() if c.topic.endswith("/joint_states"))
+        assert any({*each.message_index_offsets} == {own} for each in found.chunks) == apart

@@ -6,7 +6,7 @@ import shutil
 import subprocess
 from datetime import datetime
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,8 +28,11 @@ CUTS = 30
 
 
 @pytest.fixture
-def recorded(arm: o80.Frontend, tmp_path: Path) -> tuple[Path, o80.History]:
-    """A file of 10 chunks of 20 rows, and the rows."""
+def recorded(
+    arm: o80.Frontend, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> tuple[Path, o80.History]:
+    """A file of 10 chunks of 20 rows, each before one of their joint states, and the rows."""
+    monkeypatch.setattr("o80.recording.file_writer.LARGE", 0)
     path = tmp_path / "run.mcap"
     recorder = Recorder(path, [arm.segment])
     for i in range(10):
@@ -53,9 +56,8 @@ def test_a_file_that_loses_its_name_while_it_is_written_is_not_lost(
     else:
         path.unlink()
     arm.burst(20)
-    with pytest.warns(
-        RuntimeWarning, match="moved.mcap, and goes on" if moved else "written again"
-    ):
+    said = "moved.mcap, and goes on" if moved else "written again"
+    with pytest.warns(RuntimeWarning, match=said):
         recorder.poll()
     arm.burst(20)
     recorder.poll()  # says it once
@@ -64,10 +66,11 @@ def test_a_file_that_loses_its_name_while_it_is_written_is_not_lost(
     assert len(o80.open(other if moved else path)[arm.segment].history()) == 61
 
 
-def rows_in(file: IO[bytes], arm: o80.Frontend) -> int:
+def rows_in(path: Path, arm: o80.Frontend) -> int:
     """Rows that a public reader finds."""
-    reader = make_reader(file, validate_crcs=True)
-    return sum(1 for _ in reader.iter_messages([topic_of(arm.segment)]))
+    with path.open("rb") as file:
+        reader = make_reader(file, validate_crcs=True)
+        return sum(1 for _ in reader.iter_messages([topic_of(arm.segment)]))
 
 
 def test_joint_states_may_be_left_out(arm: o80.Frontend, tmp_path: Path) -> None:
@@ -75,48 +78,36 @@ def test_joint_states_may_be_left_out(arm: o80.Frontend, tmp_path: Path) -> None
     with o80.Recording(path, arm, joint_states=False):
         arm.add_command("elbow", 0.5, iterations=20)
         arm.burst(50)
-    with path.open("rb") as file:
-        assert rows_in(file, arm) == 51
+    assert rows_in(path, arm) == 51
     with AnyReader([path]) as reader:
-        topics = [each.topic for each, _, _ in reader.messages()]
-    assert topics.count(topic_of(arm.segment)) == 51
-    assert topic_of(arm.segment, "joint_states") not in topics
+        assert topic_of(arm.segment, "joint_states") not in reader.topics
     assert o80.open(path)[arm.segment].history().rows.tobytes() == arm.history().rows.tobytes()
 
 
 def copied(
-    path: Path, *sources: Path, topics: str = "", others: bool = True, **setting: Any
+    path: Path, source: Path, *, topics: str = "", others: bool = True, **setting: Any
 ) -> None:
-    """As a tool copies files: all that the mcap library reads, through its writer."""
-    with path.open("wb") as out:
-        writer = Writer(out, chunk_size=20_000, **setting)
+    """As a tool copies a file: all that the mcap library reads, through its writer."""
+    with path.open("wb") as out, source.open("rb") as file:
+        writer, reader = Writer(out, chunk_size=20_000, **setting), make_reader(file)
         writer.start(profile="ros2", library="a tool")
-        for source in sources:
-            with source.open("rb") as file:
-                reader = make_reader(file)
-                known: dict[int, int] = {}
-                for schema, channel, message in reader.iter_messages():
-                    assert schema is not None
-                    if not re.search(topics, channel.topic):
-                        continue
-                    if channel.id not in known:
-                        number = writer.register_schema(schema.name, schema.encoding, schema.data)
-                        known[channel.id] = writer.register_channel(
-                            channel.topic, channel.message_encoding, number, channel.metadata
-                        )
-                    writer.add_message(
-                        known[channel.id],
-                        message.log_time,
-                        message.data,
-                        message.publish_time,
-                        message.sequence,
-                    )
-                for each in reader.iter_attachments() if others else ():
-                    writer.add_attachment(
-                        each.create_time, each.log_time, each.name, each.media_type, each.data
-                    )
-                for record in reader.iter_metadata() if others else ():
-                    writer.add_metadata(record.name, record.metadata)
+        known: dict[int, int] = {}
+        for schema, channel, each in reader.iter_messages():
+            assert schema is not None
+            if re.search(topics, channel.topic):
+                if channel.id not in known:
+                    number = writer.register_schema(schema.name, schema.encoding, schema.data)
+                    how = channel.message_encoding, number, channel.metadata
+                    known[channel.id] = writer.register_channel(channel.topic, *how)
+                times = {"log_time": each.log_time, "publish_time": each.publish_time}
+                writer.add_message(
+                    known[channel.id], data=each.data, sequence=each.sequence, **times
+                )
+        for kept in reader.iter_attachments() if others else ():
+            when = kept.create_time, kept.log_time
+            writer.add_attachment(*when, kept.name, kept.media_type, kept.data)
+        for record in reader.iter_metadata() if others else ():
+            writer.add_metadata(record.name, record.metadata)
         writer.finish()  # type: ignore[no-untyped-call]
 
 
@@ -167,7 +158,7 @@ def test_what_a_copy_lacks_is_named(segment: str, tmp_path: Path) -> None:
         o80.Recording(copy, segment, proceed=True)
 
 
-FORMS = [("zstd", None), ("lz4", "10k"), ("none", "20k")]
+FORMS = [("zstd", None, 0), ("lz4", "10k", 5000), ("none", "20k", 1 << 18)]  # LARGE, too
 
 
 @pytest.fixture(params=FORMS, ids=str)
@@ -175,7 +166,8 @@ def everything(request: pytest.FixtureRequest, segment: str, tmp_path: Path) -> 
     """Two robots, one with two runs: commands, halts, a reset, marks of both kinds, transforms."""
     load = o80.robots.load("two_joints").inline
     path, second = tmp_path / "run.mcap", f"{segment}-b"
-    compression, split = request.param
+    compression, split, large = request.param
+    request.getfixturevalue("monkeypatch").setattr("o80.recording.file_writer.LARGE", large)
     form = {"compression": compression, "split": split}
     with load(segment) as arm, o80.Recording(path, [segment, second], **form) as recording:
         for run in range(2):
@@ -372,6 +364,7 @@ def test_wherever_it_is_cut_whole_chunks_are_read_and_continued(
     path, history = recorded
     whole = path.read_bytes()
     groups = {0, *(each.chunk_start_offset for each in scan(path).chunks), len(whole) - 1}
+    assert len(groups) > 20
     chance = np.random.default_rng(3)
     for place in [*groups, *chance.integers(0, len(whole), CUTS)]:
         path.write_bytes(whole[: int(place)])
@@ -383,8 +376,7 @@ def test_wherever_it_is_cut_whole_chunks_are_read_and_continued(
         read = segment.history()
         assert read.rows.tobytes() == history.rows.tobytes(), f"cut at {place}"
         assert repr(segment.epochs[0].journal()) == repr(arm.journal()), f"cut at {place}"
-        with path.open("rb") as file:
-            assert rows_in(file, arm) == len(read)
+        assert rows_in(path, arm) == len(read)
 
 
 def test_the_last_rows_and_decisions_are_read_from_the_last_chunks(
@@ -399,7 +391,7 @@ def test_the_last_rows_and_decisions_are_read_from_the_last_chunks(
         recorder.poll()
     recorder.finish()
     rows, journal, data = arm.history(), arm.journal(), bytearray(path.read_bytes())
-    for chunk in scan(path).chunks[:4]:
+    for chunk in [*scan(path).chunks][:4]:
         data[chunk.chunk_start_offset + 60] ^= 0xFF
     path.write_bytes(data)
 
@@ -407,6 +399,10 @@ def test_the_last_rows_and_decisions_are_read_from_the_last_chunks(
     assert epoch.history(50).rows.tobytes() == rows[-50:].rows.tobytes()
     last = epoch.history(seconds=0.05)
     assert last.rows.tobytes() == rows.select(seconds=0.05).rows.tobytes()
+    some = epoch.history(since=150, until=170)
+    assert some.rows.tobytes() == rows.select(since=150, until=170).rows.tobytes()
+    observed = epoch.history(since=150, until=170, fields="observed")
+    assert np.array_equal(observed, some.observed)
     ends = [each for each in command_ends(journal) if each.iteration >= last.iteration[0]]
     found = command_ends(epoch.journal_since_row(int(last.iteration[0])))
     assert ends
@@ -474,6 +470,5 @@ def test_a_full_disk_ends_in_an_error_and_a_file_that_readers_open(
 
     rows = o80.open(path)[arm.segment].history()
     assert np.array_equal(rows.iteration, np.arange(len(rows)))
-    with path.open("rb") as file:
-        assert rows_in(file, arm) == len(rows)
+    assert rows_in(path, arm) == len(rows)
     assert path.stat().st_size <= 250_000

@@ -13,6 +13,7 @@ from processes import WAIT
 import o80
 from o80 import _core
 from o80.recording.reader import files_of
+from o80.rows.columns import columns_of
 
 RECORDINGS = Path(__file__).resolve().parents[2] / "data" / "recordings"
 NAMES = [path.stem for path in sorted(RECORDINGS.glob("*.mcap"))]
@@ -51,6 +52,10 @@ def test_a_recording_of_an_earlier_version_is_read(name: str, make: ModuleType) 
     for segment in o80.open(path).segments.values():
         for epoch in segment.epochs:
             assert epoch.journal_codec == CODECS[name]
+            paths = [each.name for each in columns_of(epoch.schema)]
+            history, columns = epoch.history(), epoch.history(fields=paths)
+            for each, column in zip(paths, columns, strict=True):
+                assert (each, column.tobytes()) == (each, history[each].tobytes())
 
 
 @pytest.mark.parametrize("driver", [False, True])

@@ -62,15 +62,14 @@ def recorded_iterations(path: Path, name: str) -> "np.ndarray[tuple[int], np.dty
 @pytest.mark.check
 @pytest.mark.timeout(300 + KILLS // 2)
 @pytest.mark.parametrize("split", [None, "30k"])
-def test_nothing_is_lost_and_nothing_is_written_twice(split: str | None, tmp_path: Path) -> None:
+def test_nothing_is_lost_and_nothing_is_written_twice(
+    split: str | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("o80.recording.file_writer.LARGE", 0)  # two chunks in each poll
     path = tmp_path / "run.mcap"
     chance = random.Random(7)
-    with (
-        o80.robots.load("two_joints").start(
-            frequency=1000, history=200_000 + 200 * KILLS, journal=64
-        ) as process,
-        process.frontend() as robot,
-    ):
+    start, rows = o80.robots.load("two_joints").start, 200_000 + 200 * KILLS
+    with start(frequency=1000, history=rows, journal=64) as process, process.frontend() as robot:
         name = process.segment
         for i in range(KILLS):
             command(robot, chance)

@@ -48,17 +48,14 @@ def test_recordings_are_found_with_their_runs_and_marks(folder: Path, segment: s
     for each in found:
         opened = o80.open(each.path)
         assert (each.size, each.finished, each.problem) == (opened.size, True, "")
-        assert [(run.segment, run.robot) for run in each.runs] == [
-            (segment, "two_joints") for _ in opened[segment].epochs
-        ]
+        assert {(run.segment, run.robot) for run in each.runs} == {(segment, "two_joints")}
         for run, epoch in zip(each.runs, opened[segment].epochs, strict=True):
             begin, end = (time + epoch.wall_offset for time in epoch.time_range)
             assert (run.begin, run.end, run.rows, run.missing) == (begin, end, epoch.rows, 0)
             assert run.ended == epoch.end
     assert [len(each.runs) for each in found] == [1, 2, 1]
-    assert [(name, json.loads(values)) for name, _, values in found[1].marks] == [
-        ("Changed the battery", {"volts": 24.5})
-    ]
+    ((name, _, values),) = found[1].marks
+    assert (name, json.loads(values)) == ("Changed the battery", {"volts": 24.5})
     assert names(o80.recordings(folder, text="BATTERY"), folder) == ["monday/b.mcap"]
     assert names(o80.recordings(folder, text="24.5"), folder) == ["monday/b.mcap"]
     assert len(o80.recordings(folder, text="two_jo")) == 3
