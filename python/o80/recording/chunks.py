@@ -42,6 +42,10 @@ class Chunks:
         """Adds a chunk index of a summary. Raises struct.error, ValueError if it is damaged."""
         start, end, _, _, size = _BEGIN.unpack_from(record, HEAD.size)
         begin = HEAD.size + _BEGIN.size
+        (named,) = struct.unpack_from("<I", record, begin + size + 8)
+        compression = record[begin + size + 12 : -16]
+        if size % _OFFSET or len(compression) != named or not compression.isascii():
+            raise ValueError("a chunk index is damaged")
         low, high = (record[begin + i : begin + size : _OFFSET] for i in (0, 1))
         kind = self._numbers.get(low + high)
         if kind is None:

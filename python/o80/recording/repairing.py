@@ -127,7 +127,7 @@ def _parts(data: mmap.mmap, at: int = len(MAGIC), found: Scan | None = None) -> 
     found: gives the offsets of records whose own heads are damaged.
     """
     known = {} if found is None else _places_in(found)
-    places = sorted(known, reverse=True)
+    places = sorted((each for each in known if each < len(data)), reverse=True)
     after = at  # end of the last record to keep
     while True:
         match = _HEADS.search(data, at)

@@ -3,6 +3,7 @@
 import json
 import random
 import struct
+import zlib
 from pathlib import Path
 from typing import Any
 
@@ -30,11 +31,8 @@ KIND, OTHERS, VALUES = 4, (5, 6, 18, 26), 34
 
 
 def record(path: Path, segment: str) -> Path:
-    with (
-        o80.robots.load("two_joints").inline(segment) as arm,
-        o80.Recording(path, arm) as recording,
-    ):
-        recording.mark("episode", task="x")
+    with o80.robots.load("two_joints").inline(segment) as arm, o80.Recording(path, arm) as file:
+        file.mark("episode", task="x")
         arm.burst(20)
     return path
 
@@ -214,22 +212,33 @@ def info_of(path: Path) -> None:
     info_command(str(path))
 
 
+def with_changed_index(whole: bytes, indexes: bytes, at: int) -> bytes:
+    """A file with another byte in the chunk indexes of its summary, whose checksum is right."""
+    data, (begin,) = bytearray(whole), struct.unpack_from("<Q", whole, len(whole) - 28)
+    data[whole.index(indexes, begin) + at] ^= 0xFF
+    data[-12:-8] = struct.pack("<I", zlib.crc32(data[begin:-12]))
+    return bytes(data)
+
+
 def test_a_file_damaged_anywhere_is_read_or_refused_in_a_sentence(
     segment: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     whole = record(tmp_path / "run.mcap", segment).read_bytes()
+    indexes = bytes(scan(tmp_path / "run.mcap").chunks.records)
+    files = [damaged(whole, random.Random(seed)) for seed in range(200)]
+    files += [with_changed_index(whole, indexes, at) for at in range(len(indexes))]
     sentences = set()
-    for seed in range(200):
-        path = tmp_path / f"{seed}" / "damaged.mcap"
+    for number, data in enumerate(files):
+        path = tmp_path / f"{number}" / "damaged.mcap"
         path.parent.mkdir()
-        path.write_bytes(damaged(whole, random.Random(seed)))
+        path.write_bytes(data)
         for read in (read_all, info_of, repair, read_all):
             try:
                 read(path)
             except o80.Error as refused:
                 sentences.add(str(refused).replace(str(path), "PATH"))
             except Exception as error:
-                raise AssertionError(f"seed {seed}: {read.__name__}") from error
+                raise AssertionError(f"file {number}: {read.__name__}") from error
     assert all("PATH" in each for each in sentences)
     capsys.readouterr()
 
