@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 import o80._core as _core
 from o80.base.errors import InvalidArgument
-from o80.base.machine import this_machine
+from o80.base.machine import Machine, this_machine
 from o80.frontend.segments import is_own
 
 if TYPE_CHECKING:
@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from o80.recording.reader import RecordingFile
     from o80.recording.recorded_epoch import RecordedEpoch
     from o80.rows.history import History
+    from o80.rows.provenance import Provenance
 
 ROWS_AT_ONCE = 1024  # Ctrl-C is handled between two such blocks
 _BYTES_AT_ONCE = 1 << 20
@@ -61,8 +62,15 @@ class FileRun:
     def __init__(self, segment: str, number: int, epoch: "RecordedEpoch") -> None:
         self.segment, self.number, self.epoch = segment, number, epoch
         self.schema, self.description = epoch.schema, epoch.description
-        self.provenance, self.machine = epoch.provenance, epoch.machine
         self.rows = epoch.rows
+
+    @property
+    def provenance(self) -> "Provenance":
+        return self.epoch.provenance
+
+    @property
+    def machine(self) -> "Machine":
+        return self.epoch.machine
 
     @property
     def missing(self) -> list[str]:

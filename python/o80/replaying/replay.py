@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 import o80._core as _core
-from o80.base.errors import DriverError, InvalidArgument, sentence
+from o80.base.errors import DriverError, InvalidArgument, RecordingError, sentence
 from o80.frontend.frontend import Frontend
 from o80.joining.difference import Difference, RobotsDifferError, first_difference, same_bytes
 from o80.replaying.conditions import (
@@ -83,15 +83,19 @@ def replay(
     driver=False, only the backend runs, and no hardware is touched: the backend reads the recorded
     observed and extended values and obeys the recorded halts, interrupts and fresh starts of the
     driver; its desired states are compared. The report says so. Raises InvalidArgument for wrong
-    arguments or changed files, RecordingError for an unreadable recording, DriverError for a robot
-    that is unknown or fails.
+    arguments or changed files, RecordingError if the only run is unreadable, DriverError for a
+    robot that is unknown or fails.
     """
-    return ReplayReport(
-        tuple(
-            RunReplay(run, robot, options, tolerances, ignore, since, driver, progress).report()
-            for run in _runs_of(source, segment)
-        )
-    )
+    runs, reports = _runs_of(source, segment), []
+    for run in runs:
+        replayed = RunReplay(run, robot, options, tolerances, ignore, since, driver, progress)
+        try:
+            reports.append(replayed.report())
+        except RecordingError as error:
+            if len(runs) == 1:
+                raise
+            reports.append(RunReport(segment=run.segment, number=run.number, gap=str(error)))
+    return ReplayReport(tuple(reports))
 
 
 def _runs_of(

@@ -15,6 +15,7 @@ from processes import run_o80
 import o80
 from o80 import _core
 from o80.base.machine import Machine
+from o80.cli.cut import merge
 from o80.cli.info import info as info_command
 from o80.cli.save import repair
 from o80.recording.blocks import messages_in
@@ -77,6 +78,7 @@ def test_a_damaged_provenance_is_told(
     forged: dict[str, Any],
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    good = record(tmp_path / "good.mcap", segment)
     if text.startswith("{"):
         forged |= json.loads(text)
     else:
@@ -87,6 +89,9 @@ def test_a_damaged_provenance_is_told(
     for read in (lambda: epoch.provenance, lambda: o80.replay(path)):
         with pytest.raises(o80.RecordingError, match="provenance is damaged"):
             read()
+    merge([good, path], tmp_path / "both.mcap")
+    first, second = o80.replay(tmp_path / "both.mcap")
+    assert (first.identical, "provenance is damaged" in second.gap) == (True, True)
 
 
 @pytest.mark.parametrize("values", ["", "{", "[1]", "5", "[" * 100_000])
