@@ -197,9 +197,8 @@ class FileWriter:
         Large joint states are a second chunk, so that readers of rows need not decompress them.
         If it raises OSError, nothing was added, or all but these.
         """
-        apart = [each for each in blocks if self._is_apart(each)]
-        for chunk in ([each for each in blocks if not self._is_apart(each)], apart):
-            if chunk:
+        for apart in (False, True):
+            if chunk := [each for each in blocks if self._is_apart(each) == apart]:
                 self._add_chunk(chunk)
 
     def _is_apart(self, block: Block) -> bool:

@@ -48,9 +48,7 @@ class MessagePlan:
         messages[:] = 0
         messages[:, : len(ENCAPSULATION)] = np.frombuffer(ENCAPSULATION, np.uint8)
         for copy in self._copies:
-            messages[:, copy.message : copy.message + copy.length] = rows[
-                :, copy.row : copy.row + copy.length
-            ]
+            _part(messages, copy.message, copy.length)[:] = _part(rows, copy.row, copy.length)
         for mask in self._masks:
             bits = np.ascontiguousarray(rows[:, mask.row : mask.row + (mask.bits + 7) // 8])
             messages[:, mask.message : mask.message + mask.bits] = np.unpackbits(
@@ -63,17 +61,15 @@ class MessagePlan:
         copies: from `packed`, for rows of only these numbers. Raises ValueError for another size.
         """
         if messages.shape[1] != self.size:
-            raise ValueError(
-                f"a row has {messages.shape[1]} bytes here, and {self.size} by its description"
-            )
+            raise ValueError(f"a row has {messages.shape[1]} bytes, not {self.size} as described")
         for copy in self._copies if copies is None else copies:
-            rows[:, copy.row : copy.row + copy.length] = messages[
-                :, copy.message : copy.message + copy.length
-            ]
+            _part(rows, copy.row, copy.length)[:] = _part(messages, copy.message, copy.length)
         for mask in self._masks if copies is None else ():
-            values = messages[:, mask.message : mask.message + mask.bits]
-            packed = np.packbits(values, axis=1, bitorder="little")
-            rows[:, mask.row : mask.row + packed.shape[1]] = packed
+            size = (mask.bits + 7) // 8
+            bits = np.zeros((len(messages), 8 * size), np.uint8)
+            bits[:, : mask.bits] = messages[:, mask.message : mask.message + mask.bits]
+            packed = np.packbits(bits, bitorder="little")  # faster than by row
+            rows[:, mask.row : mask.row + size] = packed.reshape(len(messages), size)
 
     def packed(self, parts: NDArray[np.uint64]) -> list[Copy]:
         """Plans rows that hold only some numbers. parts: of `o80.rows.columns.Packing`."""
@@ -105,6 +101,11 @@ class MessagePlan:
         begin = -(-self._at // alignment) * alignment
         self._at = begin + length
         return len(ENCAPSULATION) + begin
+
+
+def _part(rows: Bytes, at: int, length: int) -> NDArray[np.void]:
+    """Returns bytes of each row as one item (n, 1), which NumPy copies faster."""
+    return rows[:, at : at + length].view(np.dtype((np.void, length)))
 
 
 def _merged(copies: Iterator[Copy]) -> list[Copy]:

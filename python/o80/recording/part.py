@@ -176,7 +176,8 @@ class _PartWriter:
                 derivers.append(TransformWriter(self._file, note.segment, poses, rate))
         if self._derivers[run]:
             times = np.array([time for time, _ in rows], np.uint64)
-            raw = epoch.decoded([message for _, message in rows])
+            joined = np.frombuffer(b"".join(message for _, message in rows), np.uint8)
+            raw = epoch.decoded(joined.reshape(len(rows), -1))
             yield from filter(None, (each.block(raw, times) for each in self._derivers[run]))
 
     def add_end(self, run: Run, epoch: RecordedEpoch) -> None:

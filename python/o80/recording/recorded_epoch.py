@@ -24,13 +24,14 @@ from o80.recording.journal_channel import GAP as JOURNAL_GAP
 from o80.recording.journal_channel import Entries, codec_of, entries_in
 from o80.recording.message_plan import Bytes, Copy, MessagePlan
 from o80.recording.message_types import row_type
-from o80.recording.scan import content_of
+from o80.recording.scan import content_of, index_of
 from o80.rows.columns import packing_at
 from o80.rows.history import History, Range, Selection
 from o80.rows.journal import EntryDecoder, JournalEntry
 from o80.rows.layout import Layout, decoder_of
 from o80.rows.provenance import Provenance
 
+SMALL = 1 << 17  # size of rows in a chunk up to which a second thread gains nothing [bytes]
 T = TypeVar("T")
 Paths = list[str] | tuple[str, ...]
 RowChunk = tuple[EpochPart, ChunkIndex, NDArray[np.uint64]]  # with the message index of its rows
@@ -63,7 +64,8 @@ class Histories:
         """
         run, wanted = self._run, Selection.checked(n, **selection)
         if fields is None:
-            return run._rows(run._chunks(wanted)).select(n, **selection)
+            rows = run._read(run._chunks(wanted), run.layout.size)
+            return run._history(rows).select(n, **selection)
         arrays = run._columns(wanted, fields)
         return arrays[0] if isinstance(fields, str) else arrays
 
@@ -107,13 +109,10 @@ class RecordedEpoch(Histories):
 
         A chunk may also hold rows of other runs, so that the times may lie outside this run.
         """
+        offset = self.wall_offset
         return [
-            (
-                chunk.message_start_time - self.wall_offset,
-                chunk.message_end_time - self.wall_offset,
-            )
-            for part in self._parts
-            for chunk in part.found.chunks.having(part.channel)
+            (each.message_start_time - offset, each.message_end_time - offset)
+            for _, each in self._having(None, None)
         ]
 
     def overlaps(self, other: "RecordedEpoch") -> bool:
@@ -282,8 +281,10 @@ class RecordedEpoch(Histories):
         For recordings larger than the memory. Raises RecordingError if this part is damaged.
         """
         for part, chunk in self._having(from_time, to_time):
-            block = self._rows([(part, chunk, part.index(chunk))])
-            history = block.select(from_time=from_time, to_time=to_time)
+            with part.reading() as file:
+                messages = messages_in(content_of(file, chunk), index_of(file, chunk, part.channel))
+                rows = self.decoded(messages)
+            history = self._history(rows).select(from_time=from_time, to_time=to_time)
             if len(history):
                 yield history
 
@@ -331,14 +332,13 @@ class RecordedEpoch(Histories):
             found = found[max(0, bisect_right(found, wanted.since, key=_first_row) - 1) :]
         return [(part, chunk, part.index(chunk)) for part, chunk in found]
 
-    def _rows(self, chunks: Sequence[RowChunk]) -> History:
-        rows = self._read(chunks, self.layout.size)
+    def _history(self, rows: Bytes) -> History:
         return History(self._decoder, rows.view(self.layout.row)[:, 0])
 
     def _read(
         self, chunks: Sequence[RowChunk], size: int, copies: list[Copy] | None = None
     ) -> Bytes:
-        """Decompresses and decodes chunks to rows (n, size), in two threads."""
+        """Decompresses and decodes chunks to rows (n, size), in two threads if they are large."""
         plan, ends = self._plan, [*accumulate(len(index) for *_, index in chunks)]
         rows = np.zeros((ends[-1] if ends else 0, size), np.uint8)  # padding is zero
 
@@ -349,18 +349,18 @@ class RecordedEpoch(Histories):
                 plan.decode(messages, rows[end - len(messages) : end], copies)
 
         with ThreadPoolExecutor(2) as threads:
-            _ = [*(threads.map if len(chunks) > 1 else map)(decode, chunks, ends)]
+            run = threads.map if len(rows) * plan.size > len(chunks) * SMALL else map
+            _ = [*run(decode, chunks, ends)]
         return rows
 
     @cached
     def _plan(self) -> MessagePlan:
         return MessagePlan(row_type(self.layout))
 
-    def decoded(self, messages: Sequence[bytes]) -> Bytes:
-        """Decodes messages to rows (n, bytes of a row). Raises ValueError if they are damaged."""
-        encoded = np.frombuffer(b"".join(messages), np.uint8).reshape(len(messages), -1)
-        rows = np.zeros((len(messages), self.layout.size), np.uint8)
-        self._plan.decode(encoded, rows)
+    def decoded(self, messages: Bytes) -> Bytes:
+        """Decodes messages (n, size) to rows (n, bytes of a row). Raises ValueError."""
+        rows = np.zeros((len(messages), self.layout.size), np.uint8)  # padding is zero
+        self._plan.decode(messages, rows)
         return rows
 
     @property
