@@ -35,8 +35,7 @@ def test_the_journal_of_a_file_is_that_of_the_robot(arm: o80.Frontend, tmp_path:
     entries = recorded(path).journal()
 
     assert repr(entries) == repr(arm.journal())
-    kinds = {entry.kind for entry in entries}
-    assert {"taken", "status", "halt", "burst_ended", "fresh_start"} <= kinds
+    assert {"taken", "status", "halt", "burst_ended", "fresh_start"} <= {e.kind for e in entries}
     assert recorded(path).journal_gaps == []
 
 
