@@ -1,6 +1,7 @@
 #include "o80/robot/run.hpp"
 
 #include <pthread.h>
+#include <sched.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -240,6 +241,17 @@ void announce(const RobotTable& table, const UntypedBackend& backend) {
   std::fflush(stdout);
 }
 
+/// True if the calling thread is an ordinary one that may have this real-time priority. It stays an
+/// ordinary one.
+bool may_have_priority(int priority) noexcept {
+  const sched_param real_time{priority};
+  const sched_param ordinary{};
+  if (sched_getscheduler(0) != SCHED_OTHER) return false;
+  if (sched_setscheduler(0, SCHED_FIFO, &real_time) != 0) return false;
+  sched_setscheduler(0, SCHED_OTHER, &ordinary);
+  return true;
+}
+
 int run_robot(const RobotTable& table, const RunOptions& options) {
   const StopSignals signals;
   const std::unique_ptr<Loop> loop = make_loop(table, options);
@@ -253,6 +265,12 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
     for (const std::string& refused : set_up_real_time(real_time)) complain(refused.c_str());
   });
   announce(table, loop->backend());
+  const SchemaHead& head = loop->backend().schema().head;
+  if (!options.has_policy && head.bursting == 0 && !head.is_simulated() &&
+      may_have_priority(options.real_time.priority)) {
+    std::puts("this computer allows --policy fifo: busy programs then do not delay the loop");
+    std::fflush(stdout);
+  }
   notify_service_manager("READY=1\nSTATUS=runs on segment '" + loop->backend().name() + "'");
   const Ended ended = loop->run();
   report.reset();

@@ -105,6 +105,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
       const char* text = optarg == nullptr ? "true" : optarg;
       set_loop_option(options, loop_options()[index], text, "--" + names[index]);
       has_priority = has_priority || names[index] == "priority";
+      options.has_policy = options.has_policy || names[index] == "policy";
     } else {
       options.robot.emplace_back(robot_options[index - loop_options().size()], optarg);
     }

@@ -89,6 +89,25 @@ TEST_F(RunTest, SaysAtItsStartWhichNumbersAHaltStopsInOneIteration) {
                     Not(HasSubstr("powered"))));
 }
 
+TEST_F(RunTest, SaysWhereThePolicyFifoIsAllowedUnlessOneIsChosen) {
+  bool is_allowed = false;
+  std::thread([&] {
+    const sched_param parameter{80};
+    is_allowed = sched_setscheduler(0, SCHED_FIFO, &parameter) == 0;
+  }).join();
+  const auto says_so = [](const RobotTable& table, std::vector<std::string> words) {
+    ::testing::internal::CaptureStdout();
+    EXPECT_EQ(run_here(table, std::move(words)), 0);
+    const std::string said = ::testing::internal::GetCapturedStdout();
+    return said.find("allows --policy fifo") != std::string::npos;
+  };
+  const RobotTable& of_the_world = *robot_table<Stepper>("stepper");
+  EXPECT_EQ(says_so(of_the_world, {}), is_allowed);
+  EXPECT_EQ(sched_getscheduler(0), SCHED_OTHER);
+  EXPECT_FALSE(says_so(of_the_world, {"--policy", "other"}));
+  EXPECT_FALSE(says_so(table(), {"--finish-at", "1"})) << "simulated";
+}
+
 /// All that end a process and can be caught; those of failed writes are ignored.
 std::vector<int> ending_signals() {
   std::vector<int> numbers{SIGHUP,  SIGINT,    SIGQUIT, SIGILL,  SIGTRAP, SIGABRT, SIGBUS,
