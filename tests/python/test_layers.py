@@ -206,9 +206,9 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_333, 0),
-    "python/bindings": (5_706, 0),
-    "python/o80": (29_877, 0),
+    "include, src": (34_362, 0),
+    "python/bindings": (5_718, 0),
+    "python/o80": (29_895, 0),
     "python/o80/hybrid": (2_456, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_479, 0),
     "python/o80/view/page": (1_222, 0),
@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (8_400, 4_409),
     "benchmarks, tools": (4_384, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 61_818),
+    "tests, conftest.py": (0, 61_955),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

@@ -114,7 +114,8 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
     throw InvalidArgument(refused_word(argv[optind], words, switches));
   }
   if (has_priority && options.real_time.policy == RealTimeOptions::Policy::other) {
-    throw InvalidArgument("--priority needs --policy fifo or rr: policy other has no priorities");
+    throw InvalidArgument(
+        "--priority needs --policy fifo, rr or auto: policy other has no priorities");
   }
   check_options(table, options.robot);
   return options;
