@@ -11,6 +11,7 @@
 #include "frontend.hpp"
 #include "loop_options.hpp"
 #include "o80/base/error.hpp"
+#include "o80/robot/real_time.hpp"
 #include "robot/driver/library.hpp"
 #include "robot/driver/machine_limits.hpp"
 #include "robot/group/inline_robot.hpp"
@@ -92,6 +93,17 @@ void bind_robots(nb::module_& m) {
       .def("describe", &description_of, "options"_a)
       .def("start_inline", &start_inline, "segment"_a, "loop"_a, "options"_a);
   m.def("load_robot", &o80::RobotLibrary::load, "name_or_path"_a);
+  m.def(
+      "become_real_time",
+      [](int priority) {
+        using Options = o80::RealTimeOptions;
+        o80::set_up_real_time(
+            {.policy = Options::Policy::automatic, .priority = priority, .stack = 0});
+        return (sched_getscheduler(0) & ~SCHED_RESET_ON_FORK) == SCHED_FIFO;
+      },
+      "priority"_a,
+      "Gives the calling thread the policy fifo, until it runs for 200 ms without sleep; False if "
+      "the machine refuses.");
   m.def("unused_segment_name", &o80::unused_segment_name, "robot"_a);
   m.def("no_such_robot", &o80::no_such_robot, "name"_a, "known"_a,
         "The text of an error: what is there instead, or how to install it.");

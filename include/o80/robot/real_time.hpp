@@ -9,9 +9,11 @@ namespace o80 {
 
 /// Real-time settings of the loop's thread.
 struct RealTimeOptions {
-  enum class Policy : std::uint8_t { other, fifo, round_robin };
+  /// automatic: fifo if the machine grants it, else other; after 200 ms without sleep the thread
+  /// becomes an ordinary one, and says so on the standard error.
+  enum class Policy : std::uint8_t { other, fifo, round_robin, automatic };
   Policy policy = Policy::other;
-  int priority = 0;             // 1 to 99, for fifo and round_robin
+  int priority = 0;             // 1 to 99, unless the policy is other
   std::vector<int> processors;  // allowed for the loop; empty: all
   bool lock_memory = false;
   // the thread sleeps in each period: RealtimeKit may grant a priority that limits refuse

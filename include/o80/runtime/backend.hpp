@@ -74,6 +74,7 @@ struct Timing {
   std::uint32_t overruns = 0;  // so far
   std::uint32_t skipped = 0;   // so far
   bool missed = false;         // this iteration brought no reading
+  std::int64_t next_due = 0;   // of the next iteration [ns]; 0: the clock does not pace the loop
 };
 
 /// Result of `step`.

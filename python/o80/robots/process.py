@@ -67,9 +67,27 @@ class Process(lifecycle.Managed):
             text += part
         return text.decode(errors="replace")
 
-    def frontend(self, timeout: float | None = 5.0, **options: Any) -> Frontend:
-        """Attaches a frontend to the robot; takes the arguments of Frontend."""
-        return Frontend(self.segment, timeout, **options)
+    def frontend(
+        self, timeout: float | None = 5.0, *, real_time: bool = False, **options: Any
+    ) -> Frontend:
+        """Attaches a frontend to the robot; takes the arguments of Frontend.
+
+        real_time: give the calling thread the policy fifo, one priority below the loop's, so that
+            busy programs do not delay its waits. After 200 ms without sleep it becomes an ordinary
+            thread again and says so on the standard error. If the loop has no real-time priority,
+            or the machine refuses, a RuntimeWarning says so.
+        """
+        frontend = Frontend(self.segment, timeout, **options)
+        if real_time:
+            priority = os.sched_getparam(self._popen.pid).sched_priority - 1
+            if priority < 1:
+                why = "the loop has no real-time priority above 1: start it with policy='fifo'"
+            elif not _core.become_real_time(priority):
+                why = f"priority {priority} was refused: see docs/real_time/machine.md"
+            else:
+                return frontend
+            warnings.warn(f"this thread stays an ordinary one: {why}", RuntimeWarning, stacklevel=2)
+        return frontend
 
     def wait(self, timeout: float | None = None) -> int:
         """Waits until the process ends and returns its exit code: 0 for an end in order.

@@ -251,7 +251,7 @@ class Robot:
         gap: float | None = None,
         accept_reading: bool = False,
         resume: bool = False,
-        policy: Literal["other", "fifo", "rr"] | None = None,
+        policy: Literal["other", "fifo", "rr", "auto"] | None = None,
         priority: int | None = None,
         cpus: Sequence[int] | None = None,
         lock_memory: bool = False,

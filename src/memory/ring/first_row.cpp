@@ -1,6 +1,6 @@
 #include "memory/ring/first_row.hpp"
 
-#include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <vector>
@@ -20,9 +20,7 @@ bool is_there(const RowOf& wanted) noexcept {
 }
 
 void nap(std::int64_t at_most) noexcept {
-  if (at_most <= 0) return;
-  const timespec pause{.tv_sec = 0, .tv_nsec = static_cast<long>(std::min(at_most, kGlance))};
-  nanosleep(&pause, nullptr);
+  if (at_most > 0) usleep(static_cast<useconds_t>(std::min(at_most, kGlance) / 1000));
 }
 
 /// One sleep, which any of the rows ends.

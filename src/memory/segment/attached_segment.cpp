@@ -204,8 +204,7 @@ AttachedSegment AttachedSegment::attach(std::string_view name, Access access,
                          (polls == 0 ? ": " : " within the time given: ") + search.reason() + ".");
     if (polls % kPollsBetweenChecks == 0 && options.keep_waiting && !options.keep_waiting())
       throw Cancelled("the wait for " + segment_called(name) + " was cancelled");
-    const timespec pause{.tv_sec = 0, .tv_nsec = std::max<long>(deadline.left(kPoll), 1000)};
-    nanosleep(&pause, nullptr);
+    usleep(static_cast<useconds_t>(std::max<std::int64_t>(deadline.left(kPoll) / 1000, 1)));
   }
 }
 

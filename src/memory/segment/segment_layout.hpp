@@ -29,7 +29,7 @@ namespace o80 {
 
 inline constexpr std::uint64_t kSegmentMagic = 0x0a67'6573'2030'386fULL;   // "o80 seg\n"
 inline constexpr std::uint64_t kCommandsMagic = 0x0a64'6d63'2030'386fULL;  // "o80 cmd\n"
-inline constexpr std::uint32_t kSegmentVersion = 9;                        // format of both files
+inline constexpr std::uint32_t kSegmentVersion = 10;                       // format of both files
 inline constexpr std::size_t kLineBytes = 64;       // size of a cache line [bytes]
 inline constexpr std::size_t kBlockSize = 64;       // size of a block of a lane [bytes]
 inline constexpr std::size_t kMessages = 64;        // status texts kept for each lane
@@ -110,6 +110,8 @@ struct Counters {
   std::atomic<std::int64_t> published;                  // newest row, -1 before the first
   /// Rows before this one are missing: 0, unless a recording is played. See HistoryWriter::skip_to.
   std::atomic<std::int64_t> first;
+  std::atomic<std::int64_t> next_at;    // expected time of the next row [ns]; 0: unknown
+  std::atomic<std::int32_t> processor;  // of the loop when it published; valid with next_at
   alignas(kLineBytes) std::atomic<std::uint32_t> state;
   alignas(kLineBytes) std::atomic<std::uint64_t> fault[128];  // text
   alignas(kLineBytes) std::atomic<std::uint64_t> halted;      // number of the halt in force, or 0

@@ -1,6 +1,7 @@
 #include "memory/segment/signal.hpp"
 
-#include <time.h>
+#include <sched.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <limits>
@@ -13,7 +14,8 @@ namespace o80 {
 
 namespace {
 constexpr Iteration kNoWish = std::numeric_limits<Iteration>::max();
-}
+constexpr std::int64_t kMargin = 10'000;  // of the expected time of a row [ns]
+}  // namespace
 
 RowWaiter::RowWaiter(const AttachedSegment& segment, std::int64_t poll) noexcept
     : segment_(&segment), view_(segment.view()), poll_(std::max<std::int64_t>(poll, 1000)) {}
@@ -25,7 +27,7 @@ Waited RowWaiter::wait_for_row(Iteration k, const Deadline& deadline,
   const auto ready = [&] {
     return published.load(std::memory_order_acquire) >= k;  // sync published
   };
-  if (spinner_.spin(ready)) return Waited::ready;
+  if (time_until(k) > Spinner::kLongest ? ready() : spinner_.spin(ready)) return Waited::ready;
   std::int64_t poll_at = monotonic_now() + kSlice;
   std::int64_t nap = kSlice;  // time until poll_at [ns]
   while (!deadline.over()) {
@@ -83,7 +85,20 @@ void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept {
   futex_wake(wake, kEverybody);
 }
 
+std::int64_t RowWaiter::time_until(Iteration k) const noexcept {
+  const Counters& counters = view_.counters();
+  // first the time, then the row: the writer stores them in the other order
+  const std::int64_t at = counters.next_at.load(std::memory_order_acquire);  // sync next_at
+  const bool is_next = counters.published.load(std::memory_order_relaxed) + 1 == k;
+  return is_next && at != 0 ? std::max<std::int64_t>(0, at - monotonic_now()) : 0;
+}
+
 void RowWaiter::sleep(Iteration k, std::int64_t at_most) noexcept {
+  const std::int64_t left = time_until(k);
+  if (left > 0 && view_.counters().processor.load(std::memory_order_relaxed) == sched_getcpu()) {
+    usleep(static_cast<useconds_t>(std::min(left, at_most) / 1000));
+    return;
+  }
   const std::optional<std::uint32_t> seen = register_for_row(*segment_, k);
   if (!seen || !futex_wait(view_.wakes().row_wake, *seen, at_most)) return;
   pass_on_wake(view_, *seen);
@@ -94,9 +109,7 @@ void RowWaiter::poll(Iteration k, std::int64_t at_most) noexcept {
   const Counters& counters = view_.counters();
   const std::int64_t end = monotonic_now() + at_most;
   for (std::int64_t left = at_most; left > 0; left = end - monotonic_now()) {
-    const std::int64_t nap = std::min(left, poll_);
-    const timespec pause{.tv_sec = 0, .tv_nsec = static_cast<long>(nap)};
-    nanosleep(&pause, nullptr);
+    usleep(static_cast<useconds_t>(std::min(left, poll_) / 1000));
     if (counters.published.load(std::memory_order_acquire) >= k) return;  // sync published
     if (segment_->has_ended()) return;
   }
@@ -112,6 +125,16 @@ bool RowSignal::announce(Iteration k) noexcept {
   // sleep
   view_.wakes().row_wake.fetch_add(1, std::memory_order_seq_cst);  // sync row_wake
   return true;
+}
+
+void RowSignal::expect_next(std::int64_t due, std::int64_t period) noexcept {
+  const std::int64_t delay = monotonic_now() - (due - period);
+  Counters& counters = view_.counters();
+  counters.processor.store(sched_getcpu(), std::memory_order_relaxed);
+  // the lesser of two delays: one late row does not make the next one late
+  const std::int64_t at = due + std::min(delay, delay_) + kMargin;
+  counters.next_at.store(at, std::memory_order_release);  // sync next_at
+  delay_ = delay;
 }
 
 void wake_sleepers(const SegmentView& view, Sleepers sleepers) noexcept {

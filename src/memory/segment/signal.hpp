@@ -26,6 +26,9 @@ void pass_on_wake(const SegmentView& view, std::uint32_t seen) noexcept;
 /// resets `wanted` when that row is published and wakes one waiter, which wakes the others. A
 /// read-only waiter polls.
 ///
+/// If the row is known to come later, a waiter does not spin; on the loop's processor it sleeps by
+/// the clock until then, because a loop that wakes a thread there is preempted by it.
+///
 /// Writer:   RowSignal.
 /// Readers:  any threads.
 /// Realtime: no.
@@ -38,6 +41,8 @@ class RowWaiter {
   Waited wait_for_row(Iteration k, const Deadline& deadline, const KeepWaiting& keep_waiting = {});
 
  private:
+  /// Time until row k is expected [ns]; 0 if that is past, or unknown.
+  std::int64_t time_until(Iteration k) const noexcept;
   void sleep(Iteration k, std::int64_t at_most) noexcept;
   void poll(Iteration k, std::int64_t at_most) noexcept;
 
@@ -57,9 +62,13 @@ class RowSignal {
   explicit RowSignal(const SegmentView& view) noexcept : view_(view) {}
   /// True if a thread waits for row k or an older one. The caller then wakes one on `row_wake`.
   bool announce(Iteration k) noexcept;
+  /// Stores when the next row is expected: as long after `due` as this one after `due - period`.
+  /// For a loop that the clock paces, after each row and before announce().
+  void expect_next(std::int64_t due, std::int64_t period) noexcept;
 
  private:
   SegmentView view_;
+  std::int64_t delay_ = 0;  // of the last row after its due time [ns]
 };
 
 /// Blocks the backend until a frontend has committed a batch.

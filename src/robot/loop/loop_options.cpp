@@ -45,10 +45,9 @@ bool set_permission(LoopOptions& options, std::string_view text, double /*number
 
 bool set_policy(LoopOptions& options, std::string_view text, double /*number*/) {
   using Policy = RealTimeOptions::Policy;
-  if (text != "other" && text != "fifo" && text != "rr") return false;
-  options.real_time.policy = text == "other"  ? Policy::other
-                             : text == "fifo" ? Policy::fifo
-                                              : Policy::round_robin;
+  const auto* word = std::ranges::find(kPolicies, text);
+  if (word == kPolicies.end()) return false;
+  options.real_time.policy = static_cast<Policy>(word - kPolicies.begin());
   return true;
 }
 
@@ -134,10 +133,10 @@ constexpr std::array kOptions = {
     LoopOption{"accept_reading", OptionKind::boolean, "true or false", 0, 1, "no",
                "start where the robot is read to be, even if it cannot have come there",
                kProcess | kEmbedded, O80_SET(backend.accept_reading)},
-    LoopOption{"policy", OptionKind::word, "other, fifo or rr", 0, 0, "other",
+    LoopOption{"policy", OptionKind::word, "other, fifo, rr or auto", 0, 0, "other",
                "scheduling class of the loop", kProcess, set_policy},
     LoopOption{"priority", OptionKind::integer, "a whole number from 1 to 99", 1, 99, "80",
-               "priority of the loop, with policy fifo and rr", kProcess,
+               "priority of the loop, unless its policy is other", kProcess,
                O80_SET(real_time.priority)},
     LoopOption{"cpus", OptionKind::list, "a list of processors such as 2,3", 0, 0, "all",
                "processors of the loop", kProcess, set_processors},

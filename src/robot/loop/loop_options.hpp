@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string_view>
@@ -8,6 +9,9 @@
 #include "o80/runtime/backend.hpp"
 
 namespace o80 {
+
+/// Words of RealTimeOptions::Policy, in its order.
+inline constexpr std::array<std::string_view, 4> kPolicies{"other", "fifo", "rr", "auto"};
 
 /// Options of a backend and its loop that every robot has.
 struct LoopOptions {

@@ -11,7 +11,6 @@
 #include "memory/os/futex.hpp"
 #include "o80/base/time.hpp"
 #include "o80/runtime/frontend.hpp"
-#include "robot/loop/realtime_kit.hpp"
 #include "robot/loop/service_manager.hpp"
 
 namespace o80 {
@@ -89,7 +88,6 @@ void LoopReport::run() noexcept {
     bool has_starved = false;
     while (stop_.load(std::memory_order_acquire) == 0) {
       const std::int64_t moment = monotonic_now();
-      if (const auto line = lost_priority()) say(*line);
       if (const auto line = hangs.poll(loop_state(watcher, moment), moment)) say(*line);
       if (watcher.published() >= 0) {
         const RowHead row = watcher.latest().head();

@@ -24,6 +24,7 @@ const Timing& Pacer::next(std::int64_t now) noexcept {
     due_ += missed * period_;
     count_overrun();
   }
+  timing_.next_due = due_;
   return timing_;
 }
 

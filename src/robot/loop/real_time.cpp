@@ -17,6 +17,7 @@ namespace o80 {
 namespace {
 
 constexpr int kPage = 4096;
+constexpr rlim_t kLongestRun = 200'000;  // without sleep, with policy automatic [us]
 
 std::string allowed_by(const MachineLimit& limit) {
   return std::string("Allow it in this shell with `") + limit.at_once + "`, for good with `" +
@@ -38,16 +39,19 @@ std::string list(const std::vector<int>& processors) {
 }
 
 void set_policy(const RealTimeOptions& options, std::vector<std::string>& refused) {
-  const int policy = options.policy == RealTimeOptions::Policy::fifo ? SCHED_FIFO : SCHED_RR;
+  const bool round_robin = options.policy == RealTimeOptions::Policy::round_robin;
+  const bool automatic = options.policy == RealTimeOptions::Policy::automatic;
   sched_param parameter{};
   parameter.sched_priority = options.priority;
-  if (sched_setscheduler(0, policy, &parameter) != 0) {
+  if (sched_setscheduler(0, round_robin ? SCHED_RR : SCHED_FIFO, &parameter) != 0) {
+    if (automatic) return;
     std::string text = "real-time priority " + std::to_string(options.priority) + " was refused (" +
                        std::strerror(errno) + ")";
     if (options.sleeps) text += "; " + ask_realtime_kit(options.priority);
     refused.push_back(text + ". " + allowed_by(kPriorityLimit));
     return;
   }
+  if (automatic) limit_running(kLongestRun, RLIM_INFINITY);
   // the liveness helper must not wait for this loop or another one: it gets a higher priority
   const int why = LaneLiveness::run_above(options.priority);
   if (why == 0) return;

@@ -1,6 +1,7 @@
 #include "robot/loop/realtime_kit.hpp"
 
 #include <dlfcn.h>
+#include <poll.h>
 #include <sched.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -12,6 +13,7 @@
 #include <cstdint>
 #include <cstring>
 #include <stdexcept>
+#include <string_view>
 
 #include "base/printable.hpp"
 #include "o80/base/time.hpp"
@@ -24,8 +26,7 @@ constexpr std::int64_t kLongestTalk = 1'000'000'000;  // with the bus and the se
 constexpr const char* kService = "org.freedesktop.RealtimeKit1";  // and its interface
 constexpr const char* kObject = "/org/freedesktop/RealtimeKit1";
 
-std::atomic<pid_t> granted_to{0};  // thread with a priority of RealtimeKit
-std::atomic<bool> lost{false};     // that priority, not said yet
+std::atomic<rlim_t> longest_run{RLIM_INFINITY};  // [us]
 
 /// RealtimeKit on the system bus, by libsystemd, which is loaded here because robots run without it
 /// too.
@@ -120,29 +121,37 @@ class RealtimeKit {
 /// Runs in a signal handler: async-signal-safe operations only.
 void become_ordinary(int) {
   const int before = errno;
+  // the kernel signals the thread that ran for so long
   const sched_param ordinary{};
-  // RealtimeKit has set the flag, and only root may take it away
-  sched_setscheduler(granted_to, SCHED_OTHER | SCHED_RESET_ON_FORK, &ordinary);
-  lost = true;
+  // RealtimeKit sets the flag, and only root may take it away
+  sched_setscheduler(0, SCHED_OTHER | SCHED_RESET_ON_FORK, &ordinary);
+  rlimit limit{};
+  getrlimit(RLIMIT_RTTIME, &limit);
+  limit.rlim_cur = longest_run;  // the kernel has raised it
+  setrlimit(RLIMIT_RTTIME, &limit);
+  constexpr std::string_view kText =
+      "o80: a thread did not sleep for so long that it lost its real-time priority: it continues "
+      "as an ordinary thread. See docs/real_time.md, or lower --frequency\n";
+  pollfd error{.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
+  if (poll(&error, 1, 0) == 1 && write(STDERR_FILENO, kText.data(), kText.size()) < 0) errno = 0;
   errno = before;
 }
 
-/// Bounds the time that a real-time thread of this process may run without sleeping [us]: a
-/// SIGXCPU at half of `longest`, and the kernel kills at `longest`. Returns the half.
-rlim_t limit_running(rlim_t longest) {
+}  // namespace
+
+rlim_t limit_running(rlim_t soft, rlim_t hard) {
   struct sigaction action{};
   action.sa_handler = become_ordinary;
   action.sa_flags = SA_RESTART;
   sigaction(SIGXCPU, &action, nullptr);  // for good, as the limit is
   rlimit limit{};
   getrlimit(RLIMIT_RTTIME, &limit);
-  limit.rlim_max = std::min(limit.rlim_max, longest);
-  limit.rlim_cur = std::min(limit.rlim_cur, limit.rlim_max / 2);
+  limit.rlim_max = std::min(limit.rlim_max, hard);
+  limit.rlim_cur = std::min({limit.rlim_cur, soft, limit.rlim_max / 2});
+  longest_run = limit.rlim_cur;
   setrlimit(RLIMIT_RTTIME, &limit);
   return limit.rlim_cur;
 }
-
-}  // namespace
 
 std::string ask_realtime_kit(int priority) {
   try {
@@ -150,9 +159,9 @@ std::string ask_realtime_kit(int priority) {
     kit.connect();
     const int highest = kit.property<std::int32_t>("MaxRealtimePriority", 'i');
     const auto longest = kit.property<std::int64_t>("RTTimeUSecMax", 'x');
-    const rlim_t soft = limit_running(static_cast<rlim_t>(std::max<std::int64_t>(longest, 2)));
-    granted_to = gettid();
-    kit.make_real_time(granted_to, static_cast<std::uint32_t>(std::min(priority, highest)));
+    const auto hard = static_cast<rlim_t>(std::max<std::int64_t>(longest, 2));
+    const rlim_t soft = limit_running(hard / 2, hard);
+    kit.make_real_time(gettid(), static_cast<std::uint32_t>(std::min(priority, highest)));
     sched_param granted{};
     if (sched_getparam(0, &granted) != 0 || granted.sched_priority == 0) {
       throw std::runtime_error("it agreed, and nothing changed");
@@ -162,12 +171,6 @@ std::string ask_realtime_kit(int priority) {
   } catch (const std::exception& error) {
     return "RealtimeKit granted none (" + std::string(error.what()) + ")";
   }
-}
-
-std::optional<std::string> lost_priority() {
-  if (!lost.exchange(false)) return std::nullopt;
-  return "the loop did not sleep for so long that it lost the priority which RealtimeKit had "
-         "granted: it continues as an ordinary thread. See docs/real_time.md, or lower --frequency";
 }
 
 }  // namespace o80

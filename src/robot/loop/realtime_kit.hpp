@@ -1,6 +1,7 @@
 #pragma once
 
-#include <optional>
+#include <sys/resource.h>
+
 #include <string>
 
 namespace o80 {
@@ -15,8 +16,9 @@ namespace o80 {
 /// Realtime: no.
 std::string ask_realtime_kit(int priority);
 
-/// A line for the operator, once, after a thread has lost the priority of RealtimeKit because it
-/// did not sleep.
-std::optional<std::string> lost_priority();
+/// Bounds the time that a real-time thread of this process may run without sleeping [us]: after
+/// `soft`, or half of the hard limit if that is less, it becomes an ordinary thread and says so on
+/// the standard error; at the hard limit the kernel kills the process. Returns the bound.
+rlim_t limit_running(rlim_t soft, rlim_t hard);
 
 }  // namespace o80

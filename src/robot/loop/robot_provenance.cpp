@@ -98,8 +98,8 @@ Provenance provenance_of(const RobotTable& table, const OptionValues& options) {
 }
 
 Provenance::Options texts_of(const RealTimeOptions& options) {
-  constexpr std::array<const char*, 3> kPolicies{"other", "fifo", "rr"};
-  Provenance::Options texts{{"policy", kPolicies[static_cast<std::size_t>(options.policy)]},
+  const std::string_view policy = kPolicies.at(static_cast<std::size_t>(options.policy));
+  Provenance::Options texts{{"policy", std::string(policy)},
                             {"lock_memory", options.lock_memory ? "true" : "false"}};
   if (options.policy != RealTimeOptions::Policy::other)
     texts.emplace_back("priority", std::to_string(options.priority));

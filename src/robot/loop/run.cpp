@@ -1,6 +1,7 @@
 #include "o80/robot/run.hpp"
 
 #include <pthread.h>
+#include <sched.h>
 #include <signal.h>
 #include <unistd.h>
 
@@ -240,6 +241,24 @@ void announce(const RobotTable& table, const UntypedBackend& backend) {
   std::fflush(stdout);
 }
 
+/// True if the calling thread is an ordinary one that may have this real-time priority. It stays an
+/// ordinary one.
+bool may_have_priority(int priority) noexcept {
+  const sched_param real_time{priority};
+  const sched_param ordinary{};
+  if (sched_getscheduler(0) != SCHED_OTHER) return false;
+  if (sched_setscheduler(0, SCHED_FIFO, &real_time) != 0) return false;
+  sched_setscheduler(0, SCHED_OTHER, &ordinary);
+  return true;
+}
+
+/// True for a driver in C++ of a robot of the world, in real time, where another processor is left.
+bool suits_automatic(const SchemaHead& head) noexcept {
+  cpu_set_t allowed;
+  return head.of_the_world == 1 && head.bursting == 0 &&
+         sched_getaffinity(0, sizeof allowed, &allowed) == 0 && CPU_COUNT(&allowed) > 1;
+}
+
 int run_robot(const RobotTable& table, const RunOptions& options) {
   const StopSignals signals;
   const std::unique_ptr<Loop> loop = make_loop(table, options);
@@ -249,10 +268,25 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
   RealTimeOptions real_time = options.real_time;
   real_time.sleeps = !options.backend.bursting && table.paces_itself == 0;
   // whoever waits for the robot to run finds these lines in its output
+  const SchemaHead& head = loop->backend().schema().head;
+  const bool automatic = real_time.policy == RealTimeOptions::Policy::automatic;
+  if (automatic && !suits_automatic(head)) real_time.policy = RealTimeOptions::Policy::other;
   loop->start([&] {
     for (const std::string& refused : set_up_real_time(real_time)) complain(refused.c_str());
   });
   announce(table, loop->backend());
+  if (automatic) {
+    std::puts(sched_getscheduler(0) == SCHED_FIFO
+                  ? "policy auto: fifo, as long as the loop sleeps at least every 200 ms"
+                  : "policy auto: other. fifo needs permission, two processors, real time, and a "
+                    "driver in C++ that is not simulated (docs/real_time.md)");
+    std::fflush(stdout);
+  }
+  if (!options.has_policy && head.bursting == 0 && !head.is_simulated() &&
+      may_have_priority(options.real_time.priority)) {
+    std::puts("this computer allows --policy fifo: busy programs then do not delay the loop");
+    std::fflush(stdout);
+  }
   notify_service_manager("READY=1\nSTATUS=runs on segment '" + loop->backend().name() + "'");
   const Ended ended = loop->run();
   report.reset();

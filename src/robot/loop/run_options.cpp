@@ -105,6 +105,7 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
       const char* text = optarg == nullptr ? "true" : optarg;
       set_loop_option(options, loop_options()[index], text, "--" + names[index]);
       has_priority = has_priority || names[index] == "priority";
+      options.has_policy = options.has_policy || names[index] == "policy";
     } else {
       options.robot.emplace_back(robot_options[index - loop_options().size()], optarg);
     }
@@ -113,7 +114,8 @@ RunOptions parse_run_options(const RobotTable& table, int argc, char** argv) {
     throw InvalidArgument(refused_word(argv[optind], words, switches));
   }
   if (has_priority && options.real_time.policy == RealTimeOptions::Policy::other) {
-    throw InvalidArgument("--priority needs --policy fifo or rr: policy other has no priorities");
+    throw InvalidArgument(
+        "--priority needs --policy fifo, rr or auto: policy other has no priorities");
   }
   check_options(table, options.robot);
   return options;

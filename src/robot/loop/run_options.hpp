@@ -10,6 +10,7 @@ namespace o80 {
 /// Options from the command line of a robot's process.
 struct RunOptions : LoopOptions {
   OptionValues robot;
+  bool has_policy = false;  // --policy was given
 };
 
 /// Throws InvalidArgument with the flag and the allowed values.

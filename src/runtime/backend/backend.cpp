@@ -192,6 +192,7 @@ void UntypedBackend::Body::publish(bool fresh) noexcept {
   }
   fill_row(fresh);
   history.publish(current, row());
+  if (timing.next_due != 0) row_signal.expect_next(timing.next_due, schema.head.period);
   watch_row(fresh);
   report_ended_requests(fresh);
   if (!fresh) end_iteration();

@@ -1,6 +1,6 @@
 #include "runtime/playing/played_segment.hpp"
 
-#include <time.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <cstring>
@@ -139,8 +139,7 @@ bool PlayedSegment::wait_until(std::int64_t due, const KeepWaiting& keep_waiting
     const std::int64_t left = due - monotonic_now();
     if (left <= 0) return true;
     const std::int64_t nap = std::min(left, kSlice);
-    const timespec pause{.tv_sec = 0, .tv_nsec = static_cast<long>(nap)};
-    nanosleep(&pause, nullptr);
+    usleep(static_cast<useconds_t>(nap / 1000 + 1));
     if (stop_.load(std::memory_order_relaxed)) return false;
     if (nap == kSlice && keep_waiting && !keep_waiting()) return false;
   }

@@ -120,12 +120,12 @@ def test_what_only_a_process_has_is_checked_before_it_starts(segment: str) -> No
     for options, said in (
         ({"cpus": "2,3"}, "cpus must be a list of processors such as 2,3, got '2,3'"),
         ({"priority": 100, "policy": "rr"}, "priority must be a whole number from 1 to 99"),
-        ({"policy": "idle"}, "policy must be other, fifo or rr, got 'idle'"),
+        ({"policy": "idle"}, "policy must be other, fifo, rr or auto, got 'idle'"),
         ({"bursting": 1}, "bursting must be true or false, got 1"),
     ):
         with pytest.raises(o80.InvalidArgument, match=said):
             robot.start(segment, **options)
-    with pytest.raises(o80.InvalidArgument, match="needs --policy fifo or rr"):
+    with pytest.raises(o80.InvalidArgument, match="needs --policy fifo, rr or auto"):
         robot.start(segment, priority=50)
     assert not any(entry.name == segment for entry in o80.segments())
 

@@ -113,7 +113,7 @@ def test_a_loop_that_does_not_sleep_loses_the_priority_and_goes_on(segment: str,
         assert kit.asked == [(process.pid, 7)]
         assert process.stderr is not None
         text = ""
-        while "lost the priority" not in text:  # the line of the next report
+        while "lost its real-time priority" not in text:
             text += process.stderr.readline()
         said_by(process)
 

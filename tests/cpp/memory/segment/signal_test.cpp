@@ -1,6 +1,7 @@
 #include "memory/segment/signal.hpp"
 
 #include <gmock/gmock.h>
+#include <sched.h>
 
 #include <atomic>
 #include <thread>
@@ -128,6 +129,71 @@ TEST_F(SignalTest, HealsAWakeUpThatWasLost) {
   const std::vector<std::byte> row(64);
   writer_.publish(0, row.data());  // and nobody is woken
   sleeper.join();
+}
+
+/// A waiter on the loop's processor, for which row 1 is expected in an hour.
+class PunctualSignalTest : public SignalTest {
+ protected:
+  static constexpr std::int64_t kHour = 3600 * std::int64_t{1'000'000'000};
+
+  void SetUp() override {
+    ASSERT_EQ(sched_getaffinity(0, sizeof allowed_, &allowed_), 0);
+    cpu_set_t one;
+    CPU_ZERO(&one);
+    CPU_SET(sched_getcpu(), &one);
+    ASSERT_EQ(sched_setaffinity(0, sizeof one, &one), 0);
+    publish(0, 0);
+    signal_.expect_next(monotonic_now() + kHour, kHour);
+  }
+  void TearDown() override { sched_setaffinity(0, sizeof allowed_, &allowed_); }
+  /// The row for which a wait of a moment has registered.
+  Iteration registered(Iteration k) const {
+    RowWaiter waiter(attached_);
+    EXPECT_EQ(waiter.wait_for_row(k, Deadline(std::chrono::milliseconds(1))), Waited::timed_out);
+    return wanted();
+  }
+  Counters& counters() const { return segment_.view().counters(); }
+
+  cpu_set_t allowed_{};
+};
+
+TEST_F(PunctualSignalTest, SleepsByTheClockOnTheProcessorOfTheLoop) {
+  EXPECT_EQ(registered(1), kNobody);
+}
+
+TEST_F(PunctualSignalTest, RegistersOnAnotherProcessor) {
+  counters().processor = -1;
+  EXPECT_EQ(registered(1), 1);
+}
+
+TEST_F(PunctualSignalTest, RegistersForALaterRow) { EXPECT_EQ(registered(2), 2); }
+
+TEST_F(PunctualSignalTest, RegistersOnceTheRowIsLate) {
+  signal_.expect_next(monotonic_now() - kHour, kHour);
+  EXPECT_EQ(registered(1), 1);
+}
+
+TEST_F(PunctualSignalTest, GetsARowThatCameDuringTheSleep) {
+  signal_.expect_next(monotonic_now() + 20'000'000, 20'000'000);
+  RowWaiter waiter(attached_);
+  std::thread writer([&] { publish(1, 1); });
+  EXPECT_EQ(waiter.wait_for_row(1, patient()), Waited::ready);
+  writer.join();
+}
+
+TEST_F(SignalTest, ExpectsTheNextRowAsLateAsThePunctualOneOfTheLastTwo) {
+  constexpr std::int64_t kPeriod = 1'000'000;
+  constexpr std::int64_t kLate = 1'000'000'000;
+  const auto expected_after_due = [&](std::int64_t delay) {
+    const std::int64_t due = monotonic_now() - delay + kPeriod;
+    signal_.expect_next(due, kPeriod);
+    return segment_.view().counters().next_at - due;
+  };
+  const std::int64_t punctual = expected_after_due(kLate);
+  EXPECT_LT(punctual, kPeriod) << "no row was late before";
+  EXPECT_GE(expected_after_due(2 * kLate), kLate) << "both were late";
+  EXPECT_LT(expected_after_due(-kLate), 0);
+  EXPECT_LT(expected_after_due(kLate), 0) << "the one before was not";
 }
 
 TEST_F(SignalTest, TellsTheBackendThatTheBellRang) {

@@ -28,6 +28,13 @@ class LoopTest : public FakeDriverTest {
     loop->start();
     return loop;
   }
+  /// When waiting readers expect the next row [ns]; 0: unknown.
+  static std::int64_t next_row_at() {
+    return AttachedSegment::attach("fake", Access::read_only, Deadline(kPatience))
+        .view()
+        .counters()
+        .next_at;
+  }
 };
 
 TEST_F(LoopTest, StartsThenReadsThenIsRunning) {
@@ -58,6 +65,7 @@ TEST_F(LoopTest, WritesAndReadsOnceAnIteration) {
   EXPECT_THAT(written, ::testing::ElementsAre(1, 2, 3, 4, 5));
   EXPECT_EQ(FakeDriver::calls.read, 6);
   EXPECT_EQ(observed(frontend.latest(), 1), 4.0);
+  EXPECT_EQ(next_row_at(), 0) << "bursting has no due times";
 }
 
 /// A driver that forks in one of its functions, and whose child returns from it.
@@ -232,6 +240,7 @@ TEST_F(LoopTest, KeepsItsPeriodAndStopsWhenAsked) {
   const std::int64_t begin = frontend.wait_for(1, kPatience).time();
   const UntypedObservation row = frontend.wait_for(51, kPatience);
   EXPECT_GE(row.time() - begin, 49 * 200'000) << "never faster than its period";
+  EXPECT_GT(next_row_at(), row.time());
   loop->ask_to_stop();
   runner.join();
   EXPECT_EQ(frontend.life(), Life::stopped);

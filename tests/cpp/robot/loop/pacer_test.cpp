@@ -18,6 +18,7 @@ TEST(Pacer, SetsOnePeriodBehindTheOther) {
   const Timing timing = pacer.next(1200);
   EXPECT_EQ(timing.overruns, 0U);
   EXPECT_EQ(timing.skipped, 0U);
+  EXPECT_EQ(timing.next_due, 1300);
 }
 
 TEST(Pacer, CountsAnOverrunAndGoesOnInTheSameBeat) {
@@ -75,6 +76,7 @@ TEST(Pacer, FollowsARobotThatTicksByItsOwnClock) {
   EXPECT_EQ(pacer.tick(now).overruns, 1U) << "one iteration was late, however many ticks were lost";
   EXPECT_TRUE(pacer.in_time(now));
   const Timing early = pacer.tick(now + 60);
+  EXPECT_EQ(early.next_due, 0) << "a tick may come before its due time";
   EXPECT_EQ(early.skipped, 2U) << "an early tick is no harm";
   EXPECT_EQ(early.overruns, 1U);
 }

@@ -37,7 +37,7 @@ TEST_F(RunOptionsTest, HaveDefaults) {
 }
 
 TEST_F(RunOptionsTest, APriorityNeedsAPolicyThatHasOne) {
-  EXPECT_THAT(refusal({"--priority", "90"}), HasSubstr("needs --policy fifo or rr"));
+  EXPECT_THAT(refusal({"--priority", "90"}), HasSubstr("needs --policy fifo, rr or auto"));
   EXPECT_THAT(refusal({"--policy", "other", "--priority", "90"}), HasSubstr("needs --policy"));
   EXPECT_EQ(parse({"--priority", "90", "--policy", "rr"}).real_time.priority, 90);
 }
@@ -79,7 +79,7 @@ TEST_F(RunOptionsTest, RefuseWhatIsNotAllowedNamingTheFlag) {
   EXPECT_THAT(refusal({"--frequency", "0"}), AllOf(HasSubstr("--frequency"), HasSubstr("from")));
   EXPECT_THAT(refusal({"--lanes", "1.5"}),
               HasSubstr("must be a whole number from 1 to 256, got '1.5'"));
-  EXPECT_THAT(refusal({"--policy", "idle"}), HasSubstr("other, fifo or rr"));
+  EXPECT_THAT(refusal({"--policy", "idle"}), HasSubstr("other, fifo, rr or auto"));
   EXPECT_THAT(refusal({"--gain"}), HasSubstr("needs a value"));
   EXPECT_THAT(refusal({"--gian", "2"}), HasSubstr("there is no flag --gian"));
   EXPECT_THAT(refusal({"--gian", "2"}), HasSubstr("Did you mean --gain?"));

@@ -89,6 +89,85 @@ TEST_F(RunTest, SaysAtItsStartWhichNumbersAHaltStopsInOneIteration) {
                     Not(HasSubstr("powered"))));
 }
 
+/// Whether threads of this process may have the policy fifo.
+bool is_fifo_allowed() {
+  bool is_allowed = false;
+  std::thread([&] {
+    const sched_param parameter{80};
+    is_allowed = sched_setscheduler(0, SCHED_FIFO, &parameter) == 0;
+  }).join();
+  return is_allowed;
+}
+
+/// Spins in iteration 3 until its thread is an ordinary one (or for too long), and is done in
+/// iteration 5.
+struct Spinning {
+  struct Config {};
+  using Actuators = std::array<Stepper::Axis, 1>;
+  explicit Spinning(const Config&) {}
+  void start() { EXPECT_EQ(policy(), SCHED_OTHER) << "the loop only"; }
+  void write(const Desired<Spinning>& desired) {
+    if (desired.iteration() == 2) policy_before = policy();
+    const std::int64_t end = monotonic_now() + 30'000'000'000;
+    while (desired.iteration() == 3 && policy() == SCHED_FIFO && monotonic_now() < end) {
+    }
+  }
+  void read(Reading<Spinning>& reading) {
+    if (reading.iteration() == 5) reading.finish();
+  }
+  void stop() noexcept {}
+
+  static int policy() { return sched_getscheduler(0) & ~SCHED_RESET_ON_FORK; }
+  static inline int policy_before = -1;  // of the thread of the loop in iteration 2
+};
+O80_DESCRIBE(Spinning::Config);
+
+TEST_F(RunTest, WithPolicyAutoALoopThatDoesNotSleepBecomesAnOrdinaryThreadAndGoesOn) {
+  cpu_set_t allowed;
+  sched_getaffinity(0, sizeof allowed, &allowed);
+  if (!is_fifo_allowed() || CPU_COUNT(&allowed) < 2)
+    GTEST_SKIP() << "this process may not use the policy fifo, or has one processor";
+  ChildProcess child([&](const auto&) {
+    ::testing::internal::CaptureStdout();
+    ::testing::internal::CaptureStderr();
+    const int code = run_here(*robot_table<Spinning>("spinning"), {"--policy", "auto"});
+    const std::string out = ::testing::internal::GetCapturedStdout();
+    const std::string err = ::testing::internal::GetCapturedStderr();
+    EXPECT_EQ(code, 0);
+    EXPECT_EQ(Spinning::policy_before, SCHED_FIFO);
+    EXPECT_EQ(Spinning::policy(), SCHED_OTHER);
+    EXPECT_THAT(out, HasSubstr("policy auto: fifo, as long as"));
+    EXPECT_THAT(err, HasSubstr("it lost its real-time priority"));
+    if (HasFailure()) throw std::runtime_error("failed");
+  });
+  EXPECT_EQ(child.wait(), 0);
+}
+
+TEST_F(RunTest, WithPolicyAutoSimulatedRobotsAndPythonsAreOrdinaryThreads) {
+  for (const bool simulated : {true, false}) {
+    FakeDriver::simulated = simulated;
+    ::testing::internal::CaptureStdout();
+    EXPECT_EQ(run_here(table(), {"--policy", "auto", "--finish-at", "1"}), 0);
+    EXPECT_THAT(::testing::internal::GetCapturedStdout(), HasSubstr("policy auto: other"));
+    EXPECT_EQ(sched_getscheduler(0), SCHED_OTHER);
+  }
+}
+
+TEST_F(RunTest, SaysWhereThePolicyFifoIsAllowedUnlessOneIsChosen) {
+  const bool is_allowed = is_fifo_allowed();
+  const auto says_so = [](const RobotTable& table, std::vector<std::string> words) {
+    ::testing::internal::CaptureStdout();
+    EXPECT_EQ(run_here(table, std::move(words)), 0);
+    const std::string said = ::testing::internal::GetCapturedStdout();
+    return said.find("allows --policy fifo") != std::string::npos;
+  };
+  const RobotTable& of_the_world = *robot_table<Stepper>("stepper");
+  EXPECT_EQ(says_so(of_the_world, {}), is_allowed);
+  EXPECT_EQ(sched_getscheduler(0), SCHED_OTHER);
+  EXPECT_FALSE(says_so(of_the_world, {"--policy", "other"}));
+  EXPECT_FALSE(says_so(table(), {"--finish-at", "1"})) << "simulated";
+}
+
 /// All that end a process and can be caught; those of failed writes are ignored.
 std::vector<int> ending_signals() {
   std::vector<int> numbers{SIGHUP,  SIGINT,    SIGQUIT, SIGILL,  SIGTRAP, SIGABRT, SIGBUS,

@@ -70,6 +70,8 @@ class Segment {
     make(view.counters().begun, -1);
     make(view.counters().published, -1);
     make(view.counters().first);
+    make(view.counters().next_at);
+    make(view.counters().processor);
     make(view.counters().state, static_cast<std::uint32_t>(o80::BackendState::running));
     make(view.wakes().row_wake);
     make(view.wakes().lane_wake);
