@@ -206,23 +206,23 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_306, 0),
-    "python/bindings": (5_712, 0),
-    "python/o80": (29_968, 0),
+    "include, src": (34_305, 0),
+    "python/bindings": (5_706, 0),
+    "python/o80": (29_967, 0),
     "python/o80/hybrid": (2_456, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_479, 0),
     "python/o80/view/page": (1_222, 0),
     "docs": (571, 0),
-    "devices": (8_852, 4_500),
-    "gateways/lerobot": (530, 690),
-    "gateways/ros2": (904, 955),
+    "devices": (8_849, 4_498),
+    "gateways/lerobot": (529, 686),
+    "gateways/ros2": (903, 955),
     "robots/arms": (4_563, 3_153),
     "robots/pam, robots/two_joints": (2_108, 1_184),
     "simulators/mujoco": (5_372, 4_686),
-    "apps/table_tennis": (8_400, 4_409),
+    "apps/table_tennis": (8_399, 4_409),
     "benchmarks, tools": (4_384, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 61_777),
+    "tests, conftest.py": (0, 61_769),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}
