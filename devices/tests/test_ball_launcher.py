@@ -125,7 +125,7 @@ def test_a_stop_without_connection_says_that_the_motors_may_turn(
         until(robot, "status", Status.ready)
         served.die()
         until(robot, "status", Status.disconnected)
-    assert "cannot be told to stop its motors" in capsys.readouterr().err
+    assert "so its motors cannot be stopped" in capsys.readouterr().err
 
 
 def test_a_stop_while_a_state_is_set_is_confirmed_after_it(

@@ -266,7 +266,7 @@ def test_an_image_of_another_size_names_the_options(
         row = row_where(cameras, lambda row: row.reasons.camera_0 == CameraReason.disconnected)
         assert not row.images.any()
     told = capfd.readouterr().err
-    assert "camera Fake_1: its images have (320, 240) pixels: set --width and --height" in told
+    assert "camera Fake_1: its images need --width 320 and --height 240" in told
 
 
 def test_a_missing_library_names_its_package(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -75,8 +75,8 @@ def test_a_file_is_read_as_it_was_written(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("content", "text"),
     [
-        ("", "is not a file of a transform"),
-        ('{"rotation": 1}', "is not a file of a transform"),
+        ("", "is not a transform file"),
+        ('{"rotation": 1}', "is not a transform file"),
         ('{"rotation": [[1]], "translation": [0, 0, 0]}', "rotation must be 3 x 3"),
         (
             '{"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "translation": [0, 0, 0]}',

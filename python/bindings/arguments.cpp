@@ -86,7 +86,7 @@ o80::Timeout timeout_of(nb::handle seconds) {
   if (seconds.is_none()) return {};
   const double number = PyFloat_AsDouble(seconds.ptr());
   if ((number == -1.0 && PyErr_Occurred() != nullptr) || std::isnan(number)) {
-    refuse("timeout", "a number of seconds, or None for ever", seconds);
+    refuse("timeout", "a number of seconds, or None for no timeout", seconds);
   }
   if (number > kLongest) return {};
   return std::chrono::nanoseconds(std::llround(std::fmax(number, 0.0) * 1e9));
@@ -189,7 +189,7 @@ o80::PulseOptions pulse_options(nb::handle at, nb::handle late, nb::handle seen)
     options.at = count_of(at, "at");
     // -1 (kNow) is valid inside of o80 only
     if (options.at < 0) {
-      throw InvalidArgument("at must be an iteration from 0 on, got " + std::to_string(options.at));
+      throw InvalidArgument("at must be at least iteration 0, got " + std::to_string(options.at));
     }
   }
   options.late = late_of(late);

@@ -106,7 +106,7 @@ class Backend final : public o80::RequestServer {
       throw o80::Closed("the backend of segment '" + name_ + "' was closed while it was in step");
     }
     if (step == o80::Step::ended && backend_->phase() == o80::Phase::unreadable) {
-      throw InvalidArgument("'" + name_ + "' cannot go on: " + std::string(backend_->failure()));
+      throw InvalidArgument("'" + name_ + "' cannot continue: " + std::string(backend_->failure()));
     }
     return step == o80::Step::run;
   }

@@ -23,7 +23,7 @@ class OpenReplay {
   explicit OpenReplay(std::unique_ptr<Replay> replay) : replay_(std::move(replay)) {}
 
   Replay& open() {
-    if (replay_ == nullptr) throw o80::Closed("this replay is closed");
+    if (replay_ == nullptr) throw o80::Closed("this replay was closed: start another one");
     return *replay_;
   }
   void add(const std::vector<const o80::JournalEntry*>& entries) {

@@ -79,17 +79,17 @@ void write_boolean(nb::handle value, std::byte* to, const std::string& what) {
   store(to, static_cast<std::uint8_t>(number));
 }
 
-std::string labels_of(const Schema& schema, const FieldRow& field) {
-  std::string there;
-  for (std::uint32_t i = 0; i < field.labels; ++i) {
-    there += (i == 0 ? "" : ", ") + schema.labels[field.first_label + i].name.str();
-  }
-  return there;
+template <class Row>
+std::string names_of(std::span<const Row> rows) {
+  std::string names;
+  for (const Row& row : rows) names += (names.empty() ? "" : ", ") + row.name.str();
+  return names;
 }
 
 void write_label(const Schema& schema, const FieldRow& field, nb::handle value, std::byte* to,
                  const std::string& what) {
-  const auto labels = std::span(schema.labels).subspan(field.first_label, field.labels);
+  const auto labels =
+      std::span<const o80::LabelRow>(schema.labels).subspan(field.first_label, field.labels);
   const bool is_text = PyUnicode_Check(value.ptr()) != 0;
   const std::string text = is_text ? string_of(value, "a label") : "";
   const nb::object whole = is_text ? nb::object() : whole_number(value);
@@ -98,15 +98,16 @@ void write_label(const Schema& schema, const FieldRow& field, nb::handle value, 
   const auto found = std::ranges::find_if(labels, [&](const o80::LabelRow& label) {
     return is_text ? label.name.view() == text : is_number && label.value == number;
   });
-  if (found == labels.end()) refuse(what, "one of " + labels_of(schema, field), value);
+  if (found == labels.end()) refuse(what, "one of " + names_of(labels), value);
   std::memcpy(to, &found->value, field.size);  // little-endian
 }
 
+std::span<const FieldRow> fields_in(const Schema& schema, const o80::TypeRow& row) {
+  return std::span(schema.fields).subspan(row.first_field, row.fields);
+}
+
 std::string fields_of(const Schema& schema, const o80::TypeRow& row) {
-  std::string there;
-  for (std::uint32_t i = 0; i < row.fields; ++i) {
-    there += (i == 0 ? "" : ", ") + schema.fields[row.first_field + i].name.str();
-  }
+  const std::string there = names_of(fields_in(schema, row));
   return there.empty() ? "it has no fields" : "its fields are " + there;
 }
 
@@ -147,8 +148,7 @@ class Writer {
     std::uint32_t place = number;
     const nb::object names = nb::steal(PySequence_List(names_of(value).ptr()));
     if (!names.is_valid()) throw nb::python_error();
-    for (std::uint32_t i = 0; i < row.fields; ++i) {
-      const FieldRow& member = schema_.fields[row.first_field + i];
+    for (const FieldRow& member : fields_in(schema_, row)) {
       const nb::str name(member.name.view().data(), member.name.view().size());
       const int there = PySequence_Contains(names.ptr(), name.ptr());
       if (there < 0) throw nb::python_error();
@@ -166,15 +166,12 @@ class Writer {
     }
     if (found == nb::len(names)) return;
     for (nb::handle name : names) {
-      bool known = false;
-      for (std::uint32_t i = 0; i < row.fields; ++i) {
-        const auto text = schema_.fields[row.first_field + i].name.view();
-        known = known || name.equal(nb::str(text.data(), text.size()));
-      }
-      if (!known) {
-        throw InvalidArgument(what + " has no field " + repr_of(name) + ": " +
-                              fields_of(schema_, row));
-      }
+      const auto is_named = [&](const FieldRow& each) {
+        return name.equal(nb::str(each.name.view().data(), each.name.view().size()));
+      };
+      if (std::ranges::any_of(fields_in(schema_, row), is_named)) continue;
+      throw InvalidArgument(what + " has no field " + repr_of(name) + ": " +
+                            fields_of(schema_, row));
     }
   }
 
@@ -217,10 +214,7 @@ class Writer {
                    const std::string& what) {
     const FieldRow& first = schema_.fields[row.first_field];
     field(first, value, to + first.offset, number, "'" + first.name.str() + "' of " + what);
-    for (std::uint32_t i = 1; i < row.fields; ++i) {
-      const FieldRow& other = schema_.fields[row.first_field + i];
-      left_out(row, other, to + other.offset, what);
-    }
+    state_.whole = state_.whole && row.fields == 1;
   }
 
   void left_out(const o80::TypeRow& type, const FieldRow& member, std::byte* to,

@@ -248,12 +248,12 @@ void check_integral(const Schema& schema, const ActuatorRow& actuator, const Int
   const LimitRow& limit = schema.limits[row.limit];
   if (std::isfinite(limit.jerk)) {
     refuse(of +
-           "what moves the integral must have no limit of jerk: its speed and acceleration "
+           "a number with an integral must have no limit of jerk: its speed and acceleration "
            "are the acceleration and the jerk of the integral");
   }
   if (limit.minimum > 0.0 || limit.maximum < 0.0 || limit.resting == 0 || limit.rest != 0.0) {
     refuse(of +
-           "what moves the integral must rest at 0; describe rests_at(0), and limits around 0");
+           "a number with an integral must rest at 0; describe rests_at(0), and limits around 0");
   }
 }
 

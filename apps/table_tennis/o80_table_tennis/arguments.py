@@ -55,7 +55,7 @@ def refuse_wrong_options(options: Mapping[str, Any], *, period: float) -> None:
     """Raises ValueError for wrong options of `reset`. period: of the worlds [s]."""
     unknown = [name for name in options if name not in OPTIONS]
     if unknown:
-        raise ValueError(f"unknown options: {', '.join(unknown)}; reset knows {', '.join(OPTIONS)}")
+        raise ValueError(f"unknown options: {', '.join(unknown)}; reset has {', '.join(OPTIONS)}")
     if "flight" in options and not np.isclose(options["flight"].period, period):
         raise ValueError(
             f"a flight in steps of {options['flight'].period} s cannot be played every "

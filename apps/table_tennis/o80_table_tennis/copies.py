@@ -232,8 +232,7 @@ class TableTennisCopies(HybridTask):
     # ------------------------------------------------------------------ steps
 
     def step(self, actions: Any, copies: Index) -> None:
-        """Runs `repeat` times five iterations of these arms and worlds, with chunks for each of
-        the `action_steps`.
+        """Runs five iterations of these arms and worlds for each played action, `repeat` times.
 
         Does nothing if the arm is too far ahead for the world to follow: the episode has stalled.
         """

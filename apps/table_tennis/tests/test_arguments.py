@@ -46,7 +46,7 @@ def test_what_gymnasium_passes_on_is_checked(
 
 
 def test_wrong_options_are_refused_with_what_there_is(inline: TableTennisEnvironment) -> None:
-    with pytest.raises(ValueError, match="unknown options: bal; reset knows ball, flight"):
+    with pytest.raises(ValueError, match="unknown options: bal; reset has ball, flight"):
         inline.reset(options={"bal": 3})
     counted = opened(task=TaskSettings(ball_count=80))
     with closing(counted), pytest.raises(IndexError, match="there are 0 to 79"):

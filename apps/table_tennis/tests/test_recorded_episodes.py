@@ -103,7 +103,7 @@ def test_an_abandoned_episode_is_left_out(tmp_path: Path) -> None:
         played_out(environment)
 
     assert [episode.summary.number for episode in recorded_episodes(path)] == [1]
-    with pytest.raises(o80.InvalidArgument, match="whose `__init__` takes a `recorded` robot"):
+    with pytest.raises(o80.InvalidArgument, match="accepts the argument `recorded`"):
         next(relive(path, TableTennisCopies))
 
 

@@ -168,7 +168,7 @@ class BallLauncher:
         if self._link.is_up():
             self._stop_motors(replies)
         elif self._was_connected:
-            self._warn("is disconnected, and cannot be told to stop its motors")
+            self._warn("is disconnected, so its motors cannot be stopped")
         self._link.close()
         self._context.destroy(linger=0)
 
@@ -191,7 +191,7 @@ class BallLauncher:
 
     def _warn(self, what: str) -> None:
         address = self._config.address
-        complain(f"the ball launcher at {address} {what}: look whether they stand still")
+        complain(f"the ball launcher at {address} {what}: check that they stand still")
 
 
 _PROGRESS = {

@@ -124,7 +124,7 @@ class Launcher:
         if self._requested or status is Status.launching:
             raise RequestRejected("a launch is under way: wait until it has ended")
         if status is Status.disconnected:
-            raise RequestRejected("the launcher is not connected: see that it runs at the address")
+            raise RequestRejected("the launcher is not connected: check its power and address")
         if status is Status.unknown:
             raise RequestRejected(
                 "a launch was not answered and may still be under way: no launch for "
@@ -136,16 +136,13 @@ class Launcher:
 
     def cancel(self) -> None:
         """Cancels a launch that was not sent yet; a launch that was sent continues."""
-        if self._requested and not self._is_launching():
-            self._requested = False
+        launching = self._exchange is not None and self._kind is Kind.LAUNCH_BALL
+        self._requested = self._requested and launching
 
     def ended(self) -> tuple[LastLaunch, str] | None:
         """Returns the outcome of the requested launch, once; None: it has not ended."""
         end, self._end = self._end, None
         return end
-
-    def _is_launching(self) -> bool:
-        return self._exchange is not None and self._kind is Kind.LAUNCH_BALL
 
     def _end_launch(self, how: LastLaunch, why: str = "") -> None:
         self._requested, self._end = False, (how, why)

@@ -61,7 +61,7 @@ class Detector:
         width, height = self._sizes[index]
         if image.shape != (height, width, 3):
             raise ValueError(
-                f"the image of {self._names[index]} has the shape {image.shape}, the rig says "
+                f"the image of {self._names[index]} has the shape {image.shape}, but the rig has "
                 f"{(height, width, 3)}"
             )
 

@@ -61,12 +61,12 @@ class Message:
     def decoded(cls, content: bytes) -> Message:
         """Decodes a message. Raises ValueError if the bytes are no message."""
         if len(content) > LARGEST_MESSAGE:
-            raise ValueError(f"a message of {len(content)} bytes is not of a tracking server")
+            raise ValueError(f"a message of {len(content)} bytes is not from a tracking server")
         try:
             read = json.loads(content)
             stamp, place = read["time"], read["obs"]
         except (ValueError, KeyError, TypeError, RecursionError) as error:
-            raise ValueError(f"not a message of a tracking server: {error}") from None
+            raise ValueError(f"not a message from a tracking server: {error}") from None
         if type(stamp) is not int or abs(stamp) > LARGEST_STAMP:
             raise ValueError(f"`time` must be an integer in nanoseconds, got {stamp!r}")
         if place is None:

@@ -143,7 +143,7 @@ def load(path: Path | str) -> list[RigCamera]:
             camera.model()
         names = [camera.name for camera in cameras]
         if len(set(names)) < len(names) or not names:
-            raise InvalidArgument("each camera must have a name of its own")
+            raise InvalidArgument("each camera must have a different name")
     except (OSError, KeyError, TypeError, ValueError) as error:
         raise InvalidArgument(f"the lenses {path} cannot be used: {error}") from error
     return cameras

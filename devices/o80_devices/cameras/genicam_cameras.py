@@ -66,7 +66,8 @@ class GenicamCameras:
         if not 0 < config.silent_after < 1e6:
             raise InvalidArgument(f"silent_after must be positive [s], got {config.silent_after}")
         if config.pixel_format not in get_args(PixelFormat):
-            raise InvalidArgument(f"pixel_format must be one of {', '.join(get_args(PixelFormat))}")
+            known = ", ".join(get_args(PixelFormat))
+            raise InvalidArgument(f"pixel_format must be {known}, got {config.pixel_format}")
         self._config = config
         self._shape = (config.height, config.width, 3)
         self._pace = FramePace()

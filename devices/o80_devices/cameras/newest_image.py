@@ -143,10 +143,11 @@ class NewestImage:
             self.lost += 1
             self._set_state(CameraReason.damaged)
             why = aravis.STATUS.get(buffer.status, f"status {buffer.status}")
-            self._trouble.tell(f"an image is damaged: {why}")
+            self._trouble.tell(f"an image is damaged ({why}): check cable and network")
             return
         if buffer.size != self._settings.region[2:]:
-            raise ValueError(f"its images have {buffer.size} pixels: set --width and --height")
+            width, height = buffer.size
+            raise ValueError(f"its images need --width {width} and --height {height}")
         image = rgb_of(buffer.content, buffer.size, self._settings.pixel_format)  # type: ignore[arg-type]
         capture = Capture(arrival, 0, 0)
         if buffer.stamp:

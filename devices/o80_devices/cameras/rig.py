@@ -160,12 +160,12 @@ class Rig:
             raise InvalidArgument(f"a rig has 2 to 16 cameras, got {len(self.cameras)}")
         names = [camera.name for camera in self.cameras]
         if len(set(names)) < len(names):
-            raise InvalidArgument(f"two cameras have one name: {', '.join(names)}")
+            raise InvalidArgument(f"two cameras have the same name: {', '.join(names)}")
         self.models()
         try:
             self.law()
         except TypeError:
-            raise InvalidArgument("the flight or the table has a value that is no number") from None
+            raise InvalidArgument("a value of the flight or table is not a number") from None
 
 
 def _tuples(fields: dict[str, Any]) -> dict[str, Any]:

@@ -105,9 +105,7 @@ class VideoCameras:
         self._config = config
         self._sources = [each.strip() for each in config.sources.split(",") if each.strip()]
         if not self._sources or config.width < 1 or config.height < 1:
-            raise InvalidArgument(
-                "sources, width and height must name at least one camera's images"
-            )
+            raise InvalidArgument("give at least one source, and a positive width and height")
         self._shape = (config.height, config.width, 3)
         count = len(self._sources)
         self.extended: dict[str, Any] = {

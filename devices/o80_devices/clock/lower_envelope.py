@@ -156,7 +156,7 @@ def edge_at_mean(points: list[tuple[float, float]]) -> tuple[float, float]:
         if x1 >= mean:
             slope = (y1 - y0) / (x1 - x0)
             return slope, y0 - slope * x0
-    raise ValueError("points must be at least two, with different x")
+    raise ValueError("at least two points with different x are needed")
 
 
 def _turns_down(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> bool:

@@ -64,7 +64,7 @@ class QualisysConnection:
         stamp, number, bodies = parsed_data(content)
         if len(bodies) != len(self.names):
             # bodies were added or removed: requests their order again
-            raise ValueError(f"{len(bodies)} bodies in a frame, {len(self.names)} in the settings")
+            raise ValueError(f"a frame has {len(bodies)} bodies, the settings {len(self.names)}")
         return Frame(number, stamp, arrival, dict(zip(self.names, bodies, strict=True)))
 
     def close(self) -> None:

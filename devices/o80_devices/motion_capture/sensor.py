@@ -107,7 +107,7 @@ class Sensor:
             field = field_name(name)
             if field in found.values() or field in FRAME_FIELDS:
                 raise InvalidArgument(
-                    f"the subject '{name}' would be the field '{field}', which is there already: "
+                    f"the subject '{name}' would be the field '{field}', which exists already: "
                     "rename it in the motion capture system"
                 )
             found[name] = field

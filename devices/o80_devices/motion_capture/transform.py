@@ -43,7 +43,7 @@ class Transform:
         source = np.array([measured[name] for name in names], float)
         target = np.array([known[name] for name in names], float)
         if not (np.isfinite(source).all() and np.isfinite(target).all()):
-            raise InvalidArgument("points must be finite: leave out what was not visible")
+            raise InvalidArgument("points must be finite: leave out points that were not visible")
         middle, goal = source.mean(axis=0), target.mean(axis=0)
         left, sizes, right = np.linalg.svd((source - middle).T @ (target - goal))
         if sizes[1] < 1e-6 * sizes[0] or sizes[0] == 0.0:
@@ -64,7 +64,7 @@ class Transform:
             translation = np.array(content["translation"], float)
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise InvalidArgument(
-                f"{file} is not a file of a transform ({type(error).__name__}: {error}): expected "
+                f"{file} is not a transform file ({type(error).__name__}: {error}): expected "
                 '{"rotation": [[...], [...], [...]], "translation": [x, y, z]}'
             ) from error
         if rotation.shape != (3, 3) or translation.shape != (3,):

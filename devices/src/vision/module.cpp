@@ -117,7 +117,7 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
              int step, int threshold, double min_area, double max_area) {
   constexpr std::size_t kLargest = 1 << 14;
   if (image.shape(0) > kLargest || image.shape(1) > kLargest) {
-    throw nb::value_error("an image may have at most 16384 rows and columns");
+    throw nb::value_error("an image can have at most 16384 rows and columns");
   }
   if (step < 1 || step > 64) throw nb::value_error("step must be from 1 to 64");
   if (threshold < 1 || threshold > 255) throw nb::value_error("threshold must be from 1 to 255");
@@ -146,7 +146,7 @@ Doubles find(BlobFinder& finder, const Bytes& image, std::optional<std::array<in
 std::optional<std::tuple<Doubles, Doubles, std::uint64_t, double>> locate_ball(
     const std::vector<Camera>& cameras, const Sightings& sightings, double tolerance, double noise,
     double radius, double size_factor, int least, const std::optional<Place>& expected) {
-  if (cameras.size() > kMaxCameras) throw nb::value_error("at most 16 cameras");
+  if (cameras.size() > kMaxCameras) throw nb::value_error("there can be at most 16 cameras");
   std::vector<Sighting> list;
   for (std::size_t i = 0; i < std::min(sightings.shape(0), kMaxSightings); ++i) {
     const double camera = sightings(i, 0);

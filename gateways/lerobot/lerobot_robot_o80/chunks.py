@@ -43,7 +43,7 @@ class ChunkClient(RobotClient):
         if not isinstance(self.robot, O80):
             self.robot.disconnect()
             raise o80.InvalidArgument(
-                f"chunks are for robots of o80: take --robot.type=o80, not {config.robot.type}"
+                f"chunks are for robots of o80: use --robot.type=o80, not {config.robot.type}"
             )
         try:
             arm = self.robot.segment.checked()
@@ -148,7 +148,7 @@ def main(config: RobotClientConfig) -> None:
     client = ChunkClient(config)
     try:
         if not client.start():
-            raise o80.Error(f"no policy server answers at {config.server_address}")
+            raise o80.Error(f"no policy server answers at {config.server_address}: start it")
         receiver = threading.Thread(target=client.receive_actions, daemon=True)
         receiver.start()
         client.control_loop(config.task)

@@ -100,7 +100,7 @@ class O80(Robot):
             arm = self.segment.open()
             stack.callback(self.segment.close)
             if self.config.at_stop != "hold" and "relax" not in arm.requests:
-                raise o80.InvalidArgument(f"'{arm.segment}' cannot be relaxed: take at_stop=hold")
+                raise o80.InvalidArgument(f"'{arm.segment}' cannot be relaxed: use at_stop=hold")
             stack.enter_context(arm.control(self.config.timeout))
             self.seen, self._rest_places = self.segment.read()
             for camera in self.cameras.values():

@@ -50,7 +50,7 @@ class Segment:
         try:
             if arm.bursting:
                 raise o80.InvalidArgument(
-                    f"'{self.name}' bursts, and LeRobot's loops do not burst it: start it in real "
+                    f"'{self.name}' is bursting, but LeRobot requests no bursts: start it in real "
                     "time"
                 )
             self._describe(arm)
@@ -74,7 +74,7 @@ class Segment:
         """
         arm = self.checked()
         if (age := arm.row_age or 0.0) > self._timeout:
-            raise o80.TimeoutError(f"'{self.name}' has published nothing for {age:.1f} s")
+            raise o80.TimeoutError(f"'{self.name}' has had no row for {age:.1f} s: see `o80 list`")
         row = arm.latest()
         found = {
             name: float(number.of_row(value_of(row, number.column)))

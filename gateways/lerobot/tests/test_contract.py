@@ -137,7 +137,7 @@ def test_units_are_those_of_lerobots_driver_or_the_chosen_ones(make: Make, start
     # LeRobot's: shares of the calibrated range, which the limits of three joints cut
     ranges = np.array([2505, 2275, 2207, 2161, 3639])
     assert numbers["normalised"][:5] == pytest.approx(200 * joints / (ranges * 360 / 4095))
-    with pytest.raises(o80.InvalidArgument, match="does not say through which ranges"):
+    with pytest.raises(o80.InvalidArgument, match="has no calibrated ranges"):
         make(start("so101_twin"), units="normalised").connect()
 
 

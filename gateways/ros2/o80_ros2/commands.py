@@ -92,14 +92,14 @@ class Commands:
 
     def _read(self, kind: type, take: Callable[[Any], None], data: bytes) -> None:
         if len(data) > LARGEST:
-            raise InvalidArgument(f"it has {len(data)} bytes, and more than {LARGEST} are not read")
+            raise InvalidArgument(f"it has {len(data)} bytes, but at most {LARGEST} are read")
         take(ros.of("rclpy.serialization.deserialize_message")(data, kind))
 
     def _set_points(self, message: Any) -> None:
         """Sends a set-point for each actuator, in order."""
         if len(message.data) != len(self._actuators):
             raise InvalidArgument(
-                f"{len(self._actuators)} actuators need as many numbers, got {len(message.data)}"
+                f"{len(self._actuators)} actuators need a number each, got {len(message.data)}"
             )
         interval = time.monotonic() - self._last
         self._last += interval
@@ -114,7 +114,7 @@ class Commands:
         arm, names = self._arm, list(message.joint_names)
         if not {*names} <= {*self._actuators} or len({*names}) < max(1, len(names)):
             there = ", ".join(self._actuators)
-            raise InvalidArgument(f"joint_names must be of {there}, each once; got {names}")
+            raise InvalidArgument(f"joint_names must be from {there}, each once; got {names}")
         chosen = tuple(self._actuators.index(name) for name in names)
         if not message.points or {len(p.positions) for p in message.points} != {len(names)}:
             raise InvalidArgument(f"each point needs {len(names)} positions, one for each joint")
@@ -155,7 +155,7 @@ class Commands:
         speeds = np.abs(np.diff(rows, axis=0)) / (np.diff(due)[:, None] * self._arm.period)
         for i, j in np.argwhere(speeds > SLACK * limits):
             raise InvalidArgument(
-                f"'{names[j]}' would need a speed of {speeds[i, j]:.4g} to be at "
+                f"'{names[j]}' would need a speed of {speeds[i, j]:.4g} to reach "
                 f"{rows[i + 1, j]:.4g} in time, its limit is {limits[j]:.4g}"
             )
 

@@ -31,7 +31,7 @@ class Gateway:
         try:
             tf = node.create_publisher(ros.of("tf2_msgs.msg.TFMessage"), "/tf", 100)
         except MissingExtra:
-            self._log.warning("there is no tf2_msgs, which its wheels lack: /tf is not published")
+            self._log.warning("the package tf2_msgs is not installed: /tf is not published")
         self._shared = ros.Shared(node, settings, WallClock(), tf)
         self._array = ros.of("diagnostic_msgs.msg.DiagnosticArray")
         self._diagnostics = node.create_publisher(self._array, "/diagnostics", 10)

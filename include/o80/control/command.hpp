@@ -57,7 +57,7 @@ constexpr PaceSpec until(Iteration iteration) { return {Pace::until, iteration, 
 /// Reaches the target in `count` iterations (a trajectory: each of its waypoints).
 constexpr PaceSpec iterations(std::int64_t count) { return {Pace::iterations, count, 0}; }
 
-/// True for targets of consecutive iterations; the targets of a burst are set-points.
+/// True if each target is for one iteration; a group sends such targets as set-points.
 constexpr bool is_each_iteration(const PaceSpec& pace) {
   return pace.pace == Pace::iterations && pace.amount == 1;
 }

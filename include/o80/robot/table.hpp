@@ -86,7 +86,7 @@ struct ReadingView {
   FaultText halt_text;        // reason of the halt
 };
 
-/// A robot as a table of functions. Those that return int return 0, or 1 and fill the fault.
+/// A robot as a table of functions. An int that they return is 0, or 1 if they filled the fault.
 struct RobotTable {
   std::uint32_t version;
   std::uint32_t size;          // of this struct

@@ -128,8 +128,8 @@ class UntypedBackend {
   std::byte* extended() noexcept;
   /// True if limits bound the motion between two readings.
   bool watches_readings() const noexcept;
-  /// Before row 0 in real time: stores the first reading; then (`again`), a period later each,
-  /// false if the robot cannot have moved there from the last one; `failure` names the number.
+  /// Checks the readings before row 0 in real time, one in each period; `again`: not the first.
+  /// False if the robot cannot have moved there from the last one; `failure` names the number.
   bool judge_first(bool again) noexcept;
   /// Publishes the current row. The first one is row 0 and makes the backend running. Publishes
   /// nothing and returns false if a number of row 0 is NaN or infinite or, in real time, too

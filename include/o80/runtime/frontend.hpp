@@ -262,7 +262,7 @@ class UntypedFrontend {
   /// Returns the rows between two times [ns], both included, that the history holds.
   Rows history_between(std::int64_t first, std::int64_t last) const;
   /// Reads rows in sequence: waits for row `position`, or takes the oldest row if that one is
-  /// overwritten, and moves `position` behind it. Returns the number of rows that were skipped.
+  /// overwritten, and moves `position` past it. Returns the number of rows that were skipped.
   std::int64_t wait_for_next(Iteration& position, std::byte* row, Timeout timeout,
                              const KeepWaiting& keep_waiting = {}) const;
 

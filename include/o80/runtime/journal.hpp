@@ -136,7 +136,7 @@ class Journal {
   bool next(JournalEntry& entry);
   /// Continues at the entry of this number; entries before the oldest are reported as missed.
   void seek(std::uint64_t number);
-  /// Continues behind the newest entry.
+  /// Continues after the newest entry.
   void seek_end();
 
  private:

@@ -58,7 +58,7 @@ def cut(
     if selection.begin > (selection.end if end else last):
         if not end:
             length = f"{(last - first) * 1e-9:.4g} s"
-            raise InvalidArgument(f"--from {begin} is behind the end: {recording} has {length}")
+            raise InvalidArgument(f"--from {begin} is after the end: {recording} has {length}")
         raise InvalidArgument(f"--from must be before --to, got {begin or 0} and {end}")
     _write([recording], output, selection, model_files=model_files)
 

@@ -55,7 +55,7 @@ def diff(
     left_out = [name for name in ignore.split(",") if name]
     pairs = _pairs(list(histories(one, segment)), list(histories(other, segment)))
     if not pairs:
-        raise InvalidArgument(f"{one} and {other} hold no segment")
+        raise InvalidArgument(f"{one} and {other} have no segment: no robot ran meanwhile")
     is_different = is_missing = False
     for name, ours, theirs in pairs:
         mine, others = _comparable(ours, theirs), _comparable(theirs, ours)
@@ -94,7 +94,7 @@ def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, Named, Nam
     lacking = {(each.name, each.number) for each in ours} ^ set(there)
     if lacking:
         names = ", ".join(f"{name} (run {number})" for name, number in sorted(lacking)[:5])
-        raise InvalidArgument(f"only one of them has: {names}. Choose one with --segment")
+        raise InvalidArgument(f"only one recording has {names}: choose one with --segment")
     return [
         (
             each.name if each.number == 0 else f"{each.name}/{each.number}",

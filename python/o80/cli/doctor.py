@@ -31,7 +31,7 @@ def doctor(
     """Say whether this computer can serve a robot at a rate, and if not, why.
 
     Each finding names the problem, the command that solves it and the command that undoes this.
-    Nothing is changed. The exit status is 0 if nothing is in the way, else 1.
+    Nothing is changed. The exit status is 0 if no problem was found, else 1.
     """
     from o80.robots.doctor.computer import Computer
     from o80.robots.doctor.doctor import examine

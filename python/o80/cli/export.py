@@ -87,7 +87,7 @@ def export(
 
     found = list(histories(source, segment))
     if not found:
-        raise InvalidArgument(f"{source} holds no segment")
+        raise InvalidArgument(f"{source} has no segment: no robot ran meanwhile")
     restarted = {each.name for each in found if each.number > 0}
     named = {
         f"{each.name}/{each.number}" if each.name in restarted else each.name: each.history

@@ -76,7 +76,7 @@ def film(
         try:
             count = write_film(output, pictures(), frames_per_second=rate)
         except OSError:
-            raise InvalidArgument(f"{output} cannot be written: ffmpeg says why above") from None
+            raise InvalidArgument(f"{output} cannot be written: see ffmpeg's text") from None
     print(f"{output}: {count} frames")
 
 
@@ -89,7 +89,7 @@ def _rows(
     end = last if end is None else min(end, last)
     if not 0 <= begin < end:
         raise InvalidArgument(
-            f"'{first.label}' has the seconds 0 to {last:.3f}: give --from and --to within"
+            f"'{first.label}' lasts from 0 to {last:.3f} s: give --from and --to within that"
         )
     for at in np.arange(begin, end, step):
         row = first.row(first.nanoseconds(float(at)))

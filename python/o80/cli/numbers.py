@@ -6,14 +6,14 @@ import typer
 
 
 def positive(value: float | None) -> float | None:
-    """Refuses 0, less, and what is not finite."""
+    """Refuses numbers that are not positive or not finite."""
     if value is not None and not (value > 0 and math.isfinite(value)):
         raise typer.BadParameter(f"must be a positive number, got {value:g}")
     return value
 
 
 def not_negative(value: float | None) -> float | None:
-    """Refuses less than 0 and NaN."""
+    """Refuses negative numbers and NaN."""
     if value is not None and not value >= 0:
         raise typer.BadParameter(f"must not be negative, got {value:g}")
     return value

@@ -65,7 +65,7 @@ def plot(
         window=output is None,
     )
     if axes > 1:
-        complain(f"the runs are of {axes} different times: each begins at 0")
+        complain(f"the runs were not recorded at the same time: each of the {axes} begins at 0")
     if output is not None:
         known = figure.canvas.get_supported_filetypes()
         if output.suffix[1:].lower() not in known:

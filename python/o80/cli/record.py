@@ -117,7 +117,7 @@ def _replay_text(source: "Source", frontend: "Frontend", from_now: bool) -> str:
     if source.journal_begin is None:
         return "cannot be replayed: it was started without a journal"
     if source.begin > 0 and source.continues_at is not None:
-        return f"goes on with row {source.continues_at}; `o80 info` shows what the recording holds"
+        return f"continues with row {source.continues_at}; `o80 info` lists what was recorded"
     alone = " without its driver" if reads_the_world(frontend.schema) else ""
     if source.begin == 0 and source.journal_begin == 0:
         return f"is recorded from row 0: the recording can be replayed{alone}"

@@ -61,7 +61,7 @@ def view(
         if not is_loopback(host):
             complain(
                 "anyone on the network who learns this address can watch and halt the robots; "
-                "what is sent is not encrypted"
+                "the connection is not encrypted"
             )
         if has_screen() if browser is None else browser:
             open_browser(server.url)

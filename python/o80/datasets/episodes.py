@@ -202,7 +202,7 @@ def _episode(
     mark = span.marks[0]
     where = f"episode {span.number} (mark at row {mark.rows[segment]})"
     if span.dropped:
-        raise InvalidArgument(f"{where}: it was thrown away")
+        raise InvalidArgument(f"{where}: it was discarded")
     epochs = [*rows_of]
     epoch = _epoch_at(mark, epochs)
     run = rows_of[epoch]()

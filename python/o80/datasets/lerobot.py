@@ -56,7 +56,7 @@ def write(
     """
     needed("pyarrow", "export", "a LeRobot data set")
     if path.exists():
-        raise InvalidArgument(f"{path} exists: a data set is written to a new folder")
+        raise InvalidArgument(f"{path} exists: give a new folder for the data set")
     chosen_numbers = _Chosen.of(episodes, state, action, sensors, units, action_is)
     tasks = list(dict.fromkeys(episode.task for episode in episodes.all))
     features = _features(episodes, chosen_numbers)

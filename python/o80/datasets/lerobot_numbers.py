@@ -111,9 +111,9 @@ def _range(schema: Mapping[str, Any], index: int) -> float:
             return float(said[1].split()[index - first])
         first += group["count"]
     raise InvalidArgument(
-        f"'{schema['robot']}' does not say through which ranges its joints were calibrated, so its "
-        "angles cannot be normalised: take degrees. Arms of o80-arms say it, simulations and older "
-        "recordings do not"
+        f"'{schema['robot']}' has no calibrated ranges of its joints, so its angles cannot be "
+        "normalised: use degrees. Only arms of o80-arms have these ranges; simulations and older "
+        "recordings have none"
     )
 
 

@@ -23,7 +23,7 @@ def write(path: Path, episodes: Episodes, say: Say = warn) -> None:
     from minari.dataset.minari_storage import MinariStorage
 
     if path.exists():
-        raise InvalidArgument(f"{path} exists: a data set is written to a new folder")
+        raise InvalidArgument(f"{path} exists: give a new folder for the data set")
     size = len(episodes.names["observed"]) + len(episodes.names["extended"])
     actions = len(episodes.names["desired"])
     data = path.absolute() / "data"  # Minari would create a relative path twice

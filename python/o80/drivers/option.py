@@ -90,8 +90,8 @@ def _default(field: dataclasses.Field[Any]) -> Any:
     if field.default_factory is not dataclasses.MISSING:
         return field.default_factory()
     raise InvalidArgument(
-        f"option '{field.name}' has no default: give the field of Config one, for every robot can "
-        "be started without options"
+        f"option '{field.name}' has no default: give the field of Config one, because every "
+        "robot can be started without options"
     )
 
 

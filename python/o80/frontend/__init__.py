@@ -1,4 +1,4 @@
-"""o80.Frontend, the side that commands and reads, as three classes, and what belongs to it.
+"""o80.Frontend, which commands and reads a robot, as three classes with their helpers.
 
 | file | methods of o80.Frontend |
 |---|---|

@@ -240,8 +240,8 @@ class Chunks(Managed):
         since: int = self._arm._since(seen)
         if since < 0:
             raise InvalidArgument(
-                f"row {seen.iteration} is of another run, and '{self._arm.segment}' has no row "
-                "from before its capture: give one of this robot, or of one on the same clock"
+                f"row {seen.iteration} is from another run, and '{self._arm.segment}' has no row "
+                "from before its capture: give a row of this robot, or of one with the same clock"
             )
         return since
 
@@ -262,11 +262,11 @@ class Chunks(Managed):
 
     def _check_due(self, after: "NDArray[np.int64]", count: int, anchor: int) -> None:
         if len(after) != count:
-            raise InvalidArgument(f"{count} rows need as many due iterations, got {len(after)}")
+            raise InvalidArgument(f"{count} rows need {count} due iterations, got {len(after)}")
         if not (after[0] >= 1 and np.all(np.diff(after) > 0) and after[-1] <= _LATEST):
             raise InvalidArgument(
-                f"rows are due one after the other, after iteration {anchor}, which they answer, "
-                f"and at most 2^31 iterations later: got {(after + anchor).tolist()}"
+                f"due iterations must rise, from after iteration {anchor}, which the rows answer, "
+                f"to at most 2^31 iterations later: got {(after + anchor).tolist()}"
             )
 
     def _mixed(
@@ -274,9 +274,9 @@ class Chunks(Managed):
     ) -> "NDArray[np.float64]":
         shares = np.ones(len(new)) if weights is None else _finite(weights, "weights")
         if shares.shape != (len(new),):
-            raise InvalidArgument(f"weights are ({len(new)},), not {shares.shape}")
+            raise InvalidArgument(f"weights must have the shape ({len(new)},), got {shares.shape}")
         if shares.min() < 0 or shares.max() > 1:
-            raise InvalidArgument(f"weights are shares from 0 to 1, got {shares.tolist()}")
+            raise InvalidArgument(f"weights must be from 0 to 1, got {shares.tolist()}")
         self._settle()
         for row, iteration in enumerate(due.tolist()):
             plan = self._plan_at(iteration)
@@ -366,7 +366,7 @@ class Chunks(Managed):
         while True:
             if (halt := arm.halted) is not None and halt.iteration is not None:  # it is in force
                 why = f" ({halt.text})" if halt.text else ""
-                raise BackendHalted(f"'{arm.segment}' is halted{why}: `resume` it, then send anew")
+                raise BackendHalted(f"'{arm.segment}' is halted{why}: `resume` it, then send again")
             if not arm.bursting:
                 arm.keep_alive()
             newest = self._newest
@@ -462,7 +462,7 @@ class Chunks(Managed):
     def _start_of(self, part: ChunkPart) -> Moment:
         """Reads places and derivatives before the begin of a begun chunk, from the journal.
 
-        Raises RowOverwritten; InvalidArgument behind a command without a journal.
+        Raises RowOverwritten; InvalidArgument after a command without a journal.
         """
         before = part.begins - 1
         if not self._journal.exists:
@@ -470,7 +470,7 @@ class Chunks(Managed):
             if not row.active[self._actuators].any():
                 return self._rest_in(row)
             raise InvalidArgument(
-                f"the plan of a chunk behind a command needs the journal of '{self._arm.segment}': "
+                f"the plan of a chunk after a command needs the journal of '{self._arm.segment}': "
                 "start the robot with one (--journal)"
             )
         while entries := self._journal.read(_ENTRIES):
@@ -486,7 +486,7 @@ class Chunks(Managed):
         if not all(key in of_it for key in itertools.compress(keys, moves)):
             if self._given.blends and part.begins in self._starts:
                 raise InvalidArgument(
-                    f"no plan is known of {self._given.blends}: its state interpolates by itself"
+                    f"{self._given.blends} has no known plan, but an interpolation of its driver"
                 )
             raise RowOverwritten(f"the journal no longer has the chunk that began in {part.begins}")
         starts = np.array([of_it.get(key, (0.0, 0.0, 0.0)) for key in keys]).reshape(-1, 3)

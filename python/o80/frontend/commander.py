@@ -166,9 +166,9 @@ class Commander(Reader):
             """
 
         def purge(self, actuator: SupportsIndex | str | None = None) -> _core.Batch:
-            """Drops all commands of an actuator (None: of all) at once, also those of others.
+            """Drops all commands, from all frontends, of an actuator (None: of all) at once.
 
-            Needs no pulse; what was added and not pulsed stays added.
+            Needs no pulse; added commands stay added.
             """
 
         def mark(self, text: str) -> _core.Batch:

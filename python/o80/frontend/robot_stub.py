@@ -125,7 +125,7 @@ def check(opened: Frontend, digest: str) -> None:
 
 
 def literal(words: Iterable[str]) -> str:
-    """Returns the type of these words; Never without any."""
+    """Returns the Literal type of the words; Never if there are none."""
     known = ", ".join(map(repr, words))
     return f"Literal[{known}]" if known else "Never"
 

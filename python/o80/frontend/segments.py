@@ -69,7 +69,7 @@ def clean(name: str | None = None) -> list[str]:
 
 
 def boot_of(frontend: "Reader") -> str:
-    """Returns the id of the boot to whose clock rows refer; empty: unknown, simulated or played."""
+    """Returns the id of the boot whose clock the rows use; empty: unknown, simulated or played."""
     from o80.base.machine import this_boot  # late: `o80 list` does not need it
 
     real_time = frontend.schema["clock"] == "monotonic" and not frontend.played

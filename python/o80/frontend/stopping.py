@@ -123,7 +123,7 @@ def _signal(entry: Segment, process: int | None) -> None:
     except OSError as error:
         raise SegmentError(
             f"'{entry.name}' (pid {entry.pid}) belongs to user {entry.user}: only that user and "
-            f"root may stop it, where no sandbox refuses `kill` ({error.strerror})"
+            f"root can stop it, if no sandbox refuses `kill` ({error.strerror})"
         ) from None
 
 

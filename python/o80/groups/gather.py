@@ -77,7 +77,7 @@ def numbers_from(wanted: Sequence[str | Gathered], schema: dict[str, Any]) -> li
     for each in sequence(wanted, "numbers", "['observed']"):
         gathered = Gathered(each) if isinstance(each, str) else each
         if not isinstance(gathered, Gathered):
-            raise InvalidArgument(f"numbers must hold paths and o80.Gathered, got {each!r}")
+            raise InvalidArgument(f"numbers must be paths or o80.Gathered objects, got {each!r}")
         found += _numbers_of(gathered, schema)
     return found
 

@@ -161,8 +161,8 @@ def _feeds(
     state = targets.dtype
     if targets.ndim == 1:
         raise InvalidArgument(
-            "a burst that follows needs targets of one type: prepare it for actuators whose states "
-            f"are alike, not for {', '.join(state.names or ())}"
+            "a burst that follows another one needs targets of one type: prepare it for actuators "
+            f"of one type, got {', '.join(state.names or ())}"
         )
     steps, actuators = targets.shape[1:]
     if isinstance(numbers, str):

@@ -36,7 +36,7 @@ class Flags:
         return len(self._flags)
 
     def raised(self, running: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Returns (copies,) with any true comparison, in any of these worlds (copies, worlds)."""
+        """Returns (copies,): True if a comparison holds in a running world (copies, worlds)."""
         raised = np.zeros(len(running), np.bool_)
         for numbers, compare, value in self._flags:
             found = compare(numbers.read(EVERY)[..., 0], value)

@@ -98,7 +98,7 @@ def pairs_of(
 
 
 def numbers_at(path: str, what: str, robot: Mapping[str, Any]) -> list[Column]:
-    """Returns the numbers at a path; of states with several numbers those named `what`."""
+    """Returns the numbers at a path; if states have several, those named `what`."""
     columns = columns_at(robot, path)
     if path.partition(".")[0] == "extended":
         return columns
@@ -148,7 +148,7 @@ def _spread(
         return low, high
     raise InvalidArgument(
         f"mirror: '{column.name}' of robot '{robot['robot']}' is in {column.unit}, {joint} in "
-        f"{unit}: only a number in 1 with limits is spread over a joint's range"
+        f"{unit}: only a number with the unit 1 and limits is spread over a joint's range"
     )
 
 

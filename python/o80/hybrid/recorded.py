@@ -63,8 +63,8 @@ def relive(
     takes = signature(task).parameters.values() if hasattr(task, "_parameters") else ()
     if not any(each.name == "recorded" or each.kind is each.VAR_KEYWORD for each in takes):
         raise InvalidArgument(
-            "a class derived from o80.hybrid.HybridTask, whose `__init__` takes a `recorded` robot "
-            f"as that does, is needed, got {task!r}"
+            "task must be a class derived from o80.hybrid.HybridTask whose `__init__` accepts the "
+            f"argument `recorded`, got {task!r}"
         )
     draws = np.random.SeedSequence(seed)
     for robot, group in groupby(_spans(RecordingFile(path), segment), attrgetter("robot")):

@@ -128,8 +128,8 @@ class World:
             self.options["joints"] = ", ".join(map(_entry, self.pairs))
         elif spread := [pair.joint for pair in self.pairs if pair.over]:
             raise InvalidArgument(
-                f"mirror: '{spread[0]}' is in 1, and only worlds of o80-mujoco spread it over the "
-                "range of a joint"
+                f"mirror: '{spread[0]}' has the unit 1, and only worlds of o80-mujoco spread it "
+                "over the range of a joint"
             )
 
     def _has_velocity(self, rig: Rig, schema: Mapping[str, Any]) -> None:
@@ -143,9 +143,9 @@ class World:
         """Whether a state of a joint is a position and a velocity, and not one number."""
         if "velocity" in fields and rig.mirror.velocity is None:
             raise InvalidArgument(
-                f"mirror: the joints of world '{_name(rig.world)}' have a velocity, and none is "
-                "named: Mirror(velocity=...) takes the path of one in the robot's rows, or "
-                "difference(rows=3). With velocity 0 a moving arm hits as if it stood still"
+                f"mirror: the joints of world '{_name(rig.world)}' need a velocity: give the path "
+                "of one in the robot's rows as Mirror(velocity=...), or difference(rows=3). "
+                "With velocity 0 a moving arm hits as if it stood still"
             )
 
 
@@ -163,7 +163,7 @@ def _simulation(rig: Rig, folder: Path) -> tuple[Robot, dict[str, Any]]:
     if rig.things is not None:
         if robot._library.name != "mujoco":
             raise InvalidArgument(
-                f"things are put into models of o80-mujoco, and world '{robot.name}' has none"
+                f"things need a model of o80-mujoco, which world '{robot.name}' does not have"
             )
         options["things"] = str(folder / rig.things)
     return robot, options

@@ -258,10 +258,10 @@ class Single:
         counts.largest_lateness = max(counts.largest_lateness, late)
         counts.largest_drift = max(counts.largest_drift, drift)
         if late > most.max_late:
-            self.stalled = f"the step began {late} rows late, the most is max_late={most.max_late}"
+            self.stalled = f"the step began {late} rows late, more than max_late={most.max_late}"
         elif drift > most.max_drift:
             self.stalled = (
-                f"the robot skipped {drift:.3g} s since the episode began, the most is "
+                f"the robot skipped {drift:.3g} s since the episode began, more than "
                 f"max_drift={most.max_drift:g} s"
             )
         return bool(self.stalled)

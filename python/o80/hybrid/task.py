@@ -138,8 +138,8 @@ class HybridTask(Task):
         if attach is not None and pacing == "inline":
             raise InvalidArgument("attach is for pacing='real_time' or 'processes'")
         for name in ("home_duration", "home_tolerance", "home_rest"):
-            if not 0 <= number(getattr(self, name), name) < math.inf:
-                raise InvalidArgument(f"{name} must be a finite number from 0 on")
+            if not 0 <= (value := number(getattr(self, name), name)) < math.inf:
+                raise InvalidArgument(f"{name} must be a finite number of at least 0, got {value}")
         plan = Plan(rig, folder_of(type(self)), self.chunk_size, self.action_steps, self.profile)
         home = Home(self.home, self.home_duration, self.home_tolerance)
         tolerances = Tolerances(self.max_late, self.max_drift, self.max_missed)
@@ -366,7 +366,7 @@ class HybridTask(Task):
         return rows(observed, (slice(None), 0)), {**info, "worlds": shown}
 
     def info(self, copies: Index) -> Mapping[str, Any]:
-        """Returns in real time `moved`: the robot moved between the reset and the first step."""
+        """Returns `moved` in real time: whether the robot moved between reset and first step."""
         return {"moved": [self.engine.moved]} if self._clocked else {}
 
     def statistics(self) -> Counts:
@@ -434,4 +434,4 @@ def make_vec(
 def _checked(task: Any) -> type[HybridTask]:
     if isinstance(task, type) and issubclass(task, HybridTask):
         return task
-    raise InvalidArgument(f"a class derived from o80.hybrid.HybridTask is needed, got {task!r}")
+    raise InvalidArgument(f"task must be a class derived from o80.hybrid.HybridTask, got {task!r}")

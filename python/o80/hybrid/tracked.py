@@ -48,13 +48,13 @@ class Tracked:
         """Does nothing: the newest row is that of the last step."""
 
     def mirror(self, _copies: NDArray[np.intp], robot: Side, _seen: object = None) -> None:
-        """Selects the row for the robot's newest row."""
+        """Selects the world's row that belongs to the robot's newest row."""
         self.side.rows[...] = self._beside(robot.last)[-1]
 
     def follow(
         self, copies: NDArray[np.intp], rows: NDArray[Any], period: float, _seen: object = None
     ) -> None:
-        """Selects the rows for those of a step."""
+        """Selects the world's rows that belong to the robot's rows of a step."""
         self.counts.steps += 1
         self.counts.play += rows.size * period
         self.motion.follow(copies, rows, period)
@@ -71,7 +71,7 @@ class Tracked:
         self.stalled = ""
         if age > self._oldest:
             self.stalled = (
-                f"the newest row of world '{tracker.segment}' is {age:.3g} s old, the most is "
+                f"the newest row of world '{tracker.segment}' is {age:.3g} s old, more than "
                 f"{self._oldest:.3g} s (max_late)"
             )
         return found[np.maximum(places, 0)]

@@ -122,8 +122,8 @@ class Worlds:
         counts.world_time += (time.monotonic() - begun - counts.world_time) / counts.steps
 
     def feed(self, rows: NDArray[Any]) -> None:
-        """Makes `mirror` and `follow` read these rows (copies, iterations) of robots, always the
-        same memory.
+        """Sets the rows (copies, iterations) of robots that `mirror` and `follow` read: always
+        this memory.
         """
         feeds: Feeds = []
         with suppress(InvalidArgument):

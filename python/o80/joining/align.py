@@ -107,7 +107,7 @@ def align(
     if by == SEEN and SEEN not in (given := named(sources)):
         if (period, at, how, max_age, offsets) != (None, None, "before", None, None):
             raise InvalidArgument(
-                "by='seen' takes no period, at, how, max_age and offsets: it joins the very rows"
+                "by='seen' takes no period, at, how, max_age and offsets: it joins exact rows"
             )
         return _by_seen(given, seconds)
     if sum(given is not None for given in (by, period, at)) != 1:
@@ -133,8 +133,8 @@ def _by_seen(sources: "Mapping[str, Source]", seconds: float | None) -> Aligned:
     run = run_of(name, sources[name])
     if not hasattr(run, "journal") or not others:
         raise InvalidArgument(
-            f"by='seen' needs two sources or more, and the first must be a frontend or a run of "
-            f"a recording, whose journal says by which rows it was commanded; got {run!r}"
+            f"by='seen' needs at least two sources. The first one must have a journal with the "
+            f"rows that its commands answer: a frontend, or a run of a recording; got {run!r}"
         )
     taken = decisions(run.journal())
     rows, _ = opened(name, run, seconds)
@@ -153,8 +153,8 @@ def _by_seen(sources: "Mapping[str, Source]", seconds: float | None) -> Aligned:
         found[other] = picked
     if not any(found[other].found.any() for other in others):
         raise InvalidArgument(
-            f"no batch that '{name}' has taken was decided by a row of {' or '.join(others)} that "
-            "is there: give the row when you send, as in pulse(seen=row)"
+            f"no batch of '{name}' answers a row of {' or '.join(others)} that is available: give "
+            "the row when you send, as in pulse(seen=row)"
         )
     return Aligned(rows.time, found)
 

@@ -66,7 +66,7 @@ def timed(
         )
         raise InvalidArgument(
             f"the rows have times of different clocks ({clocks}); give offsets={{name: ns}}, "
-            "what to add to the times of each"
+            "the nanoseconds to add to the times of each"
         )
     return {name: _on_clock(history, shifts[name]) for name, (history, _) in found.items()}
 

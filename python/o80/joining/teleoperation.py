@@ -81,7 +81,7 @@ class Teleoperation:
         self.leader, self.follower = leader, follower
         self.near, self.silence = number(near, "near"), number(silence, "silence")
         if not (0 < self.near < math.inf and 0 < self.silence < math.inf):
-            raise InvalidArgument(f"near and silence must be positive, got {near} and {silence}")
+            raise InvalidArgument(f"near and silence must be finite and > 0, got {near}, {silence}")
         given = {each.name: each for each in leader.actuators}
         taken = {each.name: each for each in follower.actuators}
         if joints is None:
@@ -89,7 +89,7 @@ class Teleoperation:
             if not joints:
                 raise InvalidArgument(
                     f"'{leader.segment}' ({', '.join(given)}) and '{follower.segment}' "
-                    f"({', '.join(taken)}) have no joint of the same name: say which follow which"
+                    f"({', '.join(taken)}) share no name of a joint: give the pairs as joints"
                 )
         self.joints = list(joints)
         names = [joint.follower for joint in self.joints]
@@ -142,7 +142,7 @@ class Teleoperation:
                 raise
             return False
         if seen.halted:
-            self._disengage(f"the leader '{self.leader.segment}' is halted")
+            self._disengage(f"the leader '{self.leader.segment}' is halted: resume it first")
             return False
         is_new, self._last = seen.iteration != self._last, seen.iteration
         why = self._refused()
@@ -247,7 +247,7 @@ class Teleoperation:
         if self._near_since is None:
             self._near_since = seen.time
         self.engaged = seen.time - self._near_since >= HELD * 1e9
-        self.why = "" if self.engaged else "both are near since less than half a second"
+        self.why = "" if self.engaged else "both have been near for less than half a second"
 
     def _move(self, joint: Joint, leader: float, follower: float) -> str:
         """Describes the motion of the leader that brings the follower near, in its own numbers."""

@@ -47,7 +47,7 @@ class Environment(gymnasium.Env[Any, Any]):
         return rows(begun.observations, 0), infos.of_one(begun.info)
 
     def step(self, action: Any) -> tuple[Any, float, bool, bool, infos.Info]:
-        """Executes an action."""
+        """Executes an action; returns observation, reward, terminated, truncated and info."""
         if not self._ready:
             raise ResetNeeded("no episode runs: call reset() before step()")
         actions = batch_of_one(self.action_space, action)

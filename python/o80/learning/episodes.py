@@ -97,7 +97,7 @@ def _stepped(task: Task, copies: Index, stepped: NDArray[np.bool_] | None = None
             copy = int(np.flatnonzero(~np.isfinite(rewards))[0])
             raise InvalidArgument(
                 f"{type(task).__name__}.judge gave copy {copy} the reward {rewards[copy]}: it must "
-                "be finite, or a policy that learns from it is lost"
+                "be finite, because any other value breaks the policy that learns from it"
             )
         terminated[judged] = outcome.terminated
         if halted.size:

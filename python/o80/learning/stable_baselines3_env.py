@@ -123,7 +123,7 @@ class StableBaselines3Env(VecEnv):
         return [result] * self._count(indices)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Indices = None) -> list[bool]:
-        """Returns whether it does the work of this wrapper of single environments: only Monitor."""
+        """Returns whether it replaces this wrapper of single environments: True for Monitor."""
         from stable_baselines3.common.monitor import Monitor
 
         return [issubclass(Monitor, wrapper_class)] * self._count(indices)

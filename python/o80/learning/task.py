@@ -107,7 +107,7 @@ class Task(ABC):
         return self.judge(copies)
 
     def shown(self, copies: Index) -> tuple[Any, Mapping[str, Any]]:
-        """Returns observations and infos for an environment: `observe`, `info`, and further."""
+        """Returns observations and infos for an environment; kinds of tasks extend it."""
         info = self.info(copies)
         return self.observe(copies), info
 

@@ -218,7 +218,7 @@ class VectorEnvironment(gymnasium.vector.VectorEnv[Any, Any, NDArray[Any]], Clos
 
     @property
     def np_random_seed(self) -> tuple[int, ...]:  # type: ignore[override]
-        """The seeds of these generators."""
+        """The seeds of the copies' random generators."""
         return tuple(self._generators.seeds_of(self._everybody))
 
     def render(self) -> tuple[Any, ...] | None:

@@ -266,7 +266,7 @@ def _tracks(path: str | os.PathLike[str], segments: str | Sequence[str] | None) 
     ]
     tracks = [track for track in tracks if track.epochs]
     if not tracks:
-        raise InvalidArgument(f"{path} has no row to play")
+        raise InvalidArgument(f"{path} has no row to play: no robot ran meanwhile")
     return tracks
 
 

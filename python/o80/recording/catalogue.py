@@ -121,7 +121,7 @@ def _sizes(root: Path) -> Iterator[tuple[Path, int]]:
 
 
 def _warn(error: OSError) -> None:
-    what = f"{error.filename} cannot be read ({error.strerror}): what it holds is not listed"
+    what = f"{error.filename} cannot be read ({error.strerror}): its content is not listed"
     warnings.warn(what, RuntimeWarning, stacklevel=5)
 
 

@@ -105,16 +105,15 @@ class EpochNote:
         return {"content": content} | self.run_texts()
 
     def record(self, what: str) -> str:
-        """Returns the name of a record of this run: description (an attachment), provenance, end
-        with the last row, or the preceding interruption, in which nothing was recorded.
-        """
+        """Returns the name of a record of this run: description, provenance, end, interruption."""
         return f"{self.segment}/{self.number}/{what}"
 
 
 @dataclass
 class WallClock:
-    """Places robots on one wall clock: robots on the monotonic clock of one boot keep their exact
-    distances, although each read the wall clock at its start and it may have been set since.
+    """Places robots on one wall clock.
+
+    Rows of one boot keep their exact distances, even if the wall clock was set between starts.
     """
 
     offsets: dict[str, int]  #: log time less row time, by boot [ns]

@@ -104,7 +104,7 @@ class JournalLog:
         try:
             return self._lines(entries, many)
         except (Error, LookupError, ValueError) as error:  # a newer o80 wrote it, or it is damaged
-            return [(-1, WARN, f"decisions that cannot be told in words: {error}")]
+            return [(-1, WARN, f"decisions that cannot be shown as text: {error}")]
 
     def _lines(self, entries: Entries, many: bool) -> list[tuple[int, int, str]]:
         natives = self._native.decode(entries.content, entries.codec)

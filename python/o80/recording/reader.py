@@ -58,7 +58,7 @@ class RecordingFile:
         """First and last wall-clock time [ns since 1970]. Raises RecordingError if it is empty."""
         files = [found.chunks for _, found in self._files if found.chunks]
         if not files:
-            raise RecordingError(f"{self.path} holds no message")
+            raise RecordingError(f"{self.path} has no message")
         return min(chunks.start for chunks in files), max(chunks.end for chunks in files)
 
     @property

@@ -95,7 +95,7 @@ class RecordedEpoch(Histories):
 
     @property
     def boot(self) -> str:
-        """Id of the boot to whose monotonic clock the row times refer; empty: unknown."""
+        """Id of the boot whose monotonic clock the row times use; empty: unknown."""
         return self._note.boot
 
     @property
@@ -116,8 +116,9 @@ class RecordedEpoch(Histories):
         ]
 
     def overlaps(self, other: "RecordedEpoch") -> bool:
-        """True if another run of the recording was recorded at the same time, judged by the places
-        of rows in the files, because simulated times of two runs cannot be compared.
+        """True if another run was recorded at the same time, by the places of rows in the files.
+
+        Simulated times of two runs cannot be compared.
         """
         (first, last), (begin, end) = self._places, other._places
         return first <= end and begin <= last

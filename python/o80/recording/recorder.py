@@ -167,7 +167,7 @@ class Recorder:
         if name is not None and self._lost is not self.file:
             self._lost = self.file
             where = (
-                f"moved to {name}, and goes on there" if name else "removed: it is written again"
+                f"moved to {name}, and continues there" if name else "removed: it is written again"
             )
             end = "" if name else " to its name when it ends, and lost if its recorder is killed"
             text = f"the recording {self.file.path} was {where}{end}"
@@ -239,11 +239,11 @@ class Recorder:
         while self.size + length > self._keep:
             if not self._removable:
                 raise RecordingError(
-                    f"{self.path} may hold {bytes_text(self._keep)} (keep) and lacks "
-                    f"{bytes_text(self.size + length - self._keep)}, but no file can be deleted: "
-                    f"{bytes_text(self._bytes_before)} have marks or are of another recorder, and "
-                    f"{self.file.path.name} is being written. What was recorded until now is in "
-                    f"it: keep more, move files away, or split into smaller ones"
+                    f"{self.path} would exceed its {bytes_text(self._keep)} (keep) by "
+                    f"{bytes_text(self.size + length - self._keep)}, and no file can be deleted: "
+                    f"{bytes_text(self._bytes_before)} have marks or are from another recorder, "
+                    f"and {self.file.path.name} is being written. It has everything up to now. "
+                    f"Keep more, move files away, or split into smaller ones"
                 )
             oldest, size = self._removable.pop(0)
             oldest.unlink(missing_ok=True)
@@ -310,7 +310,7 @@ def _most(keep: str, split: "Split | None") -> float:
     most = size_of(keep, "keep")
     if split.bytes < math.inf and most < 2 * split.bytes:
         raise InvalidArgument(
-            f"keep must be at least two files of {bytes_text(split.bytes)} (split), got '{keep}'"
+            f"keep must be at least twice split ({bytes_text(split.bytes)}), got '{keep}'"
         )
     return most
 

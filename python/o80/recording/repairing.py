@@ -75,7 +75,7 @@ def repaired(path: Path, *, is_last: bool) -> list[str]:
     file.finish()
     if size < len(MAGIC):
         return [f"{path} held no rows: it is a complete recording without segments now"]
-    return [f"{path} is complete now: {kept} bytes kept, {size - kept} bytes behind them removed"]
+    return [f"{path} is complete now: {kept} bytes kept, {size - kept} bytes after them removed"]
 
 
 def _has_data_behind(path: Path, found: Scan) -> bool:
@@ -118,7 +118,7 @@ def _salvaged(path: Path, found: Scan | None, is_last: bool) -> list[str]:
         for each in dropped
     ]
     ranges += [f"{path}: {name} is damaged, and kept as it is" for name in salvage.doubtful]
-    return [*ranges, f"{path} has all that was whole; the damaged file is {kept.name} now"]
+    return [*ranges, f"{path} has all intact records; the damaged file is {kept.name} now"]
 
 
 def _parts(data: mmap.mmap, at: int = len(MAGIC), found: Scan | None = None) -> Iterator[Part]:

@@ -94,7 +94,7 @@ class Scan:
 
 
 class CopiedFile:
-    """A file that is removed when nobody refers to this object any more."""
+    """A file that is removed when this object is garbage-collected."""
 
     def __init__(self, name: str) -> None:
         folder = tempfile.mkdtemp(prefix="o80-copy-")

@@ -112,7 +112,7 @@ class Source:
             self._frontend = None
 
     def is_filled(self, share: float) -> bool:
-        """True if this share of a ring is unread, or if there may be a backend to attach to."""
+        """True if this share of a ring is unread, or a new backend may have started."""
         frontend = self._frontend
         if frontend is None or not frontend.alive:
             return True

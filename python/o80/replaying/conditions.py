@@ -13,8 +13,8 @@ def reads_the_world(schema: dict[str, Any]) -> str:
     if schema.get("simulated"):
         return ""
     return (
-        "the robot may be hardware: it does not say that it is simulated (in describe "
-        "schema.simulated(), in Python simulated = True)"
+        "the robot may be hardware: its driver does not declare that it is simulated (in "
+        "describe: schema.simulated(), in Python: simulated = True)"
     )
 
 

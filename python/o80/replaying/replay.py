@@ -108,7 +108,7 @@ def _runs_of(
     recording = source if isinstance(source, RecordingFile) else RecordingFile(source)
     runs: list[RecordedRun] = [*runs_in(recording, segment)]
     if not runs:
-        raise InvalidArgument(f"{recording.path} holds no segment")
+        raise InvalidArgument(f"{recording.path} has no segment: no robot ran meanwhile")
     return runs
 
 

@@ -71,7 +71,7 @@ def _only(recording: Any) -> Any:
     names = [*recording]
     if len(names) != 1:
         raise InvalidArgument(
-            f"the recording has {len(names)} segments, not one: say which, as FILE.mcap:NAME"
+            f"the recording has {len(names)} segments, not one: name one, as FILE.mcap:NAME"
         )
     return recording[names[0]]
 

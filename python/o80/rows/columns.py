@@ -121,7 +121,7 @@ class Packing(NamedTuple):
 
 
 def packing_of(columns_by_path: Sequence[Sequence[Column]]) -> Packing:
-    """Places the numbers of each path one behind the other, each aligned."""
+    """Packs the numbers of each path one after another, each aligned."""
     parts: list[list[int]] = []
     numbers: list[list[tuple[np.dtype[Any], int]]] = []
     end, largest = 0, 1

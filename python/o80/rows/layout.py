@@ -155,7 +155,7 @@ def field_view(rows: NDArray[Any], *paths: str) -> NDArray[Any]:
     """
     runs = joined(run for path in paths for run in runs_of(*field_at(rows.dtype, path)))
     if len(runs) != 1:
-        raise InvalidArgument(f"{', '.join(paths)}: not numbers of one kind, side by side in a row")
+        raise InvalidArgument(f"{', '.join(paths)}: must be of one type, side by side in a row")
     kind, offset, count = runs[0]
     return rows.getfield(np.dtype((kind, (count,))), offset)
 
@@ -353,9 +353,9 @@ class Layout:
         if rows.dtype is self.row or rows.dtype == self.row:
             return
         raise InvalidArgument(
-            f"rows of {rows.dtype.itemsize} bytes do not lie as '{self.schema['robot']}' describes "
-            f"them ({self.size} bytes). NumPy's concatenate and where leave out padding: give them "
-            f"single fields, such as history.observed"
+            f"rows of {rows.dtype.itemsize} bytes do not have the layout of "
+            f"'{self.schema['robot']}' ({self.size} bytes). NumPy's concatenate and where drop "
+            f"padding: give them single fields, such as history.observed"
         )
 
     def many(self, rows: NDArray[Any], part: str) -> States:

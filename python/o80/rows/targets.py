@@ -96,8 +96,8 @@ class _Parts:
                 column = array[:, i]
             elif array.ndim != axes or len(places) > 1:
                 raise InvalidArgument(
-                    f"the targets of {len(places)} actuators are (T, {len(places)}), "
-                    f"not {array.shape}"
+                    f"the targets of {len(places)} actuators must have the shape "
+                    f"(T, {len(places)}), got {array.shape}"
                 )
             labels = labels_of_type(self._types[place])
             known = labels.get(named) if isinstance(labels, Mapping) else labels
@@ -108,8 +108,8 @@ class _Parts:
         left_out = [n for n, each in zip(self._names, self._columns, strict=True) if not each]
         if left_out:
             raise InvalidArgument(
-                f"the targets leave out {', '.join(map(repr, left_out))}: give theirs, or choose "
-                "the other actuators only"
+                f"the targets lack {', '.join(map(repr, left_out))}: add these, or choose only the "
+                "other actuators"
             )
         counts = {len(column) for each in self._columns for column in each.values()}
         if len(counts) != 1:
@@ -169,8 +169,8 @@ def states_from(targets: ArrayLike, kind: np.dtype[Any]) -> NDArray[Any]:
             return array
         if given.dtype.names is None and given.shape == array.shape:
             raise InvalidArgument(
-                f"numbers alone leave fields of these states open ({', '.join(kind.names)}): give "
-                f"a mapping from each field to an array, or a structured array"
+                f"these states have several fields ({', '.join(kind.names)}): give a mapping from "
+                f"each field to an array, or a structured array"
             )
     return array
 
@@ -198,7 +198,7 @@ def _words(bits: int, count: int) -> list[int]:
 
 
 def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]:
-    """Returns the state type of each of these actuators. Raises InvalidArgument for none."""
+    """Returns the state type of each actuator. Raises InvalidArgument if there are none."""
     if not actuators:
         raise InvalidArgument("targets need an actuator")
     return [dtype_of_type(_type_of(actuator, layout)) for actuator in actuators]

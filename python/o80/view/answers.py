@@ -242,9 +242,9 @@ _ANY = Standing(floats=True)
 def others_of(
     chosen: Source, sources: Sequence[Source], of_chosen: Observation, *, now: bool
 ) -> Iterator[tuple[Source, Observation, bool]]:
-    """Yields other sources with a model, their rows at the time of the chosen one's row or now, and
-    whether they stand in the same world.
+    """Yields each other source with a model, its row, and whether it stands in the same world.
 
+    now: take its newest row, not the one at the time of `of_chosen`.
     The world is that of the first fixed model. Robots with the same model are copies, and the world
     has one of them: the chosen one, else the first.
     """
@@ -307,8 +307,8 @@ MOST = 64
 
 
 class AnswerCache:
-    """Caches answers by query, ten times as long as they took: so many pages, long rows and long
-    windows cost at most a tenth of a processor."""
+    """Caches each answer ten times as long as its computation took: so all pages together use at
+    most a tenth of a processor."""
 
     def __init__(self) -> None:
         self._answers: dict[Hashable, tuple[float, Any]] = {}

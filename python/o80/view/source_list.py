@@ -16,7 +16,7 @@ BETWEEN_LOOKS = 0.25  # interval of searches for new segments and restarts [s]
 
 
 class SourceList:
-    """Finds segments that come later too. May be used from several threads."""
+    """Finds segments, also those that start later. May be used from several threads."""
 
     def __init__(self, names: Sequence[str], *, model_files: bool = False) -> None:
         """names: segments, patterns such as "arm*", recordings (.mcap files, or folders of
@@ -90,5 +90,5 @@ def _runs_of(path: str, model_files: bool) -> list[Source]:
         )
     ]
     if not found:
-        raise RecordingError(f"{path} holds no segment")
+        raise RecordingError(f"{path} has no segment: no robot ran meanwhile")
     return found

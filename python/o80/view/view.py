@@ -80,7 +80,7 @@ class View(Closeable):
         return self._popen.poll() is None
 
     def close(self) -> None:
-        """Ends the server, as pages then show. May be called twice; no effect in a forked child."""
+        """Ends the server; pages show that. May be called twice; no effect in a forked child."""
         if self._owner != os.getpid():
             return
         end_child(self._popen, GRACE)

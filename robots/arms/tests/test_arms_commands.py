@@ -37,7 +37,7 @@ def run(*words: str | Path) -> Result:
 
 def test_a_port_before_the_command_is_refused_not_ignored() -> None:
     refused = run("--port", "/dev/ttyACM1", "relax").exception
-    assert str(refused) == "--port belongs behind relax: `o80 arms relax --port ...`"
+    assert str(refused) == "--port goes after relax: `o80 arms relax --port ...`"
 
 
 def test_o80_has_the_command() -> None:
@@ -96,7 +96,7 @@ def test_write_puts_a_file_into_the_servos_for_good(
     other = {**fake_arm.calibration()}
     other["elbow_flex"] = {**other["elbow_flex"], "homing_offset": -7, "range_max": 3000}
     arm.file.write_text(json.dumps(other))
-    with pytest.raises(o80.DriverError, match=r"elbow_flex: the file .* --write"):
+    with pytest.raises(o80.DriverError, match=r"elbow_flex: the calibration .* --write"):
         arm.started()
     arm.line.wait_until_closed()
     assert run("calibrate", "--port", arm.line.port, "--write", arm.file).exit_code == 0
@@ -168,8 +168,8 @@ def test_doubts_about_a_range_name_the_error_of_its_zero() -> None:
     assert calibration.doubts(whole) == []
     half = {**whole, "shoulder_lift": Calibration(0, 1000, 2490)}
     assert calibration.doubts(half) == [
-        "shoulder_lift was moved through 131 of 200 deg when it was calibrated: its zero is off "
-        "by up to 35 deg"
+        "shoulder_lift was moved through only 131 of 200 deg during its calibration: its zero "
+        "may be wrong by up to 35 deg"
     ]
 
 
@@ -204,7 +204,7 @@ def test_nothing_is_written_if_a_servo_cannot_keep_all(arm: FakeArm) -> None:
     calibration.write(arm.file, {**joints, "gripper": Calibration(2048, 500, 3500)})
     before = [servo.shown for servo in arm.servos]
     refused = run("calibrate", "--write", arm.file, "--port", arm.line.port)
-    assert "keeps offsets of at most 2047, not 2048" in str(refused.exception)
+    assert "an offset of at most 2047, got 2048" in str(refused.exception)
     assert [servo.shown for servo in arm.servos] == before
 
 
@@ -294,7 +294,7 @@ def test_relax_and_check(arm: FakeArm, monkeypatch: pytest.MonkeyPatch) -> None:
     elbow.put(elbow.TORQUE, 1)
     lift.overload()
     told = run("relax", "--port", arm.line.port)
-    assert "6 servos are without torque" in told.output
+    assert "6 servos have no torque" in told.output
     assert not any(arm.torque)
     arm.line.pass_time(0.1)
     assert lift.alarms == 0, "torque was off, or it was restarted"

@@ -70,9 +70,9 @@ def failed(arm: FakeArm) -> None:
 
 REFUSED: list[tuple[Callable[[FakeArm], None], str]] = [
     (other_model, r"shoulder_pan \(servo 1\) is of model 1200, but an XL430-W250 \(1060\)"),
-    (reversed_servo, r"wrist_flex \(servo 4\) has another drive mode than 0"),
-    (holding_in_another_mode, r"wrist_roll \(servo 5\) holds with another setting in its register"),
-    (other_calibration, r"elbow_flex: the file .* the servo says offset 3,"),
+    (reversed_servo, r"wrist_flex \(servo 4\) has the drive mode"),
+    (holding_in_another_mode, r"wrist_roll \(servo 5\) has its torque on, so its register"),
+    (other_calibration, r"elbow_flex: the calibration .* the servo has offset 3,"),
     (failed, r"shoulder_lift is overloaded and has switched itself off: free it"),
 ]
 

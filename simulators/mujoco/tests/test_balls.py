@@ -151,7 +151,7 @@ def test_air_has_finite_numbers(name: str, value: float) -> None:
         ({"friction": np.nan}, "friction must be 0 or more"),
         ({"restitution": (1, np.nan, 1)}, "restitution must be a finite number"),
         ({"height": np.inf}, "height must be a finite number"),
-        ({"low": (0, 2)}, "low must lie below high"),
+        ({"low": (0, 2)}, "low must be less than high"),
     ],
 )
 def test_a_platform_that_no_ball_can_bounce_on_is_refused(wrong: dict[str, Any], text: str) -> None:

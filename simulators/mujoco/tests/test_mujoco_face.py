@@ -358,7 +358,7 @@ def test_the_steps_of_the_engine_fill_the_period(gripping: Path) -> None:
         ({"joints": "lift=j3"}, "no joint 'j3'"),
         ({"joints": "lft=j2"}, "no actuator 'lft'; there are: pan"),
         ({"joints": "lift=j2 1"}, "the two numbers at the ends"),
-        ({"limits": "1"}, "the limits are those of the other robot"),
+        ({"limits": "1"}, "leave out limits"),
         ({"mode": "control"}, "leave out mode=control"),
         ({"balls": "x"}, "leave out balls"),
         ({"like": "no.json"}, "holds no description"),
@@ -437,7 +437,7 @@ def test_a_model_that_allows_less_is_refused(tmp_path: Path) -> None:
     model = tmp_path / "narrow.xml"
     narrow = 'name="elbow" range="-90 90"/>'
     model.write_text(TWO_JOINTS.read_text().replace('name="elbow"/>', narrow))
-    with pytest.raises(o80.DriverError, match=r"'elbow' may be from -3 to 3, .* from -1\.5708 to"):
+    with pytest.raises(o80.DriverError, match=r"'elbow' is allowed .* only from -1\.5708 to"):
         SIMULATION.describe(model=model, like="two_joints")
 
 

@@ -285,7 +285,7 @@ def test_an_imposed_actuator_is_spread_over_the_range_of_a_joint(world: Path) ->
         assert robot.burst(1).desired.joints["position"][0] == 0.3
     world.write_text(WORLD.replace('range="-1 1"', ""))
     for joints, text in (
-        ("gripper=slide 0 1", "'slide' has no range over which to spread 0 to 1"),
+        ("gripper=slide 0 1", "'slide' has no range, so 0 to 1 cannot be spread"),
         ("a=slide, b=slide", "the same joint"),
         ("gripper=jaw 0 1", "no joint 'jaw'"),
     ):

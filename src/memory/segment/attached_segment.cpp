@@ -73,8 +73,8 @@ std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Acce
     throw SegmentError(segment_called(name) + " cannot be opened (" + segment.path_ + " of user " +
                        owner_of(segment.path_) + "): " + std::strerror(error) +
                        (error == EACCES
-                            ? ". Its backend can be started with a permission that lets this user "
-                              "read: --permission 640 for its group, 644 for everybody."
+                            ? ". To let this user read it, start its backend with --permission 640 "
+                              "(its group) or 644 (everybody)."
                             : ""));
   }
 
@@ -87,7 +87,7 @@ std::optional<AttachedSegment> AttachedSegment::open(std::string_view name, Acce
   if (!wrong.empty())
     throw SegmentError(segment_called(name) + " cannot be attached (" + segment.path_ +
                        "): " + wrong +
-                       ". Start its backend anew with this o80, or remove it with `o80 clean " +
+                       ". Start its backend again with this o80, or remove it with `o80 clean " +
                        std::string(name) + "`.");
   if (access == Access::read_write && !segment.open_commands(reason)) return std::nullopt;
   segment.map();
@@ -130,8 +130,8 @@ bool AttachedSegment::open_commands(std::string& reason) {
   }
   if (!commands_.is_open() && (errno == EACCES || errno == EPERM))
     throw ReadOnly(segment_called(name_) +
-                   " may not be commanded by this user: attach read-only to observe it, or let "
-                   "its backend be started with --permission 660, which lets its group command");
+                   " cannot be commanded by this user: attach read-only to observe it, or start "
+                   "its backend with --permission 660, which lets its group command it");
   if (!commands_.is_open())
     throw SegmentError("the commanders' file of " + segment_called(name_) + " cannot be opened (" +
                        path + "): " + std::strerror(errno));
@@ -139,7 +139,7 @@ bool AttachedSegment::open_commands(std::string& reason) {
       inspect_commands(commands_.descriptor(), descriptor(), header_, view_.offsets);
   if (!wrong.empty())
     throw SegmentError("the commanders' file of " + segment_called(name_) + " cannot be used (" +
-                       path + "): " + wrong + ". Start its backend anew.");
+                       path + "): " + wrong + ". Start its backend again.");
   return true;
 }
 
@@ -270,7 +270,7 @@ void AttachedSegment::throw_gone(Life life) const {
   const auto backend = [&] {
     return segment_called(name_) + ": its backend (pid " + std::to_string(header_.pid) + ") ";
   };
-  constexpr const char* cure = " Its history can still be read; start it again and attach anew.";
+  constexpr const char* cure = " Its history can still be read; start it again and attach again.";
   switch (life) {
     case Life::starting:
     case Life::running:

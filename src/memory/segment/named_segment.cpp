@@ -86,9 +86,9 @@ void NamedSegment::check_owner() const {
   const std::string why = why_untrusted(descriptor());
   if (!why.empty())
     throw SegmentError(
-        "the name '" + name_ + "' is in use: " + path_ + " is in the way, and " + why +
-        ". Otherwise have that file removed, choose another name with --segment (segment "
-        "in code), or another directory with O80_DIRECTORY.");
+        "the name '" + name_ + "' is in use: " + path_ + " exists, and " + why +
+        ". Otherwise remove that file, choose another name with --segment (segment in code), or "
+        "another directory with O80_DIRECTORY.");
 }
 
 bool NamedSegment::try_lock() noexcept {
@@ -113,8 +113,8 @@ std::string NamedSegment::backend_text() const {
 }
 
 std::string NamedSegment::in_use_text() const {
-  return "segment '" + name_ + "' is not removed: it has " + backend_text() +
-         " that lives. Stop it first with `o80 stop " + name_ + "`";
+  return "segment '" + name_ + "' is not removed: it still has " + backend_text() +
+         ". Stop it first with `o80 stop " + name_ + "`";
 }
 
 std::string NamedSegment::taken_text(std::string_view otherwise) const {

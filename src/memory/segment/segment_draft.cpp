@@ -247,10 +247,10 @@ bool SegmentDraft::try_replace(const std::function<void(const Predecessor&)>& in
   if (!former.is_open() && errno == ENOENT) return false;
   if (!former.is_open()) {
     const int error = errno;
-    fail(path + " of user " + owner_of(path) + " is in the way and cannot be opened", error);
+    fail(path + " of user " + owner_of(path) + " exists and cannot be opened", error);
   }
   former.check_owner();
-  if (!former.can_lock()) fail(path + " is in the way and cannot be replaced", EACCES);
+  if (!former.can_lock()) fail(path + " exists and cannot be replaced", EACCES);
   if (!former.try_lock()) {
     if (former.is_alive()) throw SegmentTaken(former.taken_text());
     return false;
@@ -261,7 +261,7 @@ bool SegmentDraft::try_replace(const std::function<void(const Predecessor&)>& in
   inherit(supersede(former));
   O80_CRASH_POINT("create.before_rename");
   if (rename(path_.c_str(), path.c_str()) != 0)
-    fail(path + " is in the way and cannot be replaced", errno);
+    fail(path + " exists and cannot be replaced", errno);
   O80_CRASH_POINT("create.after_rename");
   published_ = true;
   former.remove_commands();

@@ -113,7 +113,7 @@ std::vector<SegmentEntry> list_segments() {
   // an empty list would say that nothing runs
   if (error != 0)
     throw SegmentError("the segments in " + segment_directory() + " cannot be listed: " +
-                       std::strerror(error) + ". In a container its profile may have to allow it");
+                       std::strerror(error) + ". In a container, allow this in its profile");
   for (const SegmentFileName& file : files)
     if (file.kind == SegmentFileName::Kind::segment) entries.push_back(describe(file.name));
   std::erase_if(holders, [&](const NameHolder& holder) {

@@ -133,7 +133,7 @@ std::string why_not_loaded(const std::string& robot, const std::string& message)
   text += there.empty() ? ", which is not installed" : ", but installed is " + there;
   return text +
          ". Install the version it was built for, or build the package of the robot again with " +
-         "the one that is there";
+         "the installed one";
 }
 
 std::string where(const std::string& name_or_path) {

@@ -33,7 +33,7 @@ void allow_descriptors(std::size_t more, const std::string& what) {
     if (setrlimit(RLIMIT_NOFILE, &limit) == 0) return;
   }
   throw Error(
-      what + " need " + std::to_string(more) + " open files, and this process may open " +
+      what + " need " + std::to_string(more) + " open files, but the limit of this process is " +
       std::to_string(limit.rlim_max) +
       ": use fewer copies, or raise the hard limit (`ulimit -Hn`, LimitNOFILE= in systemd)");
 }

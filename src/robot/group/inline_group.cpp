@@ -189,8 +189,8 @@ void InlineGroup::add_copy(const RobotTable& table, const OptionValues& options,
   const auto schema_of = [](const Copy& copy) { return copy.frontend.link()->segment.schema(); };
   if (!std::ranges::equal(schema_of(*copies_.back()), schema_of(*copies_.front()))) {
     throw DriverError("copy " + std::to_string(copies_.size() - 1) + " of '" + name_ +
-                      "' describes itself differently than copy 0: all copies of a group must "
-                      "have the same description");
+                      "' has another description than copy 0: all copies of a group must have "
+                      "the same");
   }
 }
 
@@ -372,7 +372,7 @@ void InlineGroup::check_following(const BurstPlan& plan) const {
   }
   if (then.plan->steps != plan.iterations) {
     throw InvalidArgument("a burst that follows one of " + std::to_string(plan.iterations) +
-                          " iterations needs as many steps, got " +
+                          " iterations needs one step for each, got " +
                           std::to_string(then.plan->steps));
   }
   const std::size_t last = then.plan->steps - 1;

@@ -41,7 +41,7 @@ std::optional<std::string> OverrunReport::poll(const RowHead& row, std::int64_t 
       rows * 1e9 / static_cast<double>(std::max<std::int64_t>(row.time - before.time, 1));
   return late_text(row.overruns - before.overruns, rows, rate, period_) + ", " +
          std::to_string(row.skipped - before.skipped) +
-         " periods were skipped. `o80 doctor` says what is in the way on this computer; see "
+         " periods were skipped. `o80 doctor` reports the causes on this computer; see "
          "docs/real_time.md, or lower --frequency";
 }
 
@@ -93,10 +93,9 @@ void LoopReport::run() noexcept {
         const RowHead row = watcher.latest().head();
         if (const auto line = overruns.poll(row, moment)) say(*line);
         if (row.starvations > 0 && !std::exchange(has_starved, true)) {
-          say("a plan of chunks ran out of rows: its policy answers too late, or has not closed "
-              "it. "
-              "This is said once; `o80 info " +
-              segment_ + "` counts, rows are marked `starved` (docs/chunks.md)");
+          say("a plan of chunks ran out of rows: its policy answers too late, or did not close "
+              "the plan. This is reported once; `o80 info " +
+              segment_ + "` has the count, and rows are marked `starved` (docs/chunks.md)");
         }
       }
       const std::optional<Halt> halt = watcher.halted();

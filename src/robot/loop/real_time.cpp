@@ -85,7 +85,7 @@ void set_processors(const RealTimeOptions& options, std::vector<std::string>& re
   if (missing.empty()) return;
   refused.push_back("processors " + list(missing) + " were refused (" + why +
                     "). This machine has " + std::to_string(sysconf(_SC_NPROCESSORS_ONLN)) +
-                    "; see them with `lscpu`, and what may be used with `taskset -p $$`");
+                    ": `lscpu` lists them, `taskset -p $$` those that may be used");
 }
 
 void lock_memory(std::vector<std::string>& refused) {

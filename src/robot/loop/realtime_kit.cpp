@@ -164,7 +164,7 @@ std::string ask_realtime_kit(int priority) {
     kit.make_real_time(gettid(), static_cast<std::uint32_t>(std::min(priority, highest)));
     sched_param granted{};
     if (sched_getparam(0, &granted) != 0 || granted.sched_priority == 0) {
-      throw std::runtime_error("it agreed, and nothing changed");
+      throw std::runtime_error("it agreed, but nothing changed");
     }
     return "RealtimeKit granted " + std::to_string(granted.sched_priority) +
            ", until the loop runs for " + std::to_string(soft / 1000) + " ms without sleep";

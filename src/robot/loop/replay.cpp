@@ -13,9 +13,9 @@ namespace {
 void check_simulated(const Schema& schema) {
   if (schema.head.is_simulated()) return;
   throw DriverError("robot '" + schema.head.robot.str() +
-                    "' is not started for a replay: it may be hardware, because it does not say "
-                    "that it is simulated (in describe schema.simulated(), in Python simulated = "
-                    "True)");
+                    "' is not started for a replay: it may be hardware, because its driver does "
+                    "not declare that it is simulated (in describe: schema.simulated(), in Python: "
+                    "simulated = True)");
 }
 
 }  // namespace

@@ -62,7 +62,7 @@ std::string held_by(const Schema& schema, std::span<const SentCommand> commands,
       return "it is held back at the " + bound + " of the " + std::string(name.view());
     }
   }
-  return "it is held back at the " + bound + " of what it moves";
+  return "it is held back at the " + bound + " of its integral";
 }
 
 std::string words_for(const Link& link, std::span<const SentCommand> commands, const Handle& handle,
@@ -90,7 +90,7 @@ std::string words_for(const Link& link, std::span<const SentCommand> commands, c
     case Reason::stopped:
       return "the backend stopped";
     case Reason::older:
-      return "it answers an older observation than the chunk of this plan that was taken before it";
+      return "it answers an older observation than an earlier chunk of its plan";
     case Reason::full:
       return "too many batches of its lane wait for later iterations";
     case Reason::halted: {
@@ -238,7 +238,7 @@ void Batch::wait_for_row(const Deadline& deadline, const KeepWaiting& keep_waiti
   if (lane_->wait_until(ended, deadline, guarded) == Waited::timed_out) {
     const std::string queue = first_iteration() < 0 ? link_->queue_text() : "";
     throw TimeoutError("the batch sent to '" + link_->segment.name() +
-                       "' has not ended in time: look at its handles, pass a longer timeout, or "
+                       "' has not ended in time: check its handles, pass a longer timeout, or "
                        "purge" +
                        (queue.empty() ? "" : ". It was not taken yet: " + queue));
   }
@@ -269,7 +269,7 @@ void throw_cut(const Link& link, Iteration last) {
   // the halt began in the iteration after its last row
   const std::string halt = link.halt_text(last + 1);
   throw BackendHalted("the burst of '" + link.segment.name() + "' ended in iteration " +
-                      std::to_string(last) + ": " + (halt.empty() ? "it was cut" : halt));
+                      std::to_string(last) + ": " + (halt.empty() ? "it was cut short" : halt));
 }
 
 Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeout timeout,
@@ -285,8 +285,8 @@ Iteration wait_for_burst(const Link& link, LaneSender& lane, CommandId id, Timeo
       Waited::timed_out) {
     const std::string queue = link.queue_text();
     throw TimeoutError("the burst of '" + link.segment.name() +
-                       "' was not done in time: pass a longer timeout, or see whether the burst of "
-                       "another frontend comes first" +
+                       "' was not done in time: pass a longer timeout, or check whether the burst "
+                       "of another frontend comes first" +
                        (queue.empty() ? "" : ". Now " + queue));
   }
   if (answer.known == LaneSender::Known::forgotten) {
@@ -374,7 +374,7 @@ void Burst::throw_if_failed() const {
 void read_last_row(const Link& link, Iteration row, UntypedObservation& observation) {
   if (!link.history.read(row, observation.bytes())) {
     throw RowOverwritten("row " + std::to_string(row) + " of '" + link.segment.name() +
-                         "', the last of this burst, is no longer there");
+                         "', the last of this burst, was overwritten: use a longer history");
   }
 }
 

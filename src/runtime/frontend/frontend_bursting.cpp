@@ -129,7 +129,7 @@ Iteration UntypedFrontend::burst_rows(std::span<std::byte> rows, Timeout timeout
   const Iteration first = last + 1 - static_cast<Iteration>(count);
   if (link_->history.read_range(first, count, rows.data()).count != count) {
     throw RowOverwritten("rows " + std::to_string(first) + " to " + std::to_string(last) + " of '" +
-                         segment() + "', those of this burst, are no longer there");
+                         segment() + "', of this burst, were overwritten: use a longer history");
   }
   return last;
 }

@@ -39,7 +39,7 @@ void throw_if_halted(const Link& link) {
   if (!halt) return;
   const std::string text = link.halt_text(std::numeric_limits<Iteration>::max());
   throw BackendHalted("'" + link.segment.name() +
-                      "' did not get to its targets: " + (text.empty() ? "it is halted" : text));
+                      "' did not reach its targets: " + (text.empty() ? "it is halted" : text));
 }
 
 }  // namespace

@@ -59,7 +59,7 @@ void check_pace(const PaceSpec& pace, std::uint32_t rows) {
       return check("iterations", 1, kMaxIterations);
     case Pace::until:
       if (rows == 1) return check("until", 0, kMaxIterations);
-      throw InvalidArgument("until is for one target: give a trajectory iterations or times");
+      throw InvalidArgument("until is for one target: for a trajectory give iterations or times");
   }
 }
 
@@ -89,9 +89,8 @@ void check_options(const CommandOptions& options) {
 /// Refuses rows that would be passed over, because another one is due in the same iteration.
 void check_times(std::span<const std::int64_t> times, std::uint32_t rows, std::int64_t period) {
   if (times.size() != rows) {
-    throw InvalidArgument("a trajectory of " + std::to_string(rows) +
-                          " rows needs as many times, " + std::to_string(times.size()) +
-                          " were given");
+    throw InvalidArgument("a trajectory of " + std::to_string(rows) + " rows needs " +
+                          std::to_string(rows) + " times, got " + std::to_string(times.size()));
   }
   std::int64_t before = 0;
   for (std::size_t i = 0; i < times.size(); before = times[i++]) {
@@ -115,15 +114,15 @@ void check_chunk(std::span<const std::uint32_t> due, const ChunkOptions& options
   };
   const auto rows = static_cast<std::int64_t>(due.size());
   check("the number of rows of a chunk", rows, 1, kMaxChunkRows);
-  check("first, whose row is the first that is played,", options.first, 0, rows - 1);
+  check("first (the first row to play)", options.first, 0, rows - 1);
   check("ease [iterations]", options.ease, 0, kLatestDue);
   check("the anchor", options.anchor, -std::int64_t{kLatestDue}, kMaxIterations);
   std::int64_t before = 0;
   for (std::size_t i = 0; i < due.size(); before = due[i++]) {
     if (due[i] > before && due[i] <= kLatestDue) continue;
-    throw InvalidArgument("rows of a chunk are due one after the other, after its anchor: row " +
+    throw InvalidArgument("the due iterations of a chunk must rise from its anchor: row " +
                           std::to_string(i) + " is due " + std::to_string(due[i]) +
-                          " iterations after it, the one before " + std::to_string(before));
+                          " iterations after it, the row before " + std::to_string(before));
   }
   if (is_of_rows(options.profile) || options.profile == Profile::linear) return;
   throw InvalidArgument("the profile of a chunk is smooth, monotone, linear or hold, got " +
@@ -322,7 +321,8 @@ std::uint32_t UntypedFrontend::add_chunk(BatchBuilder& batch,
     head.profile = options.profile;
     layouts.push_back(&link_->command_check.layout(actuator));
     if (own.size() != due.size() * layouts.back()->size()) {
-      throw InvalidArgument("a chunk of " + std::to_string(rows) + " rows needs as many states");
+      throw InvalidArgument("a chunk needs a state for each of its " + std::to_string(rows) +
+                            " rows");
     }
     link_->members.push_back({head, mask, own});
   });
@@ -413,7 +413,7 @@ bool has_begun(const LaneSender& lane, CommandId batch) {
 
 BatchRecord UntypedFrontend::batch_of(const PulseOptions& options) {
   if (options.at != kNow && options.at < 0) {
-    throw InvalidArgument("at must be an iteration from 0 on, got " + std::to_string(options.at));
+    throw InvalidArgument("at must be at least iteration 0, got " + std::to_string(options.at));
   }
   BatchRecord record;
   record.at = options.at;
@@ -426,7 +426,7 @@ BatchRecord UntypedFrontend::batch_of(const PulseOptions& options) {
 void UntypedFrontend::refuse_if_too_much(const BatchBuilder& builder) const {
   const auto refuse = [&](std::uint32_t count, std::uint32_t most, const char* what) {
     if (count <= most) return;
-    throw InvalidArgument("a batch may have " + std::to_string(most) + " " + what +
+    throw InvalidArgument("a batch can have at most " + std::to_string(most) + " " + what +
                           ", this one has " + std::to_string(count) +
                           ": send them in several pulses. Nothing was sent, all stays added "
                           "(forget_added() drops it)");
@@ -453,10 +453,10 @@ void UntypedFrontend::refuse_if_too_many_wait(Iteration at, const LaneSender& la
   });
   const auto refuse = [&](std::size_t there, std::uint32_t most, const std::string& of) {
     if (there < most) return;
-    throw LaneFull("at most " + std::to_string(most) + " batches of a frontend may wait for " + of +
-                   ", and so many wait in '" + segment() +
-                   "'. Nothing was sent, all stays added: put several commands into one batch, or "
-                   "pulse again later");
+    throw LaneFull("'" + segment() + "' has " + std::to_string(most) +
+                   " batches of this frontend that wait for " + of +
+                   ", the maximum. Nothing was "
+                   "sent, all stays added: put several commands into one batch, or pulse later");
   };
   const auto same = std::ranges::count(link_->scheduled, at, &Link::Scheduled::at);
   refuse(static_cast<std::size_t>(same), kMaxScheduledAt, "iteration " + std::to_string(at));
@@ -503,8 +503,8 @@ std::optional<Seen> Link::with_newest_row(const std::optional<Seen>& seen) const
   if (seen->epoch == 0 || seen->iteration < 0 || seen->iteration > kMaxIterations) {
     throw InvalidArgument("seen: row " + std::to_string(seen->iteration) + " of run " +
                           std::to_string(seen->epoch) +
-                          " is no row: give an observation that a frontend or a recording has "
-                          "returned");
+                          " is not a valid row: give an observation that a frontend or a "
+                          "recording returned");
   }
   Seen sent = *seen;
   sent.since = -1;

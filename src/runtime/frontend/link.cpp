@@ -126,7 +126,7 @@ std::string Link::queue_text() const {
   const std::string since = " since iteration " + std::to_string(holder->since);
   return holder->bursts
              ? "a burst of " + owner + " has been running" + since
-             : "most of the queue is of " + owner + "; batches have been waiting" + since;
+             : "most of the queue is from " + owner + "; batches have been waiting" + since;
 }
 
 KeepWaiting Link::guarded(const KeepWaiting& keep_waiting) const {

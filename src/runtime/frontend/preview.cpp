@@ -111,7 +111,7 @@ Preview UntypedFrontend::preview_from(const UntypedObservation& row,
                                       std::span<const std::byte> states,
                                       const CommandOptions& options,
                                       std::span<const std::uint64_t> masks) const {
-  if (row.size() != layout().size) throw InvalidArgument("the row is one of another robot");
+  if (row.size() != layout().size) throw InvalidArgument("the row is from another robot");
   const Rows rows{row.iteration(), 1, row.size(), {row.bytes(), row.bytes() + row.size()}};
   return preview_after(rows, actuators, states, options, masks);
 }
@@ -154,7 +154,7 @@ Preview UntypedFrontend::preview_after(const Rows& rows, std::span<const std::ui
   }
   if (end.reason == Reason::late) {
     throw InvalidArgument("the command comes too late: it would begin in iteration " +
-                          std::to_string(preview.rows.first) + ", after that of its `until`");
+                          std::to_string(preview.rows.first) + ", after its `until`");
   }
   if (end.status != Status::completed) throw_too_long();
   preview.late = end.late;

@@ -16,7 +16,7 @@ void RecordedJournal::decode(std::span<const std::byte> bytes, std::vector<Journ
 void RecordedJournal::take(JournalItem& item, std::vector<JournalEntry>& entries) {
   if (item.head.number < expected_) {
     throw InvalidArgument("the journal is damaged: entry " + std::to_string(item.head.number) +
-                          " stands after entry " + std::to_string(expected_ - 1));
+                          " comes after entry " + std::to_string(expected_ - 1));
   }
   item.missed = item.head.number - expected_;
   expected_ = item.head.number + item.head.numbers();

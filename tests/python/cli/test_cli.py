@@ -35,11 +35,6 @@ def o80(folder: Path, *words: str, fails: bool = False) -> str:
     return done.stderr if fails else done.stdout
 
 
-def in_a_line(said: str) -> str:
-    """Text in a box, without its borders and line breaks."""
-    return " ".join(said.replace("│", " ").split())
-
-
 def start(folder: Path, *words: str) -> "subprocess.Popen[str]":
     """A robot that is up."""
     process = subprocess.Popen(
@@ -167,7 +162,8 @@ def test_errors_name_the_cure(folder: Path) -> None:
         ("echo nobody", "o80 run"),
         ("list --watch --json", "--json prints one list; leave out --watch"),
     ):
-        assert text in in_a_line(o80(folder, *words.split(), fails=True))
+        boxed = o80(folder, *words.split(), fails=True)
+        assert text in " ".join(boxed.replace("│", " ").split())
 
 
 def test_echo_prints_the_last_rows_of_a_dead_robot(

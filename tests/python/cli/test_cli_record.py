@@ -100,7 +100,7 @@ def test_a_recorder_that_continues_says_where_it_goes_on(arm: o80.Frontend, tmp_
             arm.burst(20)
             recording.flush()
     said = recorded(arm.segment, path, "--split", "1k", "--continue")
-    assert f"'{arm.segment}' goes on with row 61; `o80 info` shows" in said
+    assert f"'{arm.segment}' continues with row 61; `o80 info` lists" in said
 
 
 @pytest.mark.parametrize(

@@ -179,7 +179,7 @@ def test_a_process_that_is_stopped_hangs_until_it_is_continued(folder: Path, her
         for said in (here.o80("list"), here.o80("info", "arm")):
             assert f"(pid {process.pid}) is stopped, continue it with `kill -CONT" in said
         assert "1 running: not removed" in here.o80("clean")
-        assert "is not removed: it has a backend" in here.o80("clean", "arm", fails=True)
+        assert "is not removed: it still has a backend" in here.o80("clean", "arm", fails=True)
         said = here.o80("stop", "arm", "--timeout", "0", fails=True)
         assert "did not stop in 0 s" in said
         assert f"`kill -CONT {process.pid}`" in said
@@ -272,7 +272,7 @@ def test_a_user_sees_of_a_segment_of_root_what_its_permission_says(
         if permission == "600":
             assert nobody.state() == "unknown"
             assert "arm: it cannot be opened: Permission denied" in nobody.o80("list")
-            assert "--permission 640 for its group" in nobody.o80("info", "arm", fails=True)
+            assert "--permission 640 (its group)" in nobody.o80("info", "arm", fails=True)
             assert "arm (unknown)" in nobody.o80("info", "leg", fails=True)
             said = nobody.o80("stop", "arm", fails=True)
             assert "it is unknown whether 'arm' of user root runs" in said
@@ -281,12 +281,14 @@ def test_a_user_sees_of_a_segment_of_root_what_its_permission_says(
         else:
             nobody.expect("running")
             said = nobody.o80("stop", "arm", fails=True)
-            assert "belongs to user root: only that user and root may stop it" in said
+            assert "belongs to user root: only that user and root can stop it" in said
             assert "1 running: not removed" in nobody.o80("clean")
-            assert "is not removed: it has a backend" in nobody.o80("clean", "arm", fails=True)
+            assert "is not removed: it still has a backend" in nobody.o80(
+                "clean", "arm", fails=True
+            )
         if permission == "644":
             said = nobody.o80("halt", "arm", fails=True)
-            assert "may not be commanded by this user" in said
+            assert "cannot be commanded by this user" in said
     finally:
         end(process)
     here.expect("killed")

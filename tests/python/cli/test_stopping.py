@@ -11,10 +11,6 @@ from processes import WAIT, run_o80
 import o80
 
 
-def entry_of(segment: str) -> o80.Segment:
-    return next(entry for entry in o80.segments() if entry.name == segment)
-
-
 def test_a_backend_that_does_not_stop_in_time_is_told_of(segment: str) -> None:
     program = (
         "import signal, o80\n"
@@ -37,7 +33,7 @@ def reused(process: o80.robots.Process, segment: str) -> o80.robots.Process:
     """A robot whose segment bears the process id of another, later process."""
     file = Path(os.environ["O80_DIRECTORY"], f"o80-{segment}")
     content = file.read_bytes()
-    entry = entry_of(segment)
+    entry = next(entry for entry in o80.segments() if entry.name == segment)
     where = content.index(entry.process_start.to_bytes(8, "little"))
     with file.open("r+b") as header:
         header.seek(where)

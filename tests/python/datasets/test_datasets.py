@@ -346,7 +346,7 @@ def test_numbers_and_units_of_a_lerobot_data_set_are_chosen(recorded: Path, tmp_
     plain = json.loads((tmp_path / "plain/meta/info.json").read_text())["features"]
     assert "observation.environment_state" not in plain
     for refused, why in (
-        (("--units", "normalised"), "through which ranges"),
+        (("--units", "normalised"), "no calibrated ranges"),
         (("--units", "turns"), "must be one of degrees, normalised, native"),
         (("--action", "elbo"), "Did you mean 'elbow'"),
         (("--fields", "effort"), "--sensors"),

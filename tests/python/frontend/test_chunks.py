@@ -143,7 +143,7 @@ def test_the_row_of_a_camera_is_an_anchor(process: o80.robots.Process) -> None:
             arm.purge()
         with (
             o80.robots.load("two_joints").inline() as simulated,
-            pytest.raises(o80.InvalidArgument, match="is of another run"),
+            pytest.raises(o80.InvalidArgument, match="is from another run"),
         ):
             simulated.chunks(step=10).send(ROWS, seen=seen)
 
@@ -323,20 +323,20 @@ def test_a_frontend_that_closes_ends_its_plans(process: o80.robots.Process) -> N
     ("send", "said"),
     [
         (lambda plan: plan.send([]), "a chunk needs a row|targets of 2 actuators"),
-        (lambda plan: plan.send(np.zeros((3, 3))), r"the targets of 2 actuators are \(T, 2\)"),
+        (lambda plan: plan.send(np.zeros((3, 3))), r"2 actuators must have the shape \(T, 2\)"),
         (lambda plan: plan.send(np.full((3, 2), 4.0)), "shoulder.*-3 to 3"),
         (lambda plan: plan.send(np.full((3, 2), np.nan)), "nan"),
         (lambda plan: plan.send(np.zeros((3, 2)), late="now"), "late must be 'skip' or 'reject'"),
         (lambda plan: plan.send(np.zeros((2, 2)), seen=5, due=[5, 7]), "after iteration 5"),
-        (lambda plan: plan.send(np.zeros((2, 2)), due=[9, 9]), "one after the other"),
-        (lambda plan: plan.send(np.zeros((2, 2)), weights=[1.0]), r"weights are \(2,\)"),
+        (lambda plan: plan.send(np.zeros((2, 2)), due=[9, 9]), "due iterations must rise"),
+        (lambda plan: plan.send(np.zeros((2, 2)), weights=[1.0]), "weights must have the shape"),
         (lambda plan: plan.send(np.zeros((2, 2)), seen="now"), "seen"),
         (lambda plan: plan.send(np.zeros((2049, 2))), "from 1 to 2048, got 2049"),
         (lambda plan: plan.send(ROWS, first=-1), "first must be from 0 to 4, got -1"),
         (lambda plan: plan.send(ROWS, seen=2**63), "seen must be from -2147483648"),
         (lambda plan: plan.send(ROWS, due=[10.7]), "due must be a list of whole numbers"),
         (lambda plan: plan.send(ROWS, weights="ab"), "weights must be finite numbers, got 'ab'"),
-        (lambda plan: plan.send(ROWS, weights=[1.5] * 5), "weights are shares from 0 to 1, got"),
+        (lambda plan: plan.send(ROWS, weights=[1.5] * 5), "weights must be from 0 to 1, got"),
     ],
 )
 def test_what_cannot_be_sent_is_refused_and_nothing_is_sent(
@@ -469,12 +469,12 @@ def test_rows_outside_the_limits_are_put_on_them_where_that_is_wanted(segment: s
     ("targets", "message"),
     [
         ({"griper": [0.1]}, "named 'griper'. Did you mean 'gripper'"),
-        ({"gripper": [0.1]}, "leave out 'left', 'right', 'valve'"),
+        ({"gripper": [0.1]}, "lack 'left', 'right', 'valve'"),
         (
             {"joints": {"positoin": [[0, 0]]}},
             "of 'left' has no field 'positoin'; there are: position",
         ),
-        ([[0.1, 0.2]], r"4 actuators are \(T, 4\), not \(1, 2\)"),
+        ([[0.1, 0.2]], r"must have the shape \(T, 4\), got \(1, 2\)"),
         ([[0.1, 0.2, "open", True]], "cannot be read as float64"),
     ],
 )

@@ -158,7 +158,7 @@ def test_what_is_no_observation_is_refused(arm: o80.Frontend, wrong: object) -> 
     with pytest.raises(o80.InvalidArgument, match="seen must be"):
         arm.request("reset", seen=wrong)  # type: ignore[arg-type]
     for epoch, iteration in ((0, 3), (5, -1), (5, 2**62)):
-        with pytest.raises(o80.InvalidArgument, match=f"row {iteration} of run {epoch} is no row"):
+        with pytest.raises(o80.InvalidArgument, match=f"row {iteration} of run {epoch} is not a"):
             arm.pulse(seen=o80.Seen(epoch, iteration, -1, "monotonic"))
     with pytest.raises(o80.InvalidArgument, match="clock must be 'monotonic' or 'simulated'"):
         o80.Seen(5, 3, -1, "wall")

@@ -210,7 +210,7 @@ def test_profiles_of_rows_are_refused_where_they_cannot_be(arm: o80.Frontend) ->
         ([[0.0, 0.0], [0.0, 9.0]], {}, "elbow"),
         (np.full((2, 2), np.nan), {}, "shoulder"),
         ({"position": [0.0]}, {}, "no actuator, group or field is named 'position'"),
-        ({}, {}, "leave out 'shoulder', 'elbow'"),
+        ({}, {}, "lack 'shoulder', 'elbow'"),
     ],
 )
 def test_a_trajectory_is_added_whole_or_not_at_all(
@@ -279,9 +279,9 @@ def test_a_trajectory_takes_the_forms_of_a_command(robot: ManualBackend, single:
 def test_a_trajectory_names_fields_that_there_are(robot: ManualBackend) -> None:
     with pytest.raises(o80.InvalidArgument, match=r"'positoin'\. Did you mean 'position'"):
         robot.frontend.add_trajectory({"positoin": np.zeros((3, 2))}, ["a", "b"])
-    with pytest.raises(o80.InvalidArgument, match=r"leave out 'a', 'b'"):
+    with pytest.raises(o80.InvalidArgument, match=r"lack 'a', 'b'"):
         robot.frontend.add_trajectory({}, ["a", "b"])
-    with pytest.raises(o80.InvalidArgument, match=r"\(T, 2\), not \(\)"):
+    with pytest.raises(o80.InvalidArgument, match=r"\(T, 2\), got \(\)"):
         robot.frontend.add_trajectory(0.5, ["a", "b"])
     assert robot.frontend.added == 0
 

@@ -72,7 +72,7 @@ def test_what_cannot_follow_a_burst_is_said_when_it_is_made(group: o80.InlineGro
         wrong: list[tuple[o80.GroupBurst, o80.GroupBurst, Any, str]] = [
             (first, stranger.prepared_burst(4, steps=4), "observed", "share its threads"),
             (first, group.prepared_burst(4, steps=4), "observed", "share its threads"),
-            (first, mirror.prepared_burst(4, steps=2), "observed", "as many steps, got 2"),
+            (first, mirror.prepared_burst(4, steps=2), "observed", "one step for each, got 2"),
             (first, second, "extended.speed", r"no path in a row 'extended\.speed'"),
             (first, second, "iteration", "must have a float64 for each of 2"),
             (first, second, {"position": "observed"}, "no field of the targets 'position'"),

@@ -262,7 +262,7 @@ def test_rows_by_which_nothing_was_commanded_are_no_partners(arm: o80.Frontend) 
     history = arm.history()
     sources: dict[str, Any] = {"arm": arm, "other": history}
     for wrong in ({"arm": arm}, dict(reversed(sources.items()))):
-        with pytest.raises(o80.InvalidArgument, match="needs two sources"):
+        with pytest.raises(o80.InvalidArgument, match="needs at least two sources"):
             o80.align(wrong, by="seen")
     with pytest.raises(o80.InvalidArgument, match=r"give the row when you send.*seen=row"):
         o80.align(sources, by="seen")

@@ -292,7 +292,7 @@ def test_a_leader_that_halts_or_ends_halts_the_follower(
             robots.step()
     arm.burst(1)
     assert arm.halted is not None
-    said = "is halted" if how == "halt" else "has ended"
+    said = "is halted: resume it first" if how == "halt" else "has ended"
     assert arm.halted.text == f"the leader '{segment}-1' {said}"
 
 
@@ -363,12 +363,12 @@ def test_demonstrations_are_of_a_robot_that_follows(
         session.press(" ")  # nothing follows yet
         play(robots, hand, arm, steps=100, iterations=10)
         assert robots.engaged
-        for how in ("kept", "halted", "thrown away", "open at the end"):
+        for how in ("kept", "halted", "discarded", "open at the end"):
             session.press(" ")
             arm.burst(20)
             if how == "kept":
                 session.press(" ")
-            if how == "thrown away":
+            if how == "discarded":
                 session.press("x")
             if how == "halted":
                 arm.halt()
@@ -389,7 +389,7 @@ def test_demonstrations_are_of_a_robot_that_follows(
     (kept,) = found.all
     assert (kept.task, kept.terminated, len(kept)) == ("wave", True, 20)
     assert len(found.left_out) == 4
-    assert all("thrown away" in why for why in found.left_out)
+    assert all("discarded" in why for why in found.left_out)
 
 
 @pytest.mark.parametrize(
@@ -414,7 +414,7 @@ def test_robots_without_a_common_joint_are_refused(segment: str) -> None:
         with (
             o80.Frontend(f"{segment}-1") as hand,
             o80.Frontend(f"{segment}-2") as arm,
-            pytest.raises(o80.InvalidArgument, match="have no joint of the same name"),
+            pytest.raises(o80.InvalidArgument, match="share no name of a joint"),
         ):
             o80.Teleoperation(hand, arm)
 
@@ -473,4 +473,4 @@ def test_the_command_marks_demonstrations_by_keys(segment: str, tmp_path: Path) 
     assert (kept.task, kept.terminated) == ("wave", True)
     assert np.ptp(kept.rows.observed[:, 1]) > 0.3
     assert len(episodes.left_out) == 1
-    assert "thrown away" in episodes.left_out[0]
+    assert "discarded" in episodes.left_out[0]

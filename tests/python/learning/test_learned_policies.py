@@ -111,7 +111,7 @@ def test_every_policy_plays_the_same_episodes_whatever_the_number_of_copies() ->
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"policies": ["nothing"]}, "name one"),
+        ({"policies": ["nothing"]}, "give task"),
         ({"policies": ["large"]}, "3 observed numbers and 2 actions, the task has 1 and 1"),
         ({"policies": ["nothing"], "task": NamedTask(Near), "episodes": 0}, "episodes"),
         ({"policies": ["nothing"], "task": NamedTask(Guess, success="hit")}, "'hit'.*is_success"),

@@ -56,7 +56,7 @@ def test_a_file_that_loses_its_name_while_it_is_written_is_not_lost(
     else:
         path.unlink()
     arm.burst(20)
-    said = "moved.mcap, and goes on" if moved else "written again"
+    said = "moved.mcap, and continues" if moved else "written again"
     with pytest.warns(RuntimeWarning, match=said):
         recorder.poll()
     arm.burst(20)
@@ -336,7 +336,7 @@ def test_decisions_that_cannot_be_told_in_words_are_recorded_all_the_same(
             for each, _, raw in reader.messages()
             if each.topic == "/rosout"
         ]
-    assert any("cannot be told in words: request 999" in line.msg for line in lines)
+    assert any("cannot be shown as text: request 999" in line.msg for line in lines)
 
 
 def test_names_with_one_topic_are_not_recorded_together(segment: str, tmp_path: Path) -> None:

@@ -41,7 +41,7 @@ def refused(*words: str | Path, code: int = 1) -> str:
         ),
         ("run.mcap", {"keep": "1G"}, "keep needs split"),
         ("run.mcap", {"split": "1M", "keep": "10min"}, "a size such as 50G"),
-        ("run.mcap", {"split": "1M", "keep": "1M"}, "at least two files"),
+        ("run.mcap", {"split": "1M", "keep": "1M"}, "at least twice split"),
     ],
 )
 def test_what_cannot_be_recorded_is_refused_and_leaves_no_file(
@@ -263,4 +263,4 @@ def test_empty_recordings_are_not_called_equal(tmp_path: Path) -> None:
     path = tmp_path / "empty.mcap"
     Recorder(path, ["nobody"]).finish()
 
-    assert "hold no segment" in refused("diff", path, path)
+    assert "have no segment" in refused("diff", path, path)

@@ -121,7 +121,7 @@ def test_a_stretch_without_rows_says_so(
     assert "no row" in capsys.readouterr().out
     with pytest.raises(o80.InvalidArgument, match="--from must be before --to"):
         cut(day, tmp_path / "other.mcap", "2", "1")
-    with pytest.raises(o80.InvalidArgument, match=r"--from 100 is behind the end: .* s$"):
+    with pytest.raises(o80.InvalidArgument, match=r"--from 100 is after the end: .* s$"):
         cut(day, tmp_path / "other.mcap", "100")
     with pytest.raises(o80.RecordingError, match="exists"):
         cut(day, day, "0", "1")

@@ -114,7 +114,7 @@ def test_repair_completes_every_file(arm: o80.Frontend, tmp_path: Path) -> None:
         file.write_bytes(file.read_bytes()[:-50])
 
     said = run_o80("repair", path).stdout
-    assert said.count("is complete now") == said.count("bytes behind them removed") == 2
+    assert said.count("is complete now") == said.count("bytes after them removed") == 2
     assert o80.open(path).finished
 
     for file in path.iterdir():
@@ -178,7 +178,9 @@ def test_a_recorder_that_may_delete_nothing_stops(arm: o80.Frontend, tmp_path: P
             recorder.mark("here", number=i)
             play(arm, recorder, 1)
 
-    with pytest.raises(o80.RecordingError, match=r"lacks .* have marks or are of another recorder"):
+    with pytest.raises(
+        o80.RecordingError, match=r"exceed .* have marks or are from another recorder"
+    ):
         record()
     recorder.finish()
     assert bytes_in(path) <= 220_000

@@ -191,7 +191,7 @@ def test_the_command_says_what_was_compared(recorded: Path) -> None:
     done = o80_replay(str(recorded))
     assert (done.returncode, done.stderr) == (0, "")
     assert "compared: desired states" in done.stdout
-    assert "does not say that it is simulated" in done.stdout
+    assert "does not declare that it is simulated" in done.stdout
 
 
 def test_rows_of_another_robot_are_refused(recorded: Path) -> None:

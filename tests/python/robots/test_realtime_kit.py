@@ -127,7 +127,7 @@ def test_a_loop_that_does_not_sleep_loses_the_priority_and_goes_on(segment: str,
         "absent": "no such service",
         "late": "no answer within 1 s",
         "refuses": "not you",
-        "agrees": "it agreed, and nothing changed",
+        "agrees": "it agreed, but nothing changed",
     }.items(),
 )
 def test_a_robot_that_gets_no_priority_says_why_and_runs(

@@ -111,7 +111,7 @@ def test_rows_without_their_padding_are_no_history(segment: str) -> None:
         with o80.Frontend(segment) as frontend:
             history = frontend.history()
     for rows in (np.concatenate([history.rows]), np.where([True], history.rows, history.rows)):
-        with pytest.raises(o80.InvalidArgument, match=r"leave out padding.*history\.observed"):
+        with pytest.raises(o80.InvalidArgument, match=r"drop padding.*history\.observed"):
             o80.History(history._decoder, rows)
     copy = pickle.loads(pickle.dumps(history))
     assert copy.extended.heat.tolist() == [20.0]
@@ -128,7 +128,7 @@ def test_a_view_of_fields_side_by_side_holds_their_numbers() -> None:
     with pytest.raises(o80.InvalidArgument, match="'angle' is none of position, velocity, on"):
         field_view(rows, "joints.angle")
     for paths in (("joints",), ("joints.velocity", "joints.position")):
-        with pytest.raises(o80.InvalidArgument, match="not numbers of one kind, side by side"):
+        with pytest.raises(o80.InvalidArgument, match="must be of one type"):
             field_view(rows, *paths)
 
 

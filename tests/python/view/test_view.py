@@ -31,10 +31,6 @@ def look(url: str) -> dict[str, Any]:
         return found
 
 
-def child_of(view: o80.View) -> int:
-    return view._popen.pid
-
-
 def test_a_view_shows_frontends_names_and_recordings(arm: o80.Frontend, tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
     with o80.Recording(path, arm):
@@ -51,7 +47,7 @@ def test_a_view_only_reads_what_it_shows(arm: o80.Frontend) -> None:
     with o80.View(arm) as view:
         for _ in range(5):
             look(view.url)
-        maps = Path(f"/proc/{child_of(view)}/maps").read_text().splitlines()
+        maps = Path(f"/proc/{view._popen.pid}/maps").read_text().splitlines()
         own = [line.split() for line in maps if arm.segment in line]
         assert own
         assert {words[1] for words in own} == {"r--s"}

@@ -47,7 +47,7 @@ def main(
         missed = "" if found["reached"] else ": not reached"
         console.print(f"{what}: {found['measured']} ({found['wanted']}){missed}", markup=False)
     if not all(found["reached"] for found in report["wanted"].values()):
-        console.print("`o80 doctor --frequency 500` says what is in the way on this computer")
+        console.print("`o80 doctor --frequency 500` reports the causes on this computer")
     console.print(f"balls: {report['balls']}\nreport: {settings.folder / 'report.json'}")
 
 

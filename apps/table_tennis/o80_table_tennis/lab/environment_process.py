@@ -187,7 +187,7 @@ class EnvironmentProcess:
 
 
 def main(prefix: str = "lab", balls: int = 5, seed: int = 1, policy: str = "learned") -> None:
-    """Plays so many balls (0: without end); ends at Ctrl-C, SIGTERM or `o80 stop`."""
+    """Plays a number of balls (0: without end); ends at Ctrl-C, SIGTERM or `o80 stop`."""
     settings, rate = LabSettings(balls, seed, policy, prefix), RATES[ENVIRONMENT]
     name = settings.segment(ENVIRONMENT)
     with (

@@ -123,7 +123,7 @@ class Processes(Closeable):
         return PartEndedError(name, code, self.printed(name)[-LAST_LINES:])
 
     def printed(self, name: str) -> list[str]:
-        """Returns the printed lines of a process, of all its starts."""
+        """Returns all lines that a process has printed, also before a restart."""
         return (self._folder / f"{name}.txt").read_text(errors="replace").rstrip().splitlines()
 
     def close(self) -> None:

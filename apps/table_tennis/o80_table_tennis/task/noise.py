@@ -1,4 +1,4 @@
-"""Observation noise: of the ball, like a camera system's, and of the pressures."""
+"""Observation noise of the ball, as from a camera system, and of the pressures."""
 
 from __future__ import annotations
 

@@ -64,7 +64,7 @@ class CollectorEnv(VecEnv):
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Not supported: raises InvalidArgument."""
-        raise InvalidArgument(f"give '{attr_name}' to what makes the collector's environments")
+        raise InvalidArgument(f"set '{attr_name}' where the collector's environments are made")
 
     def env_method(self, method_name: str, *_: Any, indices: Any = None, **__: Any) -> list[Any]:
         """Not supported: raises InvalidArgument."""

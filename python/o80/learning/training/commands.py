@@ -148,7 +148,7 @@ def _run(folder: Path, settings: TrainingSettings, *, resume: bool = False) -> N
         except BaseException:
             saved = training.policy.training["decisions"]
             go_on = f"python -m o80.learning resume {folder}"
-            complain(f"stopped, {saved} decisions are saved; go on with: {go_on}")
+            complain(f"stopped, {saved} decisions are saved; continue with: {go_on}")
             raise
     print(f"policy and curve: {folder}")
 
@@ -168,7 +168,7 @@ def evaluate_(
     """Run the same episodes with each policy, and compare."""
     learned = next((name for name in policies if name not in BASELINES), None)
     if task is None and learned is None:
-        raise InvalidArgument("nothing and random play any task: name it with --task")
+        raise InvalidArgument("`nothing` and `random` play any task: name the task with --task")
     named = LearnedPolicy.load(learned or "").task if task is None else NamedTask(task)
     named = replace(named, options={**named.options, **_values("--option", option)})
     first, *others = evaluate(policies, task=named, episodes=episodes, seed=seed, copies=copies)

@@ -85,7 +85,7 @@ def evaluate(
     first = next(iter(learned.values()), None)
     task = first.task if task is None and first else task
     if task is None:
-        raise InvalidArgument("nothing and random play any task: name one")
+        raise InvalidArgument("`nothing` and `random` play any task: give task")
     if copies is None:
         copies = int(first.training.get("copies", 1)) if first else 1
     count = min(whole(copies, "copies", 1), episodes)

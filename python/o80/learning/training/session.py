@@ -114,7 +114,7 @@ class Training(Closeable):
         training, checkpoint and policy are saved as they were before the unfinished rollout.
         """
         if self._ran:
-            raise Closed("this training has ended: resume its folder with a new one")
+            raise Closed("this training has ended: resume its folder with a new Training")
         self._ran = True
         threads = torch.get_num_threads()
         torch.set_num_threads(1)  # small networks: more threads wait for each other

@@ -55,7 +55,7 @@ class TrainingSettings:
                 raise InvalidArgument(f"ppo has no '{name}': there are {', '.join(PPO)}")
             whole(value, name, 1) if isinstance(PPO[name], int) else number(value, name)
             if not (name == "log_std" or 0 <= value < math.inf):
-                raise InvalidArgument(f"{name} must be a finite number from 0 on, got {value}")
+                raise InvalidArgument(f"{name} must be a finite number of at least 0, got {value}")
         object.__setattr__(self, "ppo", {**PPO, **self.ppo})
         if not isinstance(self.task, NamedTask):
             object.__setattr__(self, "task", NamedTask(self.task))

@@ -145,8 +145,8 @@ class NamedTask:
                 json_text(value)
             except (TypeError, ValueError):
                 raise InvalidArgument(
-                    f"option '{option}' must be of numbers and texts, got {value!r}: give objects "
-                    "by the name of their class or function, as imported={...} or --import"
+                    f"option '{option}' must consist of numbers and texts, got {value!r}: give "
+                    "objects by the name of their class or function, as imported={...} or --import"
                 ) from None
         object.__setattr__(self, "options", json.loads(json_text(dict(self.options))))
         names = {option: name_of(value) for option, value in self.imported.items()}
@@ -162,7 +162,7 @@ class NamedTask:
                 made[option] = found() if isinstance(found, type) else found
             except TypeError as error:
                 raise InvalidArgument(
-                    f"the {option} '{name}' must be made without arguments: {error}"
+                    f"the {option} '{name}' must be callable without arguments: {error}"
                 ) from error
         return made
 

@@ -130,7 +130,7 @@ class Check:
 
 
 def in_container(kind: str, flags: str) -> str:
-    """Returns a command that starts a container with these docker flags, or a sentence."""
+    """Returns how to start a container with docker flags: a command, or a sentence."""
     if kind in ("docker", "podman"):
         return f"{kind} run {flags} ..."
     return f"start the container ({kind}) with what `docker run {flags}` would give it"

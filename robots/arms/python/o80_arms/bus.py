@@ -65,7 +65,7 @@ class Bus:
             self._line = os.open(port, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK)
         except PermissionError:
             raise BusError(
-                f"you may not use {port}: `sudo usermod -aG dialout $USER`, then log in again"
+                f"no permission for {port}: run `sudo usermod -aG dialout $USER`, then log in again"
             ) from None
         except OSError as error:
             raise BusError(f"cannot open {port} ({os.strerror(error.errno or 0)})") from None
@@ -76,7 +76,7 @@ class Bus:
         except (OSError, termios.error) as error:
             os.close(self._line)
             busy = isinstance(error, OSError) and error.errno in (errno.EAGAIN, errno.EACCES)
-            why = "another process has it open" if busy else "it is no serial line of 1 Mbaud"
+            why = "another process has it open" if busy else "it is not a serial line for 1 Mbaud"
             raise BusError(f"cannot use {port}: {why}") from None
         self._question = 0
 
@@ -100,7 +100,7 @@ class Bus:
             size = register.size + self._question
             if answer := self._ask(servo, 2, self._numbers(register.address, size), size):
                 return self._value(register, answer[: register.size])
-        raise BusError(f"servo {servo} at {self.port} does not answer: look at its plug")
+        raise BusError(f"servo {servo} at {self.port} does not answer: check its plug")
 
     def write(self, servo: int, register: Register, value: int) -> None:
         """Writes a register and reads it back. Raises BusError if the values differ."""
@@ -146,7 +146,7 @@ class Bus:
         self.write(number, self.LOCK, 1)
 
     def read_all(self, servos: list[int], size: int) -> tuple[bytes, int]:
-        """Request for `size` bytes of each servo from POSITION on, and the answer's size."""
+        """Returns a request for `size` bytes of each servo from POSITION, and the answer's size."""
         request = packet(EVERYBODY, 0x82, bytes([self.POSITION.address, size, *servos]))
         return request, len(servos) * (size + 6)
 
@@ -203,7 +203,7 @@ class Bus:
         try:
             os.write(self._line, request)
         except OSError:
-            raise BusError(f"the adapter {self.port} is gone") from None
+            raise BusError(f"the adapter {self.port} is unplugged") from None
 
     def _received(self, is_enough: Callable[[bytes], bool], wait: float | None = None) -> bytes:
         received, end = b"", time.monotonic() + (self.wait if wait is None else wait)
@@ -214,7 +214,7 @@ class Bus:
             with suppress(BlockingIOError):
                 part = os.read(self._line, 4096)
                 if not part:
-                    raise BusError(f"the adapter {self.port} is gone")
+                    raise BusError(f"the adapter {self.port} is unplugged")
                 received += part
         return received
 

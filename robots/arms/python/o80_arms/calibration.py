@@ -112,8 +112,8 @@ def read(file: Path) -> dict[str, Calibration]:
     except (OSError, ValueError, KeyError, TypeError) as error:
         why = f"{error} is missing" if isinstance(error, KeyError) else str(error)
         raise CalibrationError(
-            f"{file} is no calibration of an arm: {why}. `o80 arms calibrate --take NAME` makes "
-            f"one from what the servos hold"
+            f"{file} is not a calibration of an arm: {why}. `o80 arms calibrate --take NAME` makes "
+            f"one from the values in the servos"
         ) from None
 
 
@@ -138,7 +138,7 @@ def doubts(joints: dict[str, Calibration]) -> list[str]:
         moved = (joints[joint].largest - joints[joint].smallest) * 360 / (TURN - 1)
         if joint not in ("wrist_roll", "gripper") and moved < 0.85 * degrees:
             found.append(
-                f"{joint} was moved through {moved:.0f} of {degrees} deg when it was calibrated: "
-                f"its zero is off by up to {(degrees - moved) / 2:.0f} deg"
+                f"{joint} was moved through only {moved:.0f} of {degrees} deg during its "
+                f"calibration: its zero may be wrong by up to {(degrees - moved) / 2:.0f} deg"
             )
     return found

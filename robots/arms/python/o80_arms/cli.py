@@ -34,7 +34,7 @@ def opened(port: Path | None, kind: Callable[[Path], Bus] = bus_at) -> Iterator[
     found = [port] if port else ports()
     if len(found) != 1:
         names = ", ".join(map(str, found)) or "none"
-        raise BusError(f"--port must say which adapter; there are: {names}")
+        raise BusError(f"choose an adapter with --port; there are: {names}")
     bus = kind(found[0])
     try:
         yield bus
@@ -51,11 +51,11 @@ def arms(
     if context.invoked_subcommand is not None:
         if port:
             word = context.invoked_subcommand
-            raise o80.InvalidArgument(f"--port belongs behind {word}: `o80 arms {word} --port ...`")
+            raise o80.InvalidArgument(f"--port goes after {word}: `o80 arms {word} --port ...`")
         return
     found = port or ports()
     if not found:
-        print("No serial adapter is plugged in: is the USB cable in, has the adapter power?")
+        print("No serial adapter was found: check its USB cable and its power.")
     for each in found:
         print(f"{each}: {told_of(each)}")
 
@@ -103,7 +103,7 @@ def relax(port: Port = None) -> None:
         servos = bus.scan()
         for servo in servos:
             bus.relax(servo)
-    print(f"{len(servos)} servos are without torque")
+    print(f"{len(servos)} servos have no torque")
 
 
 @app.command()
@@ -113,7 +113,7 @@ def calibrate(
         str | None, typer.Option(help="Move the joints by hand; name of the new file.")
     ] = None,
     take: Annotated[
-        str | None, typer.Option(help="Make a file of this name from what the servos hold.")
+        str | None, typer.Option(help="Make a file of this name from the values in the servos.")
     ] = None,
     write: Annotated[
         str | None, typer.Option(help="Put the file of this name into the servos.")
@@ -137,7 +137,7 @@ def calibrate(
             joints = moved_by_hand(bus) if name else held_by(bus)
             file = calibration.place_for(given[0], folders)
             if file.exists() and calibration.read(file) != joints:
-                print(f"the one before is now {file.rename(file.with_suffix('.json.old'))}")
+                print(f"the previous file is now {file.rename(file.with_suffix('.json.old'))}")
             calibration.write(file, joints)
         told = [*(f"{joint:14} {each}" for joint, each in joints.items()), *doubts(bus, joints)]
     print(*told, sep="\n")
@@ -154,8 +154,8 @@ def put(bus: Bus, joints: dict[str, Calibration]) -> None:
     for joint, each in joints.items():
         if abs(each.offset) > LARGEST_OFFSET and not isinstance(bus, DynamixelBus):
             raise BusError(
-                f"{joint}: a servo keeps offsets of at most {LARGEST_OFFSET}, not {each.offset}: "
-                "calibrate the arm anew; nothing was written"
+                f"{joint}: a servo can store an offset of at most {LARGEST_OFFSET}, got "
+                f"{each.offset}: calibrate the arm again; nothing was written"
             )
     for servo, joint in zip(SERVOS, JOINTS, strict=True):
         joints[joint].write(bus, servo)
@@ -270,7 +270,7 @@ def check(port: Port = None) -> None:
         goes_on = bus.answered(behind, servos[-1])
         print(f"a reading of all goes on behind a silent servo: {yes(goes_on)}")
         if bus.read(servos[-1], bus.TORQUE):
-            print("the torque is on: `o80 arms relax` first, to see what it has to do with a goal")
+            print("the torque is on: `o80 arms relax` first, to check its reaction to a goal")
         else:
             print(told_of_torque(bus, servos[-1]))
 

@@ -95,8 +95,8 @@ Calibration of_joint(const Fields& fields, int id) {
                              std::to_string(field_of(fields, "id")));
   }
   if (field_of(fields, "drive_mode") != 0) {
-    throw std::runtime_error(
-        "drive_mode must be 0: LeRobot writes no other, and what it means for degrees is unclear");
+    throw std::runtime_error("drive_mode must be 0, the only one that LeRobot writes, got " +
+                             std::to_string(field_of(fields, "drive_mode")));
   }
   const Calibration found{.offset = field_of(fields, "homing_offset"),
                           .smallest = field_of(fields, "range_min"),
@@ -162,7 +162,7 @@ std::string find_calibration(const std::string& name, const std::vector<std::str
   const std::string leader = folders[0].starts_with("teleoperators") ? " --leader" : "";
   throw std::runtime_error(
       "there is no calibration '" + name + "' in " + (calibrations() / folders[0]).string() +
-      ": `o80 arms calibrate --take " + name + leader + "` makes it from what the servos hold");
+      ": `o80 arms calibrate --take " + name + leader + "` makes it from the values in the servos");
 }
 
 }  // namespace o80::arms

@@ -42,10 +42,9 @@ void DynamixelChain::set_up(std::size_t servo) {
                              models_[servo].name + " (" + std::to_string(models_[servo].number) +
                              ") is needed");
   }
-  if (needed(servo, dynamixel::kDriveMode) != 0) {
-    throw std::runtime_error(
-        "has another drive mode than 0 in its register 10: the calibration "
-        "would not be right");
+  if (const int mode = needed(servo, dynamixel::kDriveMode); mode != 0) {
+    throw std::runtime_error("has the drive mode " + std::to_string(mode) +
+                             " in its register 10, which must be 0 for the calibration");
   }
   const bool grips = servo + 1 == count_;
   keep(servo, {dynamixel::kReturnDelay, 0});
@@ -64,13 +63,14 @@ void DynamixelChain::keep(std::size_t servo, const Setting& setting) {
   const std::string where =
       "its register " + std::to_string(static_cast<int>(setting.where.address));
   if (states_[servo].torque) {
-    throw std::runtime_error("holds with another setting in " + where +
-                             ": `o80 arms relax` first (the arm sinks), then start it again");
+    throw std::runtime_error("has its torque on, so " + where +
+                             " cannot be set: `o80 arms relax` first (the arm sinks), then start "
+                             "it again");
   }
   queue(setting.where, Mask{1} << servo, setting.value);
   send_queued();
   if (needed(servo, setting.where) == setting.value) return;
-  throw std::runtime_error("does not keep what is written to " + where);
+  throw std::runtime_error("does not keep the value written to " + where);
 }
 
 Calibration DynamixelChain::calibration_of(std::size_t servo) {

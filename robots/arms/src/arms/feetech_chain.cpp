@@ -21,7 +21,7 @@ void FeetechChain::set_up(std::size_t servo) {
   const int firmware = needed(servo, feetech::kFirmware);
   if (servo > 0 && firmware != firmware_) {
     throw std::runtime_error(
-        "has another firmware than those before it: bring all to the same version");
+        "has another firmware than the servos before it: install the same version on all");
   }
   firmware_ = firmware;
   if (needed(servo, feetech::kMode) != 0) {

@@ -119,7 +119,7 @@ SerialPort SerialPort::open(const std::string& path) {
   std::error_code error;
   const fs::path file = fs::canonical(path, error);
   if (error) {
-    throw std::runtime_error("there is no port " + path + ": `o80 arms` lists those that are");
+    throw std::runtime_error("there is no port " + path + ": `o80 arms` lists the ports");
   }
   const std::string owner = owner_of(file);
   if (!owner.empty()) {
@@ -131,13 +131,13 @@ SerialPort SerialPort::open(const std::string& path) {
   if (result >= 0) return SerialPort(result);
   switch (-result) {
     case EACCES:
-      throw std::runtime_error("you may not use " + path +
-                               ": `sudo usermod -aG dialout $USER`, then log in again");
+      throw std::runtime_error("no permission for " + path +
+                               ": run `sudo usermod -aG dialout $USER`, then log in again");
     case EBUSY:
-      throw std::runtime_error("another process of somebody else has " + path +
-                               " open: `sudo fuser -v " + path + "` tells which");
+      throw std::runtime_error("a process of another user has " + path + " open: `sudo fuser -v " +
+                               path + "` names it");
     case ENOTTY:
-      throw std::runtime_error(path + " is no serial line that can do 1 Mbaud");
+      throw std::runtime_error(path + " is not a serial line for 1 Mbaud");
     default:
       throw std::runtime_error("cannot open " + path + " (" + std::strerror(-result) + ")");
   }
@@ -195,8 +195,8 @@ std::string only_port() {
   const std::vector<std::string> found = ports();
   if (found.empty()) {
     throw std::runtime_error(
-        "no serial adapter is plugged in: is the USB cable in, and has the "
-        "adapter power? --port gives one of another name");
+        "no serial adapter was found: check its USB cable and its power, or give a port of "
+        "another name with --port");
   }
   if (found.size() > 1) {
     throw std::runtime_error("there are " + std::to_string(found.size()) + " ports (" + found[0] +

@@ -80,8 +80,8 @@ void ServoArm::settle() noexcept {
     const bool stands = std::abs(servos_[i].position - held_places_[i]) <= kBacklash;
     if (!stands && has(held_, i) && goals_[i] == held_places_[i]) {
       because(
-          "%s moved when its torque was switched on, and is held with little strength: look "
-          "what pulls at it",
+          "%s moved when its torque was switched on, and is held with little strength: check "
+          "that nothing pulls it",
           kJointNames[i]);
     }
   }
@@ -134,7 +134,7 @@ void ServoArm::receive(ArmState& observed, ArmSensors& sensors, std::int64_t tim
   take(transfer);
   if (transfer.asked) look_for_trouble(transfer);
   if (!chain_->has_port()) {
-    because("the adapter %s is gone", lasting_name_.c_str());
+    because("the adapter %s is unplugged", lasting_name_.c_str());
     held_ = 0;  // old goals would move the arm when the adapter returns
   }
 
@@ -204,8 +204,8 @@ void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
     because("no servo answers: is the power supply on?");
   } else if (first != servos_.end()) {
     const auto i = static_cast<std::size_t>(first - servos_.begin());
-    because("%s (servo %zu) does not answer: look at its plug and the one before it",
-            kJointNames[i], i + 1);
+    because("%s (servo %zu) does not answer: check its plug and the plug before it", kJointNames[i],
+            i + 1);
   }
   for (std::size_t i = 0; i < kServos; ++i) {
     Servo& servo = servos_[i];
@@ -216,7 +216,7 @@ void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
       goals_[i] = (*chain_)[i].position;
       chain_->queue_goals(bit(i) & held_, goals_);
       held_ &= ~bit(i);
-      because("%s is read where it cannot be: has its encoder lost a turn?", kJointNames[i]);
+      because("%s is read at an impossible position: has its encoder lost a turn?", kJointNames[i]);
     }
     if (servo.alarmed >= kAlarmsToHalt) name_alarm(i);
     if (has(held_, i) && servo.without_torque && (*chain_)[i].status == 0) {
@@ -227,7 +227,7 @@ void ServoArm::look_for_trouble(const ServoChain::Transfer& transfer) noexcept {
   damaged_in_window_ += transfer.damaged > 0 ? 1 : 0;
   const std::int64_t window = std::max<std::int64_t>(kSecond / period_, 20);
   if (damaged_in_window_ * 20 > window) {
-    because("more than 5 %% of the answers of a second are damaged: look at the cables");
+    because("more than 5 %% of the answers of a second are damaged: check the cables");
   }
   if (++window_ >= window) window_ = damaged_in_window_ = 0;
 }
@@ -288,7 +288,7 @@ const char* ServoArm::why_not_ready() noexcept {
     std::snprintf(not_ready_.data(), not_ready_.size(), format, values...);
     return not_ready_.data();
   };
-  if (!chain_->has_port()) return say("the adapter %s is gone", lasting_name_.c_str());
+  if (!chain_->has_port()) return say("the adapter %s is unplugged", lasting_name_.c_str());
   for (std::size_t i = 0; i < kServos; ++i) {
     const char* const name = kJointNames[i];
     const int status = (*chain_)[i].status;
@@ -414,9 +414,9 @@ void ServoArm::stop() noexcept {
     const auto holding = std::ranges::count_if(
         servos_, [](const Servo& servo) { return servo.missed == 0 && !servo.without_torque; });
     std::fprintf(stderr,
-                 "%s%d servos hold, and nobody watches their heat: `o80 arms relax` "
-                 "switches their torque off\n",
-                 is_there ? "" : "the adapter is gone; ",
+                 "%s%d servos keep their torque, and no process watches their temperature: "
+                 "`o80 arms relax` switches the torque off\n",
+                 is_there ? "" : "the adapter is unplugged; ",
                  is_there ? static_cast<int>(holding) : static_cast<int>(kServos));
   }
   chain_->port().close();

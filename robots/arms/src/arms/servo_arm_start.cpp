@@ -102,9 +102,9 @@ void ServoArm::refuse(std::size_t servo, const std::string& why) const {
 void ServoArm::start() {
   if (calibration_.empty()) {
     throw std::runtime_error(
-        "no calibration is given, and there is not exactly one: --calibration NAME chooses one, "
-        "`o80 arms calibrate --take NAME` makes one from what the servos hold (of a leader with "
-        "--leader)");
+        "no calibration was given, and there is none or more than one: choose one with "
+        "--calibration NAME, or make one from the values in the servos with `o80 arms calibrate "
+        "--take NAME` (for a leader add --leader)");
   }
   const std::string port = config_.port.empty() ? only_port() : config_.port;
   lasting_name_ = lasting_name(port);
@@ -132,7 +132,7 @@ void ServoArm::check_servos() {
   }
   if (silent == chain_->all()) {
     throw std::runtime_error(
-        "no servo answers: is the power supply on? `o80 arms` lists what each port has");
+        "no servo answers: is the power supply on? `o80 arms` lists the servos of each port");
   }
   for (std::size_t i = 0; i < kServos; ++i) {
     try {
@@ -148,10 +148,10 @@ void ServoArm::check_calibration() {
     const Calibration own = chain_->calibration_of(i);
     if (own == calibration_[i]) continue;
     throw std::runtime_error(
-        std::string(kJointNames[i]) + ": the file '" + config_.calibration + "' says " +
-        range_of(calibration_[i]) + "; the servo says " + range_of(own) +
-        ". `o80 arms calibrate --write NAME` puts the file into the servos, "
-        "`--take NAME` makes a new file from them (of a leader with --leader)");
+        std::string(kJointNames[i]) + ": the calibration '" + config_.calibration + "' has " +
+        range_of(calibration_[i]) + ", but the servo has " + range_of(own) +
+        ". Write the file to the servos with `o80 arms calibrate --write NAME`, or make a new file "
+        "from their values with `--take NAME` (for a leader add --leader)");
   }
   tell_doubts();
 }
@@ -166,8 +166,8 @@ void ServoArm::tell_doubts() const {
     const double moved = calibration_[i].width() * Calibration::kStep;
     if (kind_.farthest[i] > kWholeTurn || moved >= kEnough * all) continue;
     std::fprintf(stderr,
-                 "%s was moved through %.0f of %.0f deg when it was calibrated: its zero is off by "
-                 "up to %.0f deg\n",
+                 "%s was moved through only %.0f of %.0f deg during its calibration: its zero may "
+                 "be wrong by up to %.0f deg. Calibrate it again\n",
                  kJointNames[i], moved * kDegrees, all * kDegrees, (all - moved) / 2 * kDegrees);
   }
 }
@@ -186,8 +186,8 @@ void ServoArm::check_rate() {
   if (config_.answer_timeout > 0.0 || most <= period_) return;
   std::array<char, 200> text{};
   std::snprintf(text.data(), text.size(),
-                "the bus answers in %.1f ms (95 %%): %.0f Hz are possible, %.0f Hz were asked for; "
-                "is this an ESP32 board, or an FTDI adapter with a latency of 16 ms?",
+                "the bus answers within %.1f ms (95 %%): %.0f Hz are possible, not %.0f Hz. "
+                "Is this an ESP32 board, or an FTDI adapter with a latency of 16 ms?",
                 static_cast<double>(most) * 1e-6, std::floor(0.9e9 / static_cast<double>(most)),
                 1e9 / static_cast<double>(period_));
   throw std::runtime_error(text.data());
@@ -195,7 +195,7 @@ void ServoArm::check_rate() {
 
 void ServoArm::refuse_if_gone() const {
   if (chain_->has_port()) return;
-  throw std::runtime_error("the adapter " + lasting_name_ + " is gone");
+  throw std::runtime_error("the adapter " + lasting_name_ + " is unplugged");
 }
 
 /// Two complete readings that agree, inside what the servos do not clamp.
@@ -218,7 +218,7 @@ void ServoArm::find_place() {
     known = true;
   }
   refuse_if_gone();
-  if (!agree) refuse(differs, "gave no two readings that agree: is something moving it?");
+  if (!agree) refuse(differs, "moved between its readings: the arm must be still while it starts");
   for (std::size_t i = 0; i < kServos; ++i) {
     const Calibration& range = calibration_[i];
     const int position = servos_[i].position;
@@ -240,8 +240,8 @@ void ServoArm::begin_to_hold() {
     const std::optional<int> found = chain_->read(servo, wanted.where);
     if (found == wanted.value) return;
     refuse_if_gone();
-    if (!found) refuse(servo, "does not answer: look at its plug and the one before it");
-    refuse(servo, "does not keep what is written to its register " +
+    if (!found) refuse(servo, "does not answer: check its plug and the plug before it");
+    refuse(servo, "does not keep the value written to its register " +
                       std::to_string(static_cast<int>(wanted.where.address)));
   };
   approach(chain_->all());

@@ -47,7 +47,7 @@ std::optional<int> ServoChain::read(std::size_t servo, Register where) {
 int ServoChain::needed(std::size_t servo, Register where) {
   const std::optional<int> value = read(servo, where);
   if (value) return *value;
-  throw std::runtime_error("does not answer: look at its plug and the one before it");
+  throw std::runtime_error("does not answer: check its plug and the plug before it");
 }
 
 bool ServoChain::find(std::size_t servo) {

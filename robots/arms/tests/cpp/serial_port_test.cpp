@@ -93,7 +93,7 @@ TEST(SerialPort, SaysWhatToDoIfThereIsNone) {
   const std::string file = testing::TempDir() + "o80_no_line_" + std::to_string(getpid());
   std::ofstream(file) << "no line";  // one that no other process has open
   EXPECT_THAT([&] { SerialPort::open(file); },
-              ThrowsMessage<std::runtime_error>(HasSubstr("no serial line")));
+              ThrowsMessage<std::runtime_error>(HasSubstr("not a serial line")));
   std::remove(file.c_str());
 }
 

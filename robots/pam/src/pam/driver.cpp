@@ -142,7 +142,7 @@ Served PamDriver::on(const Snapshot& snapshot) noexcept {
 Served PamDriver::on(const Restore& restore) noexcept {
   if (restore.slot >= slots_.size()) return no_such_slot();
   const State& slot = slots_[restore.slot];
-  if (slot.filled == 0) return Served::rejected("this slot holds no snapshot: snapshot it first");
+  if (slot.filled == 0) return Served::rejected("this slot has no snapshot: request it first");
   now_ = slot;
   plant_.restore(slot.plant);
   return Served::start_afresh();

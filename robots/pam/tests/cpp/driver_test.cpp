@@ -131,7 +131,7 @@ TEST_F(PamDriverTest, TellsHowManySlotsThereAre) {
   EXPECT_EQ(batch.handle(0).status, Status::rejected);
   EXPECT_THAT(batch.handle(0).text, HasSubstr("there are 2 slots"));
   EXPECT_EQ(batch.handle(1).status, Status::rejected);
-  EXPECT_THAT(batch.handle(1).text, HasSubstr("snapshot it first"));
+  EXPECT_THAT(batch.handle(1).text, HasSubstr("request it first"));
 }
 
 TEST_F(PamDriverTest, TakesAPresetAndSingleNumbersInsteadOfItsOwn) {

@@ -325,7 +325,7 @@ Served MujocoDriver::on(const Restore& restore) noexcept {
     restored_ = true;
     return Served::start_afresh();
   }
-  return Served::rejected("this slot holds no snapshot: send the request snapshot first");
+  return Served::rejected("this slot has no snapshot: send the request snapshot first");
 }
 
 /// Serves the requests of arms that the model supports.

@@ -123,7 +123,7 @@ class Builder {
     for (const Named& named : named_) {
       if (!has(servos_, joint_of(named), &Servo::joint)) refuse_without_actuator(named);
       if (!named.over.empty()) {
-        throw DriverError("joints: numbers, as those of '" + named.name + "', are for like only");
+        throw DriverError("joints: '" + named.name + "' has numbers, which need the option like");
       }
     }
     for (const Quantity quantity : kQuantities) {
@@ -221,7 +221,7 @@ class Builder {
 
   void take(const Face& other) {
     schema() = other.schema;
-    if (schema().actuators.empty()) throw DriverError("the face has no actuators");
+    if (schema().actuators.empty()) throw DriverError("like: the other robot has no actuators");
     for (const Named& named : named_) (void)schema().actuator(named.name);  // throws with the names
     std::erase_if(schema().requests, [](const RequestRow& request) {
       const std::string_view name = request.name.view();
@@ -353,10 +353,10 @@ class Builder {
     const bool fits = (!std::isfinite(row.minimum) || row.minimum >= allowed.low - slack) &&
                       (!std::isfinite(row.maximum) || row.maximum <= allowed.high + slack);
     if (!fits) {
-      throw DriverError("'" + actuator.name.str() + "' may be from " + shown(row.minimum) + " to " +
-                        shown(row.maximum) + ", but joint '" + named.joint +
+      throw DriverError("'" + actuator.name.str() + "' is allowed from " + shown(row.minimum) +
+                        " to " + shown(row.maximum) + ", but joint '" + named.joint +
                         "' of the model only from " + shown(allowed.low) + " to " +
-                        shown(allowed.high) + " (its range and ctrlrange): widen them");
+                        shown(allowed.high) + ": widen its range and ctrlrange in the model");
     }
     if (!std::isfinite(row.minimum)) row.minimum = allowed.low;
     if (!std::isfinite(row.maximum)) row.maximum = allowed.high;
@@ -481,8 +481,8 @@ std::vector<Named> named_in(const std::string& list) {
 
 Line spread_over(const Named& named, const std::vector<double>& over, const Range& range) {
   if (!std::isfinite(range.low) || !std::isfinite(range.high)) {
-    throw DriverError("joint '" + named.joint + "' has no range over which to spread " +
-                      shown(over[0]) + " to " + shown(over[1]) + ": give it one in the model");
+    throw DriverError("joint '" + named.joint + "' has no range, so " + shown(over[0]) + " to " +
+                      shown(over[1]) + " cannot be spread over it: give it a range in the model");
   }
   const double factor = (range.high - range.low) / (over[1] - over[0]);
   return {factor, range.low - over[0] * factor};

@@ -143,15 +143,15 @@ void check_options(const Config& config) {
   if (config.like.empty()) {
     if (config.limits.empty() || config.mode == JointMode::actuated) return;
     throw DriverError(
-        "limits are for mode=actuated: mode imposed has none, control those of the "
+        "limits are for mode=actuated: mode=imposed has none, and mode=control has those of the "
         "model");
   }
   if (!config.limits.empty())
-    throw DriverError("with like the limits are those of the other robot");
+    throw DriverError("like takes the limits of the other robot: leave out limits");
   if (config.mode == JointMode::control)
-    throw DriverError("like drives the joints: leave out mode=control");
+    throw DriverError("like commands the joints of the model: leave out mode=control");
   if (has_balls(config.ball_options)) {
-    throw DriverError("with like all actuators are those of the other robot: leave out balls");
+    throw DriverError("like takes the actuators of the other robot: leave out balls");
   }
 }
 
@@ -190,8 +190,8 @@ Model::Model(const Config& config, const std::function<void(mjSpec&)>& edit,
   mjcf = std::move(made.mjcf);
   if (config.slots > 0 && (model->opt.enableflags & mjENBL_SLEEP) != 0) {
     throw DriverError(
-        "bodies of the model may sleep (<flag sleep='enable'/>), which snapshots do not hold: give "
-        "slots=0, or leave the flag out");
+        "bodies of the model may sleep (<flag sleep='enable'/>), and snapshots cannot store that: "
+        "give slots=0, or remove the flag");
   }
   if (!config.keyframe.empty()) keyframe = find(*model, mjOBJ_KEY, config.keyframe, "keyframe");
   sensors = sensors_in(*model);

@@ -60,13 +60,13 @@ double* put(double* to, const Ball& from) {
 }
 
 /// Raises ValueError with the name of a wrong number.
-double finite(double number, const char* name) {
-  if (std::isfinite(number)) return number;
-  throw nb::value_error((std::string(name) + " must be a finite number").c_str());
+double finite(double x, const std::string& name) {
+  if (std::isfinite(x)) return x;
+  throw nb::value_error((name + " must be a finite number, got " + std::to_string(x)).c_str());
 }
-double positive(double number, const char* name) {
-  if (finite(number, name) > 0) return number;
-  throw nb::value_error((std::string(name) + " must be positive").c_str());
+double positive(double x, const std::string& name) {
+  if (finite(x, name) > 0) return x;
+  throw nb::value_error((name + " must be positive, got " + std::to_string(x)).c_str());
 }
 template <std::size_t N>
 const std::array<double, N>& finite(const std::array<double, N>& numbers, const char* name) {
@@ -93,7 +93,7 @@ Platform platform(double height, const std::array<double, 2>& low,
                   const std::array<double, 2>& high, const Three& restitution, double friction,
                   double radius, double inertia) {
   if (!(low[0] < high[0]) || !(low[1] < high[1])) {
-    throw nb::value_error("low must lie below high, in x and in y");
+    throw nb::value_error("low must be less than high, in x and in y");
   }
   return {finite(height, "height"),           finite(low, "low"),         finite(high, "high"),
           finite(restitution, "restitution"), checked_friction(friction), sphere(radius, inertia)};

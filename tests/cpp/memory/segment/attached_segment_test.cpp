@@ -127,7 +127,7 @@ TEST_F(AttachedSegmentTest, KnowsHowItsBackendEnded) {
   owner.end(BackendState::stopped);
   EXPECT_EQ(segment.life(), Life::stopped);
   EXPECT_THAT(message_of<BackendStopped>([&] { segment.throw_if_gone(); }),
-              AllOf(HasSubstr("'arm'"), HasSubstr("stopped"), HasSubstr("attach anew")));
+              AllOf(HasSubstr("'arm'"), HasSubstr("stopped"), HasSubstr("attach again")));
   EXPECT_THROW(segment.throw_if_known_gone(), BackendStopped);
 
   owner.end(BackendState::failed, "joint 2 is too hot");

@@ -67,7 +67,7 @@ TEST_F(ForeignFileTest, ThatIsAFolderIsRefusedBySayingSo) {
   std::filesystem::create_directory(path);
   EXPECT_THAT(refusal(), HasSubstr(path));
   EXPECT_THAT(message_of<SegmentError>([] { OwnedSegment::create(small_spec()); }),
-              AllOf(HasSubstr(path), HasSubstr("in the way"), HasSubstr("directory")));
+              AllOf(HasSubstr(path), HasSubstr("exists and"), HasSubstr("directory")));
   EXPECT_TRUE(std::filesystem::is_directory(path));
   EXPECT_EQ(directory_.files(), 1U) << "no draft is left";
 }
@@ -122,7 +122,7 @@ TEST_F(ForeignFileTest, OfAnotherVersionIsRefusedWithBothVersionsAndTheCure) {
   poke(path, offsetof(SegmentHeader, version), std::uint32_t{77});
   EXPECT_THAT(refusal(), AllOf(HasSubstr("version 77"),
                                HasSubstr("version " + std::to_string(kSegmentVersion)),
-                               HasSubstr("Start its backend anew"), HasSubstr("o80 clean arm")));
+                               HasSubstr("Start its backend again"), HasSubstr("o80 clean arm")));
   // the dead do not keep the name, whatever wrote them
   EXPECT_NO_THROW(OwnedSegment::create(small_spec()));
 }

@@ -307,8 +307,8 @@ TEST_F(InlineGroupTest, RaisesTheSoftLimitOfOpenFilesOrNamesTheHardOne) {
     const std::string said =
         message_of<Error>([] { const InlineGroup larger(fake(), {}, group_of(100)); });
     const bool named = said.find(
-                           "100 copies of 'fake' need 900 open files, and this process "
-                           "may open 400") != std::string::npos;
+                           "100 copies of 'fake' need 900 open files, but the limit of "
+                           "this process is 400") != std::string::npos;
     _exit(now.rlim_cur > 100 && named ? 0 : 1);
   });
   EXPECT_EQ(child.wait(), 0);

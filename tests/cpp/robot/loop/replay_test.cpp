@@ -510,7 +510,7 @@ TEST_F(HardwareReplayTest, ARobotThatMayBeHardwareIsNotStarted) {
   try {
     Replay replay(std::make_unique<DriverInstance>(table(), OptionValues{}), options);
     replay.run(std::array<std::int64_t, 2>{0, 1});
-    FAIL() << "it does not say that it is simulated";
+    FAIL() << "it does not declare that it is simulated";
   } catch (const DriverError& error) {
     EXPECT_THAT(error.what(), ::testing::HasSubstr("robot 'fake' is not started for a replay"));
   }

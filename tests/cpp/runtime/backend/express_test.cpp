@@ -92,7 +92,7 @@ TEST_F(ExpressTest, NamesTheFrontendWhoseBatchesOthersWaitFor) {
   EXPECT_EQ(holder->since, begun);
   std::string program;
   std::ifstream("/proc/self/comm") >> program;
-  const std::string told = "most of the queue is of the frontend of pid " +
+  const std::string told = "most of the queue is from the frontend of pid " +
                            std::to_string(getpid()) + " (" + program +
                            "); batches have been waiting since iteration " + std::to_string(begun);
   EXPECT_THAT([&] { waiting.wait(std::chrono::nanoseconds(0)); },
@@ -189,7 +189,7 @@ TEST_F(ExpressTest, MoreRequestsOrOrdersThanABatchMayHaveAreRefused) {
   UntypedFrontend one("pair");
   for (std::uint32_t i = 0; i < kMaxRequests + 1; ++i) add_request<Snapshot>(one);
   EXPECT_THAT(message_of<InvalidArgument>([&] { one.pulse(); }),
-              AllOf(HasSubstr("may have 8 requests, this one has 9"), HasSubstr("several pulses")));
+              AllOf(HasSubstr("at most 8 requests, this one has 9"), HasSubstr("several pulses")));
   EXPECT_EQ(one.added(), kMaxRequests + 1) << "nothing was sent";
   one.forget_added();
   for (std::uint32_t i = 0; i < kMaxOrders + 1; ++i) one.add_take_control();

@@ -74,7 +74,7 @@ TEST_F(FrontendTest, RefusesATrajectoryWhoseTimesMakeNoSense) {
     return message_of<InvalidArgument>(
         [&] { frontend.add_trajectory(0, 3, std::as_bytes(std::span(rows)), options, times); });
   };
-  EXPECT_THAT(add_with({1000, 2000}), HasSubstr("3 rows needs as many times"));
+  EXPECT_THAT(add_with({1000, 2000}), HasSubstr("3 rows needs 3 times, got 2"));
   const std::string grow = "must grow from 0, by an iteration at least: ";
   EXPECT_THAT(add_with({kMs, 3 * kMs, 2 * kMs}),
               HasSubstr(grow + "row 2 is due after 0.002 s, the row before after 0.003 s"));

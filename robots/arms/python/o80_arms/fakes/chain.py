@@ -193,13 +193,13 @@ class FakeChain(Generic[Servo]):
             os.write(self._waker, b"p")
 
     def unplug(self, servo: int) -> None:
-        """Cuts the power of this servo and all behind it."""
+        """Cuts the power of a servo and of all after it in the chain."""
         with self._lock:
             for number in range(servo, len(self.servos) + 1):
                 self.servos[number].powered = False
 
     def plug_in(self, servo: int) -> None:
-        """Restores the power of this servo and all behind it, as after a power-up."""
+        """Powers up a servo and all after it in the chain."""
         with self._lock:
             for number in range(servo, len(self.servos) + 1):
                 self.servos[number].power_up()
