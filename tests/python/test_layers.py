@@ -218,7 +218,7 @@ CEILINGS = {
     "gateways/ros2": (904, 955),
     "robots/arms": (4_563, 3_153),
     "robots/pam, robots/two_joints": (2_108, 1_184),
-    "simulators/mujoco": (5_372, 4_686),
+    "simulators/mujoco": (5_372, 4_669),
     "apps/table_tennis": (8_400, 4_409),
     "benchmarks, tools": (4_384, 0),
     "examples": (1_985, 0),
