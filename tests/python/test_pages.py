@@ -4,10 +4,12 @@ import re
 from pathlib import Path
 
 import pytest
-from pages import DOCS, KNOWN, pages, programs, read_page, run_programs
+import typer
+from pages import BLOCK, DOCS, KNOWN, pages, programs, read_page, run_programs
 from processes import run_python
 
 import o80
+from o80.cli.app import COMMANDS, app, register
 
 
 @pytest.mark.check
@@ -19,6 +21,26 @@ def test_every_block_and_command_runs(page: str) -> None:
 
 def test_what_a_page_needs_is_known_of_pages_that_exist() -> None:
     assert {*KNOWN} - {"scenes"} - {*pages()} == set()
+
+
+def test_every_command_in_a_sentence_exists_and_has_its_options() -> None:
+    for name in COMMANDS:
+        register(name)
+    known = typer.main.get_command(app).commands  # type: ignore[attr-defined]
+    options = {name: {o for p in each.params for o in p.opts} for name, each in known.items()}
+    texts = [BLOCK.sub("", page.read_text()) for page in DOCS.rglob("*.md")]
+    found = [each for text in texts for each in re.findall(r"`(o80 [a-z][^`\n]*)`", text)]
+    of_packages = ("arms", "ros2", "run")  # and options of robots
+    names = [each for each in found if each.split()[1] not in of_packages]
+    wrong = [
+        command
+        for command in names
+        if set(re.findall(r"(?<!\S)--?[a-z][\w-]*", command))
+        - options.get(command.split()[1], set())
+        or command.split()[1] not in options
+    ]
+    assert len(found) > 150
+    assert not wrong
 
 
 def test_the_first_program_about_commands_runs(capsys: pytest.CaptureFixture[str]) -> None:
