@@ -1,5 +1,5 @@
 # Everything made lies in .venv and build/. Options go through ARGS="...".
-.PHONY: demo setup learn test check soak wheel site scripts torture model fuzz rt systemd debian13 bench format clean distclean
+.PHONY: demo setup learn test check soak wheel site pages scripts torture model fuzz rt systemd debian13 bench format clean distclean
 ARGS ?=
 export PYTHONDONTWRITEBYTECODE := 1
 export PATH := $(CURDIR)/.venv/bin:$(PATH)
@@ -41,6 +41,11 @@ wheel:
 site:
 	@tools/setup.sh site
 	@.venv/bin/python docs/site/build_site.py
+
+# every block and command of every page: ARGS=docs/time.md chooses pages; tests/python/pages.toml
+pages:
+	@tools/setup.sh check
+	@.venv/bin/python tests/python/pages.py $(ARGS)
 
 # random scripts of motion, 100 000 of each kind by default: ARGS="--count 1000000 --seed 5000000"
 scripts:

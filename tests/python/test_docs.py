@@ -5,6 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from o80.base.symptoms import PAGES as PAGES_OF_SYMPTOMS
+from o80.base.symptoms import see
+
 ROOT = Path(__file__).resolve().parents[2]
 FOLDERS = (
     *("apps", "benchmarks", "devices", "docs", "examples", "gateways"),
@@ -131,6 +134,11 @@ def test_every_page_and_section_that_a_source_names_exists() -> None:
             if not page.exists() or (anchor and anchor not in anchors(page)):
                 broken.append(f"{source.relative_to(ROOT)}: {name}#{anchor}")
     assert not broken
+
+
+def test_each_page_about_a_symptom_is_named_by_errors_or_programs() -> None:
+    named = {f"See docs/symptoms/{page.name}." for page in (ROOT / "docs/symptoms").iterdir()}
+    assert {see(page) for page in PAGES_OF_SYMPTOMS} == named
 
 
 def test_the_page_on_compatibility_names_the_formats_of_this_version() -> None:

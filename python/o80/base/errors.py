@@ -3,6 +3,8 @@
 import builtins
 from typing import TYPE_CHECKING, Any, NamedTuple, Optional
 
+from o80.base.symptoms import page_about
+
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
@@ -25,7 +27,12 @@ def sentence(text: object) -> str:
 
 
 class Error(Exception):
-    """Base class of all exceptions of o80."""
+    """Base class of all exceptions of o80. A note of it may name a page about the symptom."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        if page := page_about(exception_text(self)):
+            self.add_note(page)
 
 
 class InvalidArgument(Error, ValueError):

@@ -18,7 +18,7 @@ def main() -> None:
         with explained(f"do `o80 {' '.join(sys.argv[1:2])}`"):
             _run(sys.argv[1:])
     except Error as error:
-        complain(str(error))
+        complain("\n".join([str(error), *getattr(error, "__notes__", ())]))
         code = 1
     except KeyboardInterrupt:
         code = 130

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from o80.base.screen import plain, print_json, style
+from o80.base.symptoms import see
 
 if TYPE_CHECKING:
     from o80.robots.doctor.check import Finding
@@ -73,6 +74,8 @@ def _print(report: "Report") -> None:
     parts += [f"{len(about['processors'])} processors"]
     parts += [f"container ({about['container']})"] if about["container"] else []
     print(plain(", ".join(part for part in parts if part)))
+    if not report.serves:
+        print(see("late_loop"))
 
 
 def _text(finding: "Finding") -> str:

@@ -8,6 +8,7 @@ import typer
 
 from o80.base.errors import Error
 from o80.base.screen import complain, overwrite, plain
+from o80.base.symptoms import see
 from o80.cli.diff import _tolerances
 from o80.frontend.frontend import Frontend
 
@@ -93,6 +94,7 @@ def replay(
             speed = run.recorded_seconds / run.seconds
             print(f"  {run.rows / run.seconds:.0f} rows/s, {speed:.3g} times as fast as it ran")
     if report.difference is not None:
+        print(see("replay_differs"))
         raise typer.Exit(1)
     if not report.identical or any(run.unused for run in report):
         raise typer.Exit(2)

@@ -5,8 +5,9 @@ import time
 from typing import Any
 
 import o80._core as _core
-from o80.base.errors import Error, SegmentError
+from o80.base.errors import Error, SegmentError, sentence
 from o80.base.screen import Column, print_json, print_table, style
+from o80.base.symptoms import page_about
 from o80.frontend.backend_texts import (
     age_text,
     halt_text,
@@ -66,6 +67,8 @@ def print_segments(*, as_json: bool) -> None:
         latency = latency_text(row["decision_latency"], 1e9 / (row["frequency"] or 1))
         for said in (row["halted"], row["state_of_loop"], row["problem"], *row["running"], latency):
             if said:
+                page = page_about(said)
+                said = f"{sentence(said)} {page}" if page else said
                 print(f"{style(row['segment'], 'yellow')}: {said}")
     if any(row["state"] in ("killed", "failed", "stopped") for row in rows):
         print(style("Dead segments can still be read; o80 clean removes them.", "dim"))

@@ -6,7 +6,7 @@ o80.hybrid.make(Push)                                  # one robot, inline
 o80.hybrid.make_vec(Push, 64)                          # copies to learn on
 o80.hybrid.make(Push, pacing="real_time", robot=...)   # the robot itself
 
-Needs the extra `gym`. See docs/hybrid.md.
+Needs the extras `gym` and `record`. See docs/hybrid.md.
 """
 
 from o80.base.extras import needed

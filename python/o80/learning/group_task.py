@@ -1,7 +1,7 @@
 """A task on one inline group."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from gymnasium import Space
@@ -13,7 +13,9 @@ from o80.groups.gather import Gather
 from o80.groups.group_burst import GroupBurst, GroupRequest
 from o80.groups.inline_group import InlineGroup
 from o80.learning.task import Index, Task
-from o80.view.pictures import Pictures
+
+if TYPE_CHECKING:
+    from o80.view.pictures import Pictures  # needs the extra `record`
 
 
 class GroupTask(Task):
@@ -121,6 +123,8 @@ class GroupTask(Task):
     def render(self, copy: int) -> Image:
         """Draws a picture (height, width, 3) of the robot's model in the newest row of a copy."""
         if self._pictures is None:
+            from o80.view.pictures import Pictures
+
             self._pictures = Pictures(self.group[copy], model_files=True)
         return self._pictures.draw(self.group[copy].latest())
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import gc
 import itertools
 import os
-import re
 import signal
-import subprocess
 import sys
 import time
 import warnings
@@ -780,21 +778,6 @@ def test_columns_are_found_by_their_group() -> None:
         for joint in ("shoulder", "elbow")
         for part in ("position", "velocity")
     ]
-
-
-def test_the_page_runs_as_it_stands(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    page = (Path(__file__).resolve().parents[3] / "docs" / "hybrid.md").read_text()
-    blocks = re.findall(r"^```(xml|python)\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
-    assert [kind for kind, _ in blocks] == ["xml", "python", "python"]
-    for name, (_, text) in zip(("ball.xml", "push.py", "main.py"), blocks, strict=True):
-        (tmp_path / name).write_text(text)
-    done = subprocess.run(
-        [sys.executable, "main.py"], cwd=tmp_path, capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
-    worlds, late = done.stdout.splitlines()
-    assert worlds == "(20, 7) (20,)"
-    assert late in ("0", "1"), "one action was sent by the clock"
 
 
 class Unset(Push):

@@ -23,6 +23,11 @@ def test_import_and_list_load_neither_numpy_nor_a_parser() -> None:
     assert in_a_fresh_interpreter(f"import sys; {listing}; {loaded}").endswith("[]")
 
 
+def test_learning_needs_no_recordings() -> None:
+    program = "import sys; sys.modules['mcap'] = None; import o80.learning; print('imported')"
+    assert in_a_fresh_interpreter(program) == "imported"
+
+
 def test_the_first_attach_loads_little_beyond_numpy(segment: str) -> None:
     attach = f"import o80; o80.Frontend({segment!r}).latest()"
     late = "{'json', 'html', 'inspect', 'datetime', 'o80.robots', 'o80.rows.journal', "

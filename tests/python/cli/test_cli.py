@@ -179,3 +179,8 @@ def test_echo_prints_the_last_rows_of_a_dead_robot(
     first, *_, last = (json.loads(line)["iteration"] for line in done.stdout.splitlines())
     assert last == first + 2
     assert "was killed" in done.stderr
+
+
+def test_errors_and_the_table_of_robots_name_the_page_about_the_symptom(folder: Path) -> None:
+    said = o80(folder, "plot", "arm", "-o", "x.png", fails=True)
+    assert said.endswith("See docs/symptoms/attach_times_out.md.\n")

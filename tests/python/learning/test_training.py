@@ -6,7 +6,6 @@ import contextlib
 import json
 import os
 import pty
-import re
 import shutil
 import signal
 import subprocess
@@ -268,26 +267,6 @@ def test_on_the_clock_no_step_follows_an_update_within_an_episode(
     # a step of real time lasts 20 iterations at 1000 Hz
     assert all(each.play_hours * 3600 >= each.decisions * 0.019 for each in points)
     assert points[-1].minutes * 60 >= (points[-1].play_hours + points[-1].reset_hours) * 3600
-
-
-def test_the_commands_and_the_program_of_the_page_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    task = re.findall(r"```python\n(.*?)```", (DOCS / "learning.md").read_text(), re.DOTALL)[0]
-    (tmp_path / "reach.py").write_text(task)
-    text = (DOCS / "learning" / "training.md").read_text()
-    commands, program = re.findall(r"```(?:python)?\n(.*?)```", text, re.DOTALL)[:2]
-    short = commands.replace("--copies 16", "--copies 16 --decisions 2000")
-    for command in short.replace("python", sys.executable).splitlines():
-        done = subprocess.run(command, shell=True, cwd=tmp_path, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-    assert (tmp_path / "build" / "reach" / "curve.png").stat().st_size > 1000
-    monkeypatch.chdir(tmp_path)
-    names: dict[str, Any] = {"observations": np.zeros((16, 4), np.float32)}
-    exec(program.replace("seed=2", "seed=2, decisions=2000"), names)
-    assert names["actions"].shape == (16, 2)
-    loaded = LearnedPolicy.load("reach_policy")  # as text, and both files copied
-    assert loaded.task.options == {"gain": 40}
 
 
 def test_a_file_of_settings_is_trained_and_words_of_the_command_replace_its_values(
