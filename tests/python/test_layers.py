@@ -206,7 +206,7 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_388, 0),
+    "include, src": (34_399, 0),
     "python/bindings": (5_724, 0),
     "python/o80": (30_027, 0),
     "python/o80/hybrid": (2_456, 0),
@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (8_399, 4_409),
     "benchmarks, tools": (4_384, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 62_308),
+    "tests, conftest.py": (0, 62_329),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

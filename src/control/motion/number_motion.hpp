@@ -176,10 +176,16 @@ class NumberMotion {
 
  private:
   bool is_away() const noexcept { return rest_ && !held_ && guard_.position() != *rest_; }
-  /// One iteration of the former plan, if a stop would leave the bounds.
+  /// One iteration of the former plan, if a stop would leave the bounds. Where that has led, the
+  /// shortest stop may leave the span with which the motion began: what follows stops there, too.
   bool leave() noexcept {
-    if (leaves_) leaves_ = !guard_.stops_inside();
-    return leaves_ && guard_.pass(former_.next());
+    if (!leaves_) return false;
+    leaves_ = !guard_.stops_inside();
+    if (leaves_) return guard_.pass(former_.next());
+    const Span stop = guard_.stopping_span();
+    guard_.widen(stop.low);
+    guard_.widen(stop.high);
+    return false;
   }
   template <class Move>
   Limit move(Move&& move) noexcept;

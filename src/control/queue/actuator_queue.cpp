@@ -104,7 +104,7 @@ ActuatorQueue::Moved ActuatorQueue::go_to(Iteration iteration, const std::byte* 
   }
   set_point_ = set_point;
   pace_ = Pace::direct;
-  masked_ = planned_ = false;
+  masked_ = planned_ = is_stretched_ = false;
   rows_left_ = ahead_left_ = 0;
   in_force_ = true;
   runs_ = Runs::given;
@@ -155,7 +155,9 @@ void ActuatorQueue::begin_command(const std::byte* observed) noexcept {
   if (is_chunk(head)) return begin_chunk();
   open_plan_.is_open = false;
   const SetPoint next{head.profile, head.start, head.amount};
-  keeps_plan_ = same_mask && head.pace == Pace::direct && is_in_force(next) && is_next_row_target();
+  const bool together = is_member(head) && head.rows == 1;
+  keeps_plan_ =
+      same_mask && head.pace == Pace::direct && is_in_force(next, together) && is_next_row_target();
   // targets of a generator are one motion
   const bool streams = same_mask && in_force_ && set_point_.profile == Profile::as_sent &&
                        head.profile == Profile::as_sent;
@@ -261,11 +263,11 @@ void ActuatorQueue::plan_with_others(Iteration iteration, const std::byte* obser
 /// Begins the planned row; false if the command would take too long and is rejected.
 bool ActuatorQueue::begin_row(Iteration iteration) noexcept {
   const RecordHead& head = pool_->head(record_);
-  if (std::exchange(planned_, false)) {
-    row_iterations_ = ledger_->groups().agreed(head);
-  } else {
-    plan_row(iteration);
-  }
+  const bool together = std::exchange(planned_, false);
+  if (!together) plan_row(iteration);
+  const std::int64_t own = row_iterations_;
+  if (together) row_iterations_ = ledger_->groups().agreed(head);
+  is_stretched_ = (keeps_plan_ && is_stretched_) || row_iterations_ > own;
   const bool is_requested = pace_ != Pace::speed && row_iterations_ <= requested_;
   if (row_iterations_ > kLongestPlan && !is_requested) {
     queue_.pop();

@@ -236,8 +236,10 @@ class ActuatorQueue {
   const std::uint64_t* mask_of(BlockIndex record) noexcept;
   void begin_chunk() noexcept;
   void switch_passed_rows(Iteration iteration) noexcept;
-  bool is_in_force(const SetPoint& next) const noexcept {
-    return in_force_ && !motion_.was_held_back() && next == set_point_;
+  /// `together`: the next one is that of a group, so it may take as long as the last one did.
+  bool is_in_force(const SetPoint& next, bool together = false) const noexcept {
+    return in_force_ && !motion_.was_held_back() && next == set_point_ &&
+           (together || !is_stretched_);
   }
   /// True if the next row is the target already.
   bool is_next_row_target() noexcept {
@@ -324,6 +326,7 @@ class ActuatorQueue {
   // the set-point in force: of the running command, or of the last one if nothing came after it
   bool in_force_ = false;
   SetPoint set_point_;
+  bool is_stretched_ = false;  // its group takes longer than this actuator needs
 
   // the running command
   Pace pace_ = Pace::direct;

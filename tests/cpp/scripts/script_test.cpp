@@ -62,6 +62,8 @@ TEST(Script, KeepsThePromisesItBroke) {
   constexpr std::uint64_t kSeeds[] = {
       1074205,   // a motion that had just left a bound was continued at its reference's speed
       1076616,   // a row clamped where rounding left an unsigned kind
+      91090800,  // a motion that first went on with the plan before it could not stop in its span
+      91058671,  // a set-point equal to that of a group took as long as the group
       1005831};  // a member that had waited went on with the motion from before its wait
   for (const std::uint64_t seed : kSeeds) {
     const Script script = random_script(seed);

@@ -46,6 +46,33 @@ TEST(CommandGroup, TakesTheFastestWayThatAllCanKeep) {
   EXPECT_EQ(iterations_of({0, 1}, {0.8, 0.1}), slow);
 }
 
+/// What is sent to several again arrives with the slowest one; what is sent to one does not.
+// rule C15
+TEST(CommandGroup, OnlyAnEqualGroupKeepsTheTimeOfItsSetPoint) {
+  Schema schema = plain_robot(2);
+  schema.actuator(0).limits({.speed = 1.0, .acceleration = 10.0});
+  const auto last_end = [&](const RecordHead& head, int groups, int all) {
+    Rig rig(schema);
+    CommandId batch = 0;
+    for (int i = 0; i < all; ++i) {
+      if (i < groups) {
+        add_group(rig, {0, 1}, head, {0.1, 0.1});
+      } else {
+        rig.add(1, head, {0.1});
+      }
+      batch = rig.pulse();
+      rig.step();
+    }
+    while (rig.controller.active()) rig.step();
+    EXPECT_EQ(rig.desired(1), 0.1);
+    return rig.witness.last(record_id(batch, 0)).iteration;
+  };
+  for (const RecordHead& head : {direct(), overwriting(direct())}) {
+    EXPECT_EQ(last_end(head, 3, 4), 4);
+    EXPECT_EQ(last_end(head, 4, 4), last_end(head, 1, 1));
+  }
+}
+
 TEST(CommandGroup, IsInvalidWholeIfOneMemberIs) {
   const auto refused = [](auto&& spoil) {
     Rig rig(plain_robot(2));
