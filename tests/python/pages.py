@@ -13,6 +13,7 @@ import json
 import os
 import re
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -249,8 +250,13 @@ def read_page(page: str) -> Counter[str]:
     """Reads a page in a process of its own; returns how many blocks and commands were what."""
     with (
         tempfile.TemporaryDirectory(prefix="page-") as folder,
-        tempfile.TemporaryDirectory(prefix="page-", dir="/dev/shm") as segments,
+        contextlib.ExitStack() as stack,
     ):
+        segments = (
+            f"/dev/shm/pytest-o80-page-{os.getpid()}"  # conftest removes it if this is killed
+        )
+        stack.callback(shutil.rmtree, segments, ignore_errors=True)
+        Path(segments).mkdir()
         for name in ("apps", "examples", "tools"):
             Path(folder, name).symlink_to(ROOT / name)
         own = {"HOME": folder, "O80_DIRECTORY": segments, "MPLBACKEND": "agg", "PYTHONPATH": ""}

@@ -159,7 +159,7 @@ def test_the_end_of_its_process_and_a_hang_are_errors(make: Make, tmp_path: Path
         robot = make(segment)
         robot.connect()
         robot.segment._timeout = -1.0  # any row is too old
-        with pytest.raises(o80.TimeoutError, match="has published nothing"):
+        with pytest.raises(o80.TimeoutError, match="has had no row"):
             robot.get_observation()
         robot.segment._timeout = 60.0
     with pytest.raises(o80.BackendGone):
