@@ -43,7 +43,10 @@ void set_policy(const RealTimeOptions& options, std::vector<std::string>& refuse
   const bool automatic = options.policy == RealTimeOptions::Policy::automatic;
   sched_param parameter{};
   parameter.sched_priority = options.priority;
-  if (sched_setscheduler(0, round_robin ? SCHED_RR : SCHED_FIFO, &parameter) != 0) {
+  int policy = round_robin ? SCHED_RR : SCHED_FIFO;
+  // its guard does not reach programs that the thread starts: SIGXCPU would end them
+  if (automatic) policy |= SCHED_RESET_ON_FORK;
+  if (sched_setscheduler(0, policy, &parameter) != 0) {
     if (automatic) return;
     std::string text = "real-time priority " + std::to_string(options.priority) + " was refused (" +
                        std::strerror(errno) + ")";

@@ -276,7 +276,7 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
   });
   announce(table, loop->backend());
   if (automatic) {
-    std::puts(sched_getscheduler(0) == SCHED_FIFO
+    std::puts((sched_getscheduler(0) & ~SCHED_RESET_ON_FORK) == SCHED_FIFO
                   ? "policy auto: fifo, as long as the loop sleeps at least every 200 ms"
                   : "policy auto: other. fifo needs permission, two processors, real time, and a "
                     "driver in C++ that is not simulated (docs/real_time.md)");

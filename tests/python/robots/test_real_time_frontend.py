@@ -11,7 +11,7 @@ from processes import WAIT
 import o80
 
 TWO_CONTROLLERS = """
-import os, sys, threading, time, o80
+import os, subprocess, sys, threading, time, o80
 
 ready, over = threading.Event(), threading.Event()
 policies = {}
@@ -20,6 +20,8 @@ def waits(process):
     with process.frontend(real_time=True):
         ready.set()
         over.wait()
+        ask = "import os; print(os.sched_getscheduler(0))"
+        policies["child"] = subprocess.check_output([sys.executable, "-c", ask], text=True)
         policies["waits"] = os.sched_getscheduler(0), os.sched_getparam(0).sched_priority
 
 def spins(process):
@@ -30,7 +32,7 @@ def spins(process):
         other.start()
         ready.wait()
         end = time.monotonic() + 30
-        while os.sched_getscheduler(0) == os.SCHED_FIFO and time.monotonic() < end:
+        while os.sched_getscheduler(0) & os.SCHED_FIFO and time.monotonic() < end:
             pass
         policies["after"] = os.sched_getscheduler(0) & ~os.SCHED_RESET_ON_FORK, 0
         over.set()
@@ -61,9 +63,10 @@ def test_a_controller_that_does_not_sleep_becomes_an_ordinary_thread_and_no_othe
         capture_output=True, text=True, timeout=WAIT, check=True,
     )  # fmt: skip
     assert ast.literal_eval(ran.stdout) == {
-        "before": (os.SCHED_FIFO, 49),
+        "before": (os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 49),
         "after": (os.SCHED_OTHER, 0),
-        "waits": (os.SCHED_FIFO, 49),
+        "waits": (os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 49),
+        "child": "0\n",  # the guard is not inherited, so the policy is not
         "main": (os.SCHED_OTHER, 0),
     }
     assert "it lost its real-time priority" in ran.stderr
