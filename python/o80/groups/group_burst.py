@@ -58,13 +58,15 @@ class GroupBurst(BurstArrays):
         if instead is None:
             self._group.burst(self._compiled, chosen, timeout)
             return
-        others, request = instead
-        if not (isinstance(others, np.ndarray) and others.dtype == np.bool_):
-            numbers = chosen_copies(others, self._everybody)
-            others = np.zeros(len(self._everybody), np.bool_)
-            others[numbers] = True
+        others, request = _mask(instead[0], self._everybody), instead[1]
         if request._group is not self._group:
             raise InvalidArgument("the request and the burst must be of the same group")
+        if copies is not None:
+            missing = np.setdiff1d(others.nonzero()[0], chosen.view(np.uint32))
+            if missing.size:
+                raise InvalidArgument(
+                    f"copies {missing.tolist()} of `instead` must be among the copies that run"
+                )
         payloads = request._payloads
         self._group.burst(self._compiled, chosen, timeout, others, request._request, payloads)
 
@@ -152,6 +154,16 @@ def chosen_copies(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.u
         if not 0 <= low <= high < len(everybody):
             raise InvalidArgument(f"there are copies 0 to {len(everybody) - 1}, got {copies!r}")
     return np.ascontiguousarray(given, np.uint32)
+
+
+def _mask(copies: Copies, everybody: NDArray[np.uint32]) -> NDArray[np.bool_]:
+    """Returns the choice as a mask (copies,). Raises InvalidArgument for a wrong choice."""
+    given = copies if isinstance(copies, np.ndarray) else everybody
+    if given.dtype == np.bool_ and given.shape == everybody.shape:
+        return np.ascontiguousarray(given)
+    mask = np.zeros(len(everybody), np.bool_)
+    mask[chosen_copies(copies, everybody)] = True
+    return mask
 
 
 def _feeds(

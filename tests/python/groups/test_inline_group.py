@@ -206,8 +206,14 @@ def test_a_request_instead_of_the_burst_is_both_calls_in_one(group: o80.InlineGr
             assert rows[0][[1, 4]].tobytes() == np.repeat(newest, 10, axis=1).tobytes()
         with pytest.raises(o80.InvalidArgument, match="of the same group"):
             bursts[0].run(instead=([1], resets[1]))
-        with pytest.raises(o80.InvalidArgument, match="copies 0 to 4"):
-            bursts[0].run(instead=([5], resets[0]))
+        for wrong, words in (([5], "copies 0 to 4"), (np.array([True, False]), r"shape \(5,\)")):
+            with pytest.raises(o80.InvalidArgument, match=words):
+                bursts[0].run(instead=(wrong, resets[0]))
+        with pytest.raises(o80.InvalidArgument, match=r"copies \[3\] of `instead` must be among"):
+            bursts[0].run([0, 1], instead=([1, 3], resets[0]))
+        before = group.latest([4])["iteration"]
+        bursts[0].run(instead=(np.eye(COPIES, dtype=bool)[:, 4], resets[0]))  # not contiguous
+        assert group.latest([4])["iteration"] == before + 1
         restore = group.prepared_request("restore", slot=9)  # there are slots 0 to 7
         with pytest.raises(o80.CopyFailed, match="copy 2 of 'two_joints' failed"):
             bursts[0].run(instead=([2], restore))
