@@ -206,10 +206,10 @@ def test_a_binding_includes_the_casters_that_it_uses(file: Path) -> None:
 # ---------------------------------------------------------------------------------- the ceilings
 
 CEILINGS = {
-    "include, src": (34_399, 0),
+    "include, src": (34_401, 0),
     "python/bindings": (5_724, 0),
-    "python/o80": (30_027, 0),
-    "python/o80/hybrid": (2_456, 0),
+    "python/o80": (30_039, 0),
+    "python/o80/hybrid": (2_458, 0),
     "python/o80/learning/training, python/o80/learning/__main__.py": (1_479, 0),
     "python/o80/view/page": (1_222, 0),
     "docs": (571, 0),
@@ -222,7 +222,7 @@ CEILINGS = {
     "apps/table_tennis": (8_399, 4_409),
     "benchmarks, tools": (4_384, 0),
     "examples": (1_985, 0),
-    "tests, conftest.py": (0, 62_349),
+    "tests, conftest.py": (0, 62_358),
 }
 """Most lines of product and of tests in each room. Whoever raises one says why in the commit."""
 LANGUAGES = {".py", ".cpp", ".hpp", ".js"}

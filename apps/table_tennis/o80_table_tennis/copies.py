@@ -223,7 +223,7 @@ class TableTennisCopies(HybridTask):
         joints[copies, ::2], joints[copies, 1::2] = motion[:, :JOINTS], motion[:, JOINTS:]
         numbers[copies, 2 * JOINTS :] = [draw.flights[0].states[0] for draw in self.draws]
         launch.run(copies)
-        with_padding(self.world.rows)[copies, 0] = with_padding(launch.rows)[copies]
+        self.world.show(copies, with_padding(launch.rows)[copies, np.newaxis])
 
     def commanded(self, copies: Index = EVERY) -> FloatArray:
         """Normalised desired pressures (n, 8) of the last rows, a fresh array."""

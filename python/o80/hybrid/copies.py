@@ -18,7 +18,6 @@ from o80.hybrid.starts import BURST, Home, Starts
 from o80.hybrid.worlds import Worlds
 from o80.learning.task import Index
 from o80.robots.robot import Robot
-from o80.rows.layout import with_padding
 
 Numbers = NDArray[np.intp]
 
@@ -98,8 +97,7 @@ class Copies:
         """Resets robots and worlds, each world with the positions of its robot."""
         self._starts.begin(copies, [pair[0] for pair in seeds], self.period)
         if not self._starts.shows:
-            newest = with_padding(self._robots.latest(copies))
-            with_padding(self.robot.rows)[copies] = newest[:, np.newaxis]
+            self.robot.show(copies, self._robots.latest(copies)[:, np.newaxis])
         self._worlds.reset(copies, [pair[1] for pair in seeds], self.robot)
 
     def mirror(self, copies: Numbers) -> None:

@@ -100,6 +100,10 @@ class Side:
         request.run(numbers)
         self._flat[numbers] = rows[numbers]
 
+    def show(self, copies: NDArray[np.intp], rows: NDArray[Any]) -> None:
+        """Sets all rows of these copies to rows (n, 1), for worlds (n, worlds, 1)."""
+        self._bytes[copies] = with_padding(rows)
+
     def newest(self, copies: NDArray[np.intp]) -> NDArray[Any]:
         """Returns the newest rows (n,) or (n, worlds) of these copies, as a copy."""
         return self._bytes[copies, ..., -1].view(self.rows.dtype)

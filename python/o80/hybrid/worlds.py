@@ -20,7 +20,7 @@ from o80.hybrid.sides import Side, numbers_of_worlds
 from o80.rows.layout import field_view, with_padding
 
 Numbers = NDArray[np.intp]
-Feeds = list[tuple[Sequence[NDArray[Any]], NDArray[Any]]]
+Feeds = list[tuple[Sequence[NDArray[Any]], NDArray[Any]]]  # two targets, as in _targets; numbers
 TIMEOUT = 20.0
 """Longest wait for a row [s]."""
 
@@ -71,9 +71,9 @@ class Worlds:
         self._follow: Any = member.prepared_burst(iterations, world.joints, steps=iterations)
         self._one: Any = member.prepared_burst(1, world.joints)
         self._shape = copies, self._each
+        # of `mirror` and of `follow`
         self._targets = [self._by_copy(burst.targets) for burst in (self._one, self._follow)]
         self._first = with_padding(self._by_copy(self._one.rows))
-        self._rows = with_padding(self._by_copy(self._follow.rows))
         self._feeds: Feeds = []
         self.side = Side(member, self._by_copy(self._follow.rows), each)
         self._resets = self.side.serves("reset")
@@ -104,7 +104,7 @@ class Worlds:
         if not self._feeds:
             self._put(self._targets[0], copies, *self.motion.standing(robots.newest(copies)))
         self._run(self._one, copies, seen)
-        self._rows[copies] = self._first[copies]
+        self.side.show(copies, self._first[copies])
 
     def follow(
         self, copies: Numbers, rows: NDArray[Any], period: float, seen: _core.Seen | None = None
