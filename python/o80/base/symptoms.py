@@ -9,7 +9,7 @@ PAGES = {
     "replay_differs": r"replay differs",
     "arm_does_not_move": r"^(NotReached|NotCompleted|BackendHalted):",
 }
-"""The name of each page, and what a text says that the page is about. The first one counts."""
+"""Name of each page, and a pattern of the texts that it explains. The first match counts."""
 
 
 def see(page: str) -> str:

@@ -43,8 +43,8 @@ class GroupBurst(BurstArrays):
         """Sends the targets, with all else that was added, and bursts; fills `rows`.
 
         copies: numbers of the copies that run, a slice, or a mask (None: all).
-        instead: some of these copies, and a request that they run instead in the same call, such
-            as a reset; all their rows are then their newest row.
+        instead: (copies, request). These copies run the request, such as a reset, in the same call
+            in place of the burst. All their rows are then their newest row.
         timeout: for all copies together [s].
 
         Raises CopyFailed with the exception of each copy that failed (for example targets that the

@@ -74,8 +74,9 @@ class Process(lifecycle.Managed):
 
         real_time: give the calling thread the policy fifo, one priority below the loop's, so that
             busy programs do not delay its waits. After 200 ms without sleep it becomes an ordinary
-            thread again and says so on the standard error. If the loop has no real-time priority,
-            or the machine refuses, a RuntimeWarning says so.
+            thread again and reports this on the standard error. If the loop has no real-time
+            priority, or the machine refuses, a RuntimeWarning reports this. Threads and programs
+            that it starts are ordinary.
         """
         frontend = Frontend(self.segment, timeout, **options)
         if real_time:

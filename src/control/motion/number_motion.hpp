@@ -176,8 +176,8 @@ class NumberMotion {
 
  private:
   bool is_away() const noexcept { return rest_ && !held_ && guard_.position() != *rest_; }
-  /// One iteration of the former plan, if a stop would leave the bounds. Where that has led, the
-  /// shortest stop may leave the span with which the motion began: what follows stops there, too.
+  /// Runs an iteration of the former plan as long as a stop would leave the bounds. Then widens the
+  /// span by the shortest stop from here, which may lie outside the span of the motion's start.
   bool leave() noexcept {
     if (!leaves_) return false;
     leaves_ = !guard_.stops_inside();

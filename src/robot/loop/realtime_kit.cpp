@@ -130,7 +130,7 @@ void become_ordinary(int) {
   limit.rlim_cur = longest_run;  // the kernel has raised it
   setrlimit(RLIMIT_RTTIME, &limit);
   constexpr std::string_view kText =
-      "o80: a thread did not sleep for so long that it lost its real-time priority: it continues "
+      "o80: a thread ran too long without sleep and lost its real-time priority: it continues "
       "as an ordinary thread. See docs/real_time.md, or lower --frequency\n";
   pollfd error{.fd = STDERR_FILENO, .events = POLLOUT, .revents = 0};
   if (poll(&error, 1, 0) == 1 && write(STDERR_FILENO, kText.data(), kText.size()) < 0) errno = 0;

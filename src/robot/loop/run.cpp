@@ -253,7 +253,7 @@ bool may_have_priority(int priority) noexcept {
 }
 
 /// True for a driver in C++ of a robot of the world, in real time, where another processor is left.
-bool suits_automatic(const SchemaHead& head) noexcept {
+bool admits_automatic(const SchemaHead& head) noexcept {
   cpu_set_t allowed;
   return head.of_the_world == 1 && head.bursting == 0 &&
          sched_getaffinity(0, sizeof allowed, &allowed) == 0 && CPU_COUNT(&allowed) > 1;
@@ -270,7 +270,7 @@ int run_robot(const RobotTable& table, const RunOptions& options) {
   // whoever waits for the robot to run finds these lines in its output
   const SchemaHead& head = loop->backend().schema().head;
   const bool automatic = real_time.policy == RealTimeOptions::Policy::automatic;
-  if (automatic && !suits_automatic(head)) real_time.policy = RealTimeOptions::Policy::other;
+  if (automatic && !admits_automatic(head)) real_time.policy = RealTimeOptions::Policy::other;
   loop->start([&] {
     for (const std::string& refused : set_up_real_time(real_time)) complain(refused.c_str());
   });

@@ -13,8 +13,10 @@ GOALS = 5
 
 
 def rule(seen: Any) -> Any:
-    """Returns actions (n, 2) for observations (n, 9): behind the puck, in line with its goal, the
-    fingers go ahead, more slowly near the goal; beside the puck they go back.
+    """Returns actions (n, 2) for observations (n, 9).
+
+    Behind the puck and in line with its goal, the fingers move ahead, more slowly near the goal;
+    beside the puck they move back.
     """
     before, aside, far = seen[:, 0] / 15, seen[:, 5] / 15, seen[:, 4] / 10  # [m]
     ahead = np.clip(far / 0.05, 0.1, 1.0)
@@ -27,7 +29,7 @@ def run() -> None:
     record = sys.argv[1] if len(sys.argv) > 1 else None
     print(
         "A simulated SO-101 runs in real time in its own process; a simulated world in another\n"
-        "process copies its motion, and only this world has a puck. A rule of six lines pushes\n"
+        "process copies its motion, and only this world has a puck. A rule of four lines pushes\n"
         f"it to {GOALS} goals.\n# distance of the puck from its goal [m], . {NEAR} m to reach\n"
     )
     reached = 0
@@ -45,5 +47,5 @@ def run() -> None:
             name = "reached" if success else "missed"
             print("\n".join(chart(name, seconds, near, np.array(far))), flush=True)
     print(f"\n{reached} of {GOALS} goals reached. A policy that has learned reaches more:")
-    print("  pip install torch==2.13.0 'o80[stable-baselines3]'")
+    print("  pip install torch==2.13.0 'o80[stable-baselines3,record]'")
     print("  python -m o80.learning train o80_arms.push:Push --decisions 300000")
