@@ -197,9 +197,12 @@ class Reader:
         process = subprocess.Popen(["bash", "-c", text], stdin=subprocess.PIPE, process_group=0)
         self.running.append((text, process))
         begun, robot = time.monotonic(), re.match(r"o80 (run|play)\b", text)
+        file = re.search(r" (?:-o|>) (\S+)$", text)
         while process.poll() is None and time.monotonic() < begun + END:
             now = {each.name for each in o80.segments() if each.state == "running"}
-            if (now - before) if robot else time.monotonic() > begun + BEGIN:
+            written = not file or (Path(file[1]).exists() and Path(file[1]).stat().st_size > 0)
+            passed = time.monotonic() > begun + BEGIN
+            if (now - before) if robot else passed and written:
                 return
             time.sleep(0.05)
         assert process.returncode == 0, f"{self.page}: {text}: does not begin ({process.poll()})"
