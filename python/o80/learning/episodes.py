@@ -1,5 +1,6 @@
 """Runs the parts of a step and of a reset in order, for one copy and for many."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -79,10 +80,11 @@ def step_others(
 def _stepped(task: Task, copies: Index, stepped: NDArray[np.bool_] | None = None) -> Stepped:
     """Judges these copies after a step, except those that are not `stepped` (copies,)."""
     halted = _halted(task, copies)
-    if stepped is None:
-        task.steps[copies] += 1
+    one = 1 if stepped is None else stepped
+    if copies is EVERY:
+        task.steps += one
     else:
-        task.steps += stepped
+        task.steps[copies] += one
     rewards = np.zeros(task.copies)
     terminated, truncated = np.zeros(task.copies, np.bool_), np.zeros(task.copies, np.bool_)
     judged_info: Mapping[str, Any] = {}
@@ -92,8 +94,9 @@ def _stepped(task: Task, copies: Index, stepped: NDArray[np.bool_] | None = None
         if not isinstance(outcome, Outcome):
             name = type(task).__name__
             raise InvalidArgument(f"{name}.judge must return an Outcome, got {outcome!r}")
-        rewards[judged] = outcome.reward
-        if not np.isfinite(rewards).all():
+        rewards[judged] = reward = outcome.reward
+        whole = math.isfinite(reward) if type(reward) is float else np.isfinite(rewards).all()
+        if not whole:
             copy = int(np.flatnonzero(~np.isfinite(rewards))[0])
             raise InvalidArgument(
                 f"{type(task).__name__}.judge gave copy {copy} the reward {rewards[copy]}: it must "

@@ -12,7 +12,7 @@ from o80.base.errors import CopyFailed
 from o80.groups.gather import Gather
 from o80.groups.group_burst import GroupBurst, GroupRequest
 from o80.groups.inline_group import InlineGroup
-from o80.learning.task import Index, Task
+from o80.learning.task import EVERY, Index, Task
 
 if TYPE_CHECKING:
     from o80.view.pictures import Pictures  # needs the extra `record`
@@ -107,7 +107,7 @@ class GroupTask(Task):
         """Sends the targets of these copies, and runs a burst of these copies."""
         self.burst.targets[copies] = self.targets(actions)
         with self.until_halted():
-            self.burst.run(copies)
+            self.burst.run(None if copies is EVERY else copies)
 
     def observe(self, copies: Index) -> Any:
         """Returns the gathered numbers (n, numbers)."""
@@ -117,8 +117,9 @@ class GroupTask(Task):
         """Returns (copies,) with a flag raised; all copies if there are no flags."""
         if not self._has_flags:
             return super().flagged()
-        raised: NDArray[np.bool_] = np.logical_or.reduce(self.seen.flags, axis=1)
-        return raised
+        flags = self.seen.flags
+        raised: NDArray[np.bool_] = flags[:, 0]
+        return raised if flags.shape[1] == 1 else np.logical_or.reduce(flags, axis=1)
 
     def render(self, copy: int) -> Image:
         """Draws a picture (height, width, 3) of the robot's model in the newest row of a copy."""

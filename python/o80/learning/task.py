@@ -92,6 +92,7 @@ class Task(ABC):
         self.max_steps = None if max_steps is None else whole(max_steps, "max_steps", 1)
         self.steps: NDArray[np.int64] = np.zeros(self.copies, np.int64)
         """(copies,) steps of each episode so far; counted by the environment."""
+        self._bounds: tuple[Any, Any, Any] = None, None, None  # a space, and those of all copies
 
     def restart(
         self,
@@ -139,7 +140,15 @@ class Task(ABC):
             raise InvalidArgument(
                 f"{type(self).__name__} has actions of {space}: define targets(actions)"
             )
-        return np.minimum(np.maximum(actions, space.low), space.high)  # np.clip is slower
+        of, low, high = self._bounds
+        if of is not space:
+            shape = self.copies, *space.shape
+            # NumPy is slow where it repeats the bounds of one copy, and np.clip is slower
+            low, high = (np.broadcast_to(each, shape).copy() for each in (space.low, space.high))
+            self._bounds = space, low, high
+        if (count := len(actions)) < self.copies:
+            low, high = low[:count], high[:count]
+        return np.minimum(np.maximum(actions, low), high)
 
     @abstractmethod
     def observe(self, copies: Index) -> Any:
