@@ -241,7 +241,7 @@ double FastestMotion::next() noexcept {
     acceleration = (1.0 - share_) * acceleration + share_ * nearer_.acceleration(done_);
   }
   speed_ += acceleration;
-  position_ += sign_ * speed_;
+  position_ += sign_ < 0.0 ? -speed_ : speed_;
   return static_cast<double>(position_);
 }
 

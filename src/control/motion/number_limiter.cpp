@@ -5,8 +5,6 @@
 namespace o80 {
 namespace {
 
-// rounding of the interpolation does not exceed a limit
-constexpr double kLimitRounding = 1e-9;
 constexpr int kHalvings = 16;
 
 /// The highest speed from which a number stops within the distance `room`, if it slows down by
@@ -28,23 +26,6 @@ NumberLimiter::NumberLimiter(double minimum, double maximum, const Rates& rates)
                  std::isfinite(rates.jerk)) {
   const double finest = std::min({rates.speed, rates.acceleration, rates.jerk});
   tolerance_ = std::isfinite(finest) ? kLimitRounding * finest : 0.0;
-}
-
-/// Limits and bounds may be exceeded by rounding.
-bool NumberLimiter::pass_rounded(double next) noexcept {
-  const double speed = next - now_.position;
-  const double acceleration = speed - now_.speed;
-  const double room = rounding();
-  const auto within = [&](double value, double limit) {
-    return std::abs(value) <= limit * (1.0 + kLimitRounding) + room;
-  };
-  Span allowed = bounds_;
-  allowed.include(now_.position);
-  const bool keeps = within(speed, rates_.speed) && within(acceleration, rates_.acceleration) &&
-                     within(acceleration - now_.acceleration, rates_.jerk) &&
-                     next <= allowed.high + room && next >= allowed.low - room;
-  if (keeps) accept(std::clamp(next, allowed.low, allowed.high));
-  return keeps;
 }
 
 /// The speeds from which it stops inside its bounds, in both directions.

@@ -95,18 +95,26 @@ class NumberLimiter {
              std::min(bounds_.high, std::max(span_.high, position))};
   }
 
-  /// One iteration of a plan: to `next`, if all limits allow it; else false, and nothing changes.
-  bool pass(double next) noexcept {
+  /// One iteration of a plan: to `next`, if all limits and bounds allow it but for rounding; else
+  /// false, and nothing changes.
+  [[gnu::always_inline]] bool pass(double next) noexcept {
+    scale_ = std::max(scale_, std::abs(next));
     const double speed = next - now_.position;
     const double acceleration = speed - now_.speed;
-    const bool keeps = next <= bounds_.high && next >= bounds_.low &&
-                       (!has_rates_ || (std::abs(speed) <= rates_.speed &&
-                                        std::abs(acceleration) <= rates_.acceleration &&
-                                        std::abs(acceleration - now_.acceleration) <= rates_.jerk));
-    scale_ = std::max(scale_, std::abs(next));
-    if (!keeps) return pass_rounded(next);
-    accept(next);
-    return true;
+    const double room = rounding();
+    const auto within = [room](double value, double limit) {
+      return std::abs(value) <= limit * (1.0 + kLimitRounding) + room;
+    };
+    // one branch for all limits: which of them rounding exceeds cannot be predicted
+    const bool keeps_rates = within(speed, rates_.speed) &
+                             within(acceleration, rates_.acceleration) &
+                             within(acceleration - now_.acceleration, rates_.jerk);
+    Span allowed = bounds_;
+    allowed.include(now_.position);
+    const bool keeps =
+        (keeps_rates || !has_rates_) && next <= allowed.high + room && next >= allowed.low - room;
+    if (keeps) accept(std::clamp(next, allowed.low, allowed.high));
+    return keeps;
   }
   /// One iteration to `next`, whatever the limits say.
   void accept(double next) noexcept {
@@ -155,13 +163,15 @@ class NumberLimiter {
   Limit nearest_speed(double wanted) noexcept;
 
  private:
+  // rounding of the interpolation does not exceed a limit
+  static constexpr double kLimitRounding = 1e-9;
+
   /// A possible next state and its shortest stop.
   struct Candidate {
     Moment moment;
     VelocityChange stop;
   };
 
-  bool pass_rounded(double next) noexcept;
   Limit follow_without_jerk(double step, double lag) noexcept;
   Limit follow_with_jerk(double step, double lag) noexcept;
   Limit accelerate(double wanted) noexcept;
