@@ -86,7 +86,7 @@ def test_the_example_over_udp_builds_outside_the_tree(tmp_path: Path) -> None:
 def scale(tmp_path_factory: pytest.TempPathFactory) -> o80.robots.Robot:
     """A robot library made by a compiler alone."""
     library = tmp_path_factory.mktemp("scale") / "scale.so"
-    flags = ["-std=c++20", "-shared", "-fPIC", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
+    flags = ["-std=c++20", "-O3", "-shared", "-fPIC", "-Wall", "-Wextra", "-Wpedantic", "-Werror"]
     source = PROJECT.parent / "headers_only.cpp"
     run("c++", *flags, f"-I{PACKAGE / 'include'}", source, "-o", library)
     return o80.robots.load(library)
