@@ -102,13 +102,13 @@ class NumberLimiter {
     const double speed = next - now_.position;
     const double acceleration = speed - now_.speed;
     const double room = rounding();
-    const auto within = [room](double value, double limit) {
-      return std::abs(value) <= limit * (1.0 + kLimitRounding) + room;
-    };
     // one branch for all limits: which of them rounding exceeds cannot be predicted
-    const bool keeps_rates = within(speed, rates_.speed) &
-                             within(acceleration, rates_.acceleration) &
-                             within(acceleration - now_.acceleration, rates_.jerk);
+    const auto within = [room](double value, double limit) -> unsigned {
+      return std::abs(value) <= limit * (1.0 + kLimitRounding) + room ? 1 : 0;
+    };
+    const unsigned keeps_rates = within(speed, rates_.speed) &
+                                 within(acceleration, rates_.acceleration) &
+                                 within(acceleration - now_.acceleration, rates_.jerk);
     Span allowed = bounds_;
     allowed.include(now_.position);
     const bool keeps =
