@@ -92,7 +92,8 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   // a row begins at the row before it
   if (first_row || !is_row_) layout_.copy(from(), desired);
   const std::byte* observed = first_row ? std::exchange(observed_, nullptr) : nullptr;
-  if (observed != nullptr) layout_.copy_finite(from(), observed);
+  starts_observed_ = observed != nullptr;
+  if (starts_observed_) layout_.copy_finite(from(), observed);
   if (is_row_ && profile_ == Profile::hold) layout_.copy(from(), target());
 
   std::int64_t longest = std::max<std::int64_t>(1, course.iterations);
@@ -109,23 +110,12 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
   }
   requested_by_speed_ = longest;
   for (Number& each : numbers_) {
-    if (!each.is_commanded) continue;
-    const bool at_published = observed != nullptr || !each.is_limited;
-    const double start =
-        at_published ? layout_.number(each.number, from()) : each.motion.position();
-    if (is_row_) {
-      if (observed != nullptr) {
-        each.motion.start_at(start);
-      } else if (!each.motion.is_planned()) {
-        each.motion.start_from({start}, false);
-      }
-      continue;
-    }
+    if (!each.is_commanded || is_row_) continue;
     Requested requested = course;
     requested.target = layout_.number(each.number, target());
-    requested.line_start = start;
+    requested.line_start = start_of(each);
     if (!first_row) each.motion.begin();
-    if (observed != nullptr) requested.start = requested.line_start;
+    if (starts_observed_) requested.start = requested.line_start;
     if (each.number != course.first) requested.cruise = kUnlimited;
     const std::int64_t fewest = each.motion.propose(requested);
     if (each.number == course.first) requested_by_speed_ = fewest;
@@ -138,6 +128,11 @@ std::int64_t Motion::propose(const Course& course, const std::byte* desired) noe
 
 /// Plans the way of one number to the next row.
 void Motion::to_row(Number& number, std::int64_t iterations) noexcept {
+  if (starts_observed_) {
+    number.motion.start_at(start_of(number));
+  } else if (!number.motion.is_planned()) {
+    number.motion.start_from({start_of(number)}, false);
+  }
   const double row = layout_.number(number.number, target());
   if (profile_ == Profile::hold) return number.motion.jump_on(row);
   if (profile_ == Profile::linear) return number.motion.line_on(row, iterations);

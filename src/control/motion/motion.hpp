@@ -252,6 +252,10 @@ class Motion {
     return std::ranges::any_of(numbers_, predicate, &Number::motion);
   }
   std::byte* from() noexcept { return reinterpret_cast<std::byte*>(ends_.data()); }
+  double start_of(const Number& number) noexcept {
+    const bool at_published = starts_observed_ || !number.is_limited;
+    return at_published ? layout_.number(number.number, from()) : number.motion.position();
+  }
   void to_row(Number& number, std::int64_t iterations) noexcept;
   void blend(Iteration now, std::byte* state) noexcept;
   void publish(const Number& number, std::byte* state) noexcept;
@@ -265,6 +269,7 @@ class Motion {
   Iteration last_ = 0;
   Profile profile_ = Profile::linear;
   const std::byte* observed_ = nullptr;
+  bool starts_observed_ = false;  // what propose() planned last
   bool has_integrals_ = false;
   bool is_row_ = false;
   // as in Course

@@ -142,17 +142,20 @@ std::int64_t NumberPlan::fewest_smooth(std::int64_t least) noexcept {
   return enough;
 }
 
-bool NumberPlan::fits(const SmoothMotion& motion) const noexcept {
+/// `speed`: of its start. In that direction it may be faster than the speed asked for.
+bool NumberPlan::fits(const SmoothMotion& motion, double speed) const noexcept {
   const SmoothMotion::Extremes most = motion.extremes();
-  const double speed =
-      std::min(task_.rates.speed, std::max(task_.cruise, std::abs(task_.from.speed)));
+  const auto fastest = [&](double side) {
+    return std::min(task_.rates.speed, std::max(task_.cruise, side * speed));
+  };
   const auto within = [](double value, double limit) {
     return value <= limit * (1.0 + kPlanRounding / 2.0);
   };
   const double rounding = 4.0 * std::numeric_limits<double>::epsilon() *
                           std::max(std::abs(task_.span.low), std::abs(task_.span.high));
   return most.positions.low >= task_.span.low - rounding &&
-         most.positions.high <= task_.span.high + rounding && within(most.speed, speed) &&
+         most.positions.high <= task_.span.high + rounding &&
+         within(most.speeds.high, fastest(1.0)) && within(-most.speeds.low, fastest(-1.0)) &&
          within(most.acceleration, task_.rates.acceleration) && within(most.jerk, task_.rates.jerk);
 }
 
@@ -161,7 +164,7 @@ bool NumberPlan::plan_smooth(std::int64_t iterations) noexcept {
   smooth_for_ = iterations;
   shape_ = Shape::smooth;
   smooth_ = SmoothMotion(task_.from, task_.target, iterations);
-  if (fits(smooth_)) return true;
+  if (fits(smooth_, task_.from.speed)) return true;
   const bool moves = task_.from.speed != 0.0 || task_.from.acceleration != 0.0;
   if (!std::isfinite(task_.rates.acceleration) && moves && stop_then_smooth(iterations))
     return true;
@@ -174,7 +177,7 @@ bool NumberPlan::plan_smooth(std::int64_t iterations) noexcept {
   const double a2 = second - first;
   return std::abs(a1) <= task_.rates.acceleration &&
          std::abs(a1 - task_.from.acceleration) <= task_.rates.jerk &&
-         std::abs(a2 - a1) <= task_.rates.jerk && fits(smooth_);
+         std::abs(a2 - a1) <= task_.rates.jerk && fits(smooth_, 0.0);
 }
 
 /// Without a limit of acceleration: comes to rest in a half, a quarter, ... of the iterations, the
@@ -187,9 +190,9 @@ bool NumberPlan::stop_then_smooth(std::int64_t iterations) noexcept {
         task_.from.position + r * task_.from.speed / 2.0 + r * r * task_.from.acceleration / 12.0;
     if (!(rest >= task_.span.low && rest <= task_.span.high)) continue;
     to_stop_ = SmoothMotion(task_.from, rest, stop_);
-    if (!fits(to_stop_)) continue;
+    if (!fits(to_stop_, task_.from.speed)) continue;
     smooth_ = SmoothMotion({rest}, task_.target, iterations - stop_);
-    if (!fits(smooth_)) continue;
+    if (!fits(smooth_, 0.0)) continue;
     shape_ = Shape::stop_first;
     return true;
   }

@@ -178,7 +178,7 @@ class NumberPlan {
     return is_smooth_ = plan_smooth(iterations);
   }
   bool plan_smooth(std::int64_t iterations) noexcept;
-  bool fits(const SmoothMotion& motion) const noexcept;
+  bool fits(const SmoothMotion& motion, double speed) const noexcept;
   bool stop_then_smooth(std::int64_t iterations) noexcept;
 
   PlanTask task_;

@@ -59,10 +59,10 @@ SmoothMotion::Extremes SmoothMotion::extremes() const noexcept {
   const auto [h0, h1, h2] = h.c;
   const Quadratic k{{(n + 3.0) * (h1 - h2) - h0, h2 * (2.0 * n + 7.0) - 2.0 * h1, -3.0 * h2}};
 
-  Extremes all{{target_, target_}, 0.0, 0.0, 0.0};
+  Extremes all{{target_, target_}, {}, 0.0, 0.0};
   const auto widen = [](double& most, double value) { most = std::max(most, std::abs(value)); };
   const auto place = [&](double i) { all.positions.include(position(i)); };
-  const auto speed = [&](double i) { widen(all.speed, (n - i + 1.0) * (n - i + 2.0) * u.at(i)); };
+  const auto speed = [&](double i) { all.speeds.include((n - i + 1.0) * (n - i + 2.0) * u.at(i)); };
   const auto acceleration = [&](double i) { widen(all.acceleration, (n - i + 2.0) * h.at(i)); };
   const auto jerk = [&](double i) { widen(all.jerk, k.at(i)); };
 

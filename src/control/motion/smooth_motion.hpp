@@ -26,8 +26,8 @@ class SmoothMotion {
   /// Largest values from the first iteration to rest.
   struct Extremes {
     Span positions;
-    double speed;  // sizes of the differences
-    double acceleration;
+    Span speeds;
+    double acceleration;  // size
     double jerk;
   };
   Extremes extremes() const noexcept;

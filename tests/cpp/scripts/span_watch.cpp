@@ -124,13 +124,12 @@ void SpanWatch::begin(const ScriptWorld& world, std::size_t actuator, bool taken
     Span span{place, place};
     if (step.head.start == Start::observed && track.reading && world.names(command, n) &&
         std::isfinite(*track.reading)) {
-      const Kind kind = world.script.actuators[actuator].numbers[n].kind;
-      const long double reading = as_stored(kind, *track.reading);
+      const NumberSpec& spec = world.script.actuators[actuator].numbers[n];
+      const long double reading = as_stored(spec.kind, *track.reading);
       span.include(reading);
-      // limits count from the last desired state
-      if (!world.script.actuators[actuator].numbers[n].limited()) {
-        number.from = reading;
-      }
+      // it jumps there, unless limits count from the last desired state
+      const bool is_inside = reading >= spec.limits.minimum && reading <= spec.limits.maximum;
+      if (is_inside && !std::isfinite(spec.limits.speed)) number.from = reading;
     }
     if (taken_over) {
       span.include(

@@ -86,5 +86,40 @@ TEST(Pace, ASpeedIsThatOfTheFirstNumberTheCommandNames) {
   }
 }
 
+// rule C7
+TEST(Pace, AMotionThatIsTurnedBackIsNoFasterThanItsSpeed) {
+  for (const bool limited : {false, true}) {
+    Schema schema = plain_robot(1);
+    if (limited) schema.actuator(0).limits({.speed = 5000, .acceleration = 400'000, .jerk = 2e8});
+    Rig rig(schema);
+    rig.add(0, smoothly(over(10)), {20.0});
+    rig.pulse();
+    double before = rig.run(5).back();
+    rig.add(0, overwriting(smoothly(at_speed(227.0))), {before - 3.5});
+    const CommandId batch = rig.pulse();
+    for (int i = 0; i < 500 && rig.controller.active(); ++i) {
+      rig.step();
+      ASSERT_GE(rig.desired() - before, -0.227 * (1.0 + 1e-9)) << limited << ' ' << i;
+      before = rig.desired();
+    }
+    EXPECT_EQ(rig.witness.status(batch + 2), Status::completed) << limited;
+  }
+}
+
+TEST(Pace, ACommandThatWouldTakeTooLongMovesNothing) {
+  Rig rig(plain_robot(1, 2));
+  rig.observe(8, 100.0);
+  rig.add_rows(0, from_observed(at_speed(1e-9)), 2, {1e9, 5.0, 2e9, 6.0});
+  const CommandId batch = rig.pulse();
+  rig.step();
+  EXPECT_EQ(rig.witness.status(batch + 2), Status::rejected);
+  rig.add(0, smoothly(over(10)), {0.0, 1.0});
+  rig.pulse();
+  for (const double desired : rig.run(10, 1)) {
+    EXPECT_GE(desired, 0.0);
+    EXPECT_LE(desired, 1.0);
+  }
+}
+
 }  // namespace
 }  // namespace o80::test
