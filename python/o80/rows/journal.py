@@ -15,16 +15,7 @@ from o80.rows.enumerations import labelled
 from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, request_fields
 from o80.rows.record import Record
 
-ENDS = frozenset(
-    {
-        Status.COMPLETED,
-        Status.OVERWRITTEN,
-        Status.PURGED,
-        Status.INTERRUPTED,
-        Status.REJECTED,
-        Status.HALTED,
-    }
-)
+ENDS = frozenset(Status) - {Status.NONE, Status.QUEUED, Status.ACTIVE, Status.FORGOTTEN}
 
 
 @dataclass(frozen=True)
