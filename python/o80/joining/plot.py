@@ -152,16 +152,8 @@ def _draw(
         ax.axvspan(times[begin], last, color="tab:red", alpha=0.15, label=label)
     late = np.flatnonzero(np.diff(history.overruns.astype(np.int64), prepend=history.overruns[:1]))
     if len(late):
-        at = np.full(len(late), 0.02)
-        label = "late iteration"
-        ax.plot(
-            times[late],
-            at,
-            "|",
-            color="tab:orange",
-            transform=ax.get_xaxis_transform(),
-            label=label,
-        )
+        at, shares = np.full(len(late), 0.02), ax.get_xaxis_transform()
+        ax.plot(times[late], at, "|", color="tab:orange", transform=shares, label="late iteration")
 
 
 def _mark_ends(
@@ -230,19 +222,10 @@ def _draw_marks(
                 labels[-1][1].append(short)
             else:
                 labels.append((at, [short]))
-    for at, texts in labels:
-        place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
-        # a mark holds any text: none of it is a formula
-        joined = ", ".join(texts)
-        ax.text(
-            at,
-            0.98,
-            joined,
-            transform=ax.get_xaxis_transform(),
-            parse_math=False,
-            clip_on=True,
-            **place,
-        )
+    place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
+    place |= {"transform": ax.get_xaxis_transform(), "clip_on": True}
+    for at, texts in labels:  # a mark holds any text: none of it is a formula
+        ax.text(at, 0.98, ", ".join(texts), parse_math=False, **place)
 
 
 def _draw_latency(ax: "Axes", history: History, taken: Decisions, zero: int) -> None:
