@@ -185,31 +185,7 @@ def cases() -> Iterator[tuple[float, float, int]]:
                 yield delay, disagreement, actions_a_second
 
 
-def plot(path: str) -> None:
-    """Two seconds of each player, beside the truth."""
-    from matplotlib.figure import Figure
-
-    world = world_of(1, 0.3, 0.02, 50)
-    figure = Figure(figsize=(9, 7), layout="tight")
-    above, below = figure.subplots(2, 1, sharex=True)
-    time = np.arange(LENGTH) / RATE
-    part = slice(10 * RATE, 13 * RATE)
-    above.plot(time[part], world.truth[part], "k--", label="truth")
-    for name in ("naive", "queue", "chunks"):
-        places = PLAYERS[name](world).places
-        above.plot(time[part], places[part], label=name)
-        below.plot(time[part], np.gradient(places, 1 / RATE)[part], label=name)
-    above.set_ylabel("joint [rad]")
-    below.set_ylabel("velocity [rad/s]")
-    below.set_xlabel("time [s]")
-    above.legend()
-    figure.suptitle("Answers 0.3 s late that disagree by 20 mrad")
-    figure.savefig(path, dpi=110)
-
-
 def main() -> None:
-    if sys.argv[1:2] == ["--plot"]:
-        return plot(sys.argv[2])
     print_table = sys.argv[1:2] == ["--table"]
     worst = {"wrong": 0.0, "share": 0.0}
     most: dict[tuple[str, int], float] = {}  # of changes of velocity, for a rate of actions

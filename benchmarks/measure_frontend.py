@@ -3,6 +3,7 @@
 import ctypes
 import time
 from collections.abc import Callable
+from timeit import timeit
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,11 @@ ROWS = 10_000
 CALLS = 2000
 COMMANDS = 1000
 HISTORIES = 5  # in a round
+CALLED = {
+    "python_burst_1": "arm.burst(1)",
+    "python_latest": "arm.latest()",
+    "python_observed": "arm.latest().observed",
+}
 
 
 def start_robot() -> None:
@@ -30,27 +36,16 @@ def start_robot() -> None:
 
 def command(arm: o80.Frontend) -> None:
     """Commands added, sent, and dropped again by the backend before the next round."""
-
-    def add() -> None:
-        for _ in range(COMMANDS):
-            arm.add_command(0, 0.5, duration=2.0)
-
-    sample("python_add_command", "us", seconds(add) / COMMANDS * 1e6)
+    added = timeit("arm.add_command(0, 0.5, duration=2.0)", number=COMMANDS, globals={"arm": arm})
+    sample("python_add_command", "us", added / COMMANDS * 1e6)
     sample("python_pulse_1000", "us", seconds(arm.pulse) * 1e6)
     arm.purge().wait(5.0)
 
 
 def read(arm: o80.Frontend) -> None:
-    def latest() -> None:
-        for _ in range(CALLS):
-            arm.latest()
-
-    def observed() -> None:
-        for _ in range(CALLS):
-            arm.latest().observed  # noqa: B018
-
-    sample("python_latest", "us", seconds(latest) / CALLS * 1e6)
-    sample("python_observed", "us", seconds(observed) / CALLS * 1e6)
+    for name, statement in CALLED.items():
+        taken = timeit(statement, number=CALLS, globals={"arm": arm})
+        sample(name, "us", taken / CALLS * 1e6)
 
     # in turn, after the first pages were touched
     rows = arm.history(ROWS).rows
@@ -67,14 +62,6 @@ def read(arm: o80.Frontend) -> None:
     for _ in range(HISTORIES):
         for name, call in calls.items():
             sample(name, "us", seconds(call) * 1e6)
-
-
-def burst(arm: o80.Frontend) -> None:
-    def once() -> None:
-        for _ in range(CALLS):
-            arm.burst(1)
-
-    sample("python_burst_1", "us", seconds(once) / CALLS * 1e6)
 
 
 def follow_trajectory(arm: o80.Frontend, targets: NDArray[np.float64]) -> None:
@@ -98,7 +85,6 @@ def main() -> None:
     with two, two.frontend() as arm, eight, eight.frontend() as many:
         arm.burst(ROWS + 10)
         for _ in range(rounds()):
-            burst(arm)
             read(arm)
             command(arm)
             follow_trajectory(many, targets)

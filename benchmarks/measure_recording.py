@@ -59,7 +59,7 @@ def measure_recorder(count: int, folder: Path) -> int:
         publisher.stdout.readline()
         names = [f"bench-recording-{i}" for i in range(count)]
         recorder = Recorder(folder / f"{count}.mcap", names)
-        frontends = [each._frontend for each in recorder.sources.values()]
+        frontends = [each.frontend for each in recorder.sources.values()]
         assert all(each is not None and each._layout.size == 512 for each in frontends)
         poll_for(recorder, 0.3)  # warms up
         rows, begin = recorder.rows, time.process_time()

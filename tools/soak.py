@@ -67,9 +67,9 @@ def programs(*commands: list[str]) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def one_processor(this: Round) -> Iterator[None]:
-    processor = this.random.choice(sorted(os.sched_getaffinity(0)))
-    this.prefix += ["taskset", "-c", str(processor)]
+def processor(this: Round) -> Iterator[None]:
+    chosen = this.random.choice(sorted(os.sched_getaffinity(0)))
+    this.prefix += ["taskset", "-c", str(chosen)]
     yield
 
 
@@ -197,15 +197,7 @@ def test_processes(parent: int) -> list[int]:
 
 
 CONDITIONS: dict[str, Condition] = {
-    "processor": one_processor,
-    "busy": busy,
-    "quota": quota,
-    "order": order,
-    "user": user,
-    "zone": zone,
-    "disk": disk,
-    "memory": memory,
-    "stops": stops,
+    each.__name__: each for each in (processor, busy, quota, order, user, zone, disk, memory, stops)
 }
 
 

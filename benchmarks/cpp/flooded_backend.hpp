@@ -136,36 +136,25 @@ struct Load {
 
 /// The loads under which the first version had its longest iterations.
 inline std::vector<Load> heaviest_loads() {
-  const auto whole = [](Sender& to, const std::function<void(std::uint32_t)>& add) {
-    for (std::uint32_t i = 0; i + 17 < to.blocks(); ++i) add(i);
+  // one batch that fills the lane
+  const auto whole = [](auto add, bool scheduled = false) {
+    return [add, scheduled](Sender& to, std::uint32_t actuators, Iteration at) {
+      for (std::uint32_t i = 0; i + 17 < to.blocks(); ++i) add(to, i % actuators);
+      to.send(scheduled ? at : kNow);
+    };
   };
-  const auto queued = [whole](Sender& to, std::uint32_t actuators, Iteration) {
-    whole(to, [&](std::uint32_t i) { to.command(i % actuators, Mode::queue); });
-    to.send();
+  const auto commands = [whole](Mode mode) {
+    return whole([mode](Sender& to, std::uint32_t actuator) { to.command(actuator, mode); });
   };
-  const auto overwrites = [whole](Sender& to, std::uint32_t actuators, Iteration) {
-    whole(to, [&](std::uint32_t i) { to.command(i % actuators, Mode::overwrite); });
-    to.send();
-  };
-  const auto purges = [whole](Sender& to, std::uint32_t, Iteration) {
-    whole(to, [&](std::uint32_t) { to.batch.purge(kEveryActuator); });
-    to.send();
-  };
-  const auto requests = [whole](Sender& to, std::uint32_t, Iteration) {
-    whole(to, [&](std::uint32_t) { to.batch.request(0, {}); });
-    to.send();
-  };
-  const auto few_requests = [](Sender& to, std::uint32_t, Iteration) {
-    do {
-      for (int i = 0; i < 8; ++i) to.batch.request(0, {});
-    } while (to.send());
-    to.batch.clear();
-  };
-  const auto running_requests = [](Sender& to, std::uint32_t, Iteration) {
-    do {
-      for (int i = 0; i < 8; ++i) to.batch.request(2, {});
-    } while (to.send());
-    to.batch.clear();
+  const auto purge = [](Sender& to, std::uint32_t) { to.batch.purge(kEveryActuator); };
+  const auto request = [](Sender& to, std::uint32_t) { to.batch.request(0, {}); };
+  const auto eight_requests = [](std::uint16_t index) {
+    return [index](Sender& to, std::uint32_t, Iteration) {
+      do {
+        for (int i = 0; i < 8; ++i) to.batch.request(index, {});
+      } while (to.send());
+      to.batch.clear();
+    };
   };
   const auto scheduled = [](Sender& to, std::uint32_t actuators, Iteration at) {
     std::uint32_t i = 0;
@@ -173,10 +162,6 @@ inline std::vector<Load> heaviest_loads() {
       to.command(i++ % actuators, Mode::overwrite);
     } while (to.send(at));
     to.batch.clear();
-  };
-  const auto scheduled_purges = [whole](Sender& to, std::uint32_t, Iteration at) {
-    whole(to, [&](std::uint32_t) { to.batch.purge(kEveryActuator); });
-    to.send(at);
   };
   // the dearest batch: each request begins a part, in which no drop can stand for another
   const auto dearest = [](Sender& to, std::uint32_t actuators, Iteration) {
@@ -197,42 +182,36 @@ inline std::vector<Load> heaviest_loads() {
     } while (to.send());
     to.batch.clear();
   };
-  const auto groups = [](Sender& to, std::uint32_t actuators, Mode mode, std::uint32_t members,
-                         Pace pace, std::int64_t amount = 1'000'000) {
-    for (std::uint32_t i = 0; to.batch.blocks() + members + 17 < to.blocks(); ++i) {
-      to.group(i, members, actuators, mode, pace, amount);
-    }
-    to.send();
-  };
-  const auto groups_of_all = [groups](Sender& to, std::uint32_t actuators, Iteration) {
-    groups(to, actuators, Mode::queue, actuators, Pace::speed);
-  };
-  const auto groups_of_two = [groups](Sender& to, std::uint32_t actuators, Iteration) {
-    groups(to, actuators, Mode::queue, 2, Pace::direct);
-  };
-  const auto overwriting_groups = [groups](Sender& to, std::uint32_t actuators, Iteration) {
-    groups(to, actuators, Mode::overwrite, actuators, Pace::iterations);
-  };
-  const auto late_groups = [groups](Sender& to, std::uint32_t actuators, Iteration) {
-    groups(to, actuators, Mode::queue, 2, Pace::until, 0);
+  constexpr std::uint32_t kAll = 0;
+  const auto groups = [](Mode mode, std::uint32_t members, Pace pace,
+                         std::int64_t amount = 1'000'000) {
+    return [=](Sender& to, std::uint32_t actuators, Iteration) {
+      const std::uint32_t size = members == kAll ? actuators : members;
+      for (std::uint32_t i = 0; to.batch.blocks() + size + 17 < to.blocks(); ++i) {
+        to.group(i, size, actuators, mode, pace, amount);
+      }
+      to.send();
+    };
   };
   return {{"idle", 0, {}},
-          {"8 lanes full of commands for all actuators", 8, groups_of_all},
-          {"8 lanes full of commands for two actuators", 8, groups_of_two},
-          {"8 lanes full of commands for all actuators, overwriting", 8, overwriting_groups},
-          {"8 lanes full of commands for two actuators, too late", 8, late_groups},
-          {"16 367 queued", 1, queued},
-          {"8 lanes x 16 367 queued", 8, queued},
-          {"16 367 overwrites", 1, overwrites},
-          {"8 lanes x 16 367 overwrites", 8, overwrites},
-          {"16 367 purges of all", 1, purges},
-          {"8 lanes x 16 367 purges of all", 8, purges},
-          {"16 367 requests with a fresh start in a batch", 1, requests},
-          {"8 lanes full of batches of 8 such requests", 8, few_requests},
-          {"8 lanes full of batches of 8 requests that take time", 8, running_requests},
+          {"8 lanes full of commands for all actuators", 8, groups(Mode::queue, kAll, Pace::speed)},
+          {"8 lanes full of commands for two actuators", 8, groups(Mode::queue, 2, Pace::direct)},
+          {"8 lanes full of commands for all actuators, overwriting", 8,
+           groups(Mode::overwrite, kAll, Pace::iterations)},
+          {"8 lanes full of commands for two actuators, too late", 8,
+           groups(Mode::queue, 2, Pace::until, 0)},
+          {"16 367 queued", 1, commands(Mode::queue)},
+          {"8 lanes x 16 367 queued", 8, commands(Mode::queue)},
+          {"16 367 overwrites", 1, commands(Mode::overwrite)},
+          {"8 lanes x 16 367 overwrites", 8, commands(Mode::overwrite)},
+          {"16 367 purges of all", 1, whole(purge)},
+          {"8 lanes x 16 367 purges of all", 8, whole(purge)},
+          {"16 367 requests with a fresh start in a batch", 1, whole(request)},
+          {"8 lanes full of batches of 8 such requests", 8, eight_requests(0)},
+          {"8 lanes full of batches of 8 requests that take time", 8, eight_requests(2)},
           {"8 lanes full of the dearest batches", 8, dearest},
           {"8 lanes x 8183 batches of one overwrite, same at", 8, scheduled},
-          {"8 lanes x 16 367 purges, same at", 8, scheduled_purges}};
+          {"8 lanes x 16 367 purges, same at", 8, whole(purge, true)}};
 }
 
 /// The iteration for which batches are meant when the loads give one.

@@ -1,7 +1,5 @@
 #include "arguments.hpp"
 
-#include <nanobind/stl/string.h>
-
 #include <cmath>
 #include <string>
 
@@ -12,7 +10,6 @@
 #include "observation.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
 using o80::InvalidArgument;
 
 std::string repr_of(nb::handle value) { return nb::cast<std::string>(nb::repr(value)); }

@@ -1,12 +1,5 @@
 #include "o80/runtime/backend.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
 #include <algorithm>
 #include <atomic>
 #include <chrono>
@@ -27,8 +20,6 @@
 #include "schema_builder.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::InvalidArgument;
 
 namespace {
@@ -111,6 +102,20 @@ class Backend final : public o80::RequestServer {
     return step == o80::Step::run;
   }
 
+  void interrupt(std::uint32_t actuator) const { between_steps().interrupt(actuator); }
+  bool runs(std::uint32_t request) const { return checked().runs(request); }
+  void show_progress(std::uint32_t request, nb::handle text) const {
+    in_its_thread().show_progress(request, shown_text(text));
+  }
+  void end_request(std::uint32_t request, bool afresh, nb::handle rejected) const {
+    const o80::Served done = afresh ? o80::Served::start_afresh() : o80::Served::done();
+    in_its_thread().end_request(
+        request, rejected.is_none() ? done : o80::Served::rejected(shown_text(rejected)));
+  }
+  void halt_by_driver(nb::handle text) const {
+    checked().halt(o80::HaltCause::driver, shown_text(text, ""));
+  }
+
   /// The reason why `step` returned false without a stop; empty if there is none.
   std::string failure() const {
     return backend_ && !guard_.forked() ? std::string(backend_->failure()) : "";
@@ -118,9 +123,10 @@ class Backend final : public o80::RequestServer {
 
   /// Ends the backend. A `step` in another thread raises Closed, and the backend ends when that
   /// `step` returns.
-  void end(bool failed, const std::string& text) {
+  void end(bool failed, nb::handle text) {
     if (!backend_ || guard_.forked()) return;
-    last_words_ = {failed ? o80::BackendState::failed : o80::BackendState::stopped, text};
+    last_words_ = {failed ? o80::BackendState::failed : o80::BackendState::stopped,
+                   shown_text(text)};
     const std::shared_ptr<o80::UntypedBackend> ended = std::move(backend_);
     if (!stepping_) return finish(*ended);
     ended->ask_to_stop();
@@ -308,42 +314,13 @@ void bind_backend(nb::module_& m) {
       .def("check", [](const Backend& self) { self.checked(); })
       .def("publish", &Backend::publish)
       .def("step", &Backend::step, "timeout"_a.none())
-      .def(
-          "interrupt",
-          [](const Backend& self, std::uint32_t actuator) {
-            self.between_steps().interrupt(actuator);
-          },
-          "actuator"_a)
-      .def(
-          "runs",
-          [](const Backend& self, std::uint32_t request) { return self.checked().runs(request); },
-          "request"_a)
-      .def(
-          "show_progress",
-          [](const Backend& self, std::uint32_t request, nb::handle text) {
-            self.in_its_thread().show_progress(request, shown_text(text));
-          },
-          "request"_a, "text"_a)
-      .def(
-          "end_request",
-          [](const Backend& self, std::uint32_t request, bool afresh, nb::handle rejected) {
-            self.in_its_thread().end_request(
-                request, !rejected.is_none() ? o80::Served::rejected(shown_text(rejected))
-                         : afresh            ? o80::Served::start_afresh()
-                                             : o80::Served::done());
-          },
-          "request"_a, "afresh"_a, "rejected"_a.none())
-      .def(
-          "halt",
-          [](const Backend& self, nb::handle text) {
-            self.checked().halt(o80::HaltCause::driver, shown_text(text, ""));
-          },
-          "text"_a)
+      .def("interrupt", &Backend::interrupt, "actuator"_a)
+      .def("runs", &Backend::runs, "request"_a)
+      .def("show_progress", &Backend::show_progress, "request"_a, "text"_a)
+      .def("end_request", &Backend::end_request, "request"_a, "afresh"_a, "rejected"_a.none())
+      .def("halt", &Backend::halt_by_driver, "text"_a)
       .def("ask_to_stop", [](const Backend& self) { self.checked().ask_to_stop(); })
-      .def(
-          "end",
-          [](Backend& self, bool failed, nb::handle text) { self.end(failed, shown_text(text)); },
-          "failed"_a, "text"_a)
+      .def("end", &Backend::end, "failed"_a, "text"_a)
       .def_prop_ro("failure", &Backend::failure)
       .def_prop_ro("iteration", [](const Backend& self) { return self.checked().iteration(); })
       .def_prop_ro("time", [](const Backend& self) { return self.checked().time(); });

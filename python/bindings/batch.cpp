@@ -1,10 +1,5 @@
 #include "batch.hpp"
 
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
 #include <optional>
 
 #include "arguments.hpp"
@@ -14,8 +9,6 @@
 #include "pickling.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::Batch;
 using o80::Handle;
 

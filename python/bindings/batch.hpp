@@ -1,11 +1,10 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <memory>
 
 #include "errors.hpp"
 #include "interpreter.hpp"
+#include "nb.hpp"
 #include "o80/runtime/batch.hpp"
 #include "o80/runtime/move.hpp"
 #include "observation.hpp"
@@ -27,10 +26,10 @@ auto carrying(const o80::Batch& batch, Wait&& wait) {
     throw;
   } catch (const o80::TimeoutError& error) {
     call_python([&] {
-      const nanobind::object type = python_error("TimeoutError");
-      const nanobind::object raised = type(error.what(), nanobind::cast(batch));
+      const nb::object type = python_error("TimeoutError");
+      const nb::object raised = type(error.what(), nb::cast(batch));
       PyErr_SetObject(type.ptr(), raised.ptr());
     });
-    throw nanobind::python_error();
+    throw nb::python_error();
   }
 }

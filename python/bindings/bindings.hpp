@@ -1,23 +1,23 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
+#include "nb.hpp"
 
 // What each file of this folder adds to the module.
 
-void bind_errors(nanobind::module_& module);
-void bind_segment_list(nanobind::module_& module);
-void bind_observation(nanobind::module_& module);
-void bind_batch(nanobind::module_& module);
-void bind_canceller(nanobind::module_& module);
-void bind_frontend(nanobind::module_& module);
-void bind_control(nanobind::module_& module);
-void bind_backend(nanobind::module_& module);
-void bind_inline_group(nanobind::module_& module);
-void bind_robots(nanobind::module_& module);
-void bind_loop_state(nanobind::module_& module);
-void bind_journal(nanobind::module_& module);
-void bind_provenance(nanobind::module_& module);
-void bind_played_segment(nanobind::module_& module);
-void bind_nearest_name(nanobind::module_& module);
-void bind_python_driver(nanobind::module_& module);
-void bind_replay(nanobind::module_& module);
+void bind_errors(nb::module_& module);
+void bind_segment_list(nb::module_& module);
+void bind_observation(nb::module_& module);
+void bind_batch(nb::module_& module);
+void bind_canceller(nb::module_& module);
+void bind_frontend(nb::module_& module);
+void bind_control(nb::module_& module);
+void bind_backend(nb::module_& module);
+void bind_inline_group(nb::module_& module);
+void bind_robots(nb::module_& module);
+void bind_loop_state(nb::module_& module);
+void bind_journal(nb::module_& module);
+void bind_provenance(nb::module_& module);
+void bind_played_segment(nb::module_& module);
+void bind_nearest_name(nb::module_& module);
+void bind_python_driver(nb::module_& module);
+void bind_replay(nb::module_& module);

@@ -1,16 +1,16 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <cstddef>
 #include <cstring>
 #include <span>
 #include <vector>
 
+#include "nb.hpp"
+
 /// The memory of a Python object.
 struct Bytes {
-  explicit Bytes(nanobind::handle owner, int flags = PyBUF_SIMPLE) {
-    if (PyObject_GetBuffer(owner.ptr(), &view, flags) != 0) throw nanobind::python_error();
+  explicit Bytes(nb::handle owner, int flags = PyBUF_SIMPLE) {
+    if (PyObject_GetBuffer(owner.ptr(), &view, flags) != 0) throw nb::python_error();
   }
   Bytes(const Bytes&) = delete;
   Bytes& operator=(const Bytes&) = delete;
@@ -27,7 +27,7 @@ struct Bytes {
 
 /// The numbers in the memory of a Python object.
 template <class T>
-std::vector<T> numbers_in(nanobind::handle owner) {
+std::vector<T> numbers_in(nb::handle owner) {
   const Bytes bytes(owner);
   std::vector<T> numbers(bytes.span().size() / sizeof(T));
   if (!numbers.empty())
@@ -35,11 +35,11 @@ std::vector<T> numbers_in(nanobind::handle owner) {
   return numbers;
 }
 
-inline std::span<const std::byte> span_of(const nanobind::bytes& bytes) {
+inline std::span<const std::byte> span_of(const nb::bytes& bytes) {
   return std::as_bytes(std::span(bytes.c_str(), bytes.size()));
 }
 
 template <class T>
-nanobind::bytes bytes_of(const std::vector<T>& values) {
-  return nanobind::bytes(values.data(), values.size() * sizeof(T));
+nb::bytes bytes_of(const std::vector<T>& values) {
+  return nb::bytes(values.data(), values.size() * sizeof(T));
 }

@@ -5,9 +5,6 @@
 #include "bindings.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-
 namespace {
 
 thread_local const std::atomic<bool>* cancelled_call = nullptr;

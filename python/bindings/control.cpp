@@ -2,8 +2,6 @@
 
 #include "runtime/frontend/control_block.hpp"
 
-#include <nanobind/nanobind.h>
-
 #include <memory>
 #include <optional>
 #include <utility>
@@ -15,9 +13,6 @@
 #include "pickling.hpp"
 #include "runtime/frontend/link.hpp"
 #include "waiting.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 

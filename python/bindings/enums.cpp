@@ -1,14 +1,11 @@
 #include "enums.hpp"
 
-#include <nanobind/stl/string.h>
 #include <array>
 
 #include <string>
 
 #include "arguments.hpp"
 #include "o80/base/error.hpp"
-
-namespace nb = nanobind;
 
 namespace {
 

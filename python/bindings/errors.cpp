@@ -1,8 +1,3 @@
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
 #include <cstring>
 
 #include "bindings.hpp"
@@ -13,8 +8,6 @@
 #include "o80/runtime/not_completed.hpp"
 #include "observation.hpp"
 #include "robot/group/inline_group.hpp"
-
-namespace nb = nanobind;
 
 namespace {
 
@@ -49,6 +42,12 @@ nb::object imported(const char* module) {
   return nb::steal(found);
 }
 
+/// Raises a class of o80.base.errors, made with these arguments.
+void set_made(const char* name, const nb::tuple& arguments) {
+  const nb::object type = python_error(name);
+  PyErr_SetObject(type.ptr(), called(type, arguments).ptr());
+}
+
 /// Raises CopyFailed from the error of the first copy.
 void set_copy_failed(const o80::CopyFailed& failed) {
   nb::dict errors;
@@ -79,10 +78,8 @@ void set_not_completed(const o80::NotCompleted& error) {
     handles.append(nb::cast(end.handle));
     actuators.append(nb::tuple(nb::cast(end.actuators)));
   }
-  const nb::object type = python_error("NotCompleted");
-  const nb::object raised = called(
-      type, nb::make_tuple(error.what(), handles, actuators, observation_of(error.observation())));
-  PyErr_SetObject(type.ptr(), raised.ptr());
+  set_made("NotCompleted",
+           nb::make_tuple(error.what(), handles, actuators, observation_of(error.observation())));
 }
 
 void set_not_reached(const o80::NotReached& error) {
@@ -92,11 +89,8 @@ void set_not_reached(const o80::NotReached& error) {
     misses.append(called(miss, nb::make_tuple(each.actuator, each.field, each.target, each.observed,
                                               each.distance, each.tolerance, each.unit)));
   }
-  const nb::object type = python_error("NotReached");
-  const nb::object raised =
-      called(type, nb::make_tuple(error.what(), error.batch(), nb::list(), misses,
-                                  observation_of(error.observation())));
-  PyErr_SetObject(type.ptr(), raised.ptr());
+  set_made("NotReached", nb::make_tuple(error.what(), error.batch(), nb::list(), misses,
+                                        observation_of(error.observation())));
 }
 
 /// Raises the class of o80.base.errors with the name of the C++ class.

@@ -1,10 +1,5 @@
 #include "frontend.hpp"
 
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/string_view.h>
-
 #include <array>
 #include <cstring>
 #include <vector>
@@ -17,8 +12,6 @@
 #include "verb.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::InvalidArgument;
 using o80::UntypedFrontend;
 

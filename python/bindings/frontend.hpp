@@ -1,7 +1,5 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -9,9 +7,11 @@
 #include <tuple>
 #include <vector>
 
+#include "nb.hpp"
 #include "o80/runtime/frontend.hpp"
 #include "observation.hpp"
 #include "robot/group/inline_robot.hpp"
+#include "waiting.hpp"
 
 /// A native frontend that no Python object owns yet: attached, or of an inline robot.
 struct Attachment {
@@ -42,20 +42,27 @@ class Frontend {
   bool is_inline() const { return robot_ != nullptr; }
 
   /// From an index or a name.
-  std::uint32_t actuator(nanobind::handle named) const;
+  std::uint32_t actuator(nb::handle named) const;
   /// Each returns the index of its record in the batch.
-  std::uint32_t add_command(nanobind::handle named, nanobind::handle target,
+  std::uint32_t add_command(nb::handle named, nb::handle target,
                             const o80::CommandOptions& options) const;
   /// The targets of one command: for one actuator, a group, a list of actuators, or all (None).
-  Targets targets_of(nanobind::handle named, nanobind::handle targets) const;
+  Targets targets_of(nb::handle named, nb::handle targets) const;
   /// The actuators of a group, by its name; what is no name of a group stays what it is.
-  nanobind::object expanded(nanobind::handle named) const;
+  nb::object expanded(nb::handle named) const;
   /// Puts `rows` targets of each actuator inside their bounds if `clip`.
-  void clip(nanobind::handle clip, Targets& targets, std::uint32_t rows = 1) const;
+  void clip(nb::handle clip, Targets& targets, std::uint32_t rows = 1) const;
   /// Counts what was clipped of targets that were added.
   void note_clipped(const Targets& targets) const;
-  std::vector<std::byte> request_bytes(std::uint32_t index, nanobind::handle fields) const;
+  std::vector<std::byte> request_bytes(std::uint32_t index, nb::handle fields) const;
   Observation blank() const { return Observation(decoder_); }
+  /// Calls `work` with the core's frontend, without the GIL.
+  template <class Work>
+  auto released(Work&& work) const {
+    const std::shared_ptr<o80::UntypedFrontend> frontend = untyped_;
+    const Waiting waiting;
+    return work(*frontend);
+  }
 
   /// Releases the lane and stops an inline robot.
   void close();
@@ -67,17 +74,17 @@ class Frontend {
 
  private:
   std::string name_of(std::uint32_t index) const;
-  void write(std::uint32_t index, const o80::FieldRow& number, nanobind::handle target,
+  void write(std::uint32_t index, const o80::FieldRow& number, nb::handle target,
              std::byte* to) const;
-  std::vector<std::uint32_t> actuators(nanobind::handle named) const;
+  std::vector<std::uint32_t> actuators(nb::handle named) const;
   /// From a sequence of actuators, or None, and a sequence of targets.
-  Targets of_each(nanobind::handle named, nanobind::handle targets) const;
+  Targets of_each(nb::handle named, nb::handle targets) const;
 
   std::shared_ptr<o80::UntypedFrontend> untyped_;
   std::shared_ptr<o80::InlineRobot> robot_;
   std::shared_ptr<const Decoder> decoder_;
-  nanobind::dict indices_;
-  nanobind::dict groups_;  // lists of indices, of groups whose name is none of an actuator
+  nb::dict indices_;
+  nb::dict groups_;  // lists of indices, of groups whose name is none of an actuator
   std::vector<const o80::FieldRow*> plain_;  // of each actuator; null: a struct
 };
 
@@ -89,7 +96,7 @@ using RunningFields = std::tuple<std::string, std::int64_t, std::string, std::st
 std::vector<RunningFields> running_fields(const o80::UntypedFrontend& frontend);
 
 // what each file adds to the class
-void bind_moving(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
-void bind_sending(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
-void bind_halting(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
-void bind_reading(nanobind::module_& m, nanobind::class_<Frontend>& frontend);
+void bind_moving(nb::module_& m, nb::class_<Frontend>& frontend);
+void bind_sending(nb::module_& m, nb::class_<Frontend>& frontend);
+void bind_halting(nb::module_& m, nb::class_<Frontend>& frontend);
+void bind_reading(nb::module_& m, nb::class_<Frontend>& frontend);

@@ -1,8 +1,3 @@
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
-
 #include <string>
 #include <tuple>
 
@@ -12,9 +7,6 @@
 #include "o80/base/error.hpp"
 #include "verb.hpp"
 #include "waiting.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 using o80::InvalidArgument;
 
@@ -44,11 +36,8 @@ std::uint64_t halt(const Frontend& self, const nb::args& given, const nb::kwargs
   }
   const std::string text = shown_text(why, "");
   const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
-  std::uint64_t number = 0;
-  {
-    const Waiting waiting;  // an inline robot may be in a burst of another thread
-    number = frontend->halt(text);
-  }
+  // an inline robot may be in a burst of another thread
+  const std::uint64_t number = without_gil([&] { return frontend->halt(text); });
   const std::string done = halted_text(frontend->segment(), number);
   if (given.size() + named.size() > 1 || (named.size() == 1 && !named.contains("reason"))) {
     throw nb::type_error(done.c_str());  // explained by its Verb
@@ -59,9 +48,9 @@ std::uint64_t halt(const Frontend& self, const nb::args& given, const nb::kwargs
 
 bool resume(const Frontend& self, std::uint64_t number, nb::handle timeout, bool accept_reading) {
   const o80::Timeout patience = timeout_of(timeout);
-  const std::shared_ptr<o80::UntypedFrontend> frontend = self.shared();
-  const Waiting waiting;
-  return frontend->resume(number, patience, Waiting::keep_waiting, accept_reading);
+  return self.released([&](o80::UntypedFrontend& frontend) {
+    return frontend.resume(number, patience, Waiting::keep_waiting, accept_reading);
+  });
 }
 
 std::uint64_t halt_segment(nb::handle segment, nb::handle reason, nb::handle timeout) {
@@ -74,11 +63,8 @@ std::uint64_t halt_segment(nb::handle segment, nb::handle reason, nb::handle tim
     wrong = error;
   }
   const std::string text = shown_text(reason, "");
-  std::uint64_t number = 0;
-  {
-    const Waiting waiting;
-    number = o80::halt(name, text, patience, Waiting::keep_waiting);
-  }
+  const std::uint64_t number =
+      without_gil([&] { return o80::halt(name, text, patience, Waiting::keep_waiting); });
   refuse_after(halted_text(name, number), [&] {
     string_of(reason, "the reason of a halt");
     if (wrong) throw InvalidArgument(*wrong);

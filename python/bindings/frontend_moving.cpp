@@ -1,7 +1,5 @@
 // How a frontend moves a robot and waits until it is observed there.
 
-#include <nanobind/stl/string.h>
-
 #include <cstring>
 #include <limits>
 #include <utility>
@@ -14,8 +12,6 @@
 #include "states.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::Move;
 using o80::MoveOptions;
 

@@ -1,9 +1,5 @@
 // How a frontend reads rows.
 
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/vector.h>
-
 #include <algorithm>
 #include <utility>
 
@@ -15,8 +11,6 @@
 #include "verb.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::Iteration;
 using o80::UntypedFrontend;
 using o80::UntypedObservation;
@@ -33,9 +27,9 @@ Observation wait_for(const Frontend& self, nb::handle iteration, nb::handle time
   const Iteration wanted = count_of(iteration, "the iteration to wait for");
   const o80::Timeout patience = timeout_of(timeout);
   Observation observation = self.blank();
-  const auto frontend = self.shared();
-  const Waiting waiting;
-  frontend->wait_for(wanted, observation.row.bytes(), patience, Waiting::keep_waiting);
+  self.released([&](UntypedFrontend& frontend) {
+    frontend.wait_for(wanted, observation.row.bytes(), patience, Waiting::keep_waiting);
+  });
   return observation;
 }
 

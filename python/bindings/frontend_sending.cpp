@@ -1,13 +1,5 @@
 // How a frontend adds records to a batch and sends it.
 
-#include <nanobind/stl/array.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/string_view.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
-
 #include <algorithm>
 #include <array>
 #include <cstring>
@@ -29,8 +21,6 @@
 #include "verb.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::Batch;
 using o80::UntypedFrontend;
 
@@ -122,16 +112,12 @@ std::uint32_t add_trajectories(const Frontend& self, const std::vector<std::uint
 Batch pulse(const Frontend& self, nb::handle at, nb::handle late, nb::handle seen) {
   const o80::PulseOptions options = pulse_options(at, late, seen);
   if (!self.is_inline()) return self.untyped().pulse(options);
-  const auto frontend = self.shared();
-  const Waiting waiting;
-  return frontend->pulse(options);
+  return self.released([&](UntypedFrontend& frontend) { return frontend.pulse(options); });
 }
 
 Batch pulse_to_end(const Frontend& self, nb::handle at, nb::handle late, nb::handle seen) {
   const o80::PulseOptions options = pulse_options(at, late, seen);
-  const auto frontend = self.shared();
-  const Waiting waiting;
-  return frontend->pulse_to_end(options);
+  return self.released([&](UntypedFrontend& frontend) { return frontend.pulse_to_end(options); });
 }
 
 Observation wait_for_end(const Frontend& self, const Batch& batch, nb::handle timeout,
@@ -163,10 +149,10 @@ PendingBurst start_burst(const Frontend& self, nb::handle iterations, nb::handle
                          nb::handle late, nb::handle seen) {
   const std::int64_t count = burst_length(iterations);
   const o80::PulseOptions options = pulse_options(at, late, seen);
-  const auto frontend = self.shared();
   const auto decoder = self.decoder();
-  const Waiting waiting;
-  return {frontend->start_burst(count, options), decoder};
+  return self.released([&](UntypedFrontend& frontend) {
+    return PendingBurst{frontend.start_burst(count, options), decoder};
+  });
 }
 
 Observation burst(const Frontend& self, nb::handle iterations, nb::handle timeout, nb::handle at,
@@ -174,11 +160,10 @@ Observation burst(const Frontend& self, nb::handle iterations, nb::handle timeou
   const std::int64_t count = burst_length(iterations);
   const o80::Timeout patience = timeout_of(timeout);
   const o80::PulseOptions options = pulse_options(at, late, seen);
-  const auto frontend = self.shared();
   const auto decoder = self.decoder();
-  return Observation(decoder, without_gil([&] {
-                       return frontend->burst(count, patience, Waiting::keep_waiting, options);
-                     }));
+  return Observation(decoder, self.released([&](UntypedFrontend& frontend) {
+    return frontend.burst(count, patience, Waiting::keep_waiting, options);
+  }));
 }
 
 /// Starts the bursts of a group, each with the decoder of its row.
@@ -219,9 +204,7 @@ template <class Fill>
 Batch send_alone(const Frontend& self, Fill&& fill, const std::optional<o80::Seen>& seen = {}) {
   o80::BatchBuilder batch;
   fill(batch);
-  const auto frontend = self.shared();
-  const Waiting waiting;
-  return frontend->pulse(batch, seen);
+  return self.released([&](UntypedFrontend& frontend) { return frontend.pulse(batch, seen); });
 }
 
 /// Sends a chunk. `due`: for each row an uint32, iterations after the anchor.

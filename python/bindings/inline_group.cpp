@@ -3,13 +3,6 @@
 
 #include "robot/group/inline_group.hpp"
 
-#include <nanobind/stl/map.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
-
 #include <map>
 #include <optional>
 #include <tuple>
@@ -26,9 +19,6 @@
 #include "schema_builder.hpp"
 #include "states.hpp"
 #include "waiting.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 

@@ -40,7 +40,7 @@ WithGil::~WithGil() {
   if (own_) PyGILState_Release(*own_);
 }
 
-void bind_interpreter(nanobind::module_&) {
+void bind_interpreter(nb::module_&) {
   if (Py_AtExit([] { ended.store(true, std::memory_order_relaxed); }) != 0) {
     throw o80::Error("o80 cannot register its exit handler: Python has no free slot (Py_AtExit)");
   }

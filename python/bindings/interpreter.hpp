@@ -1,11 +1,11 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <cxxabi.h>
 
 #include <optional>
 #include <utility>
+
+#include "nb.hpp"
 
 /// Sleeps until the process ends.
 [[noreturn]] void stay() noexcept;
@@ -69,4 +69,4 @@ class WithGil {
 };
 
 /// From this call on, threads that request the GIL after the interpreter has ended sleep for ever.
-void bind_interpreter(nanobind::module_& module);
+void bind_interpreter(nb::module_& module);

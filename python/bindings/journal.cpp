@@ -1,13 +1,5 @@
 #include "o80/runtime/journal.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
-
 #include <memory>
 #include <string>
 #include <tuple>
@@ -22,9 +14,6 @@
 #include "runtime/frontend/raw_journal.hpp"
 #include "runtime/journal/recorded_journal.hpp"
 #include "waiting.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 

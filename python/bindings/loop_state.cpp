@@ -1,11 +1,5 @@
 #include "runtime/frontend/loop_state.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
-
 #include <chrono>
 #include <string>
 #include <tuple>
@@ -16,9 +10,6 @@
 #include "o80/runtime/frontend.hpp"
 #include "o80/runtime/journal.hpp"
 #include "waiting.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 

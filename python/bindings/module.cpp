@@ -1,12 +1,8 @@
-#include <nanobind/nanobind.h>
-
 #include <string>
 
 #include "bindings.hpp"
 #include "interpreter.hpp"
 #include "o80/base/version.hpp"
-
-namespace nb = nanobind;
 
 NB_MODULE(_core, m) {
   m.doc() = "The compiled part of o80.";

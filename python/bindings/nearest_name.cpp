@@ -1,13 +1,6 @@
 #include "o80/base/nearest_name.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/string_view.h>
-#include <nanobind/stl/vector.h>
-
 #include "bindings.hpp"
-
-namespace nb = nanobind;
 
 void bind_nearest_name(nb::module_& m) {
   m.def("nearest_name", &o80::nearest_name, nb::arg("given"), nb::arg("known"),

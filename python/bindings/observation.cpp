@@ -1,8 +1,5 @@
 #include "observation.hpp"
 
-#include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
-
 #include <algorithm>
 #include <cstring>
 #include <span>
@@ -13,9 +10,6 @@
 #include "interpreter.hpp"
 #include "o80/base/error.hpp"
 #include "schema_tables.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 Decoder::Decoder(std::shared_ptr<const o80::Description> what, nb::object how)
     : description(std::move(what)),

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <cstdint>
 #include <memory>
 
+#include "nb.hpp"
 #include "o80/runtime/observation.hpp"
 
 /// Makes arrays by the table of functions that NumPy gives to compiled modules, whose places do not
@@ -13,7 +12,7 @@ class Numpy {
  public:
   Numpy();
   /// An array over a row. `way`: its shape, dtype and offset in the row.
-  nanobind::object view(nanobind::handle row, nanobind::handle way) const;
+  nb::object view(nb::handle row, nb::handle way) const;
 
  private:
   PyTypeObject* type_;
@@ -25,12 +24,12 @@ class Numpy {
 /// Converts rows of one robot to arrays: the methods of its o80.rows.layout.Layout, looked up once,
 /// or the way to a plain array.
 struct Decoder {
-  Decoder(std::shared_ptr<const o80::Description> description, nanobind::object layout);
+  Decoder(std::shared_ptr<const o80::Description> description, nb::object layout);
 
   std::shared_ptr<const o80::Description> description;
   Numpy numpy;
-  nanobind::object layout, desired, observed, extended, active, clamped, braking, starved, off_plan,
-      flat, text;
+  nb::object layout, desired, observed, extended, active, clamped, braking, starved, off_plan, flat,
+      text;
 };
 
 /// A row and its decoder. Python sees the bytes as a buffer.

@@ -1,7 +1,5 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -10,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "nb.hpp"
 #include "o80/base/error.hpp"
 #include "o80/runtime/journal.hpp"
 
@@ -42,10 +41,8 @@ class OpenReplay {
   std::int64_t next() { return open().next(); }
 
   /// Binds what both kinds of replay have.
-  static nanobind::class_<OpenReplay> bind(nanobind::module_& m, const char* name,
-                                           const char* text) {
-    using namespace nanobind::literals;
-    return nanobind::class_<OpenReplay>(m, name, text)
+  static nb::class_<OpenReplay> bind(nb::module_& m, const char* name, const char* text) {
+    return nb::class_<OpenReplay>(m, name, text)
         .def("add", &OpenReplay::add, "entries"_a)
         .def("begin_at", &OpenReplay::begin_at, "first"_a)
         .def("close", &OpenReplay::close)

@@ -1,8 +1,5 @@
 #include "runtime/playing/played_segment.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/string.h>
-
 #include <cstring>
 #include <memory>
 #include <vector>
@@ -12,8 +9,6 @@
 #include "pickling.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::PlayedSegment;
 
 namespace {

@@ -1,16 +1,11 @@
 #include "o80/runtime/provenance.hpp"
 
-#include <nanobind/nanobind.h>
-
 #include <string>
 #include <vector>
 
 #include "bindings.hpp"
 #include "control/motion/number_plan.hpp"
 #include "frontend.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 

@@ -1,12 +1,5 @@
 // A driver class in Python as a robot: its table of functions calls the class.
 
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
-
 #include <algorithm>
 #include <cstring>
 #include <memory>
@@ -28,8 +21,6 @@
 #include "robot/loop/robot_provenance.hpp"
 #include "schema_builder.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::FaultText;
 using o80::OptionValue;
 using o80::RequestAnswer;

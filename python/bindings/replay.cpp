@@ -1,13 +1,5 @@
 #include "robot/loop/replay.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-#include <nanobind/stl/optional.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/tuple.h>
-#include <nanobind/stl/vector.h>
-
 #include <cstdint>
 #include <memory>
 #include <span>
@@ -22,12 +14,8 @@
 #include "runtime/replay/driverless_replay.hpp"
 #include "waiting.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
-
 namespace {
 
-using Times = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
 using WithDriver = OpenReplay<o80::Replay>;
 using WithoutDriver = OpenReplay<o80::DriverlessReplay>;
 
@@ -63,11 +51,10 @@ void bind_replay(nb::module_& m) {
            "period"_a, nb::keep_alive<1, 2>())
       .def(
           "run",
-          [](WithDriver& self, const Times& times) {
+          [](WithDriver& self, nb::handle times) {
             o80::Replay& replay = self.open();
-            const std::span<const std::int64_t> rows(times.data(), times.size());
-            const Waiting waiting;
-            return replay.run(rows);
+            const auto rows = numbers_in<std::int64_t>(times);
+            return without_gil([&] { return replay.run(rows); });
           },
           "times"_a, nb::sig("def run(self, times: numpy.typing.NDArray[numpy.int64]) -> bool"))
       .def(
@@ -93,8 +80,7 @@ void bind_replay(nb::module_& m) {
           [](WithoutDriver& self, nb::handle rows) {
             o80::DriverlessReplay& replay = self.open();
             const Bytes bytes(rows);
-            const Waiting waiting;
-            return replay.run(bytes.span());
+            return without_gil([&] { return replay.run(bytes.span()); });
           },
           "rows"_a, nb::sig("def run(self, rows: bytes) -> bool"));
 }

@@ -1,9 +1,3 @@
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/pair.h>
-#include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
 #include <memory>
 
 #include "bindings.hpp"
@@ -16,9 +10,6 @@
 #include "robot/driver/machine_limits.hpp"
 #include "robot/group/inline_robot.hpp"
 #include "waiting.hpp"
-
-namespace nb = nanobind;
-using namespace nb::literals;
 
 namespace {
 

@@ -1,10 +1,5 @@
 #include "schema_builder.hpp"
 
-#include <nanobind/stl/array.h>
-#include <nanobind/stl/shared_ptr.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,8 +15,6 @@
 #include "schema_tables.hpp"
 #include "states.hpp"
 
-namespace nb = nanobind;
-using namespace nb::literals;
 using o80::InvalidArgument;
 
 o80::Kind kind_of(const std::string& name) {
@@ -147,26 +140,16 @@ void bind_schema_builder(nb::module_& m) {
             return self.schema.add_actuators(group, type, count, is_array);
           },
           "group"_a, "type"_a, "count"_a, "is_array"_a)
-      .def(
-          "set_block", [](Self& self, uint32_t offset) { self.schema.head.block = offset; },
-          "offset"_a, "The next group begins here [bytes].")
-      .def(
-          "set_extended", [](Self& self, uint32_t type) { self.schema.head.extended = type; },
-          "type"_a)
+      .def("set_block", &Self::set_block, "offset"_a, "The next group begins here [bytes].")
+      .def("set_extended", &Self::set_extended, "type"_a)
       .def(
           "add_request",
           [](Self& self, const string& name, uint32_t type, const string& help, bool halted) {
             self.schema.add_request(name, type, help, halted);
           },
           "name"_a, "type"_a, "help"_a, "while_halted"_a)
-      .def(
-          "name_actuator",
-          [](Self& self, uint32_t i, const string& name) { self.schema.actuator(i).name(name); },
-          "actuator"_a, "name"_a)
-      .def(
-          "set_follow",
-          [](Self& self, uint32_t i) { self.schema.actuator(i).when_idle(o80::WhenIdle::follow); },
-          "actuator"_a)
+      .def("name_actuator", &Self::name_actuator, "actuator"_a, "name"_a)
+      .def("set_follow", &Self::set_follow, "actuator"_a)
       .def(
           "set_limits",
           [](Self& self, uint32_t i, const string& field, const std::array<double, 7>& given,
@@ -187,40 +170,13 @@ void bind_schema_builder(nb::module_& m) {
           },
           "index"_a, "limits"_a, "rests"_a, "noise"_a,
           "Limits of a number of another robot, in the order of o80::LimitRow.")
-      .def(
-          "add_integral",
-          [](Self& self, uint32_t limit, uint32_t number, const std::array<double, 3>& given) {
-            self.schema.integrals.push_back({limit, number, given[0], given[1], given[2]});
-          },
-          "limit"_a, "number"_a, "bounds"_a)
-      .def(
-          "rests_at",
-          [](Self& self, uint32_t i, const string& field, double value) {
-            self.schema.actuator(i).rests_at(field, value);
-          },
-          "actuator"_a, "field"_a, "value"_a)
+      .def("add_integral", &Self::add_integral, "limit"_a, "number"_a, "bounds"_a)
+      .def("rests_at", &Self::rests_at, "actuator"_a, "field"_a, "value"_a)
       .def("simulated", [](Self& self, bool is) { self.schema.head.of_the_world = is ? 2 : 3; })
-      .def(
-          "gap", [](Self& self, std::int64_t longest) { self.schema.gap(longest); }, "longest"_a)
-      .def(
-          "set_model",
-          [](Self& self, const string& mjcf, const string& file) {
-            self.schema.shown.mjcf = mjcf;
-            self.schema.shown.file = file;
-          },
-          "mjcf"_a, "file"_a)
-      .def(
-          "moves_joint",
-          [](Self& self, uint32_t i, const string& joint) {
-            self.schema.actuator(i).moves_joint(joint);
-          },
-          "actuator"_a, "joint"_a)
-      .def(
-          "sensor_moves_joint",
-          [](Self& self, const string& field, uint32_t index, const string& joint) {
-            self.schema.sensor_moves_joint(field, index, joint);
-          },
-          "field"_a, "index"_a, "joint"_a)
+      .def("gap", &Self::set_gap, "longest"_a)
+      .def("set_model", &Self::set_model, "mjcf"_a, "file"_a)
+      .def("moves_joint", &Self::moves_joint, "actuator"_a, "joint"_a)
+      .def("sensor_moves_joint", &Self::sensor_moves_joint, "field"_a, "index"_a, "joint"_a)
       .def("description", &Self::description)
       .def("face", &Self::face, "period"_a)
       .def_prop_ro("actuators", [](const Self& self) {

@@ -11,8 +11,6 @@
 #include "base/printable.hpp"
 #include "o80/describe/layout.hpp"
 
-namespace nb = nanobind;
-
 namespace o80 {
 namespace {
 

@@ -1,7 +1,6 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
+#include "nb.hpp"
 #include "o80/describe/schema.hpp"
 
 namespace o80 {
@@ -14,6 +13,6 @@ inline constexpr const char* kKindNames[] = {"bool",    "int8",   "int16",  "int
 inline constexpr const char* kOriginNames[] = {"robot", "clock", "world", "absent"};
 
 /// Description of a robot as dictionaries and lists; numbers without a limit are None.
-nanobind::dict tables_of(const Schema& schema);
+nb::dict tables_of(const Schema& schema);
 
 }  // namespace o80

@@ -1,14 +1,8 @@
-#include <nanobind/nanobind.h>
-#include <nanobind/stl/string.h>
-#include <nanobind/stl/vector.h>
-
+#include "o80/memory/segment_list.hpp"
 #include "bindings.hpp"
 #include "memory/os/process_start.hpp"
 #include "memory/segment/segment_name.hpp"
-#include "o80/memory/segment_list.hpp"
 #include "waiting.hpp"
-
-namespace nb = nanobind;
 
 void bind_segment_list(nb::module_& m) {
   using o80::SegmentEntry;

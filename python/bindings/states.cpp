@@ -1,7 +1,5 @@
 #include "states.hpp"
 
-#include <nanobind/stl/string.h>
-
 #include <algorithm>
 #include <cmath>
 #include <cstring>
@@ -15,7 +13,6 @@
 #include "describe/visit_number.hpp"
 #include "o80/base/error.hpp"
 
-namespace nb = nanobind;
 using o80::FieldRow;
 using o80::InvalidArgument;
 using o80::Kind;

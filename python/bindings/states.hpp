@@ -1,19 +1,18 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <cstddef>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "nb.hpp"
 #include "o80/describe/schema.hpp"
 
 /// The field of a type that is a plain number; null for a type with named fields.
 const o80::FieldRow* plain_number(const o80::Schema& schema, std::uint32_t type);
 
 /// Writes one number; `what` names it in the error.
-void write_number(const o80::Schema& schema, const o80::FieldRow& field, nanobind::handle value,
+void write_number(const o80::Schema& schema, const o80::FieldRow& field, nb::handle value,
                   std::byte* to, const std::string& what);
 
 /// Fields that a mapping leaves out keep their value, or get their default (an error if they have
@@ -27,6 +26,6 @@ struct StateBytes {
   bool whole = true;
 
   /// Throws InvalidArgument with `owner`, the field and the known fields.
-  StateBytes(const o80::Schema& schema, std::uint32_t type, nanobind::handle value,
+  StateBytes(const o80::Schema& schema, std::uint32_t type, nb::handle value,
              const std::string& owner, Missing missing = Missing::kept);
 };

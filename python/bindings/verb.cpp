@@ -4,8 +4,6 @@
 
 #include <cstddef>
 
-namespace nb = nanobind;
-
 namespace {
 
 /// A method of a class as Python's own: it has a signature, and explains wrong arguments.

@@ -1,10 +1,9 @@
 #pragma once
 
-#include <nanobind/nanobind.h>
-
 #include <atomic>
 
 #include "interpreter.hpp"
+#include "nb.hpp"
 #include "o80/base/time.hpp"
 
 /// Cancels the waits of one thread from another thread (for a cancelled task of asyncio).
@@ -15,7 +14,7 @@ class Canceller {
  public:
   void cancel() noexcept { cancelled_.store(true, std::memory_order_relaxed); }
   /// Calls `callable`; its waits throw Cancelled within 50 ms after `cancel`.
-  nanobind::object call(nanobind::handle callable);
+  nb::object call(nb::handle callable);
   /// True if the call in this thread was cancelled.
   static bool cancelled_here() noexcept;
 
@@ -32,7 +31,7 @@ class Waiting {
   static bool keep_waiting() {
     if (Canceller::cancelled_here()) return false;
     const WithGil locked;
-    if (call_python(PyErr_CheckSignals) != 0) throw nanobind::python_error();
+    if (call_python(PyErr_CheckSignals) != 0) throw nb::python_error();
     return true;
   }
 
@@ -48,4 +47,4 @@ auto without_gil(Work&& work) {
 }
 
 /// Converts seconds; None is for ever. Throws InvalidArgument.
-o80::Timeout timeout_of(nanobind::handle seconds);
+o80::Timeout timeout_of(nb::handle seconds);

@@ -12,11 +12,11 @@ from o80.base.errors import InvalidArgument
 def whole(value: Any, name: str, least: int | None = None) -> int:
     """Returns a whole number of at least `least`. Raises InvalidArgument for another value."""
     try:
+        if isinstance(value, bool):
+            raise TypeError
         number = operator.index(value)
     except TypeError:
         raise InvalidArgument(f"{name} must be a whole number, got {value!r}") from None
-    if isinstance(value, bool):
-        raise InvalidArgument(f"{name} must be a whole number, got {value!r}")
     if least is not None and number < least:
         raise InvalidArgument(f"{name} must be at least {least}, got {number}")
     return number

@@ -95,11 +95,4 @@ def _pairs(ours: list[Named], theirs: list[Named]) -> list[tuple[str, Named, Nam
     if lacking:
         names = ", ".join(f"{name} (run {number})" for name, number in sorted(lacking)[:5])
         raise InvalidArgument(f"only one recording has {names}: choose one with --segment")
-    return [
-        (
-            each.name if each.number == 0 else f"{each.name}/{each.number}",
-            each,
-            there[each.name, each.number],
-        )
-        for each in ours
-    ]
+    return [(each.title, each, there[each.name, each.number]) for each in ours]

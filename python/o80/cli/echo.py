@@ -140,8 +140,6 @@ class _Remarks:
 
 
 class _Printer:
-    """Prints rows of one robot."""
-
     def __init__(self, frontend: Frontend, fields: list[str], as_json: bool) -> None:
         self._frontend = frontend
         self._values = RowValues(frontend.schema)
@@ -159,7 +157,6 @@ class _Printer:
             print(f"{self._frontend.segment}: {head}", file=sys.stderr, flush=True)
 
     def print(self, row: Observation) -> None:
-        """Prints a row in one line."""
         plain = self._values.plain(row)
         if self._fields:
             chosen = {path: self._values.choose(plain, path) for path in self._fields}

@@ -28,6 +28,11 @@ class Named:
     gaps: Callable[[], list[Gap]] = list  #: finds the missing rows
     interruption: Interruption | None = None
 
+    @property
+    def title(self) -> str:
+        """Name of the segment, followed by the number of the run if that is not 0."""
+        return f"{self.name}/{self.number}" if self.number else self.name
+
 
 def histories(source: str, only: str | None, *, seconds: float | None = None) -> Iterator[Named]:
     """Yields the histories of a file, or of a segment in shared memory.

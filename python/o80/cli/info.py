@@ -69,24 +69,24 @@ def info(
             print()
             heads = [Column("", right=True), *(Column(name) for name in ACTUATOR_HEADS[1:])]
             print_table(heads, actuator_rows(schema))
-        if "extended" in schema:
-            print(style("\nsensor values", "bold"))
-            for line in _fields(schema["extended"], ""):
+        sections = {
+            "sensor values": _fields(schema["extended"], "") if "extended" in schema else [],
+            "enumerations": _enumerations(frontend.enums),
+            "requests": map(_request, schema["requests"]),
+            "started with": started_with(frontend.provenance),
+        }
+        for title, lines in sections.items():
+            for number, line in enumerate(lines):
+                if number == 0:
+                    print(style(f"\n{title}", "bold"))
                 print(f"  {line}")
-        if frontend.enums:
-            print(style("\nenumerations", "bold"))
-            for line in _enumerations(frontend.enums):
-                print(f"  {line}")
-        if schema["requests"]:
-            print(style("\nrequests", "bold"))
-            for request in schema["requests"]:
-                fields = ", ".join(_argument(field) for field in request["type"]["fields"])
-                served = ", also while halted" if request["while_halted"] else ""
-                told = style(f"{request['help']}{served}", "dim")
-                print(f"  {request['name']}({fields})  {told}".rstrip())
-        print(style("\nstarted with", "bold"))
-        for line in started_with(frontend.provenance):
-            print(f"  {line}")
+
+
+def _request(described: dict[str, Any]) -> str:
+    fields = ", ".join(_argument(field) for field in described["type"]["fields"])
+    served = ", also while halted" if described["while_halted"] else ""
+    told = style(f"{described['help']}{served}", "dim")
+    return f"{described['name']}({fields})  {told}".rstrip()
 
 
 def _argument(field: dict[str, Any]) -> str:

@@ -89,7 +89,9 @@ def play(
         history=history,
         hold=True if hold else None,
     ) as playback:
-        print(_head(playback, bursts), file=sys.stderr, flush=True)
+        how = "; rows come when a frontend requests iterations" if bursts else ""
+        head = f"playing {playback.duration:.1f} s of {', '.join(playback.names)}{how}"
+        print(head, file=sys.stderr, flush=True)
         _follow(playback, stop)
         holds = playback.done and (hold or fast) and not bursts
         if holds and not stop.requested:
@@ -110,12 +112,6 @@ def _names(path: Path, segments: list[str] | None, name: str | None) -> dict[str
             f"one with --segment, or rename all with --prefix"
         )
     return {found[0]: name}
-
-
-def _head(playback: "Playback", bursts: bool) -> str:
-    names = ", ".join(playback.names)
-    how = "; rows come when a frontend requests iterations" if bursts else ""
-    return f"playing {playback.duration:.1f} s of {names}{how}"
 
 
 def _follow(playback: "Playback", stop: StopRequest) -> None:

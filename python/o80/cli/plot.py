@@ -37,9 +37,8 @@ def plot(
     found: dict[str, Named] = {}
     for source in dict.fromkeys(sources):
         for each in histories(source, segment, seconds=seconds):
-            name = f"{each.name}/{each.number}" if each.number else each.name
             if len(each.history):
-                found[f"{source}: {name}" if name in found else name] = each
+                found[f"{source}: {each.title}" if each.title in found else each.title] = each
     if not found:
         raise InvalidArgument(f"{', '.join(sources)}: no rows to plot")
     offset_of: dict[str, int | None] = {}  # one for each boot: the wall clock may have been set

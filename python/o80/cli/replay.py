@@ -9,8 +9,8 @@ import typer
 from o80.base.errors import Error
 from o80.base.screen import complain, overwrite, plain
 from o80.base.symptoms import see
+from o80.cli.attach import attach
 from o80.cli.diff import _tolerances
-from o80.frontend.frontend import Frontend
 
 _ENOUGH = 1000  # rows for a speed that is not that of the start
 
@@ -72,7 +72,7 @@ def replay(
     is_file = recording.endswith(".mcap") or Path(recording).exists()
     try:
         report = replay_all(
-            recording if is_file else _attached(recording),
+            recording if is_file else attach(recording),
             segment=segment,
             robot=_robot(robot),
             options=_options(option),
@@ -98,12 +98,6 @@ def replay(
         raise typer.Exit(1)
     if not report.identical or any(run.unused for run in report):
         raise typer.Exit(2)
-
-
-def _attached(name: str) -> Frontend:
-    from o80.cli.attach import attach
-
-    return attach(name)
 
 
 def _robot(texts: list[str] | None) -> str | dict[str, str] | None:

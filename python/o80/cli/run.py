@@ -20,14 +20,16 @@ def run(context: typer.Context) -> None:
     The process becomes a C++ program (without Python, unless the driver is in Python); Ctrl-C stops
     it in order.
     """
+    import o80.robots.robot as robots
+
     arguments = context.args
     if not arguments or arguments[0] in ("-h", "--help"):
         print(context.get_help())
-        _print_robots()
+        print(style("Robots", "bold"))
+        for known in robots.list():
+            print(f"  {known.name:<16} {known.path}")
         raise typer.Exit(0 if arguments else 2)
     robot, flags = arguments[0], arguments[1:]
-    import o80.robots.robot as robots
-
     if (place := robots.place_of(robot)) is not None:
         os.execv(sys.executable, [sys.executable, "-u", "-m", "o80.run_driver", place, *flags])
     if (preset := robots.preset_of(robot)) is not None:
@@ -51,11 +53,3 @@ def _with_face(flags: list[str]) -> list[str]:
 
             joined[at] = f"--like={robots.face_text(flag.removeprefix('--like='))}"
     return joined
-
-
-def _print_robots() -> None:
-    print(style("Robots", "bold"))
-    import o80.robots.robot as robots
-
-    for robot in robots.list():
-        print(f"  {robot.name:<16} {robot.path}")

@@ -126,8 +126,6 @@ class _Session:
     def report(self) -> None:
         """Prints changes of the state; distances repeatedly while the follower waits."""
         robots = self._robots
-        if not robots.engaged:
-            self._throw_away()  # the follower does not follow
         if robots.engaged:
             state = "follows"
             if self._open:
@@ -135,6 +133,7 @@ class _Session:
             elif self._shown:
                 state += f", {self._demonstrations()}"
         else:
+            self._throw_away()
             state = f"does not follow: {robots.why}"
             if robots.moves:
                 state = f"does not follow: move the leader's {', '.join(robots.moves)}"

@@ -1,5 +1,6 @@
 """Converts rows to plain lists, dictionaries and labels, and selects values by path."""
 
+from itertools import compress
 from typing import Any
 
 import numpy as np
@@ -40,12 +41,13 @@ class RowValues:
     def acting(self, row: Observation) -> str:
         """Names the actuators that are driven, that brake, and whose plan is starved."""
         active, braking, starved = row.active, row.braking, row.starved
-        driven = [name for i, name in enumerate(self._actuators) if active[i] and not braking[i]]
-        slowing = [name for i, name in enumerate(self._actuators) if braking[i]]
-        starving = [name for i, name in enumerate(self._actuators) if starved[i]]
         said = []
-        for word, names in (("driven", driven), ("braking", slowing), ("starved", starving)):
-            if names:
+        for word, acts in (
+            ("driven", active & ~braking),
+            ("braking", braking),
+            ("starved", starved),
+        ):
+            if names := [*compress(self._actuators, acts)]:
                 said.append(f"{word} {self._named(names)}")
         return "  ".join(said) or ("idle" if self._actuators else "")
 

@@ -1,5 +1,6 @@
 """Reads the targets of commands in each iteration from the journal of a recording."""
 
+from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
@@ -16,7 +17,6 @@ _Piece = tuple[int, float]  # first iteration, value
 class Asked:
     """Targets of the newest command for each number.
 
-
     A target counts from the iteration in which its command is taken. A row of a chunk or a
     trajectory counts until the iteration in which it is due. A batch that a halt rejects counts
     too. A purge and a fresh start end all targets.
@@ -25,20 +25,15 @@ class Asked:
     def __init__(self, entries: Iterable[_core.JournalEntry], schema: Mapping[str, Any]) -> None:
         self._period = int(schema["period"])
         begin = schema["row"]["desired"]
-        self._numbers: list[list[tuple[str, Column, int]]] = []  # numbers of each actuator
+        self._numbers: list[list[tuple[Column, int]]] = []  # numbers of each actuator
         columns = columns_of_part(schema, "desired")
         for actuator in schema["actuators"]:
             count = len(actuator["limits"])
             self._numbers.append(
-                [
-                    (each.name, each, each.offset - begin - actuator["offset"])
-                    for each in columns[:count]
-                ]
+                [(each, each.offset - begin - actuator["offset"]) for each in columns[:count]]
             )
             del columns[:count]
-        self._pieces: dict[str, list[_Piece]] = {
-            name: [] for numbers in self._numbers for name, _, _ in numbers
-        }
+        self._pieces: dict[str, list[_Piece]] = defaultdict(list)
         for entry in entries:
             self._add(entry)
 
@@ -65,8 +60,8 @@ class Asked:
             if record.kind == "purge" and not record.only_own:
                 every = record.actuator >= len(self._numbers)
                 for numbers in self._numbers if every else [self._numbers[record.actuator]]:
-                    for name, _, _ in numbers:
-                        _end_at(self._pieces[name], entry.iteration)
+                    for column, _ in numbers:
+                        _end_at(self._pieces[column.name], entry.iteration)
             elif record.kind == "command":
                 self._command(record, entry.iteration)
 
@@ -75,12 +70,12 @@ class Asked:
         used = begins < np.append(begins[1:], np.iinfo(np.int64).max)  # late rows are skipped
         for target in record.targets:
             states = np.frombuffer(target.states, np.uint8).reshape(max(1, record.rows), -1)
-            for i, (name, column, offset) in enumerate(self._numbers[target.actuator]):
+            for i, (column, offset) in enumerate(self._numbers[target.actuator]):
                 if any(target.mask) and not target.mask[i // 64] >> i % 64 & 1:
                     continue
                 raw = states[:, offset : offset + column.dtype.itemsize]
                 values = np.ascontiguousarray(raw).view(column.dtype)[:, 0].astype(np.float64)
-                pieces = self._pieces[name]
+                pieces = self._pieces[column.name]
                 while pieces and pieces[-1][0] >= begins[0]:
                     pieces.pop()
                 pieces += zip(begins[used].tolist(), values[used].tolist(), strict=True)

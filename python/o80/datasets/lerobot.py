@@ -54,7 +54,7 @@ def write(
 
     Raises InvalidArgument for an existing folder or unknown fields, MissingExtra, OSError.
     """
-    needed("pyarrow", "export", "a LeRobot data set")
+    arrow = needed("pyarrow", "export", "a LeRobot data set")
     if path.exists():
         raise InvalidArgument(f"{path} exists: give a new folder for the data set")
     chosen_numbers = _Chosen.of(episodes, state, action, sensors, units, action_is)
@@ -72,7 +72,9 @@ def write(
     (path / "meta/episodes/chunk-000").mkdir(parents=True)
     (path / "data/chunk-000").mkdir(parents=True)
     _write_frames(path / DATA.format(chunk_index=0, file_index=0), frames, features)
-    _write_table(path / EPISODES, rows)
+    needed("pyarrow.parquet", "export", "a LeRobot data set").write_table(
+        arrow.Table.from_pylist(rows), path / EPISODES
+    )
     _write_tasks(path / TASKS, tasks)
     _write_json(path / "meta/info.json", _info(episodes, features, first, len(tasks)))
     say_not_finite(_not_finite(features, frames), "left out of the statistics", say)
@@ -299,13 +301,6 @@ def _write_frames(path: Path, frames: list[Columns], features: Mapping[str, Any]
                 made = arrow.FixedSizeListArray.from_arrays(flat, type=kind) if is_list else flat
                 arrays.append(made)
             writer.write_table(arrow.Table.from_arrays(arrays, schema=schema))
-
-
-def _write_table(path: Path, rows: list[dict[str, Any]]) -> None:
-    import pyarrow as arrow
-    import pyarrow.parquet as parquet
-
-    parquet.write_table(arrow.Table.from_pylist(rows), path)
 
 
 def _write_tasks(path: Path, tasks: list[str]) -> None:

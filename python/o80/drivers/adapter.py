@@ -159,19 +159,11 @@ class Adapter:
 
 def check_verbs(driver: type[Any]) -> None:
     """Raises InvalidArgument if a method is missing or takes other arguments."""
-    wanted = {
-        "start": (),
-        "write": ("desired",),
-        "read": ("reading",),
-        "wait": ("due",),
-        "halt": (),
-        "resume": (),
-        "stop": (),
-    }
+    given = {"write": ["desired"], "read": ["reading"], "wait": ["due"]}
     if not callable(getattr(driver, "read", None)):
         raise InvalidArgument(f"{driver.__name__} is not a driver: give it read(self, reading)")
-    for name, arguments in wanted.items():
-        verb = getattr(driver, name, None)
+    for name in ("start", "write", "read", "wait", "halt", "resume", "stop"):
+        verb, arguments = getattr(driver, name, None), given.get(name, [])
         if verb is None:
             continue
         call = f"{name}({', '.join(('self', *arguments))})"

@@ -95,8 +95,7 @@ class SchemaWriter:
 
     def set_extended(self, extended: Described) -> None:
         """Sets the type of further sensor values: a structured dtype, or a mapping."""
-        index = self._type("Extended", extended)
-        self.builder.set_extended(index)
+        self.builder.set_extended(self._type("Extended", extended))
 
     def add_requests(
         self, requests: Mapping[str, Described | None], while_halted: Sequence[str] = ()
@@ -175,8 +174,7 @@ class SchemaWriter:
     # ------------------------------------------------------------------ types
 
     def _type(self, name: str, described: Described) -> int:
-        fields = list(self._fields(name, described))
-        return self.builder.add_type(name, fields)
+        return self.builder.add_type(name, list(self._fields(name, described)))
 
     def _fields(self, owner: str, described: Described) -> Iterator[dict[str, Any]]:
         if isinstance(described, Mapping):

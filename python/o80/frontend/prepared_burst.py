@@ -128,5 +128,4 @@ def _states(
         columns = [(name, kind, (steps,)) for name, kind in zip(names, kinds, strict=True)]
         return np.empty(copies or (1,), np.dtype(columns))
     states = np.empty((*copies, len(actuators), steps), kinds[0])
-    known: NDArray[Any] = labelled(states, labels_of(actuators[0], layout))
-    return known
+    return labelled(states, labels_of(actuators[0], layout))

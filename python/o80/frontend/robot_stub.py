@@ -1,6 +1,7 @@
 """Writes a typed module for a robot, with its names as literals and its fields as types."""
 
 import ast
+import copy
 import hashlib
 import inspect
 import keyword
@@ -150,11 +151,10 @@ def verbs_of(source: Path, cls: str) -> Iterator[ast.FunctionDef]:
             for inner in node.body:
                 block = inner.body if isinstance(inner, ast.If) else [inner]
                 for verb in block:
-                    is_public = isinstance(verb, ast.FunctionDef) and (
+                    if isinstance(verb, ast.FunctionDef) and (
                         not verb.name.startswith("_") or verb.name == "__getitem__"
-                    )
-                    if is_public:
-                        yield verb  # type: ignore[misc]
+                    ):
+                        yield verb
 
 
 def changed(node: ast.expr | None, types: Mapping[str, str]) -> str:
@@ -183,13 +183,12 @@ class Module:
 
     def parts(self, segment: str) -> Iterator[str]:
         """Yields the text, part by part."""
-        base = class_of(self._schema["robot"])
-        own = base is not None and base is not Frontend
+        base = class_of(self._schema["robot"]) or Frontend
         yield HEAD.format(
             robot=self._schema["robot"],
             segment=segment,
             digest=digest_of(self._schema),
-            imports=f"import {base.__module__}\n" if own and base else "",
+            imports="" if base is Frontend else f"import {base.__module__}\n",
         )
         names = [each["name"] for each in self._schema["actuators"]]
         yield f"Actuator: TypeAlias = {literal(names)}\n"
@@ -201,7 +200,9 @@ class Module:
             self._record(extended, how) if extended else "o80.Record" for how in ("one", "many")
         ]
         rows = self._row(one, sensors[0]) + self._rows(many, sensors[1])
-        base_name = f"{base.__module__}.{base.__qualname__}" if own and base else "o80.Frontend"
+        base_name = (
+            f"{base.__module__}.{base.__qualname__}" if base is not Frontend else "o80.Frontend"
+        )
         verbs = "\n".join(f"        {line}" for line in self._verbs(one))
         yield from self._classes.values()
         yield f"{rows}\n    class {self._cls}({base_name}):\n{verbs}\n"
@@ -256,8 +257,7 @@ class Module:
 
     def _value(self, field: dict[str, Any], how: str) -> str:
         """Returns the type of a field of a record."""
-        is_struct = field["kind"] == "struct"
-        if is_struct:
+        if field["kind"] == "struct":
             return self._record(field["type"], "array" if field["shape"] else how)
         return number_type(field) if how == "one" and not field["shape"] else array_type(field)
 
@@ -274,11 +274,10 @@ class Module:
         return name
 
     def _state(self, group: dict[str, Any], how: str) -> str:
+        field = {"kind": "struct", "type": group["type"], "shape": []}
         if is_plain(group["type"]):
             field = group["type"]["fields"][0]
-            single = how == "one" and not group["array"] and not field["shape"]
-            return number_type(field) if single else array_type(field)
-        return self._record(group["type"], "array" if group["array"] else how)
+        return self._value(field | {"shape": field["shape"] or group["array"]}, how)
 
     def _row(self, states: str, sensors: str) -> str:
         return self._part("Row", "o80.Observation", states, sensors) + (
@@ -366,8 +365,7 @@ class Module:
     def _requests(self, verb: ast.FunctionDef) -> Iterator[str]:
         uses = []
         for request in self._schema["requests"]:
-            called = ast.parse(ast.unparse(verb)).body[0]
-            assert isinstance(called, ast.FunctionDef)
+            called = copy.deepcopy(verb)
             arguments, fields = called.args, request["type"]["fields"]
             taken = {each.arg for each in arguments.kwonlyargs}
             if all(_is_argument(field["name"], taken) for field in fields):
@@ -385,9 +383,7 @@ class Module:
         self, verb: ast.FunctionDef, arguments: Mapping[str, str], types: Mapping[str, str]
     ) -> list[str]:
         """Returns the lines of a method with other types."""
-        changes = ast.parse(ast.unparse(verb)).body[0]
-        assert isinstance(changes, ast.FunctionDef)
-        given = changes.args
+        given = copy.deepcopy(verb.args)
         for each in [*given.posonlyargs, *given.args, *given.kwonlyargs]:
             if each.annotation is not None:
                 text = arguments.get(each.arg) or changed(each.annotation, {})

@@ -146,12 +146,14 @@ def _draw(
     unit = first.column.unit
     ax.set_ylabel(f"{title}\n[{unit}]" if unit else title)
     ax.grid(alpha=0.3)
-    _shade(ax, times, history.halted, "tab:red", "halted")
+    edges = np.flatnonzero(np.diff(history.halted.astype(np.int8), prepend=0, append=0))
+    for i, (begin, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
+        last, label = times[min(end, len(times) - 1)], "halted" if i == 0 else None
+        ax.axvspan(times[begin], last, color="tab:red", alpha=0.15, label=label)
     late = np.flatnonzero(np.diff(history.overruns.astype(np.int64), prepend=history.overruns[:1]))
     if len(late):
-        at = np.full(len(late), 0.02)
-        label = "late iteration"
-        ax.plot(times[late], at, "|", color="tab:orange", transform=_shares(ax), label=label)
+        at, shares = np.full(len(late), 0.02), ax.get_xaxis_transform()
+        ax.plot(times[late], at, "|", color="tab:orange", transform=shares, label="late iteration")
 
 
 def _mark_ends(
@@ -178,7 +180,9 @@ def _mark_ends(
             at = np.full(len(places), 0.95)
             label = f"command {status.name.lower()}"
             where = times[sorted(places)]
-            line = ax.plot(where, at, marker, color=color, transform=_shares(ax), label=label)
+            line = ax.plot(
+                where, at, marker, color=color, transform=ax.get_xaxis_transform(), label=label
+            )
             line[0].set(markersize=9 if marker == "|" else 6, markeredgewidth=2)
 
 
@@ -218,11 +222,10 @@ def _draw_marks(
                 labels[-1][1].append(short)
             else:
                 labels.append((at, [short]))
-    for at, texts in labels:
-        place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
-        # a mark holds any text: none of it is a formula
-        joined = ", ".join(texts)
-        ax.text(at, 0.98, joined, transform=_shares(ax), parse_math=False, clip_on=True, **place)
+    place: dict[str, Any] = {"rotation": 90, "fontsize": 6, "va": "top", "ha": "right"}
+    place |= {"transform": ax.get_xaxis_transform(), "clip_on": True}
+    for at, texts in labels:  # a mark holds any text: none of it is a formula
+        ax.text(at, 0.98, ", ".join(texts), parse_math=False, **place)
 
 
 def _draw_latency(ax: "Axes", history: History, taken: Decisions, zero: int) -> None:
@@ -236,21 +239,6 @@ def _draw_latency(ax: "Axes", history: History, taken: Decisions, zero: int) -> 
         ax.plot((begun - zero) * 1e-9, delay * 1e-6, ".", color="tab:brown", markersize=3)
     ax.set_ylim(bottom=0.0)
     ax.grid(alpha=0.3)
-
-
-def _shares(ax: "Axes") -> Any:
-    """Returns the transform with data along x and shares of the panel along y."""
-    return ax.get_xaxis_transform()
-
-
-def _shade(
-    ax: "Axes", times: NDArray[np.float64], where: NDArray[np.bool_], color: str, label: str
-) -> None:
-    """Shades the spans of time in which `where` is true."""
-    edges = np.flatnonzero(np.diff(where.astype(np.int8), prepend=0, append=0))
-    for i, (begin, end) in enumerate(zip(edges[::2], edges[1::2], strict=True)):
-        last = times[min(end, len(times) - 1)]
-        ax.axvspan(times[begin], last, color=color, alpha=0.15, label=label if i == 0 else None)
 
 
 APART = 10_000_000_000  # runs further apart have axes of their own [ns]

@@ -76,7 +76,11 @@ class Playback(Closeable):
         self._begin = first + round(begin * 1e9)
         self._end = NEVER if end is None else first + round(end * 1e9)
         self.duration = max(0, min(last, self._end) - self._begin) * 1e-9  #: [s] at speed 1
-        self._tracks_in_range(tracks, path)
+        if self.duration == 0 and not any(
+            begin <= self._end and end >= self._begin
+            for begin, end in (track.time_range for track in tracks)
+        ):
+            raise InvalidArgument(f"{path} has no row in the requested part")
         self._now = self._begin
         self._over = threading.Event()
         self._lock = threading.Lock()
@@ -239,14 +243,6 @@ class Playback(Closeable):
     def _end_all(self) -> None:
         for player in self._players:
             player.end()
-
-    def _tracks_in_range(self, tracks: Sequence[Track], path: str | os.PathLike[str]) -> None:
-        if self.duration > 0 or any(
-            begin <= self._end and end >= self._begin
-            for begin, end in (track.time_range for track in tracks)
-        ):
-            return
-        raise InvalidArgument(f"{path} has no row in the requested part")
 
 
 def _tracks(path: str | os.PathLike[str], segments: str | Sequence[str] | None) -> list[Track]:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from o80.base.errors import InvalidArgument, RecordingError
 from o80.base.finite import json_text
-from o80.recording.reader import RecordingFile
+from o80.recording.reader import RecordingFile, size_of
 from o80.recording.recorded_epoch import RecordedEpoch
 
 MARKS = 200  # most marks listed of each recording
@@ -114,9 +114,9 @@ def _sizes(root: Path) -> Iterator[tuple[Path, int]]:
         for path in (Path(folder, name) for name in folders + files if name.endswith(".mcap")):
             with contextlib.suppress(OSError):  # removed meanwhile
                 if path.is_dir():
-                    yield path, sum(map(_size, path.iterdir()))
+                    yield path, sum(map(size_of, path.iterdir()))
                 elif path.is_file():  # reading a pipe could last for ever
-                    yield path, _size(path)
+                    yield path, size_of(path)
         folders[:] = [name for name in folders if not name.endswith(".mcap")]
 
 
@@ -125,14 +125,7 @@ def _warn(error: OSError) -> None:
     warnings.warn(what, RuntimeWarning, stacklevel=5)
 
 
-def _size(file: Path) -> int:
-    with contextlib.suppress(FileNotFoundError):  # deleted by a recorder (keep) meanwhile
-        return file.stat().st_size
-    return 0
-
-
 def _found(path: Path, size: int) -> FoundRecording:
-    """Reads a recording."""
     try:
         recording = RecordingFile(path)
         runs = tuple(

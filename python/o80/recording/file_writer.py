@@ -68,7 +68,7 @@ class FileWriter:
     def __init__(self, path: Path, form: Form = USUAL) -> None:
         """Creates the file. Raises FileExistsError, or OSError without leaving a new file."""
         self._open(path, form, os.O_CREAT | os.O_EXCL)
-        self._found = Scan()
+        self.found = Scan()  #: of the file as written so far: all records except messages
         try:
             self._append(_beginning())
         except BaseException:
@@ -95,9 +95,9 @@ class FileWriter:
         begun = os.pread(self._file.descriptor, len(_beginning()), 0)
         if len(begun) < len(_beginning()) and _beginning().startswith(begun):
             os.ftruncate(self._file.descriptor, 0)  # not even the first group was whole
-            self._found = Scan()
+            self.found = Scan()
             self._append(_beginning())
-        self._found = found = scan(self.path)
+        self.found = found = scan(self.path)
         if found.foreign:
             raise RecordingError(
                 f"{self.path} was written by another program: record to another file"
@@ -127,27 +127,22 @@ class FileWriter:
 
     # ------------------------------------------------------------------ groups
 
-    @property
-    def found(self) -> Scan:
-        """Scan of the file as written so far: all records except messages."""
-        return self._found
-
     def add_schema(self, name: str, definition: str, *, encoding: str = "ros2msg") -> int:
         """Adds a message type, unless the file has it. Returns the type's number."""
-        for schema in self._found.schemas.values():
+        for schema in self.found.schemas.values():
             if schema.name == name and schema.data == definition.encode():
                 return schema.id
-        number = 1 + max(self._found.schemas, default=0)
+        number = 1 + max(self.found.schemas, default=0)
         schema = Schema(id=number, data=definition.encode(), encoding=encoding, name=name)
         self._append(bytes_of(schema))
-        self._found.schemas[number] = schema
+        self.found.schemas[number] = schema
         return number
 
     def add_channel(
         self, topic: str, schema: int, metadata: Mapping[str, str], *, encoding: str = "cdr"
     ) -> int:
         """Adds a channel. Returns the channel's number."""
-        number = 1 + max(self._found.channels, default=0)
+        number = 1 + max(self.found.channels, default=0)
         channel = Channel(
             id=number,
             topic=topic,
@@ -156,12 +151,12 @@ class FileWriter:
             schema_id=schema,
         )
         self._append(bytes_of(channel))
-        self._found.channels[number] = channel
+        self.found.channels[number] = channel
         return number
 
     def add_topic(self, topic: str, name: str, definition: str) -> int:
         """Adds a channel that belongs to no run, unless the file has it. Returns its number."""
-        for channel in self._found.channels.values():
+        for channel in self.found.channels.values():
             if channel.topic == topic:
                 return channel.id
         return self.add_channel(topic, self.add_schema(name, definition), {})
@@ -180,15 +175,15 @@ class FileWriter:
         """Adds an attachment. time: [ns] since 1970."""
         attachment = Attachment(time, time, name, media_type, data)
         record = bytes_of(attachment)
-        self._found.attachments.append(place_of(attachment, self.size, len(record)))
+        self.found.attachments.append(place_of(attachment, self.size, len(record)))
         self._append(record)
 
     def add_metadata(self, name: str, values: Mapping[str, str]) -> None:
         """Adds a metadata record."""
         metadata = Metadata(name, dict(values))
         record = bytes_of(metadata)
-        self._found.metadata_places.append(MetadataIndex(self.size, len(record), name))
-        self._found.metadata.append(metadata)
+        self.found.metadata_places.append(MetadataIndex(self.size, len(record), name))
+        self.found.metadata.append(metadata)
         self._append(record)
 
     def add_messages(self, blocks: Sequence[Block]) -> None:
@@ -202,7 +197,7 @@ class FileWriter:
                 self._add_chunk(chunk)
 
     def _is_apart(self, block: Block) -> bool:
-        texts = self._found.channels[block.channel].metadata
+        texts = self.found.channels[block.channel].metadata
         return texts.get("content") == JOINT_STATES and block.records.nbytes >= LARGE
 
     def _add_chunk(self, blocks: list[Block]) -> None:
@@ -239,9 +234,9 @@ class FileWriter:
             uncompressed_size=len(content),
         )
         self._append(chunk + indexes)
-        self._found.chunks.append(index)
+        self.found.chunks.append(index)
         for block in blocks:
-            counts = self._found.counts
+            counts = self.found.counts
             counts[block.channel] = counts.get(block.channel, 0) + len(block.log_times)
 
     def _append(self, *pieces: bytes | bytearray, last: bool = False) -> None:
@@ -249,7 +244,7 @@ class FileWriter:
         end = self.size
         try:
             if not last:
-                room = sum(map(len, pieces)) + room_for_end(self._found)
+                room = sum(map(len, pieces)) + room_for_end(self.found)
                 self.make_room(room)
                 reserve(self._file.descriptor, end, room)
             for piece in pieces:
@@ -271,8 +266,8 @@ class FileWriter:
         If it raises OSError, the file is closed and complete up to its last chunk.
         """
         try:
-            self._append(*end_of_file(self._found, self.size), last=True)
-            self._found.finished = True
+            self._append(*end_of_file(self.found, self.size), last=True)
+            self.found.finished = True
         finally:
             self.close()
 

@@ -77,8 +77,14 @@ def row_type(layout: Layout) -> MessageType:
     members = [Member(name, *numbers[kind], row[name]) for name, kind in HEAD]
     if layout.actuators:
         states = _states_members(layout)
-        members += [_placed(states, part, row[part]) for part in ("desired", "observed")]
-        mask_type = _mask_type(layout)
+        members += [
+            replace(states, name=part, offset=row[part] + states.offset)
+            for part in ("desired", "observed")
+        ]
+        mask_type = None
+        if _has_names(layout):
+            names = [_field_name(each["name"]) for each in layout.schema["actuators"]]
+            mask_type = _type("Mask", [Member(name, "bool", 1, 0) for name in names])
         members += [
             Member(
                 mask,
@@ -108,7 +114,10 @@ def _states_members(layout: Layout) -> Member:
             each["name"]: _note(kind["fields"][0]) for each, kind in described if is_plain(kind)
         }
     else:
-        members, notes = [_group_member(group) for group in groups], {}
+        members, notes = [], {}
+        for group in groups:
+            name, count = group["name"] or "state", group["count"] if group["array"] else None
+            members.append(_state_member(group["type"], name, group["offset"], count))
         if len(groups) == 1 and not groups[0]["name"]:
             return members[0]
     states = _type("States", members, notes=notes)
@@ -125,19 +134,6 @@ def _has_names(layout: Layout) -> bool:
     return not any(group["array"] for group in layout.schema["groups"])
 
 
-def _mask_type(layout: Layout) -> MessageType | None:
-    """Makes a type with a bool for each actuator, by name; None if actuators have no names."""
-    if not _has_names(layout):
-        return None
-    names = [each["name"] for each in layout.schema["actuators"]]
-    return _type("Mask", [Member(_field_name(name), "bool", 1, 0) for name in names])
-
-
-def _group_member(group: dict[str, Any]) -> Member:
-    count = group["count"] if group["array"] else None
-    return _state_member(group["type"], group["name"] or "state", group["offset"], count)
-
-
 def _state_member(
     described: dict[str, Any], name: str, offset: int, count: int | None = None
 ) -> Member:
@@ -149,10 +145,6 @@ def _state_member(
         return Member(plain.name, plain.kind, plain.size, offset, total, plain.type)
     struct = _struct(described, name)
     return Member(_field_name(name), struct.name, described["size"], offset, count, struct)
-
-
-def _placed(member: Member, name: str, offset: int) -> Member:
-    return replace(member, name=name, offset=offset + member.offset)
 
 
 def _struct(described: dict[str, Any], fallback: str) -> MessageType:

@@ -69,7 +69,7 @@ def write_part(
     try:
         writer = _PartWriter(file, selection, offsets)
         for run, epoch in _epochs_in(read):
-            writer.add_run(run, epoch, poses(run[0], epoch) if selection.transforms else None)
+            writer.runs[run] = epoch, poses(run[0], epoch) if selection.transforms else None
         for path, found in chain.from_iterable(in_order):
             with found.opened(path) as content:
                 try:
@@ -136,7 +136,8 @@ class _PartWriter:
         self._next: dict[int, int] = {}  # next row or entry by new channel, to skip duplicates
         self._row_channels: dict[Run, int] = {}
         self._seen: set[tuple[str, int, bytes]] = set()
-        self._runs: dict[Run, tuple[RecordedEpoch, Poses | None]] = {}
+        #: runs, and bodies whose transforms are added with their rows
+        self.runs: dict[Run, tuple[RecordedEpoch, Poses | None]] = {}
         self._derivers: dict[Run, list[JointWriter | TransformWriter]] = {}
         self._is_over: set[int] = set()  # journals that hold all entries up to the end
 
@@ -157,14 +158,10 @@ class _PartWriter:
             ):
                 self._channel(channel)
 
-    def add_run(self, run: Run, epoch: RecordedEpoch, poses: Poses | None) -> None:
-        """Registers a run. poses: its bodies, whose transforms are added with its rows."""
-        self._runs[run] = epoch, poses
-
     def _derived(self, note: EpochNote, rows: list[tuple[int, bytes]]) -> Iterator[Block]:
         """Yields joint states of rows, if their file has joint states, and due transforms."""
         run = note.segment, note.epoch
-        epoch, poses = self._runs[run]
+        epoch, poses = self.runs[run]
         if run not in self._derivers:
             derivers = self._derivers[run] = []
             if (note.segment, note.number) in self._joint_channels:

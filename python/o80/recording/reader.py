@@ -64,7 +64,7 @@ class RecordingFile:
     @property
     def size(self) -> int:
         """Size of all files [bytes]."""
-        return sum(_size(path) for path, _ in self._files)
+        return sum(size_of(path) for path, _ in self._files)
 
     @cached
     def marks(self) -> list[Mark]:
@@ -135,7 +135,7 @@ def files_of(path: Path) -> list[Path]:
         raise RecordingError(
             f"{path} is a folder of several recordings: `o80 recordings {path}` lists them"
         )
-    files = [file for file in there if _size(file) >= len(MAGIC)]
+    files = [file for file in there if size_of(file) >= len(MAGIC)]
     if not files:
         raise RecordingError(f"the folder {path} holds no recording (NAME.mcap)")
     return files
@@ -149,7 +149,7 @@ def in_order(folder: Path) -> list[Path]:
     )
 
 
-def _size(path: Path) -> int:
+def size_of(path: Path) -> int:
     """Returns the size of a file [bytes]; 0 if its recorder (keep) has deleted it meanwhile."""
     try:
         return path.stat().st_size
@@ -181,18 +181,14 @@ def errors_explained(path: Path) -> Iterator[None]:
     except NotARecordingError as error:
         raise RecordingError(f"{error}: o80.open reads files of o80 record") from None
     except FileNotFoundError:
-        raise RecordingError(_no_such_file(path)) from None
+        name, file = (path.name, path) if path.suffix == ".mcap" else (str(path), f"{path}.mcap")
+        segment = name.removesuffix(".mcap")
+        raise RecordingError(
+            f"there is no file {path}: give a recording. `o80 record {segment} -o {file}` records "
+            f"a segment '{segment}'"
+        ) from None
     except OSError as error:
         raise RecordingError(unreadable(path, error)) from error
-
-
-def _no_such_file(path: Path) -> str:
-    name, file = (path.name, path) if path.suffix == ".mcap" else (str(path), f"{path}.mcap")
-    segment = name.removesuffix(".mcap")
-    return (
-        f"there is no file {path}: give a recording. `o80 record {segment} -o {file}` records a "
-        f"segment '{segment}'"
-    )
 
 
 def _epochs_of(runs: list[list[EpochPart]], cut_at: Path | None) -> Iterator[RecordedEpoch]:

@@ -6,13 +6,14 @@ file repeats all groups. Without a summary a scan reads every record, and ends b
 incomplete group.
 """
 
+import contextlib
 import os
 import shutil
 import struct
 import tempfile
 import weakref
 import zlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sized
 from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
@@ -111,7 +112,13 @@ def scan(path: str | os.PathLike[str]) -> Scan:
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MAGIC)) != MAGIC:
             raise NotARecordingError(f"{path} is not an MCAP file")
-        found = _by_summary(file, size) or _scanned(file, size, path)
+        found = None
+        with contextlib.suppress(*DAMAGED):  # a scan of all records reports where
+            found = _summary(file, size)
+        try:
+            found = found or _Scanner(file, size, path).run()
+        except DAMAGED as error:
+            raise RecordingError(f"{path} is damaged, and its summary too") from error
     known = found.channels.keys()
     for there in found.chunks.channels:
         found.foreign |= not known >= there
@@ -142,23 +149,6 @@ def _footer(file: IO[bytes], size: int) -> Footer | None:
         return None
     footer: Footer = Footer.read(ReadDataStream(BytesIO(data[HEAD.size :])))
     return footer if footer.summary_start > 0 else None
-
-
-def _by_summary(file: IO[bytes], size: int) -> Scan | None:
-    """Scan from the file's summary; None if that is missing or incomplete."""
-    try:
-        return _summary(file, size)
-    except DAMAGED:  # a scan of all records reports where
-        return None
-
-
-def _scanned(file: IO[bytes], size: int, path: str | os.PathLike[str]) -> Scan:
-    try:
-        return _Scanner(file, size, path).run()
-    except RecordingError:
-        raise
-    except DAMAGED as error:
-        raise RecordingError(f"{path} is damaged, and its summary too") from error
 
 
 def damage_in(path: Path, found: Scan) -> Iterator[str]:
@@ -192,6 +182,7 @@ def _check_indexes(file: IO[bytes], chunk: ChunkIndex, content: bytes) -> None:
 
 
 def _summary(file: IO[bytes], size: int) -> Scan | None:
+    """Scan from the file's summary; None if that is missing or incomplete."""
     footer = _footer(file, size)
     if footer is None or not footer.summary_crc:
         return None
@@ -220,20 +211,16 @@ def _summary(file: IO[bytes], size: int) -> Scan | None:
             found.metadata_places.append(MetadataIndex.read(stream))
         elif opcode == Opcode.STATISTICS:
             statistics = Statistics.read(stream)
-    is_complete = statistics is not None and (
-        len(found.chunks),
-        len(found.attachments),
-        len(found.metadata_places),
-        len(found.channels),
-        len(found.schemas),
-    ) == (
-        statistics.chunk_count,
-        statistics.attachment_count,
-        statistics.metadata_count,
-        statistics.channel_count,
-        statistics.schema_count,
-    )
-    if statistics is None or not is_complete or (statistics.message_count and not found.chunks):
+    if statistics is None or (statistics.message_count and not found.chunks):
+        return None
+    groups: dict[str, Sized] = {
+        "chunk": found.chunks,
+        "attachment": found.attachments,
+        "metadata": found.metadata_places,
+        "channel": found.channels,
+        "schema": found.schemas,
+    }
+    if any(len(each) != getattr(statistics, f"{name}_count") for name, each in groups.items()):
         return None
     found.counts = statistics.channel_message_counts
     for place in found.metadata_places:

@@ -49,7 +49,7 @@ class Source:
         self._written = dict(written)
         self._clock = clock
         self._from_now = from_now
-        self._frontend: Frontend | None = None
+        self.frontend: Frontend | None = None  #: of the current backend
         self._writer: RowWriter | None = None
         self._journal: JournalRecorder | None = None
         self._journal_log: JournalLog | None = None
@@ -65,7 +65,7 @@ class Source:
     @property
     def position(self) -> tuple[int, int]:
         """Epoch and iteration of the newest row; -1: none."""
-        return (-1 if self._frontend is None else self._frontend.epoch), self.newest
+        return (-1 if self.frontend is None else self.frontend.epoch), self.newest
 
     def has_read(self, position: tuple[int, int]) -> bool:
         """True if the row at an earlier `position` and the decisions up to it were read.
@@ -79,17 +79,12 @@ class Source:
     @property
     def newest(self) -> int:
         """Iteration of the newest row; -1: there is none."""
-        return -1 if self._frontend is None else self._frontend.published
-
-    @property
-    def frontend(self) -> Frontend | None:
-        """Frontend of the current backend; None if there is none."""
-        return self._frontend
+        return -1 if self.frontend is None else self.frontend.published
 
     @property
     def begin(self) -> int:
         """First row of this run in the recording; -1: no run."""
-        return -1 if self._frontend is None else self._written[self._frontend.epoch].note.begin
+        return -1 if self.frontend is None else self._written[self.frontend.epoch].note.begin
 
     @property
     def continues_at(self) -> int | None:
@@ -107,13 +102,13 @@ class Source:
         """Detaches from the backend."""
         if self._snapshots is not None:
             self._snapshots.close()
-        if self._frontend is not None:
-            self._frontend.close()
-            self._frontend = None
+        if self.frontend is not None:
+            self.frontend.close()
+            self.frontend = None
 
     def is_filled(self, share: float) -> bool:
         """True if this share of a ring is unread, or a new backend may have started."""
-        frontend = self._frontend
+        frontend = self.frontend
         if frontend is None or not frontend.alive:
             return True
         newest = frontend.published
@@ -123,18 +118,18 @@ class Source:
 
     def poll(self) -> list[Block]:
         """Returns rows and decisions since the last call; rows of at most LARGEST_BLOCK bytes."""
-        if self._frontend is None and not self._attach():
+        if self.frontend is None and not self._attach():
             return []
-        assert self._frontend is not None
-        blocks = self._read(self._frontend)
+        assert self.frontend is not None
+        blocks = self._read(self.frontend)
         if self._snapshots is not None:
-            self._snapshots.poll(self._frontend)
-        if not self._frontend.alive:
-            blocks = blocks or self._read(self._frontend)  # rows published just before its end
+            self._snapshots.poll(self.frontend)
+        if not self.frontend.alive:
+            blocks = blocks or self._read(self.frontend)  # rows published just before its end
             if self.has_read(self.position):
-                self._note_end(self._frontend)
+                self._note_end(self.frontend)
             if not blocks and self._attach():
-                blocks = self._read(self._frontend)
+                blocks = self._read(self.frontend)
         return blocks
 
     def _read(self, frontend: Frontend) -> list[Block]:
@@ -155,7 +150,7 @@ class Source:
             found = Frontend(self.name, timeout=0, read_only=True, dead=True)
         except (TimeoutError, SegmentError, BackendGone):
             return False
-        if found.published < 0 or (self._frontend and found.epoch == self._frontend.epoch):
+        if found.published < 0 or (self.frontend and found.epoch == self.frontend.epoch):
             found.close()
             return False
         self.close()
@@ -163,7 +158,7 @@ class Source:
         return True
 
     def _begin(self, frontend: Frontend) -> None:
-        self._frontend = frontend
+        self.frontend = frontend
         known = self._written.get(frontend.epoch)
         if known is None:
             known = self._first_time(frontend)
@@ -209,10 +204,10 @@ class Source:
     def continue_in(self, file: FileWriter) -> None:
         """Writes all further rows and entries into another file."""
         self._file = file
-        if self._frontend is None or self._writer is None:
+        if self.frontend is None or self._writer is None:
             return
         note = replace(self._writer.note, begin=self._next, before=EARLIER_FILE)
-        self._writer = RowWriter.added_to(file, self._frontend, note)
+        self._writer = RowWriter.added_to(file, self.frontend, note)
         if self._journal is not None:
             self._journal.add_channel(file, note)
 
@@ -285,8 +280,8 @@ class Source:
 
     def log_time(self, iteration: int) -> int:
         """Returns the log time of a row [ns]; if the row is gone, that of the newest row read."""
-        if self._frontend is not None and self._writer is not None:
-            rows = self._frontend.history(since=iteration, until=iteration)
+        if self.frontend is not None and self._writer is not None:
+            rows = self.frontend.history(since=iteration, until=iteration)
             if len(rows):
                 return int(rows.time[0]) + self._writer.note.wall_offset
         return self._last_log_time or time_ns()

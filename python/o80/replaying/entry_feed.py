@@ -39,7 +39,11 @@ class EntryFeed:
                     f"recorded"
                 )
             elif self._lacks(entry) or entry.records_lost:
-                self._end_at(entry)
+                self.until = self._known
+                self.gap = f"the journal lacks the commands of entry {entry.number}"
+                if entry.missed:
+                    first = entry.number - entry.missed
+                    self.gap = f"the journal lacks entries {first} to {entry.number - 1}"
             elif moved := self._rules.moved_otherwise(entry):
                 self.until = entry.iteration - 1
                 self.gap = (
@@ -68,14 +72,6 @@ class EntryFeed:
     def _next(self) -> _core.JournalEntry | None:
         pending, self._pending = self._pending, None
         return pending if pending is not None else next(self._entries, None)
-
-    def _end_at(self, entry: _core.JournalEntry) -> None:
-        self.until = self._known
-        if entry.missed:
-            first = entry.number - entry.missed
-            self.gap = f"the journal lacks entries {first} to {entry.number - 1}"
-        else:
-            self.gap = f"the journal lacks the commands of entry {entry.number}"
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,7 @@
 
 import os
 from collections.abc import Iterator, Mapping
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -11,7 +11,7 @@ import numpy as np
 import o80._core as _core
 import o80.robots.robot as robots
 from o80.base.loop_options import text_of
-from o80.replaying.start import Start, times_from
+from o80.replaying.start import Start
 from o80.replaying.trust import options_of, robot_of
 
 if TYPE_CHECKING:
@@ -50,8 +50,10 @@ class Runner:
     def run(self, block: "History", start: Start) -> bool:
         """Runs one iteration for each row; False if the robot or its backend has ended."""
         if isinstance(self.native, _core.Replay):
-            first = int(block.iteration[0])
-            return self.native.run(times_from(block.time, start, first, self.period))
+            times = block.time
+            if start.row == int(block.iteration[0]) > 0:  # at a later start, that of the row before
+                times = np.concatenate([times[:1] - self.period, times])
+            return self.native.run(np.ascontiguousarray(times))
         return self.native.run(np.ascontiguousarray(block.rows).tobytes())
 
 
@@ -69,8 +71,9 @@ def with_driver(
     name = _core.unused_segment_name(loaded.name)
     period = run.schema["period"]
     given = loaded._library, name, _loop_options(run, history), [*own.items()], period
-    with _removed_at_end(name), closing(_core.Replay(*given)) as native:
-        yield Runner(native, "driver", period)
+    with ExitStack() as stack:
+        stack.callback(_core.clean, name)
+        yield Runner(stack.enter_context(closing(_core.Replay(*given))), "driver", period)
 
 
 @contextmanager
@@ -82,16 +85,11 @@ def without_driver(run: "RecordedRun", history: int) -> Iterator[Runner]:
     name = _core.unused_segment_name("replay")
     period = run.schema["period"]
     given = run.description, name, _loop_options(run, history), period
-    with _removed_at_end(name), closing(_core.DriverlessReplay(*given)) as native:
-        yield Runner(native, "backend", period)
-
-
-@contextmanager
-def _removed_at_end(segment: str) -> Iterator[None]:
-    try:
-        yield
-    finally:
-        _core.clean(segment)
+    with ExitStack() as stack:
+        stack.callback(_core.clean, name)
+        yield Runner(
+            stack.enter_context(closing(_core.DriverlessReplay(*given))), "backend", period
+        )
 
 
 def _loop_options(run: "RecordedRun", history: int) -> list[tuple[str, str]]:

@@ -121,13 +121,19 @@ def find_start(run: "RecordedRun", since: int) -> Start | None:
         if entry.kind == "snapshot":
             snapshots[entry.slot] = entry.kept
         elif entry.kind == "status":
-            _note(entry, sent, running)
+            key = (entry.lane, entry.id)
+            if entry.status != "active":
+                running.discard(key)
+                sent.discard(key)
+            elif key in sent:
+                running.add(key)
         elif entry.kind == "taken":
             named = list(requests.of(entry))
             first = named[0] if named else ("", -1, 0)
             is_start = entry.iteration >= since and entry.iteration in begun and not running
             is_start = is_start and not purges.reach_past(entry.number)
-            if is_start and (first[0] == "reset" or first[:2] in _restores(snapshots)):
+            restores = [("restore", slot) for slot in snapshots]
+            if is_start and (first[0] == "reset" or first[:2] in restores):
                 return Start(entry.iteration, entry.number, first[0], snapshots)
             sent.update((entry.lane, number) for _, _, number in named)
     return None
@@ -244,25 +250,3 @@ def _rests(entries: "Iterator[_core.JournalEntry]") -> Iterator[tuple[int, int, 
             began = entry
     if began is not None:
         yield began.iteration, 2**62, began.number
-
-
-def _restores(snapshots: dict[int, bytes]) -> list[tuple[str, int]]:
-    return [("restore", slot) for slot in snapshots]
-
-
-def _note(
-    entry: "_core.JournalEntry", sent: set[tuple[int, int]], running: set[tuple[int, int]]
-) -> None:
-    key = (entry.lane, entry.id)
-    if entry.status == "active" and key in sent:
-        running.add(key)
-    elif entry.status != "active":
-        running.discard(key)
-        sent.discard(key)
-
-
-def times_from(times: np.ndarray[Any, Any], start: Start, first: int, period: int) -> Any:
-    """Returns the times of a block; at a later start, preceded by the time of the row before it."""
-    if first != start.row or start.row == 0:
-        return np.ascontiguousarray(times)
-    return np.concatenate([times[:1] - period, times])

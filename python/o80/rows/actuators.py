@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from dataclasses import fields as fields_of
 from typing import Any
 
 from o80.base import argument_checks
@@ -82,9 +81,6 @@ class Limits:
         return tuple(getattr(self, name) for name in NUMBERS)
 
 
-LIMITS = tuple(field.name for field in fields_of(Limits) if field.name != "integral")
-
-
 @dataclass(frozen=True, kw_only=True)
 class Number:
     """One number of an actuator's state."""
@@ -155,7 +151,7 @@ class Actuator:
 
 def _limits(described: dict[str, Any], paths: list[str]) -> Limits:
     """Makes the limits of one number. paths: names of all numbers of the state."""
-    given = {key: described[key] for key in LIMITS if described.get(key) is not None}
+    given = {key: described[key] for key in NUMBERS if described.get(key) is not None}
     if integral := described.get("integral"):
         known = {key: value for key, value in integral.items() if value is not None}
         given["integral"] = IntegralBounds(paths[known.pop("number")], **known)

@@ -245,7 +245,7 @@ class EnumerationRow(np.void):  # type: ignore[misc]
         return _row_of, (plain.view(np.dtype((np.void, self.dtype))), self._labels)
 
 
-def labelled(array: NDArray[Any], labels: Labels | None) -> Any:
+def labelled(array: NDArray[Any], labels: Labels | None) -> NDArray[Any]:
     """Returns the same array as an EnumerationArray, if it has labels."""
     if not labels:
         return array

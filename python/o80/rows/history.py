@@ -263,14 +263,12 @@ class History:
     @property
     def fresh(self) -> NDArray[np.bool_]:
         """True in rows of a fresh start: (T,)."""
-        fresh: NDArray[np.bool_] = self._part("fresh") != 0
-        return fresh
+        return self._part("fresh").astype(np.bool_)
 
     @property
     def halted(self) -> NDArray[np.bool_]:
         """True in rows with a halt in force: (T,)."""
-        halted: NDArray[np.bool_] = self._part("halted") != 0
-        return halted
+        return self._part("halted").astype(np.bool_)
 
     @property
     def starvations(self) -> NDArray[np.int64]:

@@ -15,16 +15,7 @@ from o80.rows.enumerations import labelled
 from o80.rows.layout import dtype_of_type, is_plain, labels_of_type, request_fields
 from o80.rows.record import Record
 
-ENDS = frozenset(
-    {
-        Status.COMPLETED,
-        Status.OVERWRITTEN,
-        Status.PURGED,
-        Status.INTERRUPTED,
-        Status.REJECTED,
-        Status.HALTED,
-    }
-)
+ENDS = frozenset(Status) - {Status.NONE, Status.QUEUED, Status.ACTIVE, Status.FORGOTTEN}
 
 
 @dataclass(frozen=True)
@@ -157,20 +148,15 @@ def command_ends(entries: Iterable[JournalEntry]) -> list[CommandEnd]:
     ends = []
     for entry in entries:
         commands = [each for each in entry.commands if each.kind == "command"]
+        at, reason = entry.iteration, entry.reason or Reason.NONE
         if entry.kind == "rejected":
-            ends += [
-                CommandEnd(
-                    entry.iteration, Status.REJECTED, each.actuators, entry.reason or Reason.NONE
-                )
-                for each in commands
-            ]
+            ends += [CommandEnd(at, Status.REJECTED, each.actuators, reason) for each in commands]
             continue
         actuators.update({(entry.lane, each.id): each.actuators for each in commands})
         if entry.kind == "status" and entry.status in ENDS and entry.id is not None:
             named = actuators.pop((entry.lane, entry.id), None)
             if named is not None:
-                reason = entry.reason or Reason.NONE
-                ends.append(CommandEnd(entry.iteration, entry.status, named, reason))
+                ends.append(CommandEnd(at, entry.status, named, reason))
     return ends
 
 

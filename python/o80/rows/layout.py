@@ -288,13 +288,11 @@ class Layout:
     def labelled_states(self, buffer: Any) -> NDArray[Any]:
         """Returns the states in a buffer as an array to write, which accepts labels."""
         labels = self.labels.get("") if self._is_array else self.labels
-        array: NDArray[Any] = labelled(self.states_in(buffer), labels)
-        return array
+        return labelled(self.states_in(buffer), labels)
 
     def labelled_extras(self, buffer: Any) -> NDArray[Any]:
         """Returns the sensor values in a buffer as an array to write, which accepts labels."""
-        array: NDArray[Any] = labelled(np.ndarray((), self.extras, buffer), self.extended_labels)
-        return array
+        return labelled(np.ndarray((), self.extras, buffer), self.extended_labels)
 
     # one row, as a buffer => arrays over its memory
 

@@ -124,10 +124,7 @@ class _Parts:
             for name, column in columns.items():
                 (states[name] if name else states)[...] = column
             masks.append(_mask_of([*columns] if "" not in columns else kind.names or (), kind))
-        numbers = [_numbers_in(kind) for kind in self._kinds]
-        words = [mask or _words((1 << n) - 1, n) for mask, n in zip(masks, numbers, strict=True)]
-        given = [word for each in words for word in each] if any(masks) else []
-        return whole, count, given
+        return whole, count, _words_of(masks, self._kinds)
 
 
 def _field_of(kind: np.dtype[Any], name: str) -> np.dtype[Any]:
@@ -197,6 +194,15 @@ def _words(bits: int, count: int) -> list[int]:
     return [bits >> word & 2**64 - 1 for word in range(0, count, 64)]
 
 
+def _words_of(masks: list[list[int]], kinds: list[np.dtype[Any]]) -> list[int]:
+    """Joins the words of all states; no words if all numbers are given."""
+    if not any(masks):
+        return []
+    numbers = [_numbers_in(kind) for kind in kinds]
+    words = (mask or _words((1 << n) - 1, n) for mask, n in zip(masks, numbers, strict=True))
+    return [word for each in words for word in each]
+
+
 def state_types(actuators: Sequence[int], layout: Layout) -> list[np.dtype[Any]]:
     """Returns the state type of each actuator. Raises InvalidArgument if there are none."""
     if not actuators:
@@ -208,11 +214,7 @@ def first_fields(actuators: Sequence[int], layout: Layout) -> list[int]:
     """Returns the mask, in the form of `states_of`, that selects the first field of each state."""
     kinds = state_types(actuators, layout)
     masks = [_mask_of(kind.names[:1], kind) if kind.names else [] for kind in kinds]
-    if not any(masks):
-        return []
-    counts = [_numbers_in(kind) for kind in kinds]
-    words = [mask or _words((1 << n) - 1, n) for mask, n in zip(masks, counts, strict=True)]
-    return [word for each in words for word in each]
+    return _words_of(masks, kinds)
 
 
 def labels_of(actuator: int, layout: Layout) -> Any:
@@ -221,7 +223,6 @@ def labels_of(actuator: int, layout: Layout) -> Any:
 
 
 def _type_of(actuator: int, layout: Layout) -> dict[str, Any]:
-    """Returns the described type of an actuator's state."""
     schema = layout.schema
     described: dict[str, Any] = schema["groups"][schema["actuators"][actuator]["group"]]["type"]
     return described
@@ -231,14 +232,12 @@ def times_of(times: ArrayLike) -> NDArray[np.int64]:
     """Converts times [s] to [ns]. Raises InvalidArgument for others than finite times (T,)."""
     try:
         seconds = np.asarray(times, np.float64)
+        if seconds.ndim != 1 or not np.all(np.isfinite(seconds)):
+            raise ValueError
     except (TypeError, ValueError):
         raise InvalidArgument(
-            f"the times of a trajectory must be finite numbers (T,) [s], got {times!r}"
-        ) from None
-    if seconds.ndim != 1 or not np.all(np.isfinite(seconds)):
-        raise InvalidArgument(
             f"the times of a trajectory must be finite numbers (T,) [s], got {times!r:.60}"
-        )
+        ) from None
     if seconds.size == 0:
         raise InvalidArgument("the times of a trajectory are empty: give one for each row")
     if np.any(np.abs(seconds) > 1e9):

@@ -223,10 +223,7 @@ def _marks_in(rows: History, marks: Sequence[tuple[str, int]], begin: int) -> li
 
 
 def _chosen(sources: Sequence[Source], label: Any) -> Source | None:
-    for source in sources:
-        if source.label == label:
-            return source
-    return first_of(sources)
+    return next((each for each in sources if each.label == label), None) or first_of(sources)
 
 
 def first_of(sources: Sequence[Source]) -> Source | None:

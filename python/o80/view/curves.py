@@ -34,17 +34,13 @@ class Panels:
             next((panel for panel in self.columns if panel.split(".")[0].split("[")[0] == name), "")
             for name in actuators
         )
-        self._first = [panel for panel in of_actuators if panel] or self.names[:FIRST_PANELS]
+        #: the panels that are shown before the user chooses: one for each actuator
+        self.first = [panel for panel in of_actuators if panel] or self.names[:FIRST_PANELS]
 
     @property
     def names(self) -> list[str]:
         """All panels."""
         return list(self.columns)
-
-    @property
-    def first(self) -> list[str]:
-        """The panels that are shown before the user chooses: one for each actuator."""
-        return self._first
 
     def curves(
         self, rows: History, panels: list[str], begin: int

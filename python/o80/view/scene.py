@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from o80._core import Observation
 from o80.base.arrays import Image
-from o80.base.errors import Error, MissingExtra
+from o80.base.errors import Error
+from o80.base.extras import needed
 from o80.view.base64_arrays import packed, packed_indices
 from o80.view.foreign_model import compiled
 from o80.view.world import Drawn
@@ -26,13 +27,13 @@ class Scene:
     def __init__(self, schema: dict[str, Any], drawn: Drawn) -> None:
         """Raises Error if the model cannot be read, MissingExtra without mujoco."""
         described = drawn.described
-        self._mujoco = _mujoco()
-        self._model = (
+        self._mujoco: Any = needed("mujoco", "view", "the 3D view")
+        self.model: Any = (  #: the compiled model
             self._compiled(drawn.mjcf, described["file"])
             if drawn.trusted
             else compiled(drawn.mjcf, self._mujoco)
         )
-        self._data = self._mujoco.MjData(self._model)
+        self._data = self._mujoco.MjData(self.model)
         self._lock = threading.Lock()
         self._start: NDArray[np.float64] = np.array(self._data.qpos)
         self._places = [
@@ -40,10 +41,10 @@ class Scene:
             for value in described["values"]
             if (place := self._place(value, schema)) is not None
         ]
-        weld = self._model.body_weldid
-        self._moving = [body for body in range(self._model.nbody) if weld[body] != 0]
+        weld = self.model.body_weldid
+        self._moving = [body for body in range(self.model.nbody) if weld[body] != 0]
         # floating bodies, such as a tracked ball, exist only while a row has their pose
-        self._floats = not any(weld[body] == 0 for body in self._model.geom_bodyid)
+        self._floats = not any(weld[body] == 0 for body in self.model.geom_bodyid)
         self._has_ghost = any(value["from"] == "states" for value in described["values"])
         self.geometry = self._geometry()
 
@@ -63,23 +64,23 @@ class Scene:
         kind = self._mujoco.mjtObj
         joint = value["what"] == "joint"
         if joint:
-            found = self._mujoco.mj_name2id(self._model, kind.mjOBJ_JOINT, value["name"])
+            found = self._mujoco.mj_name2id(self.model, kind.mjOBJ_JOINT, value["name"])
         else:
-            body = self._mujoco.mj_name2id(self._model, kind.mjOBJ_BODY, value["name"])
-            found = int(self._model.body_jntadr[body]) if body >= 0 else -1
+            body = self._mujoco.mj_name2id(self.model, kind.mjOBJ_BODY, value["name"])
+            found = int(self.model.body_jntadr[body]) if body >= 0 else -1
         if found < 0:
             return None
         row = schema["row"]
         extended = value["from"] == "extended"
         observed = row["extended" if extended else "observed"] + value["offset"]
         desired = observed if extended else row["desired"] + value["offset"]
-        address = int(self._model.jnt_qposadr[found])
+        address = int(self.model.jnt_qposadr[found])
         follows = None if extended else _following(schema, value["offset"])
-        body = int(self._model.jnt_bodyid[found])
+        body = int(self.model.jnt_bodyid[found])
         share = None if extended or not joint else _share(schema, value["offset"])
         factor, shift = 1.0, 0.0
-        if share is not None and self._model.jnt_limited[found]:
-            low, high = (float(end) for end in self._model.jnt_range[found])
+        if share is not None and self.model.jnt_limited[found]:
+            low, high = (float(end) for end in self.model.jnt_range[found])
             factor = (high - low) / (share[1] - share[0])
             shift = low - share[0] * factor
         count = 1 if joint else 3
@@ -103,19 +104,14 @@ class Scene:
     @property
     def bodies(self) -> list[str]:
         """Names of the moving bodies; numbers of bodies without a name."""
-        names = (self._model.body(body).name for body in self._moving)
+        names = (self.model.body(body).name for body in self._moving)
         return [name or f"body_{body}" for name, body in zip(names, self._moving, strict=True)]
-
-    @property
-    def model(self) -> Any:
-        """The compiled model."""
-        return self._model
 
     def picture(self, row: Observation, renderer: Any, camera: str | int) -> Image:
         """Draws a fresh picture (height, width, 3) of the observed positions."""
         with self._lock:
             self._pose(row, [place.observed for place in self._places], [])
-            self._mujoco.mj_camlight(self._model, self._data)
+            self._mujoco.mj_camlight(self.model, self._data)
             renderer.update_scene(self._data, camera)
             picture: Image = renderer.render().copy()
             return picture
@@ -137,15 +133,15 @@ class Scene:
                 lost.append(self._moving.index(place.body))
             else:
                 not_finite.append(place.name)
-        self._mujoco.mj_kinematics(self._model, self._data)
+        self._mujoco.mj_kinematics(self.model, self._data)
         moving = self._moving
         poses = np.hstack([self._data.xpos[moving], self._data.xquat[moving]])
         poses[lost] = np.nan
         return poses
 
     def _geometry(self) -> dict[str, Any]:
-        self._mujoco.mj_kinematics(self._model, self._data)
-        model = self._model
+        self._mujoco.mj_kinematics(self.model, self._data)
+        model = self.model
         shown = [geom for geom in range(model.ngeom) if self._is_shown(geom)]
         meshes = sorted(
             {int(model.geom_dataid[geom]) for geom in shown if model.geom_type[geom] == 7}
@@ -160,7 +156,7 @@ class Scene:
         }
 
     def _is_shown(self, geom: int) -> bool:
-        model = self._model
+        model = self.model
         return (
             int(model.geom_type[geom]) in SHAPES
             and model.geom_group[geom] < DRAWN_GROUPS
@@ -168,7 +164,7 @@ class Scene:
         )
 
     def _colour(self, geom: int) -> list[float]:
-        model = self._model
+        model = self.model
         material = int(model.geom_matid[geom])
         colour = [float(number) for number in model.geom_rgba[geom]]
         if material >= 0 and np.allclose(colour, USUAL_COLOUR):
@@ -178,7 +174,7 @@ class Scene:
         return colour
 
     def _geom(self, geom: int) -> dict[str, Any]:
-        model = self._model
+        model = self.model
         return {
             "body": int(model.geom_bodyid[geom]),
             "shape": SHAPES[int(model.geom_type[geom])],
@@ -190,7 +186,7 @@ class Scene:
         }
 
     def _mesh(self, mesh: int) -> dict[str, str]:
-        model = self._model
+        model = self.model
         vertices = slice(
             model.mesh_vertadr[mesh], model.mesh_vertadr[mesh] + model.mesh_vertnum[mesh]
         )
@@ -238,14 +234,3 @@ def _share(schema: dict[str, Any], offset: int) -> tuple[float, float] | None:
         if actuator["offset"] == offset and fields[0]["unit"] == "1" and None not in (low, high):
             return low, high
     return None
-
-
-def _mujoco() -> Any:
-    try:
-        import mujoco
-    except ImportError as error:
-        raise MissingExtra(
-            'the 3D view needs mujoco, which is not installed: pip install "o80[view]"',
-            name="mujoco",
-        ) from error
-    return mujoco

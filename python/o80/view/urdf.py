@@ -54,7 +54,7 @@ class Links:
         values = schema["model"]["values"]
         places = {each["name"]: begins[each["from"]] + each["offset"] for each in values}
         shown = {name: names[place] for name, place in places.items() if place in names}
-        return _Urdf(self._scene.model, self._robot, shown).text()
+        return tostring(_Urdf(self._scene.model, self._robot, shown).element, encoding="unicode")
 
 
 class _Urdf:
@@ -64,22 +64,18 @@ class _Urdf:
     """
 
     def __init__(self, model: Any, robot: str, joints: Mapping[str, str]) -> None:
-        self._model, self._joints, self._element = model, joints, Element("robot", name=robot)
+        self._model, self._joints, self.element = model, joints, Element("robot", name=robot)
         names = (model.body(body).name or f"body_{body}" for body in range(model.nbody))
         self._frames = [
             f"{robot}/{name}" if weld else WORLD
             for name, weld in zip(names, model.body_weldid, strict=True)
         ]
-        links = {each: SubElement(self._element, "link", name=each) for each in self._frames}
+        links = {each: SubElement(self.element, "link", name=each) for each in self._frames}
         for geom in range(model.ngeom):
             if model.geom_type[geom] != FLOOR and model.geom_group[geom] <= 2:  # it is drawn
                 self._add_shape(links[self._frames[model.geom_bodyid[geom]]], geom)
         for body in np.flatnonzero(model.body_weldid):
             self._add_joints(int(body))
-
-    def text(self) -> str:
-        """Returns the URDF as text."""
-        return tostring(self._element, encoding="unicode")
 
     def _standing(self, body: int) -> Numbers:
         """Returns the pose of a body in its link (4, 4)."""
@@ -102,7 +98,7 @@ class _Urdf:
             kind, behind = kinds.get(int(model.jnt_type[joint]), "floating"), frame
             if model.jnt_pos[joint].any() or joint + 1 < first + model.body_jntnum[body]:
                 behind = f"{frame}/{joint}"
-                SubElement(self._element, "link", name=behind)
+                SubElement(self.element, "link", name=behind)
             origin = origin @ _placed(model.jnt_pos[joint] - at)
             made = self._joint(self._joints.get(name, name), kind, (link, behind), origin)
             SubElement(made, "axis", xyz=_text(model.jnt_axis[joint]))
@@ -114,7 +110,7 @@ class _Urdf:
             self._joint(f"{frame}/fixed", "fixed", (link, frame), origin @ _placed(-at))
 
     def _joint(self, name: str, kind: str, links: tuple[str, str], origin: Numbers) -> Element:
-        made = SubElement(self._element, "joint", name=name, type=kind)
+        made = SubElement(self.element, "joint", name=name, type=kind)
         for end, link in zip(("parent", "child"), links, strict=True):
             SubElement(made, end, link=link)
         _add_origin(made, origin)

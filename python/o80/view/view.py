@@ -5,7 +5,6 @@ import os
 import select
 import subprocess
 import sys
-import time
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -89,8 +88,7 @@ class View(Closeable):
 
     def _first_line(self) -> dict[str, Any]:
         assert self._popen.stdout is not None
-        end = time.monotonic() + STARTS_WITHIN
-        ready, _, _ = select.select([self._popen.stdout], [], [], end - time.monotonic())
+        ready, _, _ = select.select([self._popen.stdout], [], [], STARTS_WITHIN)
         if not ready:
             raise TimeoutError(f"the view did not start within {STARTS_WITHIN:g} s")
         line = self._popen.stdout.readline()

@@ -109,7 +109,7 @@ def test_the_last_rows_before_a_restart_are_not_lost(segment: str, tmp_path: Pat
                 stack.enter_context(load(segment))
 
         source: Any = recorder.sources[segment]
-        source._frontend = RestartsWhenAsked(source._frontend, restart)
+        source.frontend = RestartsWhenAsked(source.frontend, restart)
         source._attempt_at = 0.0  # it may attach at once
         while not arm.closed or source.newest != 0:
             recorder.poll()

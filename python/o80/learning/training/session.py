@@ -81,10 +81,7 @@ class Training(Closeable):
     def _begin(self, saved: dict[str, Any] | None) -> None:
         self.learner = learner.new_learner(self.settings, self.collector)
         self.learner.on_rollout = self._count
-        self.window, self._spent = (
-            EpisodeWindow(),
-            dict.fromkeys(("play", "reset", "clock"), 0.0),
-        )
+        self.window, self._spent = EpisodeWindow(), {"play": 0.0, "reset": 0.0, "clock": 0.0}
         if saved:
             self.collector.repeat([actions.numpy() for actions in saved["played"]])
             self.learner.restore(saved["learner"])

@@ -485,23 +485,4 @@ def boot_words(computer: Computer, words: str) -> tuple[str, str]:
     )
 
 
-CHECKS: tuple[Check, ...] = (
-    Priority(),
-    GroupShare(),
-    LockedMemory(),
-    Throttling(),
-    Preemption(),
-    VirtualMachine(),
-    Quota(),
-    Neighbours(),
-    Isolation(),
-    Interrupts(),
-    Governor(),
-    SleepStates(),
-    HyperThreads(),
-    ClockSource(),
-    HugePages(),
-    Swap(),
-    SharedMemory(),
-    Autogroup(),
-)
+CHECKS: tuple[Check, ...] = tuple(each() for each in Check.__subclasses__())

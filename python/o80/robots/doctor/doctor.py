@@ -77,8 +77,8 @@ class Report:
             "verdict": self.verdict,
             "frequency": self.frequency,
             "findings": [asdict(finding) for finding in self.findings],
-            "measured": self.measured and self.measured.as_dict(),
-            "loaded": self.loaded and self.loaded.as_dict(),
+            "measured": self.measured and asdict(self.measured),
+            "loaded": self.loaded and asdict(self.loaded),
             "unread": self.unread,
             "computer": self.computer,
         }

@@ -3,8 +3,7 @@
 import os
 import time
 import warnings
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 from o80.base.errors import Error, TimeoutError
 from o80.frontend.frontend import Frontend
@@ -29,10 +28,6 @@ class WakeUps:
     skipped: int = 0
     refused: tuple[str, ...] = ()  #: texts about settings that the machine refused
     failed: str = ""  #: why nothing was measured
-
-    def as_dict(self) -> dict[str, Any]:
-        """Converts to a dictionary for JSON."""
-        return asdict(self)
 
     def __str__(self) -> str:
         if self.failed:

@@ -12,6 +12,13 @@ function element(tag, text = "", kind = "") {
   return made;
 }
 
+function drawLine(pen, from, to) {
+  pen.beginPath();
+  pen.moveTo(...from);
+  pen.lineTo(...to);
+  pen.stroke();
+}
+
 class Chart {
   constructor(name, unit) {
     [this.name, this.unit] = [name, unit];
@@ -81,22 +88,14 @@ class Chart {
     for (const { at, texts, lines } of joinedMarks(this.marks, x)) this.mark(pen, texts.join(", "), at, lines, bottom);
     pen.restore();
     pen.strokeStyle = colour("cursor");
-    pen.beginPath();
-    pen.moveTo(x(this.cursor - this.begin), 0);
-    pen.lineTo(x(this.cursor - this.begin), bottom);
-    pen.stroke();
+    drawLine(pen, [x(this.cursor - this.begin), 0], [x(this.cursor - this.begin), bottom]);
   }
 
   // notes of programs or of persons: lines with a text
   mark(pen, text, at, lines, bottom) {
     pen.strokeStyle = pen.fillStyle = colour("mark");
     pen.lineWidth = 1;
-    pen.beginPath();
-    for (const line of lines) {
-      pen.moveTo(line, 0);
-      pen.lineTo(line, bottom);
-    }
-    pen.stroke();
+    for (const each of lines) drawLine(pen, [each, 0], [each, bottom]);
     pen.save();
     pen.translate(at - 3, 4);
     pen.rotate(-Math.PI / 2);
@@ -114,10 +113,7 @@ class Chart {
     pen.lineWidth = 1;
     pen.textAlign = "right";
     for (const value of ticks(low, high, 4)) {
-      pen.beginPath();
-      pen.moveTo(left, y(value));
-      pen.lineTo(width - 4, y(value));
-      pen.stroke();
+      drawLine(pen, [left, y(value)], [width - 4, y(value)]);
       pen.fillText(grouped(+value.toPrecision(6)), left - 4, Math.max(y(value) + 3, 8));
     }
     pen.textAlign = "center";
@@ -134,13 +130,9 @@ class Chart {
     pen.beginPath();
     let drawing = false;
     for (let i = 0; i < seconds.length; ++i) {
-      if (!Number.isFinite(values[i])) {
-        drawing = false; // a gap where a value is NaN
-        continue;
-      }
-      if (drawing) pen.lineTo(x(seconds[i]), y(values[i]));
-      else pen.moveTo(x(seconds[i]), y(values[i]));
-      drawing = true;
+      const there = Number.isFinite(values[i]); // a gap where a value is NaN
+      if (there) pen[drawing ? "lineTo" : "moveTo"](x(seconds[i]), y(values[i]));
+      drawing = there;
     }
     pen.stroke();
     pen.setLineDash([]);

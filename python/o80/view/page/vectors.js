@@ -22,15 +22,10 @@ const Mat = {
     ];
   },
   multiply(a, b) {
-    const out = new Array(16);
-    for (let column = 0; column < 4; ++column) {
-      for (let row = 0; row < 4; ++row) {
-        let sum = 0;
-        for (let k = 0; k < 4; ++k) sum += a[4 * k + row] * b[4 * column + k];
-        out[4 * column + row] = sum;
-      }
-    }
-    return out;
+    return a.map((_, i) => {
+      const [row, column] = [i % 4, i - (i % 4)];
+      return a[row] * b[column] + a[row + 4] * b[column + 1] + a[row + 8] * b[column + 2] + a[row + 12] * b[column + 3];
+    });
   },
   perspective(angle, aspect, near, far) {
     const f = 1 / Math.tan(angle / 2);
