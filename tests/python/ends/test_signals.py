@@ -9,12 +9,11 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
-from alarm import alarm_in, handling
 from blocking import CALLS
 from interrupting import at_every_moment
 from processes import WAIT
@@ -98,6 +97,27 @@ def test_ctrl_c_ends_every_wait_and_leaves_everything_usable(
     # a figure for the report, no limit: the machine may be slow
     record_property("longest delay of Ctrl-C [ms]", max(delays.values()))
     assert all(delay < WAIT * 1e3 for delay in delays.values())
+
+
+@contextlib.contextmanager
+def handling(number: int, handler: Callable[..., object]) -> Iterator[None]:
+    """Installs a signal handler for the block."""
+    before = signal.signal(number, handler)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
+        signal.signal(number, before)
+
+
+@contextlib.contextmanager
+def alarm_in(seconds: float) -> Iterator[None]:
+    """Sends SIGALRM during the block; on a slow machine before its first call."""
+    signal.setitimer(signal.ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        signal.setitimer(signal.ITIMER_REAL, 0)
 
 
 def test_a_handler_that_returns_lets_the_wait_go_on_with_its_timeout(arm: o80.Frontend) -> None:

@@ -221,6 +221,7 @@ def test_the_end_of_a_backend_ends_every_wait_of_sixteen_threads(segment: str, e
         assert type(raised).__name__ == error, f"{thread.source}: {raised!r}"
         assert segment in str(raised)
     for frontend in opened:
+        assert f"Backend{frontend.life.title()}" == error
         frontend.forget_added()
         frontend.close()
     for suffix in ("silent", "standing"):

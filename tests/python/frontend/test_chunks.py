@@ -465,27 +465,6 @@ def test_rows_outside_the_limits_are_put_on_them_where_that_is_wanted(segment: s
         assert arm.latest().desired.joints["torque"].tolist() == [1.0, 0.5]
 
 
-@pytest.mark.parametrize(
-    ("targets", "message"),
-    [
-        ({"griper": [0.1]}, "named 'griper'. Did you mean 'gripper'"),
-        ({"gripper": [0.1]}, "lack 'left', 'right', 'valve'"),
-        (
-            {"joints": {"positoin": [[0, 0]]}},
-            "of 'left' has no field 'positoin'; there are: position",
-        ),
-        ([[0.1, 0.2]], r"must have the shape \(T, 4\), got \(1, 2\)"),
-        ([[0.1, 0.2, "open", True]], "cannot be read as float64"),
-    ],
-)
-def test_what_one_action_lacks_is_named(segment: str, targets: Any, message: str) -> None:
-    with (
-        arm_and_gripper(segment) as robot,
-        pytest.raises(o80.InvalidArgument, match=message),
-    ):
-        robot.frontend.chunks(step=5).send(targets)
-
-
 def test_a_prepared_burst_moves_an_arm_and_its_gripper(segment: str) -> None:
     with arm_and_gripper(segment) as robot:
         arm = robot.frontend

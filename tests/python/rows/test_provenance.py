@@ -1,6 +1,5 @@
 """Provenance: what a segment says about how its backend was started."""
 
-import hashlib
 import json
 import os
 import subprocess
@@ -10,20 +9,6 @@ from processes import run_o80
 
 import o80
 from o80.base.installation import prefix
-
-
-def test_of_an_inline_robot_has_the_effective_options(segment: str) -> None:
-    with o80.robots.load("two_joints").inline(segment, reach=2.5, history=100) as arm:
-        found = arm.provenance
-    assert found.robot == "two_joints"
-    assert found.options["reach"] == "2.5"
-    assert set(found.options) == {option.name for option in o80.robots.load("two_joints").options}
-    assert found.run_options["bursting"] == "true"
-    assert found.run_options["history"] == "100"
-    assert found.run_options["frequency"] == "1000"
-    assert found.version == o80.version()
-    assert Path(found.library) == o80.robots.load("two_joints").path.resolve()
-    assert found.library_sha256 == hashlib.sha256(Path(found.library).read_bytes()).hexdigest()
 
 
 def test_of_a_backend_in_a_program_has_its_options(segment: str) -> None:
