@@ -3,6 +3,7 @@
 The expected numbers come from nested values and field names, without any offsets.
 """
 
+import csv
 import json
 import math
 import pickle
@@ -336,8 +337,12 @@ def leaves(value: Any) -> list[Any]:
 
 
 def files(history: o80.History, folder: Path, expected: Columns) -> None:
-    for suffix in (".npz", ".h5", ".parquet"):
+    for suffix in (".npz", ".h5", ".parquet", ".csv"):
         write(folder / f"run{suffix}", {"robot": history})
+    with (folder / "run.csv").open(newline="") as file:
+        rows = [*csv.DictReader(file)]
+    texts = {name: [*map(str, values.tolist())] for name, values in expected.items()}
+    assert {name: [row[name] for row in rows] for name in texts} == texts
     arrays = np.load(folder / "run.npz").items()
     same(expected, {name.removeprefix("robot/"): values for name, values in arrays})
     with h5py.File(folder / "run.h5") as file:

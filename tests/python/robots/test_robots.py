@@ -92,8 +92,11 @@ def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str
 
 
 def test_the_segment_has_the_name_of_the_robot_unless_another_is_given() -> None:
-    with o80.robots.load("two_joints").start() as process:
+    robot = o80.robots.load("two_joints")
+    with robot.start() as process:
         assert process.segment == "two_joints"
+        with pytest.raises(o80.SegmentTaken, match=str(process.pid)):
+            robot.start()
 
 
 def test_options_and_flags_reach_the_robot(segment: str) -> None:
@@ -119,11 +122,6 @@ def test_options_and_flags_reach_the_robot(segment: str) -> None:
         assert file.stat().st_mode & 0o777 == 0o640
 
 
-def test_a_taken_name_is_refused(process: o80.robots.Process) -> None:
-    with pytest.raises(o80.SegmentTaken, match=str(process.pid)):
-        o80.robots.load("two_joints").start(process.segment)
-
-
 def test_a_process_never_stopped_is_warned_about_and_stopped(segment: str) -> None:
     process = o80.robots.load("two_joints").start(segment)
     popen = process._popen
@@ -135,12 +133,6 @@ def test_a_process_never_stopped_is_warned_about_and_stopped(segment: str) -> No
 
 
 # ---------------------------------------------------------------------------- inline
-
-
-def test_the_installation_is_found() -> None:
-    assert (o80.prefix() / "bin" / "o80-run").exists()
-    assert (o80.prefix() / "include" / "o80" / "o80.hpp").exists()
-    assert o80.__version__ == o80.version()
 
 
 STOPPED = """
