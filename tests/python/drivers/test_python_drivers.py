@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import room_sensor
 from cart import written
-from processes import WAIT, run_o80, run_python
+from processes import WAIT, o80_says, run_python
 from room_sensor import Joint, Paced, RoomSensor
 
 import o80
@@ -21,44 +21,28 @@ from o80.drivers import Reading
 HERE = Path(__file__).parents[1]
 
 
-def command(*words: str, code: int = 0) -> str:
-    """Runs the program o80 in the folder of the drivers."""
-    done = run_o80(*words, code=code, cwd=HERE)
-    return done.stdout + done.stderr
-
-
 # ---------------------------------------------------------------------- options
 
 
 def test_every_option_reaches_the_driver_and_the_provenance(segment: str) -> None:
-    given: dict[str, Any] = {
-        "mean": 2.0,
-        "times": 3,
-        "loud": True,
-        "port": "usb",
-        "folder": "there",
-        "colour": "BLUE",
-        "mode": "fast",
-        "gains": [0.25, 0.5],
-        "offsets": (4, 5, 6),
-        "seed": 7,
+    given: dict[str, tuple[Any, str]] = {
+        "mean": (2.0, "2.0"),
+        "times": (3, "3"),
+        "loud": (True, "true"),
+        "port": ("usb", "usb"),
+        "folder": ("there", "there"),
+        "colour": ("BLUE", "BLUE"),
+        "mode": ("fast", "fast"),
+        "gains": ([0.25, 0.5], "0.25,0.5"),
+        "offsets": ((4, 5, 6), "4,5,6"),
+        "seed": (7, "7"),
     }
-    with o80.robots.load(RoomSensor).inline(segment, **given) as room:
+    options = {name: value for name, (value, _) in given.items()}
+    with o80.robots.load(RoomSensor).inline(segment, **options) as room:
         assert room.latest().extended.temperature == 6.75
         assert room.latest().extended.seed == 7
         told = room.provenance
-    assert told.options == {
-        "mean": "2.0",
-        "times": "3",
-        "loud": "true",
-        "port": "usb",
-        "folder": "there",
-        "colour": "BLUE",
-        "mode": "fast",
-        "gains": "0.25,0.5",
-        "offsets": "4,5,6",
-        "seed": "7",
-    }
+    assert told.options == {name: text for name, (_, text) in given.items()}
     assert told.robot == "room"
     assert told.library == f"{Path(room_sensor.__file__).resolve()}:RoomSensor"
     file = Path(room_sensor.__file__).read_bytes()
@@ -83,7 +67,7 @@ def test_options_are_listed_like_those_of_any_robot() -> None:
         "3 x integer",
         "seed",
     ]
-    said = command("run", "room_sensor:RoomSensor", "--help")
+    said = o80_says("run", "room_sensor:RoomSensor", "--help", cwd=HERE)
     assert "--mean number" in said
     assert "of the room [C] (default: 21.0)" in said
     assert "--frequency" in said
@@ -377,7 +361,7 @@ def test_a_script_with_a_driver_of_its_own_needs_a_main_guard(
 def test_a_class_that_is_no_driver_is_named(place: str, text: str) -> None:
     with pytest.raises(o80.DriverError, match=text):
         o80.robots.load(place)
-    assert "o80: " in command("run", place, code=1)
+    assert "o80: " in o80_says("run", place, code=1, cwd=HERE)
 
 
 class Reads:

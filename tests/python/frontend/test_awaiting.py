@@ -2,8 +2,8 @@
 
 import asyncio
 import threading
-from collections.abc import Awaitable, Callable
-from typing import Literal
+from collections.abc import Awaitable, Callable, Coroutine
+from typing import Any, Literal
 
 import pytest
 from processes import WAIT
@@ -19,6 +19,15 @@ async def started() -> None:
     """Until a task waits in its thread."""
     while not waiting_threads():
         await asyncio.sleep(0)
+
+
+async def cancelled(waits: Coroutine[Any, Any, object]) -> None:
+    """Cancels a task after it began to wait."""
+    task = asyncio.create_task(waits)
+    await started()
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
 
 
 def test_a_batch_is_awaited(process: o80.robots.Process) -> None:
@@ -77,11 +86,7 @@ def test_a_cancelled_task_leaves_no_thread(
             async def wait() -> None:
                 await call(arm)
 
-            task = asyncio.create_task(wait())
-            await started()
-            task.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await task
+            await cancelled(wait())
             assert not waiting_threads()
             # what of a burst was left is cancelled: the next one begins at once
             assert arm.burst(1, timeout=WAIT).iteration > 0
@@ -90,14 +95,7 @@ def test_a_cancelled_task_leaves_no_thread(
 
 
 def test_an_inline_burst_is_cancelled_with_its_task(arm: o80.Frontend) -> None:
-    async def cancel() -> None:
-        task = asyncio.create_task(arm.aio.burst(10**12))
-        await started()
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-
-    asyncio.run(cancel())
+    asyncio.run(cancelled(arm.aio.burst(10**12)))
     assert not waiting_threads()
 
 
@@ -108,11 +106,7 @@ def test_a_cancelled_wait_for_commands_ends_them_as_an_error_does(
     async def cancel() -> None:
         with o80.Frontend(process.segment, WAIT, on_error=on_error) as arm:
             arm.add_command("elbow", 1.0, iterations=10**9)
-            task = asyncio.create_task(arm.aio.pulse_and_wait())
-            await started()
-            task.cancel()
-            with pytest.raises(asyncio.CancelledError):
-                await task
+            await cancelled(arm.aio.pulse_and_wait())
             # an iteration that began after both batches were sent has taken them
             row = arm.wait_for(arm.published + 3, timeout=WAIT)
             assert row.active[1] == (on_error == "continue")

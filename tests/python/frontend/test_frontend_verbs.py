@@ -2,7 +2,10 @@
 
 import ast
 import inspect
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -59,17 +62,16 @@ def test_shows_signature_and_help_of_a_compiled_verb_once(name: str) -> None:
     assert ast.unparse(made.returns) == ast.unparse(verb.returns).replace("_core.", "")
 
 
-def test_a_method_of_an_object_has_the_signature_without_self() -> None:
-    with o80.robots.load("two_joints").inline() as arm:
-        assert list(inspect.signature(arm.wait_for).parameters) == ["iteration", "timeout"]
+def test_a_method_of_an_object_has_the_signature_without_self(arm: o80.Frontend) -> None:
+    assert list(inspect.signature(arm.wait_for).parameters) == ["iteration", "timeout"]
 
 
-def test_an_error_of_the_call_itself_is_not_taken_for_wrong_arguments() -> None:
+def test_an_error_of_the_call_itself_is_not_taken_for_wrong_arguments(arm: o80.Frontend) -> None:
     class Seven:
         def __index__(self) -> int:
             raise TypeError("no seven today")
 
-    with o80.robots.load("two_joints").inline() as arm, pytest.raises(o80.InvalidArgument):
+    with pytest.raises(o80.InvalidArgument):
         arm.add_command(Seven(), 0.5)
 
 
@@ -98,28 +100,26 @@ def test_names_each_of_its_files_in_the_table() -> None:
         (lambda arm: arm.resume(1, 2.0), "give the rest by name"),
     ],
 )
-def test_refuses_wrong_arguments_in_the_words_of_python(call: object, said: str) -> None:
-    with o80.robots.load("two_joints").inline() as arm:
-        with pytest.raises(TypeError) as refused:
-            call(arm)  # type: ignore[operator]
-        assert said in str(refused.value)
-        assert "nanobind" not in str(refused.value)
-        assert not str(refused.value).endswith("It takes ")
-        assert arm.added == 0
+def test_refuses_wrong_arguments_in_the_words_of_python(
+    arm: o80.Frontend, call: Callable[[Any], object], said: str
+) -> None:
+    with pytest.raises(TypeError) as refused:
+        call(arm)
+    assert said in str(refused.value)
+    assert "nanobind" not in str(refused.value)
+    assert not str(refused.value).endswith("It takes ")
+    assert arm.added == 0
 
 
 @pytest.mark.parametrize("timeout", ["soon", [1.0], float("nan")])
-def test_says_what_a_timeout_is(timeout: object) -> None:
-    with o80.robots.load("two_joints").inline() as arm:
-        for wait in (arm.wait_for_next, arm.pulse_and_wait, arm.pulse().wait):
-            with pytest.raises(o80.InvalidArgument, match="timeout must be a number of seconds"):
-                wait(timeout)  # type: ignore[arg-type]
+def test_says_what_a_timeout_is(arm: o80.Frontend, timeout: Any) -> None:
+    burst = partial(arm.burst, 1)
+    for wait in (arm.wait_for_next, arm.pulse_and_wait, arm.pulse().wait, burst):
         with pytest.raises(o80.InvalidArgument, match="timeout must be a number of seconds"):
-            arm.burst(1, timeout=timeout)  # type: ignore[call-overload]
+            wait(timeout=timeout)
 
 
-def test_takes_whole_numbers_of_seconds() -> None:
-    with o80.robots.load("two_joints").inline() as arm:
-        arm.burst(3, timeout=5)
-        assert arm.wait_for(2, 5).iteration == 2
-        assert arm.pulse_and_wait(timeout=5).iteration == 3
+def test_takes_whole_numbers_of_seconds(arm: o80.Frontend) -> None:
+    arm.burst(3, timeout=5)
+    assert arm.wait_for(2, 5).iteration == 2
+    assert arm.pulse_and_wait(timeout=5).iteration == 3

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 from enum import IntEnum
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +10,6 @@ from manual_backend import ManualBackend
 from processes import WAIT
 
 import o80
-from o80.base.words import ProfileWord
 
 
 class Control(IntEnum):
@@ -187,8 +186,6 @@ def test_profiles_of_rows_are_refused_where_they_cannot_be(arm: o80.Frontend) ->
         arm.add_trajectory([1.0, 2.0], "elbow", speed=250.0, profile="smooth")
     with pytest.raises(o80.InvalidArgument, match="'minimum_jerk', got 'as_sent'"):
         arm.add_trajectory([1.0, 2.0], "elbow", profile="as_sent")
-    with pytest.raises(o80.InvalidArgument, match="profile"):
-        arm.add_command("elbow", 1.0, profile=cast(ProfileWord, "smooth"))
     assert arm.added == 0
 
 

@@ -6,12 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from processes import run_o80
+from processes import o80_says
 
 import o80
 from o80.rows.columns import columns_of
-
-PAGE = Path(__file__).resolve().parents[3] / "docs" / "time.md"
 
 PERIOD = 2_000_000  # [ns]
 
@@ -133,11 +131,6 @@ def test_wrong_arguments_are_named(segment: str) -> None:
             o80.latency(signal_of_one, value, most=most)
 
 
-def command(*words: str | Path, code: int = 0) -> str:
-    done = run_o80("latency", *words, code=code)
-    return done.stdout + done.stderr
-
-
 def test_the_command_tells_the_delay_in_a_recording(segment: str, tmp_path: Path) -> None:
     with (
         o80.robots.load("two_joints").inline(segment, gain=20.0) as arm,
@@ -150,8 +143,10 @@ def test_the_command_tells_the_delay_in_a_recording(segment: str, tmp_path: Path
             arm.burst(100)
     where: list[str | Path] = ["--recording", tmp_path / "run.mcap", "--most", "0.3"]
     desired, observed = f"{segment}:desired.elbow", f"{segment}:observed.elbow"
-    said = command(desired, observed, *where)
+    said = o80_says("latency", desired, observed, *where)
     assert said.startswith(f"{observed} behind {desired}: ")
     assert 30 < float(said.split(": ")[1].split()[0]) < 60  # 1 / gain = 50 ms
-    assert " ms" in command(f"{segment}:norm(desired)", f"{segment}:norm(observed)", *where)
-    assert "write SEGMENT:FIELD" in command("arm", observed, *where, code=1)
+    assert " ms" in o80_says(
+        "latency", f"{segment}:norm(desired)", f"{segment}:norm(observed)", *where
+    )
+    assert "write SEGMENT:FIELD" in o80_says("latency", "arm", observed, *where, code=1)

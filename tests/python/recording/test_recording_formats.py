@@ -1,10 +1,9 @@
 """Recordings that earlier versions of o80 wrote are read as they were then."""
 
-import importlib.util
 import json
 import math
+import runpy
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import pytest
@@ -21,17 +20,6 @@ CODECS = {"codec_1": 1, "kinds_1": 1}  # of their journals
 JOURNALS = [name for name in NAMES if name.startswith("codec")]
 
 
-@pytest.fixture(scope="module")
-def make() -> ModuleType:
-    """The program that made the files."""
-    spec = importlib.util.spec_from_file_location("make", RECORDINGS / "make.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
 def test_there_is_a_recording_of_each_version_of_the_format() -> None:
     assert sorted(CODECS) == sorted(NAMES)
     assert set(CODECS.values()) == set(range(1, _core.JOURNAL_CODEC + 1))
@@ -44,11 +32,12 @@ def motion_rules(name: str) -> int | None:
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_recording_of_an_earlier_version_is_read(name: str, make: ModuleType) -> None:
+def test_a_recording_of_an_earlier_version_is_read(name: str) -> None:
     path = RECORDINGS / f"{name}.mcap"
     expected = json.loads(path.with_suffix(".json").read_text())
 
-    assert json.loads(json.dumps(make.found_in(path))) == expected
+    found_in = runpy.run_path(str(RECORDINGS / "make.py"))["found_in"]
+    assert json.loads(json.dumps(found_in(path))) == expected
     for segment in o80.open(path).segments.values():
         for epoch in segment.epochs:
             assert epoch.journal_codec == CODECS[name]

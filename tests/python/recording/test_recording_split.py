@@ -79,9 +79,7 @@ def test_a_recorder_killed_between_two_files_or_in_the_last_one_is_continued(
     before.write_bytes(before.read_bytes()[: -lost or None])  # not finished
     last.write_bytes(last.read_bytes()[:size])  # just created
     assert o80.open(path)[arm.segment].epochs[0].rows > 300
-    recorder = Recorder(path, [arm.segment], proceed=True, split="8k")
-    recorder.catch_up()
-    recorder.finish()
+    o80.Recording(path, arm, proceed=True, split="8k").close()
     recording = o80.open(path)
 
     assert recording.finished

@@ -327,14 +327,3 @@ def test_a_recording_whose_beginning_is_missing_is_replayed_from_a_snapshot(
     assert not o80.replay(paths[1]).identical
     for column in ("desired", "observed", "active"):  # snapshots disturb nothing
         assert np.array_equal(getattr(rows[0], column), getattr(rows[1], column))
-
-
-def test_a_robot_without_snapshots_is_told(segment: str, tmp_path: Path) -> None:
-    with o80.Backend(segment, 1) as backend:
-        backend.publish([0.0])
-        recorder = Recorder(tmp_path / "run.mcap", [segment], snapshots=60.0)
-        with pytest.warns(RuntimeWarning, match="serves no request snapshot"):
-            recorder.poll()
-        recorder.finish()
-    with pytest.raises(o80.InvalidArgument, match="snapshots must be a positive number"):
-        Recorder(tmp_path / "other.mcap", [segment], snapshots=-1.0)

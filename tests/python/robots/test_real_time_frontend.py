@@ -2,11 +2,9 @@
 
 import ast
 import os
-import subprocess
-import sys
 
 import pytest
-from processes import WAIT
+from processes import run_python
 
 import o80
 
@@ -50,7 +48,7 @@ print(policies)
 
 def is_fifo_allowed() -> bool:
     tries = "import os; os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(50))"
-    return subprocess.run([sys.executable, "-c", tries], capture_output=True).returncode == 0
+    return run_python("-c", tries, code=None).returncode == 0
 
 
 def test_a_controller_that_does_not_sleep_becomes_an_ordinary_thread_and_no_other(
@@ -58,10 +56,7 @@ def test_a_controller_that_does_not_sleep_becomes_an_ordinary_thread_and_no_othe
 ) -> None:
     if not is_fifo_allowed():
         pytest.skip("this user may not use the policy fifo")
-    ran = subprocess.run(
-        [sys.executable, "-c", TWO_CONTROLLERS, segment],
-        capture_output=True, text=True, timeout=WAIT, check=True,
-    )  # fmt: skip
+    ran = run_python("-c", TWO_CONTROLLERS, segment)
     assert ast.literal_eval(ran.stdout) == {
         "before": (os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, 49),
         "after": (os.SCHED_OTHER, 0),

@@ -34,12 +34,17 @@ def test_robots_that_are_shipped_say_that_they_are_simulated_or_are_hardware() -
     assert silent == hardware
 
 
+def installed(folder: Path, name: str, entry_points: str) -> None:
+    """Writes what an installation notes of a package."""
+    metadata = folder / f"{name.replace('-', '_')}-1.0.dist-info"
+    metadata.mkdir()
+    (metadata / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
+    (metadata / "entry_points.txt").write_text(entry_points)
+
+
 def test_a_package_that_fails_does_not_hide_other_robots(tmp_path: Path) -> None:
     (tmp_path / "broken_arm.py").write_text("raise ValueError('no licence')\n")
-    metadata = tmp_path / "broken_arm-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: broken-arm\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text("[o80.robots]\nbroken = broken_arm:library\n")
+    installed(tmp_path, "broken-arm", "[o80.robots]\nbroken = broken_arm:library\n")
     program = (
         "import warnings, o80\n"
         "warnings.simplefilter('error')\n"
@@ -50,9 +55,7 @@ def test_a_package_that_fails_does_not_hide_other_robots(tmp_path: Path) -> None
         "    assert 'broken-arm' in str(error) and 'no licence' in str(error), error\n"
         "else: raise AssertionError\n"
     )
-    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-
-    run_python("-c", program, env=environment)
+    run_python("-c", program, env=os.environ | {"PYTHONPATH": str(tmp_path)})
 
 
 def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str) -> None:
@@ -66,13 +69,8 @@ def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str
         "class Joints(o80.Frontend):\n"
         "    def elbow(self): return self.latest().observed[1]\n"
     )
-    metadata = tmp_path / "joints-1.0.dist-info"
-    metadata.mkdir()
-    (metadata / "METADATA").write_text("Metadata-Version: 2.1\nName: joints\nVersion: 1.0\n")
-    (metadata / "entry_points.txt").write_text(
-        "[o80.robots]\njoints_of_a_package = joints:library\njoints_by_path = joints:path\n"
-        "[o80.frontends]\ntwo_joints = joints:Joints\n"
-    )
+    robots = "[o80.robots]\njoints_of_a_package = joints:library\njoints_by_path = joints:path\n"
+    installed(tmp_path, "joints", f"{robots}[o80.frontends]\ntwo_joints = joints:Joints\n")
     program = (
         "import o80\n"
         "assert 'joints_of_a_package' in [robot.name for robot in o80.robots.list()]\n"
@@ -83,9 +81,7 @@ def test_python_packages_bring_robots_and_frontends(tmp_path: Path, segment: str
         f"    with o80.Frontend({segment!r}) as other:\n"
         "        assert type(other).__name__ == 'Joints', other\n"
     )
-    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
-
-    run_python("-c", program, env=environment)
+    run_python("-c", program, env=os.environ | {"PYTHONPATH": str(tmp_path)})
 
 
 # ---------------------------------------------------------------------------- processes

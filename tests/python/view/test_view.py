@@ -2,7 +2,6 @@
 
 import json
 import signal
-import subprocess
 import urllib.request
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 import pytest
-from processes import O80, end_of, run_python
+from processes import O80, Running, end_of, run_python
 
 import o80
 from o80.view import page_file
@@ -88,9 +87,7 @@ def test_what_cannot_be_shown_is_refused(tmp_path: Path) -> None:
 
 
 def test_the_command_prints_the_address_that_is_bound(arm: o80.Frontend) -> None:
-    command = [O80, "view", arm.segment]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as running:
-        assert running.stdout is not None
+    with Running(O80, "view", arm.segment) as running:
         assert look(running.stdout.readline().strip())["source"] == arm.segment
         running.send_signal(signal.SIGINT)
         assert running.wait(TIMEOUT) == 0

@@ -47,13 +47,6 @@ def post(server: PageServer, path: str, body: Any) -> tuple[int, dict[str, Any]]
     return code, json.loads(text)
 
 
-def raw(server: PageServer, *lines: str) -> str:
-    """The first line of the answer to what no HTTP library would send."""
-    with socket.create_connection(("127.0.0.1", server.port), TIMEOUT) as connection:
-        connection.sendall("\r\n".join([*lines, "", ""]).encode())
-        return connection.makefile().readline().strip()
-
-
 def test_the_page_comes_with_the_token_alone(server: PageServer) -> None:
     assert server.url == f"http://127.0.0.1:{server.port}/?token={server.token}"
     assert len(server.token) >= 32
@@ -116,13 +109,10 @@ def test_a_name_that_another_site_points_here_is_refused(server: PageServer) -> 
     "path",
     ["/../../etc/passwd", "/%2e%2e/%2e%2e/etc/passwd", "//etc/passwd", "/page/main.js", "/\\"],
 )
-def test_there_is_no_file_to_reach(server: PageServer, path: str) -> None:
-    first = raw(
-        server,
-        f"GET {path}?token={server.token} HTTP/1.1",
-        f"Host: 127.0.0.1:{server.port}",
-    )
-    assert first == "HTTP/1.1 404 Not Found"
+def test_there_is_no_file_to_reach(server: PageServer, arm: o80.Frontend, path: str) -> None:
+    first = f"GET {path}?token={server.token} HTTP/1.1"
+    answer = answer_to(server, request(server, arm, "Connection: close", first=first))
+    assert answer.startswith("HTTP/1.1 404 Not Found")
 
 
 def test_invalid_requests_are_answered(server: PageServer) -> None:

@@ -3,7 +3,6 @@
 import json
 import select
 import socket
-import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
@@ -13,6 +12,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
+from processes import Running
 
 import o80
 from o80.view.serve import page_server
@@ -225,18 +225,12 @@ def test_a_refusal_is_told_after_a_while_and_its_connection_closed(serve: Serve)
 def test_halts_arrive_with_few_descriptors(arm: o80.Frontend) -> None:
     options = json.dumps({"names": [arm.segment]})
     command = 'ulimit -n 64 && exec "$0" -m o80.view "$1"'
-    with subprocess.Popen(
-        ["sh", "-c", command, sys.executable, options],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-    ) as process:
-        assert process.stdout is not None
+    with Running("sh", "-c", command, sys.executable, options) as process:
         said = json.loads(process.stdout.readline())
         token = urlsplit(said["url"]).query.removeprefix("token=")
         with strangers(said["port"], 150) as attack:
             for number, _ in enumerate(attack):
                 if number % 15 == 14:
                     assert halt(said["port"], token, arm.segment) == 1 + number // 15
-        assert process.stdin is not None
         process.stdin.close()
         assert process.wait(TIMEOUT) == 0
